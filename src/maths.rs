@@ -1,0 +1,19 @@
+//! Deterministic mathematics: the same bits on every platform.
+//!
+//! IEEE 754 fixes `+ - * /` and `sqrt`; everything else comes from the pure-Rust `libm`, never from the
+//! platform's library, and nothing is contracted into a fused multiply-add.
+
+/// Log-odds of a probability in (0, 1): `ln(p / (1 - p))`.
+pub fn logit(probability: f64) -> f64 {
+    libm::log(probability / (1.0 - probability))
+}
+
+/// Probability of log-odds: `1 / (1 + e^-L)`.
+pub fn sigmoid(log_odds: f64) -> f64 {
+    1.0 / (1.0 + libm::exp(-log_odds))
+}
+
+/// Sine and cosine of an angle in radians.
+pub fn sin_cos(angle_rad: f64) -> (f64, f64) {
+    libm::sincos(angle_rad)
+}

@@ -1,0 +1,61 @@
+use super::{Point, VoxelIndex};
+
+/// An axis-aligned box in metres, half-open: `min <= p < max` along every axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Lower corner in metres, included.
+    pub min: Point,
+    /// Upper corner in metres, excluded.
+    pub max: Point,
+}
+
+impl Aabb {
+    /// The box between two corners, in whichever order they come.
+    pub fn from_corners(a: Point, b: Point) -> Self {
+        Self { min: std::array::from_fn(|k| a[k].min(b[k])), max: std::array::from_fn(|k| a[k].max(b[k])) }
+    }
+
+    /// Whether the box holds the point.
+    pub fn contains(&self, point: Point) -> bool {
+        (0..3).all(|k| self.min[k] <= point[k] && point[k] < self.max[k])
+    }
+
+    /// Squared distance in square metres from a point to the nearest point of the box, 0 inside.
+    pub fn distance_squared(&self, point: Point) -> f64 {
+        (0..3)
+            .map(|k| {
+                let outside = (self.min[k] - point[k]).max(point[k] - self.max[k]).max(0.0);
+                outside * outside
+            })
+            .sum()
+    }
+}
+
+/// A box of whole voxels, half-open: `min <= index < end` along every axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VoxelBox {
+    /// Lowest voxel.
+    pub min: VoxelIndex,
+    /// One past the highest voxel.
+    pub end: VoxelIndex,
+}
+
+impl VoxelBox {
+    /// Whether the box holds the voxel.
+    pub fn contains(&self, voxel: VoxelIndex) -> bool {
+        (0..3).all(|k| self.min[k] <= voxel[k] && voxel[k] < self.end[k])
+    }
+
+    /// Whether no voxel is inside.
+    pub fn is_empty(&self) -> bool {
+        (0..3).any(|k| self.min[k] >= self.end[k])
+    }
+
+    /// The voxels that are in both boxes.
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self {
+            min: std::array::from_fn(|k| self.min[k].max(other.min[k])),
+            end: std::array::from_fn(|k| self.end[k].min(other.end[k])),
+        }
+    }
+}

@@ -1,0 +1,196 @@
+use super::{Point, TileIndex, VoxelBox, VoxelIndex};
+use thiserror::Error;
+
+/// Most voxels along the edge of a tile.
+pub const MAX_VOXELS_PER_TILE_EDGE: u32 = 1024;
+
+/// The two lengths that cut space: voxels of `resolution_m`, tiles of `tile_size_m`.
+///
+/// The voxel of a coordinate `x` is `floor(x * (1 / resolution))`, OctoMap's own arithmetic: a coordinate that
+/// is a multiple of the resolution may land in the lower neighbour, as it does there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    resolution_m: f64,
+    inv_resolution: f64,
+    tile_size_m: f64,
+    voxels_per_tile_edge: i32,
+}
+
+/// Why two lengths do not make a grid.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum GridError {
+    /// The resolution is not a positive, finite length.
+    #[error("resolution {0} m is not a positive, finite length")]
+    Resolution(f64),
+    /// The tile size is not a positive, finite length.
+    #[error("tile size {0} m is not a positive, finite length")]
+    TileSize(f64),
+    /// The tile size is not a whole number (2 to 1024) of voxels.
+    #[error(
+        "tile size {tile_size_m} m is {ratio} voxels of {resolution_m} m; a tile edge holds a whole number of \
+         voxels from 2 to 1024: the nearest valid tile sizes are {smaller_m} m and {larger_m} m"
+    )]
+    NotWhole {
+        /// The refused tile size in metres.
+        tile_size_m: f64,
+        /// The resolution in metres.
+        resolution_m: f64,
+        /// Tile size over resolution.
+        ratio: f64,
+        /// Nearest valid tile size below, in metres (or the smallest valid one).
+        smaller_m: f64,
+        /// Nearest valid tile size above, in metres (or the largest valid one).
+        larger_m: f64,
+    },
+}
+
+impl Grid {
+    /// A grid of voxels of `resolution_m` and tiles of `tile_size_m`, both in metres.
+    pub fn new(resolution_m: f64, tile_size_m: f64) -> Result<Self, GridError> {
+        if !(resolution_m.is_normal() && resolution_m > 0.0 && (1.0 / resolution_m).is_finite()) {
+            return Err(GridError::Resolution(resolution_m));
+        }
+        if !(tile_size_m.is_normal() && tile_size_m > 0.0) {
+            return Err(GridError::TileSize(tile_size_m));
+        }
+        let ratio = tile_size_m / resolution_m;
+        let whole = ratio.round();
+        let in_range = (2.0..=f64::from(MAX_VOXELS_PER_TILE_EDGE)).contains(&whole);
+        if !in_range || (ratio - whole).abs() > 1e-9 * whole {
+            let most = f64::from(MAX_VOXELS_PER_TILE_EDGE);
+            return Err(GridError::NotWhole {
+                tile_size_m,
+                resolution_m,
+                ratio,
+                smaller_m: readable(ratio.floor().clamp(2.0, most) * resolution_m),
+                larger_m: readable(ratio.ceil().clamp(2.0, most) * resolution_m),
+            });
+        }
+        Ok(Self {
+            resolution_m,
+            inv_resolution: 1.0 / resolution_m,
+            tile_size_m,
+            voxels_per_tile_edge: whole as i32,
+        })
+    }
+
+    /// Edge of a voxel in metres.
+    pub const fn resolution_m(&self) -> f64 {
+        self.resolution_m
+    }
+
+    /// Edge of a tile in metres.
+    pub const fn tile_size_m(&self) -> f64 {
+        self.tile_size_m
+    }
+
+    /// Voxels along the edge of a tile, 2 to 1024.
+    pub const fn voxels_per_tile_edge(&self) -> i32 {
+        self.voxels_per_tile_edge
+    }
+
+    /// A point in units of voxels: its floor is the voxel index.
+    pub fn to_voxel_units(&self, point_m: Point) -> Point {
+        point_m.map(|coordinate| coordinate * self.inv_resolution)
+    }
+
+    /// The voxel that holds a point; `None` for a point that is not finite or whose index leaves `i32`.
+    pub fn voxel_of(&self, point_m: Point) -> Option<VoxelIndex> {
+        voxel_of_units(self.to_voxel_units(point_m))
+    }
+
+    /// The tile that holds a voxel.
+    pub fn tile_of_voxel(&self, voxel: VoxelIndex) -> TileIndex {
+        TileIndex::from(voxel.map(|index| index.div_euclid(self.voxels_per_tile_edge)))
+    }
+
+    /// The tile that holds a point, decided from the point's voxel; `None` as for [`Grid::voxel_of`].
+    pub fn tile_of(&self, point_m: Point) -> Option<TileIndex> {
+        self.voxel_of(point_m).map(|voxel| self.tile_of_voxel(voxel))
+    }
+
+    /// Centre of a voxel in metres: `(index + 0.5) * resolution`.
+    pub fn center_m(&self, voxel: VoxelIndex) -> Point {
+        voxel.map(|index| (f64::from(index) + 0.5) * self.resolution_m)
+    }
+
+    /// The voxels of a tile. The far edge saturates for the last tile of the `i32` range.
+    pub fn voxels_of_tile(&self, tile: TileIndex) -> VoxelBox {
+        let n = i64::from(self.voxels_per_tile_edge);
+        let min = tile.to_array().map(|index| clamp_to_i32(i64::from(index) * n));
+        let end = tile.to_array().map(|index| clamp_to_i32((i64::from(index) + 1) * n));
+        VoxelBox { min, end }
+    }
+}
+
+/// The voxel of a point given in units of voxels; `None` when not finite or outside `i32`.
+pub(crate) fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
+    let mut voxel = [0; 3];
+    for axis in 0..3 {
+        let floor = point[axis].floor();
+        // False for NaN too.
+        if !(floor >= f64::from(i32::MIN) && floor < f64::from(i32::MAX)) {
+            return None;
+        }
+        voxel[axis] = floor as i32;
+    }
+    Some(voxel)
+}
+
+fn clamp_to_i32(value: i64) -> i32 {
+    value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+}
+
+/// Rounds away the noise of a multiplication (0.30000000000000004 to 0.3) in a length shown to a person.
+fn readable(length_m: f64) -> f64 {
+    format!("{length_m:.9}").parse().unwrap_or(length_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_seeds_examples() {
+        let grid = Grid::new(0.1, 10.0).unwrap();
+        assert_eq!(grid.voxels_per_tile_edge(), 100);
+        assert_eq!(grid.tile_of([5.0, 15.0, -3.0]), Some(TileIndex::new(0, 1, -1)));
+        assert_eq!(grid.tile_of([-5.0, 0.0, 25.0]), Some(TileIndex::new(-1, 0, 2)));
+        assert_eq!(grid.voxel_of([-0.0, 0.05, -0.05]), Some([0, 0, -1]));
+    }
+
+    #[test]
+    fn what_is_no_point_of_the_grid_has_no_voxel() {
+        let grid = Grid::new(0.1, 10.0).unwrap();
+        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e9, -1e9] {
+            assert_eq!(grid.voxel_of([0.0, x, 0.0]), None, "{x}");
+        }
+        assert!(grid.voxel_of([6_378_137.0, -6_378_137.0, 2e8]).is_some());
+    }
+
+    #[test]
+    fn a_tile_size_that_is_not_whole_names_its_neighbours() {
+        let message = Grid::new(0.3, 10.0).unwrap_err().to_string();
+        assert!(message.contains("9.9 m and 10.2 m"), "{message}");
+        let message = Grid::new(0.005, 10.0).unwrap_err().to_string();
+        assert!(message.contains("5.12 m"), "{message}");
+        for (resolution, tile) in
+            [(0.0, 1.0), (-0.1, 1.0), (f64::NAN, 1.0), (0.1, f64::INFINITY), (1e-320, 1e-318)]
+        {
+            assert!(Grid::new(resolution, tile).is_err());
+        }
+        assert_eq!(Grid::new(0.05, 10.0).unwrap().voxels_per_tile_edge(), 200);
+        assert_eq!(Grid::new(0.1, 102.4).unwrap().voxels_per_tile_edge(), 1024);
+    }
+
+    #[test]
+    fn every_voxel_of_a_tile_is_in_that_tile() {
+        let grid = Grid::new(0.1, 0.7).unwrap();
+        for x in -30..30 {
+            let tile = grid.tile_of_voxel([x, 0, 0]);
+            let voxels = grid.voxels_of_tile(tile);
+            assert!(voxels.min[0] <= x && x < voxels.end[0]);
+        }
+    }
+}

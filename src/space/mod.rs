@@ -1,0 +1,27 @@
+//! Metres to integers and back; the only place where that happens.
+//!
+//! ```text
+//! point (f64 metres) -> voxel index (i32) -> tile index (i32)      grid
+//!                                         -> key (u16) -> Morton   key, morton
+//! ```
+//!
+//! A point belongs to a voxel by arithmetic on its coordinates; a voxel belongs to a tile by integer
+//! division of its index. No voxel has two homes.
+
+mod aabb;
+mod grid;
+mod key;
+mod morton;
+mod tile_index;
+
+pub use aabb::{Aabb, VoxelBox};
+pub use grid::{Grid, GridError, MAX_VOXELS_PER_TILE_EDGE};
+pub use key::VoxelKey;
+pub use morton::MortonCode;
+pub use tile_index::TileIndex;
+
+/// Index of a finest voxel along x, y and z: `floor(coordinate / resolution)`.
+pub type VoxelIndex = [i32; 3];
+
+/// A point in metres, in the world frame unless a name says otherwise.
+pub type Point = [f64; 3];
