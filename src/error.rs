@@ -83,6 +83,12 @@ pub enum Error {
         /// The folder of the map.
         path: PathBuf,
     },
+    /// A writer flushed the map while it was being read: open it again.
+    #[error("{}: the map was flushed while it was being read; open it again", path.display())]
+    Changed {
+        /// The folder of the map.
+        path: PathBuf,
+    },
     /// The operation would undo unsaved work: flush first, or say that it may be lost.
     #[error("tile {tile} has updates that are not on disk; flush first, or ask to discard them")]
     UnsavedChanges {

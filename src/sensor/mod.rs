@@ -1,1 +1,16 @@
-//! The octree.
+//! What one observation does to the evidence of a voxel. Knows no space.
+//!
+//! | model | for | hit | miss |
+//! |---|---|---|---|
+//! | [`LogOdds`] (OctoMap's) | lidar, depth cameras | a constant | a constant |
+//! | [`Iwlo`] | sonar, radar, lidar with intensity | weighted by intensity and age | weighted by age |
+
+mod evidence;
+mod iwlo;
+mod log_odds;
+mod model;
+
+pub use evidence::Evidence;
+pub use iwlo::Iwlo;
+pub use log_odds::LogOdds;
+pub use model::{Observation, SensorModel};

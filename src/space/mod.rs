@@ -9,12 +9,15 @@
 //! division of its index. No voxel has two homes.
 
 mod aabb;
+mod brick;
 mod grid;
 mod key;
 mod morton;
 mod tile_index;
 
 pub use aabb::{Aabb, VoxelBox};
+pub use brick::{BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, mask_of_box, place_of_voxel, places};
+pub(crate) use grid::voxel_of_units;
 pub use grid::{Grid, GridError, MAX_VOXELS_PER_TILE_EDGE};
 pub use key::VoxelKey;
 pub use morton::MortonCode;

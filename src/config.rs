@@ -1,0 +1,137 @@
+use crate::error::{Error, Result};
+use crate::maths::logit;
+use crate::sensor::SensorModel;
+use crate::space::Grid;
+use serde::{Deserialize, Serialize};
+
+/// How a map is made and how much memory it may use.
+///
+/// Resolution, tile size, sensor model and occupancy threshold belong to the map: they are stored with it, and
+/// opening it with others is an error. The rest may change from run to run.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct MapConfig {
+    /// Voxels and tiles. Default: 0.1 m and 10 m.
+    pub grid: Grid,
+    /// How observations become evidence. Default: OctoMap's log-odds.
+    pub sensor_model: SensorModel,
+    /// Probability in (0, 1) from which a voxel counts as occupied. Default: 0.5.
+    pub occupancy_threshold: f64,
+    /// Which part of a ray counts, and how often.
+    pub rays: RayConfig,
+    /// Shape of the voxel cache in front of each tile's octree.
+    pub voxel_cache: VoxelCacheConfig,
+    /// Most tiles kept in memory by an out-of-core mapper, at least 1. Default: 16.
+    pub cache_tiles: usize,
+    /// Most bytes of updates that wait in memory for tiles on disk before those are fetched; one scan may come
+    /// on top. Larger: fewer reads and writes. Default: 32 MiB.
+    pub pending_bytes: usize,
+}
+
+/// Which part of a ray counts, and how often.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct RayConfig {
+    /// Points nearer to the sensor than this many metres are skipped. Default: 0.
+    pub min_range_m: f64,
+    /// Rays are cut at this many metres: what lies before is free, nothing is hit. Default: no limit.
+    pub max_range_m: Option<f64>,
+    /// How often a voxel is updated by one scan. Default: once.
+    pub insert_mode: InsertMode,
+}
+
+/// How often a voxel is updated by one scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InsertMode {
+    /// Once; a hit wins over any miss (OctoMap's `insertPointCloud`).
+    #[default]
+    PerScan,
+    /// Once a ray, in the order of the points (OctoMap's `insertPointCloudRays`).
+    PerRay,
+}
+
+/// Shape of the voxel cache in front of each tile's octree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct VoxelCacheConfig {
+    /// Most voxels a bucket keeps between two scans, at least 1. Default: 4.
+    pub tau: usize,
+    /// Number of buckets of each tile's cache, a power of two; `None` fits it to the scans a tile sees, so that
+    /// the cache holds three times the voxels of one. Default: `None`.
+    pub buckets: Option<usize>,
+}
+
+impl Default for MapConfig {
+    fn default() -> Self {
+        Self {
+            grid: Grid::new(0.1, 10.0).expect("the default lengths make a grid"),
+            sensor_model: SensorModel::default(),
+            occupancy_threshold: 0.5,
+            rays: RayConfig::default(),
+            voxel_cache: VoxelCacheConfig::default(),
+            cache_tiles: 16,
+            pending_bytes: 32 << 20,
+        }
+    }
+}
+
+impl Default for RayConfig {
+    fn default() -> Self {
+        Self { min_range_m: 0.0, max_range_m: None, insert_mode: InsertMode::PerScan }
+    }
+}
+
+impl Default for VoxelCacheConfig {
+    fn default() -> Self {
+        Self { tau: 4, buckets: None }
+    }
+}
+
+impl MapConfig {
+    /// The defaults with another resolution and tile size, both in metres.
+    pub fn new(resolution_m: f64, tile_size_m: f64) -> Result<Self> {
+        Ok(Self { grid: Grid::new(resolution_m, tile_size_m)?, ..Self::default() })
+    }
+
+    /// The configuration, or the first argument that is wrong.
+    pub fn validated(self) -> Result<Self> {
+        self.sensor_model.validated()?;
+        let RayConfig { min_range_m, max_range_m, .. } = self.rays;
+        if !(self.occupancy_threshold > 0.0 && self.occupancy_threshold < 1.0) {
+            return Err(wrong(
+                "occupancy threshold",
+                self.occupancy_threshold,
+                "a probability between 0 and 1",
+            ));
+        }
+        if !(min_range_m >= 0.0 && min_range_m.is_finite()) {
+            return Err(wrong("min range", min_range_m, "a length of at least 0 m"));
+        }
+        if max_range_m.is_some_and(|max| !(max > min_range_m && max.is_finite())) {
+            let max = max_range_m.unwrap_or_default();
+            return Err(wrong("max range", max, "a length above the min range, in metres"));
+        }
+        if self.cache_tiles == 0 {
+            return Err(wrong("cache tiles", self.cache_tiles, "at least 1"));
+        }
+        let VoxelCacheConfig { tau, buckets } = self.voxel_cache;
+        if tau == 0 || tau > 1 << 16 {
+            return Err(wrong("tau", tau, "1 to 65536 voxels a bucket"));
+        }
+        if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 30) {
+            return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^30"));
+        }
+        Ok(self)
+    }
+
+    /// Log-odds from which a voxel counts as occupied.
+    pub fn occupied_log_odds(&self) -> f64 {
+        logit(self.occupancy_threshold)
+    }
+}
+
+fn wrong(argument: &str, value: impl std::fmt::Display, right: &str) -> Error {
+    Error::argument(argument, format!("{value} is not {right}"))
+}

@@ -1,0 +1,100 @@
+use super::{MapStatistics, MapView, Mapper, TileRef};
+use crate::config::MapConfig;
+use crate::error::Result;
+use crate::scan::{PointBatch, Scan, ScanReport, ScanUpdates, trace_scan};
+use crate::space::TileIndex;
+use crate::tile::Tile;
+use rustc_hash::FxHashMap;
+
+/// A map that lives in memory and ends with it. It has tiles too, and gives the answers of an
+/// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper) to the bit.
+#[derive(Debug)]
+pub struct InMemoryMapper {
+    config: MapConfig,
+    tiles: FxHashMap<TileIndex, Tile>,
+    scan_number: u64,
+}
+
+impl InMemoryMapper {
+    /// An empty map.
+    ///
+    /// # Errors
+    ///
+    /// The first argument of the configuration that is wrong.
+    pub fn new(config: MapConfig) -> Result<Self> {
+        Ok(Self { config: config.validated()?, tiles: FxHashMap::default(), scan_number: 0 })
+    }
+
+    fn accept(&mut self, updates: ScanUpdates) -> ScanReport {
+        for (index, tile_updates) in &updates.tiles {
+            let tile = self.tiles.entry(*index).or_insert_with(|| Tile::empty(&self.config, *index));
+            tile.apply(&self.config.sensor_model, tile_updates);
+        }
+        self.scan_number += 1;
+        updates.report
+    }
+}
+
+impl MapView for InMemoryMapper {
+    fn config(&self) -> &MapConfig {
+        &self.config
+    }
+
+    fn scan_number(&self) -> u64 {
+        self.scan_number
+    }
+
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        let mut indices: Vec<_> = self.tiles.keys().copied().collect();
+        indices.sort_unstable();
+        indices
+    }
+
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        self.tile_indices()
+    }
+
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        Ok(self.tiles.get(&index).map(TileRef::borrowed))
+    }
+
+    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        self.tile(index)
+    }
+
+    fn statistics(&self) -> MapStatistics {
+        let tiles = self.tiles.len() as u64;
+        let mut statistics = MapStatistics {
+            scan_number: self.scan_number,
+            tiles,
+            cached_tiles: tiles,
+            dirty_tiles: tiles,
+            ..MapStatistics::default()
+        };
+        self.tiles.values().for_each(|tile| statistics.cached += tile.counts());
+        statistics
+    }
+}
+
+impl Mapper for InMemoryMapper {
+    fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
+        let MapConfig { grid, sensor_model, rays, .. } = &self.config;
+        let updates = trace_scan(grid, sensor_model, rays, scan)?;
+        Ok(self.accept(updates))
+    }
+
+    fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
+        let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
+        Ok(self.accept(updates))
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        Ok(())
+    }
+
+    fn sync_octrees(&mut self) {
+        self.tiles.values_mut().for_each(|tile| {
+            tile.sync_octree();
+        });
+    }
+}

@@ -1,0 +1,15 @@
+use std::hash::{BuildHasher, Hasher, RandomState};
+
+/// A new map's id: 16 bytes that no other map has. Identity only, it has no part in any answer.
+pub(super) fn new_map_id() -> [u8; 16] {
+    let mut hasher = blake3::Hasher::new();
+    for _ in 0..2 {
+        // The standard library keys its hash maps from the system's source of randomness.
+        hasher.update(&RandomState::new().build_hasher().finish().to_le_bytes());
+    }
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    hasher.update(&now.as_nanos().to_le_bytes());
+    hasher.update(&std::process::id().to_le_bytes());
+    let digest = hasher.finalize();
+    std::array::from_fn(|k| digest.as_bytes()[k])
+}

@@ -1,0 +1,180 @@
+use super::statistics::IoCounts;
+use super::tile_files;
+use super::{MapStatistics, MapView, TileRef};
+use crate::config::MapConfig;
+use crate::error::{Error, FormatError, Result};
+use crate::space::{Grid, TileIndex};
+use crate::store::{Disk, FsDisk, Metadata, TileStore};
+use crate::tile::Tile;
+use lru::LruCache;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A map on disk, opened to be asked: it takes no lock, beside a writer too, and never writes.
+///
+/// It sees the last flush before it was opened. When a writer flushes later, tiles that this flush changed are
+/// answered with [`Error::Changed`]: open the map again.
+#[derive(Debug)]
+pub struct MapReader {
+    config: MapConfig,
+    store: TileStore,
+    disk: Arc<dyn Disk>,
+    cache: Mutex<ReaderCache>,
+}
+
+#[derive(Debug)]
+struct ReaderCache {
+    tiles: LruCache<TileIndex, Arc<Tile>>,
+    io: IoCounts,
+}
+
+impl MapReader {
+    /// Opens the map in a folder, keeping up to `cache_tiles` tiles in memory.
+    ///
+    /// # Errors
+    ///
+    /// No map there, or damage to what tells which tiles there are.
+    pub fn open(folder: impl AsRef<Path>, cache_tiles: usize) -> Result<Self> {
+        Self::open_on(Arc::new(FsDisk), folder.as_ref(), cache_tiles)
+    }
+
+    /// [`MapReader::open`] on another disk than the file system.
+    pub fn open_on(disk: Arc<dyn Disk>, folder: &Path, cache_tiles: usize) -> Result<Self> {
+        let store = TileStore::open_read_only(disk.clone(), folder)?;
+        let mut config = config_from(store.metadata(), store.layout().metadata())?;
+        config.cache_tiles = cache_tiles;
+        let config = config.validated()?;
+        let cache = ReaderCache { tiles: LruCache::unbounded(), io: IoCounts::default() };
+        Ok(Self { config, store, disk, cache: Mutex::new(cache) })
+    }
+
+    /// The configuration that a map was made with, to go on with it. What only concerns a run has its defaults.
+    ///
+    /// # Errors
+    ///
+    /// No map there, or metadata that cannot be read.
+    pub fn config_of(folder: impl AsRef<Path>) -> Result<MapConfig> {
+        Ok(Self::open(folder, 1)?.config)
+    }
+
+    /// What `metadata.json` says.
+    pub fn metadata(&self) -> &Metadata {
+        self.store.metadata()
+    }
+
+    /// Whether the map has the checksums that let damage be found; a map of the seed's own format has none.
+    pub fn is_verified(&self) -> bool {
+        self.store.map_id().is_some()
+    }
+
+    /// Number of the flush that this reader sees.
+    pub fn flush_number(&self) -> u64 {
+        self.store.commits().flush_number
+    }
+
+    /// Observed and occupied voxels of the whole map, from the log alone; `None` for a map of the seed's format.
+    pub fn voxel_counts(&self) -> Option<(u64, u64)> {
+        self.is_verified().then(|| {
+            let stamps = self.store.commits().tiles.values();
+            stamps.fold((0, 0), |(voxels, occupied), stamp| (voxels + stamp.voxels, occupied + stamp.occupied))
+        })
+    }
+
+    /// Bytes on disk in tables and in octrees; `None` for a map of the seed's format.
+    pub fn disk_bytes(&self) -> Option<(u64, u64)> {
+        self.is_verified().then(|| {
+            let stamps = self.store.commits().tiles.values();
+            stamps.fold((0, 0), |(table, octree), stamp| (table + stamp.table.bytes, octree + stamp.octree.bytes))
+        })
+    }
+
+    fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {
+        tile_files::load(&self.store, &self.config, index).map_err(|error| self.explain(error))
+    }
+
+    /// A tile that does not match the log is damage, unless a writer has flushed since.
+    fn explain(&self, error: Error) -> Error {
+        let folder = self.store.folder();
+        let now = TileStore::open_read_only(self.disk.clone(), folder).map(|store| store.commits().flush_number);
+        if now.is_ok_and(|flush_number| flush_number != self.flush_number()) {
+            return Error::Changed { path: folder.to_owned() };
+        }
+        error
+    }
+}
+
+impl MapView for MapReader {
+    fn config(&self) -> &MapConfig {
+        &self.config
+    }
+
+    fn scan_number(&self) -> u64 {
+        self.store.commits().scan_number
+    }
+
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        let mut indices: Vec<_> = self.store.tiles().collect();
+        indices.sort_unstable();
+        indices
+    }
+
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut indices: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
+        indices.sort_unstable();
+        indices
+    }
+
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(tile) = cache.tiles.get(&index).cloned() {
+            cache.io.hits += 1;
+            return Ok(Some(TileRef::shared(tile)));
+        }
+        let Some((tile, bytes)) = self.load(index)? else { return Ok(None) };
+        cache.io.loads += 1;
+        cache.io.bytes_read += bytes;
+        while cache.tiles.len() >= self.config.cache_tiles {
+            cache.tiles.pop_lru();
+        }
+        let tile = Arc::new(tile);
+        cache.tiles.put(index, tile.clone());
+        Ok(Some(TileRef::shared(tile)))
+    }
+
+    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        let cached = self.cache.lock().unwrap_or_else(PoisonError::into_inner).tiles.peek(&index).cloned();
+        if let Some(tile) = cached {
+            return Ok(Some(TileRef::shared(tile)));
+        }
+        Ok(self.load(index)?.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
+    }
+
+    fn statistics(&self) -> MapStatistics {
+        let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let disk_bytes = self.disk_bytes().map_or(0, |(table, octree)| table + octree);
+        let mut statistics = MapStatistics {
+            scan_number: self.scan_number(),
+            tiles: self.store.tiles().count() as u64,
+            cached_tiles: cache.tiles.len() as u64,
+            disk_bytes,
+            io: cache.io,
+            ..MapStatistics::default()
+        };
+        cache.tiles.iter().for_each(|(_, tile)| statistics.cached += tile.counts());
+        statistics
+    }
+}
+
+/// The configuration in a map's metadata; a map of the seed's format has the default sensor model.
+fn config_from(metadata: &Metadata, path: std::path::PathBuf) -> Result<MapConfig> {
+    let wrong = |error: String| FormatError::at_offset(0, error).in_map(&path, None);
+    let grid = Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
+    let mut config = MapConfig { grid, ..MapConfig::default() };
+    if let Some(ext) = &metadata.ext {
+        config.sensor_model = ext.sensor_model;
+        config.occupancy_threshold = ext.occupancy_threshold;
+        config.rays = ext.rays;
+    }
+    config.validated().map_err(|error| wrong(error.to_string()))
+}

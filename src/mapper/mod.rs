@@ -1,0 +1,31 @@
+//! The front door: two mappers, one trait, one answer; and a reader beside them.
+//!
+//! | | [`InMemoryMapper`] | [`OutOfCoreTileMapper`] | [`MapReader`] |
+//! |---|---|---|---|
+//! | storage | memory | disk, and an LRU of tiles in memory | disk, and an LRU of tiles in memory |
+//! | map size | bounded by memory | bounded by the disk | bounded by the disk |
+//! | writes | yes | yes, one at a time | never |
+//!
+//! ```text
+//! insert_scan -> scan::trace -> updates by tile -> resident tiles, at once
+//!                                               -> pending lists, for tiles on disk
+//! flush       -> pending lists -> tiles -> store -> one commit
+//! ```
+
+mod in_memory;
+mod map_id;
+mod map_reader;
+mod out_of_core;
+mod pending;
+mod residency;
+mod statistics;
+mod tile_files;
+mod tile_ref;
+mod traits;
+
+pub use in_memory::InMemoryMapper;
+pub use map_reader::MapReader;
+pub use out_of_core::OutOfCoreTileMapper;
+pub use statistics::{IoCounts, MapStatistics};
+pub use tile_ref::TileRef;
+pub use traits::{MapView, Mapper};

@@ -1,0 +1,213 @@
+use super::map_id::new_map_id;
+use super::residency::{Residency, new_metadata};
+use super::{MapStatistics, MapView, Mapper, TileRef};
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::scan::{PointBatch, Scan, ScanReport, ScanUpdates, trace_scan};
+use crate::space::TileIndex;
+use crate::store::{Disk, FsDisk, Metadata, TileStore};
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A map on disk with its active tiles in memory: bounded by the disk, never by memory.
+///
+/// What was flushed survives a crash; what came after the last flush does not. Dropping a mapper does not flush.
+#[derive(Debug)]
+pub struct OutOfCoreTileMapper {
+    config: MapConfig,
+    scan_number: u64,
+    /// Questions take `&self` and may bring tiles in.
+    residency: Mutex<Residency>,
+}
+
+impl OutOfCoreTileMapper {
+    /// Makes an empty map in a folder that does not exist yet or is empty.
+    ///
+    /// # Errors
+    ///
+    /// A wrong configuration, a folder with other content, a disk that refuses.
+    pub fn create(folder: impl AsRef<Path>, config: MapConfig) -> Result<Self> {
+        Self::create_on(Arc::new(FsDisk), folder.as_ref(), config)
+    }
+
+    /// Opens a map to go on with it. Of `config`, grid, sensor model and occupancy threshold must be the map's own;
+    /// [`MapReader::config_of`](super::MapReader::config_of) reads them.
+    ///
+    /// # Errors
+    ///
+    /// No map there, another writer, other parameters, damage to what tells which tiles there are.
+    pub fn open(folder: impl AsRef<Path>, config: MapConfig) -> Result<Self> {
+        Self::open_on(Arc::new(FsDisk), folder.as_ref(), config)
+    }
+
+    /// [`OutOfCoreTileMapper::create`] on another disk than the file system.
+    pub fn create_on(disk: Arc<dyn Disk>, folder: &Path, config: MapConfig) -> Result<Self> {
+        let config = config.validated()?;
+        let map_id = new_map_id();
+        let store = TileStore::create(disk, folder, new_metadata(&config, map_id, None), map_id)?;
+        Ok(Self::new(config, store))
+    }
+
+    /// [`OutOfCoreTileMapper::open`] on another disk than the file system.
+    pub fn open_on(disk: Arc<dyn Disk>, folder: &Path, config: MapConfig) -> Result<Self> {
+        let config = config.validated()?;
+        let store = TileStore::open(disk, folder)?;
+        check_parameters(folder, store.metadata(), &config)?;
+        Ok(Self::new(config, store))
+    }
+
+    fn new(config: MapConfig, store: TileStore) -> Self {
+        let scan_number = store.commits().scan_number;
+        Self { residency: Mutex::new(Residency::new(config.clone(), store)), config, scan_number }
+    }
+
+    /// Names what the map is built from; it is kept in `metadata.json` from the next flush on.
+    pub fn set_input_fingerprint(&mut self, fingerprint: impl Into<String>) {
+        self.residency_mut().input_fingerprint = Some(fingerprint.into());
+    }
+
+    /// The folder of the map.
+    pub fn folder(&self) -> std::path::PathBuf {
+        self.lock().store().folder().to_owned()
+    }
+
+    /// The folder of a tile, whether it exists or not.
+    pub fn tile_folder(&self, tile: TileIndex) -> std::path::PathBuf {
+        self.lock().store().layout().tile_folder(tile)
+    }
+
+    /// Whether the map has updates that no flush has made durable.
+    pub fn is_dirty(&self) -> bool {
+        let residency = self.lock();
+        self.scan_number != residency.store().commits().scan_number
+    }
+
+    /// Whether a tile has updates that are not on disk.
+    pub fn is_tile_dirty(&self, tile: TileIndex) -> bool {
+        self.lock().is_dirty(tile)
+    }
+
+    /// The tiles written, by eviction or flush, since the last call, in order; successful writes only.
+    pub fn take_saved_tiles(&mut self) -> Vec<TileIndex> {
+        self.residency_mut().take_saved()
+    }
+
+    /// Brings tiles into memory ahead of use; those that do not exist are left out. Returns how many came.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read, or one pushed out that cannot be written.
+    pub fn preload(&mut self, tiles: impl IntoIterator<Item = TileIndex>) -> Result<usize> {
+        let scan_number = self.scan_number;
+        let mut count = 0;
+        for tile in tiles {
+            count += usize::from(self.residency_mut().tile(tile, scan_number)?.is_some());
+        }
+        Ok(count)
+    }
+
+    /// Reads a tile from disk again, in place of the one in memory. Returns whether it exists.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false; a tile that cannot be read.
+    pub fn reload(&mut self, tile: TileIndex, discard_changes: bool) -> Result<bool> {
+        let scan_number = self.scan_number;
+        self.residency_mut().reload(tile, discard_changes, scan_number)
+    }
+
+    fn accept(&mut self, updates: ScanUpdates) -> Result<ScanReport> {
+        let (report, scan_number) = (updates.report, self.scan_number);
+        let residency = self.residency_mut();
+        residency.prepare(&updates, scan_number)?;
+        residency.accept(updates);
+        self.scan_number += 1;
+        Ok(report)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Residency> {
+        // A panic in a question leaves no update half applied.
+        self.residency.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn residency_mut(&mut self) -> &mut Residency {
+        self.residency.get_mut().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl MapView for OutOfCoreTileMapper {
+    fn config(&self) -> &MapConfig {
+        &self.config
+    }
+
+    fn scan_number(&self) -> u64 {
+        self.scan_number
+    }
+
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        self.lock().tile_indices()
+    }
+
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        self.lock().cached_tile_indices()
+    }
+
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        Ok(self.lock().tile(index, self.scan_number)?.map(TileRef::shared))
+    }
+
+    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        Ok(self.lock().tile_in_passing(index)?.map(TileRef::shared))
+    }
+
+    fn statistics(&self) -> MapStatistics {
+        self.lock().statistics(self.scan_number)
+    }
+}
+
+impl Mapper for OutOfCoreTileMapper {
+    fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
+        let MapConfig { grid, sensor_model, rays, .. } = &self.config;
+        let updates = trace_scan(grid, sensor_model, rays, scan)?;
+        self.accept(updates)
+    }
+
+    fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
+        let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
+        self.accept(updates)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        let scan_number = self.scan_number;
+        self.residency_mut().flush(scan_number)
+    }
+
+    fn sync_octrees(&mut self) {
+        self.residency_mut().sync_octrees();
+    }
+}
+
+/// Grid, sensor model and threshold must be the map's own.
+fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> Result<()> {
+    let mismatch = |what, found: String, wanted: String| Error::Mismatch { path: folder.to_owned(), what, found, wanted };
+    let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
+    if metadata.resolution_m != resolution_m {
+        let (found, wanted) = (format!("{} m", metadata.resolution_m), format!("{resolution_m} m"));
+        return Err(mismatch("resolution", found, wanted));
+    }
+    if metadata.tile_size_m != tile_size_m {
+        let (found, wanted) = (format!("{} m", metadata.tile_size_m), format!("{tile_size_m} m"));
+        return Err(mismatch("tile size", found, wanted));
+    }
+    let Some(ext) = &metadata.ext else { return Ok(()) };
+    if ext.sensor_model != config.sensor_model {
+        let (found, wanted) = (format!("{:?}", ext.sensor_model), format!("{:?}", config.sensor_model));
+        return Err(mismatch("sensor model", found, wanted));
+    }
+    if ext.occupancy_threshold != config.occupancy_threshold {
+        let (found, wanted) = (ext.occupancy_threshold.to_string(), config.occupancy_threshold.to_string());
+        return Err(mismatch("occupancy threshold", found, wanted));
+    }
+    Ok(())
+}
+

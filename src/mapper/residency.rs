@@ -1,0 +1,300 @@
+use super::map_id::new_map_id;
+use super::pending::Pending;
+use super::statistics::{IoCounts, MapStatistics};
+use super::tile_files;
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::scan::ScanUpdates;
+use crate::space::TileIndex;
+use crate::store::{Extension, Metadata, TileStore, hex};
+use crate::tile::Tile;
+use lru::LruCache;
+use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Which tiles are in memory: an LRU in front of the store, and the updates that wait for tiles behind it.
+///
+/// Resident tiles have no pending updates; what waits is applied when its tile comes in.
+#[derive(Debug)]
+pub(super) struct Residency {
+    config: MapConfig,
+    store: TileStore,
+    tiles: LruCache<TileIndex, Arc<Tile>>,
+    pending: Pending,
+    /// Tiles on disk that were read or written since the map was opened, and so are known to be whole. Updates wait
+    /// only for these, so that a damaged tile is found before a scan is accepted.
+    known_whole: FxHashSet<TileIndex>,
+    saved: BTreeSet<TileIndex>,
+    io: IoCounts,
+    /// Fingerprint of what the map is being built from, kept with it at the next flush.
+    pub(super) input_fingerprint: Option<String>,
+}
+
+impl Residency {
+    pub(super) fn new(config: MapConfig, store: TileStore) -> Self {
+        let input_fingerprint = store.metadata().ext.as_ref().and_then(|ext| ext.input_fingerprint.clone());
+        Self {
+            config,
+            store,
+            tiles: LruCache::unbounded(),
+            pending: Pending::default(),
+            known_whole: FxHashSet::default(),
+            saved: BTreeSet::new(),
+            io: IoCounts::default(),
+            input_fingerprint,
+        }
+    }
+
+    pub(super) fn store(&self) -> &TileStore {
+        &self.store
+    }
+
+    /// Does all that may fail before the updates can be accepted. The map's content stays as it is.
+    pub(super) fn prepare(&mut self, updates: &ScanUpdates, scan_number: u64) -> Result<()> {
+        if self.pending.bytes() > self.config.pending_bytes {
+            // Half, so that tiles come in for many updates at a time.
+            while self.pending.bytes() > self.config.pending_bytes / 2
+                && let Some(tile) = self.pending.heaviest()
+            {
+                self.bring_in(tile, scan_number)?;
+            }
+        }
+        for (tile, _) in &updates.tiles {
+            let is_unread = self.store.contains(*tile) && !self.known_whole.contains(tile);
+            let has_room = self.tiles.len() < self.config.cache_tiles;
+            if !self.tiles.contains(tile) && (is_unread || (has_room && self.exists(*tile))) {
+                self.bring_in(*tile, scan_number)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the updates: into tiles in memory at once, for the others they wait. Cannot fail.
+    pub(super) fn accept(&mut self, updates: ScanUpdates) {
+        for (index, tile_updates) in updates.tiles {
+            if !self.tiles.contains(&index)
+                && !self.exists(index)
+                && self.tiles.len() < self.config.cache_tiles
+            {
+                self.tiles.put(index, Arc::new(Tile::empty(&self.config, index)));
+            }
+            match self.tiles.get_mut(&index) {
+                Some(tile) => {
+                    self.io.hits += 1;
+                    Arc::make_mut(tile).apply(&self.config.sensor_model, &tile_updates);
+                }
+                None => self.pending.push(index, tile_updates),
+            }
+        }
+    }
+
+    /// A tile, brought into memory; `None` if nothing was observed in it.
+    pub(super) fn tile(&mut self, index: TileIndex, scan_number: u64) -> Result<Option<Arc<Tile>>> {
+        if let Some(tile) = self.tiles.get(&index) {
+            self.io.hits += 1;
+            return Ok(Some(tile.clone()));
+        }
+        if !self.exists(index) {
+            return Ok(None);
+        }
+        self.bring_in(index, scan_number).map(Some)
+    }
+
+    /// A tile as it is now, without bringing it into memory.
+    pub(super) fn tile_in_passing(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
+        if let Some(tile) = self.tiles.peek(&index) {
+            return Ok(Some(tile.clone()));
+        }
+        if !self.exists(index) {
+            return Ok(None);
+        }
+        self.read(index).map(|tile| Some(Arc::new(tile)))
+    }
+
+    /// Every tile in which something was observed, in order.
+    pub(super) fn tile_indices(&self) -> Vec<TileIndex> {
+        let resident = self.tiles.iter().map(|(index, _)| *index);
+        let mut indices: Vec<_> = self.store.tiles().chain(resident).chain(self.pending.tiles()).collect();
+        indices.sort_unstable();
+        indices.dedup();
+        indices
+    }
+
+    /// The tiles in memory, in order.
+    pub(super) fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        let mut indices: Vec<_> = self.tiles.iter().map(|(index, _)| *index).collect();
+        indices.sort_unstable();
+        indices
+    }
+
+    /// Whether a tile has updates that are not on disk.
+    pub(super) fn is_dirty(&self, index: TileIndex) -> bool {
+        !self.pending.of(index).is_empty() || self.tiles.peek(&index).is_some_and(|tile| tile.is_dirty())
+    }
+
+    /// Applies what waits, writes every dirty tile and commits.
+    pub(super) fn flush(&mut self, scan_number: u64) -> Result<()> {
+        let mut waiting: Vec<_> = self.pending.tiles().collect();
+        waiting.sort_unstable();
+        for index in waiting {
+            self.bring_in(index, scan_number)?;
+        }
+        for index in self.cached_tile_indices() {
+            self.save(index, scan_number)?;
+        }
+        self.adopt()?;
+        self.store.commit(self.metadata(), scan_number)
+    }
+
+    /// Drops a tile from memory, so that the next question reads it from disk.
+    pub(super) fn reload(&mut self, index: TileIndex, discard_changes: bool, scan_number: u64) -> Result<bool> {
+        if self.is_dirty(index) && !discard_changes {
+            return Err(Error::UnsavedChanges { tile: index });
+        }
+        let before = self.tiles.pop(&index);
+        self.pending.applied(index);
+        if !self.exists(index) {
+            return Ok(false);
+        }
+        match self.bring_in(index, scan_number) {
+            Ok(_) => Ok(true),
+            Err(error) => {
+                if let Some(tile) = before {
+                    self.tiles.put(index, tile);
+                }
+                Err(error)
+            }
+        }
+    }
+
+    /// The tiles written since the last call.
+    pub(super) fn take_saved(&mut self) -> Vec<TileIndex> {
+        std::mem::take(&mut self.saved).into_iter().collect()
+    }
+
+    pub(super) fn sync_octrees(&mut self) {
+        for (_, tile) in &mut self.tiles {
+            Arc::make_mut(tile).sync_octree();
+        }
+    }
+
+    pub(super) fn statistics(&self, scan_number: u64) -> MapStatistics {
+        let mut statistics = MapStatistics {
+            scan_number,
+            tiles: self.tile_indices().len() as u64,
+            cached_tiles: self.tiles.len() as u64,
+            dirty_tiles: self.tiles.iter().filter(|(_, tile)| tile.is_dirty()).count() as u64,
+            pending_tiles: self.pending.len() as u64,
+            pending_updates: self.pending.updates() as u64,
+            pending_bytes: self.pending.bytes() as u64,
+            disk_bytes: self
+                .store
+                .tiles()
+                .filter_map(|tile| self.store.stamp(tile))
+                .map(|stamp| stamp.table.bytes + stamp.octree.bytes)
+                .sum(),
+            io: self.io,
+            ..MapStatistics::default()
+        };
+        self.tiles.iter().for_each(|(_, tile)| statistics.cached += tile.counts());
+        statistics
+    }
+
+    /// Whether anything was observed in a tile.
+    fn exists(&self, index: TileIndex) -> bool {
+        self.store.contains(index) || !self.pending.of(index).is_empty() || self.tiles.contains(&index)
+    }
+
+    /// Puts a tile into memory with what waits for it, pushing out others first.
+    fn bring_in(&mut self, index: TileIndex, scan_number: u64) -> Result<Arc<Tile>> {
+        // Read first: a tile that cannot be read pushes nothing out.
+        let tile = Arc::new(self.read(index)?);
+        self.make_room(scan_number)?;
+        self.pending.applied(index);
+        self.tiles.put(index, tile.clone());
+        Ok(tile)
+    }
+
+    /// The tile as it is on disk, with what waits for it applied.
+    fn read(&mut self, index: TileIndex) -> Result<Tile> {
+        let mut tile = match tile_files::load(&self.store, &self.config, index)? {
+            Some((tile, bytes)) => {
+                self.io.loads += 1;
+                self.io.bytes_read += bytes;
+                self.known_whole.insert(index);
+                tile
+            }
+            None => Tile::empty(&self.config, index),
+        };
+        for updates in self.pending.of(index) {
+            tile.apply(&self.config.sensor_model, updates);
+        }
+        Ok(tile)
+    }
+
+    /// Pushes out the least recently used tiles until one more fits. Tiles in use stay; if all are, one more comes
+    /// on top.
+    fn make_room(&mut self, scan_number: u64) -> Result<()> {
+        while self.tiles.len() >= self.config.cache_tiles {
+            let unused = self.tiles.iter().rev().find(|(_, tile)| Arc::strong_count(tile) == 1);
+            let Some(index) = unused.map(|(index, _)| *index) else { return Ok(()) };
+            self.save(index, scan_number)?;
+            self.tiles.pop(&index);
+        }
+        Ok(())
+    }
+
+    /// Writes a tile in memory if it is dirty; after an error it is as it was.
+    fn save(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+        if !self.tiles.peek(&index).is_some_and(|tile| tile.is_dirty()) {
+            return Ok(());
+        }
+        self.adopt()?;
+        let Some(tile) = self.tiles.peek_mut(&index) else { return Ok(()) };
+        let tile = Arc::make_mut(tile);
+        let stamp = tile_files::save(&mut self.store, &self.config, tile, scan_number)?;
+        tile.mark_clean();
+        self.io.saves += 1;
+        self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
+        self.known_whole.insert(index);
+        self.saved.insert(index);
+        Ok(())
+    }
+
+    /// Gives a map of the seed's format, before its first change, an id, a log and trailers: every tile is written
+    /// anew as it is, and committed. Until that is done it stays a map of the seed's format, with the same content.
+    fn adopt(&mut self) -> Result<()> {
+        if self.store.metadata().ext.is_some() {
+            return Ok(());
+        }
+        log::info!("{}: a map of the seed's format; its tiles get checksums", self.store.folder().display());
+        self.store.adopt(new_map_id())?;
+        for index in self.store.tiles().collect::<BTreeSet<_>>() {
+            if let Some((mut tile, _)) = tile_files::load(&self.store, &self.config, index)? {
+                tile_files::save(&mut self.store, &self.config, &mut tile, 0)?;
+            }
+        }
+        self.store.commit(self.metadata(), 0)
+    }
+
+    fn metadata(&self) -> Metadata {
+        new_metadata(&self.config, self.store.map_id().unwrap_or_default(), self.input_fingerprint.clone())
+    }
+}
+
+/// The metadata of a map; bounds and numbers are the store's to fill in.
+pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input_fingerprint: Option<String>) -> Metadata {
+    let ext = Extension {
+        empty: true,
+        map_id: hex(&map_id),
+        flush_number: 0,
+        scan_number: 0,
+        sensor_model: config.sensor_model,
+        occupancy_threshold: config.occupancy_threshold,
+        rays: config.rays,
+        input_fingerprint,
+    };
+    let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
+    Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }
+}

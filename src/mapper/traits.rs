@@ -1,0 +1,80 @@
+use super::{MapStatistics, TileRef};
+use crate::config::MapConfig;
+use crate::error::Result;
+use crate::scan::{PointBatch, Scan, ScanReport};
+use crate::space::TileIndex;
+
+/// A map that can be asked. Every question of [`Questions`](crate::query::Questions) is answered through these few
+/// methods.
+///
+/// Questions see whole scans, unsaved ones too.
+pub trait MapView {
+    /// How the map is made.
+    fn config(&self) -> &MapConfig;
+
+    /// Number of the last scan or batch in the map; 0 for none.
+    fn scan_number(&self) -> u64;
+
+    /// The tiles in which something was observed, ordered by x, then y, then z.
+    fn tile_indices(&self) -> Vec<TileIndex>;
+
+    /// The tiles held in memory, ordered likewise.
+    fn cached_tile_indices(&self) -> Vec<TileIndex>;
+
+    /// A tile; `None` if nothing was observed in it. It stays in memory while the returned value lives, and may
+    /// push out others.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read, or one pushed out that cannot be written.
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
+
+    /// The same for work on the whole map: what is read for it leaves memory with the returned value, and the
+    /// tiles in memory stay.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
+    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
+
+    /// Sizes of the map and of what is in memory.
+    fn statistics(&self) -> MapStatistics;
+
+    /// All tiles, in the order of [`MapView::tile_indices`] and in constant memory.
+    fn tiles(&self) -> impl Iterator<Item = Result<TileRef<'_>>>
+    where
+        Self: Sized,
+    {
+        self.tile_indices().into_iter().filter_map(|index| self.tile_in_passing(index).transpose())
+    }
+}
+
+/// A map that takes scans.
+///
+/// An accepted call gets the next scan number. After an error the map is as it was before the call, and the number
+/// is not used.
+pub trait Mapper: MapView + Send {
+    /// Adds a scan: rays from its origin to its points.
+    ///
+    /// # Errors
+    ///
+    /// An origin without a voxel, intensities that are missing or too few, a tile that cannot be read or written.
+    fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport>;
+
+    /// Adds observations of single points, without rays, in order.
+    ///
+    /// # Errors
+    ///
+    /// Lists of different lengths, missing intensities, a tile that cannot be read or written.
+    fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport>;
+
+    /// Makes everything so far durable, as a whole; nothing to do for a map in memory.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read or written. Nothing is lost then: the call can be repeated.
+    fn flush(&mut self) -> Result<()>;
+
+    /// Brings the octree of every tile in memory up to date, which questions do not need.
+    fn sync_octrees(&mut self);
+}

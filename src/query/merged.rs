@@ -1,0 +1,41 @@
+use super::region::{for_each_occupied, for_each_voxel_in};
+use crate::error::{Error, Result};
+use crate::mapper::MapView;
+use crate::octree::Octree;
+use crate::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
+use crate::tile::Voxel;
+
+pub(super) fn merged_octree(view: &impl MapView, region: Option<&Aabb>, max_voxels: u64) -> Result<Octree> {
+    let mut voxels: Vec<(MortonCode, f32)> = Vec::new();
+    let mut count = 0;
+    let mut outside: Option<VoxelIndex> = None;
+    let take = |voxel: Voxel| {
+        if voxel.index.iter().any(|index| !(-32768..32768).contains(index)) {
+            outside = Some(voxel.index);
+            return;
+        }
+        count += 1;
+        if count <= max_voxels {
+            voxels.push((VoxelKey::from_index(voxel.index).morton(), voxel.evidence.log_odds as f32));
+        }
+    };
+    match region {
+        Some(region) => for_each_voxel_in(view, region, take)?,
+        None => for_each_occupied(view, Some(0.0), None, take)?,
+    }
+    if let Some(voxel) = outside {
+        let half_m = 32768.0 * view.config().grid.resolution_m();
+        let center = view.config().grid.center_m(voxel);
+        let reason = format!(
+            "the voxel at {center:?} m is outside the {half_m} m around the origin that OctoMap's keys reach at this \
+             resolution; name a region (--region) inside"
+        );
+        return Err(Error::argument("merged octree", reason));
+    }
+    if count > max_voxels {
+        let hint = "name a smaller region (--region)";
+        return Err(Error::TooLarge { what: "number of voxels in one octree", size: count, limit: max_voxels, hint });
+    }
+    voxels.sort_unstable_by_key(|&(code, _)| code);
+    Ok(Octree::from_sorted(voxels.into_iter()))
+}

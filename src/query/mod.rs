@@ -1,0 +1,28 @@
+//! What a map can be asked. Works on any [`MapView`](crate::mapper::MapView), tile by tile.
+//!
+//! | question | answer |
+//! |---|---|
+//! | a point, many points | [`Occupancy`]: unknown, free or occupied, with the probability |
+//! | a point at a coarse depth | the same, for the largest log-odds under that octree node |
+//! | a region, the whole map | its voxels, streamed |
+//! | a ray, many rays | the first occupied voxel, exactly as single steps would find it |
+//! | a sphere, a box | the first occupied voxel that it touches |
+//! | nearest occupied | the occupied voxel with the nearest centre |
+//! | digest | one number for the whole content |
+
+mod coarse;
+mod collision;
+mod digest;
+mod merged;
+mod nearest;
+mod occupancy;
+mod point;
+mod questions;
+mod ray;
+mod region;
+
+pub use collision::Shape;
+pub use nearest::Nearest;
+pub use occupancy::{Occupancy, UnknownAs};
+pub use questions::Questions;
+pub use ray::{RayHit, RayQuery};

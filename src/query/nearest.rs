@@ -1,0 +1,59 @@
+use super::region::{tiles_in, voxels_around, voxels_in};
+use crate::error::{Error, Result};
+use crate::mapper::MapView;
+use crate::space::{Aabb, Point, TileIndex, VoxelIndex};
+use serde::Serialize;
+
+/// The nearest occupied voxel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Nearest {
+    /// Its index.
+    pub voxel: VoxelIndex,
+    /// Its centre in metres.
+    pub center_m: Point,
+    /// Distance to its centre in metres.
+    pub distance_m: f64,
+}
+
+pub(super) fn nearest_occupied(view: &impl MapView, point: Point, max_distance_m: f64) -> Result<Option<Nearest>> {
+    if max_distance_m.is_nan() || max_distance_m < 0.0 || !point.iter().all(|coordinate| coordinate.is_finite()) {
+        return Err(Error::argument("nearest occupied", "needs a finite point and a distance of at least 0 m"));
+    }
+    let (grid, threshold) = (view.config().grid, view.config().occupied_log_odds());
+    let ball = |radius_m: f64| Aabb { min: point.map(|c| c - radius_m), max: point.map(|c| c + radius_m) };
+    let mut tiles: Vec<(f64, TileIndex)> = tiles_in(view, &voxels_around(&grid, &ball(max_distance_m)))
+        .into_iter()
+        .map(|index| (distance_to_tile_m(&grid, index, point), index))
+        .collect();
+    tiles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut best: Option<Nearest> = None;
+    for (distance_m, index) in tiles {
+        let limit_m = best.map_or(max_distance_m, |best| best.distance_m);
+        if distance_m > limit_m {
+            break;
+        }
+        let Some(tile) = view.tile(index)? else { continue };
+        for voxel in voxels_in(&tile, &voxels_around(&grid, &ball(limit_m))) {
+            if voxel.evidence.log_odds < threshold {
+                continue;
+            }
+            let center_m = grid.center_m(voxel.index);
+            let distance_m = (0..3).map(|k| (center_m[k] - point[k]).powi(2)).sum::<f64>().sqrt();
+            let nearer = best.is_none_or(|best| (distance_m, voxel.index) < (best.distance_m, best.voxel));
+            if distance_m <= max_distance_m && nearer {
+                best = Some(Nearest { voxel: voxel.index, center_m, distance_m });
+            }
+        }
+    }
+    Ok(best)
+}
+
+fn distance_to_tile_m(grid: &crate::space::Grid, index: TileIndex, point: Point) -> f64 {
+    let voxels = grid.voxels_of_tile(index);
+    // A voxel of room for the rounding between voxel borders and multiples of the resolution.
+    let bounds = Aabb {
+        min: voxels.min.map(|k| (f64::from(k) - 1.0) * grid.resolution_m()),
+        max: voxels.end.map(|k| (f64::from(k) + 1.0) * grid.resolution_m()),
+    };
+    bounds.distance_squared(point).sqrt()
+}

@@ -1,0 +1,53 @@
+use crate::config::MapConfig;
+use crate::maths::sigmoid;
+use crate::sensor::Evidence;
+
+/// What the map says of a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Occupancy {
+    /// Never observed, or outside the map.
+    Unknown,
+    /// Observed and free, with the probability of being occupied.
+    Free(f64),
+    /// Observed and occupied, with the probability of being occupied.
+    Occupied(f64),
+}
+
+/// What unknown space counts as for a question.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UnknownAs {
+    /// It is passed through.
+    #[default]
+    Free,
+    /// It stops a ray, and a body collides with it.
+    Obstacle,
+}
+
+impl Occupancy {
+    /// The occupancy of a voxel's evidence; compared in log-odds, so that no rounding of a probability decides.
+    pub fn of(config: &MapConfig, evidence: Option<Evidence>) -> Self {
+        Self::of_log_odds(config, evidence.map(|evidence| evidence.log_odds))
+    }
+
+    /// The occupancy of log-odds.
+    pub fn of_log_odds(config: &MapConfig, log_odds: Option<f64>) -> Self {
+        match log_odds {
+            None => Self::Unknown,
+            Some(log_odds) if log_odds >= config.occupied_log_odds() => Self::Occupied(sigmoid(log_odds)),
+            Some(log_odds) => Self::Free(sigmoid(log_odds)),
+        }
+    }
+
+    /// Whether the place is known to be occupied.
+    pub const fn is_occupied(&self) -> bool {
+        matches!(self, Self::Occupied(_))
+    }
+
+    /// Probability of being occupied; `None` if unknown.
+    pub const fn probability(&self) -> Option<f64> {
+        match self {
+            Self::Unknown => None,
+            Self::Free(probability) | Self::Occupied(probability) => Some(*probability),
+        }
+    }
+}

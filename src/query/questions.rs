@@ -1,0 +1,115 @@
+use super::collision::{self, Shape};
+use super::nearest::{self, Nearest};
+use super::ray::{self, RayHit, RayQuery};
+use super::{Occupancy, UnknownAs, coarse, digest, merged, point, region};
+use crate::error::Result;
+use crate::mapper::MapView;
+use crate::octree::Octree;
+use crate::space::{Aabb, Point, VoxelIndex};
+use crate::tile::Voxel;
+
+/// The questions; bring this trait into scope to ask any map.
+///
+/// Points are in metres in the world frame. Every question fails only if a tile cannot be read, or if one that it
+/// pushes out of memory cannot be written.
+pub trait Questions: MapView + Sized {
+    /// What the map says of the voxel that holds a point; a point that is not finite is unknown.
+    fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
+        Ok(Occupancy::of(self.config(), self.voxel_at(point)?.map(|voxel| voxel.evidence)))
+    }
+
+    /// What the map says of many points, in their order; each tile is fetched once.
+    fn occupancy_at_points(&self, points: &[Point]) -> Result<Vec<Occupancy>> {
+        point::occupancy_at_points(self, points)
+    }
+
+    /// The observed voxel that holds a point, with its exact evidence.
+    fn voxel_at(&self, point: Point) -> Result<Option<Voxel>> {
+        point::voxel_at(self, point)
+    }
+
+    /// What the map says of the octree node at `depth` (1, half of OctoMap's space, to 16, a voxel) that holds a
+    /// point: the largest log-odds under the node, as `f32`.
+    ///
+    /// # Errors
+    ///
+    /// Another depth.
+    fn occupancy_at_depth(&self, point: Point, depth: u8) -> Result<Occupancy> {
+        coarse::occupancy_at_depth(self, point, depth)
+    }
+
+    /// Visits the observed voxels whose centre is in the half-open box, tile by tile, in Morton order within each.
+    fn for_each_voxel_in(&self, region: &Aabb, visit: impl FnMut(Voxel)) -> Result<()> {
+        region::for_each_voxel_in(self, region, visit)
+    }
+
+    /// Visits the voxels of the whole map, or of a region, whose probability of being occupied is at least
+    /// `min_probability`; `None` takes the map's occupancy threshold.
+    fn for_each_occupied(
+        &self,
+        min_probability: Option<f64>,
+        region: Option<&Aabb>,
+        visit: impl FnMut(Voxel),
+    ) -> Result<()> {
+        region::for_each_occupied(self, min_probability, region, visit)
+    }
+
+    /// The occupied voxels of the whole map; large maps are better visited with [`Questions::for_each_occupied`].
+    fn all_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
+        let mut voxels = Vec::new();
+        self.for_each_occupied(min_probability, None, |voxel| voxels.push(voxel))?;
+        Ok(voxels)
+    }
+
+    /// The occupied voxels of the tiles in memory only; the answer depends on what is there.
+    fn cached_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
+        region::cached_occupied_voxels(self, min_probability)
+    }
+
+    /// The first occupied voxel on a ray (or the first unknown one, if that is an obstacle); `None` if the ray ends
+    /// first.
+    ///
+    /// # Errors
+    ///
+    /// An origin without a voxel, a direction of no length.
+    fn cast_ray(&self, query: &RayQuery) -> Result<Option<RayHit>> {
+        ray::cast_ray(self, query)
+    }
+
+    /// [`Questions::cast_ray`] for many rays, in their order.
+    fn cast_rays(&self, queries: &[RayQuery]) -> Result<Vec<Option<RayHit>>> {
+        queries.iter().map(|query| self.cast_ray(query)).collect()
+    }
+
+    /// The first voxel, in no stated order, that a body touches and that is occupied (or unknown, if that is an
+    /// obstacle); `None` if the body is free of collision.
+    ///
+    /// # Errors
+    ///
+    /// A body that is not finite, or so large that its voxels have no index.
+    fn collision(&self, body: &Shape, unknown: UnknownAs) -> Result<Option<VoxelIndex>> {
+        collision::collision(self, body, unknown)
+    }
+
+    /// The occupied voxel whose centre is nearest to a point and at most `max_distance_m` away; of equals the one
+    /// with the lowest index.
+    fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Nearest>> {
+        nearest::nearest_occupied(self, point, max_distance_m)
+    }
+
+    /// The digest of the map's content: equal for equal maps, whatever way they came about. See `docs/format.md`.
+    fn digest(&self) -> Result<blake3::Hash> {
+        digest::digest(self)
+    }
+
+    /// One octree of the whole map or of a region, as OctoMap has it.
+    ///
+    /// # Errors
+    ///
+    /// Voxels outside OctoMap's key range of 65536 voxels an axis around the origin; more than `max_voxels`.
+    fn merged_octree(&self, region: Option<&Aabb>, max_voxels: u64) -> Result<Octree> {
+        merged::merged_octree(self, region, max_voxels)
+    }
+}
+
+impl<V: MapView> Questions for V {}

@@ -1,0 +1,109 @@
+use super::{Occupancy, UnknownAs};
+use crate::error::{Error, Result};
+use crate::mapper::{MapView, TileRef};
+use crate::scan::RayWalk;
+use crate::space::{BRICK_EDGE, BrickCode, Point, TileIndex, VoxelBox, VoxelIndex};
+use crate::store::Bounds;
+use serde::Serialize;
+
+/// A ray to be cast through the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayQuery {
+    /// Where the ray begins, in metres.
+    pub origin: Point,
+    /// Where it goes; any length but 0.
+    pub direction: Point,
+    /// How far it goes, in metres; `None` as far as the map reaches.
+    pub max_range_m: Option<f64>,
+    /// Whether unknown space stops the ray.
+    pub unknown: UnknownAs,
+}
+
+/// Where a ray ended.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RayHit {
+    /// The voxel that stopped the ray.
+    pub voxel: VoxelIndex,
+    /// Its centre in metres.
+    pub center_m: Point,
+    /// How far from the origin the ray enters it, in metres; 0 if the ray begins in it.
+    pub distance_m: f64,
+    /// Probability of being occupied; `None` if the voxel is unknown.
+    pub probability: Option<f64>,
+}
+
+pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<RayHit>> {
+    let config = view.config();
+    let grid = &config.grid;
+    let (origin, direction) = (query.origin, query.direction);
+    let start = grid
+        .voxel_of(origin)
+        .ok_or_else(|| Error::argument("origin", format!("{origin:?} m is not finite or too far away")))?;
+    let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
+    if !(length.is_normal() && direction.iter().all(|d| d.is_finite())) {
+        return Err(Error::argument("direction", format!("{direction:?} has no usable length")));
+    }
+    if query.max_range_m.is_some_and(|range| range.is_nan() || range < 0.0) {
+        return Err(Error::argument("max range", "must be a length of at least 0 m"));
+    }
+    let Some(reach_m) = reach_of_map(view, origin) else {
+        // An empty map: nothing to hit but the unknown at the origin.
+        let blocked = query.unknown == UnknownAs::Obstacle;
+        let hit = RayHit { voxel: start, center_m: grid.center_m(start), distance_m: 0.0, probability: None };
+        return Ok(blocked.then_some(hit));
+    };
+    let range_m = match query.unknown {
+        UnknownAs::Free => query.max_range_m.map_or(reach_m, |range| range.min(reach_m)),
+        // Beyond the map all is unknown, which stops the ray by itself.
+        UnknownAs::Obstacle => query.max_range_m.unwrap_or(f64::INFINITY),
+    };
+    let mut walk = RayWalk::along(
+        grid.to_voxel_units(origin),
+        start,
+        grid.to_voxel_units(direction.map(|d| d / length)), // Times come out in metres.
+    );
+    let mut held: Option<(TileIndex, Option<TileRef<'_>>)> = None;
+    while walk.entry_time() <= range_m {
+        let voxel = walk.voxel();
+        let index = grid.tile_of_voxel(voxel);
+        if held.as_ref().is_none_or(|(tile, _)| *tile != index) {
+            drop(held.take());
+            held = Some((index, view.tile(index)?));
+        }
+        let tile = held.as_ref().and_then(|(_, tile)| tile.as_ref());
+        let occupancy = Occupancy::of(config, tile.and_then(|tile| tile.evidence(voxel)));
+        let stops = occupancy.is_occupied() || (occupancy == Occupancy::Unknown && query.unknown == UnknownAs::Obstacle);
+        if stops {
+            let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time());
+            return Ok(Some(RayHit { voxel, center_m, distance_m, probability: occupancy.probability() }));
+        }
+        match tile {
+            None => walk.leave(&grid.voxels_of_tile(index)),
+            Some(tile) if !tile.table().has_brick(BrickCode::of_voxel(voxel)) => {
+                walk.leave(&brick_of(voxel).intersection(&tile.voxel_box()));
+            }
+            Some(_) => walk.advance(),
+        }
+        if walk.voxel() == voxel {
+            // The end of all voxels.
+            return Ok(None);
+        }
+    }
+    Ok(None)
+}
+
+/// Distance in metres from which on a ray from `origin` can meet nothing; `None` for an empty map.
+fn reach_of_map(view: &impl MapView, origin: Point) -> Option<f64> {
+    let Bounds { min, max } = Bounds::of(view.tile_indices().into_iter())?;
+    let tile_size_m = view.config().grid.tile_size_m();
+    let farthest = |k: usize| {
+        let (low, high) = (f64::from(min[k]) * tile_size_m, (f64::from(max[k]) + 1.0) * tile_size_m);
+        (origin[k] - low).abs().max((high - origin[k]).abs())
+    };
+    Some((0..3).map(|k| farthest(k) * farthest(k)).sum::<f64>().sqrt() + tile_size_m)
+}
+
+fn brick_of(voxel: VoxelIndex) -> VoxelBox {
+    let min = voxel.map(|k| k & !(BRICK_EDGE - 1));
+    VoxelBox { min, end: min.map(|k| k.saturating_add(BRICK_EDGE)) }
+}

@@ -1,0 +1,118 @@
+use crate::config::MapConfig;
+use crate::error::Result;
+use crate::mapper::{MapView, TileRef};
+use crate::maths::logit;
+use crate::space::{Aabb, BRICK_EDGE, Grid, TileIndex, VoxelBox, VoxelIndex};
+use crate::tile::{Tile, Voxel};
+
+pub(super) fn for_each_voxel_in(view: &impl MapView, region: &Aabb, mut visit: impl FnMut(Voxel)) -> Result<()> {
+    let grid = view.config().grid;
+    let voxels = voxels_around(&grid, region);
+    for index in tiles_in(view, &voxels) {
+        if let Some(tile) = view.tile_in_passing(index)? {
+            let inside = voxels_in(&tile, &voxels).filter(|voxel| region.contains(grid.center_m(voxel.index)));
+            inside.for_each(&mut visit);
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn for_each_occupied(
+    view: &impl MapView,
+    min_probability: Option<f64>,
+    region: Option<&Aabb>,
+    mut visit: impl FnMut(Voxel),
+) -> Result<()> {
+    let threshold = min_log_odds(view.config(), min_probability);
+    let mut visit_occupied = |voxel: Voxel| {
+        if voxel.evidence.log_odds >= threshold {
+            visit(voxel);
+        }
+    };
+    match region {
+        Some(region) => for_each_voxel_in(view, region, visit_occupied),
+        None => view.tiles().try_for_each(|tile| {
+            tile?.voxels().for_each(&mut visit_occupied);
+            Ok(())
+        }),
+    }
+}
+
+pub(super) fn cached_occupied_voxels(view: &impl MapView, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
+    let threshold = min_log_odds(view.config(), min_probability);
+    let mut voxels = Vec::new();
+    for index in view.cached_tile_indices() {
+        if let Some(tile) = view.tile_in_passing(index)? {
+            voxels.extend(tile.voxels().filter(|voxel| voxel.evidence.log_odds >= threshold));
+        }
+    }
+    Ok(voxels)
+}
+
+/// Log-odds of a smallest probability; 0 and below let every observed voxel pass, above 1 none.
+fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
+    match min_probability {
+        None => config.occupied_log_odds(),
+        Some(probability) if probability <= 0.0 => f64::NEG_INFINITY,
+        Some(probability) if probability >= 1.0 => f64::INFINITY,
+        Some(probability) => logit(probability),
+    }
+}
+
+/// The tiles of the map that reach into a box of voxels, in order.
+pub(super) fn tiles_in(view: &impl MapView, voxels: &VoxelBox) -> Vec<TileIndex> {
+    if voxels.is_empty() {
+        return Vec::new();
+    }
+    let grid = &view.config().grid;
+    let first = grid.tile_of_voxel(voxels.min).to_array();
+    let last = grid.tile_of_voxel(voxels.end.map(|end| end - 1)).to_array();
+    let is_inside = |tile: &TileIndex| {
+        let tile = tile.to_array();
+        (0..3).all(|k| first[k] <= tile[k] && tile[k] <= last[k])
+    };
+    let mut tiles = view.tile_indices();
+    tiles.retain(is_inside);
+    tiles
+}
+
+/// Holds the last tile that was asked for, so that voxels that lie together fetch it once.
+pub(super) struct TileCursor<'a, V> {
+    view: &'a V,
+    tile: Option<(TileIndex, Option<TileRef<'a>>)>,
+}
+
+impl<'a, V: MapView> TileCursor<'a, V> {
+    pub(super) fn new(view: &'a V) -> Self {
+        Self { view, tile: None }
+    }
+
+    /// The tile that holds a voxel; `None` if nothing was observed in it.
+    pub(super) fn tile_of(&mut self, voxel: VoxelIndex) -> Result<Option<&Tile>> {
+        let index = self.view.config().grid.tile_of_voxel(voxel);
+        if self.tile.as_ref().is_none_or(|(current, _)| *current != index) {
+            // Let go of the one before first, so that it can be pushed out.
+            self.tile = None;
+            self.tile = Some((index, self.view.tile(index)?));
+        }
+        Ok(self.tile.as_ref().and_then(|(_, tile)| tile.as_deref()))
+    }
+}
+
+/// The observed voxels of a tile that lie in a box, by brick.
+pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = Voxel> {
+    let bricks = tile.table().bricks().filter(move |brick| {
+        let min = tile.index_of(brick.voxel(0)).map(|k| k & !(BRICK_EDGE - 1));
+        (0..3).all(|k| min[k] < voxels.end[k] && voxels.min[k] - BRICK_EDGE < min[k])
+    });
+    bricks.flat_map(|brick| tile.voxels_of_brick(brick)).filter(|voxel| voxels.contains(voxel.index))
+}
+
+/// The voxels whose centre may lie in a box, and a few around.
+pub(super) fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
+    let to_index = |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN / 2), f64::from(i32::MAX / 2)) as i32;
+    VoxelBox {
+        min: grid.to_voxel_units(region.min).map(|coordinate| to_index(coordinate) - 1),
+        end: grid.to_voxel_units(region.max).map(|coordinate| to_index(coordinate) + 2),
+    }
+}

@@ -1,0 +1,79 @@
+use serde::Serialize;
+use std::ops::AddAssign;
+
+/// What became of the points of a scan or batch. Reports of several add up with `+=`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct ScanReport {
+    /// Points that came in.
+    pub points: u64,
+    /// Points that were skipped, by cause.
+    pub skipped: SkippedPoints,
+    /// Points beyond the max range, whose rays were cut there.
+    pub cut_at_max_range: u64,
+    /// Updates of voxels by hits.
+    pub hits: u64,
+    /// Updates of voxels by misses.
+    pub misses: u64,
+    /// Tiles updated.
+    pub tiles: u64,
+}
+
+/// Points that were skipped, by cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct SkippedPoints {
+    /// A coordinate is NaN or infinite.
+    pub not_finite: u64,
+    /// So far away that no voxel index reaches it.
+    pub out_of_range: u64,
+    /// The sensor's own origin, which drivers use for "no return".
+    pub no_return: u64,
+    /// Nearer than the min range.
+    pub too_near: u64,
+    /// The ray would cross more than a million voxels.
+    pub ray_too_long: u64,
+    /// The intensity is NaN and the sensor model needs it.
+    pub no_intensity: u64,
+}
+
+impl SkippedPoints {
+    /// All skipped points.
+    pub fn total(&self) -> u64 {
+        self.by_cause().iter().map(|(_, count)| count).sum()
+    }
+
+    /// Each cause in words, with its count.
+    pub fn by_cause(&self) -> [(&'static str, u64); 6] {
+        [
+            ("not finite", self.not_finite),
+            ("out of range", self.out_of_range),
+            ("no return", self.no_return),
+            ("nearer than the min range", self.too_near),
+            ("ray too long", self.ray_too_long),
+            ("no intensity", self.no_intensity),
+        ]
+    }
+}
+
+impl AddAssign for ScanReport {
+    fn add_assign(&mut self, other: Self) {
+        self.points += other.points;
+        self.skipped += other.skipped;
+        self.cut_at_max_range += other.cut_at_max_range;
+        self.hits += other.hits;
+        self.misses += other.misses;
+        self.tiles += other.tiles;
+    }
+}
+
+impl AddAssign for SkippedPoints {
+    fn add_assign(&mut self, other: Self) {
+        self.not_finite += other.not_finite;
+        self.out_of_range += other.out_of_range;
+        self.no_return += other.no_return;
+        self.too_near += other.too_near;
+        self.ray_too_long += other.ray_too_long;
+        self.no_intensity += other.no_intensity;
+    }
+}

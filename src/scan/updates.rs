@@ -1,0 +1,136 @@
+use super::ScanReport;
+use crate::sensor::Observation;
+use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, places};
+
+/// Everything one accepted call says about voxels, grouped by tile in Morton order of the tiles.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScanUpdates {
+    /// The updates of each tile.
+    pub tiles: Vec<(TileIndex, TileUpdates)>,
+    /// What became of the points.
+    pub report: ScanReport,
+}
+
+/// What one call says about the voxels of one tile, in a form that can be kept and applied later.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TileUpdates {
+    /// At most one update a voxel: masks a brick, in Morton order.
+    Once(Vec<BrickUpdate>),
+    /// Any number of updates a voxel, in order.
+    Ordered(OrderedUpdates),
+}
+
+/// The voxels of one brick that one scan updates, each once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickUpdate {
+    /// Which brick.
+    pub brick: BrickCode,
+    /// Voxels that were hit.
+    pub hits: BrickMask,
+    /// Voxels that were passed and not hit.
+    pub misses: BrickMask,
+    /// The largest intensity of each hit voxel, in the order of the mask; empty for sensor models that need none.
+    pub intensities: Box<[f32]>,
+}
+
+/// Updates of voxels of one tile in the order in which they count.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OrderedUpdates {
+    /// The voxel relative to the tile's lowest, 10 bits an axis from x at bit 0; bit 31 is set for a hit.
+    voxels: Vec<u32>,
+    /// The intensity of each hit, in order; empty for sensor models that need none.
+    intensities: Vec<f32>,
+}
+
+const HIT: u32 = 1 << 31;
+
+impl OrderedUpdates {
+    /// Appends an update. `offset` is the voxel relative to the tile's lowest, below 1024 along every axis.
+    pub(super) fn push(&mut self, offset: VoxelIndex, observation: Observation, keep_intensity: bool) {
+        let [x, y, z] = offset.map(|k| k as u32 & 1023);
+        let voxel = x | y << 10 | z << 20;
+        match observation {
+            Observation::Miss => self.voxels.push(voxel),
+            Observation::Hit(intensity) => {
+                self.voxels.push(voxel | HIT);
+                if keep_intensity {
+                    self.intensities.push(intensity);
+                }
+            }
+        }
+    }
+
+    /// The updates in order: the voxel relative to the tile's lowest, and what was observed.
+    pub fn iter(&self) -> impl Iterator<Item = (VoxelIndex, Observation)> {
+        let mut intensities = self.intensities.iter();
+        self.voxels.iter().map(move |packed| {
+            let offset = [packed & 1023, packed >> 10 & 1023, packed >> 20 & 1023].map(|k| k as i32);
+            let observation = if packed & HIT == 0 {
+                Observation::Miss
+            } else {
+                Observation::Hit(intensities.next().copied().unwrap_or_default())
+            };
+            (offset, observation)
+        })
+    }
+
+    /// Number of updates.
+    pub fn len(&self) -> usize {
+        self.voxels.len()
+    }
+
+    /// Whether there is no update.
+    pub fn is_empty(&self) -> bool {
+        self.voxels.is_empty()
+    }
+}
+
+impl BrickUpdate {
+    /// The voxels that are updated.
+    pub fn touched(&self) -> BrickMask {
+        std::array::from_fn(|word| self.hits[word] | self.misses[word])
+    }
+
+    /// What was observed of each touched voxel, in Morton order.
+    pub fn observations(&self) -> impl Iterator<Item = Observation> {
+        let mut intensities = self.intensities.iter();
+        places(self.touched()).map(move |place| {
+            if self.hits[place / 64] >> (place % 64) & 1 == 1 {
+                Observation::Hit(intensities.next().copied().unwrap_or_default())
+            } else {
+                Observation::Miss
+            }
+        })
+    }
+}
+
+impl TileUpdates {
+    /// Number of updates.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Once(bricks) => bricks
+                .iter()
+                .flat_map(|brick| brick.hits.iter().chain(&brick.misses))
+                .map(|word| word.count_ones() as usize)
+                .sum(),
+            Self::Ordered(updates) => updates.len(),
+        }
+    }
+
+    /// Whether there is no update.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Bytes of memory that the updates occupy.
+    pub fn bytes(&self) -> usize {
+        let heap = match self {
+            Self::Once(bricks) => {
+                let intensities: usize = bricks.iter().map(|brick| size_of_val(&*brick.intensities)).sum();
+                bricks.capacity() * size_of::<BrickUpdate>() + intensities
+            }
+            Self::Ordered(updates) => (updates.voxels.capacity() + updates.intensities.capacity()) * 4,
+        };
+        size_of::<Self>() + heap
+    }
+}

@@ -1,0 +1,98 @@
+use super::{MortonCode, VoxelIndex, VoxelKey};
+
+/// Voxels along the edge of a brick.
+pub const BRICK_EDGE: i32 = 8;
+
+/// Voxels in a brick.
+pub const BRICK_VOXELS: usize = 512;
+
+/// A brick: 8 x 8 x 8 voxels aligned to the octree, addressed by the upper 39 bits of their Morton code.
+///
+/// Bricks follow the grid of keys, not the tiles: a brick on the border of two tiles exists in both, each with
+/// its own voxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct BrickCode(pub u64);
+
+/// A set of voxels of one brick: bit `b % 64` of word `b / 64` for the voxel at place `b` of the brick's Morton
+/// order.
+pub type BrickMask = [u64; 8];
+
+impl BrickCode {
+    /// The brick that holds a voxel.
+    pub const fn of_voxel(voxel: VoxelIndex) -> Self {
+        VoxelKey::from_index(voxel).morton().brick()
+    }
+
+    /// The voxel at a place (0 to 511) of the brick's Morton order.
+    pub const fn voxel(self, place: usize) -> MortonCode {
+        MortonCode(self.0 << 9 | place as u64)
+    }
+}
+
+impl MortonCode {
+    /// The brick that holds this voxel.
+    pub const fn brick(self) -> BrickCode {
+        BrickCode(self.0 >> 9)
+    }
+
+    /// This voxel's place (0 to 511) in its brick's Morton order.
+    pub const fn place_in_brick(self) -> usize {
+        (self.0 & 511) as usize
+    }
+}
+
+/// A voxel's place (0 to 511) in its brick's Morton order.
+#[inline]
+pub const fn place_of_voxel(voxel: VoxelIndex) -> usize {
+    const SPREAD: [u16; 8] = [0, 1, 8, 9, 64, 65, 72, 73];
+    // Keys and indices agree in their lowest three bits.
+    let [x, y, z] = voxel;
+    (SPREAD[(x & 7) as usize] | SPREAD[(y & 7) as usize] << 1 | SPREAD[(z & 7) as usize] << 2) as usize
+}
+
+/// The places of a brick whose voxel satisfies `min <= local < end` along every axis, each in 0..=8.
+pub fn mask_of_box(min: [i32; 3], end: [i32; 3]) -> BrickMask {
+    let mut mask = [0; 8];
+    for x in min[0].max(0)..end[0].min(BRICK_EDGE) {
+        for y in min[1].max(0)..end[1].min(BRICK_EDGE) {
+            for z in min[2].max(0)..end[2].min(BRICK_EDGE) {
+                let place = place_of_voxel([x, y, z]);
+                mask[place / 64] |= 1 << (place % 64);
+            }
+        }
+    }
+    mask
+}
+
+/// The places of a mask, ascending.
+pub fn places(mask: BrickMask) -> impl Iterator<Item = usize> {
+    mask.into_iter().enumerate().flat_map(|(word, mut bits)| {
+        std::iter::from_fn(move || {
+            let bit = bits.trailing_zeros() as usize;
+            bits &= bits.wrapping_sub(1);
+            (bit < 64).then_some(word * 64 + bit)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn brick_and_place_make_the_morton_code() {
+        for voxel in [[0, 0, 0], [-1, -8, 7], [12345, -23456, 32767], [-32768, 63, 64]] {
+            let code = VoxelKey::from_index(voxel).morton();
+            assert_eq!(code.place_in_brick(), place_of_voxel(voxel));
+            assert_eq!(BrickCode::of_voxel(voxel).voxel(place_of_voxel(voxel)), code);
+        }
+    }
+
+    #[test]
+    fn masks_hold_what_was_put_in() {
+        assert_eq!(mask_of_box([0; 3], [8; 3]), [u64::MAX; 8]);
+        assert_eq!(places(mask_of_box([0; 3], [2; 3])).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(places(mask_of_box([7; 3], [99; 3])).collect::<Vec<_>>(), [511]);
+        assert_eq!(places([0; 8]).count(), 0);
+    }
+}

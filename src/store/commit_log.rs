@@ -1,0 +1,210 @@
+use super::disk::{Disk, DiskRead};
+use super::tile_stamp::TileStamp;
+use crate::error::{DecodeError, FormatError};
+use crate::space::TileIndex;
+use rustc_hash::FxHashMap;
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+/// The append-only record of flushes, `commits.log`. A record that is whole is a commit.
+///
+/// ```text
+/// header  32 bytes  magic "VXTCOMIT", version u32 1, map id 16 bytes, CRC-32 of these
+/// record            payload length u32, its complement u32, payload, CRC-32 of the payload
+/// payload           kind u32 (0 change, 1 whole map), tile count u32, flush number u64, scan number u64,
+///                   then a tile: index 3 x i32, stamp 48 bytes
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CommitLog {
+    map_id: [u8; 16],
+    /// Length of the valid part in bytes: the next record goes here.
+    bytes: u64,
+}
+
+/// All commits of a log, taken together.
+#[derive(Clone, Debug, Default)]
+pub struct Commits {
+    /// Number of the last flush; 0 before the first.
+    pub flush_number: u64,
+    /// Number of the last scan in the last flush; 0 before the first.
+    pub scan_number: u64,
+    /// Every tile of the map.
+    pub tiles: FxHashMap<TileIndex, TileStamp>,
+    /// The tiles that the last record names.
+    pub last_changed: Vec<TileIndex>,
+}
+
+const MAGIC: &[u8; 8] = b"VXTCOMIT";
+const VERSION: u32 = 1;
+const HEADER_BYTES: usize = 32;
+const PAYLOAD_HEADER_BYTES: usize = 24;
+const TILE_BYTES: usize = 12 + TileStamp::BYTES;
+const KIND_CHANGE: u32 = 0;
+const KIND_WHOLE_MAP: u32 = 1;
+
+impl CommitLog {
+    /// Length of the valid part in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The map that the log belongs to.
+    pub fn map_id(&self) -> [u8; 16] {
+        self.map_id
+    }
+
+    /// Writes a log with one record of the whole map, synced, in place of nothing or of a temporary name.
+    pub fn write_whole(disk: &dyn Disk, path: &Path, map_id: [u8; 16], commits: &Commits) -> io::Result<Self> {
+        let mut out = disk.create(path)?;
+        let mut bytes = header(map_id).to_vec();
+        let mut tiles: Vec<_> = commits.tiles.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
+        tiles.sort_unstable_by_key(|&(tile, _)| tile);
+        bytes.extend(record(KIND_WHOLE_MAP, commits.flush_number, commits.scan_number, &tiles));
+        out.write_all(&bytes)?;
+        out.sync()?;
+        Ok(Self { map_id, bytes: bytes.len() as u64 })
+    }
+
+    /// Appends a record of changed tiles and syncs it: when this returns, the flush is committed.
+    pub fn append(
+        &mut self,
+        disk: &dyn Disk,
+        path: &Path,
+        flush_number: u64,
+        scan_number: u64,
+        changed: &[(TileIndex, TileStamp)],
+    ) -> io::Result<()> {
+        let record = record(KIND_CHANGE, flush_number, scan_number, changed);
+        // What an earlier attempt may have left behind the valid part is cut off.
+        let mut out = disk.append(path, self.bytes)?;
+        out.write_all(&record)?;
+        out.sync()?;
+        self.bytes += record.len() as u64;
+        Ok(())
+    }
+
+    /// Reads a log. An incomplete record at the end is a flush that never happened and is left out.
+    ///
+    /// # Errors
+    ///
+    /// A wrong header, or a record that is complete and does not match its checksum.
+    pub fn read(disk: &dyn Disk, path: &Path) -> Result<(Self, Commits), DecodeError> {
+        let mut input = disk.open(path)?;
+        let file_bytes = input.file_bytes();
+        let map_id = read_header(&mut *input, file_bytes)?;
+        let mut log = Self { map_id, bytes: HEADER_BYTES as u64 };
+        let mut commits = Commits::default();
+        while let Some(payload) = read_record(&mut *input, log.bytes, file_bytes)? {
+            commits.take(&payload, log.bytes + 8)?;
+            log.bytes += payload.len() as u64 + 12;
+        }
+        Ok((log, commits))
+    }
+}
+
+impl Commits {
+    fn take(&mut self, payload: &[u8], offset: u64) -> Result<(), FormatError> {
+        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| payload[at + k]));
+        let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| payload[at + k]));
+        let wrong = |at: u64, reason: &str| Err(FormatError::at_offset(offset + at, reason));
+        if payload.len() < PAYLOAD_HEADER_BYTES
+            || (payload.len() - PAYLOAD_HEADER_BYTES) as u64 != u64::from(u32_at(4)) * TILE_BYTES as u64
+        {
+            return wrong(4, "the number of tiles does not fit the record");
+        }
+        match u32_at(0) {
+            KIND_CHANGE => {}
+            KIND_WHOLE_MAP => self.tiles.clear(),
+            _ => return wrong(0, "a record of unknown kind"),
+        }
+        if u64_at(8) < self.flush_number {
+            return wrong(8, "the flush number is lower than in the record before");
+        }
+        self.flush_number = u64_at(8);
+        self.scan_number = u64_at(16);
+        self.last_changed.clear();
+        for tile in payload[PAYLOAD_HEADER_BYTES..].chunks_exact(TILE_BYTES) {
+            let index = |axis: usize| i32::from_le_bytes(std::array::from_fn(|k| tile[4 * axis + k]));
+            let index = TileIndex::new(index(0), index(1), index(2));
+            self.tiles.insert(index, TileStamp::from_bytes(&std::array::from_fn(|k| tile[12 + k])));
+            self.last_changed.push(index);
+        }
+        Ok(())
+    }
+}
+
+fn header(map_id: [u8; 16]) -> [u8; HEADER_BYTES] {
+    let mut bytes = [0; HEADER_BYTES];
+    bytes[0..8].copy_from_slice(MAGIC);
+    bytes[8..12].copy_from_slice(&VERSION.to_le_bytes());
+    bytes[12..28].copy_from_slice(&map_id);
+    let crc = crc32fast::hash(&bytes[..28]);
+    bytes[28..].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+fn record(kind: u32, flush_number: u64, scan_number: u64, tiles: &[(TileIndex, TileStamp)]) -> Vec<u8> {
+    let payload_bytes = (PAYLOAD_HEADER_BYTES + tiles.len() * TILE_BYTES) as u32;
+    let mut bytes = Vec::with_capacity(payload_bytes as usize + 12);
+    bytes.extend_from_slice(&payload_bytes.to_le_bytes());
+    bytes.extend_from_slice(&(!payload_bytes).to_le_bytes());
+    bytes.extend_from_slice(&kind.to_le_bytes());
+    bytes.extend_from_slice(&(tiles.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(&flush_number.to_le_bytes());
+    bytes.extend_from_slice(&scan_number.to_le_bytes());
+    for (tile, stamp) in tiles {
+        tile.to_array().iter().for_each(|index| bytes.extend_from_slice(&index.to_le_bytes()));
+        bytes.extend_from_slice(&stamp.to_bytes());
+    }
+    let crc = crc32fast::hash(&bytes[8..]);
+    bytes.extend_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+fn read_header(input: &mut dyn DiskRead, file_bytes: u64) -> Result<[u8; 16], DecodeError> {
+    let mut bytes = [0; HEADER_BYTES];
+    if file_bytes < HEADER_BYTES as u64 {
+        return Err(FormatError::at_offset(0, "too short for the header of a commit log").into());
+    }
+    input.read_exact(&mut bytes)?;
+    let map_id = std::array::from_fn(|k| bytes[12 + k]);
+    if bytes != header(map_id) {
+        return Err(FormatError::at_offset(0, "not the header of a commit log of version 1").into());
+    }
+    Ok(map_id)
+}
+
+/// The payload of the record at `offset`; `None` if there is none, or not a whole one.
+fn read_record(input: &mut dyn DiskRead, offset: u64, file_bytes: u64) -> Result<Option<Vec<u8>>, DecodeError> {
+    let remaining = file_bytes - offset;
+    if remaining < 8 {
+        return Ok(None);
+    }
+    let mut lengths = [0; 8];
+    input.read_exact(&mut lengths)?;
+    let length = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| lengths[at + k]));
+    if length(0) != !length(4) {
+        // A crash can leave the file longer than what was written, filled with zeros, and only at its end.
+        return match lengths {
+            [0, 0, 0, 0, 0, 0, 0, 0] => Ok(None),
+            _ => Err(FormatError::at_offset(offset, "the length of the record is damaged").into()),
+        };
+    }
+    let payload_bytes = u64::from(length(0));
+    if remaining < payload_bytes + 12 {
+        return Ok(None);
+    }
+    // The length is within the file's, which bounds the allocation.
+    let mut payload = vec![0; payload_bytes as usize];
+    input.read_exact(&mut payload)?;
+    let mut crc = [0; 4];
+    input.read_exact(&mut crc)?;
+    if u32::from_le_bytes(crc) == crc32fast::hash(&payload) {
+        return Ok(Some(payload));
+    }
+    if remaining == payload_bytes + 12 {
+        // The last record: its length came to disk before its content. It was never committed.
+        return Ok(None);
+    }
+    Err(FormatError::at_offset(offset, "the record does not match its checksum").into())
+}

@@ -1,0 +1,167 @@
+use std::any::Any;
+use std::fmt::Debug;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+/// The one seam to the file system: every operation on a map's files, one method each.
+///
+/// [`FsDisk`] is the real one; tests put in disks that fail, fill up or crash.
+pub trait Disk: Debug + Send + Sync {
+    /// Opens a file for reading. A symbolic link is an error.
+    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
+    /// Creates a file, or empties it, for writing from the beginning.
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>>;
+    /// Opens a file for writing from `offset` on; what stood there before is cut off.
+    fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>>;
+    /// Makes a file's content durable.
+    fn sync_file(&self, path: &Path) -> io::Result<()>;
+    /// Makes the names in a folder durable.
+    fn sync_folder(&self, path: &Path) -> io::Result<()>;
+    /// Renames a file, replacing what had the new name.
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Removes a file.
+    fn remove_file(&self, path: &Path) -> io::Result<()>;
+    /// Makes a folder; its parents must exist.
+    fn create_folder(&self, path: &Path) -> io::Result<()>;
+    /// Removes an empty folder.
+    fn remove_folder(&self, path: &Path) -> io::Result<()>;
+    /// The names in a folder, in no particular order; names that are not UTF-8 are left out.
+    fn list(&self, path: &Path) -> io::Result<Vec<String>>;
+    /// What has a name, links not followed; `None` if nothing has.
+    fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>>;
+    /// Locks a file, made if missing, until the returned value is dropped; `None` if another holds it.
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>>;
+}
+
+/// What a name in a folder stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EntryKind {
+    /// A file of so many bytes.
+    File(u64),
+    /// A folder.
+    Folder,
+    /// A symbolic link or something else that a map does not contain.
+    Other,
+}
+
+/// A file open for reading.
+pub trait DiskRead: Read + Send {
+    /// Length of the file in bytes when it was opened.
+    fn file_bytes(&self) -> u64;
+}
+
+/// A file open for writing.
+pub trait DiskWrite: Write + Send {
+    /// Makes what was written durable.
+    fn sync(&mut self) -> io::Result<()>;
+}
+
+/// The real file system.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FsDisk;
+
+struct FsRead {
+    file: File,
+    bytes: u64,
+}
+
+impl Disk for FsDisk {
+    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        let file = File::open(not_a_link(path)?)?;
+        let metadata = file.metadata()?;
+        if !metadata.is_file() {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
+        }
+        Ok(Box::new(FsRead { file, bytes: metadata.len() }))
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        Ok(Box::new(File::create(not_a_link(path)?)?))
+    }
+
+    fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
+        let file = OpenOptions::new().append(true).create(true).open(not_a_link(path)?)?;
+        if file.metadata()?.len() != offset {
+            file.set_len(offset)?;
+        }
+        Ok(Box::new(file))
+    }
+
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        OpenOptions::new().write(true).open(not_a_link(path)?)?.sync_all()
+    }
+
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        // Only Unix lets a folder be opened and synced; elsewhere renames are durable by themselves.
+        if cfg!(unix) { File::open(path)?.sync_all() } else { Ok(()) }
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)
+    }
+
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        fs::remove_file(path)
+    }
+
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        fs::create_dir(path)
+    }
+
+    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+        fs::remove_dir(path)
+    }
+
+    fn list(&self, path: &Path) -> io::Result<Vec<String>> {
+        let names = fs::read_dir(path)?.map(|entry| Ok(entry?.file_name().into_string().ok()));
+        names.filter_map(io::Result::transpose).collect()
+    }
+
+    fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {
+        match fs::symlink_metadata(path) {
+            Ok(metadata) if metadata.is_file() => Ok(Some(EntryKind::File(metadata.len()))),
+            Ok(metadata) if metadata.is_dir() => Ok(Some(EntryKind::Folder)),
+            Ok(_) => Ok(Some(EntryKind::Other)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {
+        let file = OpenOptions::new().write(true).create(true).truncate(false).open(not_a_link(path)?)?;
+        match file.try_lock() {
+            Ok(()) => Ok(Some(Box::new(file))),
+            Err(TryLockError::WouldBlock) => Ok(None),
+            Err(TryLockError::Error(error)) => Err(error),
+        }
+    }
+}
+
+impl Read for FsRead {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.file.read(buffer)
+    }
+}
+
+impl DiskRead for FsRead {
+    fn file_bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+impl DiskWrite for File {
+    fn sync(&mut self) -> io::Result<()> {
+        self.sync_all()
+    }
+}
+
+/// A link inside a map could lead anywhere: it is never followed.
+fn not_a_link(path: &Path) -> io::Result<&Path> {
+    match fs::symlink_metadata(path) {
+        Ok(metadata) if metadata.is_symlink() => {
+            Err(io::Error::new(io::ErrorKind::InvalidInput, "a symbolic link; links inside a map are not followed"))
+        }
+        _ => Ok(path),
+    }
+}

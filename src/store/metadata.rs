@@ -1,0 +1,193 @@
+use crate::config::RayConfig;
+use crate::error::FormatError;
+use crate::sensor::SensorModel;
+use crate::space::TileIndex;
+use serde::{Deserialize, Serialize};
+
+/// What `metadata.json` says: the seed's keys, and voxtile's own in a last object `ext`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metadata {
+    /// Edge of a voxel in metres.
+    pub resolution_m: f64,
+    /// Edge of a tile in metres.
+    pub tile_size_m: f64,
+    /// The exact hull of the tiles; `None` for an empty map.
+    pub bounds: Option<Bounds>,
+    /// voxtile's own; `None` for a map of the seed's format, which cannot be verified.
+    pub ext: Option<Extension>,
+}
+
+/// Lowest and highest tile index along each axis, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Bounds {
+    /// Lowest tile index along x, y and z.
+    pub min: [i32; 3],
+    /// Highest tile index along x, y and z.
+    pub max: [i32; 3],
+}
+
+/// What voxtile adds to the seed's metadata.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extension {
+    /// Whether the map has no tile, which zeros as bounds cannot say.
+    pub empty: bool,
+    /// Id of the map, 32 hexadecimal digits.
+    pub map_id: String,
+    /// Number of the last flush.
+    pub flush_number: u64,
+    /// Number of the last scan in the map.
+    pub scan_number: u64,
+    /// How observations become evidence.
+    pub sensor_model: SensorModel,
+    /// Probability from which a voxel counts as occupied.
+    pub occupancy_threshold: f64,
+    /// Which part of a ray counted when the map was last written to.
+    pub rays: RayConfig,
+    /// Fingerprint of the input that the map was last built from, if its builder gave one.
+    pub input_fingerprint: Option<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Document {
+    version: String,
+    resolution: f64,
+    tile_size: f64,
+    bounds: Bounds,
+    ext: Option<Extension>,
+}
+
+const VERSION: &str = "1.0";
+/// The file ends with the checksum of all bytes before it, so that no byte is without guard.
+const CHECKSUM_KEY: &str = "    \"crc32\": \"";
+const END: &str = "\"\n  }\n}\n";
+
+impl Bounds {
+    /// The hull of tiles; `None` of none.
+    pub fn of(tiles: impl Iterator<Item = TileIndex>) -> Option<Self> {
+        tiles.map(TileIndex::to_array).fold(None, |bounds: Option<Self>, tile| {
+            let Self { min, max } = bounds.unwrap_or(Self { min: tile, max: tile });
+            Some(Self {
+                min: std::array::from_fn(|k| min[k].min(tile[k])),
+                max: std::array::from_fn(|k| max[k].max(tile[k])),
+            })
+        })
+    }
+}
+
+impl Metadata {
+    /// The file's text. The seed's keys come first and in its order; lengths are plain decimals.
+    pub fn to_text(&self) -> String {
+        let Bounds { min, max } = self.bounds.unwrap_or(Bounds { min: [0; 3], max: [0; 3] });
+        let bounds = format!("\"bounds\": {{\n    \"min\": {min:?},\n    \"max\": {max:?}\n  }}");
+        // Rust prints the shortest decimal that reads back to the same bits, never with an exponent.
+        let (resolution, tile_size) = (decimal(self.resolution_m), decimal(self.tile_size_m));
+        let head = format!(
+            "{{\n  \"version\": \"{VERSION}\",\n  \"resolution\": {resolution},\n  \"tile_size\": {tile_size},\n  {bounds}"
+        );
+        let Some(ext) = &self.ext else { return head + "\n}\n" };
+        let ext = serde_json::to_string_pretty(ext).expect("plain data of strings and numbers");
+        let ext = ext.replace('\n', "\n  ");
+        let ext = ext.strip_suffix("\n  }").expect("an object ends with its brace").to_owned();
+        let text = format!("{head},\n  \"ext\": {ext},\n{CHECKSUM_KEY}");
+        let crc = crc32fast::hash(text.as_bytes());
+        format!("{text}{crc:08x}{END}")
+    }
+
+    /// Reads the file's text.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no such JSON, a version other than 1.0, or a checksum that does not match.
+    pub fn from_text(text: &str) -> Result<Self, FormatError> {
+        let document: Document = serde_json::from_str(text)
+            .map_err(|error| FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}")))?;
+        if document.version != VERSION {
+            let reason = format!("version {:?} is not known; this program reads {VERSION:?}", document.version);
+            return Err(FormatError::at_offset(0, reason));
+        }
+        if document.ext.is_some() {
+            check_crc(text)?;
+        }
+        let is_empty = document.ext.as_ref().is_some_and(|ext| ext.empty);
+        Ok(Self {
+            resolution_m: document.resolution,
+            tile_size_m: document.tile_size,
+            bounds: (!is_empty).then_some(document.bounds),
+            ext: document.ext,
+        })
+    }
+}
+
+fn check_crc(text: &str) -> Result<(), FormatError> {
+    let wrong = |at: usize| Err(FormatError::at_offset(at as u64, "the text does not match its checksum"));
+    let Some(key) = text.rfind(CHECKSUM_KEY) else { return wrong(text.len()) };
+    let end = key + CHECKSUM_KEY.len();
+    let crc = format!("{:08x}{END}", crc32fast::hash(&text.as_bytes()[..end]));
+    if text[end..] == crc { Ok(()) } else { wrong(end) }
+}
+
+/// A length as a plain decimal that is a JSON float.
+fn decimal(length_m: f64) -> String {
+    let text = length_m.to_string();
+    if text.contains('.') { text } else { text + ".0" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn metadata() -> Metadata {
+        let ext = Extension {
+            empty: false,
+            map_id: "00ff".repeat(8),
+            flush_number: 3,
+            scan_number: 75,
+            sensor_model: SensorModel::default(),
+            occupancy_threshold: 0.5,
+            rays: RayConfig::default(),
+            input_fingerprint: Some("abc".into()),
+        };
+        let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());
+        Metadata { resolution_m: 0.05, tile_size_m: 10.0, bounds, ext: Some(ext) }
+    }
+
+    #[test]
+    fn text_and_back() {
+        let written = metadata();
+        let text = written.to_text();
+        let seed = "{\n  \"version\": \"1.0\",\n  \"resolution\": 0.05,\n  \"tile_size\": 10.0,\n  \"bounds\": {\n    \
+                    \"min\": [-7, -1, 0],\n    \"max\": [0, 2, 4]\n  },\n  \"ext\": {\n    \"empty\": false";
+        assert!(text.starts_with(seed), "{text}");
+        assert_eq!(Metadata::from_text(&text), Ok(written));
+    }
+
+    #[test]
+    fn the_seeds_own_file_is_read_and_has_no_ext() {
+        let text = r#"{"version": "1.0", "resolution": 0.05, "tile_size": 10.0,
+            "bounds": {"min": [0, -1, 0], "max": [5, 3, 2]}}"#;
+        let read = Metadata::from_text(text).unwrap();
+        assert_eq!(read.bounds, Some(Bounds { min: [0, -1, 0], max: [5, 3, 2] }));
+        assert_eq!(read.ext, None);
+    }
+
+    #[test]
+    fn every_changed_byte_is_found() {
+        let text = metadata().to_text();
+        for at in 0..text.len() {
+            for flip in [1, 2, 16, 32] {
+                let mut bytes = text.clone().into_bytes();
+                bytes[at] ^= flip;
+                if let Ok(changed) = String::from_utf8(bytes) {
+                    assert!(Metadata::from_text(&changed).is_err(), "byte {at} ^ {flip}: {changed}");
+                }
+            }
+            assert!(Metadata::from_text(&text[..at]).is_err());
+        }
+    }
+
+    #[test]
+    fn small_lengths_are_written_without_exponent() {
+        let tiny = Metadata { resolution_m: 1e-7, tile_size_m: 1e-5, bounds: None, ext: None };
+        assert!(tiny.to_text().contains("\"resolution\": 0.0000001,"));
+    }
+}

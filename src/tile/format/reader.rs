@@ -1,0 +1,166 @@
+use super::trailer::{TRAILER_BYTES, Trailer};
+use super::{ENTRY_BYTES, HEADER_BYTES, MAGIC, VERSION};
+use crate::error::{DecodeError, FormatError};
+use crate::sensor::Evidence;
+use crate::space::{MortonCode, VoxelBox, VoxelKey};
+use crate::tile::Table;
+use std::io::Read;
+
+/// What `iwlo_meta.bin` holds.
+#[derive(Debug)]
+pub struct DecodedTable {
+    /// The exact table.
+    pub table: Table,
+    /// The trailer; `None` for a file of the seed's own format, which cannot be verified.
+    pub trailer: Option<Trailer>,
+}
+
+/// Reads an `iwlo_meta.bin` of `file_bytes` bytes that belongs to the tile of `voxels`.
+///
+/// With a trailer, entries must be in Morton order and the checksum must match. Without one any order is read.
+///
+/// # Errors
+///
+/// Anything that is not as the format says, with its offset: wrong magic or version, a count that does not fit the
+/// length, keys of another tile, keys that come twice, values that are no evidence, a wrong checksum.
+pub fn read_table(
+    input: &mut impl Read,
+    file_bytes: u64,
+    voxels: &VoxelBox,
+) -> Result<DecodedTable, DecodeError> {
+    let mut crc = crc32fast::Hasher::new();
+    let (count, has_trailer) = read_header(input, file_bytes, &mut crc)?;
+    let mut entries = Entries::new(voxels, has_trailer);
+    let mut chunk = vec![0; 4096 * ENTRY_BYTES as usize];
+    let mut done = 0;
+    while done < count {
+        let entries_here = (count - done).min(4096);
+        let bytes = &mut chunk[..(entries_here * ENTRY_BYTES) as usize];
+        input.read_exact(bytes)?;
+        crc.update(bytes);
+        for (number, entry) in (done..).zip(bytes.chunks_exact(ENTRY_BYTES as usize)) {
+            entries.take(entry, HEADER_BYTES + number * ENTRY_BYTES)?;
+        }
+        done += entries_here;
+    }
+    let table = entries.into_table()?;
+    let trailer = if has_trailer {
+        let offset = HEADER_BYTES + count * ENTRY_BYTES;
+        let mut bytes = [0; TRAILER_BYTES];
+        input.read_exact(&mut bytes)?;
+        let trailer = Trailer::from_bytes(&bytes, offset)?;
+        if trailer.table_crc != crc.finalize() {
+            return Err(FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into());
+        }
+        Some(trailer)
+    } else {
+        None
+    };
+    Ok(DecodedTable { table, trailer })
+}
+
+/// The count of entries, checked against the length of the file, and whether a trailer follows them.
+fn read_header(
+    input: &mut impl Read,
+    file_bytes: u64,
+    crc: &mut crc32fast::Hasher,
+) -> Result<(u64, bool), DecodeError> {
+    let wrong = |offset, reason: String| Err(FormatError::at_offset(offset, reason).into());
+    if file_bytes < HEADER_BYTES {
+        return wrong(0, format!("{file_bytes} bytes are too few for the header of {HEADER_BYTES}"));
+    }
+    let mut header = [0; HEADER_BYTES as usize];
+    input.read_exact(&mut header)?;
+    crc.update(&header);
+    let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| header[at + k]));
+    if u32_at(0) != MAGIC {
+        return wrong(0, format!("the magic number is {:#010x}, not {MAGIC:#010x}", u32_at(0)));
+    }
+    if u32_at(4) != VERSION {
+        return wrong(4, format!("version {} is not known; this program reads version {VERSION}", u32_at(4)));
+    }
+    let count = u64::from(u32_at(8)) | u64::from(u32_at(12)) << 32;
+    let after_header = file_bytes - HEADER_BYTES;
+    let Some(after_entries) = count.checked_mul(ENTRY_BYTES).and_then(|bytes| after_header.checked_sub(bytes)) else {
+        return wrong(8, format!("a count of {count} entries does not fit into {file_bytes} bytes"));
+    };
+    match after_entries {
+        0 => Ok((count, false)),
+        bytes if bytes == TRAILER_BYTES as u64 => Ok((count, true)),
+        bytes => wrong(
+            file_bytes - bytes,
+            format!("{bytes} bytes follow the last entry; there must be none or a trailer of {TRAILER_BYTES}"),
+        ),
+    }
+}
+
+/// Decodes entries into a table, brick by brick.
+struct Entries<'a> {
+    voxels: &'a VoxelBox,
+    must_ascend: bool,
+    table: Table,
+    /// The entries of one brick, with their offsets.
+    run: Vec<(MortonCode, Evidence, u64)>,
+}
+
+impl<'a> Entries<'a> {
+    fn new(voxels: &'a VoxelBox, must_ascend: bool) -> Self {
+        Self { voxels, must_ascend, table: Table::default(), run: Vec::with_capacity(512) }
+    }
+
+    fn take(&mut self, entry: &[u8], offset: u64) -> Result<(), FormatError> {
+        let key = VoxelKey(std::array::from_fn(|axis| u16::from_le_bytes([entry[2 * axis], entry[2 * axis + 1]])));
+        let log_odds = f64::from_le_bytes(std::array::from_fn(|k| entry[6 + k]));
+        let observation_count = i32::from_le_bytes(std::array::from_fn(|k| entry[14 + k]));
+        let wrong = |at, reason| Err(FormatError::at_offset(offset + at, reason));
+        if !self.voxels.contains(key.to_index_from(self.voxels.min)) {
+            return wrong(0, format!("key {:?} belongs to another tile", key.0));
+        }
+        if !log_odds.is_finite() {
+            return wrong(6, format!("log-odds {log_odds} are not finite"));
+        }
+        if observation_count < 0 {
+            return wrong(14, format!("observation count {observation_count} is negative"));
+        }
+        let code = key.morton();
+        if let Some(&(previous, ..)) = self.run.last() {
+            if self.must_ascend && previous >= code {
+                return wrong(0, format!("key {:?} is not in Morton order", key.0));
+            }
+            if previous.brick() != code.brick() {
+                self.end_run()?;
+            }
+        }
+        self.run.push((code, Evidence { log_odds, observation_count }, offset));
+        Ok(())
+    }
+
+    /// Moves the run into the table, all voxels of the brick at once.
+    fn end_run(&mut self) -> Result<(), FormatError> {
+        let Some(&(first, ..)) = self.run.first() else { return Ok(()) };
+        self.run.sort_unstable_by_key(|&(code, _, offset)| (code, offset));
+        let mut touched = [0; 8];
+        for (code, ..) in &self.run {
+            touched[code.place_in_brick() / 64] |= 1 << (code.place_in_brick() % 64);
+        }
+        let mut twice = self.run.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].2);
+        if twice.is_none() {
+            let mut run = self.run.iter();
+            self.table.update_brick(first.brick(), touched, |_, before| {
+                let (_, evidence, offset) = run.next().expect("one entry for each touched voxel");
+                twice = twice.or(before.map(|_| *offset));
+                *evidence
+            });
+        }
+        self.run.clear();
+        match twice {
+            Some(offset) => Err(FormatError::at_offset(offset, "the key comes twice")),
+            None => Ok(()),
+        }
+    }
+
+    fn into_table(mut self) -> Result<Table, FormatError> {
+        self.end_run()?;
+        Ok(self.table)
+    }
+}

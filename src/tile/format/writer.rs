@@ -1,0 +1,48 @@
+use super::trailer::Trailer;
+use super::{ENTRY_BYTES, MAGIC, VERSION};
+use crate::tile::Table;
+use std::io::{self, Write};
+
+/// What a written table weighs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TableChecksums {
+    /// CRC-32 of header and entries.
+    pub table_crc: u32,
+    /// Bytes written, the trailer included.
+    pub bytes: u64,
+}
+
+/// Entries encoded between two writes: 64 KiB or so.
+const CHUNK_BYTES: usize = 4096 * ENTRY_BYTES as usize;
+
+/// Streams a table as `iwlo_meta.bin`. The checksum in `trailer.table_crc` is computed here; what the caller put
+/// there is ignored.
+pub fn write_table(table: &Table, trailer: Trailer, out: &mut impl Write) -> io::Result<TableChecksums> {
+    let mut crc = crc32fast::Hasher::new();
+    let mut bytes = 0;
+    let mut write = |chunk: &[u8]| {
+        crc.update(chunk);
+        bytes += chunk.len() as u64;
+        out.write_all(chunk)
+    };
+    let mut chunk = Vec::with_capacity(CHUNK_BYTES);
+    chunk.extend_from_slice(&MAGIC.to_le_bytes());
+    chunk.extend_from_slice(&VERSION.to_le_bytes());
+    chunk.extend_from_slice(&(table.len() as u64).to_le_bytes());
+    for (code, evidence) in table.iter() {
+        if chunk.len() + ENTRY_BYTES as usize > CHUNK_BYTES {
+            write(&chunk)?;
+            chunk.clear();
+        }
+        for key in code.to_key().0 {
+            chunk.extend_from_slice(&key.to_le_bytes());
+        }
+        chunk.extend_from_slice(&evidence.log_odds.to_le_bytes());
+        chunk.extend_from_slice(&evidence.observation_count.to_le_bytes());
+    }
+    write(&chunk)?;
+    let table_crc = crc.finalize();
+    let trailer = Trailer { table_crc, ..trailer }.to_bytes();
+    out.write_all(&trailer)?;
+    Ok(TableChecksums { table_crc, bytes: bytes + trailer.len() as u64 })
+}

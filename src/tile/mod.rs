@@ -1,0 +1,21 @@
+//! A tile: three stores, one truth.
+//!
+//! ```text
+//! updates -> Table (exact, the truth) -> VoxelCache (accumulated values) -> Octree (coarse answers, octree.bt)
+//! ```
+//!
+//! The table answers every question about a finest voxel. The octree is derived from it and serves coarse
+//! questions; the voxel cache in front keeps it from seeing every update (OctoCache). [`format`] turns a tile
+//! into the bytes of its two files and back; nothing here knows a path.
+
+mod brick;
+mod cached_octree;
+pub mod format;
+mod table;
+mod tile;
+mod voxel_cache;
+
+pub use cached_octree::CachedOctree;
+pub use table::Table;
+pub use tile::{Tile, TileCounts, Voxel};
+pub use voxel_cache::{VoxelCache, VoxelCacheCounts};

@@ -1,0 +1,200 @@
+use super::cached_octree::CachedOctree;
+use super::table::Table;
+use super::voxel_cache::VoxelCacheCounts;
+use crate::config::{MapConfig, VoxelCacheConfig};
+use crate::octree::Octree;
+use crate::scan::TileUpdates;
+use crate::sensor::{Evidence, SensorModel};
+use crate::space::{BrickCode, MortonCode, TileIndex, VoxelBox, VoxelIndex, VoxelKey};
+use serde::Serialize;
+use std::borrow::Cow;
+use std::ops::AddAssign;
+
+/// One tile of the map: its exact table, and its octree behind a voxel cache.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    index: TileIndex,
+    voxels: VoxelBox,
+    table: Table,
+    octree: CachedOctree,
+    is_dirty: bool,
+}
+
+/// An observed voxel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Voxel {
+    /// Its index along x, y and z.
+    pub index: VoxelIndex,
+    /// What is known of it.
+    pub evidence: Evidence,
+}
+
+/// Sizes of one tile or of several.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct TileCounts {
+    /// Observed voxels.
+    pub voxels: u64,
+    /// Nodes of the octrees.
+    pub octree_nodes: u64,
+    /// Bytes of memory in tables.
+    pub table_bytes: u64,
+    /// Bytes of memory in octrees.
+    pub octree_bytes: u64,
+    /// Bytes of memory in voxel caches.
+    pub voxel_cache_bytes: u64,
+    /// What the voxel caches have seen.
+    pub voxel_cache: VoxelCacheCounts,
+}
+
+impl Tile {
+    /// A tile in which nothing was observed yet.
+    pub fn empty(config: &MapConfig, index: TileIndex) -> Self {
+        Self::from_table(config, index, Table::default())
+    }
+
+    /// The tile of a table, its octree derived.
+    pub fn from_table(config: &MapConfig, index: TileIndex, table: Table) -> Self {
+        let octree = CachedOctree::from_voxels(&config.voxel_cache, table.iter());
+        Self { index, voxels: config.grid.voxels_of_tile(index), table, octree, is_dirty: false }
+    }
+
+    /// Which tile this is.
+    pub fn index(&self) -> TileIndex {
+        self.index
+    }
+
+    /// The voxels that belong to the tile.
+    pub fn voxel_box(&self) -> VoxelBox {
+        self.voxels
+    }
+
+    /// The exact table.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// Whether the tile changed since it was last written or made.
+    pub fn is_dirty(&self) -> bool {
+        self.is_dirty
+    }
+
+    /// Notes that the tile's content is on disk.
+    pub(crate) fn mark_clean(&mut self) {
+        self.is_dirty = false;
+    }
+
+    /// Applies the updates of one scan or batch.
+    pub fn apply(&mut self, model: &SensorModel, updates: &TileUpdates) {
+        self.is_dirty |= !updates.is_empty();
+        match updates {
+            TileUpdates::Once(bricks) => {
+                for brick in bricks {
+                    let mut observations = brick.observations();
+                    self.table.update_brick(brick.brick, brick.touched(), |place, before| {
+                        let observation = observations.next().expect("one observation for each touched voxel");
+                        let after = model.update(before, observation);
+                        self.octree.put(brick.brick.voxel(place), after.log_odds);
+                        after
+                    });
+                }
+            }
+            TileUpdates::Ordered(updates) => {
+                for (offset, observation) in updates.iter() {
+                    let code = self.code_of_offset(offset);
+                    self.table.update(code, |before| {
+                        let after = model.update(before, observation);
+                        self.octree.put(code, after.log_odds);
+                        after
+                    });
+                }
+            }
+        }
+        self.octree.end_scan();
+    }
+
+    /// The evidence of a voxel of this tile; `None` if it was never observed or belongs to another tile.
+    pub fn evidence(&self, voxel: VoxelIndex) -> Option<Evidence> {
+        self.voxels.contains(voxel).then(|| self.table.get(VoxelKey::from_index(voxel).morton()))?
+    }
+
+    /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that holds
+    /// the voxel; `None` if all are unknown.
+    pub fn max_log_odds_under(&self, voxel: VoxelIndex, depth: u8) -> Option<f32> {
+        self.octree.max_under(VoxelKey::from_index(voxel).morton(), depth)
+    }
+
+    /// The observed voxels in Morton order.
+    pub fn voxels(&self) -> impl Iterator<Item = Voxel> {
+        self.table.iter().map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
+    }
+
+    /// The observed voxels of one brick in Morton order.
+    pub fn voxels_of_brick(&self, brick: BrickCode) -> impl Iterator<Item = Voxel> {
+        self.table.voxels_of_brick(brick).map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
+    }
+
+    /// The voxel of this tile with the given code.
+    pub fn index_of(&self, code: MortonCode) -> VoxelIndex {
+        code.to_key().to_index_from(self.voxels.min)
+    }
+
+    /// Brings the octree up to date and returns it.
+    pub fn sync_octree(&mut self) -> &Octree {
+        self.octree.sync()
+    }
+
+    /// The octree brought up to date without changing the tile: borrowed if nothing waits, else derived anew.
+    pub fn octree(&self) -> Cow<'_, Octree> {
+        match self.octree.synced() {
+            Some(octree) => Cow::Borrowed(octree),
+            None => Cow::Owned(self.octree.clone().into_octree()),
+        }
+    }
+
+    /// Empties the voxel cache into the octree and gives it another shape.
+    pub fn reshape_voxel_cache(&mut self, config: &VoxelCacheConfig) {
+        self.octree = CachedOctree::from_voxels(config, self.table.iter());
+    }
+
+    /// Sizes of the tile.
+    pub fn counts(&self) -> TileCounts {
+        let (octree_bytes, cache_bytes) = self.octree.bytes();
+        TileCounts {
+            voxels: self.table.len() as u64,
+            octree_nodes: self.octree.node_count() as u64,
+            table_bytes: self.table.bytes() as u64,
+            octree_bytes: octree_bytes as u64,
+            voxel_cache_bytes: cache_bytes as u64,
+            voxel_cache: self.octree.cache_counts(),
+        }
+    }
+
+    /// Bytes of memory that the tile occupies.
+    pub fn bytes(&self) -> usize {
+        let (octree_bytes, cache_bytes) = self.octree.bytes();
+        size_of::<Self>() + self.table.bytes() + octree_bytes + cache_bytes
+    }
+
+    fn code_of_offset(&self, offset: VoxelIndex) -> MortonCode {
+        VoxelKey::from_index(std::array::from_fn(|k| self.voxels.min[k].wrapping_add(offset[k]))).morton()
+    }
+}
+
+impl TileCounts {
+    /// Bytes of memory in tables, octrees and voxel caches together.
+    pub fn bytes(&self) -> u64 {
+        self.table_bytes + self.octree_bytes + self.voxel_cache_bytes
+    }
+}
+
+impl AddAssign for TileCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.voxels += other.voxels;
+        self.octree_nodes += other.octree_nodes;
+        self.table_bytes += other.table_bytes;
+        self.octree_bytes += other.octree_bytes;
+        self.voxel_cache_bytes += other.voxel_cache_bytes;
+        self.voxel_cache += other.voxel_cache;
+    }
+}

@@ -1,0 +1,224 @@
+use crate::space::MortonCode;
+use serde::Serialize;
+use std::ops::AddAssign;
+
+/// The cache of OctoCache (Chen et al., ASPLOS 2025, sections 4.1 to 4.3): it takes every update of a voxel and
+/// passes on to the octree only what leaves it.
+///
+/// A voxel's bucket is its Morton code modulo the number of buckets. A cell holds the *accumulated* log-odds, so
+/// the cache answers for its voxels alone. During a scan buckets may grow; after it each keeps its `tau` latest
+/// cells, and the earliest leave in Morton order.
+#[derive(Clone, Debug)]
+pub struct VoxelCache {
+    tau: usize,
+    /// Whether the number of buckets follows the scans.
+    fits_itself: bool,
+    buckets: Box<[Vec<Cell>]>,
+    len: usize,
+    cell_bytes: usize,
+    /// Distinct voxels put in since the last eviction.
+    voxels_of_scan: usize,
+    counts: VoxelCacheCounts,
+}
+
+/// What a voxel cache has seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct VoxelCacheCounts {
+    /// Updates of voxels that were in the cache.
+    pub hits: u64,
+    /// Updates of voxels that were not.
+    pub misses: u64,
+    /// Voxels passed on to the octree.
+    pub evictions: u64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    code: MortonCode,
+    log_odds: f32,
+    /// Whether the voxel was put in or changed since the last eviction.
+    is_of_this_scan: bool,
+}
+
+/// Cells of a cache that fits itself, as a multiple of the voxels of a scan; the paper's section 5.2 takes 3 to 4.
+const CELLS_PER_SCAN_VOXEL: usize = 3;
+
+impl VoxelCache {
+    /// A cache whose buckets keep `tau` voxels between scans; `buckets` must be a power of two, `None` fits their
+    /// number to the scans.
+    pub fn new(tau: usize, buckets: Option<usize>) -> Self {
+        Self {
+            tau,
+            fits_itself: buckets.is_none(),
+            buckets: empty_buckets(buckets.unwrap_or(1)),
+            len: 0,
+            cell_bytes: 0,
+            voxels_of_scan: 0,
+            counts: VoxelCacheCounts::default(),
+        }
+    }
+
+    /// What the cache has seen.
+    pub fn counts(&self) -> VoxelCacheCounts {
+        self.counts
+    }
+
+    /// Voxels in the cache.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether the cache is empty.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Bytes of memory on the heap.
+    pub fn bytes(&self) -> usize {
+        self.buckets.len() * size_of::<Vec<Cell>>() + self.cell_bytes
+    }
+
+    /// Takes the accumulated log-odds of an updated voxel.
+    pub fn put(&mut self, code: MortonCode, log_odds: f32) {
+        let bucket = &mut self.buckets[code.0 as usize & (self.buckets.len() - 1)];
+        if let Some(cell) = bucket.iter_mut().find(|cell| cell.code == code) {
+            self.counts.hits += 1;
+            self.voxels_of_scan += usize::from(!cell.is_of_this_scan);
+            (cell.log_odds, cell.is_of_this_scan) = (log_odds, true);
+        } else {
+            self.counts.misses += 1;
+            self.voxels_of_scan += 1;
+            let capacity = bucket.capacity();
+            bucket.push(Cell { code, log_odds, is_of_this_scan: true });
+            self.cell_bytes += (bucket.capacity() - capacity) * size_of::<Cell>();
+            self.len += 1;
+        }
+    }
+
+    /// The accumulated log-odds of a voxel, if it is in the cache.
+    pub fn get(&self, code: MortonCode) -> Option<f32> {
+        let bucket = &self.buckets[code.0 as usize & (self.buckets.len() - 1)];
+        bucket.iter().find(|cell| cell.code == code).map(|cell| cell.log_odds)
+    }
+
+    /// The cached voxels under a node, in Morton order. `first` is the node's first code, `span` its voxels.
+    pub fn under(&self, first: MortonCode, span: u64) -> Vec<(MortonCode, f32)> {
+        let count = (span as usize).min(self.buckets.len());
+        // A node's codes are consecutive, and so are their buckets.
+        let buckets = (0..count).map(|k| (first.0 as usize + k) & (self.buckets.len() - 1));
+        let cells = buckets.flat_map(|bucket| &self.buckets[bucket]);
+        let mut voxels: Vec<_> = cells
+            .filter(|cell| first <= cell.code && cell.code.0 < first.0 + span)
+            .map(|cell| (cell.code, cell.log_odds))
+            .collect();
+        voxels.sort_unstable_by_key(|&(code, _)| code);
+        voxels
+    }
+
+    /// Ends a scan: leaves at most `tau` voxels a bucket and returns the others in Morton order.
+    pub fn evict(&mut self) -> Vec<(MortonCode, f32)> {
+        let wanted = (self.voxels_of_scan * CELLS_PER_SCAN_VOXEL).div_ceil(self.tau).next_power_of_two();
+        self.voxels_of_scan = 0;
+        let mut evicted = Vec::new();
+        if self.fits_itself && wanted > self.buckets.len() {
+            self.grow(wanted);
+        }
+        for bucket in &mut self.buckets {
+            let surplus = bucket.len().saturating_sub(self.tau);
+            evicted.extend(bucket.drain(..surplus).map(|cell| (cell.code, cell.log_odds)));
+            if bucket.capacity() > 2 * self.tau {
+                self.cell_bytes -= bucket.capacity() * size_of::<Cell>();
+                bucket.shrink_to(self.tau);
+                self.cell_bytes += bucket.capacity() * size_of::<Cell>();
+            }
+            bucket.iter_mut().for_each(|cell| cell.is_of_this_scan = false);
+        }
+        self.in_morton_order(evicted)
+    }
+
+    /// Empties the cache and returns its voxels in Morton order.
+    pub fn drain(&mut self) -> Vec<(MortonCode, f32)> {
+        let cells = self.buckets.iter_mut().flat_map(|bucket| bucket.drain(..));
+        let drained = cells.map(|cell| (cell.code, cell.log_odds)).collect();
+        self.voxels_of_scan = 0;
+        self.in_morton_order(drained)
+    }
+
+    fn in_morton_order(&mut self, mut evicted: Vec<(MortonCode, f32)>) -> Vec<(MortonCode, f32)> {
+        evicted.sort_unstable_by_key(|&(code, _)| code);
+        self.len -= evicted.len();
+        self.counts.evictions += evicted.len() as u64;
+        evicted
+    }
+
+    /// Spreads the cells over more buckets; within a bucket they keep the order in which they came.
+    fn grow(&mut self, buckets: usize) {
+        let old = std::mem::replace(&mut self.buckets, empty_buckets(buckets));
+        for cell in old.iter().flatten() {
+            self.buckets[cell.code.0 as usize & (buckets - 1)].push(*cell);
+        }
+        self.cell_bytes = self.buckets.iter().map(|bucket| bucket.capacity() * size_of::<Cell>()).sum();
+    }
+}
+
+impl AddAssign for VoxelCacheCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.hits += other.hits;
+        self.misses += other.misses;
+        self.evictions += other.evictions;
+    }
+}
+
+fn empty_buckets(count: usize) -> Box<[Vec<Cell>]> {
+    vec![Vec::new(); count].into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn codes(voxels: Vec<(MortonCode, f32)>) -> Vec<u64> {
+        voxels.into_iter().map(|(code, _)| code.0).collect()
+    }
+
+    #[test]
+    fn the_earliest_inserted_leave_in_morton_order_and_a_hit_makes_no_voxel_younger() {
+        let mut cache = VoxelCache::new(2, Some(4));
+        for code in [16, 1, 8, 12, 5, 4, 16] {
+            cache.put(MortonCode(code), code as f32);
+        }
+        cache.put(MortonCode(8), 80.0);
+        // Bucket 0 got 16, 8, 12, 4 in this order; bucket 1 got 1, 5.
+        assert_eq!(cache.evict(), [(MortonCode(8), 80.0), (MortonCode(16), 16.0)]);
+        assert_eq!(cache.get(MortonCode(12)), Some(12.0));
+        assert_eq!(cache.get(MortonCode(16)), None);
+        assert_eq!(cache.counts(), VoxelCacheCounts { hits: 2, misses: 6, evictions: 2 });
+        assert_eq!(codes(cache.drain()), [1, 4, 5, 12]);
+        assert!(cache.is_empty());
+    }
+
+    #[test]
+    fn a_cache_that_fits_itself_holds_a_repeated_scan() {
+        let mut cache = VoxelCache::new(4, None);
+        for _ in 0..2 {
+            for code in 0..1000 {
+                cache.put(MortonCode(code * 7), 1.0);
+            }
+            cache.evict();
+        }
+        assert_eq!(cache.counts().misses, 1000);
+        assert_eq!(cache.counts().hits, 1000);
+    }
+
+    #[test]
+    fn under_finds_the_cached_voxels_of_a_node() {
+        let mut cache = VoxelCache::new(4, Some(16));
+        for code in [3, 63, 64, 70, 127, 128, 1000] {
+            cache.put(MortonCode(code), 0.5);
+        }
+        assert_eq!(codes(cache.under(MortonCode(64), 64)), [64, 70, 127]);
+        assert_eq!(codes(cache.under(MortonCode(0), 8)), [3]);
+        assert_eq!(codes(cache.under(MortonCode(0), MortonCode::END)), [3, 63, 64, 70, 127, 128, 1000]);
+    }
+}
