@@ -95,6 +95,38 @@ impl MapConfig {
         Ok(Self { grid: Grid::new(resolution_m, tile_size_m)?, ..Self::default() })
     }
 
+    /// The same with another sensor model.
+    pub fn with_sensor_model(self, sensor_model: SensorModel) -> Self {
+        Self { sensor_model, ..self }
+    }
+
+    /// The same with rays from `min_range_m` to `max_range_m`, in metres.
+    pub fn with_range(mut self, min_range_m: f64, max_range_m: impl Into<Option<f64>>) -> Self {
+        (self.rays.min_range_m, self.rays.max_range_m) = (min_range_m, max_range_m.into());
+        self
+    }
+
+    /// The same with another insert mode.
+    pub fn with_insert_mode(mut self, insert_mode: InsertMode) -> Self {
+        self.rays.insert_mode = insert_mode;
+        self
+    }
+
+    /// The same with at most so many tiles in memory.
+    pub fn with_cache_tiles(self, cache_tiles: usize) -> Self {
+        Self { cache_tiles, ..self }
+    }
+
+    /// The same with at most so many bytes of updates waiting for tiles on disk.
+    pub fn with_pending_bytes(self, pending_bytes: usize) -> Self {
+        Self { pending_bytes, ..self }
+    }
+
+    /// The same with voxel caches of another shape.
+    pub fn with_voxel_cache(self, tau: usize, buckets: Option<usize>) -> Self {
+        Self { voxel_cache: VoxelCacheConfig { tau, buckets }, ..self }
+    }
+
     /// The configuration, or the first argument that is wrong.
     pub fn validated(self) -> Result<Self> {
         self.sensor_model.validated()?;

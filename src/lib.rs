@@ -3,9 +3,9 @@ mod config;
 mod error;
 pub mod io;
 pub mod mapper;
-pub mod query;
 pub mod maths;
 pub mod octree;
+pub mod query;
 pub mod scan;
 pub mod sensor;
 pub mod simulation;
@@ -15,3 +15,6 @@ pub mod tile;
 
 pub use config::{InsertMode, MapConfig, RayConfig, VoxelCacheConfig};
 pub use error::{DecodeError, Error, FormatError, Place, Result};
+pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+pub use query::{Occupancy, Questions};
+pub use scan::Scan;

@@ -125,7 +125,7 @@ impl Grid {
 }
 
 /// The voxel of a point given in units of voxels; `None` when not finite or outside `i32`.
-pub(crate) fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
+fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
     let mut voxel = [0; 3];
     for axis in 0..3 {
         let floor = point[axis].floor();

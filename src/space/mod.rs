@@ -17,7 +17,6 @@ mod tile_index;
 
 pub use aabb::{Aabb, VoxelBox};
 pub use brick::{BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, mask_of_box, place_of_voxel, places};
-pub(crate) use grid::voxel_of_units;
 pub use grid::{Grid, GridError, MAX_VOXELS_PER_TILE_EDGE};
 pub use key::VoxelKey;
 pub use morton::MortonCode;

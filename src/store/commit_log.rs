@@ -3,7 +3,7 @@ use super::tile_stamp::TileStamp;
 use crate::error::{DecodeError, FormatError};
 use crate::space::TileIndex;
 use rustc_hash::FxHashMap;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// The append-only record of flushes, `commits.log`. A record that is whole is a commit.

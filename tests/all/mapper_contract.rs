@@ -1,0 +1,220 @@
+use crate::support::random_scans::{Random, random_scan};
+use crate::support::reference_map::{ReferenceMap, voxels_of};
+use std::collections::BTreeMap;
+use tempfile::TempDir;
+use voxtile::mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+use voxtile::query::Questions;
+use voxtile::scan::PointBatch;
+use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::space::{TileIndex, VoxelKey};
+use voxtile::{InsertMode, MapConfig};
+
+/// Small tiles, so that a scan of a few metres touches many.
+fn config() -> MapConfig {
+    MapConfig::new(0.1, 1.2).unwrap()
+}
+
+fn configs() -> Vec<MapConfig> {
+    let mut configs = Vec::new();
+    for sensor_model in [SensorModel::default(), SensorModel::Iwlo(Iwlo::default())] {
+        for insert_mode in [InsertMode::PerScan, InsertMode::PerRay] {
+            let config = config().with_sensor_model(sensor_model).with_insert_mode(insert_mode);
+            configs.push(config.with_range(0.5, 3.0));
+        }
+    }
+    configs
+}
+
+/// A seeded drive: scans and batches, revisits included.
+fn drive(mapper: &mut impl Mapper, reference: &mut ReferenceMap, seed: u64, steps: usize) {
+    let mut random = Random(seed);
+    for step in 0..steps {
+        let center = [1.5 * f64::from((step % 4) as u8), -2.0, 0.3];
+        let scan = random_scan(&mut random, center, 60);
+        if step % 3 == 2 {
+            let is_occupied: Vec<bool> = scan.points.iter().map(|_| random.below(2) == 0).collect();
+            let intensities = scan.intensities.as_deref();
+            let batch = PointBatch { points: &scan.points, intensities, is_occupied: &is_occupied };
+            mapper.batch_update(&batch).unwrap();
+            reference.batch_update(&batch);
+        } else {
+            let report = mapper.insert_scan(&scan).unwrap();
+            assert_eq!(report.points, 60);
+            reference.insert_scan(&scan);
+        }
+        assert_eq!(mapper.scan_number(), step as u64 + 1);
+    }
+}
+
+#[test]
+fn in_memory_equals_the_naive_map() {
+    for (seed, config) in configs().into_iter().enumerate() {
+        let mut reference = ReferenceMap::new(&config);
+        let mut mapper = InMemoryMapper::new(config).unwrap();
+        drive(&mut mapper, &mut reference, seed as u64, 24);
+        assert!(reference.voxels.len() > 1000);
+        assert_eq!(voxels_of(&mapper), reference.voxels);
+    }
+}
+
+#[test]
+fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
+    for (seed, config) in configs().into_iter().enumerate() {
+        let mut digests = Vec::new();
+        for (cache_tiles, pending_bytes) in [(1, 0), (1, 1 << 20), (3, 20_000), (10_000, 0)] {
+            let folder = TempDir::new().unwrap();
+            let config = config.clone().with_cache_tiles(cache_tiles).with_pending_bytes(pending_bytes);
+            let mut reference = ReferenceMap::new(&config);
+            let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config.clone()).unwrap();
+            drive(&mut mapper, &mut reference, seed as u64, 12);
+            assert_eq!(voxels_of(&mapper), reference.voxels, "before flush");
+            assert!(mapper.cached_tile_indices().len() <= cache_tiles);
+            let unsaved = mapper.digest().unwrap();
+            mapper.flush().unwrap();
+            assert_eq!(voxels_of(&mapper), reference.voxels, "after flush");
+            drop(mapper);
+
+            let mut mapper = OutOfCoreTileMapper::open(folder.path().join("map"), config.clone()).unwrap();
+            assert_eq!(mapper.digest().unwrap(), unsaved);
+            assert_eq!(mapper.scan_number(), 12);
+            let mut random = Random(99);
+            for _ in 0..4 {
+                let scan = random_scan(&mut random, [3.0, -2.0, 0.0], 40);
+                mapper.insert_scan(&scan).unwrap();
+                reference.insert_scan(&scan);
+            }
+            assert_eq!(voxels_of(&mapper), reference.voxels, "after reopening");
+            mapper.flush().unwrap();
+            let reader = MapReader::open(folder.path().join("map"), 2).unwrap();
+            assert_eq!(voxels_of(&reader), reference.voxels, "by a reader");
+            assert_eq!(reader.voxel_counts().unwrap().0, reference.voxels.len() as u64);
+            digests.push(reader.digest().unwrap());
+        }
+        assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
+    }
+}
+
+#[test]
+fn the_answer_does_not_depend_on_the_voxel_cache_and_coarse_answers_are_the_tables_maxima_at_every_moment() {
+    let mut digests = Vec::new();
+    for (tau, buckets) in [(1, Some(1)), (2, Some(64)), (4, None), (16, Some(4096))] {
+        let mut mapper = InMemoryMapper::new(config().with_voxel_cache(tau, buckets)).unwrap();
+        let mut random = Random(5);
+        for step in 0..10 {
+            mapper.insert_scan(&random_scan(&mut random, [0.0, 0.0, 0.0], 50)).unwrap();
+            if step == 6 {
+                mapper.sync_octrees();
+            }
+            assert_coarse_answers_are_maxima(&mapper);
+        }
+        digests.push(mapper.digest().unwrap());
+    }
+    assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+fn assert_coarse_answers_are_maxima(view: &impl MapView) {
+    for depth in [1, 9, 11, 13, 14, 15, 16] {
+        let mut maxima: BTreeMap<[i32; 3], f32> = BTreeMap::new();
+        for (voxel, (bits, _)) in voxels_of(view) {
+            let log_odds = f64::from_bits(bits) as f32;
+            let max = maxima.entry(voxel.map(|index| index >> (16 - depth))).or_insert(log_odds);
+            *max = max.max(log_odds);
+        }
+        for (node, max) in maxima.into_iter().step_by(7) {
+            let first = node.map(|index| index << (16 - depth));
+            // Any voxel of the node will do, known or not.
+            let point = view.config().grid.center_m(first.map(|index| index + (1 << (16 - depth)) / 2));
+            let answer = view.occupancy_at_depth(point, depth as u8).unwrap().probability();
+            assert_eq!(answer, Some(voxtile::maths::sigmoid(f64::from(max))), "depth {depth}, node {node:?}");
+        }
+    }
+}
+
+#[test]
+fn a_refused_call_changes_nothing_and_uses_no_number() {
+    let config = config().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
+    let mut mapper = InMemoryMapper::new(config).unwrap();
+    let mut random = Random(1);
+    let mut scan = random_scan(&mut random, [0.0; 3], 30);
+    mapper.insert_scan(&scan).unwrap();
+    let before = mapper.digest().unwrap();
+    scan.intensities.as_mut().unwrap().pop();
+    assert!(mapper.insert_scan(&scan).unwrap_err().to_string().contains("29 for 30 points"));
+    scan.intensities = None;
+    assert!(mapper.insert_scan(&scan).unwrap_err().to_string().contains("needs an intensity"));
+    scan.origin[1] = f64::NAN;
+    assert!(mapper.insert_scan(&scan).is_err());
+    let batch = PointBatch { points: &scan.points, intensities: Some(&[1.0; 30]), is_occupied: &[true; 3] };
+    assert!(mapper.batch_update(&batch).unwrap_err().to_string().contains("is_occupied"));
+    assert_eq!((mapper.scan_number(), mapper.digest().unwrap()), (1, before));
+}
+
+#[test]
+fn every_cause_of_a_skipped_point_is_counted() {
+    let config = config().with_sensor_model(SensorModel::Iwlo(Iwlo::default())).with_range(1.0, None);
+    let mut mapper = InMemoryMapper::new(config).unwrap();
+    let origin = [0.25; 3];
+    let points =
+        vec![[f64::NAN; 3], [f64::INFINITY; 3], origin, [0.3; 3], [1e12, 0.0, 0.0], [2e5, 0.0, 0.0], [2.0; 3], [3.0; 3]];
+    let intensities = Some(vec![90.0, 90.0, 90.0, 90.0, 90.0, 90.0, f32::NAN, 90.0]);
+    let report = mapper.insert_scan(&voxtile::Scan { origin, points, intensities }).unwrap();
+    let skipped = report.skipped;
+    assert_eq!((skipped.not_finite, skipped.no_return, skipped.too_near), (2, 1, 1));
+    assert_eq!((skipped.out_of_range, skipped.ray_too_long, skipped.no_intensity), (1, 1, 1));
+    assert_eq!((skipped.total(), report.hits), (7, 1));
+}
+
+#[test]
+fn an_echo_without_weight_is_no_evidence_for_its_voxel() {
+    let config = config().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
+    let mut mapper = InMemoryMapper::new(config).unwrap();
+    let scan = voxtile::Scan { origin: [0.05; 3], points: vec![[0.55, 0.05, 0.05]], intensities: Some(vec![20.0]) };
+    let report = mapper.insert_scan(&scan).unwrap();
+    assert_eq!((report.hits, report.misses), (0, 5));
+    assert!(mapper.voxel_at([0.55, 0.05, 0.05]).unwrap().is_none());
+}
+
+#[test]
+fn dirty_tiles_and_saved_tiles_are_told() {
+    let folder = TempDir::new().unwrap();
+    let config = config().with_cache_tiles(2);
+    let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
+    let points: Vec<_> = (0..5).map(|k| [1.2 * f64::from(k) + 0.6, 0.6, 0.6]).collect();
+    mapper.batch_update(&PointBatch { points: &points, intensities: None, is_occupied: &[true; 5] }).unwrap();
+    assert!(mapper.is_dirty());
+    let tile = |x| TileIndex::new(x, 0, 0);
+    assert!((0..5).all(|x| mapper.is_tile_dirty(tile(x))));
+    assert!(mapper.reload(tile(0), false).is_err());
+    mapper.flush().unwrap();
+    assert_eq!(mapper.take_saved_tiles(), (0..5).map(tile).collect::<Vec<_>>());
+    assert_eq!(mapper.take_saved_tiles(), []);
+    assert!(!mapper.is_dirty() && !(0..5).any(|x| mapper.is_tile_dirty(tile(x))));
+    assert!(mapper.reload(tile(0), false).unwrap());
+    assert!(!mapper.reload(tile(77), false).unwrap());
+    assert_eq!(mapper.preload([tile(3), tile(4), tile(77)]).unwrap(), 2);
+    assert_eq!(mapper.cached_tile_indices(), [tile(3), tile(4)]);
+    assert!(mapper.tile_folder(tile(3)).join("octree.bt").is_file());
+    assert_eq!(mapper.cached_occupied_voxels(None).unwrap().len(), 2);
+    assert_eq!(mapper.all_occupied_voxels(None).unwrap().len(), 5);
+}
+
+#[test]
+fn keys_on_disk_are_octomaps_and_in_morton_order() {
+    let folder = TempDir::new().unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config()).unwrap();
+    mapper.insert_scan(&random_scan(&mut Random(3), [0.6; 3], 50)).unwrap();
+    mapper.flush().unwrap();
+    let path = mapper.tile_folder(TileIndex::new(0, 0, 0)).join("iwlo_meta.bin");
+    let bytes = std::fs::read(path).unwrap();
+    assert_eq!(bytes[0..8], [0x4f, 0x4c, 0x57, 0x49, 1, 0, 0, 0]);
+    let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
+    assert_eq!(bytes.len(), 16 + 18 * count + 64);
+    let mut previous = None;
+    for entry in bytes[16..16 + 18 * count].chunks(18) {
+        let key: [u16; 3] = std::array::from_fn(|k| u16::from_le_bytes([entry[2 * k], entry[2 * k + 1]]));
+        assert!(key.iter().all(|key| (32768..32768 + 12).contains(key)), "{key:?}");
+        let code = VoxelKey(key).morton();
+        assert!(previous < Some(code));
+        previous = Some(code);
+    }
+}
