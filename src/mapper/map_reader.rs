@@ -76,7 +76,8 @@ impl MapReader {
     pub fn voxel_counts(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
             let stamps = self.store.commits().tiles.values();
-            stamps.fold((0, 0), |(voxels, occupied), stamp| (voxels + stamp.voxels, occupied + stamp.occupied))
+            stamps
+                .fold((0, 0), |(voxels, occupied), stamp| (voxels + stamp.voxels, occupied + stamp.occupied))
         })
     }
 
@@ -84,7 +85,9 @@ impl MapReader {
     pub fn disk_bytes(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
             let stamps = self.store.commits().tiles.values();
-            stamps.fold((0, 0), |(table, octree), stamp| (table + stamp.table.bytes, octree + stamp.octree.bytes))
+            stamps.fold((0, 0), |(table, octree), stamp| {
+                (table + stamp.table.bytes, octree + stamp.octree.bytes)
+            })
         })
     }
 
@@ -95,7 +98,8 @@ impl MapReader {
     /// A tile that does not match the log is damage, unless a writer has flushed since.
     fn explain(&self, error: Error) -> Error {
         let folder = self.store.folder();
-        let now = TileStore::open_read_only(self.disk.clone(), folder).map(|store| store.commits().flush_number);
+        let now =
+            TileStore::open_read_only(self.disk.clone(), folder).map(|store| store.commits().flush_number);
         if now.is_ok_and(|flush_number| flush_number != self.flush_number()) {
             return Error::Changed { path: folder.to_owned() };
         }
@@ -169,7 +173,8 @@ impl MapView for MapReader {
 /// The configuration in a map's metadata; a map of the seed's format has the default sensor model.
 fn config_from(metadata: &Metadata, path: std::path::PathBuf) -> Result<MapConfig> {
     let wrong = |error: String| FormatError::at_offset(0, error).in_map(&path, None);
-    let grid = Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
+    let grid =
+        Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
     let mut config = MapConfig { grid, ..MapConfig::default() };
     if let Some(ext) = &metadata.ext {
         config.sensor_model = ext.sensor_model;

@@ -189,7 +189,12 @@ impl Mapper for OutOfCoreTileMapper {
 
 /// Grid, sensor model and threshold must be the map's own.
 fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> Result<()> {
-    let mismatch = |what, found: String, wanted: String| Error::Mismatch { path: folder.to_owned(), what, found, wanted };
+    let mismatch = |what, found: String, wanted: String| Error::Mismatch {
+        path: folder.to_owned(),
+        what,
+        found,
+        wanted,
+    };
     let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
     if metadata.resolution_m != resolution_m {
         let (found, wanted) = (format!("{} m", metadata.resolution_m), format!("{resolution_m} m"));
@@ -210,4 +215,3 @@ fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> R
     }
     Ok(())
 }
-

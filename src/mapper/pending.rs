@@ -54,7 +54,8 @@ impl Pending {
 
     /// The tile for which the most bytes wait, the lowest of equals.
     pub(super) fn heaviest(&self) -> Option<TileIndex> {
-        let heaviest = self.tiles.iter().max_by_key(|(tile, waiting)| (waiting.bytes, std::cmp::Reverse(**tile)));
+        let heaviest =
+            self.tiles.iter().max_by_key(|(tile, waiting)| (waiting.bytes, std::cmp::Reverse(**tile)));
         heaviest.map(|(tile, _)| *tile)
     }
 }

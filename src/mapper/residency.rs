@@ -148,7 +148,12 @@ impl Residency {
     }
 
     /// Drops a tile from memory, so that the next question reads it from disk.
-    pub(super) fn reload(&mut self, index: TileIndex, discard_changes: bool, scan_number: u64) -> Result<bool> {
+    pub(super) fn reload(
+        &mut self,
+        index: TileIndex,
+        discard_changes: bool,
+        scan_number: u64,
+    ) -> Result<bool> {
         if self.is_dirty(index) && !discard_changes {
             return Err(Error::UnsavedChanges { tile: index });
         }
@@ -284,7 +289,11 @@ impl Residency {
 }
 
 /// The metadata of a map; bounds and numbers are the store's to fill in.
-pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input_fingerprint: Option<String>) -> Metadata {
+pub(super) fn new_metadata(
+    config: &MapConfig,
+    map_id: [u8; 16],
+    input_fingerprint: Option<String>,
+) -> Metadata {
     let ext = Extension {
         empty: true,
         map_id: hex(&map_id),

@@ -9,7 +9,12 @@ use crate::tile::Tile;
 use crate::tile::format::{DecodedTable, Trailer, read_table, write_table};
 
 /// Writes the next version of a tile's files. Its octree is brought up to date.
-pub(super) fn save(store: &mut TileStore, config: &MapConfig, tile: &mut Tile, scan_number: u64) -> Result<TileStamp> {
+pub(super) fn save(
+    store: &mut TileStore,
+    config: &MapConfig,
+    tile: &mut Tile,
+    scan_number: u64,
+) -> Result<TileStamp> {
     let index = tile.index();
     let threshold = config.occupied_log_odds();
     let map_id = store.map_id().unwrap_or_default();
@@ -19,7 +24,9 @@ pub(super) fn save(store: &mut TileStore, config: &MapConfig, tile: &mut Tile, s
     })?;
     let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
     let trailer = Trailer { map_id, tile: index, scan_number, table_crc: 0, octree_crc, octree_bytes };
-    let table = store.write_next(index, TileFile::Table, |mut out| write_table(tile.table(), trailer, &mut out).map(drop))?;
+    let table = store.write_next(index, TileFile::Table, |mut out| {
+        write_table(tile.table(), trailer, &mut out).map(drop)
+    })?;
     let occupied = tile.table().iter().filter(|(_, evidence)| evidence.log_odds >= threshold).count() as u64;
     let stamp = TileStamp { scan_number, table, octree, voxels: tile.table().len() as u64, occupied };
     store.note_next(index, stamp);
@@ -55,7 +62,10 @@ fn check(store: &TileStore, index: TileIndex, decoded: &DecodedTable, stored: St
     }
     if input.finish().0 != stamp.table {
         let (found, wanted) = (trailer.scan_number, stamp.scan_number);
-        return damaged(bytes, format!("the file is of scan {found}, commits.log names the version of scan {wanted}"));
+        return damaged(
+            bytes,
+            format!("the file is of scan {found}, commits.log names the version of scan {wanted}"),
+        );
     }
     Ok(())
 }

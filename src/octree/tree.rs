@@ -18,10 +18,10 @@ pub struct Octree {
 type Block = [Node; 8];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Node {
-    log_odds: f32,
+pub(super) struct Node {
+    pub(super) log_odds: f32,
     /// Block of the children; [`LEAF`] for a leaf.
-    children: u32,
+    pub(super) children: u32,
 }
 
 const LEAF: u32 = u32::MAX;
@@ -41,11 +41,11 @@ pub struct Leaf {
 impl Node {
     const NONE: Self = Self { log_odds: 0.0, children: LEAF };
 
-    const fn leaf(log_odds: f32) -> Self {
+    pub(super) const fn leaf(log_odds: f32) -> Self {
         Self { log_odds, children: LEAF }
     }
 
-    const fn is_leaf(&self) -> bool {
+    pub(super) const fn is_leaf(&self) -> bool {
         self.children == LEAF
     }
 }
@@ -85,7 +85,12 @@ impl Octree {
 
     /// What [`Octree::get`] would say of the node at `depth` that begins at `first` if the given voxels under it, in
     /// ascending order, had the given log-odds.
-    pub fn max_with_overrides(&self, first: MortonCode, depth: u8, voxels: &[(MortonCode, f32)]) -> Option<f32> {
+    pub fn max_with_overrides(
+        &self,
+        first: MortonCode,
+        depth: u8,
+        voxels: &[(MortonCode, f32)],
+    ) -> Option<f32> {
         self.max_under(self.node_at(first, depth), depth, voxels)
     }
 
@@ -107,7 +112,9 @@ impl Octree {
 
     /// Bytes of memory on the heap.
     pub fn bytes(&self) -> usize {
-        self.blocks.capacity() * size_of::<Block>() + self.masks.capacity() + self.free.capacity() * size_of::<u32>()
+        self.blocks.capacity() * size_of::<Block>()
+            + self.masks.capacity()
+            + self.free.capacity() * size_of::<u32>()
     }
 
     /// The leaves in Morton order.
@@ -132,9 +139,36 @@ impl Octree {
         })
     }
 
-    fn child(&self, node: Node, child: usize) -> Option<Node> {
+    pub(super) fn child(&self, node: Node, child: usize) -> Option<Node> {
         let block = node.children as usize;
         (!node.is_leaf() && self.masks[block] >> child & 1 == 1).then(|| self.blocks[block][child])
+    }
+
+    pub(super) fn root(&self) -> Option<Node> {
+        self.root
+    }
+
+    /// Makes a node that [`Octree::add_inner`] or a leaf gave the root; for building a tree from a file.
+    pub(super) fn set_root(&mut self, root: Node) {
+        self.nodes += 1;
+        self.root = Some(root);
+    }
+
+    /// Adds a node above existing children, without pruning.
+    pub(super) fn add_inner(&mut self, children: [Option<Node>; 8]) -> Node {
+        let mask = children.iter().rev().fold(0, |mask: u8, child| mask << 1 | u8::from(child.is_some()));
+        self.nodes += mask.count_ones() as usize;
+        let log_odds =
+            children.iter().flatten().map(|child| child.log_odds).fold(f32::NEG_INFINITY, f32::max);
+        Node { log_odds, children: self.new_block(children.map(|child| child.unwrap_or(Node::NONE)), mask) }
+    }
+
+    /// Number of finest voxels that the leaves stand for, and how many of them have at least `threshold` log-odds.
+    pub fn expanded_voxels(&self, threshold: f32) -> (u64, u64) {
+        self.leaves().fold((0, 0), |(all, occupied), leaf| {
+            let voxels = MortonCode::span(leaf.depth);
+            (all + voxels, occupied + if leaf.log_odds >= threshold { voxels } else { 0 })
+        })
     }
 
     fn node_at(&self, code: MortonCode, depth: u8) -> Option<Node> {
@@ -180,7 +214,8 @@ impl Octree {
     fn summary(&mut self, block: usize) -> Node {
         let (children, mask) = (&self.blocks[block], self.masks[block]);
         let first = children[0];
-        let equals_first = |child: &Node| child.is_leaf() && child.log_odds.to_bits() == first.log_odds.to_bits();
+        let equals_first =
+            |child: &Node| child.is_leaf() && child.log_odds.to_bits() == first.log_odds.to_bits();
         if mask == 0xff && children.iter().all(equals_first) {
             self.nodes -= 8;
             self.free.push(block as u32);
@@ -226,5 +261,84 @@ impl Octree {
             max = under.into_iter().chain(max).reduce(f32::max);
         }
         max
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    /// Codes in a few clusters, so that cubes fill up, and few values, so that they are equal.
+    fn voxels() -> impl Strategy<Value = Vec<(u64, f32)>> {
+        let code = (0..3_u64, 0..128_u64).prop_map(|(cluster, low)| cluster * 0x0123_4567_8000 + low);
+        let value = prop::sample::select(vec![-1.0_f32, 0.5, 0.5, 0.5, 2.0]);
+        prop::collection::vec((code, value), 0..600)
+    }
+
+    fn max_in(model: &BTreeMap<u64, f32>, code: u64, depth: u8) -> Option<f32> {
+        let first = MortonCode(code).ancestor(depth).0;
+        model.range(first..first + MortonCode::span(depth)).map(|(_, &value)| value).reduce(f32::max)
+    }
+
+    /// Leaves and nodes of the pruned tree of a model, counted from the definition.
+    fn minimal_leaves(model: &BTreeMap<u64, f32>) -> usize {
+        let is_leaf = |code: u64, depth: u8| {
+            let first = MortonCode(code).ancestor(depth).0;
+            let values: Vec<f32> =
+                model.range(first..first + MortonCode::span(depth)).map(|(_, &v)| v).collect();
+            values.len() as u64 == MortonCode::span(depth) && values.iter().all(|&v| v == values[0])
+        };
+        let mut leaves: Vec<(u64, u8)> = model
+            .keys()
+            .map(|&code| {
+                let depth = (0..=16).find(|&depth| is_leaf(code, depth)).expect("depth 16 is one voxel");
+                (MortonCode(code).ancestor(depth).0, depth)
+            })
+            .collect();
+        leaves.dedup();
+        leaves.len()
+    }
+
+    proptest! {
+        #[test]
+        fn the_tree_equals_a_map_of_voxels_at_every_depth(batches in prop::collection::vec(voxels(), 1..4)) {
+            let mut tree = Octree::new();
+            let mut model = BTreeMap::new();
+            for batch in batches {
+                let batch: BTreeMap<u64, f32> = batch.into_iter().collect();
+                let sorted: Vec<_> = batch.iter().map(|(&code, &value)| (MortonCode(code), value)).collect();
+                for code in model.keys().chain(batch.keys()).copied().collect::<Vec<u64>>() {
+                    for depth in [0, 5, 13, 14, 15, 16] {
+                        let first = MortonCode(code).ancestor(depth);
+                        let span = MortonCode::span(depth);
+                        let under: Vec<_> =
+                            sorted.iter().copied().filter(|(c, _)| (first.0..first.0 + span).contains(&c.0)).collect();
+                        let mut with = model.clone();
+                        with.extend(batch.iter().map(|(&code, &value)| (code, value)));
+                        prop_assert_eq!(
+                            tree.max_with_overrides(first, depth, &under),
+                            max_in(&with, code, depth)
+                        );
+                    }
+                }
+                tree.write_sorted(&sorted);
+                model.extend(batch);
+                for &code in model.keys() {
+                    for depth in 0..=16 {
+                        prop_assert_eq!(tree.get(MortonCode(code), depth), max_in(&model, code, depth));
+                    }
+                }
+                prop_assert_eq!(tree.get(MortonCode(0xffff_ffff_ffff), 16), None);
+                prop_assert_eq!(tree.leaves().count(), tree.len_leaves());
+                prop_assert_eq!(tree.len_leaves(), minimal_leaves(&model));
+                prop_assert_eq!(tree.expanded_voxels(f32::NEG_INFINITY).0, model.len() as u64);
+            }
+            let mut one_by_one = Octree::new();
+            model.iter().for_each(|(&code, &value)| one_by_one.set(MortonCode(code), value));
+            prop_assert_eq!(one_by_one.leaves().collect::<Vec<_>>(), tree.leaves().collect::<Vec<_>>());
+            prop_assert_eq!(one_by_one.len_nodes(), tree.len_nodes());
+        }
     }
 }

@@ -45,10 +45,16 @@ fn first_not_free(
     around: &VoxelBox,
     touches: impl Fn(VoxelIndex) -> bool,
 ) -> Result<Option<VoxelIndex>> {
-    let size: u64 = (0..3).map(|k| u64::from(around.end[k].abs_diff(around.min[k]))).fold(1, u64::saturating_mul);
+    let size: u64 =
+        (0..3).map(|k| u64::from(around.end[k].abs_diff(around.min[k]))).fold(1, u64::saturating_mul);
     if size > MAX_UNKNOWN_VOXELS {
         let hint = "take a smaller body, or count unknown as free";
-        return Err(Error::TooLarge { what: "number of voxels in the body", size, limit: MAX_UNKNOWN_VOXELS, hint });
+        return Err(Error::TooLarge {
+            what: "number of voxels in the body",
+            size,
+            limit: MAX_UNKNOWN_VOXELS,
+            hint,
+        });
     }
     let mut tiles = TileCursor::new(view);
     for x in around.min[0]..around.end[0] {

@@ -34,7 +34,12 @@ pub(super) fn merged_octree(view: &impl MapView, region: Option<&Aabb>, max_voxe
     }
     if count > max_voxels {
         let hint = "name a smaller region (--region)";
-        return Err(Error::TooLarge { what: "number of voxels in one octree", size: count, limit: max_voxels, hint });
+        return Err(Error::TooLarge {
+            what: "number of voxels in one octree",
+            size: count,
+            limit: max_voxels,
+            hint,
+        });
     }
     voxels.sort_unstable_by_key(|&(code, _)| code);
     Ok(Octree::from_sorted(voxels.into_iter()))

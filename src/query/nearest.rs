@@ -15,9 +15,19 @@ pub struct Nearest {
     pub distance_m: f64,
 }
 
-pub(super) fn nearest_occupied(view: &impl MapView, point: Point, max_distance_m: f64) -> Result<Option<Nearest>> {
-    if max_distance_m.is_nan() || max_distance_m < 0.0 || !point.iter().all(|coordinate| coordinate.is_finite()) {
-        return Err(Error::argument("nearest occupied", "needs a finite point and a distance of at least 0 m"));
+pub(super) fn nearest_occupied(
+    view: &impl MapView,
+    point: Point,
+    max_distance_m: f64,
+) -> Result<Option<Nearest>> {
+    if max_distance_m.is_nan()
+        || max_distance_m < 0.0
+        || !point.iter().all(|coordinate| coordinate.is_finite())
+    {
+        return Err(Error::argument(
+            "nearest occupied",
+            "needs a finite point and a distance of at least 0 m",
+        ));
     }
     let (grid, threshold) = (view.config().grid, view.config().occupied_log_odds());
     let ball = |radius_m: f64| Aabb { min: point.map(|c| c - radius_m), max: point.map(|c| c + radius_m) };

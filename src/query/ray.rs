@@ -72,7 +72,8 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
         }
         let tile = held.as_ref().and_then(|(_, tile)| tile.as_ref());
         let occupancy = Occupancy::of(config, tile.and_then(|tile| tile.evidence(voxel)));
-        let stops = occupancy.is_occupied() || (occupancy == Occupancy::Unknown && query.unknown == UnknownAs::Obstacle);
+        let stops = occupancy.is_occupied()
+            || (occupancy == Occupancy::Unknown && query.unknown == UnknownAs::Obstacle);
         if stops {
             let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time());
             return Ok(Some(RayHit { voxel, center_m, distance_m, probability: occupancy.probability() }));

@@ -5,12 +5,17 @@ use crate::maths::logit;
 use crate::space::{Aabb, BRICK_EDGE, Grid, TileIndex, VoxelBox, VoxelIndex};
 use crate::tile::{Tile, Voxel};
 
-pub(super) fn for_each_voxel_in(view: &impl MapView, region: &Aabb, mut visit: impl FnMut(Voxel)) -> Result<()> {
+pub(super) fn for_each_voxel_in(
+    view: &impl MapView,
+    region: &Aabb,
+    mut visit: impl FnMut(Voxel),
+) -> Result<()> {
     let grid = view.config().grid;
     let voxels = voxels_around(&grid, region);
     for index in tiles_in(view, &voxels) {
         if let Some(tile) = view.tile_in_passing(index)? {
-            let inside = voxels_in(&tile, &voxels).filter(|voxel| region.contains(grid.center_m(voxel.index)));
+            let inside =
+                voxels_in(&tile, &voxels).filter(|voxel| region.contains(grid.center_m(voxel.index)));
             inside.for_each(&mut visit);
         }
     }
@@ -38,7 +43,10 @@ pub(super) fn for_each_occupied(
     }
 }
 
-pub(super) fn cached_occupied_voxels(view: &impl MapView, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
+pub(super) fn cached_occupied_voxels(
+    view: &impl MapView,
+    min_probability: Option<f64>,
+) -> Result<Vec<Voxel>> {
     let threshold = min_log_odds(view.config(), min_probability);
     let mut voxels = Vec::new();
     for index in view.cached_tile_indices() {
@@ -110,7 +118,8 @@ pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
 
 /// The voxels whose centre may lie in a box, and a few around.
 pub(super) fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
-    let to_index = |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN / 2), f64::from(i32::MAX / 2)) as i32;
+    let to_index =
+        |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN / 2), f64::from(i32::MAX / 2)) as i32;
     VoxelBox {
         min: grid.to_voxel_units(region.min).map(|coordinate| to_index(coordinate) - 1),
         end: grid.to_voxel_units(region.max).map(|coordinate| to_index(coordinate) + 2),

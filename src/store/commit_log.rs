@@ -54,7 +54,12 @@ impl CommitLog {
     }
 
     /// Writes a log with one record of the whole map, synced, in place of nothing or of a temporary name.
-    pub fn write_whole(disk: &dyn Disk, path: &Path, map_id: [u8; 16], commits: &Commits) -> io::Result<Self> {
+    pub fn write_whole(
+        disk: &dyn Disk,
+        path: &Path,
+        map_id: [u8; 16],
+        commits: &Commits,
+    ) -> io::Result<Self> {
         let mut out = disk.create(path)?;
         let mut bytes = header(map_id).to_vec();
         let mut tiles: Vec<_> = commits.tiles.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
@@ -175,7 +180,11 @@ fn read_header(input: &mut dyn DiskRead, file_bytes: u64) -> Result<[u8; 16], De
 }
 
 /// The payload of the record at `offset`; `None` if there is none, or not a whole one.
-fn read_record(input: &mut dyn DiskRead, offset: u64, file_bytes: u64) -> Result<Option<Vec<u8>>, DecodeError> {
+fn read_record(
+    input: &mut dyn DiskRead,
+    offset: u64,
+    file_bytes: u64,
+) -> Result<Option<Vec<u8>>, DecodeError> {
     let remaining = file_bytes - offset;
     if remaining < 8 {
         return Ok(None);

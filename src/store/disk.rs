@@ -159,9 +159,10 @@ impl DiskWrite for File {
 /// A link inside a map could lead anywhere: it is never followed.
 fn not_a_link(path: &Path) -> io::Result<&Path> {
     match fs::symlink_metadata(path) {
-        Ok(metadata) if metadata.is_symlink() => {
-            Err(io::Error::new(io::ErrorKind::InvalidInput, "a symbolic link; links inside a map are not followed"))
-        }
+        Ok(metadata) if metadata.is_symlink() => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "a symbolic link; links inside a map are not followed",
+        )),
         _ => Ok(path),
     }
 }

@@ -101,7 +101,14 @@ mod tests {
         let tile = TileIndex::new(0, 1, -1);
         assert_eq!(folder_name(tile), "tile_0_1_-1");
         assert_eq!(tile_of_folder("tile_0_1_-1"), Some(tile));
-        for name in ["tile_0_1", "tile_0_1_-1_2", "tile_00_1_-1", "tile_+0_1_-1", "tile_0_1_-0", "tile_0_1_3000000000"] {
+        for name in [
+            "tile_0_1",
+            "tile_0_1_-1_2",
+            "tile_00_1_-1",
+            "tile_+0_1_-1",
+            "tile_0_1_-0",
+            "tile_0_1_3000000000",
+        ] {
             assert_eq!(tile_of_folder(name), None, "{name}");
         }
     }

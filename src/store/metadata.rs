@@ -99,10 +99,12 @@ impl Metadata {
     ///
     /// Text that is no such JSON, a version other than 1.0, or a checksum that does not match.
     pub fn from_text(text: &str) -> Result<Self, FormatError> {
-        let document: Document = serde_json::from_str(text)
-            .map_err(|error| FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}")))?;
+        let document: Document = serde_json::from_str(text).map_err(|error| {
+            FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}"))
+        })?;
         if document.version != VERSION {
-            let reason = format!("version {:?} is not known; this program reads {VERSION:?}", document.version);
+            let reason =
+                format!("version {:?} is not known; this program reads {VERSION:?}", document.version);
             return Err(FormatError::at_offset(0, reason));
         }
         if document.ext.is_some() {

@@ -265,7 +265,8 @@ impl TileStore {
     }
 
     fn sync_next(&self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
-        let sync = |path: &Path, result: io::Result<()>| result.map_err(|error| Error::io(path, "sync", error));
+        let sync =
+            |path: &Path, result: io::Result<()>| result.map_err(|error| Error::io(path, "sync", error));
         for &(tile, _) in changed {
             for file in TileFile::IN_ORDER {
                 let path = self.layout.next(tile, file);
@@ -402,7 +403,8 @@ fn read_metadata(disk: &dyn Disk, layout: &Layout) -> Result<Metadata> {
     let text = String::from_utf8(bytes).map_err(|error| {
         FormatError::at_offset(error.utf8_error().valid_up_to() as u64, "not UTF-8 text").in_map(&path, None)
     })?;
-    let metadata = Metadata::from_text(&text).map_err(|error| DecodeError::from(error).in_map(&path, None))?;
+    let metadata =
+        Metadata::from_text(&text).map_err(|error| DecodeError::from(error).in_map(&path, None))?;
     Ok(metadata)
 }
 

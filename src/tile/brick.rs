@@ -30,7 +30,11 @@ impl Brick {
     }
 
     /// Applies `update` to the voxels of `touched`, in Morton order; it gets the place and what was known.
-    pub(super) fn update(&mut self, touched: BrickMask, mut update: impl FnMut(usize, Option<Evidence>) -> Evidence) {
+    pub(super) fn update(
+        &mut self,
+        touched: BrickMask,
+        mut update: impl FnMut(usize, Option<Evidence>) -> Evidence,
+    ) {
         let known = self.observed;
         self.make_room(touched);
         for place in places(touched) {
@@ -73,7 +77,8 @@ impl Brick {
             counts.push(if was_there { self.counts[rank] } else { 0 });
             rank += usize::from(was_there);
         }
-        *self = Self { observed: union, before: before(union), log_odds: log_odds.into(), counts: counts.into() };
+        *self =
+            Self { observed: union, before: before(union), log_odds: log_odds.into(), counts: counts.into() };
     }
 }
 

@@ -14,7 +14,10 @@ pub struct CachedOctree {
 
 impl CachedOctree {
     /// The octree of the given voxels, in Morton order, behind an empty cache.
-    pub fn from_voxels(config: &VoxelCacheConfig, voxels: impl Iterator<Item = (MortonCode, Evidence)>) -> Self {
+    pub fn from_voxels(
+        config: &VoxelCacheConfig,
+        voxels: impl Iterator<Item = (MortonCode, Evidence)>,
+    ) -> Self {
         let octree = Octree::from_sorted(voxels.map(|(code, evidence)| (code, evidence.log_odds as f32)));
         Self { cache: VoxelCache::new(config.tau, config.buckets), octree }
     }

@@ -92,7 +92,8 @@ impl Tile {
                 for brick in bricks {
                     let mut observations = brick.observations();
                     self.table.update_brick(brick.brick, brick.touched(), |place, before| {
-                        let observation = observations.next().expect("one observation for each touched voxel");
+                        let observation =
+                            observations.next().expect("one observation for each touched voxel");
                         let after = model.update(before, observation);
                         self.octree.put(brick.brick.voxel(place), after.log_odds);
                         after
@@ -131,7 +132,9 @@ impl Tile {
 
     /// The observed voxels of one brick in Morton order.
     pub fn voxels_of_brick(&self, brick: BrickCode) -> impl Iterator<Item = Voxel> {
-        self.table.voxels_of_brick(brick).map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
+        self.table
+            .voxels_of_brick(brick)
+            .map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
     }
 
     /// The voxel of this tile with the given code.

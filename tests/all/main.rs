@@ -2,4 +2,6 @@
 
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
+/// OctoMap's own files, to the last node and byte.
+mod octomap_files;
 mod support;

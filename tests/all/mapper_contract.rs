@@ -154,8 +154,16 @@ fn every_cause_of_a_skipped_point_is_counted() {
     let config = config().with_sensor_model(SensorModel::Iwlo(Iwlo::default())).with_range(1.0, None);
     let mut mapper = InMemoryMapper::new(config).unwrap();
     let origin = [0.25; 3];
-    let points =
-        vec![[f64::NAN; 3], [f64::INFINITY; 3], origin, [0.3; 3], [1e12, 0.0, 0.0], [2e5, 0.0, 0.0], [2.0; 3], [3.0; 3]];
+    let points = vec![
+        [f64::NAN; 3],
+        [f64::INFINITY; 3],
+        origin,
+        [0.3; 3],
+        [1e12, 0.0, 0.0],
+        [2e5, 0.0, 0.0],
+        [2.0; 3],
+        [3.0; 3],
+    ];
     let intensities = Some(vec![90.0, 90.0, 90.0, 90.0, 90.0, 90.0, f32::NAN, 90.0]);
     let report = mapper.insert_scan(&voxtile::Scan { origin, points, intensities }).unwrap();
     let skipped = report.skipped;
@@ -168,7 +176,8 @@ fn every_cause_of_a_skipped_point_is_counted() {
 fn an_echo_without_weight_is_no_evidence_for_its_voxel() {
     let config = config().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
     let mut mapper = InMemoryMapper::new(config).unwrap();
-    let scan = voxtile::Scan { origin: [0.05; 3], points: vec![[0.55, 0.05, 0.05]], intensities: Some(vec![20.0]) };
+    let scan =
+        voxtile::Scan { origin: [0.05; 3], points: vec![[0.55, 0.05, 0.05]], intensities: Some(vec![20.0]) };
     let report = mapper.insert_scan(&scan).unwrap();
     assert_eq!((report.hits, report.misses), (0, 5));
     assert!(mapper.voxel_at([0.55, 0.05, 0.05]).unwrap().is_none());

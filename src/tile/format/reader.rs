@@ -50,7 +50,9 @@ pub fn read_table(
         input.read_exact(&mut bytes)?;
         let trailer = Trailer::from_bytes(&bytes, offset)?;
         if trailer.table_crc != crc.finalize() {
-            return Err(FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into());
+            return Err(
+                FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into()
+            );
         }
         Some(trailer)
     } else {
@@ -81,7 +83,9 @@ fn read_header(
     }
     let count = u64::from(u32_at(8)) | u64::from(u32_at(12)) << 32;
     let after_header = file_bytes - HEADER_BYTES;
-    let Some(after_entries) = count.checked_mul(ENTRY_BYTES).and_then(|bytes| after_header.checked_sub(bytes)) else {
+    let Some(after_entries) =
+        count.checked_mul(ENTRY_BYTES).and_then(|bytes| after_header.checked_sub(bytes))
+    else {
         return wrong(8, format!("a count of {count} entries does not fit into {file_bytes} bytes"));
     };
     match after_entries {
@@ -89,7 +93,9 @@ fn read_header(
         bytes if bytes == TRAILER_BYTES as u64 => Ok((count, true)),
         bytes => wrong(
             file_bytes - bytes,
-            format!("{bytes} bytes follow the last entry; there must be none or a trailer of {TRAILER_BYTES}"),
+            format!(
+                "{bytes} bytes follow the last entry; there must be none or a trailer of {TRAILER_BYTES}"
+            ),
         ),
     }
 }
@@ -109,7 +115,8 @@ impl<'a> Entries<'a> {
     }
 
     fn take(&mut self, entry: &[u8], offset: u64) -> Result<(), FormatError> {
-        let key = VoxelKey(std::array::from_fn(|axis| u16::from_le_bytes([entry[2 * axis], entry[2 * axis + 1]])));
+        let key =
+            VoxelKey(std::array::from_fn(|axis| u16::from_le_bytes([entry[2 * axis], entry[2 * axis + 1]])));
         let log_odds = f64::from_le_bytes(std::array::from_fn(|k| entry[6 + k]));
         let observation_count = i32::from_le_bytes(std::array::from_fn(|k| entry[14 + k]));
         let wrong = |at, reason| Err(FormatError::at_offset(offset + at, reason));

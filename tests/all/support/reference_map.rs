@@ -60,9 +60,17 @@ impl ReferenceMap {
     }
 
     /// The voxels that a ray passes, and the one it hits.
-    fn ray(&self, origin: Point, point: Point, intensity: f32) -> Option<(Vec<VoxelIndex>, Option<VoxelIndex>)> {
+    fn ray(
+        &self,
+        origin: Point,
+        point: Point,
+        intensity: f32,
+    ) -> Option<(Vec<VoxelIndex>, Option<VoxelIndex>)> {
         let (rays, model) = (&self.config.rays, &self.config.sensor_model);
-        if point.iter().any(|x| !x.is_finite()) || point == origin || (model.needs_intensity() && intensity.is_nan()) {
+        if point.iter().any(|x| !x.is_finite())
+            || point == origin
+            || (model.needs_intensity() && intensity.is_nan())
+        {
             return None;
         }
         let d: Point = std::array::from_fn(|k| point[k] - origin[k]);
