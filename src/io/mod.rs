@@ -1,1 +1,25 @@
-//! The octree.
+//! Other people's files, one format a file; knows no mapper.
+//!
+//! ```text
+//! folder of PCD + poses ┐                                  ┌ .ply .pcd .csv
+//! OctoMap scan graph    ├ ScanSource -> SensorScan   Voxel ┤
+//! OctoMap scan log      ┘                                  └ VoxelWriter
+//! ```
+
+mod lzf;
+mod pcd;
+mod pcd_folder;
+mod points;
+mod poses;
+mod scan_graph;
+mod scan_log;
+mod sensor_scan;
+mod source;
+mod voxel_writer;
+
+pub use pcd::{PcdCloud, read_pcd};
+pub use points::read_points;
+pub use poses::read_poses;
+pub use sensor_scan::SensorScan;
+pub use source::{ScanSource, open_scans};
+pub use voxel_writer::{VoxelFormat, VoxelRecord, VoxelWriter};

@@ -1,0 +1,31 @@
+use crate::error::FormatError;
+use crate::space::Point;
+use std::io::{self, BufRead};
+
+/// Reads points, one a line: x y z in metres, separated by blanks or commas; more columns are ignored. Empty lines,
+/// lines that begin with `#` and a first line of words are skipped.
+///
+/// # Errors
+///
+/// A line without three numbers; the outer error is the stream's.
+pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatError>> {
+    let mut points = Vec::new();
+    for (number, line) in (1..).zip(input.lines()) {
+        let line = line?;
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let words = line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty());
+        let numbers: Vec<Option<f64>> = words.take(3).map(|word| word.parse().ok()).collect();
+        match numbers[..] {
+            [Some(x), Some(y), Some(z)] => points.push([x, y, z]),
+            _ if points.is_empty() && number == 1 && numbers.iter().all(Option::is_none) => {}
+            _ => {
+                let reason = format!("`{line}` is not a point; three numbers x y z are needed");
+                return Ok(Err(FormatError::at_line(number, reason)));
+            }
+        }
+    }
+    Ok(Ok(points))
+}

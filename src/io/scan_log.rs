@@ -1,0 +1,130 @@
+use super::scan_graph::fingerprint_of_file;
+use super::sensor_scan::SensorScan;
+use super::source::ScanSource;
+use crate::error::{Error, FormatError, Result};
+use crate::maths::sin_cos;
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// OctoMap's scan log, a text: `NODE x y z roll pitch yaw` begins a scan, its points follow as `x y z`, in the frame
+/// of the node. Empty lines and those that begin with `#` or a blank are skipped, as OctoMap skips them.
+///
+/// Numbers are read as `f32`, as OctoMap does, so that log and graph give the same map.
+pub(super) struct ScanLog {
+    path: PathBuf,
+    input: BufReader<File>,
+    file_bytes: u64,
+    line: u64,
+    /// Pose of the scan whose points come next.
+    pose: Option<Isometry3<f64>>,
+    done: usize,
+}
+
+/// A longer line is none of a scan log.
+const MAX_LINE_BYTES: u64 = 1 << 16;
+
+impl ScanLog {
+    pub(super) fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
+        let file_bytes = file.metadata().map_err(|error| Error::io(path, "look at", error))?.len();
+        let input = BufReader::new(file);
+        Ok(Self { path: path.to_owned(), input, file_bytes, line: 0, pose: None, done: 0 })
+    }
+
+    /// The next line with content; `None` at the end.
+    fn next_line(&mut self) -> Result<Option<String>> {
+        loop {
+            let mut bytes = Vec::new();
+            let mut limited = std::io::Read::take(&mut self.input, MAX_LINE_BYTES);
+            let read = limited
+                .read_until(b'\n', &mut bytes)
+                .map_err(|error| Error::io(&self.path, "read", error))?;
+            if read == 0 {
+                return Ok(None);
+            }
+            self.line += 1;
+            if read as u64 == MAX_LINE_BYTES {
+                return Err(self.wrong("the line is too long for a scan log"));
+            }
+            let line = String::from_utf8_lossy(&bytes).trim_end().to_owned();
+            if !(line.is_empty() || line.starts_with(['#', ' '])) {
+                return Ok(Some(line));
+            }
+        }
+    }
+
+    fn numbers<const N: usize>(&self, words: &str) -> Result<[f64; N]> {
+        let mut words = words.split_ascii_whitespace();
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            let Some(word) = words.next() else { return Err(self.wrong(format!("fewer than {N} numbers"))) };
+            let parsed: f32 = word.parse().map_err(|_| self.wrong(format!("`{word}` is not a number")))?;
+            *number = f64::from(parsed);
+        }
+        Ok(numbers)
+    }
+
+    fn pose(&self, words: &str) -> Result<Isometry3<f64>> {
+        let [x, y, z, roll, pitch, yaw] = self.numbers(words)?;
+        if ![x, y, z, roll, pitch, yaw].iter().all(|number| number.is_finite()) {
+            return Err(self.wrong("a pose that is not finite"));
+        }
+        Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation(roll, pitch, yaw)))
+    }
+
+    fn wrong(&self, reason: impl Into<String>) -> Error {
+        FormatError::at_line(self.line, reason).in_input(&self.path)
+    }
+}
+
+impl ScanSource for ScanLog {
+    fn len_hint(&self) -> Option<usize> {
+        None
+    }
+
+    fn next_scan(&mut self) -> Result<Option<SensorScan>> {
+        let mut points_in_sensor = Vec::new();
+        let mut next = None;
+        while let Some(line) = self.next_line()? {
+            let node = line.strip_prefix("NODE").map(|words| self.pose(words)).transpose()?;
+            match (node, self.pose) {
+                (Some(pose), None) => self.pose = Some(pose),
+                (Some(pose), Some(_)) => {
+                    next = Some(pose);
+                    break;
+                }
+                (None, Some(_)) => points_in_sensor.push(self.numbers(&line)?),
+                (None, None) => {
+                    return Err(self.wrong("points before the first line NODE; this is no scan log"));
+                }
+            }
+        }
+        let Some(world_from_sensor) = std::mem::replace(&mut self.pose, next) else { return Ok(None) };
+        let name = self.done.to_string();
+        self.done += 1;
+        Ok(Some(SensorScan { name, points_in_sensor, intensities: None, world_from_sensor }))
+    }
+
+    fn fingerprint(&self) -> String {
+        fingerprint_of_file(&self.path, self.file_bytes)
+    }
+}
+
+/// First roll about x, then pitch about y, then yaw about z, in radians.
+fn rotation(roll: f64, pitch: f64, yaw: f64) -> UnitQuaternion<f64> {
+    let ((sr, cr), (sp, cp), (sy, cy)) = (sin_cos(roll), sin_cos(pitch), sin_cos(yaw));
+    let matrix = Matrix3::new(
+        cy * cp,
+        cy * sp * sr - sy * cr,
+        cy * sp * cr + sy * sr,
+        sy * cp,
+        sy * sp * sr + cy * cr,
+        sy * sp * cr - cy * sr,
+        -sp,
+        cp * sr,
+        cp * cr,
+    );
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))
+}

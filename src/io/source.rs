@@ -1,0 +1,73 @@
+use super::pcd_folder::PcdFolder;
+use super::scan_graph::ScanGraph;
+use super::scan_log::ScanLog;
+use super::sensor_scan::SensorScan;
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Scans one at a time, in order.
+pub trait ScanSource {
+    /// Number of scans, if known before they are read.
+    fn len_hint(&self) -> Option<usize>;
+
+    /// The next scan; `None` after the last.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read or is not what it should be, with its path and offset or line.
+    fn next_scan(&mut self) -> Result<Option<SensorScan>>;
+
+    /// Passes over scans without building them; returns how many there were.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanSource::next_scan`].
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        for skipped in 0..scans {
+            if self.next_scan()?.is_none() {
+                return Ok(skipped);
+            }
+        }
+        Ok(scans)
+    }
+
+    /// A fingerprint of the input that stays the same when it is moved: BLAKE3 over names, sizes and poses. Point
+    /// data is not read for it.
+    fn fingerprint(&self) -> String;
+}
+
+/// Opens scans by what the path is: a folder of PCD files (or one that holds it as `scans/`), one PCD file, an
+/// OctoMap scan graph (`.graph`) or scan log (`.log`).
+///
+/// Poses of PCD files come from `poses`, or from `poses_tum.txt` or `poses_kitti.txt` in or beside the folder, or from
+/// the `VIEWPOINT` of each file.
+///
+/// # Errors
+///
+/// A path that is none of these, poses that do not match the files in number, a file that cannot be read.
+pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource>> {
+    let metadata = std::fs::metadata(path).map_err(|error| Error::io(path, "open", error))?;
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let needs_no_poses = |kind: &str| match poses {
+        None => Ok(()),
+        Some(_) => {
+            Err(Error::argument("--poses", format!("a {kind} has its own poses; leave the option out")))
+        }
+    };
+    match extension.to_ascii_lowercase().as_str() {
+        _ if metadata.is_dir() => Ok(Box::new(PcdFolder::open(path, poses)?)),
+        "pcd" => Ok(Box::new(PcdFolder::open_file(path, poses)?)),
+        "graph" => {
+            needs_no_poses("scan graph")?;
+            Ok(Box::new(ScanGraph::open(path)?))
+        }
+        "log" => {
+            needs_no_poses("scan log")?;
+            Ok(Box::new(ScanLog::open(path)?))
+        }
+        _ => {
+            let reason = "not a folder of .pcd files, nor a .pcd, .graph or .log file";
+            Err(Error::argument(path.display().to_string(), reason))
+        }
+    }
+}
