@@ -198,7 +198,7 @@ impl Header {
             .split_at_checked(8)
             .ok_or_else(|| wrong("the file ends before the sizes of the packed data".into()))?;
         let size = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| sizes[at + k])) as usize;
-        let wanted = self.point_bytes.checked_mul(self.points).unwrap_or(usize::MAX);
+        let wanted = self.point_bytes.saturating_mul(self.points);
         if size(4) != wanted {
             return Err(wrong(format!(
                 "{} bytes unpacked for {} points of {}",

@@ -42,5 +42,5 @@ pub(super) fn merged_octree(view: &impl MapView, region: Option<&Aabb>, max_voxe
         });
     }
     voxels.sort_unstable_by_key(|&(code, _)| code);
-    Ok(Octree::from_sorted(voxels.into_iter()))
+    Ok(Octree::from_sorted(voxels))
 }

@@ -107,14 +107,11 @@ impl RayWalk {
             }
             return;
         }
-        for axis in 0..3 {
-            if axis == exit_axis {
-                self.voxel[axis] = border[axis] + self.step[axis];
-            } else {
-                self.voxel[axis] = self.voxel_before(axis, border[axis], exit, axis < exit_axis);
-            }
-            self.next[axis] = self.crossing(axis, self.voxel[axis]);
-        }
+        self.voxel = std::array::from_fn(|axis| match axis == exit_axis {
+            true => border[axis] + self.step[axis],
+            false => self.voxel_before(axis, border[axis], exit, axis < exit_axis),
+        });
+        self.next = std::array::from_fn(|axis| self.crossing(axis, self.voxel[axis]));
         self.entry = exit;
     }
 

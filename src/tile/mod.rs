@@ -12,10 +12,10 @@ mod brick;
 mod cached_octree;
 pub mod format;
 mod table;
-mod tile;
+mod tile_body;
 mod voxel_cache;
 
 pub use cached_octree::CachedOctree;
 pub use table::Table;
-pub use tile::{Tile, TileCounts, Voxel};
+pub use tile_body::{Tile, TileCounts, Voxel};
 pub use voxel_cache::{VoxelCache, VoxelCacheCounts};

@@ -1,2 +1,66 @@
-//! The command.
-fn main() {}
+//! The command `voxtile`: parse, run one command, exit code.
+
+mod args;
+mod build;
+mod demo;
+mod digest;
+mod export;
+mod info;
+mod map_at;
+mod memory;
+mod picture;
+mod progress;
+mod query;
+mod raycast;
+mod summary;
+
+use args::{Cli, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn"))
+        .format_timestamp(None)
+        .init();
+    let outcome = match Cli::parse().command {
+        Command::Build(args) => build::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Query(args) => query::run(&args),
+        Command::Raycast(args) => raycast::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Digest(args) => digest::run(&args),
+        Command::Demo(args) => demo::run(&args),
+    };
+    outcome.unwrap_or_else(|error| {
+        if is_closed_pipe(&error) {
+            return ExitCode::SUCCESS;
+        }
+        eprintln!("voxtile: {error:#}");
+        exit_code_of(&error)
+    })
+}
+
+/// Ended by Ctrl-C or SIGTERM, after everything so far was flushed.
+pub const INTERRUPTED: u8 = 130;
+
+/// 2 for what the user can put right on the command line, 1 for everything else.
+fn exit_code_of(error: &anyhow::Error) -> ExitCode {
+    use voxtile::Error;
+    match error.downcast_ref() {
+        Some(
+            Error::InvalidArgument { .. }
+            | Error::Grid(_)
+            | Error::AlreadyExists { .. }
+            | Error::Mismatch { .. },
+        ) => ExitCode::from(2),
+        _ => ExitCode::FAILURE,
+    }
+}
+
+/// `voxtile ... | head` is no error.
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
+        .any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
+}

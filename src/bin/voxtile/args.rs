@@ -1,0 +1,185 @@
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
+///
+/// Lengths are metres, coordinates are in the world frame.
+#[derive(Debug, Parser)]
+#[command(name = "voxtile", version, propagate_version = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Build a map from scans, or add scans to one
+    Build(BuildArgs),
+    /// Say what a map holds
+    Info(InfoArgs),
+    /// Ask whether places are occupied, free or unknown
+    Query(QueryArgs),
+    /// Find the first occupied voxel on a ray
+    Raycast(RaycastArgs),
+    /// Write a map's voxels to a file: .ply .pcd .csv .bt .ot
+    Export(ExportArgs),
+    /// Print the digest of a map's content: equal for equal maps
+    Digest(DigestArgs),
+    /// Map a small made-up city and draw it: a first look, no data needed
+    Demo(DemoArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct BuildArgs {
+    /// A folder of PCD files in the sensor frame (or one that holds it as scans/), an OctoMap scan graph (.graph) or
+    /// scan log (.log)
+    #[arg(value_name = "SCANS")]
+    pub scans: PathBuf,
+    /// Folder of the map
+    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    pub output: PathBuf,
+    /// Edge of a voxel in metres [default: 0.1, or the map's own with --append]
+    #[arg(long, value_name = "M")]
+    pub resolution: Option<f64>,
+    /// Edge of a tile in metres, 2 to 1024 whole voxels [default: 10, or the map's own with --append]
+    #[arg(long, value_name = "M")]
+    pub tile_size: Option<f64>,
+    /// Most tiles kept in memory
+    #[arg(long, value_name = "N", default_value_t = 256)]
+    pub cache_tiles: usize,
+    /// Skip points nearer to the sensor than this, in metres
+    #[arg(long, value_name = "M", default_value_t = 0.0)]
+    pub min_range: f64,
+    /// Cut rays at this range in metres: free up to there, nothing hit
+    #[arg(long, value_name = "M", default_value_t = 100.0)]
+    pub max_range: f64,
+    /// How observations become evidence [default: log-odds, or the map's own with --append]
+    #[arg(long, value_name = "MODEL")]
+    pub sensor_model: Option<ModelName>,
+    /// iwlo: intensities up to this one are no evidence, in the sensor's unit [default: 35]
+    #[arg(long, value_name = "I", allow_negative_numbers = true)]
+    pub intensity_threshold: Option<f64>,
+    /// iwlo: intensity of full weight, in the sensor's unit [default: 255]
+    #[arg(long, value_name = "I", allow_negative_numbers = true)]
+    pub intensity_max: Option<f64>,
+    /// How often one scan updates a voxel
+    #[arg(long, value_name = "MODE", default_value = "per-scan")]
+    pub insert: InsertName,
+    /// File of poses, sensor to world, one line a scan: TUM (t tx ty tz qx qy qz qw) or KITTI (3x4 matrix, row by row)
+    /// [default: poses_tum.txt or poses_kitti.txt in or beside SCANS, else the VIEWPOINT of each PCD file]
+    #[arg(long, value_name = "FILE")]
+    pub poses: Option<PathBuf>,
+    /// Add the scans to an existing map
+    #[arg(long)]
+    pub append: bool,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ModelName {
+    /// OctoMap's: constant log-odds for hit and miss
+    LogOdds,
+    /// Intensity-weighted log-odds, for sonar, radar and lidar intensity
+    Iwlo,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum InsertName {
+    /// Once; a hit wins over any miss
+    PerScan,
+    /// Once for every ray
+    PerRay,
+}
+
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct QueryArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// A point: X Y Z in metres
+    #[arg(value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true, required_unless_present = "points")]
+    pub point: Vec<f64>,
+    /// A file of points, one a line: x y z in metres, separated by blanks or commas; - for standard input
+    #[arg(long, value_name = "FILE", conflicts_with = "point")]
+    pub points: Option<PathBuf>,
+    /// Print JSON, one object a line
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct RaycastArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// Where the ray begins, in metres
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true, required = true)]
+    pub origin: Vec<f64>,
+    /// Where it goes; any length but 0
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true, required = true)]
+    pub direction: Vec<f64>,
+    /// How far it goes, in metres [default: as far as the map reaches]
+    #[arg(long, value_name = "M")]
+    pub max_range: Option<f64>,
+    /// Let unknown space stop the ray
+    #[arg(long)]
+    pub unknown_blocks: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// File to write; its extension says what: .ply .pcd .csv hold occupied voxels, .bt .ot the whole octree
+    #[arg(short = 'o', long = "output", value_name = "FILE")]
+    pub output: PathBuf,
+    /// Voxels of at least this probability; 0 takes all observed ones [default: the map's occupancy threshold]
+    #[arg(long, value_name = "P")]
+    pub min_probability: Option<f64>,
+    /// Only voxels whose centre is in this box: X0 <= x < X1 and so on, in metres
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, allow_negative_numbers = true)]
+    pub region: Option<Vec<f64>>,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct DigestArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Folder for the map and the picture
+    #[arg(long, value_name = "DIR", default_value = "voxtile_demo")]
+    pub out: PathBuf,
+    /// Which city
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Length of the drive in metres
+    #[arg(long, value_name = "M", default_value_t = 120)]
+    pub length: u32,
+    /// Most tiles kept in memory
+    #[arg(long, value_name = "N", default_value_t = 24)]
+    pub cache_tiles: usize,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+}

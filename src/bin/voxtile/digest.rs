@@ -1,0 +1,18 @@
+use crate::args::DigestArgs;
+use crate::map_at::read_map;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::Questions;
+use voxtile::mapper::MapView;
+
+pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {
+    let (digest, scan_number) = read_map(&args.map, |reader| Ok((reader.digest()?, reader.scan_number())))?;
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let digest = digest.to_string();
+        writeln!(out, "{}", serde_json::json!({ "digest": digest, "scan_number": scan_number }))?;
+    } else {
+        writeln!(out, "{digest}")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,125 @@
+use crate::args::ExportArgs;
+use crate::map_at::{point_of, read_map};
+use crate::progress::Progress;
+use indicatif::HumanCount;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use voxtile::io::{VoxelFormat, VoxelRecord, VoxelWriter};
+use voxtile::mapper::{MapReader, MapView};
+use voxtile::octree::{write_bt, write_ot};
+use voxtile::space::Aabb;
+use voxtile::{Error, Questions};
+
+/// Most voxels of one merged octree, which is built in memory: about 2 GB.
+const MAX_OCTREE_VOXELS: u64 = 100_000_000;
+
+pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
+    let region = args
+        .region
+        .as_ref()
+        .map(|corners| Aabb { min: point_of(&corners[..3]), max: point_of(&corners[3..]) });
+    if region.is_some_and(|region| !(0..3).all(|k| region.min[k] < region.max[k])) {
+        return Err(Error::argument("--region", "needs X0 < X1, Y0 < Y1 and Z0 < Z1").into());
+    }
+    if args.min_probability.is_some_and(|probability| !(0.0..=1.0).contains(&probability)) {
+        return Err(Error::argument("--min-probability", "must be from 0 to 1").into());
+    }
+    let extension = args.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let count = match (extension, VoxelFormat::of_path(&args.output)) {
+        (_, Some(format)) => {
+            read_map(&args.map, |reader| export_voxels(args, format, region.as_ref(), reader))?
+        }
+        ("bt" | "ot", None) if args.min_probability.is_some() => {
+            let reason = "an octree file holds free and occupied voxels alike; leave the option out";
+            return Err(Error::argument("--min-probability", reason).into());
+        }
+        ("bt" | "ot", None) => {
+            read_map(&args.map, |reader| export_octree(args, extension, region.as_ref(), reader))?
+        }
+        _ => {
+            let reason =
+                format!("{}: the extension must be .ply, .pcd, .csv, .bt or .ot", args.output.display());
+            return Err(Error::argument("--output", reason).into());
+        }
+    };
+    let mut out = io::stdout().lock();
+    if args.json {
+        writeln!(out, "{}", serde_json::json!({ "file": args.output, "voxels": count }))?;
+    } else {
+        writeln!(out, "{} voxels in {}", HumanCount(count), args.output.display())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn export_voxels(
+    args: &ExportArgs,
+    format: VoxelFormat,
+    region: Option<&Aabb>,
+    reader: &MapReader,
+) -> anyhow::Result<u64> {
+    let grid = reader.config().grid;
+    // Two passes in constant memory: the header names the count.
+    let mut count = 0;
+    reader.for_each_occupied(args.min_probability, region, |_| count += 1)?;
+    write_whole(&args.output, |out| {
+        let progress = Progress::over_tiles(reader.tile_indices().len());
+        let mut writer = VoxelWriter::new(format, count, grid.resolution_m(), out)?;
+        let mut written = Ok(());
+        let mut tile = None;
+        reader.for_each_occupied(args.min_probability, region, |voxel| {
+            let index = Some(grid.tile_of_voxel(voxel.index));
+            if tile != index {
+                tile = index;
+                progress.step();
+            }
+            if written.is_ok() {
+                written = writer.write(&VoxelRecord {
+                    center_m: grid.center_m(voxel.index),
+                    probability: voxel.evidence.probability(),
+                    log_odds: voxel.evidence.log_odds,
+                    observation_count: voxel.evidence.observation_count,
+                });
+            }
+        })?;
+        written?;
+        writer.finish()?;
+        Ok(count)
+    })
+}
+
+fn export_octree(
+    args: &ExportArgs,
+    extension: &str,
+    region: Option<&Aabb>,
+    reader: &MapReader,
+) -> anyhow::Result<u64> {
+    let (config, tree) = (reader.config(), reader.merged_octree(region, MAX_OCTREE_VOXELS)?);
+    let resolution_m = config.grid.resolution_m();
+    let threshold = config.occupied_log_odds() as f32;
+    write_whole(&args.output, |mut out| {
+        match extension {
+            "bt" => write_bt(&tree, resolution_m, threshold, &mut out)?,
+            _ => write_ot(&tree, resolution_m, &mut out)?,
+        }
+        Ok(tree.expanded_voxels(threshold).0)
+    })
+}
+
+/// Writes a file beside its place and moves it there once it is whole.
+fn write_whole<T>(path: &Path, write: impl FnOnce(&mut dyn Write) -> anyhow::Result<T>) -> anyhow::Result<T> {
+    let part: PathBuf = path.with_added_extension("part");
+    let file = File::create(&part).map_err(|error| Error::io(&part, "create", error))?;
+    let mut out = BufWriter::with_capacity(1 << 18, file);
+    let outcome = write(&mut out).and_then(|value| {
+        out.flush()?;
+        fs::rename(&part, path)?;
+        Ok(value)
+    });
+    if outcome.is_err() {
+        // The error to report is the first one.
+        fs::remove_file(&part).ok();
+    }
+    outcome
+}

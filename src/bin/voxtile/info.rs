@@ -1,0 +1,110 @@
+use crate::args::InfoArgs;
+use crate::map_at::read_map;
+use indicatif::{HumanBytes, HumanCount};
+use serde::Serialize;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::mapper::{MapReader, MapView};
+use voxtile::sensor::SensorModel;
+use voxtile::store::Bounds;
+use voxtile::{Questions, Result};
+
+#[derive(Debug, Serialize)]
+struct Info {
+    map_id: Option<String>,
+    verified: bool,
+    resolution_m: f64,
+    tile_size_m: f64,
+    sensor_model: SensorModel,
+    occupancy_threshold: f64,
+    scan_number: u64,
+    flush_number: u64,
+    input_fingerprint: Option<String>,
+    tiles: u64,
+    tile_bounds: Option<Bounds>,
+    bounds_m: Option<[[f64; 3]; 2]>,
+    voxels: u64,
+    occupied: u64,
+    table_bytes: u64,
+    octree_bytes: u64,
+}
+
+pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
+    let info = read_map(&args.map, |reader| Ok(Info::of(reader)?))?;
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string(&info)?)?;
+    } else {
+        info.print(&mut out)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Info {
+    fn of(reader: &MapReader) -> Result<Self> {
+        let config = reader.config();
+        let ext = reader.metadata().ext.as_ref();
+        let tile_bounds = Bounds::of(reader.tile_indices().into_iter());
+        let tile_size_m = config.grid.tile_size_m();
+        let corner = |index: [i32; 3], add: i64| index.map(|k| (i64::from(k) + add) as f64 * tile_size_m);
+        let (voxels, occupied) = match reader.voxel_counts() {
+            Some(counts) => counts,
+            None => count(reader)?,
+        };
+        let (table_bytes, octree_bytes) = reader.disk_bytes().unwrap_or_default();
+        Ok(Self {
+            map_id: ext.map(|ext| ext.map_id.clone()),
+            verified: reader.is_verified(),
+            resolution_m: config.grid.resolution_m(),
+            tile_size_m,
+            sensor_model: config.sensor_model,
+            occupancy_threshold: config.occupancy_threshold,
+            scan_number: reader.scan_number(),
+            flush_number: reader.flush_number(),
+            input_fingerprint: ext.and_then(|ext| ext.input_fingerprint.clone()),
+            tiles: reader.tile_indices().len() as u64,
+            tile_bounds,
+            bounds_m: tile_bounds.map(|bounds| [corner(bounds.min, 0), corner(bounds.max, 1)]),
+            voxels,
+            occupied,
+            table_bytes,
+            octree_bytes,
+        })
+    }
+
+    fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let id = self
+            .map_id
+            .as_deref()
+            .unwrap_or("none: the seed's format, without checksums, cannot be verified");
+        writeln!(out, "map id       {id}")?;
+        writeln!(out, "resolution   {} m, tiles of {} m", self.resolution_m, self.tile_size_m)?;
+        let model = match self.sensor_model {
+            SensorModel::LogOdds(_) => "log-odds",
+            SensorModel::Iwlo(_) => "iwlo",
+            _ => "other",
+        };
+        writeln!(out, "model        {model}, occupied from probability {}", self.occupancy_threshold)?;
+        writeln!(
+            out,
+            "scans        {} in {} flushes",
+            HumanCount(self.scan_number),
+            HumanCount(self.flush_number)
+        )?;
+        writeln!(out, "tiles        {}", HumanCount(self.tiles))?;
+        if let Some([min, max]) = self.bounds_m {
+            writeln!(out, "bounds       {min:?} to {max:?} m")?;
+        }
+        writeln!(out, "voxels       {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;
+        let (table, octree) = (HumanBytes(self.table_bytes), HumanBytes(self.octree_bytes));
+        writeln!(out, "on disk      {table} in tables, {octree} in octrees")
+    }
+}
+
+/// Observed and occupied voxels, tile by tile.
+fn count(reader: &MapReader) -> Result<(u64, u64)> {
+    let (mut voxels, mut occupied) = (0, 0);
+    reader.for_each_occupied(Some(0.0), None, |_| voxels += 1)?;
+    reader.for_each_occupied(None, None, |_| occupied += 1)?;
+    Ok((voxels, occupied))
+}

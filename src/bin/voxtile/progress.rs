@@ -1,0 +1,60 @@
+use crate::memory::resident_bytes;
+use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
+use voxtile::mapper::{MapStatistics, MapView};
+
+/// A bar on standard error for long work; nothing where that is no terminal.
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// A bar over scans.
+    pub fn over_scans(scans: Option<usize>) -> Self {
+        let (bar, template) = match scans {
+            Some(scans) => (
+                ProgressBar::new(scans as u64),
+                "{bar:30} {pos}/{len} scans  {per_sec:.0}  {msg}  {eta} left",
+            ),
+            None => (ProgressBar::no_length(), "{spinner} {pos} scans  {per_sec:.0}  {msg}"),
+        };
+        bar.set_style(style(template));
+        Self { bar }
+    }
+
+    /// A bar over tiles.
+    pub fn over_tiles(tiles: usize) -> Self {
+        let bar = ProgressBar::new(tiles as u64);
+        bar.set_style(style("{bar:30} {pos}/{len} tiles  {eta} left"));
+        Self { bar }
+    }
+
+    /// One more is done.
+    pub fn step(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Shows what a mapper holds. Asked for a few times a second at most.
+    pub fn show(&self, mapper: &impl MapView) {
+        if self.bar.is_hidden() || !self.bar.position().is_multiple_of(8) {
+            return;
+        }
+        let MapStatistics { tiles, cached_tiles, .. } = mapper.statistics();
+        let memory = resident_bytes().map_or(String::new(), |bytes| format!(", {}", HumanBytes(bytes)));
+        self.bar.set_message(format!("{tiles} tiles, {cached_tiles} in memory{memory}"));
+    }
+
+    /// Says what is going on when it is no step.
+    pub fn say(&self, message: &'static str) {
+        self.bar.set_message(message);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}

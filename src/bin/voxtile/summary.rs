@@ -1,0 +1,86 @@
+use crate::memory;
+use indicatif::{HumanBytes, HumanCount};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use voxtile::mapper::{MapReader, MapView};
+use voxtile::scan::ScanReport;
+
+/// What a build did, and what the map now is.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    pub map: PathBuf,
+    pub scans: u64,
+    pub interrupted: bool,
+    #[serde(flatten)]
+    pub report: ScanReport,
+    pub scan_number: u64,
+    pub voxels: u64,
+    pub occupied: u64,
+    pub tiles: u64,
+    pub disk_bytes: u64,
+    pub loads: u64,
+    pub saves: u64,
+    pub seconds: f64,
+    pub peak_memory_bytes: Option<u64>,
+}
+
+impl Summary {
+    /// The summary of `scans` inserted into a map that has been flushed.
+    pub fn of(
+        map: &Path,
+        scans: u64,
+        report: ScanReport,
+        mapper: &impl MapView,
+        elapsed: Duration,
+    ) -> voxtile::Result<Self> {
+        let reader = MapReader::open(map, 1)?;
+        let (voxels, occupied) = reader.voxel_counts().unwrap_or_default();
+        let statistics = mapper.statistics();
+        Ok(Self {
+            map: map.to_owned(),
+            scans,
+            interrupted: false,
+            report,
+            scan_number: reader.scan_number(),
+            voxels,
+            occupied,
+            tiles: statistics.tiles,
+            disk_bytes: statistics.disk_bytes,
+            loads: statistics.io.loads,
+            saves: statistics.io.saves,
+            seconds: elapsed.as_secs_f64(),
+            peak_memory_bytes: memory::peak_bytes(),
+        })
+    }
+
+    /// Prints the summary for a person, or as JSON.
+    pub fn print(&self, json: bool) -> anyhow::Result<()> {
+        use std::io::Write;
+        let mut out = std::io::stdout().lock();
+        if json {
+            writeln!(out, "{}", serde_json::to_string(self)?)?;
+            return Ok(());
+        }
+        let ScanReport { points, skipped, cut_at_max_range, .. } = self.report;
+        let rate = self.scans as f64 / self.seconds.max(1e-9);
+        writeln!(out, "map       {}", self.map.display())?;
+        writeln!(out, "scans     {} in {:.1} s ({rate:.1} a second)", HumanCount(self.scans), self.seconds)?;
+        writeln!(
+            out,
+            "points    {}, {} cut at the max range",
+            HumanCount(points),
+            HumanCount(cut_at_max_range)
+        )?;
+        for (cause, count) in skipped.by_cause().into_iter().filter(|&(_, count)| count > 0) {
+            writeln!(out, "skipped   {} {cause}", HumanCount(count))?;
+        }
+        writeln!(out, "voxels    {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;
+        writeln!(out, "tiles     {}, {} on disk", HumanCount(self.tiles), HumanBytes(self.disk_bytes))?;
+        writeln!(out, "tile I/O  {} read, {} written", HumanCount(self.loads), HumanCount(self.saves))?;
+        if let Some(bytes) = self.peak_memory_bytes {
+            writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
+        }
+        Ok(())
+    }
+}
