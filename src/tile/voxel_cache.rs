@@ -16,7 +16,10 @@ pub struct VoxelCache {
     buckets: Box<[Vec<Cell>]>,
     len: usize,
     cell_bytes: usize,
-    /// Distinct voxels put in since the last eviction.
+    /// Buckets with more than `tau` cells.
+    overfull: Vec<u32>,
+    /// Number of the present scan, and the distinct voxels that it put in.
+    scan: u32,
     voxels_of_scan: usize,
     counts: VoxelCacheCounts,
 }
@@ -37,8 +40,8 @@ pub struct VoxelCacheCounts {
 struct Cell {
     code: MortonCode,
     log_odds: f32,
-    /// Whether the voxel was put in or changed since the last eviction.
-    is_of_this_scan: bool,
+    /// The scan that put the voxel in or changed it last.
+    scan: u32,
 }
 
 /// Cells of a cache that fits itself, as a multiple of the voxels of a scan; the paper's section 5.2 takes 3 to 4.
@@ -54,6 +57,8 @@ impl VoxelCache {
             buckets: empty_buckets(buckets.unwrap_or(1)),
             len: 0,
             cell_bytes: 0,
+            overfull: Vec::new(),
+            scan: 0,
             voxels_of_scan: 0,
             counts: VoxelCacheCounts::default(),
         }
@@ -76,23 +81,31 @@ impl VoxelCache {
 
     /// Bytes of memory on the heap.
     pub fn bytes(&self) -> usize {
-        self.buckets.len() * size_of::<Vec<Cell>>() + self.cell_bytes
+        self.buckets.len() * size_of::<Vec<Cell>>() + self.cell_bytes + self.overfull.capacity() * size_of::<u32>()
     }
 
     /// Takes the accumulated log-odds of an updated voxel.
     pub fn put(&mut self, code: MortonCode, log_odds: f32) {
-        let bucket = &mut self.buckets[code.0 as usize & (self.buckets.len() - 1)];
+        let number = code.0 as usize & (self.buckets.len() - 1);
+        let bucket = &mut self.buckets[number];
         if let Some(cell) = bucket.iter_mut().find(|cell| cell.code == code) {
             self.counts.hits += 1;
-            self.voxels_of_scan += usize::from(!cell.is_of_this_scan);
-            (cell.log_odds, cell.is_of_this_scan) = (log_odds, true);
+            self.voxels_of_scan += usize::from(cell.scan != self.scan);
+            (cell.log_odds, cell.scan) = (log_odds, self.scan);
         } else {
             self.counts.misses += 1;
             self.voxels_of_scan += 1;
             let capacity = bucket.capacity();
-            bucket.push(Cell { code, log_odds, is_of_this_scan: true });
+            bucket.push(Cell { code, log_odds, scan: self.scan });
+            if bucket.len() == self.tau + 1 {
+                self.overfull.push(number as u32);
+            }
             self.cell_bytes += (bucket.capacity() - capacity) * size_of::<Cell>();
             self.len += 1;
+        }
+        // While the scan runs, too: buckets that hold a whole first scan would be slow to search.
+        if self.fits_itself && self.voxels_of_scan * CELLS_PER_SCAN_VOXEL > self.buckets.len() * self.tau {
+            self.grow(self.buckets.len() * 2);
         }
     }
 
@@ -118,21 +131,12 @@ impl VoxelCache {
 
     /// Ends a scan: leaves at most `tau` voxels a bucket and returns the others in Morton order.
     pub fn evict(&mut self) -> Vec<(MortonCode, f32)> {
-        let wanted = (self.voxels_of_scan * CELLS_PER_SCAN_VOXEL).div_ceil(self.tau).next_power_of_two();
-        self.voxels_of_scan = 0;
+        (self.scan, self.voxels_of_scan) = (self.scan.wrapping_add(1), 0);
         let mut evicted = Vec::new();
-        if self.fits_itself && wanted > self.buckets.len() {
-            self.grow(wanted);
-        }
-        for bucket in &mut self.buckets {
-            let surplus = bucket.len().saturating_sub(self.tau);
+        for number in self.overfull.drain(..) {
+            let bucket = &mut self.buckets[number as usize];
+            let surplus = bucket.len() - self.tau;
             evicted.extend(bucket.drain(..surplus).map(|cell| (cell.code, cell.log_odds)));
-            if bucket.capacity() > 2 * self.tau {
-                self.cell_bytes -= bucket.capacity() * size_of::<Cell>();
-                bucket.shrink_to(self.tau);
-                self.cell_bytes += bucket.capacity() * size_of::<Cell>();
-            }
-            bucket.iter_mut().for_each(|cell| cell.is_of_this_scan = false);
         }
         self.in_morton_order(evicted)
     }
@@ -141,7 +145,8 @@ impl VoxelCache {
     pub fn drain(&mut self) -> Vec<(MortonCode, f32)> {
         let cells = self.buckets.iter_mut().flat_map(|bucket| bucket.drain(..));
         let drained = cells.map(|cell| (cell.code, cell.log_odds)).collect();
-        self.voxels_of_scan = 0;
+        self.overfull.clear();
+        (self.scan, self.voxels_of_scan) = (self.scan.wrapping_add(1), 0);
         self.in_morton_order(drained)
     }
 
@@ -158,6 +163,8 @@ impl VoxelCache {
         for cell in old.iter().flatten() {
             self.buckets[cell.code.0 as usize & (buckets - 1)].push(*cell);
         }
+        let is_overfull = |number: &u32| self.buckets[*number as usize].len() > self.tau;
+        self.overfull = (0..buckets as u32).filter(is_overfull).collect();
         self.cell_bytes = self.buckets.iter().map(|bucket| bucket.capacity() * size_of::<Cell>()).sum();
     }
 }
