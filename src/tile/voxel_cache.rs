@@ -81,7 +81,9 @@ impl VoxelCache {
 
     /// Bytes of memory on the heap.
     pub fn bytes(&self) -> usize {
-        self.buckets.len() * size_of::<Vec<Cell>>() + self.cell_bytes + self.overfull.capacity() * size_of::<u32>()
+        self.buckets.len() * size_of::<Vec<Cell>>()
+            + self.cell_bytes
+            + self.overfull.capacity() * size_of::<u32>()
     }
 
     /// Takes the accumulated log-odds of an updated voxel.
