@@ -1,26 +1,25 @@
-//! OctoMap's octree, and its files.
+//! OctoMap's octree over voxel keys, and OctoMap's files.
 //!
-//! 16 levels over [Morton codes](crate::space::MortonCode), `f32` log-odds, an inner node is the maximum of its
-//! children, eight equal leaf children are pruned into their parent. Knows no path and no metres but the resolution
-//! that its files name.
+//! ```text
+//! Octree       16 levels below the root, f32 log-odds, pruned at once     tree, block, leaves, overrides
+//! read, write  `.bt` (occupied / free) and `.ot` (all values), by bytes   codec
+//! ```
 //!
-//! | file | holds | written by OctoMap's |
-//! |---|---|---|
-//! | `.bt` | free or occupied, two bits a node | `writeBinary` |
-//! | `.ot` | log-odds of every node | `write` |
+//! A tree knows neither metres nor tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds
+//! one length, the resolution.
 
-mod bt;
-mod file;
-mod header;
-mod ot;
+mod block;
+mod codec;
+mod leaves;
+mod overrides;
 mod tree;
 
-pub use bt::write_bt;
-pub use file::{OctreeFile, OctreeFormat, read_octree};
-pub use ot::write_ot;
-pub use tree::{Leaf, Octree};
+pub use codec::{
+    OCTOMAP_MAX_LOG_ODDS, OCTOMAP_MIN_LOG_ODDS, OctreeFile, OctreeFormat, read, read_bt, read_ot,
+    read_with_limit, write_bt, write_bt_unpruned, write_ot,
+};
+pub use leaves::{Leaf, Leaves};
+pub use tree::{Octree, VoxelCounts};
 
-/// Log-odds of a leaf that a `.bt` file calls free: OctoMap's lower clamp, `logit(0.1192)` as `f32`.
-pub const BT_FREE: f32 = f32::from_bits(0xc000_0075);
-/// Log-odds of a leaf that a `.bt` file calls occupied: OctoMap's upper clamp, `logit(0.971)` as `f32`.
-pub const BT_OCCUPIED: f32 = f32::from_bits(0x4060_b4ba);
+#[cfg(test)]
+mod tests;

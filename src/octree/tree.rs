@@ -1,344 +1,269 @@
+use super::block::{Arena, Block, BlockId, Node};
+use super::leaves::Leaves;
 use crate::space::MortonCode;
+use std::fmt;
 
-/// An octree of 16 levels with `f32` log-odds, always pruned and always up to date: an inner node is the maximum of
-/// its children, and eight equal leaf children are one leaf.
+/// Depth of the finest voxels; the root has depth 0.
+pub(super) const DEPTH: u8 = 16;
+
+/// OctoMap's octree: 16 levels below the root, a log-odds value (`f32`) at every known node.
 ///
-/// Nodes live in blocks of eight siblings, 65 bytes a block.
-#[derive(Clone, Debug, Default)]
+/// - The value of an inner node is the maximum of its children.
+/// - Eight leaves with one parent and one value, to the bit, are pruned into the parent at once, and expanded
+///   again when one of them changes.
+/// - A voxel that was never set is unknown; it has no value.
+///
+/// A tree that was [read from a file](super::read) is kept as it stood there, even where the file breaks the
+/// first two rules. [`Octree::normalize`] mends it, which is to be done before the tree is changed.
+///
+/// Values are any `f32` but NaN, which is neither refused nor given a sensible place among the maxima. Of a
+/// code only the lowest 48 bits count.
+#[derive(Clone)]
 pub struct Octree {
-    root: Option<Node>,
-    blocks: Vec<Block>,
-    /// Which children of each block exist.
-    masks: Vec<u8>,
-    /// Blocks that are not in use.
-    free: Vec<u32>,
-    nodes: usize,
+    pub(super) root: Node,
+    pub(super) arena: Arena,
+    nodes: u64,
+    leaves: u64,
+    voxels: u64,
 }
 
-type Block = [Node; 8];
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Node {
-    pub(super) log_odds: f32,
-    /// Block of the children; [`LEAF`] for a leaf.
-    pub(super) children: u32,
-}
-
-const LEAF: u32 = u32::MAX;
-const FINEST_DEPTH: u8 = 16;
-
-/// A leaf: a finest voxel, or a cube of equal ones.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leaf {
-    /// The first voxel under the leaf.
-    pub code: MortonCode,
-    /// Depth of the leaf: 16 for a finest voxel, one less for every doubling of the cube's edge.
-    pub depth: u8,
-    /// Log-odds of every voxel under the leaf.
-    pub log_odds: f32,
-}
-
-impl Node {
-    const NONE: Self = Self { log_odds: 0.0, children: LEAF };
-
-    pub(super) const fn leaf(log_odds: f32) -> Self {
-        Self { log_odds, children: LEAF }
-    }
-
-    pub(super) const fn is_leaf(&self) -> bool {
-        self.children == LEAF
-    }
+/// How many finest voxels the leaves of a tree stand for, by state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VoxelCounts {
+    /// Voxels with log-odds at or above the threshold.
+    pub occupied: u64,
+    /// Voxels with log-odds below it.
+    pub free: u64,
 }
 
 impl Octree {
-    /// An empty tree.
+    /// An empty tree; it allocates nothing.
     pub fn new() -> Self {
-        Self::default()
+        Self { root: Node::Unknown, arena: Arena::default(), nodes: 0, leaves: 0, voxels: 0 }
     }
 
-    /// The tree of finest voxels given in ascending order.
+    /// The tree of these voxels, in time linear in their number where the codes ascend.
+    ///
+    /// The same as setting them one by one, and as correct in any order.
     pub fn from_sorted(voxels: impl IntoIterator<Item = (MortonCode, f32)>) -> Self {
-        let mut tree = Self::default();
-        tree.write_sorted(&voxels.into_iter().collect::<Vec<_>>());
-        tree
-    }
-
-    /// Overwrites finest voxels, given in ascending order; of equal codes the last counts. Voxels that lie together
-    /// share their way down and up.
-    pub fn write_sorted(&mut self, voxels: &[(MortonCode, f32)]) {
-        if !voxels.is_empty() {
-            self.nodes += usize::from(self.root.is_none());
-            self.root = Some(self.written(self.root, 0, voxels));
+        const BATCH: usize = 4096;
+        let mut tree = Self::new();
+        let mut voxels = voxels.into_iter();
+        let mut batch = Vec::new();
+        loop {
+            batch.clear();
+            batch.extend(voxels.by_ref().take(BATCH));
+            if batch.is_empty() {
+                return tree;
+            }
+            tree.write_sorted(&batch);
         }
     }
 
-    /// Overwrites one finest voxel.
-    pub fn set(&mut self, code: MortonCode, log_odds: f32) {
-        self.write_sorted(&[(code, log_odds)]);
+    /// Gives one voxel a value (log-odds).
+    pub fn set(&mut self, code: MortonCode, value: f32) {
+        self.root = self.write(self.root, 0, &[(code, value)]);
     }
 
-    /// Log-odds of the node at `depth` (0, the root, to 16, a voxel) that holds `code`, or of the leaf above it;
-    /// `None` if unknown.
+    /// Gives many voxels a value (log-odds) each; where a code comes twice, the later counts.
+    ///
+    /// Cheap for strictly ascending codes: the path that they share is walked once, and a node is summed up
+    /// once for the whole batch. Other batches are written voxel by voxel.
+    pub fn write_sorted(&mut self, voxels: &[(MortonCode, f32)]) {
+        let Some((last, _)) = voxels.last() else { return };
+        if last.0 < MortonCode::END && voxels.is_sorted_by(|a, b| a.0 < b.0) {
+            self.root = self.write(self.root, 0, voxels);
+        } else {
+            for &(code, value) in voxels {
+                self.set(code, value);
+            }
+        }
+    }
+
+    /// Value (log-odds) of the node at `depth` (0, the root, to 16, the voxel) that holds the voxel `code`, or of
+    /// the leaf above it; `None` where nothing is known.
+    ///
+    /// It is the maximum of all known voxels of the node. A depth beyond 16 counts as 16.
     pub fn get(&self, code: MortonCode, depth: u8) -> Option<f32> {
-        self.node_at(code, depth).map(|node| node.log_odds)
+        self.node_at(code, depth).0.value()
     }
 
-    /// What [`Octree::get`] would say of the node at `depth` that begins at `first` if the given voxels under it, in
-    /// ascending order, had the given log-odds.
-    pub fn max_with_overrides(
-        &self,
-        first: MortonCode,
-        depth: u8,
-        voxels: &[(MortonCode, f32)],
-    ) -> Option<f32> {
-        self.max_under(self.node_at(first, depth), depth, voxels)
+    /// The leaves in Morton order.
+    pub fn leaves(&self) -> Leaves<'_> {
+        Leaves::under(self, MortonCode(0), 0)
     }
 
-    /// Number of nodes, inner ones and the root included.
-    pub fn len_nodes(&self) -> usize {
+    /// The leaves of the node at `depth` (0 to 16) that holds the voxel `code`, in Morton order.
+    ///
+    /// Where the node lies inside a leaf, that part of the leaf is what comes.
+    pub fn leaves_under(&self, code: MortonCode, depth: u8) -> Leaves<'_> {
+        Leaves::under(self, code, depth)
+    }
+
+    /// The leaves in Morton order, beginning with the one that holds the voxel `code` or else with the next.
+    pub fn leaves_from(&self, code: MortonCode) -> Leaves<'_> {
+        Leaves::from(self, code)
+    }
+
+    /// Number of nodes: inner ones, leaves and the root.
+    pub fn node_count(&self) -> u64 {
         self.nodes
     }
 
     /// Number of leaves.
-    pub fn len_leaves(&self) -> usize {
-        // Every inner node has one block.
-        self.nodes - (self.blocks.len() - self.free.len())
+    pub fn leaf_count(&self) -> u64 {
+        self.leaves
     }
 
-    /// Whether nothing is known.
-    pub fn is_empty(&self) -> bool {
-        self.root.is_none()
+    /// Number of finest voxels that the leaves stand for, at most 2^48.
+    ///
+    /// A few bytes of a file can stand for all of them: look here before the leaves of a foreign tree are taken
+    /// apart.
+    pub fn expanded_leaf_count(&self) -> u64 {
+        self.voxels
     }
 
-    /// Bytes of memory on the heap.
-    pub fn bytes(&self) -> usize {
-        self.blocks.capacity() * size_of::<Block>()
-            + self.masks.capacity()
-            + self.free.capacity() * size_of::<u32>()
-    }
-
-    /// The leaves in Morton order.
-    pub fn leaves(&self) -> impl Iterator<Item = Leaf> {
-        let mut stack: Vec<(Node, Leaf)> = Vec::new();
-        let root = |node: Node| (node, Leaf { code: MortonCode(0), depth: 0, log_odds: node.log_odds });
-        stack.extend(self.root.map(root));
-        std::iter::from_fn(move || {
-            loop {
-                let (node, place) = stack.pop()?;
-                if node.is_leaf() {
-                    return Some(place);
-                }
-                for child in (0..8).rev() {
-                    if let Some(node) = self.child(node, child) {
-                        let depth = place.depth + 1;
-                        let code = MortonCode(place.code.0 + child as u64 * MortonCode::span(depth));
-                        stack.push((node, Leaf { code, depth, log_odds: node.log_odds }));
-                    }
-                }
-            }
-        })
-    }
-
-    pub(super) fn child(&self, node: Node, child: usize) -> Option<Node> {
-        let block = node.children as usize;
-        (!node.is_leaf() && self.masks[block] >> child & 1 == 1).then(|| self.blocks[block][child])
-    }
-
-    pub(super) fn root(&self) -> Option<Node> {
-        self.root
-    }
-
-    /// Makes a node that [`Octree::add_inner`] or a leaf gave the root; for building a tree from a file.
-    pub(super) fn set_root(&mut self, root: Node) {
-        self.nodes += 1;
-        self.root = Some(root);
-    }
-
-    /// Adds a node above existing children, without pruning.
-    pub(super) fn add_inner(&mut self, children: [Option<Node>; 8]) -> Node {
-        let mask = children.iter().rev().fold(0, |mask: u8, child| mask << 1 | u8::from(child.is_some()));
-        self.nodes += mask.count_ones() as usize;
-        let log_odds =
-            children.iter().flatten().map(|child| child.log_odds).fold(f32::NEG_INFINITY, f32::max);
-        Node { log_odds, children: self.new_block(children.map(|child| child.unwrap_or(Node::NONE)), mask) }
-    }
-
-    /// Number of finest voxels that the leaves stand for, and how many of them have at least `threshold` log-odds.
-    pub fn expanded_voxels(&self, threshold: f32) -> (u64, u64) {
-        self.leaves().fold((0, 0), |(all, occupied), leaf| {
-            let voxels = MortonCode::span(leaf.depth);
-            (all + voxels, occupied + if leaf.log_odds >= threshold { voxels } else { 0 })
-        })
-    }
-
-    fn node_at(&self, code: MortonCode, depth: u8) -> Option<Node> {
-        let mut node = self.root?;
-        for level in 0..depth.min(FINEST_DEPTH) {
-            if node.is_leaf() {
-                break;
-            }
-            node = self.child(node, code.child_at(level))?;
+    /// The finest voxels that the leaves stand for, split by a threshold (log-odds). Visits every leaf.
+    pub fn count_voxels(&self, threshold_log_odds: f32) -> VoxelCounts {
+        let mut counts = VoxelCounts::default();
+        for leaf in self.leaves() {
+            let count =
+                if leaf.value >= threshold_log_odds { &mut counts.occupied } else { &mut counts.free };
+            *count += MortonCode::span(leaf.depth);
         }
-        Some(node)
+        counts
     }
 
-    /// The node after the voxels under it are overwritten. The node itself is counted by its parent.
-    fn written(&mut self, node: Option<Node>, depth: u8, voxels: &[(MortonCode, f32)]) -> Node {
-        let last = voxels[voxels.len() - 1].1;
-        if depth == FINEST_DEPTH {
-            return Node::leaf(last);
+    /// Whether no voxel is known.
+    pub fn is_empty(&self) -> bool {
+        self.nodes == 0
+    }
+
+    /// Bytes of heap that the tree holds, the unused ones included.
+    pub fn bytes(&self) -> usize {
+        self.arena.bytes()
+    }
+
+    /// Forgets every voxel and returns the memory.
+    pub fn clear(&mut self) {
+        *self = Self::new();
+    }
+
+    /// Makes every inner node the maximum of its children and prunes whatever can be pruned, so that a tree that
+    /// was read from a file is as if its voxels had been set here.
+    pub fn normalize(&mut self) {
+        self.root = self.normalized(self.root);
+    }
+
+    fn normalized(&mut self, node: Node) -> Node {
+        let Node::Inner { block, .. } = node else { return node };
+        for index in 0..8 {
+            let child = self.arena[block].child(index);
+            let child = self.normalized(child);
+            self.arena[block].set_child(index, child);
+        }
+        self.summed_up(block)
+    }
+
+    /// Writes voxels, at least one and all below `node`, and returns what becomes of the node.
+    fn write(&mut self, node: Node, depth: u8, voxels: &[(MortonCode, f32)]) -> Node {
+        if depth == DEPTH {
+            if let Node::Unknown = node {
+                self.add_leaf(depth);
+            }
+            return voxels.last().map_or(node, |&(_, value)| Node::Leaf(value));
         }
         let block = match node {
-            None => self.new_block([Node::NONE; 8], 0),
-            Some(leaf) if leaf.is_leaf() => {
-                if voxels.iter().all(|&(_, log_odds)| log_odds.to_bits() == leaf.log_odds.to_bits()) {
-                    return leaf;
-                }
-                self.nodes += 8;
-                self.new_block([leaf; 8], 0xff)
+            Node::Inner { block, .. } => block,
+            Node::Leaf(value) if voxels.iter().all(|(_, new)| new.to_bits() == value.to_bits()) => {
+                return node;
             }
-            Some(inner) => inner.children,
-        } as usize;
-        for group in voxels.chunk_by(|a, b| a.0.child_at(depth) == b.0.child_at(depth)) {
-            let child = group[0].0.child_at(depth);
-            let is_new = self.masks[block] >> child & 1 == 0;
-            let before = (!is_new).then(|| self.blocks[block][child]);
-            self.nodes += usize::from(is_new);
-            self.masks[block] |= 1 << child;
-            self.blocks[block][child] = self.written(before, depth + 1, group);
+            Node::Leaf(value) => {
+                self.nodes += 8;
+                self.leaves += 7;
+                self.arena.allocate(Block::of_leaves(value))
+            }
+            Node::Unknown => self.add_inner(),
+        };
+        let mut changed = false;
+        for (index, run) in runs_by_child(voxels, depth) {
+            let before = self.arena[block].child(index);
+            let after = self.write(before, depth + 1, run);
+            if !after.is_same_as(before) {
+                self.arena[block].set_child(index, after);
+                changed = true;
+            }
         }
-        self.summary(block)
+        if changed { self.summed_up(block) } else { node }
     }
 
-    /// The node above a block: a leaf if the block holds eight equal leaves, which then goes away.
-    fn summary(&mut self, block: usize) -> Node {
-        let (children, mask) = (&self.blocks[block], self.masks[block]);
-        let first = children[0];
-        let equals_first =
-            |child: &Node| child.is_leaf() && child.log_odds.to_bits() == first.log_odds.to_bits();
-        if mask == 0xff && children.iter().all(equals_first) {
-            self.nodes -= 8;
-            self.free.push(block as u32);
-            return first;
+    /// The node above a block: a leaf where the block can be pruned, which is done.
+    fn summed_up(&mut self, block: BlockId) -> Node {
+        match self.arena[block].uniform_leaves() {
+            Some(value) => {
+                self.arena.release(block);
+                self.nodes -= 8;
+                self.leaves -= 7;
+                Node::Leaf(value)
+            }
+            None => Node::Inner { value: self.arena[block].max(), block },
         }
-        let existing = children.iter().enumerate().filter(|(child, _)| mask >> child & 1 == 1);
-        let max = existing.map(|(_, child)| child.log_odds).fold(f32::NEG_INFINITY, f32::max);
-        Node { log_odds: max, children: block as u32 }
     }
 
-    fn new_block(&mut self, children: Block, mask: u8) -> u32 {
-        if let Some(block) = self.free.pop() {
-            self.blocks[block as usize] = children;
-            self.masks[block as usize] = mask;
-            return block;
-        }
-        self.blocks.push(children);
-        self.masks.push(mask);
-        (self.blocks.len() - 1) as u32
+    /// Counts a new inner node, and makes its children's block.
+    pub(super) fn add_inner(&mut self) -> BlockId {
+        self.nodes += 1;
+        self.arena.allocate(Block::EMPTY)
     }
 
-    fn max_under(&self, node: Option<Node>, depth: u8, voxels: &[(MortonCode, f32)]) -> Option<f32> {
-        let max_of_voxels = || voxels.iter().map(|&(_, log_odds)| log_odds).reduce(f32::max);
-        let Some(node) = node else { return max_of_voxels() };
-        if voxels.is_empty() {
-            return Some(node.log_odds);
+    /// Counts a new leaf.
+    pub(super) fn add_leaf(&mut self, depth: u8) {
+        self.nodes += 1;
+        self.leaves += 1;
+        self.voxels += MortonCode::span(depth);
+    }
+
+    /// The node at `depth` that holds `code`, or the leaf or unknown node above it, with the depth found.
+    pub(super) fn node_at(&self, code: MortonCode, depth: u8) -> (Node, u8) {
+        let mut node = self.root;
+        for at in 0..depth.min(DEPTH) {
+            let Node::Inner { block, .. } = node else { return (node, at) };
+            node = self.arena[block].child(code.child_at(at));
         }
-        if node.is_leaf() {
-            let covers_all = voxels.len() as u64 >= MortonCode::span(depth);
-            return if covers_all {
-                max_of_voxels()
-            } else {
-                max_of_voxels().map(|max| max.max(node.log_odds))
-            };
-        }
-        let mut rest = voxels;
-        let mut max: Option<f32> = None;
-        for child in 0..8 {
-            let count = rest.iter().take_while(|(code, _)| code.child_at(depth) == child).count();
-            let (group, others) = rest.split_at(count);
-            rest = others;
-            let under = self.max_under(self.child(node, child), depth + 1, group);
-            max = under.into_iter().chain(max).reduce(f32::max);
-        }
-        max
+        (node, depth.min(DEPTH))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-    use std::collections::BTreeMap;
-
-    /// Codes in a few clusters, so that cubes fill up, and few values, so that they are equal.
-    fn voxels() -> impl Strategy<Value = Vec<(u64, f32)>> {
-        let code = (0..3_u64, 0..128_u64).prop_map(|(cluster, low)| cluster * 0x0123_4567_8000 + low);
-        let value = prop::sample::select(vec![-1.0_f32, 0.5, 0.5, 0.5, 2.0]);
-        prop::collection::vec((code, value), 0..600)
-    }
-
-    fn max_in(model: &BTreeMap<u64, f32>, code: u64, depth: u8) -> Option<f32> {
-        let first = MortonCode(code).ancestor(depth).0;
-        model.range(first..first + MortonCode::span(depth)).map(|(_, &value)| value).reduce(f32::max)
-    }
-
-    /// Leaves and nodes of the pruned tree of a model, counted from the definition.
-    fn minimal_leaves(model: &BTreeMap<u64, f32>) -> usize {
-        let is_leaf = |code: u64, depth: u8| {
-            let first = MortonCode(code).ancestor(depth).0;
-            let values: Vec<f32> =
-                model.range(first..first + MortonCode::span(depth)).map(|(_, &v)| v).collect();
-            values.len() as u64 == MortonCode::span(depth) && values.iter().all(|&v| v == values[0])
+/// Cuts voxels in Morton order into those of each child of their common ancestor at `depth`.
+pub(super) fn runs_by_child(
+    mut voxels: &[(MortonCode, f32)],
+    depth: u8,
+) -> impl Iterator<Item = (usize, &[(MortonCode, f32)])> {
+    std::iter::from_fn(move || {
+        let index = voxels.first()?.0.child_at(depth);
+        // Most ancestors have all the voxels of a batch in one child.
+        let run = if voxels[voxels.len() - 1].0.child_at(depth) == index {
+            std::mem::take(&mut voxels)
+        } else {
+            let (run, rest) = voxels.split_at(voxels.partition_point(|v| v.0.child_at(depth) <= index));
+            voxels = rest;
+            run
         };
-        let mut leaves: Vec<(u64, u8)> = model
-            .keys()
-            .map(|&code| {
-                let depth = (0..=16).find(|&depth| is_leaf(code, depth)).expect("depth 16 is one voxel");
-                (MortonCode(code).ancestor(depth).0, depth)
-            })
-            .collect();
-        leaves.dedup();
-        leaves.len()
-    }
+        Some((index, run))
+    })
+}
 
-    proptest! {
-        #[test]
-        fn the_tree_equals_a_map_of_voxels_at_every_depth(batches in prop::collection::vec(voxels(), 1..4)) {
-            let mut tree = Octree::new();
-            let mut model = BTreeMap::new();
-            for batch in batches {
-                let batch: BTreeMap<u64, f32> = batch.into_iter().collect();
-                let sorted: Vec<_> = batch.iter().map(|(&code, &value)| (MortonCode(code), value)).collect();
-                for code in model.keys().chain(batch.keys()).copied().collect::<Vec<u64>>() {
-                    for depth in [0, 5, 13, 14, 15, 16] {
-                        let first = MortonCode(code).ancestor(depth);
-                        let span = MortonCode::span(depth);
-                        let under: Vec<_> =
-                            sorted.iter().copied().filter(|(c, _)| (first.0..first.0 + span).contains(&c.0)).collect();
-                        let mut with = model.clone();
-                        with.extend(batch.iter().map(|(&code, &value)| (code, value)));
-                        prop_assert_eq!(
-                            tree.max_with_overrides(first, depth, &under),
-                            max_in(&with, code, depth)
-                        );
-                    }
-                }
-                tree.write_sorted(&sorted);
-                model.extend(batch);
-                for &code in model.keys() {
-                    for depth in 0..=16 {
-                        prop_assert_eq!(tree.get(MortonCode(code), depth), max_in(&model, code, depth));
-                    }
-                }
-                prop_assert_eq!(tree.get(MortonCode(0xffff_ffff_ffff), 16), None);
-                prop_assert_eq!(tree.leaves().count(), tree.len_leaves());
-                prop_assert_eq!(tree.len_leaves(), minimal_leaves(&model));
-                prop_assert_eq!(tree.expanded_voxels(f32::NEG_INFINITY).0, model.len() as u64);
-            }
-            let mut one_by_one = Octree::new();
-            model.iter().for_each(|(&code, &value)| one_by_one.set(MortonCode(code), value));
-            prop_assert_eq!(one_by_one.leaves().collect::<Vec<_>>(), tree.leaves().collect::<Vec<_>>());
-            prop_assert_eq!(one_by_one.len_nodes(), tree.len_nodes());
-        }
+impl Default for Octree {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl fmt::Debug for Octree {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Octree")
+            .field("nodes", &self.nodes)
+            .field("leaves", &self.leaves)
+            .finish_non_exhaustive()
     }
 }

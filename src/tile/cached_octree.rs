@@ -65,8 +65,8 @@ impl CachedOctree {
     }
 
     /// Nodes of the tree, without what waits in the cache.
-    pub fn node_count(&self) -> usize {
-        self.octree.len_nodes()
+    pub fn node_count(&self) -> u64 {
+        self.octree.node_count()
     }
 
     /// Bytes of memory on the heap: of the tree, and of the cache.

@@ -165,7 +165,7 @@ impl Tile {
         let (octree_bytes, cache_bytes) = self.octree.bytes();
         TileCounts {
             voxels: self.table.len() as u64,
-            octree_nodes: self.octree.node_count() as u64,
+            octree_nodes: self.octree.node_count(),
             table_bytes: self.table.bytes() as u64,
             octree_bytes: octree_bytes as u64,
             voxel_cache_bytes: cache_bytes as u64,

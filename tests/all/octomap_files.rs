@@ -1,156 +1,331 @@
-use crate::support::data;
-use crate::support::random_scans::Random;
-use voxtile::octree::{Octree, OctreeFormat, read_octree, write_bt, write_ot};
-use voxtile::space::MortonCode;
+//! OctoMap's `.bt` and `.ot` files: real maps, bytes written by hand, and bytes that are no map.
 
-fn written(tree: &Octree, resolution_m: f64, format: OctreeFormat) -> Vec<u8> {
+use crate::support::shared_data;
+use proptest::prelude::*;
+use std::path::PathBuf;
+use voxtile::DecodeError;
+use voxtile::octree::{
+    Leaf, OCTOMAP_MAX_LOG_ODDS as OCCUPIED, OCTOMAP_MIN_LOG_ODDS as FREE, Octree, OctreeFormat, read,
+    read_bt, read_ot, read_with_limit, write_bt, write_bt_unpruned, write_ot,
+};
+use voxtile::space::{MortonCode, VoxelKey};
+
+const COMMENTS: &str = "# (feel free to add / change comments, but leave the first line as it is!)\n#\n";
+
+fn bt_file(fields: &str, payload: &[u8]) -> Vec<u8> {
+    [format!("# Octomap OcTree binary file\n{COMMENTS}{fields}\ndata\n").as_bytes(), payload].concat()
+}
+
+fn ot_file(fields: &str, payload: &[u8]) -> Vec<u8> {
+    [format!("# Octomap OcTree file\n{COMMENTS}{fields}\ndata\n").as_bytes(), payload].concat()
+}
+
+fn written_bt(tree: &Octree, resolution_m: f64) -> Vec<u8> {
     let mut bytes = Vec::new();
-    match format {
-        OctreeFormat::Binary => write_bt(tree, resolution_m, 0.0, &mut bytes).unwrap(),
-        OctreeFormat::Full => write_ot(tree, resolution_m, &mut bytes).unwrap(),
-    }
+    write_bt(tree, resolution_m, 0.0, &mut bytes).unwrap();
     bytes
 }
 
-/// From the line `data` on: comments in the header are free.
-fn payload(file: &[u8]) -> &[u8] {
-    let at = file.windows(6).position(|window| window == b"\ndata\n").unwrap();
-    &file[at..]
+fn written_ot(tree: &Octree, resolution_m: f64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write_ot(tree, resolution_m, &mut bytes).unwrap();
+    bytes
+}
+
+fn refusal(bytes: &[u8]) -> (u64, String) {
+    match read(bytes).unwrap_err() {
+        DecodeError::Format(error) => (error.at, error.reason),
+        error => panic!("{error}"),
+    }
+}
+
+fn real_maps() -> Vec<PathBuf> {
+    let Some(folder) = shared_data("octomap_maps") else { return Vec::new() };
+    let is_map =
+        |path: &PathBuf| path.extension().is_some_and(|extension| extension == "bt" || extension == "ot");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    files.filter(is_map).collect()
+}
+
+/// The finest voxel of a key near the middle of OctoMap's range, and its value.
+fn voxel(x: u16, y: u16, z: u16, value: f32) -> (MortonCode, f32) {
+    (VoxelKey([32768 + x, 32768 + y, 32768 + z]).morton(), value)
 }
 
 #[test]
-fn real_maps_are_read_to_the_last_node_and_written_back_byte_for_byte() {
-    let Some(folder) = data("octomap_maps") else { return };
-    let mut count = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if !path.extension().is_some_and(|extension| extension == "bt" || extension == "ot") {
-            continue;
-        }
+fn real_maps_are_read_to_the_last_node_and_written_back_to_the_byte() {
+    for path in real_maps() {
         let bytes = std::fs::read(&path).unwrap();
-        let mut rest = &bytes[..];
-        let file = read_octree(&mut rest).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        assert!(rest.is_empty(), "{}: {} bytes left", path.display(), rest.len());
-        let again = written(&file.tree, file.resolution_m, file.format);
-        assert!(payload(&again) == payload(&bytes), "{} differs", path.display());
-        count += 1;
+        let mut rest = bytes.as_slice();
+        let file = read(&mut rest).unwrap();
+        assert!(rest.is_empty(), "{}: {} bytes are left", path.display(), rest.len());
+        assert_eq!(file.tree.node_count(), file.stated_nodes);
+        assert_eq!(file.tree.leaf_count(), file.tree.leaves().count() as u64);
+        let again = match file.format {
+            OctreeFormat::Bt => written_bt(&file.tree, file.resolution_m),
+            OctreeFormat::Ot => written_ot(&file.tree, file.resolution_m),
+        };
+        assert!(again == bytes, "{}: not the same bytes", path.display());
     }
-    assert!(count > 0);
 }
 
 #[test]
-fn geb079_has_the_counts_that_octomap_reports() {
-    let Some(folder) = data("octomap_maps") else { return };
-    let file = read_octree(&*std::fs::read(folder.join("geb079.bt")).unwrap()).unwrap();
-    assert_eq!((file.tree.len_nodes(), file.tree.len_leaves(), file.resolution_m), (532_566, 428_144, 0.08));
-    let full = read_octree(&*std::fs::read(folder.join("geb079_from_pyoctomap.ot")).unwrap()).unwrap();
-    assert!(full.tree.leaves().eq(file.tree.leaves()));
-}
-
-/// One voxel occupied, its neighbour free, and a cube of eight equal ones beside them.
-fn small_tree() -> Octree {
-    let mut tree = Octree::new();
-    tree.set(MortonCode(0), 0.5);
-    tree.set(MortonCode(1), -0.5);
-    (8..16).for_each(|code| tree.set(MortonCode(code), 2.0));
-    tree
-}
-
-#[test]
-fn a_small_tree_has_these_bytes() {
-    let head = |magic: &str, nodes: usize| {
-        format!(
-            "{magic}\n# (feel free to add / change comments, but leave the first line as it is!)\n#\nid OcTree\nsize \
-             {nodes}\nres 0.1\ndata\n"
-        )
-    };
-    let mut bt = head("# Octomap OcTree binary file", 19).into_bytes();
-    // Fourteen nodes with one inner child 0, then one with an inner and an occupied child, then the two voxels.
-    (0..14).for_each(|_| bt.extend([0b11, 0]));
-    bt.extend([0b1011, 0, 0b0110, 0]);
-    assert_eq!(written(&small_tree(), 0.1, OctreeFormat::Binary), bt);
-
-    let mut ot = head("# Octomap OcTree file", 19).into_bytes();
-    let mut node = |log_odds: f32, mask: u8| {
-        ot.extend(log_odds.to_le_bytes());
-        ot.push(mask);
-    };
-    (0..14).for_each(|_| node(2.0, 0b1));
-    [(2.0, 0b11), (0.5, 0b11), (0.5, 0), (-0.5, 0), (2.0, 0)]
-        .into_iter()
-        .for_each(|(value, mask)| node(value, mask));
-    assert_eq!(written(&small_tree(), 0.1, OctreeFormat::Full), ot);
-    let file = read_octree(&*ot).unwrap();
-    assert!(file.tree.leaves().eq(small_tree().leaves()));
-    assert_eq!(file.tree.len_nodes(), small_tree().len_nodes());
+fn real_maps_are_normal_trees_that_grow_again_from_their_leaves() {
+    for path in real_maps() {
+        let bytes = std::fs::read(&path).unwrap();
+        let tree = read(bytes.as_slice()).unwrap().tree;
+        let mut normal = tree.clone();
+        normal.normalize();
+        assert!(normal.leaves().eq(tree.leaves()), "{}", path.display());
+        for leaf in tree.leaves().step_by(97) {
+            for depth in leaf.depth..=16 {
+                assert_eq!(tree.get(leaf.code, depth), Some(leaf.value));
+            }
+            assert!(tree.get(leaf.code, leaf.depth - 1) >= Some(leaf.value));
+        }
+    }
 }
 
 #[test]
-fn headers_are_read_as_octomap_reads_them() {
-    let bt = written(&small_tree(), 0.1, OctreeFormat::Binary);
-    let with_header = |header: &str| {
-        let mut file = format!("# Octomap OcTree binary file\n{header}").into_bytes();
-        file.extend_from_slice(&payload(&bt)[1..]);
-        file
-    };
+fn geb079_has_the_numbers_that_octomap_counts() {
+    let Some(path) = real_maps().into_iter().find(|path| path.ends_with("geb079.bt")) else { return };
+    let file = read_bt(std::fs::read(path).unwrap().as_slice()).unwrap();
+    assert_eq!((file.tree.node_count(), file.tree.leaf_count()), (532_566, 428_144));
+    assert_eq!(file.tree.count_voxels(0.0).occupied, 185_673);
+    assert_eq!((file.resolution_m, file.id.as_str()), (0.08, "OcTree"));
+}
+
+#[test]
+fn a_tiny_tree_has_these_bytes() {
+    let mut tree = Octree::from_sorted([voxel(0, 0, 0, 1.5), voxel(1, 0, 0, -0.5), voxel(0, 1, 0, 0.0)]);
+    // 15 times: the first child of the last has children. Then free (1) and occupied (2) leaves.
+    let bt = [[0x00, 0xc0].as_slice(), &[0x03, 0x00].repeat(14), &[0b10_01_10, 0x00]].concat();
+    assert_eq!(written_bt(&tree, 0.1), bt_file("id OcTree\nsize 19\nres 0.1", &bt));
+
+    let inner = |mask| [1.5_f32.to_le_bytes().as_slice(), &[mask]].concat();
+    let leaf = |value: f32| [value.to_le_bytes().as_slice(), &[0]].concat();
+    let ot = [inner(0x80), inner(1).repeat(14), inner(0b111), leaf(1.5), leaf(-0.5), leaf(0.0)].concat();
+    assert_eq!(written_ot(&tree, 1e-5), ot_file("id OcTree\nsize 19\nres 1e-05", &ot));
+
+    tree.clear();
+    assert_eq!(written_bt(&tree, 0.1), bt_file("id OcTree\nsize 0\nres 0.1", &[]));
+    assert_eq!(written_ot(&tree, 0.1), ot_file("id OcTree\nsize 0\nres 0.1", &[]));
+    for bytes in [written_bt(&tree, 0.1), written_ot(&tree, 0.1)] {
+        assert!(read(bytes.as_slice()).unwrap().tree.is_empty());
+    }
+}
+
+#[test]
+fn writing_bt_prunes_by_state_and_leaves_the_tree_alone() {
+    let tree = Octree::from_sorted((0..64).map(|i| (MortonCode(i), 1.0 + i as f32)));
+    assert_eq!((tree.node_count(), tree.leaf_count()), (15 + 8 + 64, 64));
+    let bytes = written_bt(&tree, 0.1);
+    let pruned = read(bytes.as_slice()).unwrap().tree;
+    assert_eq!(
+        pruned.leaves().collect::<Vec<_>>(),
+        [Leaf { code: MortonCode(0), depth: 14, value: OCCUPIED }]
+    );
+    assert_eq!((pruned.node_count(), tree.leaf_count()), (15, 64));
+
+    let mut unpruned = Vec::new();
+    write_bt_unpruned(&tree, 0.1, 10.0, &mut unpruned).unwrap();
+    let mut unpruned = read(unpruned.as_slice()).unwrap().tree;
+    assert_eq!((unpruned.node_count(), unpruned.count_voxels(0.0).free), (87, 9));
+    unpruned.normalize();
+    assert_eq!((unpruned.leaf_count(), unpruned.get(MortonCode(0), 15)), (1 + 8 + 6, Some(FREE)));
+}
+
+#[test]
+fn writing_bt_stops_pruning_where_octomap_does() {
+    // Eight cubes of eight voxels. OctoMap finds nothing to prune among the voxels and looks no further up.
+    let cubes = Octree::from_sorted((0..64).map(|i| (MortonCode(i), 1.0 + (i / 8) as f32)));
+    assert_eq!(read(written_bt(&cubes, 0.1).as_slice()).unwrap().tree.node_count(), 15 + 8);
+
+    // One more cube that is pruned, and the eight are too.
+    let mut tree = cubes.clone();
+    tree.write_sorted(&std::array::from_fn::<_, 8, _>(|i| (MortonCode(512 + i as u64), -1.0 - i as f32)));
+    let pruned = read(written_bt(&tree, 0.1).as_slice()).unwrap().tree;
+    let depths: Vec<_> = pruned.leaves().map(|leaf| (leaf.depth, leaf.value)).collect();
+    assert_eq!(depths, [(14, OCCUPIED), (15, FREE)]);
+}
+
+#[test]
+fn a_root_alone_is_a_whole_occupied_world() {
+    let bytes = bt_file("id OcTree\nsize 1\nres 0.1", &[0, 0]);
+    let mut tree = read(bytes.as_slice()).unwrap().tree;
+    assert_eq!(tree.expanded_leaf_count(), 1 << 48);
+    assert_eq!(tree.get(MortonCode(12345), 16), Some(OCCUPIED));
+    assert_eq!(tree.bytes(), 0);
+    assert_eq!(written_bt(&tree, 0.1), bytes);
+    tree.set(MortonCode(12345), FREE);
+    assert_eq!((tree.leaf_count(), tree.expanded_leaf_count()), (1 + 16 * 7, 1 << 48));
+}
+
+#[test]
+fn the_header_may_be_in_any_order_and_say_more() {
+    let nodes = [[0x80, 0x00].as_slice(), &[0x00, 0x00]].concat();
     for header in [
-        "res 0.1\nsize 19\nid OcTree\n",
-        "# words id size\nid 1\nres 0.1\ncolor blue and green\nsize 19\n",
-        "id OcTree size 19 res 0.1\n",
+        "id 1\nsize 2\nres 0.1\ndata\n",
+        "res 0.1 size 2\n\n  # id Other\nid\tOcTree\r\ncolour red and green\ndata  and more\n",
+        "size 7\nsize 2\nid OcTreeStamped\n#data\nres +1e-1 data\n",
     ] {
-        let file = read_octree(&*with_header(header)).unwrap();
-        assert!(file.tree.leaves().count() == 3 && file.resolution_m == 0.1, "{header}");
+        let bytes = [b"# Octomap OcTree binary file, mine\n", header.as_bytes(), &nodes[..2]].concat();
+        let file = read(bytes.as_slice()).unwrap();
+        assert_eq!((file.resolution_m, file.stated_nodes, file.tree.leaf_count()), (0.1, 2, 1));
+        assert_ne!(file.id, "1");
     }
-    let mut legacy = 3_i32.to_le_bytes().to_vec();
-    legacy.extend(0.25_f64.to_le_bytes());
-    legacy.extend(19_u32.to_le_bytes());
-    legacy.extend_from_slice(&payload(&bt)[6..]);
-    let file = read_octree(&*legacy).unwrap();
-    assert_eq!((file.tree.len_leaves(), file.resolution_m), (3, 0.25));
-    let empty = written(&Octree::new(), 0.2, OctreeFormat::Binary);
-    assert!(read_octree(&*empty).unwrap().tree.is_empty());
-
-    for (header, message) in [
-        ("id OcTree\nsize 18\nres 0.1\n", "the header says 18 nodes, the tree has 19"),
-        ("id OcTree\nsize 19\nres -1\n", "is not a positive length"),
-        ("id OcTree\nsize 19\nres NaN\n", "is not a positive length"),
-        ("id CountingOcTree\nsize 19\nres 0.1\n", "a tree of type `CountingOcTree`"),
-        ("id OcTree\nsize many\nres 0.1\n", "`size many` is not a number"),
-    ] {
-        let error = read_octree(&*with_header(header)).unwrap_err().to_string();
-        assert!(error.contains(message), "{error}");
-    }
-    assert!(read_octree(&b"# nonsense\n"[..]).unwrap_err().to_string().contains("offset 0"));
 }
 
 #[test]
-fn hostile_files_are_errors_and_never_more() {
-    let deep: Vec<u8> = [0xff_u8; 4000].to_vec();
-    let header = "# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n";
-    let error = read_octree(&*[header.as_bytes(), &deep].concat()).unwrap_err().to_string();
-    assert!(error.contains("below the finest depth"), "{error}");
+fn a_file_from_before_the_text_header_is_read() {
+    let payload = [0x02, 0x40];
+    let bytes =
+        [3_i32.to_le_bytes().as_slice(), &0.25_f64.to_le_bytes(), &3_u32.to_le_bytes(), &payload].concat();
+    let file = read(bytes.as_slice()).unwrap();
+    assert_eq!((file.resolution_m, file.id.as_str(), file.format), (0.25, "OcTree", OctreeFormat::Bt));
+    let values: Vec<_> = file.tree.leaves().map(|leaf| (leaf.depth, leaf.value)).collect();
+    assert_eq!(values, [(1, OCCUPIED), (1, FREE)]);
+}
 
-    // All of space free: eight leaves of 2^45 voxels each, in two bytes.
-    let bomb = read_octree(&*[header.as_bytes(), &[0x55, 0x55]].concat()).unwrap();
-    assert_eq!(bomb.tree.expanded_voxels(0.0), (1 << 48, 0));
+#[test]
+fn a_coloured_tree_is_read_without_its_colours() {
+    let node = |value: f32, mask| [value.to_le_bytes().as_slice(), b"RGB", &[mask]].concat();
+    let payload = [node(2.0, 0b101), node(2.0, 0), node(-1.0, 0)].concat();
+    let bytes = ot_file("id ColorOcTree\nsize 3\nres 0.1", &payload);
+    let file = read_ot(bytes.as_slice()).unwrap();
+    assert_eq!(file.id, "ColorOcTree");
+    assert_eq!(file.tree.leaves().map(|leaf| leaf.value).collect::<Vec<_>>(), [2.0, -1.0]);
+    let (at, reason) = refusal(&ot_file("id CountingOcTree\nsize 1\nres 1", &payload));
+    assert_eq!(at, ot_file("id CountingOcTree\nsize 1\nres 1", &[]).len() as u64);
+    assert!(reason.contains("CountingOcTree"), "{reason}");
+}
 
-    let mut random = Random(8);
-    for format in [OctreeFormat::Binary, OctreeFormat::Full] {
-        let good = written(&small_tree(), 0.1, format);
-        for length in 0..good.len() {
-            assert!(read_octree(&good[..length]).is_err(), "cut to {length} bytes");
-        }
-        for _ in 0..20_000 {
-            let mut bytes = good.clone();
-            for _ in 0..1 + random.below(4) {
-                let at = random.below(bytes.len() as u64) as usize;
-                bytes[at] = random.next() as u8;
+#[test]
+fn what_a_file_says_is_kept_even_where_it_is_no_normal_tree() {
+    let node = |value: f32, mask| [value.to_le_bytes().as_slice(), &[mask]].concat();
+    let payload = [node(-7.0, 0xff), node(0.5, 0).repeat(8)].concat();
+    let bytes = ot_file("id OcTree\nsize 9\nres 0.1", &payload);
+    let mut tree = read(bytes.as_slice()).unwrap().tree;
+    assert_eq!(tree.get(MortonCode(0), 0), Some(-7.0));
+    assert_eq!(written_ot(&tree, 0.1), bytes);
+    tree.normalize();
+    assert_eq!((tree.node_count(), tree.get(MortonCode(0), 0)), (1, Some(0.5)));
+}
+
+#[test]
+fn what_follows_the_last_node_stays_in_the_stream() {
+    let tree = Octree::from_sorted([voxel(3, 4, 5, 1.0)]);
+    for mut bytes in [written_bt(&tree, 0.1), written_ot(&tree, 0.1)] {
+        bytes.extend(b"more");
+        let mut rest = bytes.as_slice();
+        read(&mut rest).unwrap();
+        assert_eq!(rest, b"more");
+    }
+}
+
+#[test]
+fn wrong_files_are_refused_with_their_offset() {
+    let header = "id OcTree\nsize 2\nres 0.1";
+    let begin = bt_file(header, &[]).len() as u64;
+    let ot_begin = ot_file("id OcTree\nres 1", &[]).len() as u64;
+    let refusals = [
+        (bt_file(header, &[0x01]), begin, "ends"),
+        (bt_file(header, &[0x05, 0x00]), begin, "3 nodes follow, but the header says 2"),
+        (bt_file(header, &[0x03, 0x00, 0x00, 0x00]), begin + 2, "has none"),
+        (bt_file(header, &[0x03, 0x00].repeat(16)), begin + 30, "finest level"),
+        (ot_file("id OcTree\nres 1", &[0, 0, 0, 0, 1].repeat(17)), ot_begin + 84, "finest level"),
+        (ot_file("id OcTree\nres 1", &f32::NAN.to_le_bytes()), ot_begin, "not finite"),
+        (ot_file("id OcTree\nres 1", &f32::INFINITY.to_le_bytes()), ot_begin, "not finite"),
+        (bt_file("id OcTree\nsize 2\nres -0.1", &[1, 0]), begin + 1, "positive, finite"),
+        (bt_file("id OcTree\nsize 2\nres 0.0", &[1, 0]), begin, "positive, finite"),
+        (bt_file("id OcTree\nsize 2\nres nan", &[1, 0]), begin, "positive, finite"),
+        (bt_file("size 2\nres 0.1", &[1, 0]), begin - 10, "no id"),
+        (bt_file("id OcTree\nsize 2", &[1, 0]), begin - 8, "no res"),
+        (b"# Octomap OcTree".to_vec(), 0, "first line"),
+        (b"PLY".to_vec(), 0, "ends where the header"),
+        (Vec::new(), 0, "ends where the header"),
+    ];
+    for (bytes, offset, part) in refusals {
+        let (at, reason) = refusal(&bytes);
+        assert!(reason.contains(part), "{reason}");
+        assert_eq!(at, offset, "{reason}");
+    }
+    assert!(read_ot(bt_file(header, &[1, 0]).as_slice()).is_err());
+    assert!(read_bt(ot_file(header, &[0; 5]).as_slice()).is_err());
+    let endless = bt_file(&"more\n".repeat(100_000), &[]);
+    assert_eq!(refusal(&endless).0, 1 << 16);
+}
+
+#[test]
+fn a_resolution_that_is_no_length_is_not_written() {
+    for resolution_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(write_bt(&Octree::new(), resolution_m, 0.0, &mut Vec::new()).is_err());
+        assert!(write_ot(&Octree::new(), resolution_m, &mut Vec::new()).is_err());
+    }
+}
+
+#[test]
+fn memory_has_a_limit() {
+    let tree = Octree::from_sorted((0..1000).map(|i| (MortonCode(i * 1_000_003), i as f32)));
+    for bytes in [written_bt(&tree, 0.1), written_ot(&tree, 0.1)] {
+        let blocks = 64 * (tree.node_count() - tree.leaf_count()) as usize;
+        let error = read_with_limit(bytes.as_slice(), blocks - 1).unwrap_err();
+        assert!(error.to_string().contains("more than"), "{error}");
+        assert!(read_with_limit(bytes.as_slice(), blocks).is_ok());
+    }
+}
+
+/// Bytes of a valid file, with some of them changed, cut off or put in.
+fn damaged_file() -> impl Strategy<Value = Vec<u8>> {
+    let voxels = prop::collection::btree_map(0..600_u64, prop_oneof![Just(1.0_f32), Just(-1.0)], 0..200);
+    let damage = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3), 0..4);
+    (voxels, any::<bool>(), damage).prop_map(|(voxels, is_bt, damage)| {
+        let tree = Octree::from_sorted(voxels.into_iter().map(|(code, value)| (MortonCode(code), value)));
+        let mut bytes = if is_bt { written_bt(&tree, 0.1) } else { written_ot(&tree, 0.1) };
+        for (at, byte, kind) in damage {
+            let at = at.index(bytes.len());
+            match kind {
+                0 => bytes[at] = byte,
+                1 => bytes.insert(at, byte),
+                _ => bytes.truncate(at + 1),
             }
-            if let Ok(file) = read_octree(&*bytes) {
-                file.tree.expanded_voxels(0.0);
-                written(&file.tree, file.resolution_m, OctreeFormat::Binary);
-                written(&file.tree, file.resolution_m, OctreeFormat::Full);
-            }
         }
+        bytes
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn damaged_bytes_give_a_tree_or_an_error(bytes in damaged_file()) {
+        if let Ok(file) = read(bytes.as_slice()) {
+            let again = written_ot(&file.tree, file.resolution_m);
+            let tree = read(again.as_slice()).unwrap().tree;
+            assert!(tree.leaves().eq(file.tree.leaves()));
+            assert_eq!(tree.node_count(), file.tree.node_count());
+            let _ = read(written_bt(&tree, file.resolution_m).as_slice()).unwrap();
+        }
+    }
+
+    #[test]
+    fn bytes_of_no_kind_give_a_tree_or_an_error(
+        is_bt in any::<bool>(), nodes in any::<u64>(), payload in prop::collection::vec(any::<u8>(), 0..200),
+    ) {
+        let _ = read(payload.as_slice());
+        let fields = format!("id OcTree\nsize {nodes}\nres 0.1");
+        let bytes = if is_bt { bt_file(&fields, &payload) } else { ot_file(&fields, &payload) };
+        let _ = read(bytes.as_slice());
+    }
+
+    #[test]
+    fn every_tree_comes_back_from_ot_with_every_bit(
+        voxels in prop::collection::btree_map(0..MortonCode::END, -4.0..4.0_f32, 0..100),
+    ) {
+        let tree = Octree::from_sorted(voxels.into_iter().map(|(code, value)| (MortonCode(code), value)));
+        let bytes = written_ot(&tree, 0.1);
+        let back = read(bytes.as_slice()).unwrap().tree;
+        assert!(back.leaves().eq(tree.leaves()));
+        assert_eq!(written_ot(&back, 0.1), bytes);
     }
 }

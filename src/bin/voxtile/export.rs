@@ -103,7 +103,7 @@ fn export_octree(
             "bt" => write_bt(&tree, resolution_m, threshold, &mut out)?,
             _ => write_ot(&tree, resolution_m, &mut out)?,
         }
-        Ok(tree.expanded_voxels(threshold).0)
+        Ok(tree.expanded_leaf_count())
     })
 }
 

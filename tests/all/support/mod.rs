@@ -1,18 +1,19 @@
-//! What the tests share.
+//! What several subjects share.
 
 pub mod random_scans;
 pub mod reference_map;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// A folder of real data: below `VOXTILE_DATA`, or `../shared/data` beside the project. Without it the test says that
-/// it is skipped.
-pub fn data(name: &str) -> Option<PathBuf> {
-    let default = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let path = std::env::var_os("VOXTILE_DATA").map_or(default, PathBuf::from).join(name);
-    if path.exists() {
+/// A folder of the data that is too large for the repository: under `$VOXTILE_DATA`, by default `../shared/data`
+/// beside the repository. `None`, after saying so, where it is absent.
+pub fn shared_data(folder: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("VOXTILE_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let path = root.join(folder);
+    if path.is_dir() {
         return Some(path);
     }
-    eprintln!("skipped: no {}", path.display());
+    println!("skipped: there is no {} (VOXTILE_DATA may name another folder)", path.display());
     None
 }

@@ -1,0 +1,221 @@
+use super::OctreeFormat;
+use super::header::{Header, write_header};
+use super::input::Input;
+use super::octree_file::GrowingTree;
+use crate::error::{DecodeError, FormatError};
+use crate::octree::Octree;
+use crate::octree::block::{Block, Node};
+use crate::octree::tree::DEPTH;
+use std::io::{self, BufRead, Write};
+
+/// Log-odds of a free leaf read from `.bt`: OctoMap's lower clamp, `logit(0.1192)`, about -2.
+pub const OCTOMAP_MIN_LOG_ODDS: f32 = f32::from_bits(0xc000_0075);
+
+/// Log-odds of an occupied leaf read from `.bt`: OctoMap's upper clamp, `logit(0.971)`, about 3.5.
+pub const OCTOMAP_MAX_LOG_ODDS: f32 = f32::from_bits(0x4060_b4ba);
+
+/// What two bits say about a child.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Code {
+    Unknown,
+    Free,
+    Occupied,
+    Inner,
+}
+
+impl Code {
+    const ALL: [Self; 4] = [Self::Unknown, Self::Free, Self::Occupied, Self::Inner];
+
+    fn of_leaf(log_odds: f32, threshold: f32) -> Self {
+        if log_odds >= threshold { Self::Occupied } else { Self::Free }
+    }
+
+    /// The codes of eight children from their two bytes.
+    fn unpack(bytes: [u8; 2]) -> [Self; 8] {
+        let bits = u16::from_le_bytes(bytes);
+        std::array::from_fn(|child| Self::ALL[usize::from(bits >> (2 * child) & 3)])
+    }
+
+    fn pack(codes: [Self; 8]) -> [u8; 2] {
+        codes.iter().rev().fold(0, |bits: u16, &code| bits << 2 | code as u16).to_le_bytes()
+    }
+
+    /// What a node with these children becomes if it is pruned, where it can be.
+    fn pruned(children: [Self; 8]) -> Option<Self> {
+        let prunable = matches!(children[0], Self::Free | Self::Occupied);
+        (prunable && children.iter().all(|&code| code == children[0])).then_some(children[0])
+    }
+}
+
+pub(super) fn read_nodes(
+    input: &mut Input<impl BufRead>,
+    header: &Header,
+    mut growing: GrowingTree,
+) -> Result<Octree, DecodeError> {
+    let begin = input.offset();
+    if header.nodes > 0 {
+        growing.tree.root = read_node(input, &mut growing, 0)?;
+    }
+    if growing.tree.node_count() != header.nodes {
+        let reason =
+            format!("{} nodes follow, but the header says {}", growing.tree.node_count(), header.nodes);
+        return Err(FormatError::at_offset(begin, reason).into());
+    }
+    Ok(growing.tree)
+}
+
+fn read_node(
+    input: &mut Input<impl BufRead>,
+    growing: &mut GrowingTree,
+    depth: u8,
+) -> Result<Node, DecodeError> {
+    let begin = input.offset();
+    let codes = Code::unpack(input.take("the children of a node")?);
+    if codes == [Code::Unknown; 8] {
+        if depth > 0 {
+            return Err(FormatError::at_offset(begin, "a node that should have children has none").into());
+        }
+        growing.tree.add_leaf(depth);
+        return Ok(Node::Leaf(OCTOMAP_MAX_LOG_ODDS));
+    }
+    let block = growing.add_inner(input)?;
+    for (index, code) in codes.into_iter().enumerate() {
+        let child = match code {
+            Code::Unknown => continue,
+            Code::Free => Node::Leaf(OCTOMAP_MIN_LOG_ODDS),
+            Code::Occupied => Node::Leaf(OCTOMAP_MAX_LOG_ODDS),
+            Code::Inner if depth + 1 == DEPTH => {
+                let reason = "a node of the finest level should have no children";
+                return Err(FormatError::at_offset(begin, reason).into());
+            }
+            Code::Inner => read_node(input, growing, depth + 1)?,
+        };
+        if code != Code::Inner {
+            growing.tree.add_leaf(depth + 1);
+        }
+        growing.tree.arena[block].set_child(index, child);
+    }
+    Ok(Node::Inner { value: growing.tree.arena[block].max(), block })
+}
+
+/// Writes the `.bt` file that OctoMap's `writeBinary` writes for this tree, and leaves the tree as it is.
+///
+/// A leaf counts as occupied at or above `threshold_log_odds`, else as free; nodes that become equal by that are
+/// pruned in the file. Besides the tree it takes two bytes of memory for each inner node that is left.
+///
+/// # Errors
+///
+/// Those of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
+pub fn write_bt(
+    tree: &Octree,
+    resolution_m: f64,
+    threshold_log_odds: f32,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let depths = PrunedDepths::of(tree, threshold_log_odds);
+    write_encoded(tree, resolution_m, threshold_log_odds, depths, out)
+}
+
+/// Writes the `.bt` file that OctoMap's `writeBinaryConst` writes for this tree: as [`write_bt`], but pruned only
+/// as far as the tree is.
+///
+/// # Errors
+///
+/// Those of [`write_bt`].
+pub fn write_bt_unpruned(
+    tree: &Octree,
+    resolution_m: f64,
+    threshold_log_odds: f32,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    write_encoded(tree, resolution_m, threshold_log_odds, PrunedDepths::NONE, out)
+}
+
+fn write_encoded(
+    tree: &Octree,
+    resolution_m: f64,
+    threshold: f32,
+    depths: PrunedDepths,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let mut encoder = Encoder { tree, threshold, depths, payload: Vec::new() };
+    let (root, nodes) = encoder.encode(tree.root, 0);
+    if matches!(root, Code::Free | Code::Occupied) {
+        encoder.payload.extend(Code::pack([Code::Unknown; 8]));
+    }
+    write_header(out, OctreeFormat::Bt, nodes, resolution_m)?;
+    out.write_all(&encoder.payload)
+}
+
+/// Nodes at this depth and deeper are pruned where they can be.
+#[derive(Clone, Copy)]
+struct PrunedDepths(u8);
+
+impl PrunedDepths {
+    const NONE: Self = Self(DEPTH);
+
+    /// How far OctoMap's `prune` gets: from the depth above the voxels upwards, not beyond the first depth where it
+    /// finds nothing to prune, and never to the root.
+    fn of(tree: &Octree, threshold: f32) -> Self {
+        let mut prunable = [0; DEPTH as usize];
+        count_prunable(tree, tree.root, 0, threshold, &mut prunable);
+        let lowest = (1..DEPTH).rev().take_while(|&depth| prunable[usize::from(depth)] > 0).last();
+        lowest.map_or(Self::NONE, Self)
+    }
+}
+
+/// Counts by depth the nodes that can be pruned once all below them are; says what becomes of `node`.
+fn count_prunable(
+    tree: &Octree,
+    node: Node,
+    depth: u8,
+    threshold: f32,
+    prunable: &mut [u64; DEPTH as usize],
+) -> Code {
+    let block = match node {
+        Node::Unknown => return Code::Unknown,
+        Node::Leaf(value) => return Code::of_leaf(value, threshold),
+        Node::Inner { block, .. } => block,
+    };
+    let block: &Block = &tree.arena[block];
+    let children =
+        std::array::from_fn(|i| count_prunable(tree, block.child(i), depth + 1, threshold, prunable));
+    let pruned = Code::pruned(children);
+    prunable[usize::from(depth)] += u64::from(pruned.is_some());
+    pruned.unwrap_or(Code::Inner)
+}
+
+struct Encoder<'a> {
+    tree: &'a Octree,
+    threshold: f32,
+    depths: PrunedDepths,
+    payload: Vec<u8>,
+}
+
+impl Encoder<'_> {
+    /// Appends the bytes of a node with those below it; gives its code and the number of nodes.
+    fn encode(&mut self, node: Node, depth: u8) -> (Code, u64) {
+        let block = match node {
+            Node::Unknown => return (Code::Unknown, 0),
+            Node::Leaf(value) => return (Code::of_leaf(value, self.threshold), 1),
+            Node::Inner { block, .. } => block,
+        };
+        let begin = self.payload.len();
+        self.payload.extend([0; 2]);
+        let mut codes = [Code::Unknown; 8];
+        let mut nodes = 1;
+        for (index, child) in self.tree.arena[block].children().enumerate() {
+            let (code, below) = self.encode(child, depth + 1);
+            codes[index] = code;
+            nodes += below;
+        }
+        if depth >= self.depths.0
+            && let Some(pruned) = Code::pruned(codes)
+        {
+            self.payload.truncate(begin);
+            return (pruned, 1);
+        }
+        self.payload[begin..begin + 2].copy_from_slice(&Code::pack(codes));
+        (Code::Inner, nodes)
+    }
+}

@@ -1,0 +1,56 @@
+use crate::error::{DecodeError, FormatError};
+use std::io::{BufRead, ErrorKind};
+
+/// A stream that knows its offset, for the errors.
+pub(super) struct Input<R> {
+    reader: R,
+    offset: u64,
+}
+
+impl<R: BufRead> Input<R> {
+    pub(super) fn new(reader: R) -> Self {
+        Self { reader, offset: 0 }
+    }
+
+    /// Bytes taken so far.
+    pub(super) fn offset(&self) -> u64 {
+        self.offset
+    }
+
+    /// The next byte, which stays; `None` at the end.
+    pub(super) fn peek(&mut self) -> Result<Option<u8>, DecodeError> {
+        loop {
+            match self.reader.fill_buf() {
+                Ok(bytes) => return Ok(bytes.first().copied()),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+
+    /// Takes the next byte; `None` at the end.
+    pub(super) fn next(&mut self) -> Result<Option<u8>, DecodeError> {
+        let byte = self.peek()?;
+        if byte.is_some() {
+            self.reader.consume(1);
+            self.offset += 1;
+        }
+        Ok(byte)
+    }
+
+    /// Takes exactly `N` bytes, those of a `part` of the file.
+    pub(super) fn take<const N: usize>(&mut self, part: &str) -> Result<[u8; N], DecodeError> {
+        let mut bytes = [0; N];
+        self.reader.read_exact(&mut bytes).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => self.error(format!("the file ends where {part} should be")).into(),
+            _ => DecodeError::Io(error),
+        })?;
+        self.offset += N as u64;
+        Ok(bytes)
+    }
+
+    /// Something wrong with what comes next.
+    pub(super) fn error(&self, reason: impl Into<String>) -> FormatError {
+        FormatError::at_offset(self.offset, reason)
+    }
+}

@@ -1,0 +1,16 @@
+//! OctoMap's files, byte for byte.
+//!
+//! A text header, then the nodes in preorder: `.bt` has two bits a child (unknown, free leaf, occupied leaf, has
+//! children), `.ot` the log-odds of every node and a mask of its children. Any byte string decodes to a tree or
+//! to an error; memory grows with the bytes that were really read, never with a number that a file states.
+
+mod bt;
+mod header;
+mod input;
+mod number;
+mod octree_file;
+mod ot;
+
+pub use bt::{OCTOMAP_MAX_LOG_ODDS, OCTOMAP_MIN_LOG_ODDS, write_bt, write_bt_unpruned};
+pub use octree_file::{OctreeFile, OctreeFormat, read, read_bt, read_ot, read_with_limit};
+pub use ot::write_ot;
