@@ -180,7 +180,12 @@ impl Header {
                         format!("{} values; field {} is missing", words.len(), field.name),
                     )
                 })?;
-                word.parse().map_err(|_| FormatError::at_line(number, format!("`{word}` is not a number")))
+                // A number of a four-byte field is one of its values, as in the binary encodings.
+                let parsed = match (field.kind, field.size) {
+                    (b'F', 4) => word.parse::<f32>().map(f64::from),
+                    _ => word.parse(),
+                };
+                parsed.map_err(|_| FormatError::at_line(number, format!("`{word}` is not a number")))
             };
             let [x, y, z] = columns.xyz;
             cloud.points.push([value(x)?, value(y)?, value(z)?]);

@@ -35,7 +35,22 @@ pub(super) fn save(
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
 pub(super) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-    let Some(mut stored) = store.open_table(index)? else { return Ok(None) };
+    let loaded = decode(store, config, index, store.open_table(index));
+    if store.is_read_only() && loaded.is_err() {
+        // A writer beside this reader, or a crash, may have committed a version without renaming it yet.
+        let next = decode(store, config, index, store.open_next_table(index));
+        return if next.is_ok() { next } else { loaded };
+    }
+    loaded
+}
+
+fn decode(
+    store: &TileStore,
+    config: &MapConfig,
+    index: TileIndex,
+    stored: Result<Option<StoredTile>>,
+) -> Result<Option<(Tile, u64)>> {
+    let Some(mut stored) = stored? else { return Ok(None) };
     let voxels = config.grid.voxels_of_tile(index);
     let decoded = read_table(&mut stored.input, stored.bytes, &voxels)
         .map_err(|error| error.in_map(&stored.path, Some(index)))?;

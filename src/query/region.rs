@@ -109,9 +109,11 @@ impl<'a, V: MapView> TileCursor<'a, V> {
 
 /// The observed voxels of a tile that lie in a box, by brick.
 pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = Voxel> {
-    let bricks = tile.table().bricks().filter(move |brick| {
-        let min = tile.index_of(brick.voxel(0)).map(|k| k & !(BRICK_EDGE - 1));
-        (0..3).all(|k| min[k] < voxels.end[k] && voxels.min[k] - BRICK_EDGE < min[k])
+    let bricks = tile.table().bricks().filter(move |&brick| {
+        // A brick may reach beyond the tile: place it by a voxel that is inside.
+        let Some(voxel) = tile.voxels_of_brick(brick).next() else { return false };
+        let min = voxel.index.map(|k| k & !(BRICK_EDGE - 1));
+        (0..3).all(|k| min[k] < voxels.end[k] && voxels.min[k].saturating_sub(BRICK_EDGE) < min[k])
     });
     bricks.flat_map(|brick| tile.voxels_of_brick(brick)).filter(|voxel| voxels.contains(voxel.index))
 }

@@ -33,7 +33,7 @@ pub struct TileStore {
     /// Tiles of a map of the seed's format, which has no log.
     foreign: FxHashSet<TileIndex>,
     /// Held while the store may write.
-    _lock: Option<Lock>,
+    lock: Option<Lock>,
 }
 
 struct Lock(#[expect(dead_code, reason = "held for its drop")] Box<dyn Any + Send + Sync>);
@@ -122,7 +122,7 @@ impl TileStore {
         lock: Option<Lock>,
     ) -> Self {
         let (next, unrenamed, strays, foreign) = Default::default();
-        Self { disk, layout, metadata, log, commits, next, unrenamed, strays, foreign, _lock: lock }
+        Self { disk, layout, metadata, log, commits, next, unrenamed, strays, foreign, lock }
     }
 
     /// The map's folder.
@@ -169,12 +169,32 @@ impl TileStore {
         self.next.get(&tile).or_else(|| self.commits.tiles.get(&tile)).copied()
     }
 
+    /// Whether this store reads beside a writer that may be in the middle of a flush: a committed version may then
+    /// still have its `*.next` name.
+    pub fn is_read_only(&self) -> bool {
+        self.lock.is_none()
+    }
+
     /// Opens the latest version of a tile's table; `None` if the tile has none.
     ///
     /// # Errors
     ///
     /// A file that the log names and that is missing, and a tile folder that the log does not name.
     pub fn open_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
+        let is_next = self.next.contains_key(&tile) || self.unrenamed.contains(&tile);
+        self.open_version(tile, is_next)
+    }
+
+    /// Opens the `*.next` version of a tile's table, which a reader beside a writer tries after the other.
+    ///
+    /// # Errors
+    ///
+    /// As for [`TileStore::open_table`].
+    pub fn open_next_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
+        self.open_version(tile, true)
+    }
+
+    fn open_version(&self, tile: TileIndex, is_next: bool) -> Result<Option<StoredTile>> {
         if self.strays.contains(&tile) {
             let path = self.layout.current(tile, TileFile::Table);
             let reason = "commits.log does not name this tile; move its folder away or repair the map";
@@ -184,7 +204,6 @@ impl TileStore {
         if stamp.is_none() && !self.foreign.contains(&tile) {
             return Ok(None);
         }
-        let is_next = self.next.contains_key(&tile) || self.unrenamed.contains(&tile);
         let path = if is_next {
             self.layout.next(tile, TileFile::Table)
         } else {

@@ -1,7 +1,20 @@
 //! All integration tests in one binary, a module a subject.
 
+/// The command as a person types it.
+#[cfg(feature = "cli")]
+mod cli;
+/// What each folder may know.
+mod layering;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
 /// OctoMap's own files, to the last node and byte.
 mod octomap_files;
+/// Questions against brute force.
+mod questions;
+/// Scans from files, good and bad.
+mod readers;
+/// Numbers that are large, negative or on a border.
+mod space;
+/// Files of a map: what a flush leaves, what damage is told, what is never overwritten.
+mod store;
 mod support;

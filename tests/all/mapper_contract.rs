@@ -1,5 +1,6 @@
 use crate::support::random_scans::{Random, random_scan};
 use crate::support::reference_map::{ReferenceMap, voxels_of};
+use crate::support::unsynced_disk::UnsyncedDisk;
 use std::collections::BTreeMap;
 use tempfile::TempDir;
 use voxtile::mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
@@ -11,7 +12,7 @@ use voxtile::{InsertMode, MapConfig};
 
 /// Small tiles, so that a scan of a few metres touches many.
 fn config() -> MapConfig {
-    MapConfig::new(0.1, 1.2).unwrap()
+    MapConfig::new(0.1, 1.6).unwrap()
 }
 
 fn configs() -> Vec<MapConfig> {
@@ -65,7 +66,12 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             let folder = TempDir::new().unwrap();
             let config = config.clone().with_cache_tiles(cache_tiles).with_pending_bytes(pending_bytes);
             let mut reference = ReferenceMap::new(&config);
-            let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config.clone()).unwrap();
+            let mut mapper = OutOfCoreTileMapper::create_on(
+                UnsyncedDisk::shared(),
+                &folder.path().join("map"),
+                config.clone(),
+            )
+            .unwrap();
             drive(&mut mapper, &mut reference, seed as u64, 12);
             assert_eq!(voxels_of(&mapper), reference.voxels, "before flush");
             assert!(mapper.cached_tile_indices().len() <= cache_tiles);
@@ -74,7 +80,12 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             assert_eq!(voxels_of(&mapper), reference.voxels, "after flush");
             drop(mapper);
 
-            let mut mapper = OutOfCoreTileMapper::open(folder.path().join("map"), config.clone()).unwrap();
+            let mut mapper = OutOfCoreTileMapper::open_on(
+                UnsyncedDisk::shared(),
+                &folder.path().join("map"),
+                config.clone(),
+            )
+            .unwrap();
             assert_eq!(mapper.digest().unwrap(), unsaved);
             assert_eq!(mapper.scan_number(), 12);
             let mut random = Random(99);
@@ -188,7 +199,7 @@ fn dirty_tiles_and_saved_tiles_are_told() {
     let folder = TempDir::new().unwrap();
     let config = config().with_cache_tiles(2);
     let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
-    let points: Vec<_> = (0..5).map(|k| [1.2 * f64::from(k) + 0.6, 0.6, 0.6]).collect();
+    let points: Vec<_> = (0..5).map(|k| [1.6 * f64::from(k) + 0.6, 0.6, 0.6]).collect();
     mapper.batch_update(&PointBatch { points: &points, intensities: None, is_occupied: &[true; 5] }).unwrap();
     assert!(mapper.is_dirty());
     let tile = |x| TileIndex::new(x, 0, 0);
@@ -221,7 +232,7 @@ fn keys_on_disk_are_octomaps_and_in_morton_order() {
     let mut previous = None;
     for entry in bytes[16..16 + 18 * count].chunks(18) {
         let key: [u16; 3] = std::array::from_fn(|k| u16::from_le_bytes([entry[2 * k], entry[2 * k + 1]]));
-        assert!(key.iter().all(|key| (32768..32768 + 12).contains(key)), "{key:?}");
+        assert!(key.iter().all(|key| (32768..32768 + 16).contains(key)), "{key:?}");
         let code = VoxelKey(key).morton();
         assert!(previous < Some(code));
         previous = Some(code);

@@ -30,6 +30,7 @@ pub enum Command {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct BuildArgs {
     /// A folder of PCD files in the sensor frame (or one that holds it as scans/), an OctoMap scan graph (.graph) or
     /// scan log (.log)
@@ -57,10 +58,10 @@ pub struct BuildArgs {
     #[arg(long, value_name = "MODEL")]
     pub sensor_model: Option<ModelName>,
     /// iwlo: intensities up to this one are no evidence, in the sensor's unit [default: 35]
-    #[arg(long, value_name = "I", allow_negative_numbers = true)]
+    #[arg(long, value_name = "I")]
     pub intensity_threshold: Option<f64>,
     /// iwlo: intensity of full weight, in the sensor's unit [default: 255]
-    #[arg(long, value_name = "I", allow_negative_numbers = true)]
+    #[arg(long, value_name = "I")]
     pub intensity_max: Option<f64>,
     /// How often one scan updates a voxel
     #[arg(long, value_name = "MODE", default_value = "per-scan")]
@@ -94,6 +95,7 @@ pub enum InsertName {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct InfoArgs {
     /// Folder of the map
     pub map: PathBuf,
@@ -103,11 +105,12 @@ pub struct InfoArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct QueryArgs {
     /// Folder of the map
     pub map: PathBuf,
     /// A point: X Y Z in metres
-    #[arg(value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true, required_unless_present = "points")]
+    #[arg(value_names = ["X", "Y", "Z"], num_args = 3, required_unless_present = "points")]
     pub point: Vec<f64>,
     /// A file of points, one a line: x y z in metres, separated by blanks or commas; - for standard input
     #[arg(long, value_name = "FILE", conflicts_with = "point")]
@@ -118,14 +121,15 @@ pub struct QueryArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct RaycastArgs {
     /// Folder of the map
     pub map: PathBuf,
     /// Where the ray begins, in metres
-    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true, required = true)]
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, required = true)]
     pub origin: Vec<f64>,
     /// Where it goes; any length but 0
-    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true, required = true)]
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, required = true)]
     pub direction: Vec<f64>,
     /// How far it goes, in metres [default: as far as the map reaches]
     #[arg(long, value_name = "M")]
@@ -139,6 +143,7 @@ pub struct RaycastArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct ExportArgs {
     /// Folder of the map
     pub map: PathBuf,
@@ -149,7 +154,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "P")]
     pub min_probability: Option<f64>,
     /// Only voxels whose centre is in this box: X0 <= x < X1 and so on, in metres
-    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, allow_negative_numbers = true)]
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,
     /// Print the summary as JSON
     #[arg(long)]
@@ -157,6 +162,7 @@ pub struct ExportArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct DigestArgs {
     /// Folder of the map
     pub map: PathBuf,
@@ -166,6 +172,7 @@ pub struct DigestArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct DemoArgs {
     /// Folder for the map and the picture
     #[arg(long, value_name = "DIR", default_value = "voxtile_demo")]

@@ -2,6 +2,7 @@
 
 pub mod random_scans;
 pub mod reference_map;
+pub mod unsynced_disk;
 
 use std::path::{Path, PathBuf};
 

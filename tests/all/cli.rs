@@ -1,0 +1,342 @@
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn voxtile(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("voxtile").unwrap();
+    command.args(arguments);
+    command
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Standard output of a run that must succeed.
+fn output(arguments: &[&str]) -> String {
+    String::from_utf8(voxtile(arguments).assert().success().get_output().stdout.clone()).unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    serde_json::from_str(&output(arguments)).unwrap()
+}
+
+/// Exit code and standard error of a run that must fail.
+fn failure(arguments: &[&str]) -> (i32, String) {
+    let assert = voxtile(arguments).assert().failure();
+    let run = assert.get_output();
+    (run.status.code().unwrap(), String::from_utf8(run.stderr.clone()).unwrap())
+}
+
+/// A folder of three small ascii scans of a wall, the sensor a metre further each time.
+fn scans(folder: &TempDir) -> PathBuf {
+    let path = folder.path().join("scans");
+    fs::create_dir(&path).unwrap();
+    for number in 0..3 {
+        let mut file = "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 42\nHEIGHT \
+                        1\nPOINTS 42\nDATA ascii\n"
+            .to_owned();
+        for point in 0..40 {
+            file += &format!("4.05 {} 0.55 {}\n", -2.0 + 0.1 * f64::from(point), 40 + point);
+        }
+        file += "nan 0 0 50\n0 0 0 50\n";
+        fs::write(path.join(format!("{number:03}.pcd")), file).unwrap();
+    }
+    fs::write(path.join("poses_kitti.txt"), "1 0 0 0.05 0 1 0 0.05 0 0 1 0.05\n".repeat(3)).unwrap();
+    path
+}
+
+fn built(folder: &TempDir) -> (PathBuf, PathBuf) {
+    let (scans, map) = (scans(folder), folder.path().join("map"));
+    output(&["build", text(&scans), "-o", text(&map)]);
+    (scans, map)
+}
+
+#[test]
+fn a_map_is_built_asked_exported_and_added_to() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = (scans(&folder), folder.path().join("deep/down/map"));
+    let map = text(&map);
+    let summary = json(&["build", text(&scans), "-o", map, "--json"]);
+    assert_eq!((summary["scans"].as_u64(), summary["points"].as_u64()), (Some(3), Some(126)));
+    assert_eq!(
+        (summary["skipped"]["not_finite"].as_u64(), summary["skipped"]["no_return"].as_u64()),
+        (Some(3), Some(3))
+    );
+    let info = json(&["info", map, "--json"]);
+    assert_eq!((info["scan_number"].as_u64(), info["verified"].as_bool()), (Some(3), Some(true)));
+    assert_eq!(info["occupied"], summary["occupied"]);
+
+    let occupied = json(&["query", map, "4.1", "-0.5", "0.6", "--json"]);
+    assert_eq!(
+        (occupied["state"].as_str(), occupied["observation_count"].as_i64()),
+        (Some("occupied"), Some(3))
+    );
+    assert!(output(&["query", map, "2", "-0.1", "0.3"]).contains("free  probability 0.2286"));
+    assert!(output(&["query", map, "-7", "-1e3", "-0.3"]).contains("unknown"));
+    let points = folder.path().join("points.csv");
+    fs::write(&points, "x,y,z\n4.1,-0.5,0.6\n2 -0.1 0.3\n").unwrap();
+    let answers = output(&["query", map, "--points", text(&points)]);
+    assert_eq!(
+        answers.lines().map(|line| line.split("  ").nth(1).unwrap()).collect::<Vec<_>>(),
+        ["occupied", "free"]
+    );
+
+    let hit = json(&[
+        "raycast",
+        map,
+        "--origin",
+        "0.05",
+        "0.05",
+        "0.6",
+        "--direction",
+        "1",
+        "-0.01",
+        "0",
+        "--json",
+    ]);
+    assert!((hit["hit"]["distance_m"].as_f64().unwrap() - 4.0).abs() < 0.11, "{hit}");
+    assert!(
+        output(&["raycast", map, "--origin", "0", "0", "0.6", "--direction", "-1", "0", "0"])
+            .contains("no hit")
+    );
+
+    for (name, bytes) in [("a.ply", 0), ("a.pcd", 0), ("a.csv", 0), ("a.bt", 0), ("a.ot", 0)] {
+        let file = folder.path().join(name);
+        output(&["export", map, "-o", text(&file)]);
+        assert!(fs::metadata(&file).unwrap().len() > bytes);
+    }
+    let lines = fs::read_to_string(folder.path().join("a.csv")).unwrap().lines().count() as u64;
+    assert_eq!(lines, 1 + info["occupied"].as_u64().unwrap());
+    let exported = voxtile::io::read_pcd(&fs::read(folder.path().join("a.pcd")).unwrap()).unwrap();
+    assert_eq!(exported.points.len() as u64 + 1, lines);
+    let all = folder.path().join("all.csv");
+    let count = json(&["export", map, "-o", text(&all), "--min-probability", "0", "--json"]);
+    assert_eq!(count["voxels"], info["voxels"]);
+    let part = ["export", map, "-o", text(&all), "--region", "-1", "-1", "-1", "2", "2", "2", "--json"];
+    assert_eq!(json(&part)["voxels"].as_u64(), Some(0));
+
+    let digest = output(&["digest", map]);
+    output(&["build", text(&scans), "-o", map, "--append"]);
+    assert_ne!(output(&["digest", map]), digest);
+    assert_eq!(json(&["info", map, "--json"])["scan_number"].as_u64(), Some(6));
+}
+
+#[test]
+fn the_same_scans_give_the_same_digest_whatever_the_cache() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let digests: Vec<String> = ["1", "3", "1000"]
+        .iter()
+        .map(|tiles| {
+            let map = folder.path().join(tiles);
+            let build =
+                ["build", text(&scans), "-o", text(&map), "--cache-tiles", tiles, "--tile-size", "0.5"];
+            output(&build);
+            output(&["digest", text(&map)])
+        })
+        .collect();
+    assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+/// What was typed, the exit code, and what the message must say.
+#[test]
+fn bad_inputs_get_one_line_that_says_what_to_do() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = built(&folder);
+    let (scans, map) = (text(&scans), text(&map));
+    let new = folder.path().join("new");
+    let new = text(&new);
+    let file = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let empty_folder = folder.path().join("empty");
+    fs::create_dir(&empty_folder).unwrap();
+    let few = file("few.txt", b"0 0 0 0 0 0 0 1\n");
+    let many = file("many.txt", "0 0 0 0 0 0 0 1\n".repeat(4).as_bytes());
+    let wrong_header = file(
+        "wrong.pcd",
+        b"VERSION .7\nFIELDS x y\nSIZE 4 4\nTYPE F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n0 0\n",
+    );
+    let truncated =
+        file("cut.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 9\nHEIGHT 1\nDATA binary\nabc");
+    let plain =
+        file("plain.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 3\n");
+    let points = file("points.txt", b"1 2 3\n4 five 6\n");
+    let other = file("scans.xyz", b"1 2 3\n");
+    let cases: Vec<(Vec<&str>, i32, &str)> = vec![
+        (vec!["build", scans, "-o", map], 2, "use --append to add these scans"),
+        (vec!["build", "nowhere", "-o", new], 1, "nowhere: cannot open"),
+        (vec!["build", text(&empty_folder), "-o", new], 2, "no .pcd file in this folder"),
+        (vec!["build", &other, "-o", new], 2, "not a folder of .pcd files, nor a .pcd, .graph or .log file"),
+        (vec!["build", scans, "-o", new, "--poses", &few], 2, "1 poses for 3 scan files"),
+        (vec!["build", scans, "-o", new, "--poses", &many], 2, "4 poses for 3 scan files"),
+        (vec!["build", &wrong_header, "-o", new], 1, "line 7: the points have no field z"),
+        (vec!["build", &truncated, "-o", new], 1, "the file ends after 0 of 9 points"),
+        (vec!["build", &plain, "-o", new, "--sensor-model", "iwlo"], 2, "needs an intensity a point"),
+        (vec!["build", scans, "-o", new, "--intensity-max", "9"], 2, "add --sensor-model iwlo"),
+        (
+            vec!["build", scans, "-o", new, "--sensor-model", "iwlo", "--intensity-max", "35"],
+            2,
+            "the largest intensity must be above the intensity threshold",
+        ),
+        (
+            vec!["build", scans, "-o", new, "--resolution", "0.3"],
+            2,
+            "nearest valid tile sizes are 9.9 m and 10.2 m",
+        ),
+        (vec!["build", scans, "-o", new, "--resolution", "-1"], 2, "resolution"),
+        (
+            vec!["build", scans, "-o", new, "--max-range", "0"],
+            2,
+            "max range: 0 is not a length above the min range",
+        ),
+        (vec!["build", scans, "-o", new, "--cache-tiles", "0"], 2, "cache tiles: 0 is not at least 1"),
+        (
+            vec!["build", scans, "-o", map, "--append", "--resolution", "0.2"],
+            2,
+            "resolution 0.1 m, not 0.2 m",
+        ),
+        (vec!["build", scans, "-o", new, "--append"], 1, "no map here"),
+        (vec!["build", scans, "-o", scans], 2, "there is a map or other content already"),
+        (vec!["info", text(&empty_folder)], 1, "no map here (metadata.json is missing)"),
+        (vec!["query", map, "1", "2"], 2, "3 values required"),
+        (vec!["query", map, "1", "2", "nan"], 2, "is not finite"),
+        (vec!["query", map, "--points", &points], 1, "line 2: `4 five 6` is not a point"),
+        (
+            vec!["raycast", map, "--origin", "0", "0", "0", "--direction", "0", "0", "0"],
+            2,
+            "has no usable length",
+        ),
+        (vec!["export", map, "-o", "a.xyz"], 2, "the extension must be .ply, .pcd, .csv, .bt or .ot"),
+        (vec!["export", map, "-o", "a.ply", "--region", "1", "1", "1", "0", "2", "2"], 2, "needs X0 < X1"),
+        (vec!["export", map, "-o", "no/such/a.ply"], 1, "no/such/a.ply.part: cannot create"),
+    ];
+    for (arguments, code, message) in cases {
+        let (found, stderr) = failure(&arguments);
+        assert!(stderr.contains(message), "{arguments:?}: {stderr}");
+        assert_eq!(found, code, "{arguments:?}: {stderr}");
+        assert!(!stderr.contains("panicked"), "{stderr}");
+        if stderr.starts_with("voxtile: ") {
+            assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+        }
+        assert!(!Path::new(new).exists(), "{arguments:?} left a map behind");
+    }
+}
+
+#[test]
+fn a_stray_point_far_away_is_cut_or_skipped_and_told() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("stray.pcd");
+    let header = "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nDATA ascii\n";
+    fs::write(&path, format!("{header}1 2 3\n1e8 0 0\n")).unwrap();
+    let map = folder.path().join("map");
+    let summary = json(&["build", text(&path), "-o", text(&map), "--json"]);
+    assert_eq!(summary["cut_at_max_range"].as_u64(), Some(1));
+    let far = folder.path().join("far");
+    let summary = json(&["build", text(&path), "-o", text(&far), "--max-range", "1e9", "--json"]);
+    assert_eq!(summary["skipped"]["ray_too_long"].as_u64(), Some(1));
+}
+
+#[test]
+fn a_second_writer_and_damage_are_told_with_the_path() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = built(&folder);
+    let config = voxtile::MapReader::config_of(&map).unwrap();
+    let writer = voxtile::OutOfCoreTileMapper::open(&map, config).unwrap();
+    let (code, stderr) = failure(&["build", text(&scans), "-o", text(&map), "--append"]);
+    assert!(code == 1 && stderr.contains("another process is writing to this map"), "{stderr}");
+    drop(writer);
+    let table = map.join("tile_0_0_0/iwlo_meta.bin");
+    let mut bytes = fs::read(&table).unwrap();
+    bytes[40] ^= 1;
+    fs::write(&table, bytes).unwrap();
+    let (code, stderr) = failure(&["digest", text(&map)]);
+    assert!(
+        code == 1 && stderr.contains("tile_0_0_0") && stderr.contains("tile (0, 0, 0) is damaged"),
+        "{stderr}"
+    );
+    let metadata = map.join("metadata.json");
+    let changed = fs::read_to_string(&metadata).unwrap().replace("\"scan_number\": 3", "\"scan_number\": 4");
+    fs::write(&metadata, changed).unwrap();
+    let (_, stderr) = failure(&["info", text(&map)]);
+    assert!(stderr.contains("metadata.json") && stderr.contains("checksum"), "{stderr}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_cannot_be_written_to_is_told() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let closed = folder.path().join("closed");
+    fs::create_dir(&closed).unwrap();
+    fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
+    // Root may write anywhere: ask in a place where nobody may.
+    let target =
+        if fs::write(closed.join("probe"), "").is_ok() { "/proc/map".into() } else { closed.join("map") };
+    let (code, stderr) = failure(&["build", text(&scans), "-o", text(&target)]);
+    assert!(code == 1 && stderr.contains("cannot create"), "{stderr}");
+}
+
+#[test]
+fn a_merged_octree_beyond_octomaps_keys_names_the_region() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("far.pcd");
+    let header = "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nVIEWPOINT 500000 4000000 10 1 0 0 0\nDATA ascii\n";
+    fs::write(&path, format!("{header}1 2 3\n")).unwrap();
+    let map = folder.path().join("map");
+    output(&["build", text(&path), "-o", text(&map)]);
+    let file = folder.path().join("a.bt");
+    let (code, stderr) = failure(&["export", text(&map), "-o", text(&file)]);
+    assert!(code == 2 && stderr.contains("--region"), "{stderr}");
+    assert!(!file.exists() && !folder.path().join("a.bt.part").exists());
+    assert!(output(&["query", text(&map), "500001.05", "4000002.05", "13.05"]).contains("occupied"));
+}
+
+#[test]
+fn the_demo_makes_a_map_and_a_picture() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("demo");
+    let summary = json(&["demo", "--out", text(&out), "--length", "4", "--cache-tiles", "4", "--json"]);
+    assert!(summary["occupied"].as_u64().unwrap() > 1000);
+    assert!(fs::read(out.join("map.png")).unwrap().starts_with(b"\x89PNG"));
+    assert!(output(&["info", text(&out.join("map_tiles"))]).contains("scans        4 in 1 flushes"));
+    let (code, stderr) = failure(&["demo", "--out", text(&out)]);
+    assert!(code == 2 && stderr.contains("choose another --out"), "{stderr}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_flushes_and_says_how_far_it_got() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    // Enough copies that the build takes a while.
+    for number in 3..4000 {
+        fs::hard_link(scans.join("000.pcd"), scans.join(format!("{number:04}.pcd"))).unwrap();
+    }
+    fs::remove_file(scans.join("poses_kitti.txt")).unwrap();
+    let map = folder.path().join("map");
+    let binary = assert_cmd::cargo::cargo_bin("voxtile");
+    let child = std::process::Command::new(binary)
+        .args(["build", text(&scans), "-o", text(&map), "--resolution", "0.02"])
+        .stderr(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    while !map.join("metadata.json").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let run = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8(run.stderr).unwrap();
+    assert_eq!(run.status.code(), Some(130), "{stderr}");
+    let words: Vec<&str> = stderr.trim().rsplit('\n').next().unwrap().split(' ').collect();
+    let scans: u64 = words[3].parse().unwrap_or_else(|_| panic!("{stderr}"));
+    assert!(scans < 4000);
+    assert_eq!(json(&["info", text(&map), "--json"])["scan_number"].as_u64(), Some(scans));
+}

@@ -1,0 +1,175 @@
+use crate::support::random_scans::{Random, random_scan};
+use crate::support::reference_map::voxels_of;
+use crate::support::unsynced_disk::UnsyncedDisk;
+use tempfile::TempDir;
+use voxtile::query::{RayQuery, Shape, UnknownAs};
+use voxtile::scan::RayWalk;
+use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
+use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions};
+
+fn config() -> MapConfig {
+    MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_pending_bytes(5_000)
+}
+
+/// The same map in memory and out of core with updates still waiting.
+fn maps(folder: &TempDir) -> (InMemoryMapper, OutOfCoreTileMapper) {
+    let mut in_memory = InMemoryMapper::new(config()).unwrap();
+    let path = folder.path().join("map");
+    let mut out_of_core = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config()).unwrap();
+    for seed in 0..4 {
+        let scan = random_scan(&mut Random(seed), [0.2, 0.1, -0.3], 40);
+        in_memory.insert_scan(&scan).unwrap();
+        out_of_core.insert_scan(&scan).unwrap();
+    }
+    (in_memory, out_of_core)
+}
+
+fn occupancy(view: &impl MapView, voxel: VoxelIndex) -> Occupancy {
+    view.occupancy_at(view.config().grid.center_m(voxel)).unwrap()
+}
+
+#[test]
+fn rays_end_where_single_steps_end() {
+    let folder = TempDir::new().unwrap();
+    let (map, out_of_core) = maps(&folder);
+    let mut random = Random(50);
+    let (mut hits, grid) = (0, map.config().grid);
+    for number in 0..150 {
+        let origin = random.point([0.0; 3], 5.0);
+        let direction = match number % 5 {
+            0 => [0.0, -1.0, 0.0],
+            1 => [1.0, 1.0, 0.0],
+            _ => random.point([0.0; 3], 1.0),
+        };
+        let unknown = if number % 4 == 0 { UnknownAs::Obstacle } else { UnknownAs::Free };
+        let max_range_m = random.between(0.5, 9.0);
+        let query = RayQuery { origin, direction, max_range_m: Some(max_range_m), unknown };
+        let answer = map.cast_ray(&query).unwrap();
+        assert_eq!(out_of_core.cast_ray(&query).unwrap(), answer);
+
+        let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
+        let start = grid.voxel_of(origin).unwrap();
+        let unit = grid.to_voxel_units(direction.map(|d| d / length));
+        let mut walk = RayWalk::along(grid.to_voxel_units(origin), start, unit);
+        let stopped = loop {
+            if walk.entry_time() > max_range_m {
+                break None;
+            }
+            let found = occupancy(&map, walk.voxel());
+            if found.is_occupied() || (found == Occupancy::Unknown && unknown == UnknownAs::Obstacle) {
+                break Some((walk.voxel(), walk.entry_time(), found.probability()));
+            }
+            walk.advance();
+        };
+        assert_eq!(answer.map(|hit| (hit.voxel, hit.distance_m, hit.probability)), stopped);
+        hits += u32::from(stopped.is_some());
+        let unlimited = map.cast_ray(&RayQuery { max_range_m: None, ..query }).unwrap();
+        assert!(answer.is_none() || unlimited == answer);
+    }
+    assert!(hits > 30, "{hits} hits");
+}
+
+#[test]
+fn regions_collisions_and_nearest_are_those_of_a_search_of_every_voxel() {
+    let folder = TempDir::new().unwrap();
+    let (map, out_of_core) = maps(&folder);
+    let grid = map.config().grid;
+    let all: Vec<VoxelIndex> = voxels_of(&map).into_keys().collect();
+    let occupied: Vec<VoxelIndex> =
+        all.iter().copied().filter(|&v| occupancy(&map, v).is_occupied()).collect();
+    let mut random = Random(60);
+    for _ in 0..40 {
+        let region = Aabb::from_corners(random.point([0.0; 3], 3.0), random.point([0.0; 3], 3.0));
+        let mut found = Vec::new();
+        out_of_core.for_each_voxel_in(&region, |voxel| found.push(voxel.index)).unwrap();
+        found.sort_unstable();
+        let inside: Vec<_> = all.iter().copied().filter(|&v| region.contains(grid.center_m(v))).collect();
+        assert_eq!(found, inside);
+
+        let center = random.point([0.0; 3], 4.0);
+        let radius_m = random.between(0.0, 0.6);
+        let touches = |voxel: &VoxelIndex| {
+            let corner = voxel.map(|k| f64::from(k) * grid.resolution_m());
+            let far = voxel.map(|k| f64::from(k + 1) * grid.resolution_m());
+            Aabb { min: corner, max: far }.distance_squared(center) <= radius_m * radius_m
+        };
+        let sphere = Shape::Sphere { center, radius_m };
+        let answer = out_of_core.collision(&sphere, UnknownAs::Free).unwrap();
+        assert_eq!(answer.is_some(), occupied.iter().any(touches));
+        assert!(answer.is_none_or(|voxel| occupied.contains(&voxel) && touches(&voxel)));
+        let strict = map.collision(&sphere, UnknownAs::Obstacle).unwrap();
+        assert!(answer.is_none() || strict.is_some());
+        assert!(
+            strict
+                .is_none_or(|voxel| !matches!(occupancy(&map, voxel), Occupancy::Free(_)) && touches(&voxel))
+        );
+        let cube = Shape::Box(region);
+        assert_eq!(
+            map.collision(&cube, UnknownAs::Free).unwrap().is_some(),
+            out_of_core.collision(&cube, UnknownAs::Free).unwrap().is_some()
+        );
+
+        let max_distance_m = random.between(0.1, 3.0);
+        let distance =
+            |v: &VoxelIndex| (0..3).map(|k| (grid.center_m(*v)[k] - center[k]).powi(2)).sum::<f64>().sqrt();
+        let nearest = occupied
+            .iter()
+            .map(|v| (distance(v), *v))
+            .filter(|(distance, _)| *distance <= max_distance_m)
+            .min_by(|a, b| a.partial_cmp(b).unwrap());
+        let answer = out_of_core.nearest_occupied(center, max_distance_m).unwrap();
+        assert_eq!(answer.map(|nearest| (nearest.distance_m, nearest.voxel)), nearest);
+    }
+}
+
+#[test]
+fn many_points_are_answered_in_their_order() {
+    let folder = TempDir::new().unwrap();
+    let (map, out_of_core) = maps(&folder);
+    let mut random = Random(70);
+    let mut points: Vec<_> = (0..500).map(|_| random.point([0.0; 3], 4.0)).collect();
+    points[7] = [f64::NAN; 3];
+    let occupied = map.all_occupied_voxels(None).unwrap();
+    points.extend(occupied.iter().map(|voxel| map.config().grid.center_m(voxel.index)));
+    let answers = out_of_core.occupancy_at_points(&points).unwrap();
+    for (point, answer) in points.iter().zip(&answers) {
+        assert_eq!(map.occupancy_at(*point).unwrap(), *answer);
+    }
+    assert!(answers.iter().any(Occupancy::is_occupied) && answers.contains(&Occupancy::Unknown));
+}
+
+#[test]
+fn the_merged_octree_holds_every_voxel_and_refuses_what_octomap_cannot_address() {
+    let folder = TempDir::new().unwrap();
+    let (mut map, out_of_core) = maps(&folder);
+    let tree = out_of_core.merged_octree(None, 1 << 20).unwrap();
+    let voxels = voxels_of(&map);
+    assert_eq!(tree.expanded_leaf_count(), voxels.len() as u64);
+    for (voxel, (bits, _)) in &voxels {
+        let code: MortonCode = VoxelKey::from_index(*voxel).morton();
+        assert_eq!(tree.get(code, 16), Some(f64::from_bits(*bits) as f32));
+    }
+    assert!(out_of_core.merged_octree(None, 10).unwrap_err().to_string().contains("limit of 10"));
+    map.insert_scan(&random_scan(&mut Random(1), [4000.0, 0.0, 0.0], 5)).unwrap();
+    let message = map.merged_octree(None, 1 << 20).unwrap_err().to_string();
+    assert!(message.contains("--region"), "{message}");
+    let region = Aabb { min: [-9.0; 3], max: [9.0; 3] };
+    assert_eq!(map.merged_octree(Some(&region), 1 << 20).unwrap().expanded_leaf_count(), voxels.len() as u64);
+}
+
+#[test]
+fn wrong_questions_are_told_what_is_wrong() {
+    let map = InMemoryMapper::new(config()).unwrap();
+    let query =
+        RayQuery { origin: [0.0; 3], direction: [0.0; 3], max_range_m: None, unknown: UnknownAs::Free };
+    assert!(map.cast_ray(&query).unwrap_err().to_string().starts_with("direction"));
+    assert!(map.cast_ray(&RayQuery { origin: [f64::NAN; 3], ..query }).is_err());
+    assert_eq!(map.cast_ray(&RayQuery { direction: [1.0; 3], ..query }).unwrap(), None);
+    assert!(map.occupancy_at_depth([0.0; 3], 17).is_err() && map.occupancy_at_depth([0.0; 3], 0).is_err());
+    assert!(map.nearest_occupied([0.0; 3], f64::NAN).is_err());
+    let endless = Shape::Sphere { center: [0.0; 3], radius_m: f64::INFINITY };
+    assert!(map.collision(&endless, UnknownAs::Free).is_err());
+    let huge = Shape::Sphere { center: [0.0; 3], radius_m: 1e6 };
+    assert!(map.collision(&huge, UnknownAs::Obstacle).unwrap_err().to_string().contains("limit"));
+    assert_eq!(map.collision(&huge, UnknownAs::Free).unwrap(), None);
+}

@@ -1,0 +1,256 @@
+use crate::support::random_scans::Random;
+use crate::support::shared_data;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use voxtile::io::{SensorScan, open_scans, read_pcd, read_poses};
+
+const HEADER: &str =
+    "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n";
+
+fn points(count: usize) -> Vec<[f32; 4]> {
+    let mut random = Random(9);
+    (0..count).map(|_| [0; 4].map(|_| random.between(-50.0, 50.0) as f32)).collect()
+}
+
+fn pcd(encoding: &str, points: &[[f32; 4]]) -> Vec<u8> {
+    let count = points.len();
+    let mut file = format!(
+        "{HEADER}WIDTH {count}\nHEIGHT 1\nVIEWPOINT 1 2 3 0 0 0 1\nPOINTS {count}\nDATA {encoding}\n"
+    );
+    let rows =
+        |file: &mut Vec<u8>| points.iter().flatten().for_each(|value| file.extend(value.to_le_bytes()));
+    match encoding {
+        "ascii" => {
+            for [x, y, z, i] in points {
+                file += &format!("{x} {y} {z} {i}\n");
+            }
+            file.into_bytes()
+        }
+        "binary" => {
+            let mut file = file.into_bytes();
+            rows(&mut file);
+            file
+        }
+        _ => {
+            let columns: Vec<u8> = (0..4)
+                .flat_map(|column| points.iter().flat_map(move |point| point[column].to_le_bytes()))
+                .collect();
+            // Literal runs of 32 bytes: valid LZF that saves nothing.
+            let packed: Vec<u8> =
+                columns.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
+            let mut file = file.into_bytes();
+            file.extend((packed.len() as u32).to_le_bytes());
+            file.extend((columns.len() as u32).to_le_bytes());
+            file.extend(packed);
+            file
+        }
+    }
+}
+
+fn all_scans(path: &Path) -> Vec<SensorScan> {
+    let mut source = open_scans(path, None).unwrap();
+    std::iter::from_fn(|| source.next_scan().unwrap()).collect()
+}
+
+#[test]
+fn the_three_encodings_of_a_cloud_are_one_cloud() {
+    let points = points(500);
+    let clouds =
+        ["ascii", "binary", "binary_compressed"].map(|encoding| read_pcd(&pcd(encoding, &points)).unwrap());
+    for cloud in &clouds {
+        assert_eq!(cloud.points[7], [0, 1, 2].map(|k| f64::from(points[7][k])));
+        assert_eq!(cloud.points, clouds[0].points);
+        assert_eq!(cloud.intensities, clouds[0].intensities);
+        assert_eq!(<[f64; 3]>::from(cloud.world_from_sensor.translation.vector), [1.0, 2.0, 3.0]);
+    }
+}
+
+#[test]
+fn fields_of_any_type_order_and_padding_are_read() {
+    let header =
+        "FIELDS i _ z y x\nSIZE 2 1 8 4 4\nTYPE U U F I F\nCOUNT 1 3 1 1 1\nWIDTH 1\nHEIGHT 1\nDATA binary\n";
+    let mut file = header.as_bytes().to_vec();
+    file.extend(700_u16.to_le_bytes());
+    file.extend([9, 9, 9]);
+    file.extend((-2.5_f64).to_le_bytes());
+    file.extend((-3_i32).to_le_bytes());
+    file.extend(f32::NAN.to_le_bytes());
+    let cloud = read_pcd(&file).unwrap();
+    assert!(cloud.points[0][0].is_nan());
+    assert_eq!((cloud.points[0][1], cloud.points[0][2]), (-3.0, -2.5));
+    assert_eq!(cloud.intensities, Some(vec![700.0]));
+}
+
+#[test]
+fn wrong_pcd_files_are_told_what_is_wrong() {
+    let good = String::from_utf8(pcd("ascii", &points(3))).unwrap();
+    let changed = |from: &str, to: &str| read_pcd(good.replace(from, to).as_bytes()).unwrap_err().to_string();
+    for (from, to, message) in [
+        ("FIELDS x y z", "FIELDS x y w", "the points have no field z"),
+        ("SIZE 4 4 4 4", "SIZE 4 4 4", "SIZE has 3 entries for 4 fields"),
+        ("TYPE F F F F", "TYPE F F F Q", "field intensity of type Q"),
+        ("DATA ascii", "DATA zip", "DATA zip is not ascii, binary or binary_compressed"),
+        ("POINTS 3", "POINTS 4", "POINTS 4 is not WIDTH times HEIGHT, 3"),
+        ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2", "VIEWPOINT needs seven finite numbers"),
+        ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 0 0 0", "a quaternion of no length"),
+        ("VERSION", "VERSOIN", "line 2: `VERSOIN` is no key"),
+    ] {
+        let error = changed(from, to);
+        assert!(error.contains(message), "{error}");
+    }
+    assert!(read_pcd(b"ply\nformat").unwrap_err().to_string().contains("line 1"));
+    assert!(
+        changed("WIDTH 3\nHEIGHT 1", "WIDTH 99999999999999999999\nHEIGHT 1")
+            .contains("not a number that fits")
+    );
+    for encoding in ["ascii", "binary", "binary_compressed"] {
+        let file = pcd(encoding, &points(40));
+        for length in 0..file.len() - 12 {
+            assert!(read_pcd(&file[..length]).is_err(), "{encoding} cut to {length}");
+        }
+    }
+}
+
+#[test]
+fn damaged_pcd_files_never_panic() {
+    let mut random = Random(77);
+    for encoding in ["ascii", "binary", "binary_compressed"] {
+        let good = pcd(encoding, &points(10));
+        for _ in 0..20_000 {
+            let mut file = good.clone();
+            for _ in 0..1 + random.below(5) {
+                let at = random.below(file.len() as u64) as usize;
+                file[at] = random.next() as u8;
+            }
+            drop(read_pcd(&file));
+        }
+    }
+}
+
+#[test]
+fn poses_match_the_files_or_both_counts_are_told() {
+    let folder = TempDir::new().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for number in 0..3 {
+        fs::write(scans.join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
+    }
+    assert_eq!(all_scans(folder.path())[1].world_from_sensor.translation.vector.y, 2.0, "from VIEWPOINT");
+    let write = |text: &str| fs::write(folder.path().join("poses_tum.txt"), text).unwrap();
+    write("# t x y z qx qy qz qw\n0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n\n2 3 0 0 0 0 0.6 0.8\n");
+    let read = all_scans(folder.path());
+    assert_eq!(
+        read.iter().map(|scan| scan.world_from_sensor.translation.x).collect::<Vec<_>>(),
+        [1.0, 2.0, 3.0]
+    );
+    let fingerprint = open_scans(&scans, None).unwrap().fingerprint();
+    write("0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3.5 0 0 0 0 0 1\n");
+    assert_ne!(open_scans(&scans, None).unwrap().fingerprint(), fingerprint);
+    for (text, message) in [
+        ("0 1 0 0 0 0 0 1\n", "1 poses for 3 scan files"),
+        ("0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n", "4 poses for 3 scan files"),
+        ("0 1 0 0 0 0 0 0\n", "line 1: a quaternion of no length"),
+        ("0 1 0 NaN 0 0 0 1\n", "line 1: NaN in a pose"),
+        ("0 1 0\n", "line 1: 3 numbers; a pose has 8 (TUM) or 12 (KITTI)"),
+        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the 3x3 part of the matrix is not a rotation"),
+        ("0 1 0 zero 0 0 0 1\n", "`zero` is not a number"),
+    ] {
+        write(text);
+        let error = open_scans(folder.path(), None).err().unwrap().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+}
+
+#[test]
+fn the_real_sets_have_the_scans_and_points_that_their_notes_say() {
+    for (name, scans, points) in [
+        ("fastlio_hku_1", 314, 1_603_961),
+        ("mulran_riverside02_a", 75, 996_768),
+        ("balm_os0_hall", 36, 2_727_114),
+    ] {
+        let Some(folder) = shared_data(name) else { continue };
+        let read = all_scans(&folder);
+        assert_eq!(read.len(), scans, "{name}");
+        assert_eq!(read.iter().map(|scan| scan.points_in_sensor.len()).sum::<usize>(), points, "{name}");
+        assert!(read.iter().all(|scan| scan.intensities.is_some()));
+        let tum = read_poses(&folder.join("poses_tum.txt")).unwrap();
+        let kitti = read_poses(&folder.join("poses_kitti.txt")).unwrap();
+        for (a, b) in tum.iter().zip(&kitti) {
+            assert!((a.to_homogeneous() - b.to_homogeneous()).abs().max() < 1e-5, "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_real_scan_graph_is_read_to_its_end() {
+    let Some(folder) = shared_data("octomap_maps") else { return };
+    let scans = all_scans(&folder.join("spherical_scan.graph"));
+    assert_eq!(scans.iter().map(|scan| scan.points_in_sensor.len()).collect::<Vec<_>>(), [10_201]);
+}
+
+/// A graph of two scans, as OctoMap writes it.
+fn graph() -> Vec<u8> {
+    let mut file = 2_u32.to_le_bytes().to_vec();
+    let vector = |file: &mut Vec<u8>, numbers: &[f64]| {
+        file.extend((numbers.len() as i32).to_le_bytes());
+        numbers.iter().for_each(|number| file.extend(number.to_le_bytes()));
+    };
+    for id in [4_u32, 5] {
+        file.extend(2_u32.to_le_bytes());
+        vector(&mut file, &[1.0, 2.0, 3.0]);
+        vector(&mut file, &[-1.0, 0.5, 0.25]);
+        vector(&mut file, &[10.0, 0.0, 1.0]);
+        vector(&mut file, &[0.8, 0.0, 0.0, 0.6]);
+        file.extend(id.to_le_bytes());
+    }
+    file.extend(0_u32.to_le_bytes());
+    file
+}
+
+#[test]
+fn graphs_and_logs_are_read_and_hostile_ones_are_errors() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.graph");
+    fs::write(&path, graph()).unwrap();
+    let scans = all_scans(&path);
+    assert_eq!(
+        (scans.len(), scans[1].name.as_str(), scans[1].points_in_sensor[1]),
+        (2, "5", [-1.0, 0.5, 0.25])
+    );
+    let log = folder.path().join("a.log");
+    let yaw = 2.0 * 0.6_f64.asin();
+    fs::write(
+        &log,
+        format!("# a log\nNODE 10 0 1 0 0 {yaw}\n1 2 3\n-1 0.5 0.25\n\n skipped\nNODE 0 0 0 0 0 0\n"),
+    )
+    .unwrap();
+    let from_log = all_scans(&log);
+    assert_eq!(from_log.iter().map(|scan| scan.points_in_sensor.len()).collect::<Vec<_>>(), [2, 0]);
+    let [a, b] = [&scans[0], &from_log[0]].map(|scan| scan.world_from_sensor.to_homogeneous());
+    assert!((a - b).abs().max() < 1e-6);
+
+    let read = |path: &Path| {
+        let mut source = open_scans(path, None)?;
+        while source.next_scan()?.is_some() {}
+        Ok::<(), voxtile::Error>(())
+    };
+    for length in 1..graph().len() - 4 {
+        fs::write(&path, &graph()[..length]).unwrap();
+        assert!(read(&path).is_err(), "cut to {length}");
+    }
+    let mut bomb = graph();
+    bomb[4..8].copy_from_slice(&u32::MAX.to_le_bytes());
+    fs::write(&path, bomb).unwrap();
+    assert!(read(&path).unwrap_err().to_string().contains("4294967295 points announced"));
+    for (text, message) in [
+        ("1 2 3\n", "line 1: points before the first line NODE"),
+        ("NODE 1 2 3\n", "line 1: fewer than 6 numbers"),
+        ("NODE 0 0 0 0 0 0\n1 two 3\n", "line 2: `two` is not a number"),
+        ("NODE 0 0 0 0 0 nan\n", "a pose that is not finite"),
+    ] {
+        fs::write(&log, text).unwrap();
+        let error = read(&log).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+}

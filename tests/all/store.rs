@@ -1,0 +1,241 @@
+use crate::support::random_scans::{Random, random_scan};
+use crate::support::reference_map::voxels_of;
+use crate::support::unsynced_disk::UnsyncedDisk;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use voxtile::space::TileIndex;
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions};
+
+fn config() -> MapConfig {
+    MapConfig::new(0.1, 3.2).unwrap().with_cache_tiles(2).with_pending_bytes(1000)
+}
+
+/// A flushed map of a few tiles.
+fn map(folder: &TempDir) -> PathBuf {
+    let path = folder.path().join("map");
+    let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config()).unwrap();
+    for seed in 0..3 {
+        mapper.insert_scan(&random_scan(&mut Random(seed), [0.0; 3], 20)).unwrap();
+    }
+    mapper.flush().unwrap();
+    path
+}
+
+fn open(path: &Path) -> voxtile::Result<OutOfCoreTileMapper> {
+    OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), path, config())
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+#[test]
+fn what_came_after_the_last_flush_is_lost_whole_and_nothing_else() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let flushed = voxels_of(&MapReader::open(&path, 4).unwrap());
+    let mut mapper = open(&path).unwrap();
+    for seed in 10..14 {
+        // Evictions write tiles all the while.
+        mapper.insert_scan(&random_scan(&mut Random(seed), [0.5; 3], 30)).unwrap();
+    }
+    assert!(!mapper.take_saved_tiles().is_empty());
+    assert_eq!(voxels_of(&MapReader::open(&path, 4).unwrap()), flushed, "a reader beside the writer");
+    let crashed = folder.path().join("crashed");
+    copy(&path, &crashed);
+    let reopened = open(&crashed).unwrap();
+    assert_eq!((voxels_of(&reopened), reopened.scan_number()), (flushed, 3));
+    let leftovers =
+        walk(&crashed).into_iter().filter(|path| path.to_string_lossy().ends_with(".next")).count();
+    assert_eq!(leftovers, 0);
+}
+
+fn walk(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
+}
+
+#[test]
+fn a_commit_whose_renames_were_cut_short_is_finished_on_opening() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let before = folder.path().join("before");
+    copy(&path, &before);
+    let mut mapper = open(&path).unwrap();
+    mapper.insert_scan(&random_scan(&mut Random(30), [0.0; 3], 30)).unwrap();
+    mapper.flush().unwrap();
+    let committed = voxels_of(&mapper);
+    drop(mapper);
+    // As if the power had gone after the record: old files, new ones beside them, the new log.
+    let cut = folder.path().join("cut");
+    copy(&before, &cut);
+    fs::copy(path.join("commits.log"), cut.join("commits.log")).unwrap();
+    for (number, file) in walk(&path).into_iter().enumerate() {
+        let name = file.strip_prefix(&path).unwrap();
+        if name.components().count() == 2 {
+            fs::create_dir_all(cut.join(name).parent().unwrap()).unwrap();
+            let done = number % 3 == 0;
+            let next = if done { cut.join(name) } else { cut.join(format!("{}.next", name.display())) };
+            if fs::read(&file).unwrap() != fs::read(before.join(name)).unwrap_or_default() {
+                fs::copy(&file, next).unwrap();
+            }
+        }
+    }
+    assert_eq!(voxels_of(&MapReader::open(&cut, 4).unwrap()), committed, "read beside nobody");
+    let mapper = open(&cut).unwrap();
+    assert_eq!((voxels_of(&mapper), mapper.scan_number()), (committed, 4));
+}
+
+#[test]
+fn one_writer_at_a_time_and_readers_beside_it() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let writer = open(&path).unwrap();
+    assert!(matches!(open(&path), Err(Error::Locked { .. })));
+    assert!(MapReader::open(&path, 1).unwrap().digest().is_ok());
+    drop(writer);
+    assert!(open(&path).is_ok());
+}
+
+#[test]
+fn a_reader_is_told_when_the_map_was_flushed_under_it() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let reader = MapReader::open(&path, 1).unwrap();
+    let mut writer = open(&path).unwrap();
+    writer.insert_scan(&random_scan(&mut Random(40), [0.0; 3], 30)).unwrap();
+    writer.flush().unwrap();
+    assert!(matches!(reader.digest(), Err(Error::Changed { .. })));
+    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), writer.digest().unwrap());
+}
+
+#[test]
+fn other_parameters_are_refused_with_both_values() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let other = |resolution_m, tile_size_m| MapConfig::new(resolution_m, tile_size_m).unwrap();
+    let iwlo = voxtile::sensor::SensorModel::Iwlo(voxtile::sensor::Iwlo::default());
+    for (config, message) in [
+        (other(0.2, 3.2), "resolution 0.1 m, not 0.2 m"),
+        (other(0.1, 1.6), "tile size 3.2 m, not 1.6 m"),
+        (config().with_sensor_model(iwlo), "sensor model"),
+    ] {
+        let error = OutOfCoreTileMapper::open(&path, config).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+    assert!(matches!(OutOfCoreTileMapper::create(&path, config()), Err(Error::AlreadyExists { .. })));
+    assert!(matches!(open(&folder.path().join("none")), Err(Error::NoMap { .. })));
+}
+
+#[test]
+fn damage_is_named_when_read_and_a_damaged_tile_is_never_overwritten() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let tile = TileIndex::new(0, 0, 0);
+    let file = path.join("tile_0_0_0/iwlo_meta.bin");
+    let whole = fs::read(&file).unwrap();
+    let other = fs::read(path.join("tile_-1_0_0/iwlo_meta.bin")).unwrap();
+    let without_trailer = whole[..whole.len() - 64].to_vec();
+    let mut cases = vec![whole[..whole.len() / 2].to_vec(), other, without_trailer, Vec::new()];
+    for at in (0..whole.len()).step_by(whole.len() / 150) {
+        let mut flipped = whole.clone();
+        flipped[at] ^= 1 << (at % 8);
+        cases.push(flipped);
+    }
+    for damaged in cases {
+        fs::write(&file, &damaged).unwrap();
+        let reader = MapReader::open(&path, 4).unwrap();
+        let error = reader.tile(tile).unwrap_err();
+        assert!(matches!(&error, Error::Damaged { tile: Some(named), .. } if *named == tile), "{error}");
+        assert!(error.to_string().contains("tile_0_0_0"), "{error}");
+        assert!(reader.tile(TileIndex::new(-1, 0, 0)).unwrap().is_some(), "the others go on working");
+        // A scan that touches it is refused as a whole, and the file stays.
+        let mut mapper = open(&path).unwrap();
+        let before = mapper.scan_number();
+        assert!(mapper.insert_scan(&random_scan(&mut Random(3), [0.0; 3], 30)).is_err());
+        assert_eq!(mapper.scan_number(), before);
+        mapper.flush().unwrap();
+        assert_eq!(fs::read(&file).unwrap(), damaged);
+    }
+    fs::remove_file(&file).unwrap();
+    let error = MapReader::open(&path, 4).unwrap().tile(tile).unwrap_err().to_string();
+    assert!(error.contains("the file is missing"), "{error}");
+}
+
+#[test]
+fn an_older_version_of_a_tile_is_damage() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let file = path.join("tile_0_0_0/iwlo_meta.bin");
+    let old = fs::read(&file).unwrap();
+    let mut mapper = open(&path).unwrap();
+    mapper.insert_scan(&random_scan(&mut Random(3), [0.0; 3], 30)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    fs::write(&file, old).unwrap();
+    let error = MapReader::open(&path, 4).unwrap().digest().unwrap_err().to_string();
+    assert!(error.contains("the file is of scan 3, commits.log names the version of scan 4"), "{error}");
+}
+
+#[test]
+fn a_stray_tile_folder_is_neither_read_nor_overwritten() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    copy(&path.join("tile_0_0_0"), &path.join("tile_0_0_7"));
+    let mapper = open(&path).unwrap();
+    let error = mapper.tile(TileIndex::new(0, 0, 7)).unwrap_err().to_string();
+    assert!(error.contains("commits.log does not name this tile"), "{error}");
+}
+
+#[test]
+fn a_map_of_the_seeds_own_format_opens_and_is_adopted_on_the_first_write() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let voxels = voxels_of(&MapReader::open(&path, 4).unwrap());
+    // Take from it all that is ours, and the order of the entries.
+    fs::remove_file(path.join("commits.log")).unwrap();
+    let metadata = r#"{"version": "1.0", "resolution": 0.1, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
+    fs::write(path.join("metadata.json"), metadata).unwrap();
+    for file in walk(&path).into_iter().filter(|path| path.ends_with("iwlo_meta.bin")) {
+        let bytes = fs::read(&file).unwrap();
+        let mut entries: Vec<&[u8]> = bytes[16..bytes.len() - 64].chunks(18).collect();
+        entries.reverse();
+        fs::write(&file, [&bytes[..16], &entries.concat()].concat()).unwrap();
+    }
+    let reader = MapReader::open(&path, 4).unwrap();
+    assert!(!reader.is_verified());
+    assert_eq!(voxels_of(&reader), voxels);
+
+    let mut mapper = open(&path).unwrap();
+    assert_eq!(voxels_of(&mapper), voxels);
+    mapper.insert_scan(&random_scan(&mut Random(5), [0.0; 3], 30)).unwrap();
+    mapper.flush().unwrap();
+    let reader = MapReader::open(&path, 4).unwrap();
+    assert!(reader.is_verified());
+    assert_eq!(voxels_of(&reader), voxels_of(&mapper));
+}
+
+#[test]
+fn octree_files_are_what_the_octree_of_the_table_gives() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let reader = MapReader::open(&path, 4).unwrap();
+    for tile in reader.tiles() {
+        let tile = tile.unwrap();
+        let mut expected = Vec::new();
+        voxtile::octree::write_bt(&tile.octree(), 0.1, 0.0, &mut expected).unwrap();
+        let index = tile.index();
+        let file = path.join(format!("tile_{}_{}_{}/octree.bt", index.x, index.y, index.z));
+        assert_eq!(fs::read(file).unwrap(), expected);
+    }
+}
