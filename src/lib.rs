@@ -1,4 +1,60 @@
-//! voxtile
+//! Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
+//!
+//! Scans of a lidar, depth camera or sonar become a map of voxels that are occupied, free or unknown, with the exact
+//! evidence of each. Space is cut into tiles; an LRU keeps the active ones in memory, the others are on disk. What was
+//! flushed survives a crash, and the map is the same to the bit whatever the cache.
+//!
+//! ```
+//! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Scan};
+//!
+//! # fn main() -> voxtile::Result<()> {
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let folder = folder.path().join("map_tiles");
+//! let config = MapConfig::new(0.1, 10.0)?.with_range(0.5, 60.0).with_cache_tiles(64);
+//! let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
+//! let scan = Scan { origin: [0.0, 0.0, 1.8], points: vec![[4.2, 1.0, 0.3]], intensities: None };
+//! mapper.insert_scan(&scan)?;
+//! mapper.flush()?; // From here on it survives a crash.
+//!
+//! let map = MapReader::open(&folder, 16)?;
+//! assert!(map.occupancy_at([4.2, 1.0, 0.3])?.is_occupied());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # The flow
+//!
+//! ```text
+//! io::ScanSource -> Scan -> rays -> updates by tile        io, scan
+//!   -> mapper::insert_scan                                 mapper
+//!      -> resident tiles: table, voxel cache, octree       tile, octree, sensor
+//!      -> pending updates for tiles on disk                mapper
+//!      -> eviction and flush: bytes, one commit            tile::format, store
+//! questions <- tile by tile <- memory or disk              query
+//! ```
+//!
+//! # Words
+//!
+//! - **voxel**: a cube of the map's resolution, named by its index; **tile**: a cube of voxels with its own files;
+//!   **brick**: 8 x 8 x 8 voxels, the unit of the tables.
+//! - **evidence**: log-odds and number of updates of an observed voxel; *unknown* is the absence of evidence.
+//! - **flush**: the one commit point; **digest**: a number for the whole content, equal for equal maps.
+//!
+//! # It is not
+//!
+//! A localisation or SLAM system (poses come with the scans), a mesh or distance field, a database for points, or a
+//! map that several processes write to at once.
+//!
+//! # Limits
+//!
+//! Tiles of 2 to 1024 voxels along an edge; voxel indices of 32 bits; rays of at most a million steps. One writer a
+//! map, any number of readers.
+//!
+//! # Features
+//!
+//! `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
+//! it, and no feature changes a result.
+
 mod config;
 mod error;
 pub mod io;

@@ -4,6 +4,7 @@ use crate::support::unsynced_disk::UnsyncedDisk;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use voxtile::simulation::{City, Lidar};
 use voxtile::space::TileIndex;
 use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions};
 
@@ -238,4 +239,19 @@ fn octree_files_are_what_the_octree_of_the_table_gives() {
         let file = path.join(format!("tile_{}_{}_{}/octree.bt", index.x, index.y, index.z));
         assert_eq!(fs::read(file).unwrap(), expected);
     }
+}
+
+/// The digest is stable: that of a map in the repository, and of the same city mapped again today.
+#[test]
+fn the_example_in_the_repository_has_the_digest_that_its_city_gives() {
+    let golden = "86d6b6a866e687cd00aba1b2d2340f25625266cf3f71954d99885cbd320e02bb";
+    let example =
+        MapReader::open(Path::new(env!("CARGO_MANIFEST_DIR")).join("map_tiles_example"), 4).unwrap();
+    assert_eq!(example.digest().unwrap().to_string(), golden);
+    let config = MapConfig::new(1.0, 10.0).unwrap().with_range(0.0, 40.0);
+    let mut mapper = voxtile::InMemoryMapper::new(config).unwrap();
+    for scan in voxtile::simulation::scans(&City::new(1), Lidar::demo(), 1).take(20) {
+        mapper.insert_scan(&scan).unwrap();
+    }
+    assert_eq!(mapper.digest().unwrap().to_string(), golden);
 }

@@ -180,9 +180,12 @@ pub struct DemoArgs {
     /// Which city
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Length of the drive in metres
-    #[arg(long, value_name = "M", default_value_t = 120)]
+    /// Length of the drive in metres, one scan a metre
+    #[arg(long, value_name = "M", default_value_t = 80)]
     pub length: u32,
+    /// Edge of a voxel in metres
+    #[arg(long, value_name = "M", default_value_t = 0.2)]
+    pub resolution: f64,
     /// Most tiles kept in memory
     #[arg(long, value_name = "N", default_value_t = 24)]
     pub cache_tiles: usize,

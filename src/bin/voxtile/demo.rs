@@ -21,7 +21,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         return Err(Error::AlreadyExists { path: map, hint }.into());
     }
     // Few tiles and little room for what waits, so that the demo shows the disk at work.
-    let config = MapConfig::new(0.2, 10.0)?
+    let config = MapConfig::new(args.resolution, 10.0)?
         .with_range(0.0, 40.0)
         .with_cache_tiles(args.cache_tiles)
         .with_pending_bytes(2 << 20);

@@ -1,0 +1,67 @@
+//! Maps a stream of world points, as `tools/octomap_compat/points.py` writes it, into a folder of tiles.
+//!
+//! ```text
+//! insert_stream STREAM RESOLUTION_M MAP_FOLDER
+//! ```
+//!
+//! Per scan, little-endian: count `u32`, origin 3 x `f32`, points 3 x `f32` each.
+use std::error::Error;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::time::Instant;
+use voxtile::mapper::{MapView, Mapper};
+use voxtile::space::Point;
+use voxtile::{MapConfig, OutOfCoreTileMapper, Scan};
+
+/// What OctoMap is given too.
+const MAX_RANGE_M: f64 = 60.0;
+const TILE_SIZE_M: f64 = 10.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [stream, resolution_m, folder] = arguments.as_slice() else {
+        return Err("usage: insert_stream STREAM RESOLUTION_M MAP_FOLDER".into());
+    };
+    // All tiles stay in memory: what is compared is the map, not the way to the disk.
+    let config = MapConfig::new(resolution_m.parse()?, TILE_SIZE_M)?
+        .with_range(0.0, MAX_RANGE_M)
+        .with_cache_tiles(1 << 20);
+    let mut mapper = OutOfCoreTileMapper::create(folder, config)?;
+    let mut input = BufReader::new(File::open(stream)?);
+    let (mut points, mut skipped, mut seconds) = (0, 0, 0.0);
+    while let Some(scan) = read_scan(&mut input)? {
+        let start = Instant::now();
+        let report = mapper.insert_scan(&scan)?;
+        seconds += start.elapsed().as_secs_f64();
+        points += report.points;
+        skipped += report.skipped.total();
+    }
+    mapper.flush()?;
+    println!(
+        "{{\"scans\":{},\"points\":{points},\"skipped\":{skipped},\"tiles\":{},\"voxtile_seconds\":{seconds:.2}}}",
+        mapper.scan_number(),
+        mapper.tile_indices().len()
+    );
+    Ok(())
+}
+
+/// The next scan; `None` at the end of the stream.
+fn read_scan(input: &mut impl Read) -> io::Result<Option<Scan>> {
+    let mut count = [0; 4];
+    match input.read_exact(&mut count) {
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
+        result => result?,
+    }
+    let origin = read_point(input)?;
+    let points = (0..u32::from_le_bytes(count)).map(|_| read_point(input)).collect::<io::Result<_>>()?;
+    Ok(Some(Scan { origin, points, intensities: None }))
+}
+
+/// Three `f32`, widened.
+fn read_point(input: &mut impl Read) -> io::Result<Point> {
+    let mut bytes = [0; 12];
+    input.read_exact(&mut bytes)?;
+    Ok(std::array::from_fn(|k| {
+        f64::from(f32::from_le_bytes(std::array::from_fn(|byte| bytes[4 * k + byte])))
+    }))
+}

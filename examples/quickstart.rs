@@ -1,0 +1,30 @@
+//! Builds a map out of core, asks it, opens it again: `cargo run --release --example quickstart`.
+
+use voxtile::query::{RayQuery, UnknownAs};
+use voxtile::simulation::{City, Lidar, scans};
+use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = std::env::temp_dir().join(format!("voxtile_quickstart_{}", std::process::id()));
+    let config = MapConfig::new(0.25, 10.0)?.with_range(0.0, 40.0).with_cache_tiles(16);
+
+    let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
+    for scan in scans(&City::new(1), Lidar::demo(), 1).take(10) {
+        mapper.insert_scan(&scan)?;
+    }
+    let forward = RayQuery {
+        origin: [5.0, 0.0, 1.9],
+        direction: [0.0, 1.0, 0.0],
+        max_range_m: Some(50.0),
+        unknown: UnknownAs::Free,
+    };
+    println!("to the left: {:?}", mapper.cast_ray(&forward)?);
+    println!("nearest: {:?}", mapper.nearest_occupied([5.0, 0.0, 1.9], 10.0)?);
+    mapper.flush()?;
+    drop(mapper);
+
+    let map = MapReader::open(&folder, 8)?;
+    println!("{} tiles, digest {}", map.tile_indices().len(), map.digest()?);
+    std::fs::remove_dir_all(&folder)?;
+    Ok(())
+}

@@ -1,0 +1,48 @@
+#!/bin/sh
+# Compares voxtile with the OctoMap library: maps of real scans, and every tile's octree.bt.
+#
+#   tools/octomap_compat/run.sh [--short]
+#
+# Needs g++, python3 and liboctomap-dev, and data below ${VOXTILE_DATA:-../shared/data}; a data set that is absent is
+# skipped. --short: the first scans of two data sets at 0.2 m. Exits with 1 if a comparison fails.
+set -eu
+cd "$(dirname "$0")/../.."
+here=tools/octomap_compat
+data=${VOXTILE_DATA:-../shared/data}
+target=${CARGO_TARGET_DIR:-target}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+cargo build --release --quiet --no-default-features --example insert_stream
+for tool in insert tiles; do
+    # Without contracted operations, like Debian's library: fused multiply-add visits slightly other voxels.
+    # OctoMap's headers hold the ray walk, so it is compiled here, not only in the library. NDEBUG silences it.
+    g++ -std=c++17 -O2 -DNDEBUG -ffp-contract=off -Wall -o "$work/$tool" "$here/$tool.cpp" -loctomap -loctomath
+done
+
+failed=0
+
+compare() { # data set, resolution in metres, most scans
+    if [ ! -d "$data/$1/scans" ]; then
+        echo "$1: skipped, not in $data"
+        return
+    fi
+    echo "$1 at $2 m"
+    python3 "$here/points.py" "$data/$1" $3 > "$work/stream"
+    "$target/release/examples/insert_stream" "$work/stream" "$2" "$work/map"
+    "$work/insert" "$work/stream" "$2" "$work/map" || failed=1
+    "$work/tiles" "$work/map" "$2" || failed=1
+    rm -r "$work/map"
+}
+
+if [ "${1-}" = --short ]; then
+    compare fastlio_hku_1 0.2 20
+    compare balm_os0_hall 0.2 3
+else
+    for set in fastlio_hku_1 balm_os0_hall mulran_riverside02_a; do
+        for resolution in 0.2 0.1; do
+            compare "$set" "$resolution" ""
+        done
+    done
+fi
+exit $failed
