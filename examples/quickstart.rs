@@ -1,7 +1,7 @@
 //! Builds a map out of core, asks it, opens it again: `cargo run --release --example quickstart`.
 
 use voxtile::query::{RayQuery, UnknownAs};
-use voxtile::simulation::{City, Lidar, scans};
+use voxtile::simulation::Survey;
 use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -9,17 +9,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = MapConfig::new(0.25, 10.0)?.with_range(0.0, 40.0).with_cache_tiles(16);
 
     let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
-    for scan in scans(&City::new(1), Lidar::demo(), 1).take(10) {
+    let mut survey = Survey::demo(1);
+    let start = survey.scan_at(0).origin;
+    for scan in survey.take(10) {
         mapper.insert_scan(&scan)?;
     }
     let forward = RayQuery {
-        origin: [5.0, 0.0, 1.9],
+        origin: start,
         direction: [0.0, 1.0, 0.0],
         max_range_m: Some(50.0),
         unknown: UnknownAs::Free,
     };
     println!("to the left: {:?}", mapper.cast_ray(&forward)?);
-    println!("nearest: {:?}", mapper.nearest_occupied([5.0, 0.0, 1.9], 10.0)?);
+    println!("nearest: {:?}", mapper.nearest_occupied(start, 10.0)?);
     mapper.flush()?;
     drop(mapper);
 

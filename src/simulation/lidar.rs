@@ -1,154 +1,178 @@
-use super::random::normal;
-use super::scene::World;
-use crate::maths::sin_cos;
+use super::{Hit, Random, World};
+use crate::maths;
 use crate::scan::Scan;
 use crate::space::Point;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
+use std::f64::consts::PI;
 
-/// A spinning lidar: beams at fixed elevations, each with so many rays a turn.
+/// A spinning lidar: beams at fixed elevations, each fired at even steps around the full circle.
+///
+/// Its frame has x ahead, y to the left, z up.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Lidar {
-    /// Number of beams, one above the other.
+    /// Beams above each other.
     pub beams: u32,
-    /// Rays of each beam a turn.
+    /// Rays of each beam in a turn.
     pub rays_per_beam: u32,
-    /// Elevation of the lowest beam in degrees.
-    pub lowest_deg: f64,
-    /// Elevation of the highest beam in degrees.
-    pub highest_deg: f64,
-    /// Nothing farther than this is seen, in metres.
+    /// Elevation of the lowest and the highest beam in degrees, up is positive; the others lie evenly between.
+    pub elevation_deg: [f64; 2],
+    /// Farther surfaces are not seen, in metres; at most [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
     pub max_range_m: f64,
-    /// Standard deviation of a measured range, in metres.
+    /// Standard deviation of a measured distance in metres; 0 measures exactly.
     pub range_noise_m: f64,
+    /// Whether a ray that meets nothing still gives a point: the sensor's own position, which maps skip and count.
+    pub reports_misses: bool,
 }
 
 impl Lidar {
-    /// A small one for a first look: 32 beams of 512 rays.
-    pub fn demo() -> Self {
-        Self { beams: 32, rays_per_beam: 512, lowest_deg: -25.0, highest_deg: 30.0, ..Self::street() }
-    }
-
-    /// 64 beams of 1024 rays, on a car in a street.
+    /// The lidar of the *street* workload: 64 beams of 1024 rays. In a [`City`](super::City) its mean range is
+    /// about 12 m.
     pub fn street() -> Self {
         Self {
             beams: 64,
             rays_per_beam: 1024,
-            lowest_deg: -22.5,
-            highest_deg: 16.5,
-            max_range_m: 100.0,
-            range_noise_m: 0.01,
+            elevation_deg: [-28.0, 8.0],
+            max_range_m: 60.0,
+            range_noise_m: 0.02,
+            reports_misses: false,
         }
     }
 
-    /// 90 000 rays in every direction but straight up and down, carried through a building.
+    /// The lidar of the *indoor* workload: 90 000 rays. In a [`Building`](super::Building) its mean range is
+    /// about 2.3 m.
     pub fn indoor() -> Self {
         Self {
-            beams: 90,
-            rays_per_beam: 1000,
-            lowest_deg: -60.0,
-            highest_deg: 60.0,
-            max_range_m: 50.0,
-            range_noise_m: 0.005,
+            beams: 100,
+            rays_per_beam: 900,
+            elevation_deg: [-70.0, 70.0],
+            max_range_m: 20.0,
+            range_noise_m: 0.01,
+            reports_misses: false,
         }
     }
 
-    /// What the lidar sees at a pose, in the world frame, intensities from 0 to 255. Rays that meet nothing give no
-    /// point. `noise_seed` decides the noise.
-    pub fn scan(&self, world: &impl World, world_from_sensor: &Isometry3<f64>, noise_seed: u64) -> Scan {
-        let origin: Point = world_from_sensor.translation.vector.into();
+    /// A small lidar for a quick look: 16 beams of 360 rays.
+    pub fn demo() -> Self {
+        Self { beams: 16, rays_per_beam: 360, max_range_m: 40.0, ..Self::street() }
+    }
+
+    /// What the lidar sees from a pose: points in the world frame, intensities from 0 to 255.
+    ///
+    /// The points come in the order of a turn, all beams of one direction together. The noise is that of
+    /// `seed` and `scan_number`, so it is another one at the next visit.
+    pub fn scan(
+        &self,
+        world: &impl World,
+        world_from_sensor: &Isometry3<f64>,
+        seed: u64,
+        scan_number: u64,
+    ) -> Scan {
+        let at = world_from_sensor.translation;
+        let origin = [at.x, at.y, at.z];
+        let rotation = world_from_sensor.rotation.to_rotation_matrix();
+        let r = rotation.matrix();
         let scene = world.scene(origin, self.max_range_m);
-        let mut scan = Scan { origin, points: Vec::new(), intensities: None };
+        let mut noise = Random::of(seed, &[scan_number as i64]);
+        let elevations: Vec<(f64, f64)> = (0..self.beams).map(|beam| self.elevation(beam)).collect();
+        let mut points: Vec<Point> = Vec::new();
         let mut intensities = Vec::new();
-        let elevations: Vec<_> = (0..self.beams).map(|beam| sin_cos(self.elevation_rad(beam))).collect();
-        for ray in 0..self.rays_per_beam {
-            let azimuth_rad = std::f64::consts::TAU * f64::from(ray) / f64::from(self.rays_per_beam);
-            let (sin_azimuth, cos_azimuth) = sin_cos(azimuth_rad);
-            for (beam, &(sin_elevation, cos_elevation)) in elevations.iter().enumerate() {
-                let in_sensor =
-                    Vector3::new(cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation);
-                let direction: Point = (world_from_sensor.rotation * in_sensor).into();
-                let Some(echo) = scene.cast(origin, direction, self.max_range_m) else { continue };
-                let noise_m = self.range_noise_m * normal(noise_seed, i64::from(ray), beam as i64);
-                let range_m = echo.distance_m + noise_m;
-                scan.points.push(std::array::from_fn(|k| origin[k] + direction[k] * range_m));
-                let fading = 1.0 / (1.0 + echo.distance_m / 40.0);
-                intensities
-                    .push((255.0 * echo.reflectivity * echo.incidence_cos.sqrt() * fading).round() as f32);
+        for column in 0..self.rays_per_beam {
+            let azimuth_rad = 2.0 * PI * f64::from(column) / f64::from(self.rays_per_beam);
+            let (sin_azimuth, cos_azimuth) = maths::sin_cos(azimuth_rad);
+            for &(up, flat) in &elevations {
+                let d = [flat * cos_azimuth, flat * sin_azimuth, up];
+                let direction =
+                    std::array::from_fn(|i| r[(i, 0)] * d[0] + r[(i, 1)] * d[1] + r[(i, 2)] * d[2]);
+                // Drawn for every ray, so that a ray's noise does not depend on what others met.
+                let error_m = self.range_noise_m * noise.bell();
+                match scene.cast(origin, direction, self.max_range_m) {
+                    Some(hit) => {
+                        let measured_m = (hit.distance_m + error_m).max(0.0);
+                        points.push(std::array::from_fn(|k| origin[k] + direction[k] * measured_m));
+                        intensities.push(intensity(&hit));
+                    }
+                    None if self.reports_misses => {
+                        points.push(origin);
+                        intensities.push(0.0);
+                    }
+                    None => {}
+                }
             }
         }
-        scan.intensities = Some(intensities);
-        scan
+        Scan { origin, points, intensities: Some(intensities) }
     }
 
-    fn elevation_rad(&self, beam: u32) -> f64 {
-        let share = f64::from(beam) / f64::from(self.beams.max(2) - 1);
-        (self.lowest_deg + (self.highest_deg - self.lowest_deg) * share) * (std::f64::consts::PI / 180.0)
+    /// Sine and cosine of a beam's elevation.
+    fn elevation(&self, beam: u32) -> (f64, f64) {
+        let [low, high] = self.elevation_deg;
+        let share = if self.beams > 1 { f64::from(beam) / f64::from(self.beams - 1) } else { 0.5 };
+        maths::sin_cos((low + (high - low) * share) * (PI / 180.0))
     }
 }
 
-/// The scans of an endless drive through a world, one a metre.
-pub fn scans<W: World>(world: &W, lidar: Lidar, seed: u64) -> impl Iterator<Item = Scan> {
-    (0..).map(move |number| scan_at(world, lidar, seed, number))
-}
-
-/// Scan `number` of the drive that [`scans`] makes, without those before it.
-pub fn scan_at(world: &impl World, lidar: Lidar, seed: u64, number: u64) -> Scan {
-    let noise_seed = seed.wrapping_mul(0x1000_0000_01b3).wrapping_add(number);
-    lidar.scan(world, &world.pose_at(number as f64), noise_seed)
+/// The echo as a lidar reports it, a whole number from 0 to 255: dimmer from afar and at a grazing angle.
+fn intensity(hit: &Hit) -> f32 {
+    let distance = hit.distance_m / 40.0;
+    let echo = hit.reflectivity * (0.5 + 0.5 * hit.cos_incidence) / (1.0 + distance * distance);
+    // Near and bright surfaces saturate, as they do in a real one.
+    (400.0 * echo + 0.5).floor().clamp(0.0, 255.0) as f32
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::route::level_pose;
+    use super::super::{Building, City};
     use super::*;
-    use crate::simulation::{Building, City};
-
-    fn digest(scan: &Scan) -> String {
-        let mut hasher = blake3::Hasher::new();
-        scan.points.iter().flatten().for_each(|coordinate| {
-            hasher.update(&coordinate.to_bits().to_le_bytes());
-        });
-        hasher.finalize().to_hex()[..16].to_owned()
-    }
-
-    fn mean_range_m(scan: &Scan) -> f64 {
-        let range = |p: &Point| (0..3).map(|k| (p[k] - scan.origin[k]).powi(2)).sum::<f64>().sqrt();
-        scan.points.iter().map(range).sum::<f64>() / scan.points.len() as f64
-    }
 
     #[test]
-    fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
-        let third = |seed| scan_at(&City::new(seed), Lidar::demo(), seed, 3);
-        assert_eq!(digest(&third(1)), "3f8b0b4901c6233a");
-        assert_ne!(digest(&third(1)), digest(&third(2)));
-        let in_sequence = scans(&City::new(1), Lidar::demo(), 1).take(4).last().unwrap();
-        assert_eq!(third(1), in_sequence);
-    }
-
-    #[test]
-    fn ranges_are_those_of_a_street_and_of_rooms() {
-        let mean = |ranges: Vec<f64>| ranges.iter().sum::<f64>() / ranges.len() as f64;
-        let city = City::new(1);
-        let street =
-            mean((0..4).map(|k| mean_range_m(&scan_at(&city, Lidar::street(), 1, k * 15))).collect());
-        assert!((10.0..14.0).contains(&street), "{street} m");
-        let building = Building::new(1);
-        let indoor =
-            mean((0..5).map(|k| mean_range_m(&scan_at(&building, Lidar::indoor(), 1, k * 9))).collect());
-        assert!((2.0..2.7).contains(&indoor), "{indoor} m");
-    }
-
-    #[test]
-    fn the_way_is_clear_of_every_solid_and_goes_on_without_a_jump() {
-        fn check(world: &impl World, metres: u32) {
-            let place = |metre: u32| -> Point { world.pose_at(f64::from(metre)).translation.vector.into() };
-            for metre in 0..metres {
-                let here = place(metre);
-                assert!(!world.scene(here, 1.0).is_inside(here), "{here:?}");
-                let step: f64 = (0..3).map(|k| (place(metre + 1)[k] - here[k]).abs()).sum();
-                assert!(step < 1.5, "{step} m at {metre}");
-            }
+    fn without_noise_every_point_lies_on_a_surface() {
+        let lidar = Lidar { range_noise_m: 0.0, beams: 8, ..Lidar::street() };
+        let pose = level_pose([2.0, 30.0, 1.8], 1.2);
+        let scan = lidar.scan(&City::new(3), &pose, 1, 0);
+        let scene = super::super::World::scene(&City::new(3), scan.origin, 90.0);
+        assert!(scan.points.len() > 3_000);
+        for point in &scan.points {
+            let box_m = scene.solids().iter().map(|solid| solid.bounds.distance_squared(*point).sqrt());
+            let nearest_m = box_m.fold(point[2].abs(), f64::min);
+            assert!(nearest_m < 1e-9, "{point:?} hangs {nearest_m} m from everything");
         }
-        check(&City::new(3), 3000);
-        check(&Building::new(3), 300);
+    }
+
+    #[test]
+    fn rays_that_meet_nothing_give_a_point_only_if_asked() {
+        let lidar = Lidar { elevation_deg: [80.0, 90.0], beams: 4, ..Lidar::street() };
+        let pose = level_pose([0.0, 0.0, 1.8], 0.0);
+        let city = City::new(3);
+        assert_eq!(lidar.scan(&city, &pose, 1, 0).points, Vec::<Point>::new());
+        let scan = Lidar { reports_misses: true, ..lidar }.scan(&city, &pose, 1, 0);
+        assert_eq!(scan.points, vec![scan.origin; 4 * 1024]);
+    }
+
+    #[test]
+    fn intensities_are_whole_numbers_of_a_byte_and_spread() {
+        let scan = Lidar::indoor().scan(&Building::new(3), &level_pose([2.0, 10.0, 1.4], 0.0), 1, 0);
+        let intensities = scan.intensities.expect("a lidar has intensities");
+        assert_eq!(intensities.len(), scan.points.len());
+        assert!(intensities.iter().all(|i| (0.0..=255.0).contains(i) && i.fract() == 0.0));
+        let bright = intensities.iter().filter(|&&i| i > 100.0).count();
+        assert!(bright > intensities.len() / 10 && bright < intensities.len());
+    }
+
+    #[test]
+    fn a_lidar_of_odd_numbers_scans_without_a_panic() {
+        for odd in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            let lidar = Lidar {
+                beams: 1,
+                rays_per_beam: 3,
+                elevation_deg: [odd; 2],
+                max_range_m: odd,
+                range_noise_m: odd,
+                ..Lidar::demo()
+            };
+            lidar.scan(&City::new(1), &level_pose([odd, 0.0, 1.0], 0.0), 1, 0);
+        }
+        let nothing = Lidar { beams: 0, ..Lidar::demo() };
+        assert!(nothing.scan(&City::new(1), &level_pose([0.0, 0.0, 1.0], 0.0), 1, 0).points.is_empty());
     }
 }

@@ -1,23 +1,44 @@
-//! A made-up world, seeded: a city or a building, a lidar, a drive. The demo, tests and benchmarks use the same.
+//! A made-up world to map: seeded, endless, and the same to the last bit on every platform.
 //!
-//! Everything is a function of a seed and a number, to the bit on every platform: scan `k` of a drive can be made
-//! without the scans before it, and a drive of any length needs no memory.
+//! ```text
+//! City, Building  (World)  what there is: boxes and a ground plane      block, solid, scene
+//! Drive, Walk     (Route)  where the sensor is at step k
+//! Lidar                    what it sees from there: a Scan in the world frame
+//! Survey                   the three together: scan k, or one scan after another
+//! ```
+//!
+//! Everything is a function of a seed and an index. Nothing is stored that grows with the distance driven, and
+//! scan k comes out the same whether or not the scans before it were made.
 //!
 //! ```
-//! use voxtile::simulation::{City, Lidar, scan_at};
+//! use voxtile::simulation::Survey;
 //!
-//! let city = City::new(7);
-//! let scan = scan_at(&city, Lidar::demo(), 7, 3);
-//! assert!(scan.points.len() > 1000);
+//! let mut survey = Survey::demo(7);
+//! let first = survey.next().expect("the demo drive has no end");
+//! assert_eq!(first, survey.scan_at(0));
 //! ```
 
+mod block;
 mod building;
 mod city;
+mod drive;
 mod lidar;
 mod random;
+mod route;
 mod scene;
+mod solid;
+mod survey;
+mod walk;
+mod world;
 
 pub use building::Building;
 pub use city::City;
-pub use lidar::{Lidar, scan_at, scans};
-pub use scene::{Echo, Scene, Solid, World};
+pub use drive::Drive;
+pub use lidar::Lidar;
+pub use random::Random;
+pub use route::Route;
+pub use scene::{Hit, Scene};
+pub use solid::Solid;
+pub use survey::Survey;
+pub use walk::Walk;
+pub use world::World;

@@ -1,27 +1,99 @@
-/// A number from 0 to 1 (excluded) that belongs to a seed and three other numbers: hashed, not drawn in sequence, so
-/// that any part of the world can be made on its own.
-pub(super) fn unit(seed: u64, a: i64, b: i64, c: i64) -> f64 {
-    let mut hash = mix(seed ^ 0x6a09_e667_f3bc_c908);
-    for part in [a, b, c] {
-        hash = mix(hash ^ part as u64);
+/// A small seeded generator of random numbers (SplitMix64), the same on every platform.
+#[derive(Clone, Debug)]
+pub struct Random {
+    state: u64,
+}
+
+/// The odd constant by which SplitMix64 steps: 2^64 over the golden ratio.
+const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+
+impl Random {
+    /// The generator of one thing, named by numbers: another thing, or another seed, gets an unrelated one.
+    pub fn of(seed: u64, name: &[i64]) -> Self {
+        let fold = |state: u64, part: &i64| mixed(state.wrapping_add(STEP) ^ mixed(*part as u64));
+        Self { state: name.iter().fold(mixed(seed.wrapping_add(STEP)), fold) }
     }
-    (hash >> 11) as f64 / (1_u64 << 53) as f64
+
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.state = self.state.wrapping_add(STEP);
+        mixed(self.state)
+    }
+
+    /// A number from `low` up to, not including, `high` (or `low`, where the two are equal).
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        // The upper 53 bits are a whole number that an f64 holds exactly.
+        let unit = (self.bits() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0);
+        low + (high - low) * unit
+    }
+
+    /// A whole number from 0 up to, not including, `end` (0 where `end` is 0).
+    pub fn below(&mut self, end: u64) -> u64 {
+        ((u128::from(self.bits()) * u128::from(end)) >> 64) as u64
+    }
+
+    /// True with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.between(0.0, 1.0) < probability
+    }
+
+    /// A number of mean 0 and standard deviation 1, bell-shaped, never beyond 3.47.
+    ///
+    /// The sum of four uniform numbers: it needs no logarithm, so it is exact everywhere.
+    pub fn bell(&mut self) -> f64 {
+        let bits = self.bits();
+        let sum: u64 = (0..4).map(|quarter| (bits >> (16 * quarter)) & 0xFFFF).sum();
+        const SQRT_3: f64 = 1.732_050_807_568_877_2;
+        (sum as f64 - 131_070.0) * (SQRT_3 / 65_536.0)
+    }
 }
 
-/// A number from `low` to `high`, likewise.
-pub(super) fn between(low: f64, high: f64, seed: u64, a: i64, b: i64, c: i64) -> f64 {
-    low + (high - low) * unit(seed, a, b, c)
+/// SplitMix64's finaliser: every input bit changes about half of the output bits.
+fn mixed(mut bits: u64) -> u64 {
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    bits ^ (bits >> 31)
 }
 
-/// A number of mean 0 and standard deviation 1, likewise: the sum of twelve uniform ones, which needs no logarithm.
-pub(super) fn normal(seed: u64, a: i64, b: i64) -> f64 {
-    (0..12).map(|c| unit(seed, a, b, c)).sum::<f64>() - 6.0
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// The finalizer of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
-fn mix(value: u64) -> u64 {
-    let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    #[test]
+    fn bits_are_those_of_splitmix64() {
+        // The first numbers of the reference implementation for state 0.
+        let mut random = Random { state: 0 };
+        assert_eq!(random.bits(), 0xE220_A839_7B1D_CDAF);
+        assert_eq!(random.bits(), 0x6E78_9E6A_A1B9_65F4);
+        assert_eq!(random.bits(), 0x06C4_5D18_8009_454F);
+    }
+
+    #[test]
+    fn numbers_stay_in_their_range_and_fill_it() {
+        let mut random = Random::of(1, &[]);
+        let numbers: Vec<f64> = (0..10_000).map(|_| random.between(-2.0, 3.0)).collect();
+        assert!(numbers.iter().all(|x| (-2.0..3.0).contains(x)));
+        assert!((numbers.iter().sum::<f64>() / 1e4 - 0.5).abs() < 0.05);
+        let mut seen = [false; 7];
+        (0..200).for_each(|_| seen[random.below(7) as usize] = true);
+        assert_eq!(seen, [true; 7]);
+        assert_eq!(random.below(0), 0);
+    }
+
+    #[test]
+    fn bell_has_mean_zero_and_deviation_one() {
+        let mut random = Random::of(2, &[]);
+        let numbers: Vec<f64> = (0..100_000).map(|_| random.bell()).collect();
+        let mean = numbers.iter().sum::<f64>() / 1e5;
+        let variance = numbers.iter().map(|x| x * x).sum::<f64>() / 1e5;
+        assert!(mean.abs() < 0.02 && (variance - 1.0).abs() < 0.02, "{mean} {variance}");
+    }
+
+    #[test]
+    fn things_of_other_names_are_unrelated() {
+        let first = |seed, name: &[i64]| Random::of(seed, name).bits();
+        assert_ne!(first(1, &[0, 1]), first(1, &[1, 0]));
+        assert_ne!(first(1, &[0]), first(1, &[0, 0]));
+        assert_ne!(first(1, &[0]), first(2, &[0]));
+    }
 }

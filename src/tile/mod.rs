@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The table answers every question about a finest voxel. The octree is derived from it and serves coarse
-//! questions; the voxel cache in front keeps it from seeing every update (OctoCache). [`format`] turns a tile
+//! questions; the voxel cache in front keeps it from seeing every update (OctoCache). [`mod@format`] turns a tile
 //! into the bytes of its two files and back; nothing here knows a path.
 
 mod brick;

@@ -87,6 +87,14 @@ pub enum ModelName {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ColorName {
+    /// Height of the topmost occupied voxel
+    Height,
+    /// Highest probability in the column
+    Probability,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum InsertName {
     /// Once; a hit wins over any miss
     PerScan,
@@ -180,12 +188,15 @@ pub struct DemoArgs {
     /// Which city
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Length of the drive in metres, one scan a metre
-    #[arg(long, value_name = "M", default_value_t = 80)]
+    /// Length of the drive in metres, a scan every two metres
+    #[arg(long, value_name = "M", default_value_t = 400)]
     pub length: u32,
     /// Edge of a voxel in metres
     #[arg(long, value_name = "M", default_value_t = 0.2)]
     pub resolution: f64,
+    /// What the colors of the picture show
+    #[arg(long, value_name = "WHAT", default_value = "height")]
+    pub color: ColorName,
     /// Most tiles kept in memory
     #[arg(long, value_name = "N", default_value_t = 24)]
     pub cache_tiles: usize,

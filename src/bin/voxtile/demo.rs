@@ -1,5 +1,5 @@
-use crate::args::DemoArgs;
-use crate::picture::TopDown;
+use crate::args::{ColorName, DemoArgs};
+use crate::picture::{ColourBy, TopDown, View};
 use crate::progress::Progress;
 use crate::summary::Summary;
 use std::io::Write;
@@ -8,10 +8,13 @@ use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::ScanReport;
-use voxtile::simulation::{City, Lidar, scans};
-use voxtile::space::Aabb;
+use voxtile::simulation::{City, Drive, Lidar, Survey};
+use voxtile::space::{Aabb, Point};
 use voxtile::store::Bounds;
 use voxtile::{Error, MapConfig, Occupancy};
+
+/// From scan to scan.
+const SPACING_M: u32 = 2;
 
 pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
@@ -24,57 +27,73 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let config = MapConfig::new(args.resolution, 10.0)?
         .with_range(0.0, 40.0)
         .with_cache_tiles(args.cache_tiles)
-        .with_pending_bytes(2 << 20);
+        .with_pending_bytes(4 << 20);
     let mut mapper = OutOfCoreTileMapper::create(&map, config)?;
     mapper.set_input_fingerprint(format!("demo city {} over {} m", args.seed, args.length));
-    let city = City::new(args.seed);
+    let scans = args.length.div_ceil(SPACING_M) as usize;
+    let drive = Drive::new(args.seed, f64::from(SPACING_M));
+    let survey = Survey::new(City::new(args.seed), drive, Lidar::demo(), args.seed);
     let mut report = ScanReport::default();
-    let progress = Progress::over_scans(Some(args.length as usize));
-    for scan in scans(&city, Lidar::demo(), args.seed).take(args.length as usize) {
+    let mut path: Vec<Point> = Vec::with_capacity(scans);
+    let progress = Progress::over_scans(Some(scans));
+    for scan in survey.take(scans) {
         report += mapper.insert_scan(&scan)?;
+        path.push(scan.origin);
         progress.step();
         progress.show(&mapper);
     }
     progress.say("flushing");
     mapper.flush()?;
     drop(progress);
-    Summary::of(&map, u64::from(args.length), report, &mapper, started.elapsed())?.print(args.json)?;
+    Summary::of(&map, scans as u64, report, &mapper, started.elapsed())?.print(args.json)?;
     drop(mapper);
 
     let picture = args.out.join("map.png");
-    draw(&map, &picture)?;
+    draw(args, &map, &path, &picture)?;
     if !args.json {
-        say_what_next(&args.out, &map, &picture)?;
+        say_what_next(&args.out, &map, &picture, path.first().copied().unwrap_or_default())?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Draws a map on disk from above, tile by tile.
-fn draw(map: &Path, picture: &Path) -> anyhow::Result<()> {
+/// Draws a map on disk from above, tile by tile, and the way of the sensor.
+fn draw(args: &DemoArgs, map: &Path, path: &[Point], picture: &Path) -> anyhow::Result<()> {
     let reader = MapReader::open(map, 1)?;
     let config = reader.config();
     let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
     let Some(Bounds { min, max }) = Bounds::of(reader.tile_indices().into_iter()) else { return Ok(()) };
     let corner = |index: [i32; 3], add: f64| index.map(|k| (f64::from(k) + add) * tile_size_m);
-    let mut top_down =
-        TopDown::new(Aabb { min: corner(min, 0.0), max: corner(max, 1.0) }, resolution_m, tile_size_m);
+    let mut top_down = TopDown::new(View {
+        bounds: Aabb { min: corner(min, 0.0), max: corner(max, 1.0) },
+        resolution_m,
+        tile_size_m,
+        colour_by: match args.color {
+            ColorName::Height => ColourBy::Height,
+            ColorName::Probability => ColourBy::Probability,
+        },
+        title: format!("voxtile demo: {} scans, {resolution_m} m voxels, {tile_size_m} m tiles", path.len()),
+    })?;
     for tile in reader.tiles() {
         for voxel in tile?.voxels() {
-            let is_occupied = Occupancy::of(config, Some(voxel.evidence)).is_occupied();
-            top_down.add(config.grid.center_m(voxel.index), resolution_m, is_occupied);
+            let center_m = config.grid.center_m(voxel.index);
+            match Occupancy::of(config, Some(voxel.evidence)) {
+                Occupancy::Occupied(probability) => top_down.add_occupied(center_m, probability),
+                Occupancy::Free(_) | Occupancy::Unknown => top_down.add_free(center_m),
+            }
         }
     }
-    top_down.write_png(picture)
+    path.iter().for_each(|&place| top_down.add_to_path(place));
+    Ok(top_down.write_png(picture)?)
 }
 
-fn say_what_next(folder: &Path, map: &Path, picture: &Path) -> std::io::Result<()> {
+fn say_what_next(folder: &Path, map: &Path, picture: &Path, [x, y, z]: Point) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     let (folder, map) = (folder.display(), map.display());
     writeln!(out, "picture   {}", picture.display())?;
     writeln!(out, "\nWhat to try next:")?;
     writeln!(out, "  voxtile info {map}")?;
-    writeln!(out, "  voxtile query {map} 10 0 1.9")?;
-    writeln!(out, "  voxtile raycast {map} --origin 10 0 1.9 --direction 0 1 0")?;
+    writeln!(out, "  voxtile query {map} {x:.1} {y:.1} {z:.1}")?;
+    writeln!(out, "  voxtile raycast {map} --origin {x:.1} {y:.1} {z:.1} --direction 0 1 0")?;
     writeln!(out, "  voxtile export {map} -o {folder}/city.ply")?;
     writeln!(out, "  voxtile build YOUR_SCANS -o your_map")
 }

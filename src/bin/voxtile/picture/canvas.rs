@@ -1,69 +1,110 @@
 use super::font;
+use super::palette::{Rgb, mixed};
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{self, BufWriter};
 use std::path::Path;
+use voxtile::{Error, Result};
 
-pub type Color = [u8; 3];
-
-/// A picture of square pixels, row by row from the top.
+/// Pixels, row by row from the top. What is drawn outside is cut off.
 pub struct Canvas {
     width: usize,
     height: usize,
-    pixels: Vec<Color>,
+    bytes: Vec<u8>,
 }
 
 impl Canvas {
-    pub fn new(width: usize, height: usize, background: Color) -> Self {
-        Self { width, height, pixels: vec![background; width * height] }
+    /// A canvas of one colour.
+    pub fn new(width: usize, height: usize, colour: Rgb) -> Self {
+        Self { width, height, bytes: colour.repeat(width * height) }
     }
 
-    /// Sets a pixel; outside the picture nothing happens.
-    pub fn set(&mut self, x: i64, y: i64, color: Color) {
-        if let Some(pixel) = self.pixel(x, y) {
-            *pixel = color;
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    #[cfg(test)]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Lays a colour over a box of pixels; `cover` 1 hides what was there, 0 leaves it.
+    pub fn fill(&mut self, left: usize, top: usize, size: [usize; 2], colour: Rgb, cover: f64) {
+        for y in top.min(self.height)..top.saturating_add(size[1]).min(self.height) {
+            for x in left.min(self.width)..left.saturating_add(size[0]).min(self.width) {
+                let at = 3 * (x + y * self.width);
+                let pixel = &mut self.bytes[at..at + 3];
+                let new =
+                    if cover >= 1.0 { colour } else { mixed([pixel[0], pixel[1], pixel[2]], colour, cover) };
+                pixel.copy_from_slice(&new);
+            }
         }
     }
 
-    /// Mixes a color into a pixel: 0 leaves it, 1 replaces it.
-    pub fn blend(&mut self, x: i64, y: i64, color: Color, share: f64) {
-        if let Some(pixel) = self.pixel(x, y) {
-            *pixel = std::array::from_fn(|k| {
-                (f64::from(pixel[k]) * (1.0 - share) + f64::from(color[k]) * share).round() as u8
-            });
+    /// A filled disc around the middle of a pixel.
+    pub fn disc(&mut self, middle: [usize; 2], radius: usize, colour: Rgb) {
+        for dy in 0..=2 * radius {
+            let up = dy as f64 - radius as f64;
+            let half = ((radius as f64 + 0.3).powi(2) - up * up).max(0.0).sqrt() as usize;
+            let (Some(y), Some(x)) = ((middle[1] + dy).checked_sub(radius), middle[0].checked_sub(half))
+            else {
+                continue;
+            };
+            self.fill(x, y, [2 * half + 1, 1], colour, 1.0);
         }
     }
 
-    pub fn rectangle(&mut self, x: i64, y: i64, width: i64, height: i64, color: Color) {
-        for dy in 0..height {
-            (0..width).for_each(|dx| self.set(x + dx, y + dy, color));
-        }
-    }
-
-    /// Writes text with its upper left corner at (x, y), each dot of the letters `scale` pixels wide.
-    pub fn text(&mut self, x: i64, y: i64, text: &str, scale: i64, color: Color) {
-        let mut left = x;
-        for letter in text.chars() {
-            for (row, bits) in (0..).zip(font::glyph(letter)) {
-                for column in (0..font::WIDTH).filter(|column| bits >> (font::WIDTH - 1 - column) & 1 == 1) {
-                    self.rectangle(left + column * scale, y + row * scale, scale, scale, color);
+    /// Writes text whose upper left corner is given, each dot of a letter `dot` pixels wide.
+    pub fn text(&mut self, left: usize, top: usize, dot: usize, colour: Rgb, text: &str) {
+        for (index, letter) in text.chars().enumerate() {
+            for (row, bits) in font::glyph(letter).into_iter().enumerate() {
+                for column in 0..font::WIDTH {
+                    if bits >> (font::WIDTH - 1 - column) & 1 == 1 {
+                        let x = left + (index * font::ADVANCE + column) * dot;
+                        self.fill(x, top + row * dot, [dot; 2], colour, 1.0);
+                    }
                 }
             }
-            left += (font::WIDTH + 1) * scale;
         }
     }
 
-    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
-        let file = File::create(path).map_err(|error| voxtile::Error::io(path, "create", error))?;
-        let mut encoder = png::Encoder::new(BufWriter::new(file), self.width as u32, self.height as u32);
+    /// Writes text that ends at a column.
+    pub fn text_before(&mut self, right: usize, top: usize, dot: usize, colour: Rgb, text: &str) {
+        self.text(right.saturating_sub(font::width_of(text) * dot), top, dot, colour, text);
+    }
+
+    /// Saves the picture as PNG.
+    pub fn write_png(&self, path: &Path) -> Result<()> {
+        self.encode(path).map_err(|source| Error::io(path, "write the picture", source))
+    }
+
+    fn encode(&self, path: &Path) -> io::Result<()> {
+        let too_large = |_| io::Error::other("the picture is too large for PNG");
+        let width = u32::try_from(self.width).map_err(too_large)?;
+        let height = u32::try_from(self.height).map_err(too_large)?;
+        let mut file = BufWriter::new(File::create(path)?);
+        let mut encoder = png::Encoder::new(&mut file, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(self.pixels.as_flattened())?;
-        Ok(writer.finish()?)
+        writer.write_image_data(&self.bytes)?;
+        writer.finish()?;
+        // A full disk shows when the last bytes leave the buffer, not when it is dropped.
+        io::Write::flush(&mut file)
     }
+}
 
-    fn pixel(&mut self, x: i64, y: i64) -> Option<&mut Color> {
-        let inside = (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y);
-        inside.then(|| &mut self.pixels[y as usize * self.width + x as usize])
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawing_outside_is_cut_off() {
+        let mut canvas = Canvas::new(4, 3, [0; 3]);
+        canvas.fill(3, 2, [10, 10], [9; 3], 1.0);
+        canvas.fill(usize::MAX, 0, [2, 2], [9; 3], 1.0);
+        canvas.disc([0, 0], 2, [7; 3]);
+        canvas.text(2, 1, 3, [5; 3], "10 m");
+        assert_eq!(canvas.bytes.len(), 36);
+        assert_eq!(canvas.bytes[33..], [9; 3]);
     }
 }

@@ -1,189 +1,336 @@
 use super::canvas::Canvas;
-use super::{font, palette};
+use super::font;
+use super::frame::Frame;
+use super::legend::Legend;
+use super::palette::{self, colour_of, lit};
 use std::path::Path;
+use voxtile::Result;
 use voxtile::space::{Aabb, Point};
 
-/// A map from above: the highest occupied voxel of each column by its height, free space dark, unknown darker.
+/// What the colour of an occupied cell stands for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColourBy {
+    /// Height of the topmost occupied voxel.
+    #[default]
+    Height,
+    /// Highest probability of the column.
+    Probability,
+}
+
+/// What to draw, and how.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Extent of the map in metres; what lies outside is left out, what is empty is cropped.
+    pub bounds: Aabb,
+    /// Edge of a voxel in metres.
+    pub resolution_m: f64,
+    /// Edge of a tile in metres.
+    pub tile_size_m: f64,
+    pub colour_by: ColourBy,
+    /// A line above the map.
+    pub title: String,
+}
+
+/// The columns of a map seen from above: at most 2048 x 2048 cells of 8 bytes, whatever the size of the map.
 pub struct TopDown {
-    bounds: Aabb,
-    tile_size_m: f64,
-    pixels_per_m: f64,
-    width: usize,
-    height: usize,
-    columns: Vec<Column>,
+    view: View,
+    frame: Frame,
+    cells: Vec<Cell>,
 }
 
-#[derive(Clone, Copy)]
-enum Column {
-    Unknown,
-    Free,
-    Occupied(f32),
+/// Most cells along an edge.
+const MAX_CELLS: usize = 2048;
+/// A small map is drawn larger, until its longer edge has about so many pixels.
+const GOOD_EDGE: usize = 2100;
+/// The legend needs this width.
+const LEAST_WIDTH: usize = 760;
+
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    /// Height of the topmost occupied voxel's centre.
+    top_m: f32,
+    /// Probability of the most probable occupied voxel; 0 is 0 and 255 is 1.
+    probability: u8,
+    is_occupied: bool,
+    is_free: bool,
+    is_on_path: bool,
 }
 
-/// The longer side of the map in pixels is at most this.
-const MAX_SIDE: f64 = 1800.0;
-/// The legend's band below the map, in pixels.
-const BAND: usize = 64;
+impl Cell {
+    fn is_unknown(&self) -> bool {
+        !(self.is_occupied || self.is_free || self.is_on_path)
+    }
+}
+
+/// The part of the picture that shows the map: which cells, and where.
+struct Pane {
+    first: [usize; 2],
+    cells: [usize; 2],
+    /// Pixels along a cell's edge.
+    zoom: usize,
+    left: usize,
+    top: usize,
+}
+
+impl Pane {
+    fn size(&self) -> [usize; 2] {
+        self.cells.map(|n| n * self.zoom)
+    }
+
+    /// Upper left pixel of a cell: y points up, rows count down.
+    fn pixel(&self, cell: [usize; 2]) -> [usize; 2] {
+        let row = self.cells[1] - 1 - (cell[1] - self.first[1]);
+        [self.left + (cell[0] - self.first[0]) * self.zoom, self.top + row * self.zoom]
+    }
+}
 
 impl TopDown {
-    /// An empty picture of the space in `bounds`, in metres; at most one pixel a voxel of `resolution_m`, or a few for
-    /// a small map.
-    pub fn new(bounds: Aabb, resolution_m: f64, tile_size_m: f64) -> Self {
-        let extent = |axis: usize| (bounds.max[axis] - bounds.min[axis]).max(resolution_m);
-        let longest_m = extent(0).max(extent(1));
-        let voxels = longest_m / resolution_m;
-        // A whole number of pixels a voxel, or, where there are too many voxels, as many as fit.
-        let pixels_per_voxel = (MAX_SIDE / voxels).clamp(0.0, 8.0);
-        let pixels_per_voxel =
-            if pixels_per_voxel >= 1.0 { pixels_per_voxel.floor() } else { pixels_per_voxel };
-        let pixels_per_m = pixels_per_voxel / resolution_m;
-        let pixels =
-            |axis: usize| ((extent(axis) * pixels_per_m).ceil() as usize).clamp(1, MAX_SIDE as usize + 8);
-        let (width, height) = (pixels(0), pixels(1));
-        let columns = vec![Column::Unknown; width * height];
-        Self { bounds, tile_size_m, pixels_per_m, width, height, columns }
+    /// An empty picture; an error if the bounds have no extent.
+    pub fn new(view: View) -> Result<Self> {
+        let frame = Frame::new(&view.bounds, view.resolution_m, MAX_CELLS)?;
+        let cells = vec![Cell::default(); frame.cells[0] * frame.cells[1]];
+        Ok(Self { view, frame, cells })
     }
 
-    /// Adds an observed voxel of edge `edge_m`.
-    pub fn add(&mut self, center: Point, edge_m: f64, is_occupied: bool) {
-        let half = edge_m / 2.0;
-        let (left, bottom) = self.pixel_of([center[0] - half, center[1] - half]);
-        let (right, top) = self.pixel_of([center[0] + half, center[1] + half]);
-        for x in left..right.max(left + 1) {
-            for y in top..bottom.max(top + 1) {
-                if !((0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y)) {
-                    continue;
-                }
-                let column = &mut self.columns[y as usize * self.width + x as usize];
-                let z = center[2] as f32;
-                *column = match *column {
-                    Column::Occupied(height) if is_occupied => Column::Occupied(height.max(z)),
-                    Column::Occupied(height) => Column::Occupied(height),
-                    _ if is_occupied => Column::Occupied(z),
-                    _ => Column::Free,
-                };
+    /// Adds an occupied voxel by its centre in metres.
+    pub fn add_occupied(&mut self, centre: Point, probability: f64) {
+        let Some(cell) = self.cell_at(centre) else { return };
+        let top_m = centre[2] as f32;
+        cell.top_m = if cell.is_occupied { cell.top_m.max(top_m) } else { top_m };
+        cell.probability = cell.probability.max((probability * 255.0).round() as u8);
+        cell.is_occupied = true;
+    }
+
+    /// Adds a free voxel by its centre in metres.
+    pub fn add_free(&mut self, centre: Point) {
+        if let Some(cell) = self.cell_at(centre) {
+            cell.is_free = true;
+        }
+    }
+
+    /// Marks a place where the sensor was, in metres.
+    pub fn add_to_path(&mut self, position: Point) {
+        if let Some(cell) = self.cell_at(position) {
+            cell.is_on_path = true;
+        }
+    }
+
+    /// Draws everything and saves it.
+    pub fn write_png(&self, path: &Path) -> Result<()> {
+        self.draw().write_png(path)
+    }
+
+    fn cell_at(&mut self, point: Point) -> Option<&mut Cell> {
+        let [x, y] = self.frame.cell_of(point[0], point[1])?;
+        self.cells.get_mut(x + y * self.frame.cells[0])
+    }
+
+    fn cell(&self, x: usize, y: usize) -> Cell {
+        self.cells[x + y * self.frame.cells[0]]
+    }
+
+    fn draw(&self) -> Canvas {
+        let (first, cells) = self.seen();
+        let zoom = (GOOD_EDGE / cells[0].max(cells[1])).clamp(1, 12);
+        let map_width = cells[0] * zoom;
+        let dot = (map_width.max(LEAST_WIDTH) / 480).clamp(2, 5);
+        let margin = 10 * dot;
+        let width = map_width.max(LEAST_WIDTH) + 2 * margin;
+        let pane =
+            Pane { first, cells, zoom, left: (width - map_width) / 2, top: 2 * margin + font::HEIGHT * dot };
+        let foot = pane.top + pane.size()[1] + margin;
+        let mut canvas = Canvas::new(width, foot + 24 * dot + margin, palette::UNKNOWN);
+        let range = self.range();
+        self.draw_cells(&mut canvas, &pane, range);
+        self.draw_tile_lines(&mut canvas, &pane);
+        self.draw_path(&mut canvas, &pane, dot);
+        canvas.text(margin, margin, dot, palette::INK, &self.view.title);
+        let metres_a_pixel = self.frame.cell_m / zoom as f64;
+        let lines_m = self.line_spacing_m(1.0 / metres_a_pixel);
+        Legend { metres_a_pixel, lines_m, colour_by: self.view.colour_by, range }.draw(
+            &mut canvas,
+            foot,
+            dot,
+        );
+        canvas
+    }
+
+    /// First cell and number of cells of the box around all that is known, with a little air.
+    fn seen(&self) -> ([usize; 2], [usize; 2]) {
+        let (mut low, mut high) = (self.frame.cells, [0; 2]);
+        for y in 0..self.frame.cells[1] {
+            for x in (0..self.frame.cells[0]).filter(|&x| !self.cell(x, y).is_unknown()) {
+                low = [low[0].min(x), low[1].min(y)];
+                high = [high[0].max(x), high[1].max(y)];
             }
         }
+        if low[0] > high[0] {
+            return ([0; 2], self.frame.cells);
+        }
+        let air = (high[0] - low[0]).max(high[1] - low[1]) / 60 + 1;
+        let first: [usize; 2] = std::array::from_fn(|k| low[k].saturating_sub(air));
+        let cells = std::array::from_fn(|k| (high[k] + air).min(self.frame.cells[k] - 1) + 1 - first[k]);
+        (first, cells)
     }
 
-    /// Draws map, tile grid, scale bar and height legend.
-    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
-        let (low, high) = self.heights();
-        let width = self.width.max(560);
-        let mut canvas = Canvas::new(width, self.height + BAND, palette::UNKNOWN);
-        for (number, column) in self.columns.iter().enumerate() {
-            let color = match *column {
-                Column::Unknown => continue,
-                Column::Free => palette::FREE,
-                Column::Occupied(height) => {
-                    palette::color((f64::from(height) - low) / (high - low).max(1e-6))
-                }
-            };
-            canvas.set((number % self.width) as i64, (number / self.width) as i64, color);
+    fn value(&self, cell: Cell) -> f64 {
+        match self.view.colour_by {
+            ColourBy::Height => f64::from(cell.top_m),
+            ColourBy::Probability => f64::from(cell.probability) / 255.0,
         }
-        self.draw_grid(&mut canvas);
-        self.draw_band(&mut canvas, width as i64, low, high);
-        canvas.write_png(path)
     }
 
-    fn draw_grid(&self, canvas: &mut Canvas) {
-        // Lines closer than this would hide the map.
-        if self.tile_size_m * self.pixels_per_m < 6.0 {
-            return;
+    /// What the first and the last colour stand for: one cell in a hundred may lie outside either.
+    ///
+    /// Probabilities always span the same range, so that two pictures can be compared.
+    fn range(&self) -> [f64; 2] {
+        if self.view.colour_by == ColourBy::Probability {
+            return [0.5, 1.0];
         }
-        let lines = |axis: usize| {
-            let first = (self.bounds.min[axis] / self.tile_size_m).ceil() as i64;
-            let last = (self.bounds.max[axis] / self.tile_size_m).floor() as i64;
-            (first..=last).map(|line| line as f64 * self.tile_size_m)
+        let mut values: Vec<f32> =
+            self.cells.iter().filter(|cell| cell.is_occupied).map(|cell| self.value(*cell) as f32).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let (Some(&least), Some(&most)) =
+            (values.get(values.len() / 100), values.get(values.len() * 99 / 100))
+        else {
+            return [0.0, 1.0];
         };
-        for x in lines(0) {
-            let x = self.pixel_of([x, 0.0]).0;
-            (0..self.height as i64).for_each(|y| canvas.blend(x, y, palette::GRID, 0.3));
-        }
-        for y in lines(1) {
-            let y = self.pixel_of([0.0, y]).1;
-            (0..self.width as i64).for_each(|x| canvas.blend(x, y, palette::GRID, 0.3));
-        }
+        [f64::from(least), f64::from(most).max(f64::from(least) + 0.01)]
     }
 
-    fn draw_band(&self, canvas: &mut Canvas, width: i64, low: f64, high: f64) {
-        let (top, left) = (self.height as i64 + 12, 16);
-        let (length_m, label) = scale_bar(width as f64 * 0.25 / self.pixels_per_m);
-        let length = (length_m * self.pixels_per_m).round() as i64;
-        canvas.text(left, top, &label, 2, palette::INK);
-        canvas.rectangle(left, top + 26, length, 4, palette::INK);
-        for x in [left, left + length - 2] {
-            canvas.rectangle(x, top + 20, 2, 16, palette::INK);
-        }
-        let legend = 200;
-        let right = width - 16;
-        for x in 0..legend {
-            let color = palette::color(x as f64 / legend as f64);
-            canvas.rectangle(right - legend + x, top + 24, 1, 12, color);
-        }
-        let (low, high) = (format!("z {low:.1} m"), format!("{high:.1} m"));
-        canvas.text(right - legend, top, &low, 2, palette::INK);
-        canvas.text(right - 2 * font::width(&high), top, &high, 2, palette::INK);
-    }
-
-    /// Pixel of a place: x to the right, y upward.
-    fn pixel_of(&self, [x, y]: [f64; 2]) -> (i64, i64) {
-        let column = ((x - self.bounds.min[0]) * self.pixels_per_m).round() as i64;
-        let row = self.height as i64 - ((y - self.bounds.min[1]) * self.pixels_per_m).round() as i64;
-        (column, row)
-    }
-
-    /// The heights between which colors run: all but the lowest and highest hundredth.
-    fn heights(&self) -> (f64, f64) {
-        let heights = self.columns.iter().filter_map(|column| match column {
-            Column::Occupied(height) => Some(*height),
-            _ => None,
-        });
-        let mut heights: Vec<f32> = heights.collect();
-        heights.sort_unstable_by(f32::total_cmp);
-        let at =
-            |share: f64| heights.get((heights.len() as f64 * share) as usize).copied().unwrap_or_default();
-        (f64::from(at(0.01)), f64::from(at(0.99)))
-    }
-}
-
-/// The longest bar of 1, 2 or 5 times a power of ten metres that is at most so long, and its label.
-fn scale_bar(at_most_m: f64) -> (f64, String) {
-    let mut length_m = 0.01;
-    for exponent in -2..6 {
-        for digit in [1.0, 2.0, 5.0] {
-            let candidate = digit * 10_f64.powi(exponent);
-            if candidate <= at_most_m {
-                length_m = candidate;
+    fn draw_cells(&self, canvas: &mut Canvas, pane: &Pane, [least, most]: [f64; 2]) {
+        for y in pane.first[1]..pane.first[1] + pane.cells[1] {
+            for x in pane.first[0]..pane.first[0] + pane.cells[0] {
+                let cell = self.cell(x, y);
+                let colour = if cell.is_occupied {
+                    let share = (self.value(cell) - least) / (most - least);
+                    lit(colour_of(share), self.light(x, y))
+                } else if cell.is_free {
+                    palette::FREE
+                } else {
+                    continue;
+                };
+                let [left, top] = pane.pixel([x, y]);
+                canvas.fill(left, top, [pane.zoom; 2], colour, 1.0);
             }
         }
     }
-    let label =
-        if length_m >= 1000.0 { format!("{} km", length_m / 1000.0) } else { format!("{length_m} m") };
-    (length_m, label)
+
+    /// Light from the upper left: an edge that faces it is brighter, one that looks away is darker.
+    fn light(&self, x: usize, y: usize) -> f64 {
+        let here = self.cell(x, y);
+        let rise_m = |x: usize, y: usize| {
+            let other = self.cell(x, y);
+            if other.is_occupied { f64::from(here.top_m - other.top_m).clamp(-2.0, 2.0) } else { 0.0 }
+        };
+        let left_m = if x > 0 { rise_m(x - 1, y) } else { 0.0 };
+        let above_m = if y + 1 < self.frame.cells[1] { rise_m(x, y + 1) } else { 0.0 };
+        (1.0 + 0.1 * (left_m + above_m)).clamp(0.72, 1.22)
+    }
+
+    fn draw_tile_lines(&self, canvas: &mut Canvas, pane: &Pane) {
+        let size = pane.size();
+        let pixels_a_metre = pane.zoom as f64 / self.frame.cell_m;
+        let Some(every_m) = self.line_spacing_m(pixels_a_metre) else { return };
+        for axis in 0..2 {
+            let low_m = self.frame.min_m[axis] + pane.first[axis] as f64 * self.frame.cell_m;
+            let high_m = low_m + size[axis] as f64 / pixels_a_metre;
+            let first = (low_m / every_m).ceil();
+            // Counted in whole steps: far from the origin adding 1 to a line's number may leave it as it is.
+            for step in 0..=size[axis] / 8 {
+                let line_m = (first + step as f64) * every_m;
+                if line_m.is_nan() || line_m > high_m {
+                    break;
+                }
+                let at = ((line_m - low_m) * pixels_a_metre).round() as usize;
+                if axis == 0 {
+                    canvas.fill(
+                        pane.left + at.min(size[0] - 1),
+                        pane.top,
+                        [1, size[1]],
+                        palette::TILE_LINE,
+                        0.2,
+                    );
+                } else {
+                    let row = size[1].saturating_sub(at.max(1));
+                    canvas.fill(pane.left, pane.top + row, [size[0], 1], palette::TILE_LINE, 0.2);
+                }
+            }
+        }
+    }
+
+    /// Metres from one line to the next: a tile, or ten, a hundred of them where lines would be a haze over the map.
+    fn line_spacing_m(&self, pixels_a_metre: f64) -> Option<f64> {
+        let mut every_m = self.view.tile_size_m;
+        if every_m.is_nan() || every_m <= 0.0 {
+            return None;
+        }
+        while every_m * pixels_a_metre < 16.0 {
+            every_m *= 10.0;
+        }
+        Some(every_m)
+    }
+
+    fn draw_path(&self, canvas: &mut Canvas, pane: &Pane, dot: usize) {
+        // As wide as a street lane needs, and no wider: on a large map it would hide the streets.
+        let radius = ((0.35 * pane.zoom as f64 / self.frame.cell_m) as usize).clamp(1, dot);
+        for y in pane.first[1]..pane.first[1] + pane.cells[1] {
+            for x in pane.first[0]..pane.first[0] + pane.cells[0] {
+                if self.cell(x, y).is_on_path {
+                    let middle = pane.pixel([x, y]).map(|pixel| pixel + pane.zoom / 2);
+                    canvas.disc(middle, radius, palette::PATH);
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn scale_bars_are_round_lengths_that_fit() {
-        assert_eq!(scale_bar(12.0), (10.0, "10 m".into()));
-        assert_eq!(scale_bar(4900.0), (2000.0, "2 km".into()));
-        assert_eq!(scale_bar(0.6).1, "0.5 m");
+    fn picture() -> TopDown {
+        TopDown::new(View {
+            bounds: Aabb { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 10.0] },
+            resolution_m: 0.2,
+            tile_size_m: 10.0,
+            colour_by: ColourBy::Height,
+            title: "a map".into(),
+        })
+        .unwrap()
     }
 
     #[test]
-    fn voxels_land_on_their_own_pixels_with_y_upward() {
-        let bounds = Aabb { min: [-1.0, -1.0, 0.0], max: [1.0, 1.0, 1.0] };
-        let mut picture = TopDown::new(bounds, 0.1, 1.0);
-        assert_eq!((picture.width, picture.height), (160, 160));
-        assert_eq!(picture.pixel_of([-1.0, -1.0]), (0, 160));
-        assert_eq!(picture.pixel_of([1.0, 1.0]), (160, 0));
-        picture.add([-0.95, -0.95, 0.5], 0.1, true);
-        let occupied = picture.columns.iter().filter(|column| matches!(column, Column::Occupied(_))).count();
-        assert_eq!(occupied, 64);
-        assert!(matches!(picture.columns[159 * 160], Column::Occupied(_)));
+    fn the_topmost_voxel_of_a_column_counts() {
+        let mut picture = picture();
+        for z in [0.1, 3.1, 1.1] {
+            picture.add_occupied([0.1, 0.1, z], 0.7);
+        }
+        let cell = picture.cell(100, 100);
+        assert!(cell.is_occupied && cell.top_m == 3.1);
+        picture.add_occupied([500.0, 0.1, 1.0], 0.7);
+        picture.add_occupied([f64::NAN, 0.1, f64::NAN], f64::NAN);
+        assert_eq!(picture.cells.iter().filter(|cell| cell.is_occupied).count(), 1);
+    }
+
+    #[test]
+    fn north_is_up_and_east_is_right() {
+        let pane = Pane { first: [10, 20], cells: [30, 40], zoom: 3, left: 5, top: 7 };
+        assert_eq!(pane.pixel([10, 59]), [5, 7]);
+        assert_eq!(pane.pixel([11, 58]), [8, 10]);
+        assert_eq!(pane.pixel([39, 20]), [5 + 29 * 3, 7 + 39 * 3]);
+    }
+
+    #[test]
+    fn any_map_can_be_drawn() {
+        let mut canvas = picture().draw();
+        assert!(canvas.width() >= LEAST_WIDTH && canvas.height() > 0);
+        let mut one = picture();
+        one.add_occupied([0.1, 0.1, 0.1], 1.0);
+        canvas = one.draw();
+        assert!(canvas.width() < 2_000 && canvas.height() < 2_000);
+        let far = Aabb { min: [1e18; 3], max: [1e18 + 1e6; 3] };
+        let view = View { bounds: far, resolution_m: 1e-3, tile_size_m: 1e-3, ..one.view.clone() };
+        TopDown::new(view).unwrap().draw();
     }
 }

@@ -1,0 +1,95 @@
+use super::ColourBy;
+use super::canvas::Canvas;
+use super::font;
+use super::frame::{length_label, round_length_m};
+use super::palette::{self, colour_of};
+
+/// What a reader needs to know below the map.
+pub struct Legend {
+    pub metres_a_pixel: f64,
+    /// Metres from one line over the map to the next, if there are any.
+    pub lines_m: Option<f64>,
+    pub colour_by: ColourBy,
+    /// What the first and the last colour stand for.
+    pub range: [f64; 2],
+}
+
+impl Legend {
+    /// Draws it below the row `foot`, each dot of a letter `dot` pixels wide: axes, scale bar, what is free and
+    /// unknown, the colours.
+    pub fn draw(&self, canvas: &mut Canvas, foot: usize, dot: usize) {
+        let [least, most] = self.range;
+        let margin = 10 * dot;
+        let bottom = foot + 22 * dot;
+        let line = bottom - font::HEIGHT * dot;
+        // Axes.
+        let arm = 16 * dot;
+        canvas.fill(margin, bottom - arm, [dot, arm], palette::INK, 1.0);
+        canvas.fill(margin, bottom - dot, [arm, dot], palette::INK, 1.0);
+        for step in 0..3 {
+            let (back, wide) = (step * dot, [(1 + 2 * step) * dot, dot]);
+            canvas.fill(margin - back, bottom - arm - 2 * dot + back, wide, palette::INK, 1.0);
+            canvas.fill(
+                margin + arm + dot - back,
+                bottom - dot - back,
+                [wide[1], wide[0]],
+                palette::INK,
+                1.0,
+            );
+        }
+        canvas.text(margin + arm + 5 * dot, line, dot, palette::INK, "x");
+        canvas.text(margin + 5 * dot, bottom - arm - 3 * dot, dot, palette::INK, "y");
+        // Scale bar.
+        let length_m = round_length_m(canvas.width() as f64 * 0.2 * self.metres_a_pixel);
+        let length = ((length_m / self.metres_a_pixel).round() as usize).max(1);
+        let left = margin + arm + 20 * dot;
+        canvas.text(left, foot + 4 * dot, dot, palette::INK, &length_label(length_m));
+        canvas.fill(left, bottom - 2 * dot, [length, 2 * dot], palette::INK, 1.0);
+        canvas.fill(left, bottom - 6 * dot, [dot, 6 * dot], palette::INK, 1.0);
+        canvas.fill(left + length.saturating_sub(dot), bottom - 6 * dot, [dot, 6 * dot], palette::INK, 1.0);
+        if let Some(every_m) = self.lines_m {
+            let label = format!("lines {}", length_label(every_m));
+            canvas.text(left + length + 8 * dot, line, dot, palette::FAINT_INK, &label);
+        }
+        // Colours.
+        let right = canvas.width() - margin;
+        let bar = (canvas.width() / 4).max(1);
+        for x in 0..bar {
+            let colour = colour_of(x as f64 / (bar - 1).max(1) as f64);
+            canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], colour, 1.0);
+        }
+        let (name, low, high) = match self.colour_by {
+            ColourBy::Height => ("height", height_label(least), height_label(most)),
+            ColourBy::Probability => ("probability", format!("{least:.2}"), format!("{most:.2}")),
+        };
+        canvas.text(right - bar, foot + 4 * dot, dot, palette::INK, &low);
+        canvas.text_before(right, foot + 4 * dot, dot, palette::INK, &high);
+        let middle = right - bar / 2 + font::width_of(name) * dot / 2;
+        canvas.text_before(middle, foot + 4 * dot, dot, palette::FAINT_INK, name);
+        // What is not occupied.
+        let swatch = right - bar - 74 * dot;
+        for (top, colour, label) in
+            [(foot + 4 * dot, palette::FREE, "free"), (line, palette::UNKNOWN, "unknown")]
+        {
+            canvas.fill(swatch, top, [7 * dot; 2], palette::FAINT_INK, 1.0);
+            canvas.fill(swatch + 1, top + 1, [7 * dot - 2; 2], colour, 1.0);
+            canvas.text(swatch + 11 * dot, top, dot, palette::FAINT_INK, label);
+        }
+    }
+}
+
+fn height_label(height_m: f64) -> String {
+    // Adding 0 turns the -0 that a height just below the ground is rounded to into 0.
+    format!("{:.1} m", (height_m * 10.0).round() / 10.0 + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_height_just_below_zero_is_written_as_zero() {
+        assert_eq!(height_label(-0.04), "0.0 m");
+        assert_eq!(height_label(-1.26), "-1.3 m");
+    }
+}
