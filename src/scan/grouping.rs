@@ -149,7 +149,7 @@ fn sorted(grid: &Grid, mut tiles: Vec<(TileIndex, TileUpdates)>, mut report: Sca
     tiles.sort_by_cached_key(|(tile, _)| {
         (VoxelKey::from_index(grid.voxels_of_tile(*tile).min).morton(), *tile)
     });
-    report.tiles = tiles.len() as u64;
+    report.tiles_touched = tiles.len() as u64;
     ScanUpdates { tiles, report }
 }
 

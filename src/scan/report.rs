@@ -15,8 +15,8 @@ pub struct ScanReport {
     pub hits: u64,
     /// Updates of voxels by misses.
     pub misses: u64,
-    /// Tiles updated.
-    pub tiles: u64,
+    /// Tiles that got updates, each counted once a scan.
+    pub tiles_touched: u64,
 }
 
 /// Points that were skipped, by cause.
@@ -63,7 +63,7 @@ impl AddAssign for ScanReport {
         self.cut_at_max_range += other.cut_at_max_range;
         self.hits += other.hits;
         self.misses += other.misses;
-        self.tiles += other.tiles;
+        self.tiles_touched += other.tiles_touched;
     }
 }
 

@@ -307,6 +307,29 @@ fn a_merged_octree_beyond_octomaps_keys_names_the_region() {
 }
 
 #[test]
+fn octomaps_files_are_told_and_exported_and_a_bomb_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let (_, map) = built(&folder);
+    let [bt, ot, csv] = ["a.bt", "a.ot", "a.csv"].map(|name| folder.path().join(name));
+    output(&["export", text(&map), "-o", text(&bt)]);
+    let (of_file, of_map) = (json(&["info", text(&bt), "--json"]), json(&["info", text(&map), "--json"]));
+    assert_eq!(of_file["occupied_voxels"], of_map["occupied"]);
+    let exported = json(&["export", text(&bt), "-o", text(&csv), "--json"]);
+    assert_eq!(exported["voxels"], of_map["occupied"]);
+    output(&["export", text(&bt), "-o", text(&ot)]);
+    assert_eq!(json(&["info", text(&ot), "--json"])["nodes"], of_file["nodes"]);
+
+    let bomb = folder.path().join("bomb.bt");
+    let header = "# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n";
+    fs::write(&bomb, [header.as_bytes(), &[0xaa, 0xaa]].concat()).unwrap();
+    let (code, stderr) = failure(&["export", text(&bomb), "-o", text(&csv)]);
+    assert!(code == 1 && stderr.contains("281474976710656, more than the limit of 268435456"), "{stderr}");
+    fs::write(&bomb, header).unwrap();
+    let (code, stderr) = failure(&["info", text(&bomb)]);
+    assert!(code == 1 && stderr.contains("bomb.bt: offset"), "{stderr}");
+}
+
+#[test]
 fn the_demo_makes_a_map_and_a_picture() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("demo");

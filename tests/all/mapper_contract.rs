@@ -219,6 +219,27 @@ fn dirty_tiles_and_saved_tiles_are_told() {
 }
 
 #[test]
+fn tiles_in_use_stay_and_others_leave() {
+    let folder = TempDir::new().unwrap();
+    let config = config().with_cache_tiles(2);
+    let mut mapper =
+        OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &folder.path().join("map"), config).unwrap();
+    let points: Vec<_> = (0..5).map(|k| [1.6 * f64::from(k) + 0.6, 0.6, 0.6]).collect();
+    mapper.batch_update(&PointBatch { points: &points, intensities: None, is_occupied: &[true; 5] }).unwrap();
+    mapper.flush().unwrap();
+    let tile = |x| TileIndex::new(x, 0, 0);
+    let held = mapper.tile(tile(0)).unwrap().unwrap();
+    for x in 1..5 {
+        assert_eq!(mapper.tile(tile(x)).unwrap().unwrap().table().len(), 1);
+    }
+    assert_eq!(mapper.cached_tile_indices(), [tile(0), tile(4)]);
+    // With every tile in use, one more comes on top.
+    let others = [mapper.tile(tile(4)).unwrap(), mapper.tile(tile(3)).unwrap()];
+    assert_eq!(mapper.cached_tile_indices().len(), 3);
+    assert_eq!((held.table().len(), others.len()), (1, 2));
+}
+
+#[test]
 fn keys_on_disk_are_octomaps_and_in_morton_order() {
     let folder = TempDir::new().unwrap();
     let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config()).unwrap();

@@ -105,7 +105,7 @@ pub enum InsertName {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct InfoArgs {
-    /// Folder of the map
+    /// Folder of the map, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// Print JSON
     #[arg(long)]
@@ -153,7 +153,7 @@ pub struct RaycastArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct ExportArgs {
-    /// Folder of the map
+    /// Folder of the map, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// File to write; its extension says what: .ply .pcd .csv hold occupied voxels, .bt .ot the whole octree
     #[arg(short = 'o', long = "output", value_name = "FILE")]

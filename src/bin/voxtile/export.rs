@@ -1,5 +1,6 @@
 use crate::args::ExportArgs;
 use crate::map_at::{point_of, read_map};
+use crate::octree_file;
 use crate::progress::Progress;
 use indicatif::HumanCount;
 use std::fs::{self, File};
@@ -8,12 +9,19 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use voxtile::io::{VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::mapper::{MapReader, MapView};
-use voxtile::octree::{write_bt, write_ot};
+use voxtile::maths::logit;
+use voxtile::octree::{Octree, OctreeFormat, write_bt, write_ot};
 use voxtile::space::Aabb;
 use voxtile::{Error, Questions};
 
 /// Most voxels of one merged octree, which is built in memory: about 2 GB.
 const MAX_OCTREE_VOXELS: u64 = 100_000_000;
+
+#[derive(Clone, Copy)]
+enum ExportFormat {
+    Voxels(VoxelFormat),
+    Octree(OctreeFormat),
+}
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
     let region = args
@@ -27,22 +35,31 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
         return Err(Error::argument("--min-probability", "must be from 0 to 1").into());
     }
     let extension = args.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    let count = match (extension, VoxelFormat::of_path(&args.output)) {
-        (_, Some(format)) => {
-            read_map(&args.map, |reader| export_voxels(args, format, region.as_ref(), reader))?
-        }
+    let format = match (extension, VoxelFormat::of_path(&args.output)) {
+        (_, Some(format)) => ExportFormat::Voxels(format),
         ("bt" | "ot", None) if args.min_probability.is_some() => {
             let reason = "an octree file holds free and occupied voxels alike; leave the option out";
             return Err(Error::argument("--min-probability", reason).into());
         }
-        ("bt" | "ot", None) => {
-            read_map(&args.map, |reader| export_octree(args, extension, region.as_ref(), reader))?
-        }
+        ("bt", None) => ExportFormat::Octree(OctreeFormat::Bt),
+        ("ot", None) => ExportFormat::Octree(OctreeFormat::Ot),
         _ => {
             let reason =
                 format!("{}: the extension must be .ply, .pcd, .csv, .bt or .ot", args.output.display());
             return Err(Error::argument("--output", reason).into());
         }
+    };
+    let region = region.as_ref();
+    let count = match format {
+        _ if octree_file::is_octree_file(&args.map) => export_octree_file(args, format, region)?,
+        ExportFormat::Voxels(format) => {
+            read_map(&args.map, |reader| export_voxels(args, format, region, reader))?
+        }
+        ExportFormat::Octree(format) => read_map(&args.map, |reader| {
+            let tree = reader.merged_octree(region, MAX_OCTREE_VOXELS)?;
+            let threshold = reader.config().occupied_log_odds() as f32;
+            write_octree(args, format, &tree, reader.config().grid.resolution_m(), threshold)
+        })?,
     };
     let mut out = io::stdout().lock();
     if args.json {
@@ -89,21 +106,47 @@ fn export_voxels(
     })
 }
 
-fn export_octree(
+fn write_octree(
     args: &ExportArgs,
-    extension: &str,
-    region: Option<&Aabb>,
-    reader: &MapReader,
+    format: OctreeFormat,
+    tree: &Octree,
+    resolution_m: f64,
+    threshold: f32,
 ) -> anyhow::Result<u64> {
-    let (config, tree) = (reader.config(), reader.merged_octree(region, MAX_OCTREE_VOXELS)?);
-    let resolution_m = config.grid.resolution_m();
-    let threshold = config.occupied_log_odds() as f32;
     write_whole(&args.output, |mut out| {
-        match extension {
-            "bt" => write_bt(&tree, resolution_m, threshold, &mut out)?,
-            _ => write_ot(&tree, resolution_m, &mut out)?,
+        match format {
+            OctreeFormat::Bt => write_bt(tree, resolution_m, threshold, &mut out)?,
+            OctreeFormat::Ot => write_ot(tree, resolution_m, &mut out)?,
         }
         Ok(tree.expanded_leaf_count())
+    })
+}
+
+/// From one of OctoMap's files to another file; OctoMap's threshold is log-odds 0.
+fn export_octree_file(args: &ExportArgs, format: ExportFormat, region: Option<&Aabb>) -> anyhow::Result<u64> {
+    let file = octree_file::read(&args.map)?;
+    let format = match format {
+        ExportFormat::Voxels(format) => format,
+        ExportFormat::Octree(_) if region.is_some() => {
+            return Err(
+                Error::argument("--region", "from an octree file to another is the whole tree").into()
+            );
+        }
+        ExportFormat::Octree(format) => {
+            return write_octree(args, format, &file.tree, file.resolution_m, 0.0);
+        }
+    };
+    let min_log_odds = args.min_probability.map_or(0.0, |probability| logit(probability) as f32);
+    let keep = |center_m| region.is_none_or(|region| region.contains(center_m));
+    let count = octree_file::count_voxels(&file, min_log_odds, keep)?;
+    write_whole(&args.output, |out| {
+        let mut writer = VoxelWriter::new(format, count, file.resolution_m, out)?;
+        octree_file::for_each_voxel(&file, min_log_odds, |voxel| match keep(voxel.center_m) {
+            true => Ok::<_, anyhow::Error>(writer.write(voxel)?),
+            false => Ok(()),
+        })?;
+        writer.finish()?;
+        Ok(count)
     })
 }
 

@@ -1,5 +1,6 @@
 use crate::args::InfoArgs;
 use crate::map_at::read_map;
+use crate::octree_file;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::Write;
@@ -30,8 +31,12 @@ struct Info {
 }
 
 pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
-    let info = read_map(&args.map, |reader| Ok(Info::of(reader)?))?;
     let mut out = std::io::stdout().lock();
+    if octree_file::is_octree_file(&args.map) {
+        octree_file::print_info(&args.map, args.json, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let info = read_map(&args.map, |reader| Ok(Info::of(reader)?))?;
     if args.json {
         writeln!(out, "{}", serde_json::to_string(&info)?)?;
     } else {

@@ -8,6 +8,7 @@ mod export;
 mod info;
 mod map_at;
 mod memory;
+mod octree_file;
 mod picture;
 mod progress;
 mod query;

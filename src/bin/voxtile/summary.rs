@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::scan::ScanReport;
+use voxtile::tile::TileCounts;
 
 /// What a build did, and what the map now is.
 #[derive(Debug, Serialize)]
@@ -18,6 +19,9 @@ pub struct Summary {
     pub voxels: u64,
     pub occupied: u64,
     pub tiles: u64,
+    pub cached_tiles: u64,
+    /// Sizes of the tiles in memory at the end.
+    pub cached: TileCounts,
     pub disk_bytes: u64,
     pub loads: u64,
     pub saves: u64,
@@ -46,6 +50,8 @@ impl Summary {
             voxels,
             occupied,
             tiles: statistics.tiles,
+            cached_tiles: statistics.cached_tiles,
+            cached: statistics.cached,
             disk_bytes: statistics.disk_bytes,
             loads: statistics.io.loads,
             saves: statistics.io.saves,
@@ -77,6 +83,15 @@ impl Summary {
         }
         writeln!(out, "voxels    {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;
         writeln!(out, "tiles     {}, {} on disk", HumanCount(self.tiles), HumanBytes(self.disk_bytes))?;
+        let TileCounts { table_bytes, octree_bytes, voxel_cache_bytes, .. } = self.cached;
+        writeln!(
+            out,
+            "cached    {} tiles: {} in tables, {} in octrees, {} in voxel caches",
+            HumanCount(self.cached_tiles),
+            HumanBytes(table_bytes),
+            HumanBytes(octree_bytes),
+            HumanBytes(voxel_cache_bytes)
+        )?;
         writeln!(out, "tile I/O  {} read, {} written", HumanCount(self.loads), HumanCount(self.saves))?;
         if let Some(bytes) = self.peak_memory_bytes {
             writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
