@@ -24,32 +24,32 @@ pub enum Error {
     #[error(transparent)]
     Grid(#[from] GridError),
     /// The operating system refused: look at the path, the disk, the rights; then try again.
-    #[error("{}: cannot {action}: {source}", path.display())]
+    #[error("{}: cannot {action}: {cause}", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What was tried, as a verb with its object.
         action: &'static str,
         /// The refusal.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A file of a map is damaged or not the one that belongs there: restore or repair it.
-    #[error("{}: {}damaged: {source}", path.display(), of_tile(tile))]
+    #[error("{}: {}damaged: {cause}", path.display(), of_tile(tile))]
     Damaged {
         /// The file.
         path: PathBuf,
         /// The tile it belongs to, if to one.
         tile: Option<TileIndex>,
         /// Where and what.
-        source: FormatError,
+        cause: FormatError,
     },
     /// A file that was given to be read is not what it should be: give another.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Malformed {
         /// The file.
         path: PathBuf,
         /// Where and what.
-        source: FormatError,
+        cause: FormatError,
     },
     /// There is no map at the path: create one or name another path.
     #[error("{}: no map here (metadata.json is missing); `voxtile build` makes one", path.display())]
@@ -152,12 +152,12 @@ impl FormatError {
 
     /// The error of a file that was given to be read.
     pub fn in_input(self, path: &Path) -> Error {
-        Error::Malformed { path: path.to_owned(), source: self }
+        Error::Malformed { path: path.to_owned(), cause: self }
     }
 
     /// The error of a file of a map.
     pub fn in_map(self, path: &Path, tile: Option<TileIndex>) -> Error {
-        Error::Damaged { path: path.to_owned(), tile, source: self }
+        Error::Damaged { path: path.to_owned(), tile, cause: self }
     }
 }
 
@@ -168,8 +168,8 @@ impl Error {
     }
 
     /// A refusal of the operating system about a path.
-    pub fn io(path: &Path, action: &'static str, source: io::Error) -> Self {
-        Self::Io { path: path.to_owned(), action, source }
+    pub fn io(path: &Path, action: &'static str, cause: io::Error) -> Self {
+        Self::Io { path: path.to_owned(), action, cause }
     }
 }
 
