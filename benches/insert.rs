@@ -1,0 +1,49 @@
+//! How long does a scan take into the map: in memory, out of core with room, out of core with next to none?
+
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use voxtile::simulation::Survey;
+use voxtile::{InMemoryMapper, InsertMode, MapConfig, Mapper, OutOfCoreTileMapper, Scan};
+
+fn config() -> MapConfig {
+    MapConfig::new(0.2, 10.0).expect("whole voxels").with_range(0.0, 60.0)
+}
+
+fn scans() -> Vec<Scan> {
+    Survey::street(1).take(5).collect()
+}
+
+fn insert_all(mapper: &mut impl Mapper, scans: &[Scan]) {
+    for scan in scans {
+        mapper.insert_scan(scan).expect("a scan that can be mapped");
+    }
+}
+
+fn street(criterion: &mut Criterion) {
+    let scans = scans();
+    let mut group = criterion.benchmark_group("five street scans at 0.2 m");
+    group.sample_size(10);
+    for (name, mode) in [("per scan", InsertMode::PerScan), ("per ray", InsertMode::PerRay)] {
+        group.bench_function(format!("in memory, {name}"), |bencher| {
+            let mapper =
+                || InMemoryMapper::new(config().with_insert_mode(mode)).expect("a valid configuration");
+            bencher.iter_batched_ref(mapper, |mapper| insert_all(mapper, &scans), BatchSize::PerIteration);
+        });
+    }
+    for (name, cache_tiles, pending_bytes) in [("with room", 1000, 0), ("four tiles", 4, 1 << 20)] {
+        group.bench_function(format!("out of core, {name}, flushed"), |bencher| {
+            let config = config().with_cache_tiles(cache_tiles).with_pending_bytes(pending_bytes);
+            let folder = || tempfile::tempdir().expect("room for a map");
+            let build = |folder: &mut tempfile::TempDir| {
+                let path = folder.path().join("map");
+                let mut mapper = OutOfCoreTileMapper::create(path, config.clone()).expect("an empty folder");
+                insert_all(&mut mapper, &scans);
+                mapper.flush().expect("room on the disk");
+            };
+            bencher.iter_batched_ref(folder, build, BatchSize::PerIteration);
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, street);
+criterion_main!(benches);
