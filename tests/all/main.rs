@@ -7,6 +7,8 @@ mod cli;
 mod layering;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
+/// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
+mod model;
 /// OctoMap's own files, to the last node and byte.
 mod octomap_files;
 /// Questions against brute force.

@@ -1,0 +1,65 @@
+use crate::support::random_scans::{Random, random_scan};
+use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
+use crate::support::unsynced_disk::UnsyncedDisk;
+use tempfile::TempDir;
+use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::{InsertMode, MapConfig, MapView, Mapper, OutOfCoreTileMapper, Questions};
+
+/// One random life of a map beside the naive one, which is set back to the last flush where the map crashes.
+fn live(seed: u64, config: &MapConfig) {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("map");
+    let mut random = Random(seed);
+    let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+    let mut reference = ReferenceMap::new(config);
+    let (mut scans, mut flushed): (u64, (Voxels, u64)) = (0, (Voxels::new(), 0));
+    for _ in 0..60 {
+        match random.below(10) {
+            0..5 => {
+                let center = [random.between(-3.0, 3.0), 0.0, 0.0];
+                let scan = random_scan(&mut random, center, 12);
+                mapper.insert_scan(&scan).unwrap();
+                reference.insert_scan(&scan);
+                scans += 1;
+            }
+            5 | 6 => {
+                let point = random.point([0.0; 3], 4.0);
+                let voxel = config.grid.voxel_of(point).unwrap();
+                let found = mapper.voxel_at(point).unwrap().map(|voxel| voxel.evidence);
+                let found = found.map(|evidence| (evidence.log_odds.to_bits(), evidence.observation_count));
+                assert_eq!(found, reference.voxels.get(&voxel).copied(), "seed {seed}");
+            }
+            7 => {
+                mapper.flush().unwrap();
+                flushed = (reference.voxels.clone(), scans);
+            }
+            8 => {
+                // Whatever was evicted since the last flush is on disk, and must not count.
+                drop(mapper);
+                mapper = OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+                (reference.voxels, scans) = flushed.clone();
+            }
+            _ => assert_eq!(voxels_of(&mapper), reference.voxels, "seed {seed}"),
+        }
+        assert!(mapper.cached_tile_indices().len() <= config.cache_tiles);
+        assert_eq!(mapper.scan_number(), scans, "seed {seed}");
+    }
+    assert_eq!(voxels_of(&mapper), reference.voxels, "seed {seed}");
+}
+
+#[test]
+fn any_life_of_a_map_equals_the_naive_map_as_of_then() {
+    let config = MapConfig::new(0.2, 1.6).unwrap();
+    for seed in 0..12 {
+        let mode = if seed % 3 == 0 { InsertMode::PerRay } else { InsertMode::PerScan };
+        let mut config = config
+            .clone()
+            .with_insert_mode(mode)
+            .with_cache_tiles(1 + (seed as usize * 5) % 17)
+            .with_pending_bytes((seed as usize % 4) * 3000);
+        if seed % 2 == 1 {
+            config = config.with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
+        }
+        live(seed, &config);
+    }
+}
