@@ -1,4 +1,5 @@
-use super::region::{TileCursor, tiles_in, voxels_around, voxels_in};
+use super::region::{tiles_in, voxels_around, voxels_in};
+use super::tile_cursor::TileCursor;
 use super::{Occupancy, UnknownAs};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;

@@ -20,6 +20,7 @@ mod point;
 mod questions;
 mod ray;
 mod region;
+mod tile_cursor;
 
 pub use collision::Shape;
 pub use nearest::Nearest;

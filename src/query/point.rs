@@ -1,7 +1,8 @@
 use super::Occupancy;
+use super::tile_cursor::TileCursor;
 use crate::error::Result;
-use crate::mapper::{MapView, TileRef};
-use crate::space::{Point, TileIndex};
+use crate::mapper::MapView;
+use crate::space::{Point, VoxelIndex};
 use crate::tile::Voxel;
 
 pub(super) fn voxel_at(view: &impl MapView, point: Point) -> Result<Option<Voxel>> {
@@ -14,20 +15,14 @@ pub(super) fn voxel_at(view: &impl MapView, point: Point) -> Result<Option<Voxel
 pub(super) fn occupancy_at_points(view: &impl MapView, points: &[Point]) -> Result<Vec<Occupancy>> {
     let config = view.config();
     let mut answers = vec![Occupancy::Unknown; points.len()];
-    let voxel_of = |number: usize| config.grid.voxel_of(points[number]);
-    let tile_of = |number: usize| voxel_of(number).map(|voxel| (config.grid.tile_of_voxel(voxel), number));
-    let mut by_tile: Vec<(TileIndex, usize)> = (0..points.len()).filter_map(tile_of).collect();
-    by_tile.sort_unstable();
-    let mut tile: Option<(TileIndex, Option<TileRef<'_>>)> = None;
-    for (index, number) in by_tile {
-        if tile.as_ref().is_none_or(|(current, _)| *current != index) {
-            // Let go of the one before first, so that it can be pushed out.
-            drop(tile.take());
-            tile = Some((index, view.tile(index)?));
-        }
-        if let (Some((_, Some(tile))), Some(voxel)) = (&tile, voxel_of(number)) {
-            answers[number] = Occupancy::of(config, tile.evidence(voxel));
-        }
+    let voxels =
+        points.iter().enumerate().filter_map(|(number, &point)| Some((config.grid.voxel_of(point)?, number)));
+    let mut by_tile: Vec<(VoxelIndex, usize)> = voxels.collect();
+    by_tile.sort_unstable_by_key(|&(voxel, number)| (config.grid.tile_of_voxel(voxel), number));
+    let mut tiles = TileCursor::new(view);
+    for (voxel, number) in by_tile {
+        let evidence = tiles.tile_of(voxel)?.and_then(|tile| tile.evidence(voxel));
+        answers[number] = Occupancy::of(config, evidence);
     }
     Ok(answers)
 }

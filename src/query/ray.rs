@@ -1,8 +1,9 @@
+use super::tile_cursor::TileCursor;
 use super::{Occupancy, UnknownAs};
 use crate::error::{Error, Result};
-use crate::mapper::{MapView, TileRef};
+use crate::mapper::MapView;
 use crate::scan::RayWalk;
-use crate::space::{BRICK_EDGE, BrickCode, Point, TileIndex, VoxelBox, VoxelIndex};
+use crate::space::{BRICK_EDGE, BrickCode, Point, VoxelBox, VoxelIndex};
 use crate::store::Bounds;
 use serde::Serialize;
 
@@ -62,15 +63,10 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
         start,
         grid.to_voxel_units(direction.map(|d| d / length)), // Times come out in metres.
     );
-    let mut held: Option<(TileIndex, Option<TileRef<'_>>)> = None;
+    let mut tiles = TileCursor::new(view);
     while walk.entry_time() <= range_m {
         let voxel = walk.voxel();
-        let index = grid.tile_of_voxel(voxel);
-        if held.as_ref().is_none_or(|(tile, _)| *tile != index) {
-            drop(held.take());
-            held = Some((index, view.tile(index)?));
-        }
-        let tile = held.as_ref().and_then(|(_, tile)| tile.as_ref());
+        let tile = tiles.tile_of(voxel)?;
         let occupancy = Occupancy::of(config, tile.and_then(|tile| tile.evidence(voxel)));
         let stops = occupancy.is_occupied()
             || (occupancy == Occupancy::Unknown && query.unknown == UnknownAs::Obstacle);
@@ -79,7 +75,7 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
             return Ok(Some(RayHit { voxel, center_m, distance_m, probability: occupancy.probability() }));
         }
         match tile {
-            None => walk.leave(&grid.voxels_of_tile(index)),
+            None => walk.leave(&grid.voxels_of_tile(grid.tile_of_voxel(voxel))),
             Some(tile) if !tile.table().has_brick(BrickCode::of_voxel(voxel)) => {
                 walk.leave(&brick_of(voxel).intersection(&tile.voxel_box()));
             }
