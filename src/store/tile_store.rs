@@ -58,13 +58,10 @@ impl TileStore {
     pub fn create(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         let layout = Layout::new(folder);
         create_folders(&*disk, folder)?;
-        let names = disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
-        let ours = ["writer.lock", "commits.log", "metadata.json.next"];
-        if names.iter().any(|name| !ours.contains(&name.as_str())) {
-            let hint = "open it, name --append to add scans to it, or choose an empty folder";
-            return Err(Error::AlreadyExists { path: folder.to_owned(), hint });
-        }
+        // Before the lock, which leaves a file behind, and after it, when nobody else can begin a map here.
+        check_is_free(&*disk, folder)?;
         let lock = lock(&*disk, &layout)?;
+        check_is_free(&*disk, folder)?;
         let commits = Commits::default();
         let log_path = layout.commit_log();
         let log = CommitLog::write_whole(&*disk, &log_path, map_id, &commits)
@@ -393,14 +390,26 @@ fn lock(disk: &dyn Disk, layout: &Layout) -> Result<Lock> {
     }
 }
 
-fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    if folder.as_os_str().is_empty() || disk.kind(folder).is_ok_and(|kind| kind.is_some()) {
+/// A folder for a new map holds nothing but what an interrupted creation may have left.
+fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
+    let names = disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
+    let leftovers = ["writer.lock", "commits.log", "metadata.json.next"];
+    if names.iter().all(|name| leftovers.contains(&name.as_str())) {
         return Ok(());
     }
-    if let Some(parent) = folder.parent() {
-        create_folders(disk, parent)?;
+    let hint = "open it, name --append to add scans to it, or choose an empty folder";
+    Err(Error::AlreadyExists { path: folder.to_owned(), hint })
+}
+
+fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
+    if disk.kind(folder).is_ok_and(|kind| kind.is_some()) {
+        return Ok(());
     }
-    disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error))
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    create_folders(disk, parent)?;
+    disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error))?;
+    // A map must not vanish with the name of its folder.
+    disk.sync_folder(parent).map_err(|error| Error::io(parent, "sync", error))
 }
 
 fn read_metadata(disk: &dyn Disk, layout: &Layout) -> Result<Metadata> {

@@ -75,6 +75,10 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             drive(&mut mapper, &mut reference, seed as u64, 12);
             assert_eq!(voxels_of(&mapper), reference.voxels, "before flush");
             assert!(mapper.cached_tile_indices().len() <= cache_tiles);
+            if cache_tiles == 3 {
+                // Updates are waiting for tiles on disk here.
+                assert_coarse_answers_are_maxima(&mapper);
+            }
             let unsaved = mapper.digest().unwrap();
             mapper.flush().unwrap();
             assert_eq!(voxels_of(&mapper), reference.voxels, "after flush");
