@@ -35,7 +35,7 @@ fn rays_end_where_single_steps_end() {
     let mut random = Random(50);
     let (mut hits, grid) = (0, map.config().grid);
     let occupied = map.all_occupied_voxels(None).unwrap();
-    for number in 0..150 {
+    for number in 0..400 {
         let origin = random.point([0.0; 3], 5.0);
         let direction = match number % 5 {
             0 => [0.0, -1.0, 0.0],
@@ -47,7 +47,7 @@ fn rays_end_where_single_steps_end() {
             }
         };
         let unknown = if number % 4 == 0 { UnknownAs::Obstacle } else { UnknownAs::Free };
-        let max_range_m = random.between(0.5, 9.0);
+        let max_range_m = random.between(2.0, 12.0);
         let query = RayQuery { origin, direction, max_range_m: Some(max_range_m), unknown };
         let answer = map.cast_ray(&query).unwrap();
         assert_eq!(out_of_core.cast_ray(&query).unwrap(), answer);
