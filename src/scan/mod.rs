@@ -11,13 +11,13 @@ mod grouping;
 mod range;
 mod ray;
 mod report;
-mod sensor_look;
 mod trace;
 mod updates;
+mod world_scan;
 
 pub use batch::PointBatch;
 pub use ray::{MAX_RAY_STEPS, RayWalk};
 pub use report::{ScanReport, SkippedPoints};
-pub use sensor_look::Scan;
 pub use trace::trace_scan;
 pub use updates::{BrickUpdate, OrderedUpdates, ScanUpdates, TileUpdates};
+pub use world_scan::Scan;

@@ -73,11 +73,7 @@ impl<'a> Tracer<'a> {
         let mut collector = MaskCollector::default();
         let needs_intensity = self.model.needs_intensity();
         let report = self.for_each_ray(|ray| {
-            let mut walk = ray.walk;
-            while !walk.is_at_end() {
-                collector.miss(walk.voxel());
-                walk.advance();
-            }
+            ray.walk.for_each_before_end(|voxel| collector.miss(voxel));
             if let Some((voxel, Observation::Hit(intensity))) = ray.end {
                 collector.hit(voxel, needs_intensity.then_some(intensity));
             }
@@ -89,11 +85,7 @@ impl<'a> Tracer<'a> {
     fn every_ray(&self) -> ScanUpdates {
         let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
         let report = self.for_each_ray(|ray| {
-            let mut walk = ray.walk;
-            while !walk.is_at_end() {
-                collector.push(walk.voxel(), Observation::Miss);
-                walk.advance();
-            }
+            ray.walk.for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
             if let Some((voxel, observation)) = ray.end {
                 collector.push(voxel, observation);
             }
