@@ -5,7 +5,7 @@ use std::path::Path;
 /// A voxel as it is exported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelRecord {
-    /// Its centre in metres, world frame.
+    /// Its center in metres, world frame.
     pub center_m: Point,
     /// Probability of being occupied.
     pub probability: f64,

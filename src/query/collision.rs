@@ -10,7 +10,7 @@ use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 pub enum Shape {
     /// A ball.
     Sphere {
-        /// Its centre in metres.
+        /// Its center in metres.
         center: Point,
         /// Its radius in metres.
         radius_m: f64,

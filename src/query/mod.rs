@@ -7,7 +7,7 @@
 //! | a region, the whole map | its voxels, streamed |
 //! | a ray, many rays | the first occupied voxel, exactly as single steps would find it |
 //! | a sphere, a box | the first occupied voxel that it touches |
-//! | nearest occupied | the occupied voxel with the nearest centre |
+//! | nearest occupied | the occupied voxel with the nearest center |
 //! | digest | one number for the whole content |
 
 mod coarse;

@@ -9,9 +9,9 @@ use serde::Serialize;
 pub struct Nearest {
     /// Its index.
     pub voxel: VoxelIndex,
-    /// Its centre in metres.
+    /// Its center in metres.
     pub center_m: Point,
-    /// Distance to its centre in metres.
+    /// Distance to its center in metres.
     pub distance_m: f64,
 }
 

@@ -38,7 +38,7 @@ pub trait Questions: MapView + Sized {
         coarse::occupancy_at_depth(self, point, depth)
     }
 
-    /// Visits the observed voxels whose centre is in the half-open box, tile by tile, in Morton order within each.
+    /// Visits the observed voxels whose center is in the half-open box, tile by tile, in Morton order within each.
     fn for_each_voxel_in(&self, region: &Aabb, visit: impl FnMut(Voxel)) -> Result<()> {
         region::for_each_voxel_in(self, region, visit)
     }
@@ -91,7 +91,7 @@ pub trait Questions: MapView + Sized {
         collision::collision(self, body, unknown)
     }
 
-    /// The occupied voxel whose centre is nearest to a point and at most `max_distance_m` away; of equals the one
+    /// The occupied voxel whose center is nearest to a point and at most `max_distance_m` away; of equals the one
     /// with the lowest index.
     fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Nearest>> {
         nearest::nearest_occupied(self, point, max_distance_m)

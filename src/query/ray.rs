@@ -25,7 +25,7 @@ pub struct RayQuery {
 pub struct RayHit {
     /// The voxel that stopped the ray.
     pub voxel: VoxelIndex,
-    /// Its centre in metres.
+    /// Its center in metres.
     pub center_m: Point,
     /// How far from the origin the ray enters it, in metres; 0 if the ray begins in it.
     pub distance_m: f64,

@@ -95,7 +95,7 @@ pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
     bricks.flat_map(|brick| tile.voxels_of_brick(brick)).filter(|voxel| voxels.contains(voxel.index))
 }
 
-/// The voxels whose centre may lie in a box, and a few around.
+/// The voxels whose center may lie in a box, and a few around.
 pub(super) fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
     let to_index =
         |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN / 2), f64::from(i32::MAX / 2)) as i32;

@@ -63,8 +63,8 @@ impl Building {
 }
 
 impl World for Building {
-    fn scene(&self, centre: Point, radius_m: f64) -> Scene {
-        Scene::new(self.solids(), FLOOR, centre, radius_m)
+    fn scene(&self, center: Point, radius_m: f64) -> Scene {
+        Scene::new(self.solids(), FLOOR, center, radius_m)
     }
 }
 

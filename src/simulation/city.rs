@@ -26,21 +26,21 @@ impl City {
 }
 
 impl World for City {
-    fn scene(&self, centre: Point, radius_m: f64) -> Scene {
+    fn scene(&self, center: Point, radius_m: f64) -> Scene {
         let radius_m = bounded(radius_m);
         let mut solids = Vec::new();
         // A block's boxes never leave it, so the blocks that meet the square are all there is. The casts saturate:
         // out there no metre can be told from the next, and the ranges are single blocks.
         let range = |k: usize| {
             let block_of = |x: f64| (x / Self::BLOCK_M).floor() as i64;
-            block_of(centre[k] - radius_m)..=block_of(centre[k] + radius_m)
+            block_of(center[k] - radius_m)..=block_of(center[k] + radius_m)
         };
         for y in range(1) {
             for x in range(0) {
                 block::build(self.seed, [x, y], &mut solids);
             }
         }
-        Scene::new(solids, GROUND_REFLECTIVITY, centre, radius_m)
+        Scene::new(solids, GROUND_REFLECTIVITY, center, radius_m)
     }
 }
 

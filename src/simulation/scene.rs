@@ -38,9 +38,9 @@ impl Scene {
     pub const MAX_RADIUS_M: f64 = 400.0;
 
     /// A scene of the boxes that meet the square of `radius_m` metres around a point; the others are left out.
-    pub fn new(mut solids: Vec<Solid>, ground_reflectivity: f64, centre: Point, radius_m: f64) -> Self {
+    pub fn new(mut solids: Vec<Solid>, ground_reflectivity: f64, center: Point, radius_m: f64) -> Self {
         let radius_m = bounded(radius_m);
-        let min = [centre[0] - radius_m, centre[1] - radius_m];
+        let min = [center[0] - radius_m, center[1] - radius_m];
         let edge_cells = (2.0 * radius_m / CELL_M) as usize + 1;
         let mut scene = Self {
             solids: Vec::new(),
@@ -203,9 +203,9 @@ mod tests {
         let mut random = Random::of(3, &[]);
         let solids: Vec<Solid> = (0..300)
             .map(|_| {
-                let centre = random_point(&mut random, [40.0, 40.0, 10.0]);
+                let center = random_point(&mut random, [40.0, 40.0, 10.0]);
                 let half = random.between(0.05, 3.0);
-                Solid::new(centre.map(|x| x - half), centre.map(|x| x + half), 0.5)
+                Solid::new(center.map(|x| x - half), center.map(|x| x + half), 0.5)
             })
             .collect();
         let scene = Scene::new(solids, 0.2, [0.0; 3], 30.0);

@@ -6,7 +6,7 @@ pub trait World {
     /// What stands within `radius_m` metres of a point (world frame), ready for many rays.
     ///
     /// The radius is cut at [`Scene::MAX_RADIUS_M`], so that a scene is bounded whatever is asked for.
-    fn scene(&self, centre: Point, radius_m: f64) -> Scene;
+    fn scene(&self, center: Point, radius_m: f64) -> Scene;
 
     /// The first surface on a ray, up to and including `max_range_m` metres.
     ///

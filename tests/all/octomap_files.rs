@@ -166,7 +166,7 @@ fn the_header_may_be_in_any_order_and_say_more() {
     let nodes = [[0x80, 0x00].as_slice(), &[0x00, 0x00]].concat();
     for header in [
         "id 1\nsize 2\nres 0.1\ndata\n",
-        "res 0.1 size 2\n\n  # id Other\nid\tOcTree\r\ncolour red and green\ndata  and more\n",
+        "res 0.1 size 2\n\n  # id Other\nid\tOcTree\r\ncolor red and green\ndata  and more\n",
         "size 7\nsize 2\nid OcTreeStamped\n#data\nres +1e-1 data\n",
     ] {
         let bytes = [b"# Octomap OcTree binary file, mine\n", header.as_bytes(), &nodes[..2]].concat();
@@ -188,7 +188,7 @@ fn a_file_from_before_the_text_header_is_read() {
 }
 
 #[test]
-fn a_coloured_tree_is_read_without_its_colours() {
+fn a_colored_tree_is_read_without_its_colors() {
     let node = |value: f32, mask| [value.to_le_bytes().as_slice(), b"RGB", &[mask]].concat();
     let payload = [node(2.0, 0b101), node(2.0, 0), node(-1.0, 0)].concat();
     let bytes = ot_file("id ColorOcTree\nsize 3\nres 0.1", &payload);

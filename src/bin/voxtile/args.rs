@@ -161,7 +161,7 @@ pub struct ExportArgs {
     /// Voxels of at least this probability; 0 takes all observed ones [default: the map's occupancy threshold]
     #[arg(long, value_name = "P")]
     pub min_probability: Option<f64>,
-    /// Only voxels whose centre is in this box: X0 <= x < X1 and so on, in metres
+    /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,
     /// Print the summary as JSON

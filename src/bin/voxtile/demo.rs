@@ -1,5 +1,5 @@
 use crate::args::{ColorName, DemoArgs};
-use crate::picture::{ColourBy, TopDown, View};
+use crate::picture::{ColorBy, TopDown, View};
 use crate::progress::Progress;
 use crate::summary::Summary;
 use std::io::Write;
@@ -67,9 +67,9 @@ fn draw(args: &DemoArgs, map: &Path, path: &[Point], picture: &Path) -> anyhow::
         bounds: Aabb { min: corner(min, 0.0), max: corner(max, 1.0) },
         resolution_m,
         tile_size_m,
-        colour_by: match args.color {
-            ColorName::Height => ColourBy::Height,
-            ColorName::Probability => ColourBy::Probability,
+        color_by: match args.color {
+            ColorName::Height => ColorBy::Height,
+            ColorName::Probability => ColorBy::Probability,
         },
         title: format!("voxtile demo: {} scans, {resolution_m} m voxels, {tile_size_m} m tiles", path.len()),
     })?;

@@ -23,7 +23,7 @@ pub fn run(args: &RaycastArgs) -> anyhow::Result<ExitCode> {
                 Some(probability) => format!("occupied, probability {probability:.4}"),
                 None => "unknown".to_owned(),
             };
-            writeln!(out, "hit at {:.3} m: voxel with centre {x:.3} {y:.3} {z:.3}, {what}", hit.distance_m)?;
+            writeln!(out, "hit at {:.3} m: voxel with center {x:.3} {y:.3} {z:.3}, {what}", hit.distance_m)?;
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -38,7 +38,7 @@ pub struct OctreeFile {
 /// Reads a `.bt` or `.ot` file; the first line says which.
 ///
 /// Reads to the last node and no further: as in OctoMap, what follows it is not looked at, and `input` stays
-/// there. The colours of a `ColorOcTree` are dropped.
+/// there. The colors of a `ColorOcTree` are dropped.
 ///
 /// # Errors
 ///

@@ -13,7 +13,7 @@ pub(super) fn read_nodes(
     header: &Header,
     mut growing: GrowingTree,
 ) -> Result<Octree, DecodeError> {
-    let colour_bytes = match header.id.as_str() {
+    let color_bytes = match header.id.as_str() {
         // OctoMap writes a stamped tree without its stamps.
         "OcTree" | "OcTreeStamped" => 0,
         "ColorOcTree" => 3,
@@ -25,7 +25,7 @@ pub(super) fn read_nodes(
     };
     // The size may be missing; an empty tree is one that says 0 and has nothing behind it.
     if header.nodes > 0 || input.peek()?.is_some() {
-        growing.tree.root = read_node(input, &mut growing, colour_bytes, 0)?;
+        growing.tree.root = read_node(input, &mut growing, color_bytes, 0)?;
     }
     Ok(growing.tree)
 }
@@ -33,7 +33,7 @@ pub(super) fn read_nodes(
 fn read_node(
     input: &mut Input<impl BufRead>,
     growing: &mut GrowingTree,
-    colour_bytes: usize,
+    color_bytes: usize,
     depth: u8,
 ) -> Result<Node, DecodeError> {
     let begin = input.offset();
@@ -41,8 +41,8 @@ fn read_node(
     if !value.is_finite() {
         return Err(FormatError::at_offset(begin, format!("log-odds {value} are not finite")).into());
     }
-    for _ in 0..colour_bytes {
-        input.take::<1>("the colour of a node")?;
+    for _ in 0..color_bytes {
+        input.take::<1>("the color of a node")?;
     }
     let mask_at = input.offset();
     let [mask] = input.take("the children of a node")?;
@@ -56,7 +56,7 @@ fn read_node(
     }
     let block = growing.add_inner(input)?;
     for index in (0..8).filter(|index| mask >> index & 1 == 1) {
-        let child = read_node(input, growing, colour_bytes, depth + 1)?;
+        let child = read_node(input, growing, color_bytes, depth + 1)?;
         growing.tree.arena[block].set_child(index, child);
     }
     Ok(Node::Inner { value, block })

@@ -13,9 +13,9 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A canvas of one colour.
-    pub fn new(width: usize, height: usize, colour: Rgb) -> Self {
-        Self { width, height, bytes: colour.repeat(width * height) }
+    /// A canvas of one color.
+    pub fn new(width: usize, height: usize, color: Rgb) -> Self {
+        Self { width, height, bytes: color.repeat(width * height) }
     }
 
     pub fn width(&self) -> usize {
@@ -27,21 +27,21 @@ impl Canvas {
         self.height
     }
 
-    /// Lays a colour over a box of pixels; `cover` 1 hides what was there, 0 leaves it.
-    pub fn fill(&mut self, left: usize, top: usize, size: [usize; 2], colour: Rgb, cover: f64) {
+    /// Lays a color over a box of pixels; `cover` 1 hides what was there, 0 leaves it.
+    pub fn fill(&mut self, left: usize, top: usize, size: [usize; 2], color: Rgb, cover: f64) {
         for y in top.min(self.height)..top.saturating_add(size[1]).min(self.height) {
             for x in left.min(self.width)..left.saturating_add(size[0]).min(self.width) {
                 let at = 3 * (x + y * self.width);
                 let pixel = &mut self.bytes[at..at + 3];
                 let new =
-                    if cover >= 1.0 { colour } else { mixed([pixel[0], pixel[1], pixel[2]], colour, cover) };
+                    if cover >= 1.0 { color } else { mixed([pixel[0], pixel[1], pixel[2]], color, cover) };
                 pixel.copy_from_slice(&new);
             }
         }
     }
 
     /// A filled disc around the middle of a pixel.
-    pub fn disc(&mut self, middle: [usize; 2], radius: usize, colour: Rgb) {
+    pub fn disc(&mut self, middle: [usize; 2], radius: usize, color: Rgb) {
         for dy in 0..=2 * radius {
             let up = dy as f64 - radius as f64;
             let half = ((radius as f64 + 0.3).powi(2) - up * up).max(0.0).sqrt() as usize;
@@ -49,18 +49,18 @@ impl Canvas {
             else {
                 continue;
             };
-            self.fill(x, y, [2 * half + 1, 1], colour, 1.0);
+            self.fill(x, y, [2 * half + 1, 1], color, 1.0);
         }
     }
 
     /// Writes text whose upper left corner is given, each dot of a letter `dot` pixels wide.
-    pub fn text(&mut self, left: usize, top: usize, dot: usize, colour: Rgb, text: &str) {
+    pub fn text(&mut self, left: usize, top: usize, dot: usize, color: Rgb, text: &str) {
         for (index, letter) in text.chars().enumerate() {
             for (row, bits) in font::glyph(letter).into_iter().enumerate() {
                 for column in 0..font::WIDTH {
                     if bits >> (font::WIDTH - 1 - column) & 1 == 1 {
                         let x = left + (index * font::ADVANCE + column) * dot;
-                        self.fill(x, top + row * dot, [dot; 2], colour, 1.0);
+                        self.fill(x, top + row * dot, [dot; 2], color, 1.0);
                     }
                 }
             }
@@ -68,8 +68,8 @@ impl Canvas {
     }
 
     /// Writes text that ends at a column.
-    pub fn text_before(&mut self, right: usize, top: usize, dot: usize, colour: Rgb, text: &str) {
-        self.text(right.saturating_sub(font::width_of(text) * dot), top, dot, colour, text);
+    pub fn text_before(&mut self, right: usize, top: usize, dot: usize, color: Rgb, text: &str) {
+        self.text(right.saturating_sub(font::width_of(text) * dot), top, dot, color, text);
     }
 
     /// Saves the picture as PNG.

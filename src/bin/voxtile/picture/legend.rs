@@ -1,22 +1,22 @@
-use super::ColourBy;
+use super::ColorBy;
 use super::canvas::Canvas;
 use super::font;
 use super::frame::{length_label, round_length_m};
-use super::palette::{self, colour_of};
+use super::palette::{self, color_of};
 
 /// What a reader needs to know below the map.
 pub struct Legend {
     pub metres_a_pixel: f64,
     /// Metres from one line over the map to the next, if there are any.
     pub lines_m: Option<f64>,
-    pub colour_by: ColourBy,
-    /// What the first and the last colour stand for.
+    pub color_by: ColorBy,
+    /// What the first and the last color stand for.
     pub range: [f64; 2],
 }
 
 impl Legend {
     /// Draws it below the row `foot`, each dot of a letter `dot` pixels wide: axes, scale bar, what is free and
-    /// unknown, the colours.
+    /// unknown, the colors.
     pub fn draw(&self, canvas: &mut Canvas, foot: usize, dot: usize) {
         let [least, most] = self.range;
         let margin = 10 * dot;
@@ -51,16 +51,16 @@ impl Legend {
             let label = format!("lines {}", length_label(every_m));
             canvas.text(left + length + 8 * dot, line, dot, palette::FAINT_INK, &label);
         }
-        // Colours.
+        // Colors.
         let right = canvas.width() - margin;
         let bar = (canvas.width() / 4).max(1);
         for x in 0..bar {
-            let colour = colour_of(x as f64 / (bar - 1).max(1) as f64);
-            canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], colour, 1.0);
+            let color = color_of(x as f64 / (bar - 1).max(1) as f64);
+            canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], color, 1.0);
         }
-        let (name, low, high) = match self.colour_by {
-            ColourBy::Height => ("height", height_label(least), height_label(most)),
-            ColourBy::Probability => ("probability", format!("{least:.2}"), format!("{most:.2}")),
+        let (name, low, high) = match self.color_by {
+            ColorBy::Height => ("height", height_label(least), height_label(most)),
+            ColorBy::Probability => ("probability", format!("{least:.2}"), format!("{most:.2}")),
         };
         canvas.text(right - bar, foot + 4 * dot, dot, palette::INK, &low);
         canvas.text_before(right, foot + 4 * dot, dot, palette::INK, &high);
@@ -68,11 +68,11 @@ impl Legend {
         canvas.text_before(middle, foot + 4 * dot, dot, palette::FAINT_INK, name);
         // What is not occupied.
         let swatch = right - bar - 74 * dot;
-        for (top, colour, label) in
+        for (top, color, label) in
             [(foot + 4 * dot, palette::FREE, "free"), (line, palette::UNKNOWN, "unknown")]
         {
             canvas.fill(swatch, top, [7 * dot; 2], palette::FAINT_INK, 1.0);
-            canvas.fill(swatch + 1, top + 1, [7 * dot - 2; 2], colour, 1.0);
+            canvas.fill(swatch + 1, top + 1, [7 * dot - 2; 2], color, 1.0);
             canvas.text(swatch + 11 * dot, top, dot, palette::FAINT_INK, label);
         }
     }

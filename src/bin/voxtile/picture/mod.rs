@@ -3,7 +3,7 @@
 //! ```text
 //! TopDown   collects voxels in cells, at most a few million     top_down
 //! Frame     cells and metres, the length of the scale bar       frame
-//! Legend    axes, scale bar, colours                        legend
+//! Legend    axes, scale bar, colors                        legend
 //! Canvas    pixels, boxes, letters                              canvas, font, palette
 //! ```
 
@@ -14,4 +14,4 @@ mod legend;
 mod palette;
 mod top_down;
 
-pub use top_down::{ColourBy, TopDown, View};
+pub use top_down::{ColorBy, TopDown, View};

@@ -29,15 +29,15 @@ const VIRIDIS: [Rgb; 9] = [
 /// The map begins here: viridis' darkest purple could not be told from the paper.
 const DARKEST: f64 = 0.13;
 
-/// The colour of a share from 0 (low) to 1 (high); other numbers are cut there.
-pub fn colour_of(share: f64) -> Rgb {
+/// The color of a share from 0 (low) to 1 (high); other numbers are cut there.
+pub fn color_of(share: f64) -> Rgb {
     let share = DARKEST + (1.0 - DARKEST) * if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
     let at = share * (VIRIDIS.len() - 1) as f64;
     let low = (at as usize).min(VIRIDIS.len() - 2);
     mixed(VIRIDIS[low], VIRIDIS[low + 1], at - low as f64)
 }
 
-/// A colour between two: `share` 0 is the first, 1 the second.
+/// A color between two: `share` 0 is the first, 1 the second.
 pub fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
     std::array::from_fn(|k| {
         let (a, b) = (f64::from(first[k]), f64::from(second[k]));
@@ -45,9 +45,9 @@ pub fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
     })
 }
 
-/// A colour made lighter (above 1) or darker (below 1).
-pub fn lit(colour: Rgb, light: f64) -> Rgb {
-    if light > 1.0 { mixed(colour, [255; 3], light - 1.0) } else { mixed([0; 3], colour, light) }
+/// A color made lighter (above 1) or darker (below 1).
+pub fn lit(color: Rgb, light: f64) -> Rgb {
+    if light > 1.0 { mixed(color, [255; 3], light - 1.0) } else { mixed([0; 3], color, light) }
 }
 
 #[cfg(test)]
@@ -58,11 +58,11 @@ mod tests {
     fn higher_is_lighter() {
         let lightness =
             |rgb: Rgb| 0.3 * f64::from(rgb[0]) + 0.59 * f64::from(rgb[1]) + 0.11 * f64::from(rgb[2]);
-        let steps: Vec<f64> = (0..=20).map(|i| lightness(colour_of(f64::from(i) / 20.0))).collect();
+        let steps: Vec<f64> = (0..=20).map(|i| lightness(color_of(f64::from(i) / 20.0))).collect();
         assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
         assert!(lightness(UNKNOWN) + 15.0 < lightness(FREE));
         assert!(lightness(FREE) + 10.0 < steps[0]);
-        assert_eq!(colour_of(2.0), colour_of(1.0));
-        assert_eq!(colour_of(f64::NAN), colour_of(0.0));
+        assert_eq!(color_of(2.0), color_of(1.0));
+        assert_eq!(color_of(f64::NAN), color_of(0.0));
     }
 }

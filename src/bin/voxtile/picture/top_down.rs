@@ -2,14 +2,14 @@ use super::canvas::Canvas;
 use super::font;
 use super::frame::Frame;
 use super::legend::Legend;
-use super::palette::{self, colour_of, lit};
+use super::palette::{self, color_of, lit};
 use std::path::Path;
 use voxtile::Result;
 use voxtile::space::{Aabb, Point};
 
-/// What the colour of an occupied cell stands for.
+/// What the color of an occupied cell stands for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ColourBy {
+pub enum ColorBy {
     /// Height of the topmost occupied voxel.
     #[default]
     Height,
@@ -26,7 +26,7 @@ pub struct View {
     pub resolution_m: f64,
     /// Edge of a tile in metres.
     pub tile_size_m: f64,
-    pub colour_by: ColourBy,
+    pub color_by: ColorBy,
     /// A line above the map.
     pub title: String,
 }
@@ -47,7 +47,7 @@ const LEAST_WIDTH: usize = 760;
 
 #[derive(Clone, Copy, Default)]
 struct Cell {
-    /// Height of the topmost occupied voxel's centre.
+    /// Height of the topmost occupied voxel's center.
     top_m: f32,
     /// Probability of the most probable occupied voxel; 0 is 0 and 255 is 1.
     probability: u8,
@@ -92,18 +92,18 @@ impl TopDown {
         Ok(Self { view, frame, cells })
     }
 
-    /// Adds an occupied voxel by its centre in metres.
-    pub fn add_occupied(&mut self, centre: Point, probability: f64) {
-        let Some(cell) = self.cell_at(centre) else { return };
-        let top_m = centre[2] as f32;
+    /// Adds an occupied voxel by its center in metres.
+    pub fn add_occupied(&mut self, center: Point, probability: f64) {
+        let Some(cell) = self.cell_at(center) else { return };
+        let top_m = center[2] as f32;
         cell.top_m = if cell.is_occupied { cell.top_m.max(top_m) } else { top_m };
         cell.probability = cell.probability.max((probability * 255.0).round() as u8);
         cell.is_occupied = true;
     }
 
-    /// Adds a free voxel by its centre in metres.
-    pub fn add_free(&mut self, centre: Point) {
-        if let Some(cell) = self.cell_at(centre) {
+    /// Adds a free voxel by its center in metres.
+    pub fn add_free(&mut self, center: Point) {
+        if let Some(cell) = self.cell_at(center) {
             cell.is_free = true;
         }
     }
@@ -147,11 +147,7 @@ impl TopDown {
         canvas.text(margin, margin, dot, palette::INK, &self.view.title);
         let metres_a_pixel = self.frame.cell_m / zoom as f64;
         let lines_m = self.line_spacing_m(1.0 / metres_a_pixel);
-        Legend { metres_a_pixel, lines_m, colour_by: self.view.colour_by, range }.draw(
-            &mut canvas,
-            foot,
-            dot,
-        );
+        Legend { metres_a_pixel, lines_m, color_by: self.view.color_by, range }.draw(&mut canvas, foot, dot);
         canvas
     }
 
@@ -174,17 +170,17 @@ impl TopDown {
     }
 
     fn value(&self, cell: Cell) -> f64 {
-        match self.view.colour_by {
-            ColourBy::Height => f64::from(cell.top_m),
-            ColourBy::Probability => f64::from(cell.probability) / 255.0,
+        match self.view.color_by {
+            ColorBy::Height => f64::from(cell.top_m),
+            ColorBy::Probability => f64::from(cell.probability) / 255.0,
         }
     }
 
-    /// What the first and the last colour stand for: one cell in a hundred may lie outside either.
+    /// What the first and the last color stand for: one cell in a hundred may lie outside either.
     ///
     /// Probabilities always span the same range, so that two pictures can be compared.
     fn range(&self) -> [f64; 2] {
-        if self.view.colour_by == ColourBy::Probability {
+        if self.view.color_by == ColorBy::Probability {
             return [0.5, 1.0];
         }
         let mut values: Vec<f32> =
@@ -202,16 +198,16 @@ impl TopDown {
         for y in pane.first[1]..pane.first[1] + pane.cells[1] {
             for x in pane.first[0]..pane.first[0] + pane.cells[0] {
                 let cell = self.cell(x, y);
-                let colour = if cell.is_occupied {
+                let color = if cell.is_occupied {
                     let share = (self.value(cell) - least) / (most - least);
-                    lit(colour_of(share), self.light(x, y))
+                    lit(color_of(share), self.light(x, y))
                 } else if cell.is_free {
                     palette::FREE
                 } else {
                     continue;
                 };
                 let [left, top] = pane.pixel([x, y]);
-                canvas.fill(left, top, [pane.zoom; 2], colour, 1.0);
+                canvas.fill(left, top, [pane.zoom; 2], color, 1.0);
             }
         }
     }
@@ -294,7 +290,7 @@ mod tests {
             bounds: Aabb { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 10.0] },
             resolution_m: 0.2,
             tile_size_m: 10.0,
-            colour_by: ColourBy::Height,
+            color_by: ColorBy::Height,
             title: "a map".into(),
         })
         .unwrap()
