@@ -1,7 +1,7 @@
 use super::cached_octree::CachedOctree;
 use super::table::Table;
 use super::voxel_cache::VoxelCacheCounts;
-use crate::config::{MapConfig, VoxelCacheConfig};
+use crate::config::MapConfig;
 use crate::octree::Octree;
 use crate::scan::TileUpdates;
 use crate::sensor::{Evidence, SensorModel};
@@ -153,11 +153,6 @@ impl Tile {
             Some(octree) => Cow::Borrowed(octree),
             None => Cow::Owned(self.octree.clone().into_octree()),
         }
-    }
-
-    /// Empties the voxel cache into the octree and gives it another shape.
-    pub fn reshape_voxel_cache(&mut self, config: &VoxelCacheConfig) {
-        self.octree = CachedOctree::from_voxels(config, self.table.iter());
     }
 
     /// Sizes of the tile.
