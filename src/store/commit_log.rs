@@ -1,9 +1,9 @@
-use super::disk::{Disk, DiskRead};
+use super::disk::Disk;
 use super::tile_stamp::TileStamp;
 use crate::error::{DecodeError, FormatError};
 use crate::space::TileIndex;
 use rustc_hash::FxHashMap;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 /// The append-only record of flushes, `commits.log`. A record that is whole is a commit.
@@ -88,18 +88,16 @@ impl CommitLog {
         Ok(())
     }
 
-    /// Reads a log. An incomplete record at the end is a flush that never happened and is left out.
+    /// Reads a log of `file_bytes` bytes. An incomplete record at the end is a flush that never happened and is left out.
     ///
     /// # Errors
     ///
     /// A wrong header, or a record that is complete and does not match its checksum.
-    pub fn read(disk: &dyn Disk, path: &Path) -> Result<(Self, Commits), DecodeError> {
-        let mut input = disk.open(path)?;
-        let file_bytes = input.file_bytes();
-        let map_id = read_header(&mut *input, file_bytes)?;
+    pub fn read(input: &mut impl Read, file_bytes: u64) -> Result<(Self, Commits), DecodeError> {
+        let map_id = read_header(input, file_bytes)?;
         let mut log = Self { map_id, bytes: HEADER_BYTES as u64 };
         let mut commits = Commits::default();
-        while let Some(payload) = read_record(&mut *input, log.bytes, file_bytes)? {
+        while let Some(payload) = read_record(input, log.bytes, file_bytes)? {
             commits.take(&payload, log.bytes + 8)?;
             log.bytes += payload.len() as u64 + 12;
         }
@@ -166,7 +164,7 @@ fn record(kind: u32, flush_number: u64, scan_number: u64, tiles: &[(TileIndex, T
     bytes
 }
 
-fn read_header(input: &mut dyn DiskRead, file_bytes: u64) -> Result<[u8; 16], DecodeError> {
+fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], DecodeError> {
     let mut bytes = [0; HEADER_BYTES];
     if file_bytes < HEADER_BYTES as u64 {
         return Err(FormatError::at_offset(0, "too short for the header of a commit log").into());
@@ -180,11 +178,7 @@ fn read_header(input: &mut dyn DiskRead, file_bytes: u64) -> Result<[u8; 16], De
 }
 
 /// The payload of the record at `offset`; `None` if there is none, or not a whole one.
-fn read_record(
-    input: &mut dyn DiskRead,
-    offset: u64,
-    file_bytes: u64,
-) -> Result<Option<Vec<u8>>, DecodeError> {
+fn read_record(input: &mut impl Read, offset: u64, file_bytes: u64) -> Result<Option<Vec<u8>>, DecodeError> {
     let remaining = file_bytes - offset;
     if remaining < 8 {
         return Ok(None);

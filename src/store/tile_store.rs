@@ -98,7 +98,9 @@ impl TileStore {
             return Ok(store);
         };
         let path = layout.commit_log();
-        let (log, commits) = CommitLog::read(&*disk, &path).map_err(|error| error.in_map(&path, None))?;
+        let mut input = disk.open(&path).map_err(|error| Error::io(&path, "open", error))?;
+        let bytes = input.file_bytes();
+        let (log, commits) = CommitLog::read(&mut input, bytes).map_err(|error| error.in_map(&path, None))?;
         let damaged = |reason: String| Err(FormatError::at_offset(log.bytes(), reason).in_map(&path, None));
         if hex(&log.map_id()) != ext.map_id {
             return damaged(format!("the log belongs to map {}, not to {}", hex(&log.map_id()), ext.map_id));
