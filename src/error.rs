@@ -66,7 +66,7 @@ pub enum Error {
         hint: &'static str,
     },
     /// The map was made with other parameters: open it with its own.
-    #[error("{}: the map has {what} {found}, not {wanted}; open it with its own or build another map", path.display())]
+    #[error("{}: the map has {what} {found}, not {wanted}; go on with its own or build another map", path.display())]
     Mismatch {
         /// The folder of the map.
         path: PathBuf,

@@ -6,6 +6,7 @@
 //! OctoMap scan log      ┘                                  └ VoxelWriter
 //! ```
 
+mod fingerprint;
 mod lzf;
 mod pcd;
 mod pcd_folder;

@@ -1,3 +1,4 @@
+use super::fingerprint::Fingerprint;
 use super::pcd::read_pcd;
 use super::poses::read_poses;
 use super::sensor_scan::SensorScan;
@@ -78,20 +79,11 @@ impl ScanSource for PcdFolder {
         Ok(skipped)
     }
 
-    fn fingerprint(&self) -> String {
-        let mut hasher = blake3::Hasher::new();
-        for path in &self.files {
-            let bytes = fs::metadata(path).map_or(0, |metadata| metadata.len());
-            hasher.update(name_of(path).as_bytes());
-            hasher.update(&[0]);
-            hasher.update(&bytes.to_le_bytes());
-        }
-        for pose in self.poses.iter().flatten() {
-            pose.to_homogeneous().iter().for_each(|value| {
-                hasher.update(&value.to_bits().to_le_bytes());
-            });
-        }
-        hasher.finalize().to_string()
+    fn fingerprint(&self) -> Result<String> {
+        let mut fingerprint = Fingerprint::default();
+        self.files.iter().try_for_each(|path| fingerprint.add_file(path))?;
+        self.poses.iter().flatten().for_each(|pose| fingerprint.add_pose(pose));
+        Ok(fingerprint.finish())
     }
 }
 

@@ -1,3 +1,4 @@
+use super::fingerprint::Fingerprint;
 use super::poses::unit_quaternion;
 use super::sensor_scan::SensorScan;
 use super::source::ScanSource;
@@ -101,16 +102,7 @@ impl ScanSource for ScanGraph {
         }))
     }
 
-    fn fingerprint(&self) -> String {
-        fingerprint_of_file(&self.path, self.file_bytes)
+    fn fingerprint(&self) -> Result<String> {
+        Fingerprint::of_file(&self.path)
     }
-}
-
-/// Of a single file: its name and size.
-pub(super) fn fingerprint_of_file(path: &Path, bytes: u64) -> String {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(path.file_name().unwrap_or_default().to_string_lossy().as_bytes());
-    hasher.update(&[0]);
-    hasher.update(&bytes.to_le_bytes());
-    hasher.finalize().to_string()
 }

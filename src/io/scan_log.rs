@@ -1,4 +1,4 @@
-use super::scan_graph::fingerprint_of_file;
+use super::fingerprint::Fingerprint;
 use super::sensor_scan::SensorScan;
 use super::source::ScanSource;
 use crate::error::{Error, FormatError, Result};
@@ -15,7 +15,6 @@ use std::path::{Path, PathBuf};
 pub(super) struct ScanLog {
     path: PathBuf,
     input: BufReader<File>,
-    file_bytes: u64,
     line: u64,
     /// Pose of the scan whose points come next.
     pose: Option<Isometry3<f64>>,
@@ -28,9 +27,8 @@ const MAX_LINE_BYTES: u64 = 1 << 16;
 impl ScanLog {
     pub(super) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
-        let file_bytes = file.metadata().map_err(|error| Error::io(path, "look at", error))?.len();
         let input = BufReader::new(file);
-        Ok(Self { path: path.to_owned(), input, file_bytes, line: 0, pose: None, done: 0 })
+        Ok(Self { path: path.to_owned(), input, line: 0, pose: None, done: 0 })
     }
 
     /// The next line with content; `None` at the end.
@@ -107,8 +105,8 @@ impl ScanSource for ScanLog {
         Ok(Some(SensorScan { name, points_in_sensor, intensities: None, world_from_sensor }))
     }
 
-    fn fingerprint(&self) -> String {
-        fingerprint_of_file(&self.path, self.file_bytes)
+    fn fingerprint(&self) -> Result<String> {
+        Fingerprint::of_file(&self.path)
     }
 }
 

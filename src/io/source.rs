@@ -31,9 +31,13 @@ pub trait ScanSource {
         Ok(scans)
     }
 
-    /// A fingerprint of the input that stays the same when it is moved: BLAKE3 over names, sizes and poses. Point
-    /// data is not read for it.
-    fn fingerprint(&self) -> String;
+    /// What tells this input from others, wherever it lies: number and size of its files, and a BLAKE3 over names,
+    /// sizes, poses and the first and last 4 KiB of every file. The rest of the points is not read for it.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
+    fn fingerprint(&self) -> Result<String>;
 }
 
 /// Opens scans by what the path is: a folder of PCD files (or one that holds it as `scans/`), one PCD file, an

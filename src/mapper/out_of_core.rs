@@ -1,7 +1,7 @@
 use super::map_id::new_map_id;
-use super::residency::{Residency, new_metadata};
+use super::residency::{Input, Residency, new_metadata};
 use super::{MapStatistics, MapView, Mapper, TileRef};
-use crate::config::MapConfig;
+use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::scan::{PointBatch, Scan, ScanReport, ScanUpdates, trace_scan};
 use crate::space::TileIndex;
@@ -61,9 +61,44 @@ impl OutOfCoreTileMapper {
         Self { residency: Mutex::new(Residency::new(config.clone(), store)), config, scan_number }
     }
 
-    /// Names what the map is built from; it is kept in `metadata.json` from the next flush on.
-    pub fn set_input_fingerprint(&mut self, fingerprint: impl Into<String>) {
-        self.residency_mut().input_fingerprint = Some(fingerprint.into());
+    /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
+    /// from here. Flushes, so that [`OutOfCoreTileMapper::resume_input`] knows it from now on.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Mapper::flush`].
+    pub fn begin_input(&mut self, fingerprint: impl Into<String>) -> Result<()> {
+        let scan_number = self.scan_number;
+        let input = Input { fingerprint: fingerprint.into(), first_scan: scan_number };
+        self.residency_mut().begin_input(input, scan_number)
+    }
+
+    /// Goes on with the input that the map was last built from, and returns how many of its scans are in the map: pass
+    /// over these and insert the rest. A map without scans that was built from nothing yet begins with the input.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Mismatch`] with what differs, if the map was built from another input or with other ranges or another
+    /// insert mode; and as for [`Mapper::flush`].
+    pub fn resume_input(&mut self, fingerprint: &str) -> Result<u64> {
+        let scan_number = self.scan_number;
+        let rays = self.config.rays;
+        let residency = self.residency_mut();
+        let found = match residency.input() {
+            Some(input) if input.fingerprint == fingerprint => {
+                let done = scan_number - input.first_scan.min(scan_number);
+                check_rays(residency.store(), &rays)?;
+                return Ok(done);
+            }
+            Some(input) => input.fingerprint.clone(),
+            None if scan_number == 0 => {
+                self.begin_input(fingerprint)?;
+                return Ok(0);
+            }
+            None => "that it does not know".to_owned(),
+        };
+        let path = residency.store().folder().to_owned();
+        Err(Error::Mismatch { path, what: "been built from input", found, wanted: fingerprint.to_owned() })
     }
 
     /// The folder of the map.
@@ -80,6 +115,11 @@ impl OutOfCoreTileMapper {
     pub fn is_dirty(&self) -> bool {
         let residency = self.lock();
         self.scan_number != residency.store().commits().scan_number
+    }
+
+    /// Number of the last scan in the last flush: what a crash cannot take away.
+    pub fn flushed_scan_number(&self) -> u64 {
+        self.lock().store().commits().scan_number
     }
 
     /// Whether a tile has updates that are not on disk.
@@ -185,6 +225,26 @@ impl Mapper for OutOfCoreTileMapper {
     fn sync_octrees(&mut self) {
         self.residency_mut().sync_octrees();
     }
+}
+
+/// What was begun with some ranges and insert mode goes on with them.
+fn check_rays(store: &TileStore, rays: &RayConfig) -> Result<()> {
+    let Some(ext) = &store.metadata().ext else { return Ok(()) };
+    let mismatch = |what, found: String, wanted: String| {
+        Err(Error::Mismatch { path: store.folder().to_owned(), what, found, wanted })
+    };
+    let range = |rays: &RayConfig| {
+        let max = rays.max_range_m.map_or("no limit".to_owned(), |max| format!("{max} m"));
+        format!("{} m to {max}", rays.min_range_m)
+    };
+    if range(&ext.rays) != range(rays) {
+        return mismatch("been built with ranges of", range(&ext.rays), range(rays));
+    }
+    if ext.rays.insert_mode != rays.insert_mode {
+        let mode = |rays: &RayConfig| format!("{:?}", rays.insert_mode);
+        return mismatch("been built with insert mode", mode(&ext.rays), mode(rays));
+    }
+    Ok(())
 }
 
 /// Grid, sensor model and threshold must be the map's own.

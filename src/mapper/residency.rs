@@ -27,13 +27,24 @@ pub(super) struct Residency {
     known_whole: FxHashSet<TileIndex>,
     saved: BTreeSet<TileIndex>,
     io: IoCounts,
-    /// Fingerprint of what the map is being built from, kept with it at the next flush.
-    pub(super) input_fingerprint: Option<String>,
+    /// What the map is being built from, kept with it at the next flush.
+    input: Option<Input>,
+}
+
+/// An input that a map is built from, and how many scans the map had taken before.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Input {
+    pub(super) fingerprint: String,
+    pub(super) first_scan: u64,
 }
 
 impl Residency {
     pub(super) fn new(config: MapConfig, store: TileStore) -> Self {
-        let input_fingerprint = store.metadata().ext.as_ref().and_then(|ext| ext.input_fingerprint.clone());
+        let ext = store.metadata().ext.as_ref();
+        let input = ext.and_then(|ext| {
+            let first_scan = ext.input_first_scan;
+            ext.input_fingerprint.clone().map(|fingerprint| Input { fingerprint, first_scan })
+        });
         Self {
             config,
             store,
@@ -42,7 +53,7 @@ impl Residency {
             known_whole: FxHashSet::default(),
             saved: BTreeSet::new(),
             io: IoCounts::default(),
-            input_fingerprint,
+            input,
         }
     }
 
@@ -133,8 +144,29 @@ impl Residency {
         !self.pending.of(index).is_empty() || self.tiles.peek(&index).is_some_and(|tile| tile.is_dirty())
     }
 
+    pub(super) fn input(&self) -> Option<&Input> {
+        self.input.as_ref()
+    }
+
+    /// Flushes, and with the flush what the map is being built from now.
+    pub(super) fn begin_input(&mut self, input: Input, scan_number: u64) -> Result<()> {
+        let before = self.input.replace(input);
+        let flushed = self.flush(scan_number);
+        if flushed.is_err() {
+            self.input = before;
+        }
+        flushed
+    }
+
     /// Applies what waits, writes every dirty tile and commits.
     pub(super) fn flush(&mut self, scan_number: u64) -> Result<()> {
+        for index in self.store.suspects() {
+            // Its file cannot be trusted to be on the medium; what can be read of it is checked as always.
+            if !self.tiles.contains(&index) {
+                self.bring_in(index, scan_number)?;
+            }
+            self.write(index, scan_number)?;
+        }
         let mut waiting: Vec<_> = self.pending.tiles().collect();
         waiting.sort_unstable();
         for index in waiting {
@@ -255,6 +287,10 @@ impl Residency {
         if !self.tiles.peek(&index).is_some_and(|tile| tile.is_dirty()) {
             return Ok(());
         }
+        self.write(index, scan_number)
+    }
+
+    fn write(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
         self.adopt()?;
         let Some(tile) = self.tiles.peek_mut(&index) else { return Ok(()) };
         let tile = Arc::make_mut(tile);
@@ -284,16 +320,12 @@ impl Residency {
     }
 
     fn metadata(&self) -> Metadata {
-        new_metadata(&self.config, self.store.map_id().unwrap_or_default(), self.input_fingerprint.clone())
+        new_metadata(&self.config, self.store.map_id().unwrap_or_default(), self.input.as_ref())
     }
 }
 
 /// The metadata of a map; bounds and numbers are the store's to fill in.
-pub(super) fn new_metadata(
-    config: &MapConfig,
-    map_id: [u8; 16],
-    input_fingerprint: Option<String>,
-) -> Metadata {
+pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
     let ext = Extension {
         empty: true,
         map_id: hex(&map_id),
@@ -302,7 +334,8 @@ pub(super) fn new_metadata(
         sensor_model: config.sensor_model,
         occupancy_threshold: config.occupancy_threshold,
         rays: config.rays,
-        input_fingerprint,
+        input_fingerprint: input.map(|input| input.fingerprint.clone()),
+        input_first_scan: input.map_or(0, |input| input.first_scan),
     };
     let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
     Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }

@@ -3,13 +3,13 @@
 use crate::config::MapConfig;
 use crate::error::{FormatError, Result};
 use crate::octree::write_bt;
-use crate::space::TileIndex;
-use crate::store::{StoredTile, TileFile, TileStamp, TileStore};
-use crate::tile::Tile;
+use crate::space::{Grid, TileIndex};
+use crate::store::{FileStamp, MapParameters, StoredTile, TileFile, TileStamp, TileStore, hex};
 use crate::tile::format::{DecodedTable, Trailer, read_table, write_table};
+use crate::tile::{Table, Tile};
 
 /// Writes the next version of a tile's files. Its octree is brought up to date.
-pub(super) fn save(
+pub(crate) fn save(
     store: &mut TileStore,
     config: &MapConfig,
     tile: &mut Tile,
@@ -23,7 +23,9 @@ pub(super) fn save(
         write_bt(octree, config.grid.resolution_m(), threshold as f32, &mut out).map(drop)
     })?;
     let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
-    let trailer = Trailer { map_id, tile: index, scan_number, table_crc: 0, octree_crc, octree_bytes };
+    let parameters = map_parameters(config).to_text();
+    let trailer =
+        Trailer { map_id, tile: index, scan_number, table_crc: 0, octree_crc, octree_bytes, parameters };
     let table = store.write_next(index, TileFile::Table, |mut out| {
         write_table(tile.table(), trailer, &mut out).map(drop)
     })?;
@@ -34,12 +36,15 @@ pub(super) fn save(
 }
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
-pub(super) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> Result<Option<(Tile, u64)>> {
+pub(crate) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> Result<Option<(Tile, u64)>> {
     let loaded = decode(store, config, index, store.open_table(index));
-    if store.is_read_only() && loaded.is_err() {
-        // A writer beside this reader, or a crash, may have committed a version without renaming it yet.
-        let next = decode(store, config, index, store.open_next_table(index));
-        return if next.is_ok() { next } else { loaded };
+    if loaded.is_err() {
+        for path in store.other_places(index) {
+            let elsewhere = decode(store, config, index, store.open_version(index, path));
+            if elsewhere.is_ok() {
+                return elsewhere;
+            }
+        }
     }
     loaded
 }
@@ -50,37 +55,72 @@ fn decode(
     index: TileIndex,
     stored: Result<Option<StoredTile>>,
 ) -> Result<Option<(Tile, u64)>> {
-    let Some(mut stored) = stored? else { return Ok(None) };
-    let voxels = config.grid.voxels_of_tile(index);
-    let decoded = read_table(&mut stored.input, stored.bytes, &voxels)
+    let Some(stored) = stored? else { return Ok(None) };
+    let read = read_stored_table(&config.grid, index, stored)?;
+    Ok(Some((Tile::from_table(config, index, read.table), read.file.bytes)))
+}
+
+/// A table that was read from its file and belongs there.
+pub(crate) struct ReadTable {
+    pub table: Table,
+    pub file: FileStamp,
+    /// `None` in a map of the seed's format.
+    pub trailer: Option<Trailer>,
+}
+
+/// Reads a tile's table. In a map with an id it must be that map's, and the version that the log names, if it does.
+pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: StoredTile) -> Result<ReadTable> {
+    let decoded = read_table(&mut stored.input, stored.bytes, &grid.voxels_of_tile(index))
         .map_err(|error| error.in_map(&stored.path, Some(index)))?;
-    let bytes = stored.bytes;
-    check(store, index, &decoded, stored)?;
-    Ok(Some((Tile::from_table(config, index, decoded.table), bytes)))
+    let StoredTile { path, input, map_id, stamp, .. } = stored;
+    let (file, _) = input.finish();
+    let DecodedTable { table, trailer } = decoded;
+    if let Some(map_id) = map_id {
+        check(map_id, index, trailer.as_ref(), file, stamp)
+            .map_err(|error| error.in_map(&path, Some(index)))?;
+    }
+    Ok(ReadTable { table, file, trailer })
 }
 
 /// Whether a file that is whole in itself is also the one that belongs here.
-fn check(store: &TileStore, index: TileIndex, decoded: &DecodedTable, stored: StoredTile) -> Result<()> {
-    let StoredTile { path, input, bytes, stamp } = stored;
-    let Some(stamp) = stamp else { return Ok(()) };
-    let damaged = |offset, reason: String| -> Result<()> {
-        Err(FormatError::at_offset(offset, reason).in_map(&path, Some(index)))
+fn check(
+    map_id: [u8; 16],
+    index: TileIndex,
+    trailer: Option<&Trailer>,
+    file: FileStamp,
+    stamp: Option<TileStamp>,
+) -> std::result::Result<(), FormatError> {
+    let Some(trailer) = trailer else {
+        return Err(FormatError::at_offset(file.bytes, "the trailer after the last entry is missing"));
     };
-    let Some(trailer) = decoded.trailer else {
-        return damaged(bytes, "the trailer after the last entry is missing".into());
-    };
-    if store.map_id() != Some(trailer.map_id) {
-        return damaged(bytes, "the file belongs to another map".into());
-    }
-    if trailer.tile != index {
-        return damaged(bytes, format!("the file belongs to tile {}", trailer.tile));
-    }
-    if input.finish().0 != stamp.table {
-        let (found, wanted) = (trailer.scan_number, stamp.scan_number);
+    let at = file.bytes - trailer.bytes();
+    let damaged = |offset, reason: String| Err(FormatError::at_offset(at + offset, reason));
+    if trailer.map_id != map_id {
         return damaged(
-            bytes,
-            format!("the file is of scan {found}, commits.log names the version of scan {wanted}"),
+            8,
+            format!("the file belongs to map {}, not to {}", hex(&trailer.map_id), hex(&map_id)),
         );
     }
-    Ok(())
+    if trailer.tile != index {
+        return damaged(24, format!("the file belongs to tile {}", trailer.tile));
+    }
+    match stamp {
+        Some(stamp) if file != stamp.table => {
+            let (found, wanted) = (trailer.scan_number, stamp.scan_number);
+            let reason =
+                format!("the file is of scan {found}, commits.log names the version of scan {wanted}");
+            damaged(36, reason)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What makes a map the map it is.
+pub(crate) fn map_parameters(config: &MapConfig) -> MapParameters {
+    MapParameters {
+        resolution: config.grid.resolution_m(),
+        tile_size: config.grid.tile_size_m(),
+        sensor_model: config.sensor_model,
+        occupancy_threshold: config.occupancy_threshold,
+    }
 }

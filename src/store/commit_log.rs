@@ -1,4 +1,5 @@
 use super::disk::Disk;
+use super::metadata::Metadata;
 use super::tile_stamp::TileStamp;
 use crate::error::{DecodeError, FormatError};
 use crate::space::TileIndex;
@@ -12,7 +13,7 @@ use std::path::Path;
 /// header  32 bytes  magic "VXTCOMIT", version u32 1, map id 16 bytes, CRC-32 of these
 /// record            payload length u32, its complement u32, payload, CRC-32 of the payload
 /// payload           kind u32 (0 change, 1 whole map), tile count u32, flush number u64, scan number u64,
-///                   then a tile: index 3 x i32, stamp 48 bytes
+///                   a tile: index 3 x i32, stamp 48 bytes; then, where it changed, the text of metadata.json
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommitLog {
@@ -32,6 +33,24 @@ pub struct Commits {
     pub tiles: FxHashMap<TileIndex, TileStamp>,
     /// The tiles that the last record names.
     pub last_changed: Vec<TileIndex>,
+    /// The last metadata in the log: its parameters are the map's, its bounds and numbers may be older ones.
+    pub metadata: Option<Metadata>,
+    /// What is wrong with the end of the log, where a flush may have been cut short: it never happened, unless
+    /// something else names it.
+    pub torn: Option<FormatError>,
+}
+
+/// A flush to be appended to a log.
+#[derive(Clone, Copy, Debug)]
+pub struct Flush<'a> {
+    /// Its number.
+    pub number: u64,
+    /// Number of the last scan in it.
+    pub scan_number: u64,
+    /// The tiles that changed.
+    pub changed: &'a [(TileIndex, TileStamp)],
+    /// The text of `metadata.json`, if more of it changed than every flush changes.
+    pub metadata_text: Option<&'a str>,
 }
 
 const MAGIC: &[u8; 8] = b"VXTCOMIT";
@@ -59,28 +78,24 @@ impl CommitLog {
         path: &Path,
         map_id: [u8; 16],
         commits: &Commits,
+        metadata_text: &str,
     ) -> io::Result<Self> {
-        let mut out = disk.create(path)?;
-        let mut bytes = header(map_id).to_vec();
         let mut tiles: Vec<_> = commits.tiles.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
         tiles.sort_unstable_by_key(|&(tile, _)| tile);
-        bytes.extend(record(KIND_WHOLE_MAP, commits.flush_number, commits.scan_number, &tiles));
+        let (number, scan_number) = (commits.flush_number, commits.scan_number);
+        let whole = Flush { number, scan_number, changed: &tiles, metadata_text: Some(metadata_text) };
+        let mut bytes = header(map_id).to_vec();
+        bytes.extend(record(KIND_WHOLE_MAP, &whole)?);
+        let mut out = disk.create(path)?;
         out.write_all(&bytes)?;
         out.sync()?;
         Ok(Self { map_id, bytes: bytes.len() as u64 })
     }
 
-    /// Appends a record of changed tiles and syncs it: when this returns, the flush is committed.
-    pub fn append(
-        &mut self,
-        disk: &dyn Disk,
-        path: &Path,
-        flush_number: u64,
-        scan_number: u64,
-        changed: &[(TileIndex, TileStamp)],
-    ) -> io::Result<()> {
-        let record = record(KIND_CHANGE, flush_number, scan_number, changed);
-        // What an earlier attempt may have left behind the valid part is cut off.
+    /// Appends a record of changed tiles and syncs it: when this returns, the flush is committed. After an error
+    /// the record may be in the file or not, until [`CommitLog::cut`] has taken it out.
+    pub fn append(&mut self, disk: &dyn Disk, path: &Path, flush: &Flush<'_>) -> io::Result<()> {
+        let record = record(KIND_CHANGE, flush)?;
         let mut out = disk.append(path, self.bytes)?;
         out.write_all(&record)?;
         out.sync()?;
@@ -88,33 +103,61 @@ impl CommitLog {
         Ok(())
     }
 
-    /// Reads a log of `file_bytes` bytes. An incomplete record at the end is a flush that never happened and is left out.
+    /// Cuts off what a failed attempt may have left behind the valid part, durably.
+    pub fn cut(&self, disk: &dyn Disk, path: &Path) -> io::Result<()> {
+        disk.append(path, self.bytes)?.sync()
+    }
+
+    /// Reads a log of `file_bytes` bytes. An incomplete record at the end is a flush that never happened and is left
+    /// out.
     ///
     /// # Errors
     ///
     /// A wrong header, or a record that is complete and does not match its checksum.
     pub fn read(input: &mut impl Read, file_bytes: u64) -> Result<(Self, Commits), DecodeError> {
-        let map_id = read_header(input, file_bytes)?;
-        let mut log = Self { map_id, bytes: HEADER_BYTES as u64 };
         let mut commits = Commits::default();
-        while let Some(payload) = read_record(input, log.bytes, file_bytes)? {
-            commits.take(&payload, log.bytes + 8)?;
-            log.bytes += payload.len() as u64 + 12;
-        }
+        let log = commits.read_from(input, file_bytes)?;
         Ok((log, commits))
     }
 }
 
 impl Commits {
+    /// Takes in the records of a log. After an error, those before the damage have been taken in.
+    ///
+    /// # Errors
+    ///
+    /// As for [`CommitLog::read`].
+    pub fn read_from(&mut self, input: &mut impl Read, file_bytes: u64) -> Result<CommitLog, DecodeError> {
+        let map_id = read_header(input, file_bytes)?;
+        let mut bytes = HEADER_BYTES as u64;
+        loop {
+            match read_record(input, bytes, file_bytes)? {
+                Next::Record(payload) => {
+                    self.take(&payload, bytes + 8)?;
+                    bytes += payload.len() as u64 + 12;
+                }
+                Next::Torn(error) => {
+                    self.torn = Some(error);
+                    break;
+                }
+                Next::End => break,
+            }
+        }
+        Ok(CommitLog { map_id, bytes })
+    }
+
     fn take(&mut self, payload: &[u8], offset: u64) -> Result<(), FormatError> {
         let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| payload[at + k]));
         let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| payload[at + k]));
         let wrong = |at: u64, reason: &str| Err(FormatError::at_offset(offset + at, reason));
-        if payload.len() < PAYLOAD_HEADER_BYTES
-            || (payload.len() - PAYLOAD_HEADER_BYTES) as u64 != u64::from(u32_at(4)) * TILE_BYTES as u64
-        {
+        if payload.len() < PAYLOAD_HEADER_BYTES {
+            return wrong(0, "the record is too short");
+        }
+        let tiles_bytes = u64::from(u32_at(4)) * TILE_BYTES as u64;
+        if tiles_bytes > (payload.len() - PAYLOAD_HEADER_BYTES) as u64 {
             return wrong(4, "the number of tiles does not fit the record");
         }
+        let (tiles, text) = payload[PAYLOAD_HEADER_BYTES..].split_at(tiles_bytes as usize);
         match u32_at(0) {
             KIND_CHANGE => {}
             KIND_WHOLE_MAP => self.tiles.clear(),
@@ -126,7 +169,15 @@ impl Commits {
         self.flush_number = u64_at(8);
         self.scan_number = u64_at(16);
         self.last_changed.clear();
-        for tile in payload[PAYLOAD_HEADER_BYTES..].chunks_exact(TILE_BYTES) {
+        if !text.is_empty() {
+            let at = PAYLOAD_HEADER_BYTES as u64 + tiles_bytes;
+            let text = std::str::from_utf8(text);
+            match text.ok().and_then(|text| Metadata::from_text(text).ok()) {
+                Some(metadata) => self.metadata = Some(metadata),
+                None => return wrong(at, "the metadata in the record cannot be read"),
+            }
+        }
+        for tile in tiles.chunks_exact(TILE_BYTES) {
             let index = |axis: usize| i32::from_le_bytes(std::array::from_fn(|k| tile[4 * axis + k]));
             let index = TileIndex::new(index(0), index(1), index(2));
             self.tiles.insert(index, TileStamp::from_bytes(&std::array::from_fn(|k| tile[12 + k])));
@@ -146,22 +197,27 @@ fn header(map_id: [u8; 16]) -> [u8; HEADER_BYTES] {
     bytes
 }
 
-fn record(kind: u32, flush_number: u64, scan_number: u64, tiles: &[(TileIndex, TileStamp)]) -> Vec<u8> {
-    let payload_bytes = (PAYLOAD_HEADER_BYTES + tiles.len() * TILE_BYTES) as u32;
+fn record(kind: u32, flush: &Flush<'_>) -> io::Result<Vec<u8>> {
+    let text = flush.metadata_text.unwrap_or_default();
+    let payload_bytes = PAYLOAD_HEADER_BYTES + flush.changed.len() * TILE_BYTES + text.len();
+    let Ok(payload_bytes) = u32::try_from(payload_bytes) else {
+        return Err(io::Error::other("more tiles than one record of the log can name"));
+    };
     let mut bytes = Vec::with_capacity(payload_bytes as usize + 12);
     bytes.extend_from_slice(&payload_bytes.to_le_bytes());
     bytes.extend_from_slice(&(!payload_bytes).to_le_bytes());
     bytes.extend_from_slice(&kind.to_le_bytes());
-    bytes.extend_from_slice(&(tiles.len() as u32).to_le_bytes());
-    bytes.extend_from_slice(&flush_number.to_le_bytes());
-    bytes.extend_from_slice(&scan_number.to_le_bytes());
-    for (tile, stamp) in tiles {
+    bytes.extend_from_slice(&(flush.changed.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(&flush.number.to_le_bytes());
+    bytes.extend_from_slice(&flush.scan_number.to_le_bytes());
+    for (tile, stamp) in flush.changed {
         tile.to_array().iter().for_each(|index| bytes.extend_from_slice(&index.to_le_bytes()));
         bytes.extend_from_slice(&stamp.to_bytes());
     }
+    bytes.extend_from_slice(text.as_bytes());
     let crc = crc32fast::hash(&bytes[8..]);
     bytes.extend_from_slice(&crc.to_le_bytes());
-    bytes
+    Ok(bytes)
 }
 
 fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], DecodeError> {
@@ -177,25 +233,29 @@ fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], Decod
     Ok(map_id)
 }
 
-/// The payload of the record at `offset`; `None` if there is none, or not a whole one.
-fn read_record(input: &mut impl Read, offset: u64, file_bytes: u64) -> Result<Option<Vec<u8>>, DecodeError> {
+/// What stands where a record may begin.
+enum Next {
+    Record(Vec<u8>),
+    End,
+    /// Something that is no whole record, with nothing behind it.
+    Torn(FormatError),
+}
+
+fn read_record(input: &mut impl Read, offset: u64, file_bytes: u64) -> Result<Next, DecodeError> {
+    let wrong = |reason| FormatError::at_offset(offset, reason);
     let remaining = file_bytes - offset;
     if remaining < 8 {
-        return Ok(None);
+        return Ok(if remaining == 0 { Next::End } else { Next::Torn(wrong("the record is not whole")) });
     }
     let mut lengths = [0; 8];
     input.read_exact(&mut lengths)?;
     let length = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| lengths[at + k]));
     if length(0) != !length(4) {
-        // A crash can leave the file longer than what was written, filled with zeros, and only at its end.
-        return match lengths {
-            [0, 0, 0, 0, 0, 0, 0, 0] => Ok(None),
-            _ => Err(FormatError::at_offset(offset, "the length of the record is damaged").into()),
-        };
+        return Ok(Next::Torn(wrong("the length of the record does not match its complement")));
     }
     let payload_bytes = u64::from(length(0));
     if remaining < payload_bytes + 12 {
-        return Ok(None);
+        return Ok(Next::Torn(wrong("the record is longer than what is left of the file")));
     }
     // The length is within the file's, which bounds the allocation.
     let mut payload = vec![0; payload_bytes as usize];
@@ -203,11 +263,9 @@ fn read_record(input: &mut impl Read, offset: u64, file_bytes: u64) -> Result<Op
     let mut crc = [0; 4];
     input.read_exact(&mut crc)?;
     if u32::from_le_bytes(crc) == crc32fast::hash(&payload) {
-        return Ok(Some(payload));
+        return Ok(Next::Record(payload));
     }
-    if remaining == payload_bytes + 12 {
-        // The last record: its length came to disk before its content. It was never committed.
-        return Ok(None);
-    }
-    Err(FormatError::at_offset(offset, "the record does not match its checksum").into())
+    let error = wrong("the record does not match its checksum");
+    // A crash tears only the last record: its length can come to disk before its content.
+    if remaining == payload_bytes + 12 { Ok(Next::Torn(error)) } else { Err(error.into()) }
 }

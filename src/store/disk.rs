@@ -3,6 +3,8 @@ use std::fmt::Debug;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::Path;
+use std::thread;
+use std::time::Duration;
 
 /// The one seam to the file system: every operation on a map's files, one method each.
 ///
@@ -10,6 +12,11 @@ use std::path::Path;
 pub trait Disk: Debug + Send + Sync {
     /// Opens a file for reading. A symbolic link is an error.
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
+    /// Opens a file for reading and counts as its reader until the result is dropped: [`Disk::watch`] tells. Where
+    /// the file system has no locks, the file is opened and nobody can tell.
+    fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
+    /// Watches for readers of the file that has the name now, even after another file took its name.
+    fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>>;
     /// Creates a file, or empties it, for writing from the beginning.
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>>;
     /// Opens a file for writing from `offset` on; what stood there before is cut off.
@@ -18,7 +25,7 @@ pub trait Disk: Debug + Send + Sync {
     fn sync_file(&self, path: &Path) -> io::Result<()>;
     /// Makes the names in a folder durable.
     fn sync_folder(&self, path: &Path) -> io::Result<()>;
-    /// Renames a file, replacing what had the new name.
+    /// Renames a file, replacing what had the new name, or a folder to a name that nothing has.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Removes a file.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
@@ -51,6 +58,12 @@ pub trait DiskRead: Read + Send {
     fn file_bytes(&self) -> u64;
 }
 
+/// Tells whether a file has readers.
+pub trait ReaderWatch: Send + Sync {
+    /// Whether some process holds the file open by [`Disk::open_shared`].
+    fn has_readers(&self) -> bool;
+}
+
 /// A file open for writing.
 pub trait DiskWrite: Write + Send {
     /// Makes what was written durable.
@@ -60,6 +73,9 @@ pub trait DiskWrite: Write + Send {
 /// The real file system.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FsDisk;
+
+/// How many milliseconds to wait for a lock that a writer holds for an instant.
+const LOCK_ATTEMPTS: usize = 100;
 
 struct FsRead {
     file: File,
@@ -74,6 +90,23 @@ impl Disk for FsDisk {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
         }
         Ok(Box::new(FsRead { file, bytes: metadata.len() }))
+    }
+
+    fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        let file = File::open(not_a_link(path)?)?;
+        // A writer that looks for readers holds the lock for an instant.
+        for _ in 0..LOCK_ATTEMPTS {
+            match file.try_lock_shared() {
+                Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(1)),
+                Ok(()) | Err(TryLockError::Error(_)) => break,
+            }
+        }
+        let bytes = file.metadata()?.len();
+        Ok(Box::new(FsRead { file, bytes }))
+    }
+
+    fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
+        Ok(Box::new(File::open(not_a_link(path)?)?))
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
@@ -147,6 +180,21 @@ impl Read for FsRead {
 impl DiskRead for FsRead {
     fn file_bytes(&self) -> u64 {
         self.bytes
+    }
+}
+
+impl ReaderWatch for File {
+    fn has_readers(&self) -> bool {
+        match self.try_lock() {
+            Err(TryLockError::WouldBlock) => true,
+            // Without locks no reader can hold one.
+            Err(TryLockError::Error(_)) => false,
+            Ok(()) => {
+                // Closing the file would release it too.
+                let _ = self.unlock();
+                false
+            }
+        }
     }
 }
 

@@ -74,10 +74,30 @@ impl Layout {
         self.tile_folder(tile).join(file.name())
     }
 
+    /// The table of a tile as of a flush, kept beside newer ones for readers that opened the map then.
+    pub fn kept(&self, tile: TileIndex, flush_number: u64) -> PathBuf {
+        self.tile_folder(tile).join(format!("{KEPT_PREFIX}{flush_number}"))
+    }
+
+    /// Where repair puts what it takes out of the map.
+    pub fn quarantine(&self) -> PathBuf {
+        self.folder.join(QUARANTINE)
+    }
+
     /// The version of a tile's file that waits for the next commit.
     pub fn next(&self, tile: TileIndex, file: TileFile) -> PathBuf {
         self.tile_folder(tile).join(file.next_name())
     }
+}
+
+/// The name of the folder for what repair takes out of the map.
+pub const QUARANTINE: &str = "quarantine";
+
+const KEPT_PREFIX: &str = "iwlo_meta.bin.flush";
+
+/// The flush number of a kept table's name; `None` for another name.
+pub fn flush_of_kept(name: &str) -> Option<u64> {
+    name.strip_prefix(KEPT_PREFIX)?.parse().ok()
 }
 
 /// The name of a tile's folder, such as `tile_0_1_-1`.

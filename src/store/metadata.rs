@@ -45,6 +45,39 @@ pub struct Extension {
     pub rays: RayConfig,
     /// Fingerprint of the input that the map was last built from, if its builder gave one.
     pub input_fingerprint: Option<String>,
+    /// Number of scans that the map had taken before the first of that input.
+    #[serde(default)]
+    pub input_first_scan: u64,
+}
+
+/// What makes a map the map it is. It stands in every tile, so that a map can be put together again from its tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapParameters {
+    /// Edge of a voxel in metres.
+    pub resolution: f64,
+    /// Edge of a tile in metres.
+    pub tile_size: f64,
+    /// How observations become evidence.
+    pub sensor_model: SensorModel,
+    /// Probability from which a voxel counts as occupied.
+    pub occupancy_threshold: f64,
+}
+
+impl MapParameters {
+    /// The parameters as one line of JSON.
+    pub fn to_text(&self) -> String {
+        serde_json::to_string(self).expect("plain data of strings and numbers")
+    }
+
+    /// Reads the line.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no such JSON.
+    pub fn from_text(text: &str) -> Result<Self, FormatError> {
+        serde_json::from_str(text)
+            .map_err(|error| FormatError::at_offset(0, format!("not the parameters of a map: {error}")))
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -75,6 +108,28 @@ impl Bounds {
 }
 
 impl Metadata {
+    /// What makes the map the map it is; `None` for a map of the seed's format, which does not say it all.
+    pub fn parameters(&self) -> Option<MapParameters> {
+        self.ext.as_ref().map(|ext| MapParameters {
+            resolution: self.resolution_m,
+            tile_size: self.tile_size_m,
+            sensor_model: ext.sensor_model,
+            occupancy_threshold: ext.occupancy_threshold,
+        })
+    }
+
+    /// Whether the two say the same but for what every flush brings: bounds and numbers.
+    pub(super) fn is_same_but_for_progress(&self, other: &Self) -> bool {
+        let without_progress = |metadata: &Self| {
+            let mut metadata = Self { bounds: None, ..metadata.clone() };
+            if let Some(ext) = &mut metadata.ext {
+                (ext.empty, ext.flush_number, ext.scan_number) = (true, 0, 0);
+            }
+            metadata
+        };
+        without_progress(self) == without_progress(other)
+    }
+
     /// The file's text. The seed's keys come first and in its order; lengths are plain decimals.
     pub fn to_text(&self) -> String {
         let Bounds { min, max } = self.bounds.unwrap_or(Bounds { min: [0; 3], max: [0; 3] });
@@ -149,6 +204,7 @@ mod tests {
             occupancy_threshold: 0.5,
             rays: RayConfig::default(),
             input_fingerprint: Some("abc".into()),
+            input_first_scan: 45,
         };
         let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());
         Metadata { resolution_m: 0.05, tile_size_m: 10.0, bounds, ext: Some(ext) }

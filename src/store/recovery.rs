@@ -1,84 +1,125 @@
 use super::commit_log::Commits;
 use super::disk::Disk;
-use super::layout::{Layout, TileFile, tile_of_folder};
-use super::tile_stamp::{FileStamp, Stamping};
+use super::layout::{Layout, TileFile, flush_of_kept, tile_of_folder};
+use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use rustc_hash::FxHashSet;
 use std::io;
 use std::path::Path;
 
-/// Brings the files to the state of the last commit: finishes its renames, removes every other `*.next`. Returns
-/// the tile folders that hold files and are not in the log.
+/// What a crash left behind that is not to be removed.
+#[derive(Debug, Default)]
+pub(super) struct Leftovers {
+    /// Committed versions that still have their `*.next` names.
+    pub unrenamed: FxHashSet<TileIndex>,
+    /// Tile folders that hold files and are not in the log.
+    pub strays: FxHashSet<TileIndex>,
+}
+
+/// Looks through the folders of a map for what a writer left when it ended: removes versions that were never
+/// committed and those kept for readers, and finds the committed ones that wait for their names.
 ///
 /// Safe to repeat and to break off anywhere.
-pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Result<FxHashSet<TileIndex>> {
-    let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
+pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Result<Leftovers> {
     let changed: FxHashSet<TileIndex> = commits.last_changed.iter().copied().collect();
-    let mut strays = FxHashSet::default();
-    for name in names {
+    let mut leftovers = Leftovers::default();
+    for name in list(disk, layout.folder())? {
         let path = layout.folder().join(&name);
         if name.ends_with(".next") {
-            disk.remove_file(&path).map_err(|error| Error::io(&path, "remove", error))?;
+            remove(disk, &path)?;
         }
         let Some(tile) = tile_of_folder(&name) else { continue };
-        recover_tile(disk, layout, commits, tile, changed.contains(&tile))?;
-        if !commits.tiles.contains_key(&tile) {
-            let names = disk.list(&path).map_err(|error| Error::io(&path, "list", error))?;
-            if names.is_empty() {
-                // Made for a tile that was never committed.
+        let stamp = commits.tiles.get(&tile);
+        let is_of_last_commit = changed.contains(&tile);
+        match look_at_tile(disk, layout, tile, stamp, is_of_last_commit)? {
+            State::Whole => {}
+            State::Unrenamed => {
+                leftovers.unrenamed.insert(tile);
+            }
+            // Made for a tile that was never committed.
+            State::Empty if stamp.is_none() => {
                 disk.remove_folder(&path).map_err(|error| Error::io(&path, "remove", error))?;
-            } else {
-                strays.insert(tile);
+            }
+            State::Empty => {}
+            State::Stray => {
+                leftovers.strays.insert(tile);
             }
         }
     }
-    Ok(strays)
+    Ok(leftovers)
 }
 
-fn recover_tile(
+enum State {
+    Whole,
+    Unrenamed,
+    Empty,
+    Stray,
+}
+
+fn look_at_tile(
     disk: &dyn Disk,
     layout: &Layout,
-    commits: &Commits,
     tile: TileIndex,
+    stamp: Option<&TileStamp>,
     is_of_last_commit: bool,
-) -> Result<()> {
-    let mut renamed = false;
+) -> Result<State> {
+    let folder = layout.tile_folder(tile);
+    if disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))?
+        != Some(super::EntryKind::Folder)
+    {
+        // A file or a link with a tile's name: reading the tile, if there is one, tells.
+        return Ok(State::Stray);
+    }
+    let mut names = list(disk, &folder)?;
+    let mut unrenamed = false;
     for file in TileFile::IN_ORDER {
+        let Some(at) = names.iter().position(|name| name == file.next_name()) else { continue };
         let next = layout.next(tile, file);
-        if disk.kind(&next).map_err(|error| Error::io(&next, "look at", error))?.is_none() {
-            continue;
-        }
-        let current = layout.current(tile, file);
-        if is_of_last_commit {
-            let committed = commits.tiles[&tile].of(file);
-            if stamp_of(disk, &next)? == Some(committed) {
-                disk.rename(&next, &current).map_err(|error| Error::io(&next, "rename", error))?;
-                renamed = true;
+        match stamp.map(|stamp| stamp.of(file)) {
+            Some(committed) if has_stamp(disk, &next, committed)? => {
+                unrenamed = true;
                 continue;
             }
-            if stamp_of(disk, &current)? != Some(committed) {
+            Some(committed)
+                if is_of_last_commit && !has_stamp(disk, &layout.current(tile, file), committed)? =>
+            {
                 // Neither is what was committed: damage, which is reported when the tile is read. Keep both.
                 continue;
             }
+            _ => {}
         }
-        disk.remove_file(&next).map_err(|error| Error::io(&next, "remove", error))?;
+        remove(disk, &next)?;
+        names.swap_remove(at);
     }
-    if renamed {
-        let folder = layout.tile_folder(tile);
-        disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
+    for name in names.extract_if(.., |name| flush_of_kept(name).is_some()) {
+        remove(disk, &folder.join(name))?;
     }
-    Ok(())
+    Ok(match stamp {
+        _ if names.is_empty() => State::Empty,
+        None => State::Stray,
+        Some(_) if unrenamed => State::Unrenamed,
+        Some(_) => State::Whole,
+    })
 }
 
-/// Length and checksum of a file; `None` if there is none.
-pub(super) fn stamp_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileStamp>> {
+fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
+    disk.list(folder).map_err(|error| Error::io(folder, "list", error))
+}
+
+fn remove(disk: &dyn Disk, path: &Path) -> Result<()> {
+    disk.remove_file(path).map_err(|error| Error::io(path, "remove", error))
+}
+
+/// Whether a file has this length and checksum. One of another length is not read.
+fn has_stamp(disk: &dyn Disk, path: &Path, stamp: FileStamp) -> Result<bool> {
     let input = match disk.open(path) {
+        Ok(input) if input.file_bytes() != stamp.bytes => return Ok(false),
         Ok(input) => input,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
         Err(error) => return Err(Error::io(path, "open", error)),
     };
     let mut input = Stamping::new(input);
     io::copy(&mut input, &mut io::sink()).map_err(|error| Error::io(path, "read", error))?;
-    Ok(Some(input.finish().0))
+    Ok(input.finish().0 == stamp)
 }

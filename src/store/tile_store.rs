@@ -1,14 +1,15 @@
 use super::commit_log::{CommitLog, Commits};
-use super::disk::{Disk, DiskRead, DiskWrite};
-use super::layout::{Layout, TileFile};
-use super::metadata::{Bounds, Metadata};
+use super::disk::{Disk, DiskRead, EntryKind};
+use super::layout::{Layout, TileFile, flush_of_kept};
+use super::map_folder::{self, Lock};
+use super::metadata::Metadata;
+use super::readers::Readers;
 use super::recovery::recover;
-use super::tile_stamp::{FileStamp, Stamping, TileStamp};
-use crate::error::{DecodeError, Error, FormatError, Result};
+use super::tile_stamp::{Stamping, TileStamp};
+use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::any::Any;
-use std::io::{self, BufWriter, Read, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,25 +19,36 @@ use std::sync::Arc;
 /// appends one synced record to the log (that is the commit), and renames them over the committed versions.
 #[derive(Debug)]
 pub struct TileStore {
-    disk: Arc<dyn Disk>,
-    layout: Layout,
-    metadata: Metadata,
+    pub(super) disk: Arc<dyn Disk>,
+    pub(super) layout: Layout,
+    pub(super) metadata: Metadata,
     /// `None` for a map of the seed's format, and for nothing else.
-    log: Option<CommitLog>,
-    commits: Commits,
+    pub(super) log: Option<CommitLog>,
+    pub(super) commits: Commits,
+    /// Whether the log ends with its last commit. After a failed append its end is unknown.
+    pub(super) is_log_settled: bool,
+    /// Flush number in the `metadata.json` on disk; `None` in the seed's format. A crash can leave it behind the log.
+    pub(super) written_flush: Option<u64>,
     /// Versions written since the last commit.
-    next: FxHashMap<TileIndex, TileStamp>,
+    pub(super) next: FxHashMap<TileIndex, TileStamp>,
+    /// Versions of which a sync failed: the medium may hold anything, whatever later syncs say.
+    pub(super) suspect: FxHashSet<TileIndex>,
     /// Committed versions that still have their `*.next` names.
-    unrenamed: FxHashSet<TileIndex>,
+    pub(super) unrenamed: FxHashSet<TileIndex>,
     /// Tile folders that the log does not know: never read, never overwritten.
-    strays: FxHashSet<TileIndex>,
+    pub(super) strays: FxHashSet<TileIndex>,
     /// Tiles of a map of the seed's format, which has no log.
-    foreign: FxHashSet<TileIndex>,
+    pub(super) foreign: FxHashSet<TileIndex>,
+    /// A writer's.
+    pub(super) readers: Readers,
     /// Held while the store may write.
-    lock: Option<Lock>,
+    pub(super) lock: Option<Lock>,
+    /// Held by a reader, so that a writer keeps what it sees.
+    #[expect(dead_code, reason = "held for its drop")]
+    shared_metadata: Option<SharedMetadata>,
 }
 
-struct Lock(#[expect(dead_code, reason = "held for its drop")] Box<dyn Any + Send + Sync>);
+struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Box<dyn DiskRead>);
 
 /// A tile's table as it is stored, ready to be read.
 pub struct StoredTile {
@@ -46,27 +58,30 @@ pub struct StoredTile {
     pub input: Stamping<Box<dyn DiskRead>>,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// What the log says of the tile; `None` in a map of the seed's format.
+    /// Id of the map that the file must name; `None` if it is of the seed's format.
+    pub map_id: Option<[u8; 16]>,
+    /// What the log says of the tile, if it does.
     pub stamp: Option<TileStamp>,
 }
 
-/// A log longer than this many bytes, and than four times what one record of the whole map takes, is compacted.
-const COMPACT_LOG_BYTES: u64 = 1 << 20;
+/// How often a reader begins to open a map again because a flush came in between.
+const OPEN_ATTEMPTS: usize = 100;
 
 impl TileStore {
     /// Makes an empty map in a folder that is missing, empty, or holds what an interrupted creation left.
     pub fn create(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         let layout = Layout::new(folder);
-        create_folders(&*disk, folder)?;
+        map_folder::create_folders(&*disk, folder)?;
         // Before the lock, which leaves a file behind, and after it, when nobody else can begin a map here.
-        check_is_free(&*disk, folder)?;
-        let lock = lock(&*disk, &layout)?;
-        check_is_free(&*disk, folder)?;
+        map_folder::check_is_free(&*disk, folder)?;
+        let lock = Lock::take(&*disk, &layout)?;
+        map_folder::check_is_free(&*disk, folder)?;
         let commits = Commits::default();
         let log_path = layout.commit_log();
-        let log = CommitLog::write_whole(&*disk, &log_path, map_id, &commits)
+        let log = CommitLog::write_whole(&*disk, &log_path, map_id, &commits, &metadata.to_text())
             .map_err(|error| Error::io(&log_path, "write", error))?;
-        let mut store = Self::new(disk, layout, metadata, Some(log), commits, Some(lock));
+        let mut store = Self::new(disk, layout, metadata, Some(log), commits);
+        store.lock = Some(lock);
         store.write_metadata()?;
         Ok(store)
     }
@@ -75,41 +90,74 @@ impl TileStore {
     pub fn open(disk: Arc<dyn Disk>, folder: &Path) -> Result<Self> {
         let layout = Layout::new(folder);
         // Before the lock, so that a folder without a map is left as it is.
-        read_metadata(&*disk, &layout)?;
-        let lock = lock(&*disk, &layout)?;
-        let mut store = Self::read(disk, layout, Some(lock))?;
+        map_folder::read_metadata(&*disk, &layout)?;
+        let lock = Lock::take(&*disk, &layout)?;
+        let metadata = map_folder::read_metadata(&*disk, &layout)?;
+        let mut store = Self::read(disk, layout, metadata)?;
+        store.lock = Some(lock);
         if store.log.is_some() {
-            store.strays = recover(&*store.disk, &store.layout, &store.commits)?;
+            store.is_log_settled = store.commits.torn.is_none();
+            store.readers.watch(&*store.disk, &store.layout, store.written_flush.unwrap_or_default());
+            let leftovers = recover(&*store.disk, &store.layout, &store.commits)?;
+            store.strays = leftovers.strays;
+            store.unrenamed = leftovers.unrenamed;
+            store.finish_renames()?;
         }
         Ok(store)
     }
 
-    /// Opens a map for reading beside a writer: takes no lock and writes nothing.
+    /// Opens a map for reading beside a writer: takes no lock and writes nothing. The store sees the last flush, and
+    /// goes on seeing it while the writer flushes again.
     pub fn open_read_only(disk: Arc<dyn Disk>, folder: &Path) -> Result<Self> {
-        Self::read(disk, Layout::new(folder), None)
+        let layout = Layout::new(folder);
+        for _ in 0..OPEN_ATTEMPTS {
+            let (metadata, shared) = map_folder::read_metadata_shared(&*disk, &layout)?;
+            let store = Self::read(disk.clone(), layout.clone(), metadata)?;
+            // Only if it still is the present one has the writer seen, at its next flush, that it is read.
+            let now = map_folder::read_metadata(&*disk, &layout)?;
+            if now.ext.map(|ext| ext.flush_number) == store.written_flush {
+                return Ok(Self { shared_metadata: Some(SharedMetadata(shared)), ..store });
+            }
+        }
+        Err(Error::Changed { path: folder.to_owned() })
     }
 
-    fn read(disk: Arc<dyn Disk>, layout: Layout, lock: Option<Lock>) -> Result<Self> {
-        let metadata = read_metadata(&*disk, &layout)?;
-        let Some(ext) = &metadata.ext else {
-            let foreign = list_foreign_tiles(&*disk, &layout)?;
-            let mut store = Self::new(disk, layout, metadata, None, Commits::default(), lock);
-            store.foreign = foreign;
-            return Ok(store);
+    fn read(disk: Arc<dyn Disk>, layout: Layout, metadata: Metadata) -> Result<Self> {
+        let log = map_folder::read_log(&*disk, &layout)?;
+        let log_path = layout.commit_log();
+        let damaged = |at, reason: String| Err(FormatError::at_offset(at, reason).in_map(&log_path, None));
+        let (log, commits) = match (&metadata.ext, log) {
+            (Some(_), Some((log, commits))) => (log, commits),
+            (Some(_), None) => {
+                return damaged(0, "the file is missing; `voxtile repair` writes it anew".into());
+            }
+            // Adopted, and ended before the metadata was replaced.
+            (None, Some((log, commits))) if commits.flush_number > 0 => (log, commits),
+            (None, _) => {
+                let foreign = map_folder::list_foreign_tiles(&*disk, &layout)?;
+                return Ok(Self { foreign, ..Self::new(disk, layout, metadata, None, Commits::default()) });
+            }
         };
-        let path = layout.commit_log();
-        let mut input = disk.open(&path).map_err(|error| Error::io(&path, "open", error))?;
-        let bytes = input.file_bytes();
-        let (log, commits) = CommitLog::read(&mut input, bytes).map_err(|error| error.in_map(&path, None))?;
-        let damaged = |reason: String| Err(FormatError::at_offset(log.bytes(), reason).in_map(&path, None));
-        if hex(&log.map_id()) != ext.map_id {
-            return damaged(format!("the log belongs to map {}, not to {}", hex(&log.map_id()), ext.map_id));
+        let written = metadata.ext.as_ref();
+        if let Some(ext) = written {
+            if hex(&log.map_id()) != ext.map_id {
+                let reason = format!("the log belongs to map {}, not to {}", hex(&log.map_id()), ext.map_id);
+                return damaged(12, reason);
+            }
+            if commits.flush_number < ext.flush_number {
+                let (found, wanted) = (commits.flush_number, ext.flush_number);
+                let torn = commits.torn.as_ref().map_or(String::new(), |torn| format!("; {}", torn.reason));
+                let reason = format!("the log ends at flush {found}, metadata.json at flush {wanted}{torn}");
+                return damaged(log.bytes(), reason);
+            }
         }
-        if commits.flush_number < ext.flush_number {
-            let (log, metadata) = (commits.flush_number, ext.flush_number);
-            return damaged(format!("the log ends at flush {log}, metadata.json at flush {metadata}"));
-        }
-        Ok(Self::new(disk, layout, metadata, Some(log), commits, lock))
+        let written_flush = written.map(|ext| ext.flush_number);
+        // The log is the truth; the file may be older, if a crash came between the two.
+        let metadata = match &commits.metadata {
+            Some(committed) if written_flush != Some(commits.flush_number) => committed.clone(),
+            _ => metadata,
+        };
+        Ok(Self { written_flush, ..Self::new(disk, layout, metadata, Some(log), commits) })
     }
 
     fn new(
@@ -118,10 +166,25 @@ impl TileStore {
         metadata: Metadata,
         log: Option<CommitLog>,
         commits: Commits,
-        lock: Option<Lock>,
     ) -> Self {
-        let (next, unrenamed, strays, foreign) = Default::default();
-        Self { disk, layout, metadata, log, commits, next, unrenamed, strays, foreign, lock }
+        let (next, suspect, unrenamed, strays, foreign, readers) = Default::default();
+        Self {
+            disk,
+            layout,
+            metadata,
+            log,
+            commits,
+            is_log_settled: true,
+            written_flush: None,
+            next,
+            suspect,
+            unrenamed,
+            strays,
+            foreign,
+            readers,
+            lock: None,
+            shared_metadata: None,
+        }
     }
 
     /// The map's folder.
@@ -168,12 +231,6 @@ impl TileStore {
         self.next.get(&tile).or_else(|| self.commits.tiles.get(&tile)).copied()
     }
 
-    /// Whether this store reads beside a writer that may be in the middle of a flush: a committed version may then
-    /// still have its `*.next` name.
-    pub fn is_read_only(&self) -> bool {
-        self.lock.is_none()
-    }
-
     /// Opens the latest version of a tile's table; `None` if the tile has none.
     ///
     /// # Errors
@@ -181,271 +238,77 @@ impl TileStore {
     /// A file that the log names and that is missing, and a tile folder that the log does not name.
     pub fn open_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
         let is_next = self.next.contains_key(&tile) || self.unrenamed.contains(&tile);
-        self.open_version(tile, is_next)
+        let path = match is_next {
+            true => self.layout.next(tile, TileFile::Table),
+            false => self.layout.current(tile, TileFile::Table),
+        };
+        self.open_version(tile, path)
     }
 
-    /// Opens the `*.next` version of a tile's table, which a reader beside a writer tries after the other.
+    /// Other places where a reader beside a writer may find the version of a tile's table that it sees: committed and
+    /// waiting for its name, or already replaced and kept for readers. Empty for a writer.
+    pub fn other_places(&self, tile: TileIndex) -> Vec<PathBuf> {
+        if self.lock.is_some() {
+            return Vec::new();
+        }
+        let names = self.disk.list(&self.layout.tile_folder(tile)).unwrap_or_default();
+        let mut kept: Vec<u64> = names
+            .iter()
+            .filter_map(|name| flush_of_kept(name))
+            .filter(|&flush_number| flush_number >= self.commits.flush_number)
+            .collect();
+        kept.sort_unstable();
+        let kept = kept.into_iter().map(|flush_number| self.layout.kept(tile, flush_number));
+        kept.chain([self.layout.next(tile, TileFile::Table), self.layout.current(tile, TileFile::Table)])
+            .collect()
+    }
+
+    /// Opens one of [`TileStore::other_places`].
     ///
     /// # Errors
     ///
     /// As for [`TileStore::open_table`].
-    pub fn open_next_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
-        self.open_version(tile, true)
-    }
-
-    fn open_version(&self, tile: TileIndex, is_next: bool) -> Result<Option<StoredTile>> {
+    pub fn open_version(&self, tile: TileIndex, path: PathBuf) -> Result<Option<StoredTile>> {
+        let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         if self.strays.contains(&tile) {
-            let path = self.layout.current(tile, TileFile::Table);
-            let reason = "commits.log does not name this tile; move its folder away or repair the map";
-            return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
+            return damaged("commits.log does not name this tile; move its folder away or repair the map");
         }
         let stamp = self.stamp(tile);
         if stamp.is_none() && !self.foreign.contains(&tile) {
             return Ok(None);
         }
-        let path = if is_next {
-            self.layout.next(tile, TileFile::Table)
-        } else {
-            self.layout.current(tile, TileFile::Table)
-        };
+        let folder = self.layout.tile_folder(tile);
+        match self.disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
+            Some(EntryKind::Folder) => {}
+            Some(_) => {
+                return damaged("what has the name of the tile's folder is none; links are not followed");
+            }
+            None => return damaged("the tile's folder is missing, and the map holds this tile"),
+        }
         match self.disk.open(&path) {
             Ok(input) => {
                 let bytes = input.file_bytes();
-                Ok(Some(StoredTile { path, input: Stamping::new(input), bytes, stamp }))
+                let map_id = stamp.and_then(|_| self.map_id());
+                Ok(Some(StoredTile { path, input: Stamping::new(input), bytes, map_id, stamp }))
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let reason = "the file is missing, and the map holds this tile";
-                Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)))
+                damaged("the file is missing, and the map holds this tile")
+            }
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
+                damaged("no regular file; links inside a map are not followed")
             }
             Err(error) => Err(Error::io(&path, "open", error)),
         }
     }
-
-    /// Writes the next version of one of a tile's files; the committed version stays as it is.
-    pub fn write_next(
-        &mut self,
-        tile: TileIndex,
-        file: TileFile,
-        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<FileStamp> {
-        // A committed version under its `*.next` name is the only one: give it its name before writing there.
-        self.finish_renames()?;
-        let folder = self.layout.tile_folder(tile);
-        if self.disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))?.is_none() {
-            self.disk.create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
-        }
-        let path = self.layout.next(tile, file);
-        let stamp_file = || {
-            let mut out = Stamping::new(BufWriter::with_capacity(1 << 16, self.disk.create(&path)?));
-            write(&mut out)?;
-            out.flush()?;
-            Ok(out.finish().0)
-        };
-        stamp_file().map_err(|error| Error::io(&path, "write", error))
-    }
-
-    /// Notes that the next version of a tile is written, both files.
-    pub fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
-        self.next.insert(tile, stamp);
-    }
-
-    /// Commits every version written since the last commit. When this returns they are durable, and only they.
-    ///
-    /// `metadata` gives the map's parameters; bounds and flush number are filled in here. After an error the
-    /// flush has happened or not, as a whole; calling again finishes it.
-    pub fn commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<()> {
-        self.finish_renames()?;
-        let log_path = self.layout.commit_log();
-        let mut log = match self.log {
-            Some(log) => log,
-            None => return Err(Error::argument("map", "a map of the seed's format must be adopted first")),
-        };
-        let mut changed: Vec<_> = self.next.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
-        changed.sort_unstable_by_key(|&(tile, _)| tile);
-        if !changed.is_empty() || scan_number != self.commits.scan_number {
-            self.sync_next(&changed)?;
-            let flush_number = self.commits.flush_number + 1;
-            log.append(&*self.disk, &log_path, flush_number, scan_number, &changed)
-                .map_err(|error| Error::io(&log_path, "append to", error))?;
-            // Committed. What follows only tidies up, and opening the map would do it too.
-            self.log = Some(log);
-            self.next.clear();
-            self.commits.flush_number = flush_number;
-            self.commits.scan_number = scan_number;
-            self.foreign.clear();
-            self.unrenamed.extend(changed.iter().map(|&(tile, _)| tile));
-            self.commits.tiles.extend(changed);
-            self.finish_renames()?;
-        }
-        self.metadata = metadata;
-        self.write_metadata()?;
-        self.compact_log()
-    }
-
-    fn sync_next(&self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
-        let sync =
-            |path: &Path, result: io::Result<()>| result.map_err(|error| Error::io(path, "sync", error));
-        for &(tile, _) in changed {
-            for file in TileFile::IN_ORDER {
-                let path = self.layout.next(tile, file);
-                sync(&path, self.disk.sync_file(&path))?;
-            }
-            let folder = self.layout.tile_folder(tile);
-            sync(&folder, self.disk.sync_folder(&folder))?;
-        }
-        // New tile folders.
-        sync(self.layout.folder(), self.disk.sync_folder(self.layout.folder()))
-    }
-
-    /// Gives committed versions their names.
-    fn finish_renames(&mut self) -> Result<()> {
-        let mut tiles: Vec<TileIndex> = self.unrenamed.iter().copied().collect();
-        tiles.sort_unstable();
-        for tile in tiles {
-            for file in TileFile::IN_ORDER {
-                let (next, current) = (self.layout.next(tile, file), self.layout.current(tile, file));
-                match self.disk.rename(&next, &current) {
-                    Err(error) if error.kind() == io::ErrorKind::NotFound => {} // Done by an earlier attempt.
-                    result => result.map_err(|error| Error::io(&next, "rename", error))?,
-                }
-            }
-            let folder = self.layout.tile_folder(tile);
-            self.disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
-            self.unrenamed.remove(&tile);
-        }
-        Ok(())
-    }
-
-    /// Gives a map of the seed's format an id and a log, so that it can be written to. Its tiles count as unread
-    /// until they have been written again.
-    pub fn adopt(&mut self, map_id: [u8; 16]) -> Result<()> {
-        if self.log.is_none() {
-            let path = self.layout.commit_log();
-            let log = CommitLog::write_whole(&*self.disk, &path, map_id, &self.commits)
-                .map_err(|error| Error::io(&path, "write", error))?;
-            self.log = Some(log);
-        }
-        Ok(())
-    }
-
-    fn write_metadata(&mut self) -> Result<()> {
-        self.metadata.bounds = Bounds::of(self.tiles());
-        if let Some(ext) = &mut self.metadata.ext {
-            ext.empty = self.metadata.bounds.is_none();
-            ext.flush_number = self.commits.flush_number;
-            ext.scan_number = self.commits.scan_number;
-        }
-        let text = self.metadata.to_text();
-        self.replace(&self.layout.metadata(), |out| out.write_all(text.as_bytes()))
-    }
-
-    fn compact_log(&mut self) -> Result<()> {
-        let Some(log) = self.log else { return Ok(()) };
-        let whole_bytes = (self.commits.tiles.len() * (12 + TileStamp::BYTES)) as u64;
-        if log.bytes() < COMPACT_LOG_BYTES.max(4 * whole_bytes) {
-            return Ok(());
-        }
-        let path = self.layout.commit_log();
-        let next = next_of(&path);
-        let compacted = CommitLog::write_whole(&*self.disk, &next, log.map_id(), &self.commits)
-            .map_err(|error| Error::io(&next, "write", error))?;
-        self.disk.rename(&next, &path).map_err(|error| Error::io(&next, "rename", error))?;
-        self.log = Some(compacted);
-        self.disk.sync_folder(self.folder()).map_err(|error| Error::io(self.folder(), "sync", error))
-    }
-
-    /// Replaces a file of the map's own folder as a whole: written beside, synced, renamed, the folder synced.
-    fn replace(&self, path: &Path, write: impl FnOnce(&mut dyn DiskWrite) -> io::Result<()>) -> Result<()> {
-        let next = next_of(path);
-        let replaced = || {
-            let mut out = self.disk.create(&next)?;
-            write(&mut *out)?;
-            out.sync()?;
-            drop(out);
-            self.disk.rename(&next, path)?;
-            self.disk.sync_folder(self.layout.folder())
-        };
-        replaced().map_err(|error| Error::io(path, "replace", error))
-    }
 }
 
-impl std::fmt::Debug for Lock {
+impl std::fmt::Debug for SharedMetadata {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Lock")
+        f.write_str("SharedMetadata")
     }
 }
 
 /// An id's bytes as hexadecimal digits.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-fn next_of(path: &Path) -> PathBuf {
-    path.with_added_extension("next")
-}
-
-fn lock(disk: &dyn Disk, layout: &Layout) -> Result<Lock> {
-    let path = layout.lock();
-    match disk.lock(&path).map_err(|error| Error::io(&path, "lock", error))? {
-        Some(lock) => Ok(Lock(lock)),
-        None => Err(Error::Locked { path: layout.folder().to_owned() }),
-    }
-}
-
-/// A folder for a new map holds nothing but what an interrupted creation may have left.
-fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    let names = disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
-    let leftovers = ["writer.lock", "commits.log", "metadata.json.next"];
-    if names.iter().all(|name| leftovers.contains(&name.as_str())) {
-        return Ok(());
-    }
-    let hint = "open it, name --append to add scans to it, or choose an empty folder";
-    Err(Error::AlreadyExists { path: folder.to_owned(), hint })
-}
-
-fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    if disk.kind(folder).is_ok_and(|kind| kind.is_some()) {
-        return Ok(());
-    }
-    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    create_folders(disk, parent)?;
-    disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error))?;
-    // A map must not vanish with the name of its folder.
-    disk.sync_folder(parent).map_err(|error| Error::io(parent, "sync", error))
-}
-
-fn read_metadata(disk: &dyn Disk, layout: &Layout) -> Result<Metadata> {
-    let path = layout.metadata();
-    let mut input = match disk.open(&path) {
-        Ok(input) => input,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(Error::NoMap { path: layout.folder().to_owned() });
-        }
-        Err(error) => return Err(Error::io(&path, "open", error)),
-    };
-    // Ours has a few hundred bytes.
-    const LIMIT: u64 = 1 << 20;
-    if input.file_bytes() > LIMIT {
-        return Err(FormatError::at_offset(LIMIT, "too long for a map's metadata").in_map(&path, None));
-    }
-    let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes).map_err(|error| Error::io(&path, "read", error))?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        FormatError::at_offset(error.utf8_error().valid_up_to() as u64, "not UTF-8 text").in_map(&path, None)
-    })?;
-    let metadata =
-        Metadata::from_text(&text).map_err(|error| DecodeError::from(error).in_map(&path, None))?;
-    Ok(metadata)
-}
-
-fn list_foreign_tiles(disk: &dyn Disk, layout: &Layout) -> Result<FxHashSet<TileIndex>> {
-    let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
-    let mut tiles = FxHashSet::default();
-    for tile in names.iter().filter_map(|name| super::tile_of_folder(name)) {
-        let path = layout.current(tile, TileFile::Table);
-        if disk.kind(&path).map_err(|error| Error::io(&path, "look at", error))?.is_some() {
-            tiles.insert(tile);
-        }
-    }
-    Ok(tiles)
 }

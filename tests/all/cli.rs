@@ -177,7 +177,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
     let points = file("points.txt", b"1 2 3\n4 five 6\n");
     let other = file("scans.xyz", b"1 2 3\n");
     let cases: Vec<(Vec<&str>, i32, &str)> = vec![
-        (vec!["build", scans, "-o", map], 2, "use --append to add these scans"),
+        (vec!["build", scans, "-o", map], 2, "use --resume to go on with these scans"),
         (vec!["build", "nowhere", "-o", new], 1, "nowhere: cannot open"),
         (vec!["build", text(&empty_folder), "-o", new], 2, "no .pcd file in this folder"),
         (vec!["build", &other, "-o", new], 2, "not a folder of .pcd files, nor a .pcd, .graph or .log file"),
@@ -336,7 +336,7 @@ fn the_demo_makes_a_map_and_a_picture() {
     let summary = json(&["demo", "--out", text(&out), "--length", "8", "--cache-tiles", "4", "--json"]);
     assert!(summary["occupied"].as_u64().unwrap() > 500);
     assert!(fs::read(out.join("map.png")).unwrap().starts_with(b"\x89PNG"));
-    assert!(output(&["info", text(&out.join("map_tiles"))]).contains("scans        4 in 1 flushes"));
+    assert!(output(&["info", text(&out.join("map_tiles"))]).contains("scans        4 in 2 flushes"));
     let (code, stderr) = failure(&["demo", "--out", text(&out)]);
     assert!(code == 2 && stderr.contains("choose another --out"), "{stderr}");
 }

@@ -253,7 +253,8 @@ fn keys_on_disk_are_octomaps_and_in_morton_order() {
     let bytes = std::fs::read(path).unwrap();
     assert_eq!(bytes[0..8], [0x4f, 0x4c, 0x57, 0x49, 1, 0, 0, 0]);
     let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
-    assert_eq!(bytes.len(), 16 + 18 * count + 64);
+    let parameters = u32::from_le_bytes(std::array::from_fn(|k| bytes[16 + 18 * count + 60 + k])) as usize;
+    assert_eq!(bytes.len(), 16 + 18 * count + 72 + parameters);
     let mut previous = None;
     for entry in bytes[16..16 + 18 * count].chunks(18) {
         let key: [u16; 3] = std::array::from_fn(|k| u16::from_le_bytes([entry[2 * k], entry[2 * k + 1]]));

@@ -1,3 +1,4 @@
+use crate::flush_schedule::FlushEvery;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -39,22 +40,22 @@ pub struct BuildArgs {
     /// Folder of the map
     #[arg(short = 'o', long = "output", value_name = "MAP")]
     pub output: PathBuf,
-    /// Edge of a voxel in metres [default: 0.1, or the map's own with --append]
+    /// Edge of a voxel in metres [default: 0.1, or the map's own]
     #[arg(long, value_name = "M")]
     pub resolution: Option<f64>,
-    /// Edge of a tile in metres, 2 to 1024 whole voxels [default: 10, or the map's own with --append]
+    /// Edge of a tile in metres, 2 to 1024 whole voxels [default: 10, or the map's own]
     #[arg(long, value_name = "M")]
     pub tile_size: Option<f64>,
     /// Most tiles kept in memory
     #[arg(long, value_name = "N", default_value_t = 256)]
     pub cache_tiles: usize,
-    /// Skip points nearer to the sensor than this, in metres
-    #[arg(long, value_name = "M", default_value_t = 0.0)]
-    pub min_range: f64,
-    /// Cut rays at this range in metres: free up to there, nothing hit
-    #[arg(long, value_name = "M", default_value_t = 100.0)]
-    pub max_range: f64,
-    /// How observations become evidence [default: log-odds, or the map's own with --append]
+    /// Skip points nearer to the sensor than this, in metres [default: 0, or as begun with --resume]
+    #[arg(long, value_name = "M")]
+    pub min_range: Option<f64>,
+    /// Cut rays at this range in metres: free up to there, nothing hit [default: 100, or as begun with --resume]
+    #[arg(long, value_name = "M")]
+    pub max_range: Option<f64>,
+    /// How observations become evidence [default: log-odds, or the map's own]
     #[arg(long, value_name = "MODEL")]
     pub sensor_model: Option<ModelName>,
     /// iwlo: intensities up to this one are no evidence, in the sensor's unit [default: 35]
@@ -63,9 +64,9 @@ pub struct BuildArgs {
     /// iwlo: intensity of full weight, in the sensor's unit [default: 255]
     #[arg(long, value_name = "I")]
     pub intensity_max: Option<f64>,
-    /// How often one scan updates a voxel
-    #[arg(long, value_name = "MODE", default_value = "per-scan")]
-    pub insert: InsertName,
+    /// How often one scan updates a voxel [default: per-scan, or as begun with --resume]
+    #[arg(long, value_name = "MODE")]
+    pub insert: Option<InsertName>,
     /// File of poses, sensor to world, one line a scan: TUM (t tx ty tz qx qy qz qw) or KITTI (3x4 matrix, row by row)
     /// [default: poses_tum.txt or poses_kitti.txt in or beside SCANS, else the VIEWPOINT of each PCD file]
     #[arg(long, value_name = "FILE")]
@@ -73,6 +74,13 @@ pub struct BuildArgs {
     /// Add the scans to an existing map
     #[arg(long)]
     pub append: bool,
+    /// Go on with a build that was interrupted, with the same scans, or begin it: every scan counts exactly once
+    #[arg(long, conflicts_with = "append")]
+    pub resume: bool,
+    /// Make durable what was mapped every N scans, or with s every so many seconds (25, 60s), or only at the end (end):
+    /// what a crash can lose
+    #[arg(long, value_name = "N", default_value = "60s")]
+    pub flush_every: FlushEvery,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,

@@ -1,7 +1,9 @@
 use crate::INTERRUPTED;
 use crate::args::{BuildArgs, InsertName, ModelName};
+use crate::flush_schedule::FlushSchedule;
 use crate::progress::Progress;
 use crate::summary::Summary;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,41 +15,56 @@ use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
 use voxtile::{Error, InsertMode, MapConfig, Scan};
 
+/// Where rays are cut unless something else is asked for.
+const MAX_RANGE_M: f64 = 100.0;
+
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let stop = stop_signal()?;
     let mut source = open_scans(&args.scans, args.poses.as_deref())?;
-    let exists = args.output.join("metadata.json").exists();
-    if exists && !args.append {
-        let hint = "use --append to add these scans to it, or another -o";
-        return Err(Error::AlreadyExists { path: args.output.clone(), hint }.into());
-    }
-    let config = if args.append { config_to_append(args)? } else { config_to_create(args)? };
-    // A first scan that cannot be mapped should not leave an empty map behind.
-    let first = next_scan(&mut *source)?;
-    if let Some(scan) = &first {
-        trace_scan(&config.grid, &config.sensor_model, &config.rays, scan)?;
-    }
-    let mut mapper = if args.append {
+    let fingerprint = source.fingerprint()?;
+    let exists = exists(args)?;
+    let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
+    let mut mapper = if exists {
         OutOfCoreTileMapper::open(&args.output, config)?
     } else {
+        // A first scan that cannot be mapped should not leave an empty map behind.
+        check_first_scan(&mut *open_scans(&args.scans, args.poses.as_deref())?, &config)?;
         OutOfCoreTileMapper::create(&args.output, config)?
     };
-    mapper.set_input_fingerprint(source.fingerprint());
+    let done = if args.resume {
+        mapper.resume_input(&fingerprint)?
+    } else {
+        mapper.begin_input(fingerprint)?;
+        0
+    };
+    pass_over(&mut *source, done, &args.scans)?;
 
-    let mut build = Build { mapper: &mut mapper, report: ScanReport::default(), scans: 0 };
-    let outcome = build.insert_all(&mut *source, first, &stop);
-    let Build { report, scans, .. } = build;
+    let progress = Progress::over_scans(source.len_hint());
+    progress.pass(done);
+    let mut build = Build {
+        mapper: &mut mapper,
+        schedule: FlushSchedule::new(args.flush_every),
+        progress,
+        report: ScanReport::default(),
+        scans: 0,
+    };
+    let outcome = build.insert_all(&mut *source, &stop);
+    build.progress.say("flushing");
     // What was accepted is kept, whatever ended the build.
-    mapper.flush()?;
+    let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
+    let Build { report, scans, .. } = build;
     if let Err(error) = outcome {
+        flushed?;
         return Err(error.context(format!("after {scans} scans, which are in the map")));
     }
+    flushed?;
     let interrupted = stop.load(Ordering::Relaxed);
     let summary = Summary::of(&args.output, scans, report, &mapper, started.elapsed())?;
-    Summary { interrupted, ..summary }.print(args.json)?;
+    Summary { interrupted, resumed_after: done, ..summary }.print(args.json)?;
     if interrupted {
-        eprintln!("voxtile: stopped after {scans} scans; all of them are in the map");
+        let all = done + scans;
+        eprintln!("voxtile: stopped after {all} scans; all of them are in the map; --resume goes on");
         return Ok(ExitCode::from(INTERRUPTED));
     }
     Ok(ExitCode::SUCCESS)
@@ -55,32 +72,72 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
 
 struct Build<'a> {
     mapper: &'a mut OutOfCoreTileMapper,
+    schedule: FlushSchedule,
+    progress: Progress,
     report: ScanReport,
     scans: u64,
 }
 
 impl Build<'_> {
-    fn insert_all(
-        &mut self,
-        source: &mut dyn ScanSource,
-        first: Option<Scan>,
-        stop: &AtomicBool,
-    ) -> anyhow::Result<()> {
-        let progress = Progress::over_scans(source.len_hint());
-        let mut next = first;
-        while let Some(scan) = next {
+    fn insert_all(&mut self, source: &mut dyn ScanSource, stop: &AtomicBool) -> anyhow::Result<()> {
+        while let Some(scan) = next_scan(source)? {
             if stop.load(Ordering::Relaxed) {
                 break;
             }
             self.report += self.mapper.insert_scan(&scan)?;
             self.scans += 1;
-            progress.step();
-            progress.show(self.mapper);
-            next = next_scan(source)?;
+            self.progress.step();
+            self.progress.show(self.mapper);
+            if self.schedule.is_due() {
+                self.mapper.flush()?;
+                self.schedule.flushed();
+            }
         }
-        progress.say("flushing");
         Ok(())
     }
+}
+
+/// After a flush that failed: what a user can rely on.
+fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
+    let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
+    let hint = "once the cause is gone, the same command with --resume goes on from there";
+    anyhow::Error::new(error)
+        .context(format!("{}: the map is as of scan {scan_number}; {hint}", folder.display()))
+}
+
+/// Whether there is a map to go on with.
+fn exists(args: &BuildArgs) -> anyhow::Result<bool> {
+    let exists = match MapReader::open(&args.output, 1) {
+        Err(Error::NoMap { .. }) => false,
+        // Damage is told by the mapper, which opens the map next.
+        _ => true,
+    };
+    if exists && !args.append && !args.resume {
+        let hint = "use --resume to go on with these scans, --append to add them to it, or another -o";
+        return Err(Error::AlreadyExists { path: args.output.clone(), hint }.into());
+    }
+    if !exists && args.append {
+        return Err(Error::NoMap { path: args.output.clone() }.into());
+    }
+    Ok(exists)
+}
+
+fn check_first_scan(source: &mut dyn ScanSource, config: &MapConfig) -> anyhow::Result<()> {
+    if let Some(scan) = next_scan(source)? {
+        trace_scan(&config.grid, &config.sensor_model, &config.rays, &scan)?;
+    }
+    Ok(())
+}
+
+/// Passes over scans that are in the map.
+fn pass_over(source: &mut dyn ScanSource, done: u64, scans: &Path) -> anyhow::Result<()> {
+    let count = usize::try_from(done).unwrap_or(usize::MAX);
+    let passed = source.skip(count)?;
+    if passed < count {
+        let reason = format!("has {passed} scans, and the map has taken {done} from it");
+        return Err(Error::argument(scans.display().to_string(), reason).into());
+    }
+    Ok(())
 }
 
 fn next_scan(source: &mut dyn ScanSource) -> voxtile::Result<Option<Scan>> {
@@ -93,7 +150,7 @@ fn config_to_create(args: &BuildArgs) -> anyhow::Result<MapConfig> {
 }
 
 /// The map's own parameters, and those that were typed, which must be the same.
-fn config_to_append(args: &BuildArgs) -> anyhow::Result<MapConfig> {
+fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
     let mut config = MapReader::open(&args.output, 1)?.config().clone();
     if args.resolution.is_some() || args.tile_size.is_some() {
         let resolution_m = args.resolution.unwrap_or(config.grid.resolution_m());
@@ -104,14 +161,20 @@ fn config_to_append(args: &BuildArgs) -> anyhow::Result<MapConfig> {
 }
 
 fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig> {
+    // What was begun goes on as it was, unless something else is asked for, which is then refused.
+    let begun = args.resume.then_some(config.rays);
     let insert_mode = match args.insert {
-        InsertName::PerScan => InsertMode::PerScan,
-        InsertName::PerRay => InsertMode::PerRay,
+        Some(InsertName::PerScan) => InsertMode::PerScan,
+        Some(InsertName::PerRay) => InsertMode::PerRay,
+        None => begun.map_or(InsertMode::PerScan, |rays| rays.insert_mode),
     };
+    let min_range_m = args.min_range.unwrap_or(begun.map_or(0.0, |rays| rays.min_range_m));
+    let begun_max_m = begun.and_then(|rays| rays.max_range_m);
+    let max_range_m = args.max_range.unwrap_or(begun_max_m.unwrap_or(MAX_RANGE_M));
     let sensor_model = sensor_model(args, config.sensor_model)?;
     Ok(config
         .with_sensor_model(sensor_model)
-        .with_range(args.min_range, args.max_range)
+        .with_range(min_range_m, max_range_m)
         .with_insert_mode(insert_mode)
         .with_cache_tiles(args.cache_tiles))
 }

@@ -29,7 +29,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         .with_cache_tiles(args.cache_tiles)
         .with_pending_bytes(4 << 20);
     let mut mapper = OutOfCoreTileMapper::create(&map, config)?;
-    mapper.set_input_fingerprint(format!("demo city {} over {} m", args.seed, args.length));
+    mapper.begin_input(format!("demo city {} over {} m", args.seed, args.length))?;
     let scans = args.length.div_ceil(SPACING_M) as usize;
     let drive = Drive::new(args.seed, f64::from(SPACING_M));
     let survey = Survey::new(City::new(args.seed), drive, Lidar::demo(), args.seed);

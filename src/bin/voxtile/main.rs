@@ -5,6 +5,7 @@ mod build;
 mod demo;
 mod digest;
 mod export;
+mod flush_schedule;
 mod info;
 mod map_at;
 mod memory;

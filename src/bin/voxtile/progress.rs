@@ -28,6 +28,12 @@ impl Progress {
         Self { bar }
     }
 
+    /// So many were done before.
+    pub fn pass(&self, done: u64) {
+        self.bar.set_position(done);
+        self.bar.reset_eta();
+    }
+
     /// One more is done.
     pub fn step(&self) {
         self.bar.inc(1);

@@ -12,6 +12,8 @@ use voxtile::tile::TileCounts;
 pub struct Summary {
     pub map: PathBuf,
     pub scans: u64,
+    /// Scans of the same input that were in the map before.
+    pub resumed_after: u64,
     pub interrupted: bool,
     #[serde(flatten)]
     pub report: ScanReport,
@@ -44,6 +46,7 @@ impl Summary {
         Ok(Self {
             map: map.to_owned(),
             scans,
+            resumed_after: 0,
             interrupted: false,
             report,
             scan_number: reader.scan_number(),
@@ -72,6 +75,9 @@ impl Summary {
         let rate = self.scans as f64 / self.seconds.max(1e-9);
         writeln!(out, "map       {}", self.map.display())?;
         writeln!(out, "scans     {} in {:.1} s ({rate:.1} a second)", HumanCount(self.scans), self.seconds)?;
+        if self.resumed_after > 0 {
+            writeln!(out, "resumed   after {} scans", HumanCount(self.resumed_after))?;
+        }
         writeln!(
             out,
             "points    {}, {} cut at the max range",

@@ -3,7 +3,8 @@
 //! ```text
 //! header   16 bytes   magic "IWLO", version 1, count
 //! entries  18 bytes   each: key 3 x u16, log-odds f64, observation count i32, in Morton order
-//! trailer  64 bytes   magic, version, map id, tile index, scan number, checksums
+//! trailer  72 bytes   magic, version, map id, tile index, scan number, checksums
+//! text                the map's parameters
 //! ```
 //!
 //! All little-endian. A reader of version 1 stops after `count` entries and never sees the trailer. The byte
@@ -22,8 +23,3 @@ const MAGIC: u32 = 0x4957_4C4F;
 const VERSION: u32 = 1;
 const HEADER_BYTES: u64 = 16;
 const ENTRY_BYTES: u64 = 18;
-
-/// Length in bytes of a file with `count` entries, the trailer included.
-pub const fn table_bytes(count: u64) -> u64 {
-    HEADER_BYTES + ENTRY_BYTES * count + TRAILER_BYTES as u64
-}

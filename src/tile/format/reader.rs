@@ -1,4 +1,4 @@
-use super::trailer::{TRAILER_BYTES, Trailer};
+use super::trailer::Trailer;
 use super::{ENTRY_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
@@ -29,8 +29,8 @@ pub fn read_table(
     voxels: &VoxelBox,
 ) -> Result<DecodedTable, DecodeError> {
     let mut crc = crc32fast::Hasher::new();
-    let (count, has_trailer) = read_header(input, file_bytes, &mut crc)?;
-    let mut entries = Entries::new(voxels, has_trailer);
+    let (count, trailer_bytes) = read_header(input, file_bytes, &mut crc)?;
+    let mut entries = Entries::new(voxels, trailer_bytes > 0);
     let mut chunk = vec![0; 4096 * ENTRY_BYTES as usize];
     let mut done = 0;
     while done < count {
@@ -44,29 +44,22 @@ pub fn read_table(
         done += entries_here;
     }
     let table = entries.into_table()?;
-    let trailer = if has_trailer {
-        let offset = HEADER_BYTES + count * ENTRY_BYTES;
-        let mut bytes = [0; TRAILER_BYTES];
-        input.read_exact(&mut bytes)?;
-        let trailer = Trailer::from_bytes(&bytes, offset)?;
-        if trailer.table_crc != crc.finalize() {
-            return Err(
-                FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into()
-            );
-        }
-        Some(trailer)
-    } else {
-        None
-    };
-    Ok(DecodedTable { table, trailer })
+    if trailer_bytes == 0 {
+        return Ok(DecodedTable { table, trailer: None });
+    }
+    let trailer = Trailer::read(input, HEADER_BYTES + count * ENTRY_BYTES, trailer_bytes)?;
+    if trailer.table_crc != crc.finalize() {
+        return Err(FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into());
+    }
+    Ok(DecodedTable { table, trailer: Some(trailer) })
 }
 
-/// The count of entries, checked against the length of the file, and whether a trailer follows them.
+/// The count of entries, checked against the length of the file, and the number of bytes that follow them.
 fn read_header(
     input: &mut impl Read,
     file_bytes: u64,
     crc: &mut crc32fast::Hasher,
-) -> Result<(u64, bool), DecodeError> {
+) -> Result<(u64, u64), DecodeError> {
     let wrong = |offset, reason: String| Err(FormatError::at_offset(offset, reason).into());
     if file_bytes < HEADER_BYTES {
         return wrong(0, format!("{file_bytes} bytes are too few for the header of {HEADER_BYTES}"));
@@ -88,16 +81,7 @@ fn read_header(
     else {
         return wrong(8, format!("a count of {count} entries does not fit into {file_bytes} bytes"));
     };
-    match after_entries {
-        0 => Ok((count, false)),
-        bytes if bytes == TRAILER_BYTES as u64 => Ok((count, true)),
-        bytes => wrong(
-            file_bytes - bytes,
-            format!(
-                "{bytes} bytes follow the last entry; there must be none or a trailer of {TRAILER_BYTES}"
-            ),
-        ),
-    }
+    Ok((count, after_entries))
 }
 
 /// Decodes entries into a table, brick by brick.

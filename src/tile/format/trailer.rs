@@ -1,8 +1,12 @@
-use crate::error::FormatError;
+use crate::error::{DecodeError, FormatError};
 use crate::space::TileIndex;
+use std::io::Read;
 
-/// Length of the trailer in bytes.
-pub const TRAILER_BYTES: usize = 64;
+/// Length in bytes of the trailer without the parameters behind it.
+pub const TRAILER_BYTES: usize = 72;
+
+/// The longest parameters that are read, in bytes.
+const MAX_PARAMETERS_BYTES: u64 = 1 << 16;
 
 /// "VXTR", little-endian.
 const MAGIC: u32 = 0x5254_5856;
@@ -10,7 +14,7 @@ const VERSION: u32 = 1;
 
 /// What stands after the last entry of `iwlo_meta.bin`: which map, tile and moment the file belongs to, and
 /// checksums of both files of the tile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trailer {
     /// Id of the map.
     pub map_id: [u8; 16],
@@ -24,12 +28,14 @@ pub struct Trailer {
     pub octree_crc: u32,
     /// Length of the tile's `octree.bt` in bytes.
     pub octree_bytes: u64,
+    /// The map's parameters as text, behind the trailer: with them a map can be put together from its tiles.
+    pub parameters: String,
 }
 
 impl Trailer {
-    /// The trailer as bytes, the last four a CRC-32 of those before.
-    pub fn to_bytes(&self) -> [u8; TRAILER_BYTES] {
-        let mut bytes = [0; TRAILER_BYTES];
+    /// The trailer as bytes, closed by a CRC-32, and behind it the parameters.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = vec![0; TRAILER_BYTES];
         bytes[0..4].copy_from_slice(&MAGIC.to_le_bytes());
         bytes[4..8].copy_from_slice(&VERSION.to_le_bytes());
         bytes[8..24].copy_from_slice(&self.map_id);
@@ -40,32 +46,59 @@ impl Trailer {
         bytes[44..48].copy_from_slice(&self.table_crc.to_le_bytes());
         bytes[48..52].copy_from_slice(&self.octree_crc.to_le_bytes());
         bytes[52..60].copy_from_slice(&self.octree_bytes.to_le_bytes());
-        let crc = crc32fast::hash(&bytes[..60]);
-        bytes[60..].copy_from_slice(&crc.to_le_bytes());
+        bytes[60..64].copy_from_slice(&(self.parameters.len() as u32).to_le_bytes());
+        bytes[64..68].copy_from_slice(&crc32fast::hash(self.parameters.as_bytes()).to_le_bytes());
+        let crc = crc32fast::hash(&bytes[..68]);
+        bytes[68..].copy_from_slice(&crc.to_le_bytes());
+        bytes.extend_from_slice(self.parameters.as_bytes());
         bytes
     }
 
-    /// The trailer from its bytes, which begin at `offset` of the file.
+    /// Length in bytes, the parameters included.
+    pub fn bytes(&self) -> u64 {
+        (TRAILER_BYTES + self.parameters.len()) as u64
+    }
+
+    /// Reads the trailer and its parameters, which begin at `offset` of a file and take its last `bytes` bytes.
     ///
     /// # Errors
     ///
-    /// A wrong magic number, version or checksum.
-    pub fn from_bytes(bytes: &[u8; TRAILER_BYTES], offset: u64) -> Result<Self, FormatError> {
-        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
-        let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
-        if u32_at(60) != crc32fast::hash(&bytes[..60]) {
-            return Err(FormatError::at_offset(offset, "the trailer does not match its checksum"));
+    /// A wrong length, magic number, version or checksum.
+    pub fn read(input: &mut impl Read, offset: u64, bytes: u64) -> Result<Self, DecodeError> {
+        let wrong = |at, reason: String| Err(FormatError::at_offset(offset + at, reason).into());
+        let is_long_enough = bytes >= TRAILER_BYTES as u64;
+        if !is_long_enough || bytes - TRAILER_BYTES as u64 > MAX_PARAMETERS_BYTES {
+            let reason = "there must be none or a trailer of voxtile's";
+            return wrong(0, format!("{bytes} bytes follow the last entry; {reason}"));
+        }
+        let mut fixed = [0; TRAILER_BYTES];
+        input.read_exact(&mut fixed)?;
+        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| fixed[at + k]));
+        let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| fixed[at + k]));
+        if u32_at(68) != crc32fast::hash(&fixed[..68]) {
+            return wrong(0, "the trailer does not match its checksum".into());
         }
         if (u32_at(0), u32_at(4)) != (MAGIC, VERSION) {
-            return Err(FormatError::at_offset(offset, "no trailer of version 1 after the last entry"));
+            return wrong(0, "no trailer of version 1 after the last entry".into());
         }
+        if bytes != TRAILER_BYTES as u64 + u64::from(u32_at(60)) {
+            let (found, wanted) = (bytes - TRAILER_BYTES as u64, u32_at(60));
+            return wrong(60, format!("{found} bytes of parameters where the trailer names {wanted}"));
+        }
+        let mut parameters = vec![0; u32_at(60) as usize];
+        input.read_exact(&mut parameters)?;
+        let is_whole = u32_at(64) == crc32fast::hash(&parameters);
+        let Some(parameters) = String::from_utf8(parameters).ok().filter(|_| is_whole) else {
+            return wrong(TRAILER_BYTES as u64, "the parameters do not match their checksum".into());
+        };
         Ok(Self {
-            map_id: std::array::from_fn(|k| bytes[8 + k]),
+            map_id: std::array::from_fn(|k| fixed[8 + k]),
             tile: TileIndex::new(u32_at(24) as i32, u32_at(28) as i32, u32_at(32) as i32),
             scan_number: u64_at(36),
             table_crc: u32_at(44),
             octree_crc: u32_at(48),
             octree_bytes: u64_at(52),
+            parameters,
         })
     }
 }

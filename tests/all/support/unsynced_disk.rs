@@ -2,7 +2,7 @@ use std::any::Any;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
-use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk};
+use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
 
 /// The file system without waiting for the medium: for tests that are not about crashes.
 #[derive(Debug)]
@@ -35,6 +35,14 @@ impl DiskWrite for Unsynced {
 impl Disk for UnsyncedDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         FsDisk.open(path)
+    }
+
+    fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        FsDisk.open_shared(path)
+    }
+
+    fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
+        FsDisk.watch(path)
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {

@@ -1,0 +1,58 @@
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+/// How often a build makes durable what it mapped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FlushEvery {
+    Scans(u64),
+    Time(Duration),
+    End,
+}
+
+impl FromStr for FlushEvery {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || "neither a number of scans (25), nor seconds (60s), nor end".to_owned();
+        if text == "end" {
+            return Ok(Self::End);
+        }
+        if let Some(seconds) = text.strip_suffix('s') {
+            let seconds: f64 = seconds.parse().map_err(|_| wrong())?;
+            return Duration::try_from_secs_f64(seconds).map(Self::Time).map_err(|_| wrong());
+        }
+        match text.parse() {
+            Ok(0) | Err(_) => Err(wrong()),
+            Ok(scans) => Ok(Self::Scans(scans)),
+        }
+    }
+}
+
+/// When the next flush is due.
+pub struct FlushSchedule {
+    every: FlushEvery,
+    scans: u64,
+    since: Instant,
+}
+
+impl FlushSchedule {
+    /// A schedule that begins now.
+    pub fn new(every: FlushEvery) -> Self {
+        Self { every, scans: 0, since: Instant::now() }
+    }
+
+    /// Asked after every scan: whether to flush now.
+    pub fn is_due(&mut self) -> bool {
+        self.scans += 1;
+        match self.every {
+            FlushEvery::Scans(scans) => self.scans >= scans,
+            FlushEvery::Time(time) => self.since.elapsed() >= time,
+            FlushEvery::End => false,
+        }
+    }
+
+    /// The map was flushed.
+    pub fn flushed(&mut self) {
+        (self.scans, self.since) = (0, Instant::now());
+    }
+}

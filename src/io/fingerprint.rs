@@ -1,0 +1,57 @@
+use crate::error::{Error, Result};
+use nalgebra::Isometry3;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Tells one input from another: see [`ScanSource::fingerprint`](super::ScanSource::fingerprint).
+#[derive(Default)]
+pub(super) struct Fingerprint {
+    hasher: blake3::Hasher,
+    files: u64,
+    bytes: u64,
+}
+
+/// Read at either end of a file.
+const END_BYTES: u64 = 4096;
+
+impl Fingerprint {
+    pub(super) fn of_file(path: &Path) -> Result<String> {
+        let mut fingerprint = Self::default();
+        fingerprint.add_file(path)?;
+        Ok(fingerprint.finish())
+    }
+
+    pub(super) fn add_file(&mut self, path: &Path) -> Result<()> {
+        let bytes = self.add_content(path).map_err(|error| Error::io(path, "read", error))?;
+        self.hasher.update(path.file_name().unwrap_or_default().as_encoded_bytes());
+        self.hasher.update(&[0]);
+        self.hasher.update(&bytes.to_le_bytes());
+        self.files += 1;
+        self.bytes += bytes;
+        Ok(())
+    }
+
+    pub(super) fn add_pose(&mut self, world_from_sensor: &Isometry3<f64>) {
+        for value in world_from_sensor.to_homogeneous().iter() {
+            self.hasher.update(&value.to_bits().to_le_bytes());
+        }
+    }
+
+    pub(super) fn finish(self) -> String {
+        let hash = &self.hasher.finalize().to_hex()[..32];
+        let files = if self.files == 1 { "file" } else { "files" };
+        format!("{} {files}, {} bytes, blake3 {hash}", self.files, self.bytes)
+    }
+
+    fn add_content(&mut self, path: &Path) -> std::io::Result<u64> {
+        let mut file = File::open(path)?;
+        let bytes = file.metadata()?.len();
+        self.hasher.update_reader((&mut file).take(END_BYTES))?;
+        if bytes > END_BYTES {
+            file.seek(SeekFrom::Start(bytes - END_BYTES))?;
+            self.hasher.update_reader(file.take(END_BYTES))?;
+        }
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,257 @@
+//! The writing half of [`TileStore`]: versions beside the committed ones, and the commit that puts them in place.
+
+use super::commit_log::{CommitLog, Flush};
+use super::disk::EntryKind;
+use super::layout::TileFile;
+use super::metadata::{Bounds, Metadata};
+use super::tile_stamp::{FileStamp, Stamping, TileStamp};
+use super::tile_store::TileStore;
+use crate::error::{Error, Result};
+use crate::space::TileIndex;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A log longer than this many bytes, and than four times what one record of the whole map takes, is compacted.
+const COMPACT_LOG_BYTES: u64 = 1 << 20;
+
+impl TileStore {
+    /// Writes the next version of one of a tile's files; the committed version stays as it is.
+    pub fn write_next(
+        &mut self,
+        tile: TileIndex,
+        file: TileFile,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<FileStamp> {
+        // A committed version may still be there under the name that is written to now.
+        self.settle()?;
+        let folder = self.layout.tile_folder(tile);
+        match self.disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
+            Some(EntryKind::Folder) => {}
+            None => self.disk.create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?,
+            Some(_) => {
+                let cause =
+                    io::Error::new(io::ErrorKind::NotADirectory, "something else has the folder's name");
+                return Err(Error::io(&folder, "create", cause));
+            }
+        }
+        let path = self.layout.next(tile, file);
+        let stamp_file = || {
+            let mut out = Stamping::new(BufWriter::with_capacity(1 << 16, self.disk.create(&path)?));
+            write(&mut out)?;
+            out.flush()?;
+            Ok(out.finish().0)
+        };
+        stamp_file().map_err(|error| Error::io(&path, "write", error))
+    }
+
+    /// Notes that the next version of a tile is written, both files.
+    pub fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
+        self.suspect.remove(&tile);
+        self.next.insert(tile, stamp);
+    }
+
+    /// The tiles whose next version must be written again before the next commit: the disk failed to sync it, and what
+    /// it says of these files from then on proves nothing.
+    pub fn suspects(&self) -> Vec<TileIndex> {
+        let mut suspects: Vec<_> = self.suspect.iter().copied().collect();
+        suspects.sort_unstable();
+        suspects
+    }
+
+    /// Commits every version written since the last commit. When this returns they are durable, and only they.
+    ///
+    /// `metadata` gives the map's parameters; bounds and numbers are filled in here. After an error nothing is
+    /// committed, and calling again tries again. What comes after the commit only tidies up: if the disk refuses that,
+    /// it is logged as a warning and made good later.
+    pub fn commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<()> {
+        self.settle()?;
+        let log_path = self.layout.commit_log();
+        let Some(mut log) = self.log else {
+            return Err(Error::argument("map", "a map of the seed's format must be adopted first"));
+        };
+        if let Some(&tile) = self.suspect.iter().next() {
+            return Err(Error::io(
+                &self.layout.tile_folder(tile),
+                "trust",
+                io::Error::other("an earlier sync failed"),
+            ));
+        }
+        let mut changed: Vec<_> = self.next.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
+        changed.sort_unstable_by_key(|&(tile, _)| tile);
+        let is_new = self.metadata.ext.is_none() || !self.metadata.is_same_but_for_progress(&metadata);
+        if !changed.is_empty() || is_new || scan_number != self.commits.scan_number {
+            self.sync_next(&changed)?;
+            let number = self.commits.flush_number + 1;
+            let metadata = self.fill_in(metadata, number, scan_number);
+            let text = metadata.to_text();
+            let metadata_text = is_new.then_some(&*text);
+            let flush = Flush { number, scan_number, changed: &changed, metadata_text };
+            if let Err(error) = log.append(&*self.disk, &log_path, &flush) {
+                self.is_log_settled = false;
+                return Err(Error::io(&log_path, "append to", error));
+            }
+            // Committed.
+            self.log = Some(log);
+            self.next.clear();
+            self.foreign.clear();
+            self.unrenamed.extend(changed.iter().map(|&(tile, _)| tile));
+            self.commits.flush_number = number;
+            self.commits.scan_number = scan_number;
+            self.commits.tiles.extend(changed);
+            self.metadata = metadata;
+        }
+        if let Err(error) = self.tidy_up() {
+            log::warn!("flushed, but not tidied up: {error}");
+        }
+        Ok(())
+    }
+
+    /// Brings about what earlier calls left open, before anything that builds upon it is written.
+    fn settle(&mut self) -> Result<()> {
+        if let (false, Some(log)) = (self.is_log_settled, self.log) {
+            // A record that came to disk after all names files that must stay as they are until it is cut off.
+            let path = self.layout.commit_log();
+            log.cut(&*self.disk, &path).map_err(|error| Error::io(&path, "cut", error))?;
+            self.sync_folder(self.layout.folder())?;
+            self.is_log_settled = true;
+        }
+        self.finish_renames()
+    }
+
+    fn sync_next(&mut self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
+        for &(tile, _) in changed {
+            for file in TileFile::IN_ORDER {
+                let path = self.layout.next(tile, file);
+                if let Err(error) = self.disk.sync_file(&path) {
+                    self.suspect.insert(tile);
+                    return Err(Error::io(&path, "sync", error));
+                }
+            }
+            self.sync_folder(&self.layout.tile_folder(tile))?;
+        }
+        // New tile folders.
+        self.sync_folder(self.layout.folder())
+    }
+
+    fn tidy_up(&mut self) -> Result<()> {
+        self.finish_renames()?;
+        if self.written_flush != Some(self.commits.flush_number) {
+            self.write_metadata()?;
+        }
+        self.readers.release(&*self.disk, &self.layout);
+        self.compact_log()
+    }
+
+    /// Gives committed versions their names. Tables that they replace are kept while there are readers.
+    pub(super) fn finish_renames(&mut self) -> Result<()> {
+        if self.unrenamed.is_empty() {
+            return Ok(());
+        }
+        let mut tiles: Vec<TileIndex> = self.unrenamed.iter().copied().collect();
+        tiles.sort_unstable();
+        // Asked after the commit: who begins to read later sees it.
+        let keep = self.readers.are_there();
+        for tile in tiles {
+            if keep {
+                self.keep_table(tile)?;
+            }
+            for file in TileFile::IN_ORDER {
+                self.rename(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
+            }
+            self.sync_folder(&self.layout.tile_folder(tile))?;
+            self.unrenamed.remove(&tile);
+        }
+        Ok(())
+    }
+
+    fn keep_table(&mut self, tile: TileIndex) -> Result<()> {
+        let next = self.layout.next(tile, TileFile::Table);
+        if self.disk.kind(&next).map_err(|error| Error::io(&next, "look at", error))?.is_none() {
+            // Renamed by an earlier attempt: the table in place is the new one.
+            return Ok(());
+        }
+        let flush_number = self.commits.flush_number - 1;
+        self.rename(&self.layout.current(tile, TileFile::Table), &self.layout.kept(tile, flush_number))?;
+        self.readers.keep(tile, flush_number);
+        Ok(())
+    }
+
+    /// Renames a file; one that is not there was renamed by an earlier attempt, or never was.
+    fn rename(&self, from: &Path, to: &Path) -> Result<()> {
+        match self.disk.rename(from, to) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            result => result.map_err(|error| Error::io(from, "rename", error)),
+        }
+    }
+
+    /// Gives a map of the seed's format an id and a log, so that it can be written to. Its tiles count as unread
+    /// until they have been written again.
+    pub fn adopt(&mut self, map_id: [u8; 16]) -> Result<()> {
+        if self.log.is_none() {
+            let path = self.layout.commit_log();
+            let text = self.metadata.to_text();
+            let log = CommitLog::write_whole(&*self.disk, &path, map_id, &self.commits, &text)
+                .map_err(|error| Error::io(&path, "write", error))?;
+            self.log = Some(log);
+        }
+        Ok(())
+    }
+
+    fn fill_in(&self, mut metadata: Metadata, flush_number: u64, scan_number: u64) -> Metadata {
+        metadata.bounds = Bounds::of(self.tiles());
+        if let Some(ext) = &mut metadata.ext {
+            ext.empty = metadata.bounds.is_none();
+            (ext.flush_number, ext.scan_number) = (flush_number, scan_number);
+        }
+        metadata
+    }
+
+    /// Replaces `metadata.json`: written beside, synced, renamed, the folder synced.
+    pub(super) fn write_metadata(&mut self) -> Result<()> {
+        let (flush_number, scan_number) = (self.commits.flush_number, self.commits.scan_number);
+        self.metadata = self.fill_in(self.metadata.clone(), flush_number, scan_number);
+        let text = self.metadata.to_text();
+        let path = self.layout.metadata();
+        let next = next_of(&path);
+        let replaced = || {
+            let mut out = self.disk.create(&next)?;
+            out.write_all(text.as_bytes())?;
+            out.sync()?;
+            drop(out);
+            self.disk.rename(&next, &path)?;
+            self.disk.sync_folder(self.layout.folder())
+        };
+        replaced().map_err(|error| Error::io(&path, "replace", error))?;
+        self.written_flush = Some(flush_number);
+        self.readers.watch(&*self.disk, &self.layout, flush_number);
+        Ok(())
+    }
+
+    fn compact_log(&mut self) -> Result<()> {
+        let Some(log) = self.log else { return Ok(()) };
+        let whole_bytes = (self.commits.tiles.len() * (12 + TileStamp::BYTES)) as u64;
+        if log.bytes() < COMPACT_LOG_BYTES.max(4 * whole_bytes) {
+            return Ok(());
+        }
+        let path = self.layout.commit_log();
+        let next = next_of(&path);
+        let text = self.metadata.to_text();
+        let compacted = CommitLog::write_whole(&*self.disk, &next, log.map_id(), &self.commits, &text)
+            .map_err(|error| Error::io(&next, "write", error))?;
+        self.disk.rename(&next, &path).map_err(|error| Error::io(&next, "rename", error))?;
+        self.log = Some(compacted);
+        // What is appended from now on is in this file only.
+        self.is_log_settled = false;
+        self.sync_folder(self.layout.folder())?;
+        self.is_log_settled = true;
+        Ok(())
+    }
+
+    fn sync_folder(&self, folder: &Path) -> Result<()> {
+        self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
+    }
+}
+
+fn next_of(path: &Path) -> PathBuf {
+    path.with_added_extension("next")
+}

@@ -1,0 +1,129 @@
+//! The folder of a map as a whole: its lock, its two own files, its tile folders.
+
+use super::commit_log::{CommitLog, Commits};
+use super::disk::{Disk, DiskRead};
+use super::layout::{Layout, TileFile, tile_of_folder};
+use super::metadata::Metadata;
+use crate::error::{DecodeError, Error, FormatError, Result};
+use crate::space::TileIndex;
+use rustc_hash::FxHashSet;
+use std::any::Any;
+use std::io;
+use std::path::Path;
+
+/// Held while a store may write; a process that ends, however it ends, lets go of it.
+pub(super) struct Lock(#[expect(dead_code, reason = "held for its drop")] Box<dyn Any + Send + Sync>);
+
+impl Lock {
+    pub(super) fn take(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
+        let path = layout.lock();
+        match disk.lock(&path).map_err(|error| Error::io(&path, "lock", error))? {
+            Some(lock) => Ok(Self(lock)),
+            None => Err(Error::Locked { path: layout.folder().to_owned() }),
+        }
+    }
+}
+
+impl std::fmt::Debug for Lock {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Lock")
+    }
+}
+
+/// A folder for a new map holds nothing but what an interrupted creation may have left.
+pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
+    let names = disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
+    let leftovers = ["writer.lock", "commits.log", "metadata.json.next"];
+    if names.iter().all(|name| leftovers.contains(&name.as_str())) {
+        return Ok(());
+    }
+    let hint = "open it, name --append to add scans to it, or choose an empty folder";
+    Err(Error::AlreadyExists { path: folder.to_owned(), hint })
+}
+
+/// Makes a folder and those above it, durably: a map must not vanish with the name of its folder.
+pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
+    if disk.kind(folder).is_ok_and(|kind| kind.is_some()) {
+        return Ok(());
+    }
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    create_folders(disk, parent)?;
+    disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error))?;
+    disk.sync_folder(parent).map_err(|error| Error::io(parent, "sync", error))
+}
+
+/// Reads `metadata.json`.
+pub(super) fn read_metadata(disk: &dyn Disk, layout: &Layout) -> Result<Metadata> {
+    let path = layout.metadata();
+    match disk.open(&path) {
+        Ok(mut input) => metadata_from(&mut *input, &path),
+        Err(error) => Err(without_metadata(disk, layout, error)),
+    }
+}
+
+/// Reads `metadata.json` and counts as its reader as long as the returned file is held.
+pub(super) fn read_metadata_shared(
+    disk: &dyn Disk,
+    layout: &Layout,
+) -> Result<(Metadata, Box<dyn DiskRead>)> {
+    let path = layout.metadata();
+    match disk.open_shared(&path) {
+        Ok(mut input) => Ok((metadata_from(&mut *input, &path)?, input)),
+        Err(error) => Err(without_metadata(disk, layout, error)),
+    }
+}
+
+fn metadata_from(input: &mut dyn DiskRead, path: &Path) -> Result<Metadata> {
+    // Ours has a few hundred bytes.
+    const LIMIT: u64 = 1 << 20;
+    if input.file_bytes() > LIMIT {
+        return Err(FormatError::at_offset(LIMIT, "too long for a map's metadata").in_map(path, None));
+    }
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes).map_err(|error| Error::io(path, "read", error))?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        FormatError::at_offset(error.utf8_error().valid_up_to() as u64, "not UTF-8 text").in_map(path, None)
+    })?;
+    Metadata::from_text(&text).map_err(|error| DecodeError::from(error).in_map(path, None))
+}
+
+/// A folder without `metadata.json` is no map, unless there are tiles in it.
+fn without_metadata(disk: &dyn Disk, layout: &Layout, error: io::Error) -> Error {
+    let path = layout.metadata();
+    if error.kind() != io::ErrorKind::NotFound {
+        return Error::io(&path, "open", error);
+    }
+    let names = disk.list(layout.folder()).unwrap_or_default();
+    if names.iter().any(|name| tile_of_folder(name).is_some()) {
+        let reason = "the file is missing, and the folder holds tiles; `voxtile repair` derives it from them";
+        return FormatError::at_offset(0, reason).in_map(&path, None);
+    }
+    Error::NoMap { path: layout.folder().to_owned() }
+}
+
+/// Reads `commits.log`; `None` if there is none.
+pub(super) fn read_log(disk: &dyn Disk, layout: &Layout) -> Result<Option<(CommitLog, Commits)>> {
+    let path = layout.commit_log();
+    match disk.open(&path) {
+        Ok(input) => {
+            let bytes = input.file_bytes();
+            let mut input = io::BufReader::new(input);
+            CommitLog::read(&mut input, bytes).map(Some).map_err(|error| error.in_map(&path, None))
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(Error::io(&path, "open", error)),
+    }
+}
+
+/// The tiles of a map of the seed's format, which has no log.
+pub(super) fn list_foreign_tiles(disk: &dyn Disk, layout: &Layout) -> Result<FxHashSet<TileIndex>> {
+    let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
+    let mut tiles = FxHashSet::default();
+    for tile in names.iter().filter_map(|name| tile_of_folder(name)) {
+        let path = layout.current(tile, TileFile::Table);
+        if disk.kind(&path).map_err(|error| Error::io(&path, "look at", error))?.is_some() {
+            tiles.insert(tile);
+        }
+    }
+    Ok(tiles)
+}
