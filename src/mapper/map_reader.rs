@@ -12,8 +12,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// A map on disk, opened to be asked: it takes no lock, beside a writer too, and never writes.
 ///
-/// It sees the last flush before it was opened. When a writer flushes later, tiles that this flush changed are
-/// answered with [`Error::Changed`]: open the map again.
+/// It sees the last flush before it was opened, whole, however often a writer flushes meanwhile: the writer keeps what
+/// this reader sees. Only where the file system has no locks, or when the writer was started anew after a crash, tiles
+/// that changed are answered with [`Error::Changed`]: open the map again.
 #[derive(Debug)]
 pub struct MapReader {
     config: MapConfig,
@@ -95,8 +96,11 @@ impl MapReader {
         tile_files::load(&self.store, &self.config, index).map_err(|error| self.explain(error))
     }
 
-    /// A tile that does not match the log is damage, unless a writer has flushed since.
+    /// A tile that does not match the log is damage, unless a writer has flushed since and did not see this reader.
     fn explain(&self, error: Error) -> Error {
+        if !matches!(error, Error::Damaged { .. }) {
+            return error;
+        }
         let folder = self.store.folder();
         let now =
             TileStore::open_read_only(self.disk.clone(), folder).map(|store| store.commits().flush_number);

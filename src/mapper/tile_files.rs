@@ -1,7 +1,7 @@
 //! A tile to its two files and back: the one place that knows both tiles and store.
 
 use crate::config::MapConfig;
-use crate::error::{FormatError, Result};
+use crate::error::{Error, FormatError, Result};
 use crate::octree::write_bt;
 use crate::space::{Grid, TileIndex};
 use crate::store::{FileStamp, MapParameters, StoredTile, TileFile, TileStamp, TileStore, hex};
@@ -37,12 +37,12 @@ pub(crate) fn save(
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
 pub(crate) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-    let loaded = decode(store, config, index, store.open_table(index));
-    if loaded.is_err() {
-        for path in store.other_places(index) {
-            let elsewhere = decode(store, config, index, store.open_version(index, path));
-            if elsewhere.is_ok() {
-                return elsewhere;
+    let loaded = decode(config, index, store.open_table(index));
+    if matches!(loaded, Err(Error::Damaged { .. })) {
+        for path in store.other_places(index)? {
+            match decode(config, index, store.open_version(index, path)) {
+                Err(Error::Damaged { .. }) => {}
+                elsewhere => return elsewhere,
             }
         }
     }
@@ -50,7 +50,6 @@ pub(crate) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> R
 }
 
 fn decode(
-    store: &TileStore,
     config: &MapConfig,
     index: TileIndex,
     stored: Result<Option<StoredTile>>,

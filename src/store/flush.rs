@@ -144,22 +144,21 @@ impl TileStore {
 
     /// Gives committed versions their names. Tables that they replace are kept while there are readers.
     pub(super) fn finish_renames(&mut self) -> Result<()> {
-        if self.unrenamed.is_empty() {
-            return Ok(());
-        }
-        let mut tiles: Vec<TileIndex> = self.unrenamed.iter().copied().collect();
-        tiles.sort_unstable();
         // Asked after the commit: who begins to read later sees it.
-        let keep = self.readers.are_there();
-        for tile in tiles {
+        let keep = !self.unrenamed.is_empty() && self.readers.are_there();
+        while let Some(&tile) = self.unrenamed.first() {
             if keep {
                 self.keep_table(tile)?;
             }
             for file in TileFile::IN_ORDER {
                 self.rename(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
             }
-            self.sync_folder(&self.layout.tile_folder(tile))?;
             self.unrenamed.remove(&tile);
+            self.renamed.insert(tile);
+        }
+        while let Some(&tile) = self.renamed.first() {
+            self.sync_folder(&self.layout.tile_folder(tile))?;
+            self.renamed.remove(&tile);
         }
         Ok(())
     }
@@ -218,13 +217,15 @@ impl TileStore {
             out.write_all(text.as_bytes())?;
             out.sync()?;
             drop(out);
+            // Before anybody can read it: no reader goes unseen.
+            let watch = self.disk.watch(&next)?;
             self.disk.rename(&next, &path)?;
-            self.disk.sync_folder(self.layout.folder())
+            Ok(watch)
         };
-        replaced().map_err(|error| Error::io(&path, "replace", error))?;
+        let watch = replaced().map_err(|error| Error::io(&path, "replace", error))?;
         self.written_flush = Some(flush_number);
-        self.readers.watch(&*self.disk, &self.layout, flush_number);
-        Ok(())
+        self.readers.watch(flush_number, watch);
+        self.sync_folder(self.layout.folder())
     }
 
     fn compact_log(&mut self) -> Result<()> {

@@ -43,13 +43,24 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
 
 /// Makes a folder and those above it, durably: a map must not vanish with the name of its folder.
 pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    if disk.kind(folder).is_ok_and(|kind| kind.is_some()) {
+    let Some(parent) = folder.parent() else { return Ok(()) };
+    let is_relative_end = parent.as_os_str().is_empty();
+    let parent = if is_relative_end { Path::new(".") } else { parent };
+    let is_there = disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?.is_some();
+    if !is_relative_end {
+        create_folders(disk, parent)?;
+    }
+    if is_there {
+        // Perhaps made by an attempt that failed to sync. Where others made it, their folders may refuse.
+        let _ = disk.sync_folder(parent);
         return Ok(());
     }
-    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    create_folders(disk, parent)?;
     disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error))?;
-    disk.sync_folder(parent).map_err(|error| Error::io(parent, "sync", error))
+    disk.sync_folder(parent).map_err(|error| {
+        // Left behind, it would count as durable the next time.
+        let _ = disk.remove_folder(folder);
+        Error::io(parent, "sync", error)
+    })
 }
 
 /// Reads `metadata.json`.

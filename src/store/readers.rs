@@ -18,11 +18,8 @@ pub(super) struct Readers {
 
 impl Readers {
     /// Watches over the present `metadata.json`, which a flush has written.
-    pub(super) fn watch(&mut self, disk: &dyn Disk, layout: &Layout, flush_number: u64) {
-        match disk.watch(&layout.metadata()) {
-            Ok(watch) => self.watched.push((flush_number, watch)),
-            Err(error) => log::warn!("{}: readers are not seen: {error}", layout.metadata().display()),
-        }
+    pub(super) fn watch(&mut self, flush_number: u64, metadata: Box<dyn ReaderWatch>) {
+        self.watched.push((flush_number, metadata));
     }
 
     /// Whether a table that a flush replaces may be wanted by somebody.

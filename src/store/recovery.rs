@@ -5,6 +5,7 @@ use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 
@@ -12,7 +13,7 @@ use std::path::Path;
 #[derive(Debug, Default)]
 pub(super) struct Leftovers {
     /// Committed versions that still have their `*.next` names.
-    pub unrenamed: FxHashSet<TileIndex>,
+    pub unrenamed: BTreeSet<TileIndex>,
     /// Tile folders that hold files and are not in the log.
     pub strays: FxHashSet<TileIndex>,
 }

@@ -9,6 +9,7 @@ use super::tile_stamp::{Stamping, TileStamp};
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,7 +35,9 @@ pub struct TileStore {
     /// Versions of which a sync failed: the medium may hold anything, whatever later syncs say.
     pub(super) suspect: FxHashSet<TileIndex>,
     /// Committed versions that still have their `*.next` names.
-    pub(super) unrenamed: FxHashSet<TileIndex>,
+    pub(super) unrenamed: BTreeSet<TileIndex>,
+    /// Tiles whose versions have their names, but perhaps not on the medium.
+    pub(super) renamed: BTreeSet<TileIndex>,
     /// Tile folders that the log does not know: never read, never overwritten.
     pub(super) strays: FxHashSet<TileIndex>,
     /// Tiles of a map of the seed's format, which has no log.
@@ -97,7 +100,9 @@ impl TileStore {
         store.lock = Some(lock);
         if store.log.is_some() {
             store.is_log_settled = store.commits.torn.is_none();
-            store.readers.watch(&*store.disk, &store.layout, store.written_flush.unwrap_or_default());
+            let path = store.layout.metadata();
+            let watch = store.disk.watch(&path).map_err(|error| Error::io(&path, "open", error))?;
+            store.readers.watch(store.written_flush.unwrap_or_default(), watch);
             let leftovers = recover(&*store.disk, &store.layout, &store.commits)?;
             store.strays = leftovers.strays;
             store.unrenamed = leftovers.unrenamed;
@@ -167,7 +172,7 @@ impl TileStore {
         log: Option<CommitLog>,
         commits: Commits,
     ) -> Self {
-        let (next, suspect, unrenamed, strays, foreign, readers) = Default::default();
+        let (next, suspect, unrenamed, renamed, strays, foreign, readers) = Default::default();
         Self {
             disk,
             layout,
@@ -179,6 +184,7 @@ impl TileStore {
             next,
             suspect,
             unrenamed,
+            renamed,
             strays,
             foreign,
             readers,
@@ -247,11 +253,17 @@ impl TileStore {
 
     /// Other places where a reader beside a writer may find the version of a tile's table that it sees: committed and
     /// waiting for its name, or already replaced and kept for readers. Empty for a writer.
-    pub fn other_places(&self, tile: TileIndex) -> Vec<PathBuf> {
-        if self.lock.is_some() {
-            return Vec::new();
-        }
-        let names = self.disk.list(&self.layout.tile_folder(tile)).unwrap_or_default();
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub fn other_places(&self, tile: TileIndex) -> Result<Vec<PathBuf>> {
+        let folder = self.layout.tile_folder(tile);
+        let names = match self.disk.list(&folder) {
+            _ if self.lock.is_some() => return Ok(Vec::new()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            names => names.map_err(|error| Error::io(&folder, "list", error))?,
+        };
         let mut kept: Vec<u64> = names
             .iter()
             .filter_map(|name| flush_of_kept(name))
@@ -259,8 +271,9 @@ impl TileStore {
             .collect();
         kept.sort_unstable();
         let kept = kept.into_iter().map(|flush_number| self.layout.kept(tile, flush_number));
-        kept.chain([self.layout.next(tile, TileFile::Table), self.layout.current(tile, TileFile::Table)])
-            .collect()
+        let places =
+            kept.chain([self.layout.next(tile, TileFile::Table), self.layout.current(tile, TileFile::Table)]);
+        Ok(places.collect())
     }
 
     /// Opens one of [`TileStore::other_places`].

@@ -3,6 +3,8 @@
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;
+/// Every operation of a life of a map fails once, and the power goes at every one of them.
+mod faults;
 /// What each folder may know.
 mod layering;
 /// The same sentences about every mapper: equal to the naive one, to the bit.

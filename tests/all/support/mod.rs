@@ -1,5 +1,6 @@
 //! What several subjects share.
 
+pub mod faulty_disk;
 pub mod random_scans;
 pub mod reference_map;
 pub mod unsynced_disk;

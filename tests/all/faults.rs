@@ -1,0 +1,252 @@
+use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use crate::support::random_scans::{Random, random_scan};
+use std::path::PathBuf;
+use voxtile::{
+    Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions,
+    Result, Scan,
+};
+
+const INPUT: &str = "random scans";
+/// After these scans the map is flushed; after `REOPENED` it is closed and opened again as well.
+const FLUSHED: [usize; 4] = [3, 5, 8, 11];
+const REOPENED: usize = 8;
+
+fn map() -> PathBuf {
+    PathBuf::from("/city/map")
+}
+
+/// Room for two tiles and next to nothing that waits: every scan evicts.
+fn config() -> MapConfig {
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_pending_bytes(600)
+}
+
+/// Scans on a way there and back again, so that tiles come again that were pushed out.
+fn scans() -> Vec<Scan> {
+    let mut random = Random(7);
+    let ways = [0.0, 3.0, 6.0, 3.0, 0.0, 3.0, 6.0, 9.0, 6.0, 3.0, 0.0];
+    ways.iter().map(|&x| random_scan(&mut random, [x, 0.0, 0.0], 4)).collect()
+}
+
+/// What must come out: the digests after each number of scans.
+struct Oracle {
+    scans: Vec<Scan>,
+    digests: Vec<blake3::Hash>,
+    answers: Vec<Occupancy>,
+}
+
+impl Oracle {
+    fn new() -> Self {
+        let scans = scans();
+        let mut mapper = InMemoryMapper::new(config()).unwrap();
+        let (mut digests, mut answers) = (Vec::new(), Vec::new());
+        for number in 0..=scans.len() {
+            digests.push(mapper.digest().unwrap());
+            answers.push(mapper.occupancy_at([3.0, 0.1, 0.1]).unwrap());
+            if let Some(scan) = scans.get(number) {
+                mapper.insert_scan(scan).unwrap();
+            }
+        }
+        Self { scans, digests, answers }
+    }
+
+    fn check(&self, map: &impl MapView, what: &str) {
+        let number = map.scan_number() as usize;
+        let digest = map.digest().unwrap_or_else(|error| panic!("{what}: after {number} scans: {error}"));
+        assert_eq!(digest, self.digests[number], "{what}: after {number} scans");
+    }
+}
+
+fn create(disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
+    match OutOfCoreTileMapper::create_on(disk.shared(), &map(), config()) {
+        // An attempt that failed at its very end has made the map.
+        Err(Error::AlreadyExists { .. }) => open(disk),
+        created => created,
+    }
+}
+
+fn open(disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
+    OutOfCoreTileMapper::open_on(disk.shared(), &map(), config())
+}
+
+fn open_or_create(disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
+    match open(disk) {
+        Err(Error::NoMap { .. }) => create(disk),
+        opened => opened,
+    }
+}
+
+/// Does one thing. If the disk refuses, the subject must be as before; again, in vain if there is no room; and with
+/// room it must go. `None` if the power went.
+fn insist<S, T>(
+    disk: &FaultyDisk,
+    subject: &mut S,
+    look: impl Fn(&S),
+    mut attempt: impl FnMut(&mut S) -> Result<T>,
+) -> Option<T> {
+    for number in 0.. {
+        match attempt(subject) {
+            Ok(done) => return Some(done),
+            Err(_) if disk.has_crashed() => return None,
+            Err(error) => {
+                assert!(number < 3 && matches!(error, Error::Io { .. }), "attempt {number}: {error}");
+                look(subject);
+            }
+        }
+        if number == 1 {
+            disk.make_room();
+        }
+    }
+    None
+}
+
+/// How far a life came: the last flush that returned, and the one that was tried last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Reached {
+    safe: usize,
+    tried: usize,
+    finished: bool,
+}
+
+/// Builds the map to the end, from wherever it is, with a reader beside it now and then.
+fn live(disk: &FaultyDisk, oracle: &Oracle) -> Reached {
+    let mut reached = Reached::default();
+    let finished = live_until_crash(disk, oracle, &mut reached).is_some();
+    Reached { finished, ..reached }
+}
+
+fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -> Option<()> {
+    let nothing = |_: &()| ();
+    let look = |mapper: &OutOfCoreTileMapper| {
+        oracle.check(mapper, "after an error");
+        // A question that wants a tile in memory.
+        let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("questions go on");
+        assert_eq!(answer, oracle.answers[mapper.scan_number() as usize]);
+    };
+    let mut mapper = insist(disk, &mut (), nothing, |_| open_or_create(disk))?;
+    let done = insist(disk, &mut mapper, look, |mapper| mapper.resume_input(INPUT))? as usize;
+    (reached.safe, reached.tried) = (done, done);
+    assert_eq!(mapper.scan_number(), done as u64);
+    let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
+    assert_eq!(digest, oracle.digests[done], "as opened");
+    let mut readers: Vec<MapReader> = Vec::new();
+    for (scan, number) in oracle.scans.iter().zip(1..).skip(done) {
+        insist(disk, &mut mapper, look, |mapper| mapper.insert_scan(scan))?;
+        if !FLUSHED.contains(&number) {
+            continue;
+        }
+        let reader = || MapReader::open_on(disk.shared(), &map(), 1);
+        readers.push(insist(disk, &mut (), nothing, |_| reader())?);
+        reached.tried = number;
+        insist(disk, &mut mapper, look, |mapper| mapper.flush())?;
+        reached.safe = number;
+        for reader in &mut readers {
+            let digest = insist(disk, reader, |_| (), |reader| reader.digest())?;
+            assert_eq!(digest, oracle.digests[reader.scan_number() as usize], "a reader beside the writer");
+        }
+        if number == REOPENED {
+            readers.clear();
+            drop(mapper);
+            mapper = insist(disk, &mut (), nothing, |_| open(disk))?;
+        }
+    }
+    let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
+    assert_eq!(digest, oracle.digests[oracle.scans.len()], "at the end");
+    Some(())
+}
+
+/// The disk after an undisturbed life.
+fn undisturbed(oracle: &Oracle) -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    assert!(live(&disk, oracle).finished);
+    disk
+}
+
+/// What a crash left opens as of the last flush that returned, or of the one that it hit, whole; and the build goes
+/// on from there to the same end.
+fn check_after_crash(disk: &FaultyDisk, oracle: &Oracle, reached: Reached, what: &str) {
+    let allowed = [reached.safe, reached.tried];
+    match MapReader::open_on(disk.shared(), &map(), 1) {
+        Ok(reader) => {
+            assert!(allowed.contains(&(reader.scan_number() as usize)), "{what}: {reached:?}");
+            oracle.check(&reader, what);
+        }
+        Err(Error::NoMap { .. }) if reached.safe == 0 => {}
+        Err(error) => panic!("{what}: {reached:?}: {error}"),
+    }
+    let end = live(disk, oracle);
+    assert!(end.finished, "{what}");
+    assert!(disk.files().keys().all(|path| !path.to_string_lossy().ends_with(".next")), "{what}");
+}
+
+#[test]
+fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
+    let oracle = Oracle::new();
+    let disk = undisturbed(&oracle);
+    let (operations, changes) = (disk.operations(), disk.changes());
+    println!("{operations} operations, {changes} of them changes");
+    let faults = (0..operations).map(Fault::Fails);
+    let faults = faults.chain((0..changes).map(Fault::LosesSync));
+    let faults = faults.chain((0..changes).map(Fault::IsFull));
+    for fault in faults.chain((0..changes).map(Fault::IsReadOnly)) {
+        let disk = FaultyDisk::new(fault);
+        let reached = live(&disk, &oracle);
+        assert!(reached.finished, "{fault:?}");
+        // What was said to be safe is on the medium.
+        let left = disk.after_crash(Unsynced::Dropped);
+        let reader =
+            MapReader::open_on(left.shared(), &map(), 1).unwrap_or_else(|error| panic!("{fault:?}: {error}"));
+        assert_eq!(reader.scan_number() as usize, oracle.scans.len(), "{fault:?}");
+        oracle.check(&reader, &format!("{fault:?}"));
+    }
+}
+
+#[test]
+fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
+    let oracle = Oracle::new();
+    for at in 0..undisturbed(&oracle).changes() {
+        let disk = FaultyDisk::new(Fault::Crashes(at));
+        let reached = live(&disk, &oracle);
+        assert!(disk.has_crashed());
+        let shuffled = (0..3).map(|seed| Unsynced::Shuffled(31 * at + seed));
+        for unsynced in shuffled.chain([Unsynced::Dropped, Unsynced::Kept]) {
+            let what = format!("crash at {at}, {unsynced:?}");
+            let left = disk.after_crash(unsynced);
+            check_after_crash(&left.copy(), &oracle, reached, &what);
+        }
+    }
+}
+
+#[test]
+fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
+    let oracle = Oracle::new();
+    for at in 0..undisturbed(&oracle).changes() {
+        let disk = FaultyDisk::new(Fault::Crashes(at));
+        let reached = live(&disk, &oracle);
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
+            let left = disk.after_crash(unsynced);
+            for again in 0.. {
+                let recovering = left.copy();
+                recovering.set_fault(Fault::Crashes(again));
+                let opened = open(&recovering);
+                if !recovering.has_crashed() {
+                    break;
+                }
+                assert!(opened.is_err());
+                let what = format!("crash at {at}, {unsynced:?}, again at {again} of opening");
+                let left = recovering.after_crash(Unsynced::Shuffled(again));
+                match MapReader::open_on(left.shared(), &map(), 1) {
+                    Ok(reader) => {
+                        let found = reader.scan_number() as usize;
+                        assert!([reached.safe, reached.tried].contains(&found), "{what}");
+                        oracle.check(&reader, &what);
+                    }
+                    Err(Error::NoMap { .. }) if reached.safe == 0 => {}
+                    Err(error) => panic!("{what}: {error}"),
+                }
+                if let Ok(mapper) = open(&left) {
+                    oracle.check(&mapper, &what);
+                }
+            }
+        }
+    }
+}
