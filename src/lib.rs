@@ -68,6 +68,7 @@ pub mod simulation;
 pub mod space;
 pub mod store;
 pub mod tile;
+pub mod upkeep;
 
 pub use config::{InsertMode, MapConfig, RayConfig, VoxelCacheConfig};
 pub use error::{DecodeError, Error, FormatError, Place, Result};

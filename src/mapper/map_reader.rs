@@ -42,7 +42,7 @@ impl MapReader {
     /// [`MapReader::open`] on another disk than the file system.
     pub fn open_on(disk: Arc<dyn Disk>, folder: &Path, cache_tiles: usize) -> Result<Self> {
         let store = TileStore::open_read_only(disk.clone(), folder)?;
-        let mut config = config_from(store.metadata(), store.layout().metadata())?;
+        let mut config = config_from(store.metadata(), &store.layout().metadata())?;
         config.cache_tiles = cache_tiles;
         let config = config.validated()?;
         let cache = ReaderCache { tiles: LruCache::unbounded(), io: IoCounts::default() };
@@ -55,7 +55,16 @@ impl MapReader {
     ///
     /// No map there, or metadata that cannot be read.
     pub fn config_of(folder: impl AsRef<Path>) -> Result<MapConfig> {
-        Ok(Self::open(folder, 1)?.config)
+        Self::config_of_on(Arc::new(FsDisk), folder.as_ref())
+    }
+
+    /// [`MapReader::config_of`] on another disk than the file system.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapReader::config_of`].
+    pub fn config_of_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<MapConfig> {
+        Ok(Self::open_on(disk, folder, 1)?.config)
     }
 
     /// What `metadata.json` says.
@@ -175,8 +184,8 @@ impl MapView for MapReader {
 }
 
 /// The configuration in a map's metadata; a map of the seed's format has the default sensor model.
-fn config_from(metadata: &Metadata, path: std::path::PathBuf) -> Result<MapConfig> {
-    let wrong = |error: String| FormatError::at_offset(0, error).in_map(&path, None);
+pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig> {
+    let wrong = |error: String| FormatError::at_offset(0, error).in_map(path, None);
     let grid =
         Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
     let mut config = MapConfig { grid, ..MapConfig::default() };

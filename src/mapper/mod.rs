@@ -19,12 +19,13 @@ mod out_of_core;
 mod pending;
 mod residency;
 mod statistics;
-mod tile_files;
+pub(crate) mod tile_files;
 mod tile_ref;
 mod traits;
 
 pub use in_memory::InMemoryMapper;
 pub use map_reader::MapReader;
+pub(crate) use map_reader::config_from;
 pub use out_of_core::OutOfCoreTileMapper;
 pub use statistics::{IoCounts, MapStatistics};
 pub use tile_ref::TileRef;

@@ -37,26 +37,25 @@ pub(crate) fn save(
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
 pub(crate) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-    let loaded = decode(config, index, store.open_table(index));
+    let Some(read) = load_table(store, &config.grid, index)? else { return Ok(None) };
+    Ok(Some((Tile::from_table(config, index, read.table), read.file.bytes)))
+}
+
+/// Reads the latest version of a tile's table; `None` if there is none.
+pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Result<Option<ReadTable>> {
+    let read = |stored: Result<Option<StoredTile>>| {
+        stored?.map(|stored| read_stored_table(grid, index, stored)).transpose()
+    };
+    let loaded = read(store.open_table(index));
     if matches!(loaded, Err(Error::Damaged { .. })) {
         for path in store.other_places(index)? {
-            match decode(config, index, store.open_version(index, path)) {
+            match read(store.open_version(index, path)) {
                 Err(Error::Damaged { .. }) => {}
                 elsewhere => return elsewhere,
             }
         }
     }
     loaded
-}
-
-fn decode(
-    config: &MapConfig,
-    index: TileIndex,
-    stored: Result<Option<StoredTile>>,
-) -> Result<Option<(Tile, u64)>> {
-    let Some(stored) = stored? else { return Ok(None) };
-    let read = read_stored_table(&config.grid, index, stored)?;
-    Ok(Some((Tile::from_table(config, index, read.table), read.file.bytes)))
 }
 
 /// A table that was read from its file and belongs there.

@@ -106,6 +106,12 @@ impl TileStore {
         Ok(())
     }
 
+    /// Brings the files to what the last commit says, without another one.
+    pub fn tidy(&mut self) -> Result<()> {
+        self.settle()?;
+        self.tidy_up()
+    }
+
     /// Brings about what earlier calls left open, before anything that builds upon it is written.
     fn settle(&mut self) -> Result<()> {
         if let (false, Some(log)) = (self.is_log_settled, self.log) {
@@ -183,6 +189,29 @@ impl TileStore {
         }
     }
 
+    /// Puts the next version of a tile's octree in place by itself: it must be the one that the log names.
+    pub fn place_octree(&mut self, tile: TileIndex) -> Result<()> {
+        let (next, current) =
+            (self.layout.next(tile, TileFile::Octree), self.layout.current(tile, TileFile::Octree));
+        self.disk.sync_file(&next).map_err(|error| Error::io(&next, "sync", error))?;
+        self.rename(&next, &current)?;
+        self.sync_folder(&self.layout.tile_folder(tile))
+    }
+
+    /// Takes tiles out of the map: one commit, after which the log does not name them. Their folders stay.
+    pub fn forget(&mut self, tiles: &[TileIndex]) -> Result<()> {
+        self.settle()?;
+        for tile in tiles {
+            self.commits.tiles.remove(tile);
+            self.foreign.remove(tile);
+        }
+        if self.log.is_some() {
+            self.commits.flush_number += 1;
+            self.replace_log()?;
+        }
+        self.write_metadata()
+    }
+
     /// Gives a map of the seed's format an id and a log, so that it can be written to. Its tiles count as unread
     /// until they have been written again.
     pub fn adopt(&mut self, map_id: [u8; 16]) -> Result<()> {
@@ -231,9 +260,12 @@ impl TileStore {
     fn compact_log(&mut self) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
         let whole_bytes = (self.commits.tiles.len() * (12 + TileStamp::BYTES)) as u64;
-        if log.bytes() < COMPACT_LOG_BYTES.max(4 * whole_bytes) {
-            return Ok(());
-        }
+        if log.bytes() < COMPACT_LOG_BYTES.max(4 * whole_bytes) { Ok(()) } else { self.replace_log() }
+    }
+
+    /// Replaces the log by one record of the whole map.
+    fn replace_log(&mut self) -> Result<()> {
+        let Some(log) = self.log else { return Ok(()) };
         let path = self.layout.commit_log();
         let next = next_of(&path);
         let text = self.metadata.to_text();

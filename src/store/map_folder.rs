@@ -12,10 +12,15 @@ use std::io;
 use std::path::Path;
 
 /// Held while a store may write; a process that ends, however it ends, lets go of it.
-pub(super) struct Lock(#[expect(dead_code, reason = "held for its drop")] Box<dyn Any + Send + Sync>);
+pub struct Lock(#[expect(dead_code, reason = "held for its drop")] Box<dyn Any + Send + Sync>);
 
 impl Lock {
-    pub(super) fn take(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
+    /// Takes the lock of a map.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Locked`] if another process has it.
+    pub fn take(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
         let path = layout.lock();
         match disk.lock(&path).map_err(|error| Error::io(&path, "lock", error))? {
             Some(lock) => Ok(Self(lock)),
@@ -113,7 +118,11 @@ fn without_metadata(disk: &dyn Disk, layout: &Layout, error: io::Error) -> Error
 }
 
 /// Reads `commits.log`; `None` if there is none.
-pub(super) fn read_log(disk: &dyn Disk, layout: &Layout) -> Result<Option<(CommitLog, Commits)>> {
+///
+/// # Errors
+///
+/// Damage, or a disk that refuses.
+pub fn read_log(disk: &dyn Disk, layout: &Layout) -> Result<Option<(CommitLog, Commits)>> {
     let path = layout.commit_log();
     match disk.open(&path) {
         Ok(input) => {

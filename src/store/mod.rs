@@ -16,13 +16,16 @@ mod map_folder;
 mod metadata;
 mod readers;
 mod recovery;
+mod remains;
 mod tile_stamp;
 mod tile_store;
 
 pub use commit_log::{CommitLog, Commits, Flush};
 pub use disk::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
 pub use layout::{Layout, QUARANTINE, TileFile, flush_of_kept, folder_name, tile_of_folder};
+pub use map_folder::{Lock, read_log};
 pub use metadata::{Bounds, Extension, MapParameters, Metadata};
+pub use remains::Remains;
 pub use tile_stamp::{FileStamp, Stamping, TileStamp};
 pub(crate) use tile_store::hex;
 pub use tile_store::{StoredTile, TileStore};

@@ -16,6 +16,8 @@ pub(super) struct Leftovers {
     pub unrenamed: BTreeSet<TileIndex>,
     /// Tile folders that hold files and are not in the log.
     pub strays: FxHashSet<TileIndex>,
+    /// How many files were removed.
+    pub removed: u64,
 }
 
 /// Looks through the folders of a map for what a writer left when it ended: removes versions that were never
@@ -28,12 +30,12 @@ pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Re
     for name in list(disk, layout.folder())? {
         let path = layout.folder().join(&name);
         if name.ends_with(".next") {
-            remove(disk, &path)?;
+            remove(disk, &path, &mut leftovers.removed)?;
         }
         let Some(tile) = tile_of_folder(&name) else { continue };
         let stamp = commits.tiles.get(&tile);
         let is_of_last_commit = changed.contains(&tile);
-        match look_at_tile(disk, layout, tile, stamp, is_of_last_commit)? {
+        match look_at_tile(disk, layout, tile, stamp, is_of_last_commit, &mut leftovers.removed)? {
             State::Whole => {}
             State::Unrenamed => {
                 leftovers.unrenamed.insert(tile);
@@ -64,6 +66,7 @@ fn look_at_tile(
     tile: TileIndex,
     stamp: Option<&TileStamp>,
     is_of_last_commit: bool,
+    removed: &mut u64,
 ) -> Result<State> {
     let folder = layout.tile_folder(tile);
     if disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))?
@@ -90,11 +93,11 @@ fn look_at_tile(
             }
             _ => {}
         }
-        remove(disk, &next)?;
+        remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
     for name in names.extract_if(.., |name| flush_of_kept(name).is_some()) {
-        remove(disk, &folder.join(name))?;
+        remove(disk, &folder.join(name), removed)?;
     }
     Ok(match stamp {
         _ if names.is_empty() => State::Empty,
@@ -108,7 +111,8 @@ fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
     disk.list(folder).map_err(|error| Error::io(folder, "list", error))
 }
 
-fn remove(disk: &dyn Disk, path: &Path) -> Result<()> {
+fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
+    *removed += 1;
     disk.remove_file(path).map_err(|error| Error::io(path, "remove", error))
 }
 

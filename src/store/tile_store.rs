@@ -40,6 +40,8 @@ pub struct TileStore {
     pub(super) renamed: BTreeSet<TileIndex>,
     /// Tile folders that the log does not know: never read, never overwritten.
     pub(super) strays: FxHashSet<TileIndex>,
+    /// How many files of an earlier writer opening has removed.
+    leftovers_removed: u64,
     /// Tiles of a map of the seed's format, which has no log.
     pub(super) foreign: FxHashSet<TileIndex>,
     /// A writer's.
@@ -105,6 +107,7 @@ impl TileStore {
             store.readers.watch(store.written_flush.unwrap_or_default(), watch);
             let leftovers = recover(&*store.disk, &store.layout, &store.commits)?;
             store.strays = leftovers.strays;
+            store.leftovers_removed = leftovers.removed;
             store.unrenamed = leftovers.unrenamed;
             store.finish_renames()?;
         }
@@ -186,6 +189,7 @@ impl TileStore {
             unrenamed,
             renamed,
             strays,
+            leftovers_removed: 0,
             foreign,
             readers,
             lock: None,
@@ -216,6 +220,23 @@ impl TileStore {
     /// The last commit.
     pub fn commits(&self) -> &Commits {
         &self.commits
+    }
+
+    /// Whether `metadata.json` is older than the log: a crash came between the two.
+    pub fn is_metadata_behind(&self) -> bool {
+        self.log.is_some() && self.written_flush != Some(self.commits.flush_number)
+    }
+
+    /// The tile folders that the log does not name, in order.
+    pub fn strays(&self) -> Vec<TileIndex> {
+        let mut strays: Vec<_> = self.strays.iter().copied().collect();
+        strays.sort_unstable();
+        strays
+    }
+
+    /// How many files that an earlier writer left behind were removed when the store was opened.
+    pub fn leftovers_removed(&self) -> u64 {
+        self.leftovers_removed
     }
 
     /// Whether the tile has a version on disk, committed or not.

@@ -3,6 +3,8 @@
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;
+/// Every byte of every file of a map, damaged: found, named, repaired.
+mod corruption;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
 mod faults;
 /// What each folder may know.

@@ -26,6 +26,10 @@ pub enum Command {
     Export(ExportArgs),
     /// Print the digest of a map's content: equal for equal maps
     Digest(DigestArgs),
+    /// Check every file of a map for damage; exit code 1 if there is any
+    Verify(VerifyArgs),
+    /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted
+    Repair(RepairArgs),
     /// Map a small made-up city and draw it: a first look, no data needed
     Demo(DemoArgs),
 }
@@ -180,6 +184,24 @@ pub struct ExportArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct DigestArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// Folder of the map; a writer may be at work on it
+    pub map: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct RepairArgs {
     /// Folder of the map
     pub map: PathBuf,
     /// Print JSON

@@ -14,7 +14,9 @@ mod picture;
 mod progress;
 mod query;
 mod raycast;
+mod repair;
 mod summary;
+mod verify;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -31,6 +33,8 @@ fn main() -> ExitCode {
         Command::Raycast(args) => raycast::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Digest(args) => digest::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Repair(args) => repair::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     outcome.unwrap_or_else(|error| {

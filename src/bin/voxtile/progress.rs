@@ -1,5 +1,6 @@
 use crate::memory::resident_bytes;
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
+use std::io::Write;
 use voxtile::mapper::{MapStatistics, MapView};
 
 /// A bar on standard error for long work; nothing where that is no terminal.
@@ -37,6 +38,18 @@ impl Progress {
     /// One more is done.
     pub fn step(&self) {
         self.bar.inc(1);
+    }
+
+    /// So many of all are done.
+    pub fn set(&self, done: u64, all: u64) {
+        self.bar.set_length(all);
+        self.bar.set_position(done);
+    }
+
+    /// Prints a line on standard output, above the bar.
+    pub fn print(&self, line: &str) {
+        // A reader that has gone away, as in `| head`, is no reason to stop.
+        self.bar.suspend(|| writeln!(std::io::stdout(), "{line}").unwrap_or_default());
     }
 
     /// Shows what a mapper holds. Asked for a few times a second at most.

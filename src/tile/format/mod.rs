@@ -14,7 +14,7 @@ mod reader;
 mod trailer;
 mod writer;
 
-pub use reader::{DecodedTable, read_table};
+pub use reader::{DecodedTable, read_table, read_trailer};
 pub use trailer::{TRAILER_BYTES, Trailer};
 pub use writer::{TableChecksums, write_table};
 

@@ -4,7 +4,7 @@ use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
 use crate::space::{MortonCode, VoxelBox, VoxelKey};
 use crate::tile::Table;
-use std::io::Read;
+use std::io::{self, Read};
 
 /// What `iwlo_meta.bin` holds.
 #[derive(Debug)]
@@ -52,6 +52,21 @@ pub fn read_table(
         return Err(FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into());
     }
     Ok(DecodedTable { table, trailer: Some(trailer) })
+}
+
+/// Reads only what stands behind the entries of an `iwlo_meta.bin`; `None` for a file of the seed's own format. The
+/// entries are passed over and not looked at.
+///
+/// # Errors
+///
+/// A header or a trailer that is not as the format says.
+pub fn read_trailer(input: &mut impl Read, file_bytes: u64) -> Result<Option<Trailer>, DecodeError> {
+    let (count, trailer_bytes) = read_header(input, file_bytes, &mut crc32fast::Hasher::new())?;
+    if trailer_bytes == 0 {
+        return Ok(None);
+    }
+    io::copy(&mut input.take(count * ENTRY_BYTES), &mut io::sink())?;
+    Trailer::read(input, HEADER_BYTES + count * ENTRY_BYTES, trailer_bytes).map(Some)
 }
 
 /// The count of entries, checked against the length of the file, and the number of bytes that follow them.

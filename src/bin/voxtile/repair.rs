@@ -1,0 +1,48 @@
+use crate::args::RepairArgs;
+use crate::progress::Progress;
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::upkeep::{Action, Repair, repair};
+
+/// More actions than a person reads; the rest are counted.
+const MAX_ACTIONS: usize = 10_000;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    map: &'a std::path::Path,
+    #[serde(flatten)]
+    repair: Repair,
+    done: Vec<Action>,
+}
+
+pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let mut done = Vec::new();
+    let repair = repair(
+        &args.map,
+        |action| {
+            if !args.json {
+                progress.print(&action.to_string());
+            } else if done.len() < MAX_ACTIONS {
+                done.push(action.clone());
+            }
+        },
+        |tiles, all| progress.set(tiles, all),
+    )?;
+    drop(progress);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string(&Report { map: &args.map, repair, done })?)?;
+    } else if repair.actions == 0 {
+        writeln!(out, "nothing to repair; {} tiles are whole", HumanCount(repair.tiles))?;
+    } else {
+        let (tiles, lost) = (HumanCount(repair.tiles), HumanCount(repair.tiles_lost));
+        writeln!(
+            out,
+            "repaired: the map has {tiles} tiles; {lost} could not stay, their space is unknown again"
+        )?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

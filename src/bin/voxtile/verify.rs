@@ -1,0 +1,68 @@
+use crate::args::VerifyArgs;
+use crate::progress::Progress;
+use indicatif::{HumanBytes, HumanCount};
+use serde::Serialize;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::upkeep::{Finding, Verification, verify};
+
+/// More findings than a person reads; the rest are counted.
+const MAX_FINDINGS: usize = 10_000;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    map: &'a std::path::Path,
+    whole: bool,
+    #[serde(flatten)]
+    verification: Verification,
+    findings: Vec<Finding>,
+}
+
+pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let mut findings = Vec::new();
+    let verification = verify(
+        &args.map,
+        |finding| {
+            if !args.json {
+                progress.print(&finding.to_string());
+            } else if findings.len() < MAX_FINDINGS {
+                findings.push(finding.clone());
+            }
+        },
+        |done, all| progress.set(done, all),
+    )?;
+    drop(progress);
+    let whole = verification.is_whole();
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let report = Report { map: &args.map, whole, verification, findings };
+        writeln!(out, "{}", serde_json::to_string(&report)?)?;
+    } else {
+        print(args, &verification, &mut out)?;
+    }
+    Ok(if whole { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -> std::io::Result<()> {
+    let Verification { verified, flush_number, scan_number, tiles, voxels, table_bytes, damage, .. } =
+        verification;
+    writeln!(
+        out,
+        "{} tiles, {} voxels, {} of tables; flush {flush_number}, scan {scan_number}",
+        HumanCount(*tiles),
+        HumanCount(*voxels),
+        HumanBytes(*table_bytes)
+    )?;
+    match (damage, verified) {
+        (0, true) => writeln!(out, "whole: every checksum matches"),
+        (0, false) => writeln!(out, "unverified: the map has no checksums; the form of its tables is right"),
+        (damage, _) => {
+            let map = args.map.display();
+            writeln!(
+                out,
+                "damaged: {damage} findings; put files back from a copy, or run `voxtile repair {map}`"
+            )
+        }
+    }
+}

@@ -1,0 +1,87 @@
+use crate::error::{Error, FormatError, Place};
+use crate::space::TileIndex;
+use serde::Serialize;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Something about a map's files that a person should know.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Finding {
+    /// How bad it is.
+    pub severity: Severity,
+    /// The file or folder.
+    pub path: PathBuf,
+    /// The tile it belongs to, if to one.
+    pub tile: Option<[i32; 3]>,
+    /// Where in the file, in bytes from its beginning.
+    pub offset: Option<u64>,
+    /// Where in the file, as a line, the first being 1.
+    pub line: Option<u64>,
+    /// What it is.
+    pub reason: String,
+}
+
+/// How bad a [`Finding`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The map, or a part of it, is not as it was flushed.
+    Damage,
+    /// Nothing is wrong: leftovers, or files that are no part of a map.
+    Note,
+}
+
+impl Finding {
+    pub(super) fn note(path: &Path, tile: Option<TileIndex>, reason: impl Into<String>) -> Self {
+        let (severity, tile) = (Severity::Note, tile.map(TileIndex::to_array));
+        Self { severity, path: path.to_owned(), tile, offset: None, line: None, reason: reason.into() }
+    }
+
+    pub(super) fn damage(path: &Path, tile: Option<TileIndex>, cause: &FormatError) -> Self {
+        let at = |place| (cause.place == place).then_some(cause.at);
+        Self {
+            severity: Severity::Damage,
+            path: path.to_owned(),
+            tile: tile.map(TileIndex::to_array),
+            offset: at(Place::Offset),
+            line: at(Place::Line),
+            reason: cause.reason.clone(),
+        }
+    }
+
+    /// Whether an error is about a link, or anything else that is no file, in place of a file.
+    pub(super) fn is_link(error: &Error) -> bool {
+        matches!(error, Error::Io { cause, .. } if cause.kind() == std::io::ErrorKind::InvalidInput)
+    }
+
+    /// The finding that an error stands for, if it is damage; other errors are passed back.
+    pub(super) fn of(error: Error) -> Result<Self, Error> {
+        match error {
+            Error::Damaged { path, tile, cause } => Ok(Self::damage(&path, tile, &cause)),
+            Error::Io { path, cause, .. } if cause.kind() == std::io::ErrorKind::InvalidInput => {
+                Ok(Self::damage(&path, None, &FormatError::at_offset(0, cause.to_string())))
+            }
+            error => Err(error),
+        }
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let severity = match self.severity {
+            Severity::Damage => "damage",
+            Severity::Note => "note",
+        };
+        write!(f, "{severity}: {}: ", self.path.display())?;
+        if let Some([x, y, z]) = self.tile {
+            write!(f, "tile ({x}, {y}, {z}): ")?;
+        }
+        match (self.offset, self.line) {
+            (Some(offset), _) => write!(f, "offset {offset}: ")?,
+            (_, Some(line)) => write!(f, "line {line}: ")?,
+            _ => {}
+        }
+        f.write_str(&self.reason)
+    }
+}

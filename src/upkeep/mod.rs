@@ -1,0 +1,20 @@
+//! Looking after a map on disk: is everything whole, and what can be put right?
+//!
+//! ```text
+//! verify  metadata.json, commits.log, then tile by tile: table, octree  -> findings
+//! repair  index (metadata.json, commits.log) from whatever is left      -> actions
+//!         tile by tile: octree from its table, damaged tiles to quarantine/
+//! ```
+//!
+//! Both need memory for the list of tiles and one tile. What is promised is in `docs/durability.md`.
+
+mod finding;
+mod quarantine;
+mod rebuild;
+mod repair;
+mod tile_check;
+mod verify;
+
+pub use finding::{Finding, Severity};
+pub use repair::{Action, ActionKind, Repair, repair, repair_on};
+pub use verify::{Verification, verify, verify_on};

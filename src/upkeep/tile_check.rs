@@ -1,0 +1,102 @@
+use crate::config::MapConfig;
+use crate::error::{Error, FormatError, Result};
+use crate::mapper::tile_files::{self, ReadTable};
+use crate::octree::write_bt;
+use crate::space::TileIndex;
+use crate::store::{Disk, FileStamp, Stamping, TileFile, TileStamp, TileStore};
+use crate::tile::Tile;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// What a look at both files of a tile gave.
+pub(super) struct TileCheck {
+    pub table: Result<ReadTable>,
+    /// `None` where nothing tells what the octree must be.
+    pub octree: Option<std::result::Result<(), FormatError>>,
+}
+
+/// Reads both files of a tile that the map holds.
+///
+/// # Errors
+///
+/// A disk that refuses; damage is part of the answer.
+pub(super) fn check_tile(
+    disk: &dyn Disk,
+    store: &TileStore,
+    config: &MapConfig,
+    tile: TileIndex,
+) -> Result<TileCheck> {
+    let table = match tile_files::load_table(store, &config.grid, tile) {
+        Ok(Some(table)) => Ok(table),
+        Ok(None) => {
+            let path = store.layout().current(tile, TileFile::Table);
+            Err(FormatError::at_offset(0, "the map does not hold this tile").in_map(&path, Some(tile)))
+        }
+        Err(error @ Error::Damaged { .. }) => Err(error),
+        Err(error) => return Err(error),
+    };
+    let octree = match store.stamp(tile) {
+        Some(stamp) => Some(check_octree(disk, store, tile, stamp)?),
+        None => None,
+    };
+    Ok(TileCheck { table, octree })
+}
+
+fn check_octree(
+    disk: &dyn Disk,
+    store: &TileStore,
+    tile: TileIndex,
+    stamp: TileStamp,
+) -> Result<std::result::Result<(), FormatError>> {
+    let layout = store.layout();
+    let current = layout.current(tile, TileFile::Octree);
+    let found = stamp_of(disk, &current)?;
+    // A writer beside this reader may have committed it without renaming it yet.
+    if found == Some(stamp.octree)
+        || stamp_of(disk, &layout.next(tile, TileFile::Octree))? == Some(stamp.octree)
+    {
+        return Ok(Ok(()));
+    }
+    Ok(Err(match found {
+        None => FormatError::at_offset(0, "the file is missing; it is derived from the table"),
+        Some(FileStamp { bytes, .. }) if bytes != stamp.octree.bytes => {
+            let wanted = stamp.octree.bytes;
+            FormatError::at_offset(bytes.min(wanted), format!("{bytes} bytes, and the log names {wanted}"))
+        }
+        Some(_) => FormatError::at_offset(0, "the file does not match its checksum in the log"),
+    }))
+}
+
+/// The octree file of a table, written to `out`.
+pub(super) fn write_octree(
+    config: &MapConfig,
+    tile: TileIndex,
+    table: ReadTable,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let mut tile = Tile::from_table(config, tile, table.table);
+    let threshold = config.occupied_log_odds() as f32;
+    write_bt(tile.sync_octree(), config.grid.resolution_m(), threshold, &mut &mut *out)
+}
+
+/// Length and checksum of a file; `None` if there is none.
+pub(super) fn stamp_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileStamp>> {
+    let input = match disk.open(path) {
+        Ok(input) => input,
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
+            return Ok(None);
+        }
+        Err(error) => return Err(Error::io(path, "open", error)),
+    };
+    let mut input = Stamping::new(input);
+    io::copy(&mut input, &mut io::sink()).map_err(|error| Error::io(path, "read", error))?;
+    Ok(Some(input.finish().0))
+}
+
+/// The first byte in which a file differs from what it should be, for people who look for the cause.
+pub(super) fn first_difference(disk: &dyn Disk, path: &Path, expected: &[u8]) -> Option<u64> {
+    let mut found = Vec::new();
+    io::Read::read_to_end(&mut disk.open(path).ok()?, &mut found).ok()?;
+    let common = found.iter().zip(expected).take_while(|(a, b)| a == b).count();
+    (common < found.len().max(expected.len())).then_some(common as u64)
+}

@@ -1,0 +1,240 @@
+use super::finding::{Finding, Severity};
+use super::rebuild::{self, Index};
+use super::tile_check::{check_tile, first_difference, write_octree};
+use crate::config::MapConfig;
+use crate::error::{Error, FormatError, Result};
+use crate::mapper::config_from;
+use crate::space::TileIndex;
+use crate::store::{
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, TileFile, TileStore, flush_of_kept, tile_of_folder,
+};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What a look at every byte of a map gave.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Verification {
+    /// Whether the map has the checksums that let damage be found; a map of the seed's own format has none.
+    pub verified: bool,
+    /// Number of the flush that was looked at.
+    pub flush_number: u64,
+    /// Number of the last scan in it.
+    pub scan_number: u64,
+    /// Tiles of the map.
+    pub tiles: u64,
+    /// Observed voxels in the tiles that are whole.
+    pub voxels: u64,
+    /// Bytes of the tables that are whole.
+    pub table_bytes: u64,
+    /// Findings that are damage.
+    pub damage: u64,
+    /// Findings that are none.
+    pub notes: u64,
+}
+
+impl Verification {
+    /// Whether nothing is damaged.
+    pub fn is_whole(&self) -> bool {
+        self.damage == 0
+    }
+}
+
+/// Checks every file of a map, beside a writer too. Takes no lock and writes nothing.
+///
+/// `found` is told each finding, `progress` the tiles done and all. Memory: the list of tiles, and one tile.
+///
+/// # Errors
+///
+/// No map there, or a disk that refuses to be read. Damage is a finding, not an error.
+pub fn verify(
+    folder: impl AsRef<Path>,
+    found: impl FnMut(&Finding),
+    progress: impl FnMut(u64, u64),
+) -> Result<Verification> {
+    verify_on(Arc::new(FsDisk), folder.as_ref(), found, progress)
+}
+
+/// [`verify`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`verify`].
+pub fn verify_on(
+    disk: Arc<dyn Disk>,
+    folder: &Path,
+    found: impl FnMut(&Finding),
+    progress: impl FnMut(u64, u64),
+) -> Result<Verification> {
+    let layout = Layout::new(folder);
+    let mut verifier = Verifier { disk: &*disk, layout, found, progress, counts: Verification::default() };
+    let opened = TileStore::open_read_only(disk.clone(), folder).and_then(|store| {
+        config_from(store.metadata(), &store.layout().metadata()).map(|config| (store, config))
+    });
+    match opened {
+        Ok((store, config)) => verifier.verify_map(&store, &config)?,
+        Err(error) => {
+            let finding = Finding::of(error)?;
+            verifier.report(finding);
+            verifier.verify_without_index()?;
+        }
+    }
+    Ok(verifier.counts)
+}
+
+struct Verifier<'a, F, P> {
+    disk: &'a dyn Disk,
+    layout: Layout,
+    found: F,
+    progress: P,
+    counts: Verification,
+}
+
+impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
+    fn report(&mut self, finding: Finding) {
+        match finding.severity {
+            Severity::Damage => self.counts.damage += 1,
+            Severity::Note => self.counts.notes += 1,
+        }
+        (self.found)(&finding);
+    }
+
+    fn damage(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
+        self.report(Finding::damage(path, tile, &FormatError::at_offset(0, reason)));
+    }
+
+    fn verify_map(&mut self, store: &TileStore, config: &MapConfig) -> Result<()> {
+        self.counts.verified = store.map_id().is_some();
+        self.counts.flush_number = store.commits().flush_number;
+        self.counts.scan_number = store.commits().scan_number;
+        if !self.counts.verified {
+            let reason =
+                "a map of the seed's own format: no checksums, so only the form of its tables is checked";
+            self.report(Finding::note(&self.layout.metadata(), None, reason));
+        }
+        let mut tiles: Vec<_> = store.tiles().collect();
+        tiles.sort_unstable();
+        self.counts.tiles = tiles.len() as u64;
+        for (done, tile) in (1..).zip(&tiles) {
+            self.verify_tile(store, config, *tile)?;
+            (self.progress)(done, tiles.len() as u64);
+        }
+        self.look_around(|tile| tiles.binary_search(&tile).is_ok())
+    }
+
+    fn verify_tile(&mut self, store: &TileStore, config: &MapConfig, tile: TileIndex) -> Result<()> {
+        let check = check_tile(self.disk, store, config, tile)?;
+        let table = match check.table {
+            Ok(table) => table,
+            Err(error) => {
+                // Told about a tile that the present writer has changed since: that is a flush, not damage.
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                return Ok(());
+            }
+        };
+        self.counts.voxels += table.table.len() as u64;
+        self.counts.table_bytes += table.file.bytes;
+        if let Some(Err(mut cause)) = check.octree
+            && !self.has_changed_since(store, tile)
+        {
+            let path = self.layout.current(tile, TileFile::Octree);
+            let mut expected = Vec::new();
+            if write_octree(config, tile, table, &mut expected).is_ok() {
+                cause.at = first_difference(self.disk, &path, &expected).unwrap_or(cause.at);
+            }
+            self.report(Finding::damage(&path, Some(tile), &cause));
+        }
+        Ok(())
+    }
+
+    /// Whether a writer has flushed a tile since the store was opened. It keeps tables for readers, not octrees.
+    fn has_changed_since(&self, store: &TileStore, tile: TileIndex) -> bool {
+        let layout = store.layout();
+        let now = crate::store::read_log(self.disk, layout).ok().flatten();
+        now.is_some_and(|(_, commits)| commits.tiles.get(&tile).copied() != store.stamp(tile))
+    }
+
+    /// Without a log, every table can only be checked by itself.
+    fn verify_without_index(&mut self) -> Result<()> {
+        let index = match Remains::read(self.disk, &self.layout) {
+            Ok(remains) => rebuild::index_of(self.disk, &self.layout, &remains, &mut |_, _| ())?,
+            // A writer is at work on what cannot be read by others; its own end will tell.
+            Err(Error::Locked { .. }) => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        let Some(Index { commits, damaged, .. }) = index else { return Ok(()) };
+        self.counts.tiles = (commits.tiles.len() + damaged.len()) as u64;
+        self.counts.voxels = commits.tiles.values().map(|stamp| stamp.voxels).sum();
+        self.counts.table_bytes = commits.tiles.values().map(|stamp| stamp.table.bytes).sum();
+        for (_, error) in damaged {
+            let finding = Finding::of(error)?;
+            self.report(finding);
+        }
+        self.look_around(|_| true)
+    }
+
+    /// Looks for what is no part of the map.
+    fn look_around(&mut self, is_known: impl Fn(TileIndex) -> bool) -> Result<()> {
+        let folder = self.layout.folder().to_owned();
+        for name in self.list(&folder)? {
+            let path = folder.join(&name);
+            match (&*name, tile_of_folder(&name)) {
+                ("metadata.json" | "commits.log" | "writer.lock", _) => {}
+                (QUARANTINE, _) => {
+                    self.report(Finding::note(&path, None, "taken out of the map by a repair"))
+                }
+                (_, Some(tile)) => self.look_into(&path, tile, is_known(tile))?,
+                (name, None) if name.ends_with(".next") => {
+                    self.report(Finding::note(&path, None, "left behind, or being written"));
+                }
+                _ => self.report(Finding::note(&path, None, "no part of a map")),
+            }
+        }
+        Ok(())
+    }
+
+    fn look_into(&mut self, folder: &Path, tile: TileIndex, is_known: bool) -> Result<()> {
+        let kind = self.disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?;
+        if kind != Some(EntryKind::Folder) {
+            if !is_known {
+                self.damage(folder, Some(tile), "something with a tile's name that is no folder");
+            }
+            return Ok(());
+        }
+        let mut is_stray = false;
+        for name in self.list(folder)? {
+            let path = folder.join(&name);
+            if name.ends_with(".next") || flush_of_kept(&name).is_some() {
+                self.report(Finding::note(
+                    &path,
+                    Some(tile),
+                    "left behind, being written, or kept for a reader",
+                ));
+            } else if TileFile::IN_ORDER.iter().all(|file| file.name() != name) {
+                self.report(Finding::note(&path, Some(tile), "no part of a map"));
+            } else {
+                is_stray |= !is_known;
+            }
+        }
+        // A writer may have added it since the log was read.
+        let is_new = || {
+            crate::store::read_log(self.disk, &self.layout)
+                .ok()
+                .flatten()
+                .is_some_and(|(_, commits)| commits.tiles.contains_key(&tile))
+        };
+        if is_stray && !is_new() {
+            let path = folder.join(TileFile::Table.name());
+            self.damage(&path, Some(tile), "commits.log does not name this tile");
+        }
+        Ok(())
+    }
+
+    fn list(&self, folder: &Path) -> Result<Vec<String>> {
+        let mut names = self.disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
+        names.sort_unstable();
+        Ok(names)
+    }
+}

@@ -1,0 +1,328 @@
+use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use crate::support::random_scans::{Random, random_scan};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use voxtile::space::TileIndex;
+use voxtile::store::tile_of_folder;
+use voxtile::upkeep::{Finding, Repair, Severity, Verification, repair_on, verify_on};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan};
+
+type Digests = BTreeMap<TileIndex, Vec<(u64, i32)>>;
+
+fn map() -> &'static Path {
+    Path::new("/map")
+}
+
+fn config() -> MapConfig {
+    MapConfig::new(0.5, 2.0).unwrap().with_range(0.0, 2.0)
+}
+
+fn scan(seed: u64) -> Scan {
+    random_scan(&mut Random(seed), [0.5, 0.5, 1.0], 2)
+}
+
+/// A map of a few tiles, flushed more than once.
+fn small_map() -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map(), config()).unwrap();
+    mapper.begin_input("random scans").unwrap();
+    for seed in [1, 4] {
+        mapper.insert_scan(&scan(seed)).unwrap();
+        mapper.flush().unwrap();
+    }
+    disk.copy()
+}
+
+/// What can be read of each tile.
+fn contents(disk: &FaultyDisk) -> voxtile::Result<Digests> {
+    let reader = MapReader::open_on(disk.shared(), map(), 4)?;
+    let mut contents = Digests::new();
+    for index in reader.tile_indices() {
+        if let Some(tile) = reader.tile(index)? {
+            let entries = tile.table().iter();
+            let entries = entries.map(|(_, e)| (e.log_odds.to_bits(), e.observation_count)).collect();
+            contents.insert(index, entries);
+        }
+    }
+    Ok(contents)
+}
+
+fn findings(disk: &FaultyDisk) -> (Verification, Vec<Finding>) {
+    let mut findings = Vec::new();
+    let verification =
+        verify_on(disk.shared(), map(), |finding| findings.push(finding.clone()), |_, _| ()).unwrap();
+    (verification, findings)
+}
+
+fn repair(disk: &FaultyDisk) -> voxtile::Result<Repair> {
+    repair_on(disk.shared(), map(), |_| (), |_, _| ())
+}
+
+fn tile_of(path: &Path) -> Option<TileIndex> {
+    tile_of_folder(path.parent()?.file_name()?.to_str()?)
+}
+
+/// Every byte of every file with one bit the other way, and every shorter length of it, also none.
+fn damages(disk: &FaultyDisk) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut damages = Vec::new();
+    for (path, bytes) in disk.files() {
+        if path.ends_with("writer.lock") {
+            continue;
+        }
+        for at in 0..bytes.len() {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 1 << (at % 8);
+            damages.push((path.clone(), flipped));
+            damages.push((path.clone(), bytes[..at].to_vec()));
+        }
+    }
+    damages
+}
+
+#[test]
+fn every_flipped_byte_and_every_truncation_is_found_named_repaired_and_never_overwritten() {
+    let whole = small_map();
+    let before = contents(&whole).unwrap();
+    assert!(before.len() >= 3);
+    let (verification, found) = findings(&whole);
+    assert!(verification.is_whole() && found.is_empty(), "{found:?}");
+    let damages = damages(&whole);
+    println!("{} damages", damages.len());
+    for (path, bytes) in damages {
+        let what = format!("{} of {} bytes", path.display(), bytes.len());
+        let disk = whole.copy();
+        disk.put(&path, &bytes);
+        let (verification, found) = findings(&disk);
+        assert!(!verification.is_whole(), "{what}");
+        let named = found.iter().any(|finding| {
+            let same_file = finding.path == path || path.parent() == Some(map());
+            finding.severity == Severity::Damage
+                && same_file
+                && (finding.offset.is_some() || finding.line.is_some())
+        });
+        assert!(named, "{what}: {found:?}");
+
+        let is_derived = path.ends_with("octree.bt");
+        let tile = tile_of(&path).filter(|_| !is_derived);
+        check_reading(&disk, &before, tile, is_derived, &what);
+        // A writer at work does not overwrite what it cannot read.
+        if let Ok(mut mapper) = OutOfCoreTileMapper::open_on(disk.shared(), map(), config()) {
+            let refused = [1, 4].map(|seed| mapper.insert_scan(&scan(seed)).is_err());
+            assert_eq!(refused.contains(&true), tile.is_some(), "{what}");
+        }
+        if !is_derived {
+            assert_eq!(disk.files()[&path], bytes, "{what}");
+        }
+
+        let repaired = repair(&disk).unwrap_or_else(|error| panic!("{what}: {error}"));
+        assert_eq!(repaired.tiles_lost, u64::from(tile.is_some()), "{what}");
+        let mut expected = before.clone();
+        expected.retain(|index, _| Some(*index) != tile);
+        assert_eq!(contents(&disk).unwrap(), expected, "{what}");
+        let (verification, found) = findings(&disk);
+        assert!(verification.is_whole(), "{what}: {found:?}");
+        assert_eq!(repair(&disk).unwrap().actions, 0, "{what}");
+        let kept =
+            disk.files().iter().any(|(path, kept)| path.starts_with("/map/quarantine") && *kept == bytes);
+        assert!(kept, "{what}");
+    }
+}
+
+/// Reading says what is damaged, and the rest goes on.
+fn check_reading(disk: &FaultyDisk, before: &Digests, tile: Option<TileIndex>, is_derived: bool, what: &str) {
+    let reader = MapReader::open_on(disk.shared(), map(), 4);
+    let Ok(reader) = reader else {
+        assert!(tile.is_none() && !is_derived, "{what}");
+        assert!(matches!(reader, Err(Error::Damaged { .. })), "{what}: {reader:?}");
+        return;
+    };
+    assert!(tile.is_some() || is_derived, "{what}: nothing noticed");
+    for &index in before.keys() {
+        match reader.tile(index) {
+            Err(Error::Damaged { tile: named, .. }) => {
+                assert_eq!((tile, named), (Some(index), tile), "{what}")
+            }
+            read => assert!(read.unwrap().is_some() && tile != Some(index), "{what}"),
+        }
+    }
+}
+
+#[test]
+fn missing_swapped_older_and_foreign_files_are_found_and_repaired() {
+    let whole = small_map();
+    let before = contents(&whole).unwrap();
+    let files = whole.files();
+    let tables: Vec<&PathBuf> = files.keys().filter(|path| path.ends_with("iwlo_meta.bin")).collect();
+    let table = tables[0];
+    let tile = tile_of(table).unwrap();
+    let other_map = small_map();
+    let older = {
+        let disk = FaultyDisk::new(Fault::None);
+        let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map(), config()).unwrap();
+        mapper.insert_scan(&scan(1)).unwrap();
+        mapper.flush().unwrap();
+        disk
+    };
+    type Case<'a> = (&'a str, Box<dyn Fn(&FaultyDisk) + 'a>, &'a str, bool);
+    let cases: Vec<Case> = vec![
+        ("a missing table", Box::new(|disk| disk.take(table)), "the file is missing", true),
+        (
+            "a missing folder",
+            Box::new(|disk| disk.take(table.parent().unwrap())),
+            "the tile's folder is missing",
+            true,
+        ),
+        (
+            "a missing octree",
+            Box::new(|disk| disk.take(&table.with_file_name("octree.bt"))),
+            "is missing",
+            false,
+        ),
+        (
+            "swapped tables",
+            Box::new(|disk| disk.put(table, &files[tables[1]])),
+            "belongs to another tile",
+            true,
+        ),
+        (
+            "a table of another map",
+            Box::new(|disk| disk.put(table, &other_map.files()[table])),
+            "the file belongs to map",
+            true,
+        ),
+        (
+            "a table of a map as it was before",
+            Box::new(|disk| disk.put(table, &older.files()[table])),
+            "the file belongs to map",
+            true,
+        ),
+        (
+            "an octree of another tile",
+            Box::new(|disk| {
+                let octree = tables[1].with_file_name("octree.bt");
+                disk.put(&table.with_file_name("octree.bt"), &files[&octree]);
+            }),
+            "",
+            false,
+        ),
+        (
+            "a missing log",
+            Box::new(|disk| disk.take(Path::new("/map/commits.log"))),
+            "the file is missing",
+            false,
+        ),
+        (
+            "missing metadata",
+            Box::new(|disk| disk.take(Path::new("/map/metadata.json"))),
+            "the file is missing",
+            false,
+        ),
+        (
+            "neither metadata nor log",
+            Box::new(|disk| {
+                disk.take(Path::new("/map/metadata.json"));
+                disk.take(Path::new("/map/commits.log"));
+            }),
+            "the file is missing",
+            false,
+        ),
+        (
+            "the log of another map",
+            Box::new(|disk| {
+                let log = Path::new("/map/commits.log");
+                disk.put(log, &other_map.files()[log]);
+            }),
+            "the log belongs to map",
+            false,
+        ),
+        (
+            "the metadata of another map",
+            Box::new(|disk| {
+                let metadata = Path::new("/map/metadata.json");
+                disk.put(metadata, &other_map.files()[metadata]);
+            }),
+            "the log belongs to map",
+            false,
+        ),
+        (
+            "a tile in the wrong folder",
+            Box::new(|disk| {
+                let folder = Path::new("/map/tile_7_7_7");
+                disk.shared().create_folder(folder).unwrap();
+                disk.put(&folder.join("iwlo_meta.bin"), &files[table]);
+            }),
+            "commits.log does not name this tile",
+            false,
+        ),
+    ];
+    for (what, damage, reason, loses_tile) in cases {
+        let disk = whole.copy();
+        damage(&disk);
+        let (verification, found) = findings(&disk);
+        assert!(!verification.is_whole(), "{what}");
+        assert!(found.iter().any(|finding| finding.reason.contains(reason)), "{what}: {found:?}");
+        let repaired = repair(&disk).unwrap_or_else(|error| panic!("{what}: {error}"));
+        assert_eq!(repaired.tiles_lost, u64::from(loses_tile), "{what}");
+        let mut expected = before.clone();
+        expected.retain(|index, _| !loses_tile || *index != tile);
+        assert_eq!(contents(&disk).unwrap(), expected, "{what}");
+        let (verification, found) = findings(&disk);
+        assert!(verification.is_whole(), "{what}: {found:?}");
+        let config = MapReader::config_of_on(disk.shared(), map()).unwrap();
+        assert_eq!((config.grid, config.sensor_model), (self::config().grid, self::config().sensor_model));
+    }
+}
+
+#[test]
+fn the_power_goes_at_every_change_of_a_repair_and_another_repair_finishes_it() {
+    let whole = small_map();
+    let before = contents(&whole).unwrap();
+    let files = whole.files();
+    let table = files.keys().find(|path| path.ends_with("iwlo_meta.bin")).unwrap();
+    let cut = |path: &Path| files[path][..files[path].len() - 1].to_vec();
+    let damaged = |paths: &[&Path]| {
+        let disk = whole.copy();
+        paths.iter().for_each(|path| disk.put(path, &cut(path)));
+        disk.put(&table.with_file_name("octree.bt.next"), b"left behind");
+        disk
+    };
+    let (log, metadata) = (Path::new("/map/commits.log"), Path::new("/map/metadata.json"));
+    let octree = table.with_file_name("octree.bt");
+    let mut points = 0;
+    let cases: [&[&Path]; 6] =
+        [&[table], &[log], &[metadata], &[log, metadata], &[&octree], &[table, log, metadata]];
+    for paths in cases {
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(1), Unsynced::Shuffled(2)] {
+            for at in 0.. {
+                let disk = damaged(paths);
+                disk.set_fault(Fault::Crashes(at));
+                let repaired = repair(&disk);
+                if !disk.has_crashed() {
+                    break;
+                }
+                points += 1;
+                let what = format!("{paths:?}, crash at {at}, {unsynced:?}");
+                assert!(repaired.is_err(), "{what}");
+                let disk = disk.after_crash(unsynced);
+                repair(&disk).unwrap_or_else(|error| panic!("{what}: {error}"));
+                let mut expected = before.clone();
+                expected
+                    .retain(|index, _| !paths.contains(&table.as_path()) || Some(*index) != tile_of(table));
+                assert_eq!(contents(&disk).unwrap(), expected, "{what}");
+                let (verification, found) = findings(&disk);
+                assert!(verification.is_whole(), "{what}: {found:?}");
+                for path in paths
+                    .iter()
+                    .filter(|path| path.parent() == Some(map()) || path.ends_with("iwlo_meta.bin"))
+                {
+                    let kept = disk
+                        .files()
+                        .into_iter()
+                        .any(|(place, bytes)| place.starts_with("/map/quarantine") && bytes == cut(path));
+                    assert!(kept, "{what}: {} is gone", path.display());
+                }
+            }
+        }
+    }
+    println!("{points} crashes");
+}
