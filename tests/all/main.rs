@@ -3,6 +3,8 @@
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;
+/// Inputs that fuzzing found worth keeping, once more.
+mod fuzz_corpus;
 /// What each folder may know.
 mod layering;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
