@@ -31,20 +31,23 @@ RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 # Keeps all that has a name in the corpus (seeds and findings), and few and small files besides.
 minimize() {
     local target=$1 program=$2 kept
-    kept=$(mktemp -d)
-    for file in corpus/"$target"/*-*; do if [[ -e $file ]]; then cp "$file" "$kept"; fi; done
-    "$program" -set_cover_merge=1 -use_counters=0 -max_len=2048 -rss_limit_mb=1024 -timeout=10 \
+    kept=target/minimized
+    rm -rf "$kept"
+    mkdir "$kept"
+    find "corpus/$target" -name '*-*' -exec cp {} "$kept" \;
+    "$program" -set_cover_merge=1 -use_counters=0 -max_len=1024 -rss_limit_mb=1024 -timeout=10 \
         "$kept" "corpus/$target" "target/corpus/$target" >"target/$target.log" 2>&1
+    # The files that reach most come first, each named by 40 digits.
+    ls -tr "$kept" | { grep -v -e - || true; } | tail -n +49 | while read -r file; do rm "$kept/$file"; done
     rm -r "corpus/$target"
     mv "$kept" "corpus/$target"
-    chmod 755 "corpus/$target"
-    echo "$target: $(find "corpus/$target" -type f | wc -l) files, $(du -sb "corpus/$target" | cut -f1) bytes"
+    printf '%-10s %3d files\n' "$target" "$(find "corpus/$target" -type f | wc -l)"
 }
 
 fuzz() {
     local target=$1 program=$2 dictionary=() outcome=
     if [[ -e dictionaries/$target.dict ]]; then dictionary=("-dict=dictionaries/$target.dict"); fi
-    "$program" -max_total_time="$seconds" -max_len=65536 -timeout=10 -rss_limit_mb=1024 -malloc_limit_mb=512 \
+    "$program" -max_total_time="$seconds" -max_len=65536 -timeout=10 -rss_limit_mb=1024 \
         -artifact_prefix="artifacts/$target/" "${dictionary[@]}" \
         "target/corpus/$target" "corpus/$target" >"target/$target.log" 2>&1 || outcome="FINDING, see target/$target.log"
     # The program leaves its numbers in the last line that has them, and its runs as `#N`.

@@ -8,7 +8,7 @@ use std::alloc::System;
 pub mod targets;
 
 /// No input of 64 KiB may need more memory: beyond it an allocation fails, which is a finding.
-const MAX_BYTES: usize = 256 << 20;
+const MAX_BYTES: usize = 64 << 20;
 
 #[global_allocator]
 static ALLOCATOR: Cap<System> = Cap::new(System, MAX_BYTES);
