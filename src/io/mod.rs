@@ -20,7 +20,9 @@ mod voxel_writer;
 
 pub use pcd::{PcdCloud, read_pcd};
 pub use points::read_points;
-pub use poses::read_poses;
+pub use poses::{parse_poses, read_poses};
+pub use scan_graph::read_scan_graph;
+pub use scan_log::read_scan_log;
 pub use sensor_scan::SensorScan;
 pub use source::{ScanSource, open_scans};
 pub use voxel_writer::{VoxelFormat, VoxelRecord, VoxelWriter};

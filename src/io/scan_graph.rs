@@ -4,21 +4,35 @@ use super::sensor_scan::SensorScan;
 use super::source::ScanSource;
 use crate::error::{Error, FormatError, Result};
 use nalgebra::{Isometry3, Quaternion, Translation3};
-use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// OctoMap's binary scan graph, as `ScanGraph::writeBinary` writes it. Its edges are not read.
+/// Reads OctoMap's binary scan graph of `file_bytes` bytes, as `ScanGraph::writeBinary` writes it, scan by scan. Its
+/// edges are not read.
 ///
+/// `path` names the stream in errors; it is opened for the fingerprint only. Reads are small: `input` should be buffered.
+///
+/// # Errors
+///
+/// A stream that fails or ends before its first four bytes; what is wrong with a scan comes with that scan.
+pub fn read_scan_graph<R: Read>(input: R, file_bytes: u64, path: &Path) -> Result<impl ScanSource + use<R>> {
+    let mut graph = ScanGraph { path: path.to_owned(), input, offset: 0, file_bytes, nodes: 0, done: 0 };
+    // An empty graph is an empty file.
+    if file_bytes > 0 {
+        graph.nodes = u32::from_le_bytes(graph.bytes()?);
+    }
+    Ok(graph)
+}
+
 /// ```text
 /// count u32
 /// node   points u32, each: i32 3, x y z f64
 ///        pose: i32 3, x y z f64; i32 4, quaternion w x y z f64
 ///        id u32
 /// ```
-pub(super) struct ScanGraph {
+struct ScanGraph<R> {
     path: PathBuf,
-    input: BufReader<File>,
+    input: R,
     offset: u64,
     file_bytes: u64,
     nodes: u32,
@@ -27,19 +41,7 @@ pub(super) struct ScanGraph {
 
 const POINT_BYTES: u64 = 28;
 
-impl ScanGraph {
-    pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
-        let file_bytes = file.metadata().map_err(|error| Error::io(path, "look at", error))?.len();
-        let input = BufReader::with_capacity(1 << 16, file);
-        let mut graph = Self { path: path.to_owned(), input, offset: 0, file_bytes, nodes: 0, done: 0 };
-        // An empty graph is an empty file.
-        if file_bytes > 0 {
-            graph.nodes = u32::from_le_bytes(graph.bytes()?);
-        }
-        Ok(graph)
-    }
-
+impl<R: Read> ScanGraph<R> {
     fn bytes<const N: usize>(&mut self) -> Result<[u8; N]> {
         let mut bytes = [0; N];
         if self.offset + N as u64 > self.file_bytes {
@@ -68,7 +70,7 @@ impl ScanGraph {
     }
 }
 
-impl ScanSource for ScanGraph {
+impl<R: Read> ScanSource for ScanGraph<R> {
     fn len_hint(&self) -> Option<usize> {
         Some(self.nodes as usize)
     }

@@ -4,17 +4,21 @@ use super::source::ScanSource;
 use crate::error::{Error, FormatError, Result};
 use crate::maths::sin_cos;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
-use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-/// OctoMap's scan log, a text: `NODE x y z roll pitch yaw` begins a scan, its points follow as `x y z`, in the frame
-/// of the node. Empty lines and those that begin with `#` or a blank are skipped, as OctoMap skips them.
+/// Reads OctoMap's scan log, a text: `NODE x y z roll pitch yaw` begins a scan, its points follow as `x y z`, in the
+/// frame of the node. Empty lines and those that begin with `#` or a blank are skipped, as OctoMap skips them.
 ///
-/// Numbers are read as `f32`, as OctoMap does, so that log and graph give the same map.
-pub(super) struct ScanLog {
+/// Numbers are read as `f32`, as OctoMap does, so that log and graph give the same map. `path` names the stream in
+/// errors; it is opened for the fingerprint only.
+pub fn read_scan_log<R: BufRead>(input: R, path: &Path) -> impl ScanSource + use<R> {
+    ScanLog { path: path.to_owned(), input, line: 0, pose: None, done: 0 }
+}
+
+struct ScanLog<R> {
     path: PathBuf,
-    input: BufReader<File>,
+    input: R,
     line: u64,
     /// Pose of the scan whose points come next.
     pose: Option<Isometry3<f64>>,
@@ -24,13 +28,7 @@ pub(super) struct ScanLog {
 /// A longer line is none of a scan log.
 const MAX_LINE_BYTES: u64 = 1 << 16;
 
-impl ScanLog {
-    pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
-        let input = BufReader::new(file);
-        Ok(Self { path: path.to_owned(), input, line: 0, pose: None, done: 0 })
-    }
-
+impl<R: BufRead> ScanLog<R> {
     /// The next line with content; `None` at the end.
     fn next_line(&mut self) -> Result<Option<String>> {
         loop {
@@ -77,7 +75,7 @@ impl ScanLog {
     }
 }
 
-impl ScanSource for ScanLog {
+impl<R: BufRead> ScanSource for ScanLog<R> {
     fn len_hint(&self) -> Option<usize> {
         None
     }

@@ -1,8 +1,10 @@
 use super::pcd_folder::PcdFolder;
-use super::scan_graph::ScanGraph;
-use super::scan_log::ScanLog;
+use super::scan_graph::read_scan_graph;
+use super::scan_log::read_scan_log;
 use super::sensor_scan::SensorScan;
 use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 /// Scans one at a time, in order.
@@ -52,6 +54,10 @@ pub trait ScanSource {
 pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource>> {
     let metadata = std::fs::metadata(path).map_err(|error| Error::io(path, "open", error))?;
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let open = || match File::open(path) {
+        Ok(file) => Ok(BufReader::with_capacity(1 << 16, file)),
+        Err(error) => Err(Error::io(path, "open", error)),
+    };
     let needs_no_poses = |kind: &str| match poses {
         None => Ok(()),
         Some(_) => {
@@ -63,11 +69,11 @@ pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSourc
         "pcd" => Ok(Box::new(PcdFolder::open_file(path, poses)?)),
         "graph" => {
             needs_no_poses("scan graph")?;
-            Ok(Box::new(ScanGraph::open(path)?))
+            Ok(Box::new(read_scan_graph(open()?, metadata.len(), path)?))
         }
         "log" => {
             needs_no_poses("scan log")?;
-            Ok(Box::new(ScanLog::open(path)?))
+            Ok(Box::new(read_scan_log(open()?, path)))
         }
         _ => {
             let reason = "not a folder of .pcd files, nor a .pcd, .graph or .log file";

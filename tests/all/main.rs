@@ -7,6 +7,8 @@ mod cli;
 mod corruption;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
 mod faults;
+/// Inputs that fuzzing found worth keeping, once more.
+mod fuzz_corpus;
 /// What each folder may know.
 mod layering;
 /// The same sentences about every mapper: equal to the naive one, to the bit.

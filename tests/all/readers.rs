@@ -3,17 +3,17 @@ use crate::support::shared_data;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
-use voxtile::io::{SensorScan, open_scans, read_pcd, read_poses};
+use voxtile::io::{SensorScan, open_scans, parse_poses, read_pcd, read_poses};
 
 const HEADER: &str =
     "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n";
 
-fn points(count: usize) -> Vec<[f32; 4]> {
+pub fn points(count: usize) -> Vec<[f32; 4]> {
     let mut random = Random(9);
     (0..count).map(|_| [0; 4].map(|_| random.between(-50.0, 50.0) as f32)).collect()
 }
 
-fn pcd(encoding: &str, points: &[[f32; 4]]) -> Vec<u8> {
+pub fn pcd(encoding: &str, points: &[[f32; 4]]) -> Vec<u8> {
     let count = points.len();
     let mut file = format!(
         "{HEADER}WIDTH {count}\nHEIGHT 1\nVIEWPOINT 1 2 3 0 0 0 1\nPOINTS {count}\nDATA {encoding}\n"
@@ -94,6 +94,7 @@ fn wrong_pcd_files_are_told_what_is_wrong() {
         ("POINTS 3", "POINTS 4", "POINTS 4 is not WIDTH times HEIGHT, 3"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2", "VIEWPOINT needs seven finite numbers"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 0 0 0", "a quaternion of no length"),
+        ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 1e300 0 0", "a quaternion too long to be a rotation"),
         ("VERSION", "VERSOIN", "line 2: `VERSOIN` is no key"),
     ] {
         let error = changed(from, to);
@@ -151,6 +152,7 @@ fn poses_match_the_files_or_both_counts_are_told() {
         ("0 1 0 0 0 0 0 1\n", "1 poses for 3 scan files"),
         ("0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n", "4 poses for 3 scan files"),
         ("0 1 0 0 0 0 0 0\n", "line 1: a quaternion of no length"),
+        ("0 1 0 0 0 0 1e300 0\n", "line 1: a quaternion too long to be a rotation"),
         ("0 1 0 NaN 0 0 0 1\n", "line 1: NaN in a pose"),
         ("0 1 0\n", "line 1: 3 numbers; a pose has 8 (TUM) or 12 (KITTI)"),
         ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the 3x3 part of the matrix is not a rotation"),
@@ -160,6 +162,13 @@ fn poses_match_the_files_or_both_counts_are_told() {
         let error = open_scans(folder.path(), None).err().unwrap().to_string();
         assert!(error.contains(message), "{error}");
     }
+}
+
+#[test]
+fn a_matrix_that_is_a_rotation_to_a_few_digits_gives_a_pose_that_does_not_scale() {
+    let poses = parse_poses("0.6004 -0.8 0 1 0.8 0.6004 0 2 0 0 1.0004 3\n").unwrap();
+    assert!((poses[0].rotation.norm() - 1.0).abs() < 1e-15);
+    assert!(((poses[0] * nalgebra::Point3::new(1.0, 0.0, 0.0)).x - 1.6).abs() < 1e-3);
 }
 
 #[test]
@@ -190,7 +199,7 @@ fn the_real_scan_graph_is_read_to_its_end() {
 }
 
 /// A graph of two scans, as OctoMap writes it.
-fn graph() -> Vec<u8> {
+pub fn graph() -> Vec<u8> {
     let mut file = 2_u32.to_le_bytes().to_vec();
     let vector = |file: &mut Vec<u8>, numbers: &[f64]| {
         file.extend((numbers.len() as i32).to_le_bytes());
@@ -239,6 +248,11 @@ fn graphs_and_logs_are_read_and_hostile_ones_are_errors() {
         fs::write(&path, &graph()[..length]).unwrap();
         assert!(read(&path).is_err(), "cut to {length}");
     }
+    let mut endless = graph();
+    let qx = endless.len() - 4 - 4 - 24;
+    endless[qx..qx + 8].copy_from_slice(&1e300_f64.to_le_bytes());
+    fs::write(&path, endless).unwrap();
+    assert!(read(&path).unwrap_err().to_string().contains("a quaternion too long to be a rotation"));
     let mut bomb = graph();
     bomb[4..8].copy_from_slice(&u32::MAX.to_le_bytes());
     fs::write(&path, bomb).unwrap();

@@ -1,0 +1,126 @@
+//! Small valid files of every format, from which fuzzing begins.
+
+use super::targets::{TILES, entries_end, grid};
+use crate::readers::{graph, pcd, points};
+use std::fs;
+use tempfile::TempDir;
+use voxtile::octree::{Octree, write_bt, write_bt_unpruned, write_ot};
+use voxtile::space::{MortonCode, TileIndex, VoxelKey};
+use voxtile::store::{Layout, TileFile};
+use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
+
+/// Target, name and content of seeds.
+pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;
+
+/// Every seed.
+pub fn all() -> Seeds {
+    [octrees(), map_files(), clouds(), scans(), texts()].concat()
+}
+
+fn octrees() -> Seeds {
+    let voxel = |x: u16, y: u16, z: u16, value| (VoxelKey([32768 + x, 32768 + y, 32768 + z]).morton(), value);
+    let few = Octree::from_sorted([voxel(0, 0, 0, 1.5), voxel(1, 0, 0, -0.5), voxel(0, 1, 0, 0.0)]);
+    let cubes = Octree::from_sorted((0..72).map(|code| (MortonCode(code), 1.0 + (code / 8) as f32)));
+    let bt = |tree| {
+        let mut bytes = Vec::new();
+        write_bt(tree, 0.1, 0.0, &mut bytes).unwrap();
+        bytes
+    };
+    let ot = |tree| {
+        let mut bytes = Vec::new();
+        write_ot(tree, 0.1, &mut bytes).unwrap();
+        bytes
+    };
+    let mut unpruned = Vec::new();
+    write_bt_unpruned(&cubes, 0.05, 0.0, &mut unpruned).unwrap();
+    let legacy = [&3_i32.to_le_bytes()[..], &0.25_f64.to_le_bytes(), &3_u32.to_le_bytes(), &[2, 64]].concat();
+    let node = |value: f32, mask| [value.to_le_bytes().as_slice(), b"RGB", &[mask]].concat();
+    let colored = [
+        b"# Octomap OcTree file\nid ColorOcTree\nsize 2\nres 1\ndata\n".to_vec(),
+        node(2.0, 4),
+        node(-1.0, 0),
+    ];
+    let world = b"# Octomap OcTree binary file\nres 1e-05 id 1\nsize 1\n#\ndata\n\0\0";
+    vec![
+        ("bt", "empty", bt(&Octree::new())),
+        ("bt", "few", bt(&few)),
+        ("bt", "unpruned", unpruned),
+        ("bt", "legacy", legacy),
+        ("bt", "world", world.to_vec()),
+        ("ot", "empty", ot(&Octree::new())),
+        ("ot", "few", ot(&few)),
+        ("ot", "cubes", ot(&cubes)),
+        ("ot", "colored", colored.concat()),
+    ]
+}
+
+/// The files of a map of two scans, each in a tile of its own and flushed alone. The first byte is the choice that
+/// the targets of checksummed formats take.
+fn map_files() -> Seeds {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path().join("map");
+    let grid = grid();
+    let config = MapConfig::new(grid.resolution_m(), grid.tile_size_m()).unwrap().with_range(0.0, 1.0);
+    let mut mapper = OutOfCoreTileMapper::create(&folder, config).unwrap();
+    mapper.begin_input("a \"name\"\n").unwrap();
+    let layout = Layout::new(&folder);
+    let read = |path| fs::read(path).unwrap();
+    let empty = read(layout.metadata());
+    for tile in &TILES[..2] {
+        let origin = tile.to_array().map(|index| (f64::from(index) + 0.5) * grid.tile_size_m());
+        let [x, y, z] = origin;
+        let points = vec![[x + 0.3, y, z], [x, y - 0.2, z + 0.2]];
+        mapper.insert_scan(&Scan { origin, points, intensities: None }).unwrap();
+        mapper.flush().unwrap();
+    }
+    let table = |tile: TileIndex| read(layout.current(tile, TileFile::Table));
+    let (first, second) = (table(TILES[0]), table(TILES[1]));
+    let seeds_own = &first[..entries_end(&first).expect("a whole table")];
+    let metadata = read(layout.metadata());
+    let old = br#"{"version": "1.0", "resolution": 0.05, "tile_size": 10.0, "bounds": {"min": [0, -1, 0], "max": [5, 3, 2]}}"#;
+    let log = read(layout.commit_log());
+    let chosen = |choice: u8, bytes: &[u8]| [&[choice], bytes].concat();
+    vec![
+        ("table", "sealed", chosen(1, &first)),
+        ("table", "plain", chosen(0, &first)),
+        ("table", "other-tile", chosen(3, &second)),
+        ("table", "no-trailer", chosen(0, seeds_own)),
+        ("metadata", "sealed", chosen(1, &metadata)),
+        ("metadata", "plain", chosen(0, &metadata)),
+        ("metadata", "empty", chosen(1, &empty)),
+        ("metadata", "no-ext", chosen(0, old)),
+        ("commit_log", "sealed", chosen(1, &log)),
+        ("commit_log", "plain", chosen(0, &log)),
+        ("commit_log", "torn", chosen(1, &log[..log.len() - 1])),
+        ("commit_log", "zeros", chosen(1, &[&log, &[0; 16][..]].concat())),
+    ]
+}
+
+fn clouds() -> Seeds {
+    let types = b"FIELDS i _ z y x\nSIZE 2 1 8 4 4\nTYPE U U F I F\nCOUNT 1 3 1 1 1\nWIDTH 1\nHEIGHT 1\nDATA binary\n";
+    let columns = b"COLUMNS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 8\nDATA binary_compressed\n";
+    // Sizes, then 96 zeros: a literal and two copies of what was just written.
+    let packed = [7, 0, 0, 0, 96, 0, 0, 0, 0, 0, 7 << 5, 81, 0, 3 << 5, 0];
+    vec![
+        ("pcd", "ascii", pcd("ascii", &points(2))),
+        ("pcd", "binary", pcd("binary", &points(2))),
+        ("pcd", "literal", pcd("binary_compressed", &points(2))),
+        ("pcd", "packed", [&columns[..], &packed].concat()),
+        ("pcd", "types", [&types[..], &[1; 21]].concat()),
+    ]
+}
+
+fn scans() -> Seeds {
+    let log = "# a log\nNODE 10 0 1 0 0 1.2\n1 2 3\n-1 0.5 0.25\n\n skipped\nNODE 0 0 0 0.1 -3 0\n";
+    let no_points = [&1_u32.to_le_bytes(), &[0; 4], &graph()[64..132]].concat();
+    vec![("graph", "two", graph()), ("graph", "no-points", no_points), ("log", "two", log.into())]
+}
+
+fn texts() -> Seeds {
+    vec![
+        ("poses", "tum", "# t x y z qx qy qz qw\n0 1 0 0 0 0 0 1\n\n2 3 0 0 0 0 0.6 0.8\n".into()),
+        ("poses", "kitti", "1 0 0 0.5 0 1 0 -2 0 0 1 0\n0 -1 0 1 1 0 0 2 0 0 1 3\n".into()),
+        ("points", "columns", "1 2 3\n-0.5\t1e3 nan 4\n\n# more\n0 0 0\n".into()),
+        ("points", "csv", "x,y,z\n1,2,3\r\n4;5;6\n".into()),
+    ]
+}

@@ -1,0 +1,243 @@
+//! Bytes of any kind into every reader of a format: none may panic, hang or take much memory, and what is read must
+//! hold together. The result says whether the bytes were read.
+//!
+//! In formats with checksums the first byte of the input chooses: where its lowest bit is set, the checksums are
+//! made right before the rest is read, so that what lies behind them is reached.
+
+use nalgebra::Isometry3;
+use std::path::Path;
+use voxtile::io::{PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log};
+use voxtile::octree::{
+    OctreeFile, OctreeFormat, read, read_with_limit, write_bt, write_bt_unpruned, write_ot,
+};
+use voxtile::space::{Grid, TileIndex};
+use voxtile::store::{CommitLog, Metadata};
+use voxtile::tile::format::{TRAILER_BYTES, read_table, write_table};
+
+pub type Target = fn(&[u8]) -> bool;
+
+/// Every target by the name of its corpus.
+pub const TARGETS: [(&str, Target); 10] = [
+    ("bt", octree),
+    ("ot", octree),
+    ("table", table),
+    ("metadata", metadata),
+    ("commit_log", commit_log),
+    ("pcd", pcd),
+    ("graph", graph),
+    ("log", log),
+    ("poses", poses),
+    ("points", points),
+];
+
+const MAX_TREE_BYTES: usize = 64 << 20;
+
+/// OctoMap's `.bt` and `.ot`: what was read comes back from what is written of it.
+pub fn octree(data: &[u8]) -> bool {
+    let Ok(file) = read_with_limit(data, MAX_TREE_BYTES) else { return false };
+    let written = octree_bytes(&file);
+    let again = read(written.as_slice()).expect("what was written is read");
+    assert!(again.tree.leaves().eq(file.tree.leaves()));
+    assert_eq!(again.tree.node_count(), file.tree.node_count());
+    assert_eq!(octree_bytes(&again), written);
+
+    let mut pruned = Vec::new();
+    write_bt(&file.tree, file.resolution_m, 0.0, &mut pruned).expect("memory takes all");
+    let pruned = read(pruned.as_slice()).expect("what was written is read").tree;
+    assert_eq!(pruned.expanded_leaf_count(), file.tree.expanded_leaf_count());
+    let mut normal = file.tree.clone();
+    normal.normalize();
+    assert_eq!(normal.expanded_leaf_count(), file.tree.expanded_leaf_count());
+    let states = file.tree.count_voxels(0.0);
+    assert_eq!(normal.count_voxels(0.0), states);
+    assert_eq!(states.occupied + states.free, file.tree.expanded_leaf_count());
+    // A lone root has no bits in `.bt` that could say that it is free.
+    if file.tree.node_count() > 1 {
+        assert_eq!(pruned.count_voxels(0.0), states);
+    }
+    true
+}
+
+fn octree_bytes(file: &OctreeFile) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    match file.format {
+        OctreeFormat::Bt => write_bt_unpruned(&file.tree, file.resolution_m, 0.0, &mut bytes),
+        OctreeFormat::Ot => write_ot(&file.tree, file.resolution_m, &mut bytes),
+    }
+    .expect("memory takes all");
+    bytes
+}
+
+/// Tiles of the table; two bits of the first byte choose one.
+pub const TILES: [TileIndex; 4] = [
+    TileIndex::new(0, 0, 0),
+    TileIndex::new(-1, 7, -3),
+    TileIndex::new(1023, -1024, 2_000_000),
+    TileIndex::new(i32::MAX, i32::MIN, 67_108_863),
+];
+
+/// The grid of [`TILES`].
+pub fn grid() -> Grid {
+    Grid::new(0.1, 3.2).expect("32 voxels along a tile")
+}
+
+/// `iwlo_meta.bin`: the same bytes come from what was read.
+pub fn table(data: &[u8]) -> bool {
+    let Some((&choice, file)) = data.split_first() else { return false };
+    let mut file = file.to_vec();
+    if choice & 1 == 1 {
+        seal_table(&mut file);
+    }
+    let voxels = grid().voxels_of_tile(TILES[usize::from(choice >> 1 & 3)]);
+    let read = |bytes: &[u8]| read_table(&mut &bytes[..], bytes.len() as u64, &voxels);
+    let Ok(decoded) = read(&file) else { return false };
+    let entries = file.len() - decoded.trailer.as_ref().map_or(0, |trailer| trailer.bytes() as usize);
+    assert_eq!(entries_end(&file), Some(entries));
+    assert_eq!(decoded.table.iter().count(), decoded.table.len());
+    if let Some(trailer) = decoded.trailer {
+        let mut written = Vec::new();
+        write_table(&decoded.table, trailer.clone(), &mut written).expect("memory takes all");
+        assert_eq!(written, file);
+        assert_eq!(read(&written).expect("what was written is read").trailer, Some(trailer));
+    }
+    true
+}
+
+/// Where the entries of a table end.
+pub fn entries_end(file: &[u8]) -> Option<usize> {
+    let count = u64::from_le_bytes(file.get(8..16)?.try_into().ok()?);
+    usize::try_from(count.checked_mul(18)?.checked_add(16)?).ok()
+}
+
+/// Makes the checksums of a table right, and the length of the parameters behind its trailer.
+fn seal_table(file: &mut [u8]) {
+    let Some((entries, behind)) = entries_end(file).and_then(|end| file.split_at_mut_checked(end)) else {
+        return;
+    };
+    let Some((trailer, parameters)) = behind.split_at_mut_checked(TRAILER_BYTES) else { return };
+    trailer[44..48].copy_from_slice(&crc32fast::hash(entries).to_le_bytes());
+    trailer[60..64].copy_from_slice(&(parameters.len() as u32).to_le_bytes());
+    trailer[64..68].copy_from_slice(&crc32fast::hash(parameters).to_le_bytes());
+    seal(trailer);
+}
+
+/// Makes the last four bytes the CRC-32 of those before.
+fn seal(bytes: &mut [u8]) {
+    if let Some((content, crc)) = bytes.split_last_chunk_mut::<4>() {
+        *crc = crc32fast::hash(content).to_le_bytes();
+    }
+}
+
+/// `metadata.json`: what was read comes back from its own text.
+pub fn metadata(data: &[u8]) -> bool {
+    let Some((&choice, text)) = data.split_first() else { return false };
+    let Ok(text) = str::from_utf8(text) else { return false };
+    let read =
+        if choice & 1 == 1 { Metadata::from_text(&sealed_metadata(text)) } else { Metadata::from_text(text) };
+    let Ok(metadata) = read else { return false };
+    let text = metadata.to_text();
+    let again = Metadata::from_text(&text).expect("what was written is read");
+    assert_eq!(again, metadata);
+    assert_eq!(again.to_text(), text);
+    true
+}
+
+fn sealed_metadata(text: &str) -> String {
+    const KEY: &str = "\"crc32\": \"";
+    let Some(key) = text.rfind(KEY) else { return text.to_owned() };
+    let guarded = &text[..key + KEY.len()];
+    format!("{guarded}{:08x}\"\n  }}\n}}\n", crc32fast::hash(guarded.as_bytes()))
+}
+
+/// `commits.log`: its valid part alone says the same.
+pub fn commit_log(data: &[u8]) -> bool {
+    let Some((&choice, file)) = data.split_first() else { return false };
+    let mut file = file.to_vec();
+    if choice & 1 == 1 {
+        seal_commit_log(&mut file);
+    }
+    let read = |bytes: &[u8]| CommitLog::read(&mut &bytes[..], bytes.len() as u64);
+    let Ok((log, commits)) = read(&file) else { return false };
+    assert!(log.bytes() <= file.len() as u64);
+    let (again, same) = read(&file[..log.bytes() as usize]).expect("the valid part is read");
+    assert_eq!(again, log);
+    assert_eq!((same.flush_number, same.scan_number), (commits.flush_number, commits.scan_number));
+    assert_eq!((same.tiles, same.last_changed), (commits.tiles, commits.last_changed));
+    true
+}
+
+fn seal_commit_log(file: &mut [u8]) {
+    const HEADER_BYTES: usize = 32;
+    let Some((header, mut records)) = file.split_at_mut_checked(HEADER_BYTES) else { return };
+    seal(header);
+    while let Some((lengths, rest)) = records.split_first_chunk_mut::<8>() {
+        let payload_bytes = u32::from_le_bytes([lengths[0], lengths[1], lengths[2], lengths[3]]);
+        if payload_bytes == 0 {
+            return;
+        }
+        lengths[4..].copy_from_slice(&(!payload_bytes).to_le_bytes());
+        let Some((payload, rest)) = rest.split_at_mut_checked(payload_bytes as usize + 4) else { return };
+        seal(payload);
+        records = rest;
+    }
+}
+
+/// A PCD file in any of its encodings.
+pub fn pcd(data: &[u8]) -> bool {
+    let Ok(PcdCloud { points, intensities, world_from_sensor }) = read_pcd(data) else { return false };
+    assert!(intensities.is_none_or(|intensities| intensities.len() == points.len()));
+    assert_is_pose(&world_from_sensor);
+    true
+}
+
+/// OctoMap's scan graph, scan by scan.
+pub fn graph(data: &[u8]) -> bool {
+    const POINT_BYTES: usize = 28;
+    let source = read_scan_graph(data, data.len() as u64, Path::new("fuzz.graph"));
+    source.is_ok_and(|source| {
+        let points = all_points(source);
+        assert!(points.is_none_or(|points| points * POINT_BYTES <= data.len()));
+        points.is_some()
+    })
+}
+
+/// OctoMap's scan log, scan by scan.
+pub fn log(data: &[u8]) -> bool {
+    let points = all_points(read_scan_log(data, Path::new("fuzz.log")));
+    assert!(points.is_none_or(|points| points <= data.len()));
+    points.is_some()
+}
+
+/// Number of points in all scans; `None` if one could not be read.
+fn all_points(mut source: impl ScanSource) -> Option<usize> {
+    let len_hint = source.len_hint();
+    let (mut scans, mut points) = (0, 0);
+    while let Some(scan) = source.next_scan().ok()? {
+        assert_is_pose(&scan.world_from_sensor);
+        scans += 1;
+        points += scan.points_in_sensor.len();
+    }
+    assert!(len_hint.is_none_or(|hint| hint == scans));
+    Some(points)
+}
+
+/// Poses of TUM or KITTI, a text.
+pub fn poses(data: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(data);
+    let Ok(poses) = parse_poses(&text) else { return false };
+    assert!(poses.len() <= text.lines().count());
+    poses.iter().for_each(assert_is_pose);
+    true
+}
+
+/// Points, a text.
+pub fn points(data: &[u8]) -> bool {
+    let Ok(Ok(points)) = read_points(data) else { return false };
+    assert!(points.len() <= data.len());
+    true
+}
+
+fn assert_is_pose(pose: &Isometry3<f64>) {
+    assert!(pose.translation.vector.iter().all(|number| number.is_finite()), "{pose}");
+    assert!((pose.rotation.norm() - 1.0).abs() < 1e-6, "{pose}");
+}
