@@ -1,0 +1,57 @@
+use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Numbers from a seed (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ z >> 31) % end
+    }
+}
+
+#[test]
+fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
+    let scans = Scans::new(24, 1);
+    let how = ["--resume", "--flush-every", "2"];
+    let whole_us = {
+        let (_folder, map) = folder_for_maps();
+        let started = Instant::now();
+        assert!(scans.build(&map, &how).status().unwrap().success());
+        started.elapsed().as_micros() as u64
+    };
+    let kills = setting("VOXTILE_KILLS", 50);
+    let mut random = Random(setting("VOXTILE_SEED", 1));
+    let (mut killed, mut lives, mut in_vain) = (0, 0, 0);
+    while killed < kills {
+        let (_folder, map) = folder_for_maps();
+        lives += 1;
+        loop {
+            let mut child = scans.build(&map, &how).spawn().unwrap();
+            // Most of them while the process begins, makes or opens the map and recovers it.
+            let within_us = whole_us / [2, 8, 64][random.below(3) as usize];
+            sleep(Duration::from_micros(random.below(within_us.max(1))));
+            let has_ended = child.try_wait().unwrap().is_some();
+            child.kill().unwrap();
+            let output = child.wait_with_output().unwrap();
+            if has_ended {
+                assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+                break;
+            }
+            killed += 1;
+            match digest(&map) {
+                Ok((number, digest)) => assert_eq!(digest, scans.digests[number], "after {number} scans"),
+                Err(message) if message.contains("no map here") => in_vain += 1,
+                Err(message) => panic!("kill {killed}: {message}"),
+            }
+        }
+        assert_eq!(digest(&map), Ok((24, scans.digests[24].clone())));
+        assert!(is_whole(&map));
+    }
+    println!("{killed} kills in {lives} builds, {in_vain} of them before there was a map");
+}

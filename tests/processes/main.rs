@@ -1,0 +1,16 @@
+//! Real processes: killed, ended, reading beside a writer.
+//!
+//! The short form takes part in every test run. The long form:
+//!
+//! ```text
+//! VOXTILE_KILLS=1000 VOXTILE_READER_SECONDS=60 cargo test --release --test processes
+//! ```
+#![cfg(unix)]
+
+/// SIGKILL at random times, resumed until the end.
+mod killed;
+/// Readers beside a writer see one flush whole.
+mod readers;
+/// SIGTERM and Ctrl-C: flushed and ended.
+mod stopped;
+mod survey;

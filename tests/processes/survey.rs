@@ -1,0 +1,99 @@
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+use voxtile::io::open_scans;
+use voxtile::simulation::{City, Drive, Lidar, Survey};
+use voxtile::{InMemoryMapper, MapConfig, Mapper, Questions};
+
+/// A folder of scans, and the digest of their map after each number of them.
+pub struct Scans {
+    pub folder: TempDir,
+    pub digests: Vec<String>,
+}
+
+pub const RESOLUTION_M: f64 = 0.5;
+const MAX_RANGE_M: f64 = 20.0;
+
+impl Scans {
+    /// So many scans of a drive through a made-up city, mapped `rounds` times one after the other.
+    pub fn new(count: usize, rounds: usize) -> Self {
+        let folder = TempDir::new().unwrap();
+        let survey = Survey::new(City::new(3), Drive::new(3, 2.0), Lidar::demo(), 3);
+        for (number, scan) in survey.take(count).enumerate() {
+            let points: Vec<_> = scan.points.iter().step_by(9).collect();
+            fs::write(folder.path().join(format!("{number:04}.pcd")), pcd(scan.origin, &points)).unwrap();
+        }
+        let config = MapConfig::new(RESOLUTION_M, 10.0).unwrap().with_range(0.0, MAX_RANGE_M);
+        let mut mapper = InMemoryMapper::new(config).unwrap();
+        let mut digests = vec![mapper.digest().unwrap().to_string()];
+        for _ in 0..rounds {
+            let mut source = open_scans(folder.path(), None).unwrap();
+            while let Some(scan) = source.next_scan().unwrap() {
+                mapper.insert_scan(&scan.into_scan()).unwrap();
+                digests.push(mapper.digest().unwrap().to_string());
+            }
+        }
+        Self { folder, digests }
+    }
+
+    /// The command that builds the map with little memory, so that it evicts all the while.
+    pub fn build(&self, map: &Path, how: &[&str]) -> Command {
+        let mut command = voxtile();
+        let resolution = RESOLUTION_M.to_string();
+        let range = MAX_RANGE_M.to_string();
+        command.arg("build").arg(self.folder.path()).arg("-o").arg(map);
+        command.args(["--resolution", &resolution, "--max-range", &range, "--cache-tiles", "4"]);
+        command.args(how).stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    }
+}
+
+/// The command under test.
+pub fn voxtile() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_voxtile"))
+}
+
+/// Scan number and digest of a map, from a process of its own.
+pub fn digest(map: &Path) -> Result<(usize, String), String> {
+    let output = voxtile().arg("digest").arg(map).arg("--json").output().unwrap();
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let scan_number = answer["scan_number"].as_u64().unwrap() as usize;
+    Ok((scan_number, answer["digest"].as_str().unwrap().to_owned()))
+}
+
+/// Whether `voxtile verify` finds the map whole.
+pub fn is_whole(map: &Path) -> bool {
+    voxtile().arg("verify").arg(map).stdout(Stdio::null()).status().unwrap().success()
+}
+
+/// A number from the environment, or the short form's.
+pub fn setting(name: &str, short: u64) -> u64 {
+    std::env::var(name).map_or(short, |value| value.parse().expect("a number"))
+}
+
+/// A place for maps on the disk that is built on, which syncs are real on.
+pub fn folder_for_maps() -> (TempDir, PathBuf) {
+    let folder = TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let map = folder.path().join("map");
+    (folder, map)
+}
+
+fn pcd(origin: [f64; 3], points_in_world: &[&[f64; 3]]) -> Vec<u8> {
+    let [x, y, z] = origin;
+    let count = points_in_world.len();
+    let header = format!(
+        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {count}\nHEIGHT 1\n\
+         VIEWPOINT {x} {y} {z} 1 0 0 0\nPOINTS {count}\nDATA binary\n"
+    );
+    let mut bytes = header.into_bytes();
+    for point in points_in_world {
+        for axis in 0..3 {
+            bytes.extend_from_slice(&((point[axis] - origin[axis]) as f32).to_le_bytes());
+        }
+    }
+    bytes
+}
