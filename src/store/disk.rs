@@ -2,7 +2,9 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -25,6 +27,14 @@ pub trait Disk: Debug + Send + Sync {
     fn sync_file(&self, path: &Path) -> io::Result<()>;
     /// Makes the names in a folder durable.
     fn sync_folder(&self, path: &Path) -> io::Result<()>;
+    /// Makes the content of many files and then the names in many folders durable, in any order among the files and
+    /// among the folders. Answers with the results for the files and for the folders.
+    fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
+        [
+            files.iter().map(|path| self.sync_file(path)).collect(),
+            folders.iter().map(|path| self.sync_folder(path)).collect(),
+        ]
+    }
     /// Renames a file, replacing what had the new name, or a folder to a name that nothing has.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Removes a file.
@@ -130,6 +140,10 @@ impl Disk for FsDisk {
         if cfg!(unix) { File::open(path)?.sync_all() } else { Ok(()) }
     }
 
+    fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
+        [at_once(files, |path| self.sync_file(path)), at_once(folders, |path| self.sync_folder(path))]
+    }
+
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         fs::rename(from, to)
     }
@@ -202,6 +216,29 @@ impl DiskWrite for File {
     fn sync(&mut self) -> io::Result<()> {
         self.sync_all()
     }
+}
+
+/// Syncs many paths. A sync is waiting, not work: a file system that is asked for several at once writes them together.
+fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> Vec<io::Result<()>> {
+    const AT_ONCE: usize = 16;
+    if paths.len() < 2 {
+        return paths.iter().map(|path| sync(path)).collect();
+    }
+    let next = AtomicUsize::new(0);
+    let results: Vec<OnceLock<io::Result<()>>> = paths.iter().map(|_| OnceLock::new()).collect();
+    thread::scope(|scope| {
+        for _ in 0..AT_ONCE.min(paths.len()) {
+            scope.spawn(|| {
+                while let Some(number) = Some(next.fetch_add(1, Ordering::Relaxed))
+                    && let Some(path) = paths.get(number)
+                {
+                    let _ = results[number].set(sync(path));
+                }
+            });
+        }
+    });
+    let never_tried = || Err(io::Error::other("the sync was not tried"));
+    results.into_iter().map(|result| result.into_inner().unwrap_or_else(never_tried)).collect()
 }
 
 /// A link inside a map could lead anywhere: it is never followed.

@@ -125,18 +125,25 @@ impl TileStore {
     }
 
     fn sync_next(&mut self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
-        for &(tile, _) in changed {
-            for file in TileFile::IN_ORDER {
-                let path = self.layout.next(tile, file);
-                if let Err(error) = self.disk.sync_file(&path) {
-                    self.suspect.insert(tile);
-                    return Err(Error::io(&path, "sync", error));
-                }
+        let files: Vec<_> = changed
+            .iter()
+            .flat_map(|&(tile, _)| TileFile::IN_ORDER.map(|file| self.layout.next(tile, file)))
+            .collect();
+        let folders = changed.iter().map(|&(tile, _)| self.layout.tile_folder(tile));
+        // The map's own folder names the new tile folders.
+        let folders: Vec<_> = folders.chain([self.layout.folder().to_owned()]).collect();
+        let [synced_files, synced_folders] = self.disk.sync_all(&files, &folders);
+        let per_tile = TileFile::IN_ORDER.len();
+        for (number, result) in synced_files.iter().enumerate() {
+            if result.is_err() {
+                self.suspect.insert(changed[number / per_tile].0);
             }
-            self.sync_folder(&self.layout.tile_folder(tile))?;
         }
-        // New tile folders.
-        self.sync_folder(self.layout.folder())
+        let files = files.iter().zip(synced_files);
+        for (path, result) in files.chain(folders.iter().zip(synced_folders)) {
+            result.map_err(|error| Error::io(path, "sync", error))?;
+        }
+        Ok(())
     }
 
     fn tidy_up(&mut self) -> Result<()> {
@@ -162,9 +169,18 @@ impl TileStore {
             self.unrenamed.remove(&tile);
             self.renamed.insert(tile);
         }
-        while let Some(&tile) = self.renamed.first() {
-            self.sync_folder(&self.layout.tile_folder(tile))?;
-            self.renamed.remove(&tile);
+        self.sync_renamed()
+    }
+
+    /// Makes the new names durable. Before that nothing may be written under the old ones, which a crash could bring
+    /// back.
+    fn sync_renamed(&mut self) -> Result<()> {
+        let tiles: Vec<_> = self.renamed.iter().copied().collect();
+        let folders: Vec<_> = tiles.iter().map(|&tile| self.layout.tile_folder(tile)).collect();
+        let [_, synced] = self.disk.sync_all(&[], &folders);
+        for ((tile, folder), result) in tiles.iter().zip(&folders).zip(synced) {
+            result.map_err(|error| Error::io(folder, "sync", error))?;
+            self.renamed.remove(tile);
         }
         Ok(())
     }

@@ -14,6 +14,8 @@ use std::path::Path;
 pub(super) struct Leftovers {
     /// Committed versions that still have their `*.next` names.
     pub unrenamed: BTreeSet<TileIndex>,
+    /// Tiles of the last commit that have their names, but perhaps not on the medium.
+    pub renamed: BTreeSet<TileIndex>,
     /// Tile folders that hold files and are not in the log.
     pub strays: FxHashSet<TileIndex>,
     /// How many files were removed.
@@ -36,6 +38,10 @@ pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Re
         let stamp = commits.tiles.get(&tile);
         let is_of_last_commit = changed.contains(&tile);
         match look_at_tile(disk, layout, tile, stamp, is_of_last_commit, &mut leftovers.removed)? {
+            // Its names may not be on the medium yet, if the writer was killed before it could see to that.
+            State::Whole if is_of_last_commit => {
+                leftovers.renamed.insert(tile);
+            }
             State::Whole => {}
             State::Unrenamed => {
                 leftovers.unrenamed.insert(tile);

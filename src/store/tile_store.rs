@@ -105,10 +105,15 @@ impl TileStore {
             let path = store.layout.metadata();
             let watch = store.disk.watch(&path).map_err(|error| Error::io(&path, "open", error))?;
             store.readers.watch(store.written_flush.unwrap_or_default(), watch);
+            // The last record may be one that a killed writer wrote and did not sync: durable before it is acted upon.
+            let log = store.layout.commit_log();
+            store.disk.sync_file(&log).map_err(|error| Error::io(&log, "sync", error))?;
+            store.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))?;
             let leftovers = recover(&*store.disk, &store.layout, &store.commits)?;
             store.strays = leftovers.strays;
             store.leftovers_removed = leftovers.removed;
             store.unrenamed = leftovers.unrenamed;
+            store.renamed = leftovers.renamed;
             store.finish_renames()?;
         }
         Ok(store)

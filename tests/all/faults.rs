@@ -217,6 +217,27 @@ fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
 }
 
 #[test]
+fn the_power_goes_some_time_after_the_process_was_killed_at_every_operation() {
+    let oracle = Oracle::new();
+    let changes = undisturbed(&oracle).changes();
+    for at in 0..changes {
+        let disk = FaultyDisk::new(Fault::Crashes(at));
+        let before = live(&disk, &oracle);
+        for again in [at % 17, 7 + at % 89] {
+            let killed = disk.after_kill();
+            killed.set_fault(Fault::Crashes(again));
+            let mut reached = live(&killed, &oracle);
+            if reached == Reached::default() {
+                // It did not come to open the map.
+                reached = before;
+            }
+            let left = killed.after_crash(Unsynced::Shuffled(again));
+            check_after_crash(&left, &oracle, reached, &format!("killed at {at}, crash {again} later"));
+        }
+    }
+}
+
+#[test]
 fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
     let oracle = Oracle::new();
     for at in 0..undisturbed(&oracle).changes() {

@@ -176,6 +176,22 @@ impl FaultyDisk {
         Self::of(names, contents, Fault::None)
     }
 
+    /// The same disk for another process, after the one before was killed: nothing is lost, and nothing more is on the
+    /// medium.
+    pub fn after_kill(&self) -> Self {
+        let state = self.state();
+        let mut disk = Self::of(state.names.clone(), state.contents.clone(), Fault::None);
+        let next =
+            Arc::get_mut(&mut disk.state).expect("nobody else has it").get_mut().expect("no panic yet");
+        next.names_on_medium = state.names_on_medium.clone();
+        next.unsynced_names = state.unsynced_names.clone();
+        next.next_inode = state.next_inode;
+        for content in next.contents.values_mut() {
+            (content.readers, content.locked) = (0, false);
+        }
+        disk
+    }
+
     /// A copy with everything on the medium that programs see.
     pub fn copy(&self) -> Self {
         self.after_crash(Unsynced::Kept)
