@@ -34,7 +34,7 @@ pub enum Error {
         cause: io::Error,
     },
     /// A file of a map is damaged or not the one that belongs there: restore or repair it.
-    #[error("{}: {}damaged: {cause}", path.display(), of_tile(tile))]
+    #[error("{}: {}damaged: {cause}; see `voxtile verify` and `voxtile repair`", path.display(), of_tile(tile))]
     Damaged {
         /// The file.
         path: PathBuf,

@@ -111,7 +111,7 @@ fn without_metadata(disk: &dyn Disk, layout: &Layout, error: io::Error) -> Error
     }
     let names = disk.list(layout.folder()).unwrap_or_default();
     if names.iter().any(|name| tile_of_folder(name).is_some()) {
-        let reason = "the file is missing, and the folder holds tiles; `voxtile repair` derives it from them";
+        let reason = "the file is missing, and the folder holds tiles";
         return FormatError::at_offset(0, reason).in_map(&path, None);
     }
     Error::NoMap { path: layout.folder().to_owned() }

@@ -142,7 +142,7 @@ impl TileStore {
         let (log, commits) = match (&metadata.ext, log) {
             (Some(_), Some((log, commits))) => (log, commits),
             (Some(_), None) => {
-                return damaged(0, "the file is missing; `voxtile repair` writes it anew".into());
+                return damaged(0, "the file is missing".into());
             }
             // Adopted, and ended before the metadata was replaced.
             (None, Some((log, commits))) if commits.flush_number > 0 => (log, commits),
@@ -310,7 +310,7 @@ impl TileStore {
     pub fn open_version(&self, tile: TileIndex, path: PathBuf) -> Result<Option<StoredTile>> {
         let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         if self.strays.contains(&tile) {
-            return damaged("commits.log does not name this tile; move its folder away or repair the map");
+            return damaged("commits.log does not name this tile");
         }
         let stamp = self.stamp(tile);
         if stamp.is_none() && !self.foreign.contains(&tile) {

@@ -4,34 +4,34 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-fn voxtile(arguments: &[&str]) -> Command {
+pub fn voxtile(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("voxtile").unwrap();
     command.args(arguments);
     command
 }
 
-fn text(path: &Path) -> &str {
+pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
 /// Standard output of a run that must succeed.
-fn output(arguments: &[&str]) -> String {
+pub fn output(arguments: &[&str]) -> String {
     String::from_utf8(voxtile(arguments).assert().success().get_output().stdout.clone()).unwrap()
 }
 
-fn json(arguments: &[&str]) -> Value {
+pub fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&output(arguments)).unwrap()
 }
 
 /// Exit code and standard error of a run that must fail.
-fn failure(arguments: &[&str]) -> (i32, String) {
+pub fn failure(arguments: &[&str]) -> (i32, String) {
     let assert = voxtile(arguments).assert().failure();
     let run = assert.get_output();
     (run.status.code().unwrap(), String::from_utf8(run.stderr.clone()).unwrap())
 }
 
 /// A folder of three small ascii scans of a wall, the sensor a metre further each time.
-fn scans(folder: &TempDir) -> PathBuf {
+pub fn scans(folder: &TempDir) -> PathBuf {
     let path = folder.path().join("scans");
     fs::create_dir(&path).unwrap();
     for number in 0..3 {

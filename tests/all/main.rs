@@ -9,6 +9,9 @@ mod corruption;
 mod faults;
 /// Inputs that fuzzing found worth keeping, once more.
 mod fuzz_corpus;
+/// Builds that are resumed, maps that are verified and repaired, from the command line.
+#[cfg(feature = "cli")]
+mod interrupted;
 /// What each folder may know.
 mod layering;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
