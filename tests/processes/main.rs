@@ -11,6 +11,8 @@
 mod killed;
 /// Readers beside a writer see one flush whole.
 mod readers;
+/// A disk that is full or only for reading, and too many open files.
+mod refused;
 /// SIGTERM and Ctrl-C: flushed and ended.
 mod stopped;
 mod survey;

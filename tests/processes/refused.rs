@@ -1,0 +1,98 @@
+use crate::survey::{Scans, digest, folder_for_maps, is_whole};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// A small file system in memory; taken away when dropped.
+struct SmallDisk(TempDir);
+
+impl SmallDisk {
+    /// `None` where this process may not mount.
+    fn new(bytes: u32) -> Option<Self> {
+        let disk = Self(TempDir::new().unwrap());
+        disk.mount(&format!("size={bytes}")).then_some(disk)
+    }
+
+    fn mount(&self, options: &str) -> bool {
+        let mut mount = Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", options, "tmpfs"]).arg(self.0.path()).stderr(Stdio::null());
+        mount.status().is_ok_and(|status| status.success())
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(self.0.path()).stderr(Stdio::null()).status();
+    }
+}
+
+#[test]
+fn a_full_disk_keeps_the_last_flush_and_the_build_goes_on_when_there_is_room() {
+    let scans = Scans::new(30, 1);
+    let Some(disk) = SmallDisk::new(1500 << 10) else {
+        println!("skipped: this process may not mount a small disk");
+        return;
+    };
+    let map = disk.path().join("map");
+    let how = ["--resume", "--flush-every", "3"];
+    for _ in 0..2 {
+        let output = scans.build(&map, &how).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains("No space left on device"), "{message}");
+        assert!(message.contains("--resume goes on from there"), "{message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+        let (number, seen) = digest(&map).unwrap();
+        assert!((1..30).contains(&number), "{number}");
+        assert_eq!(seen, scans.digests[number]);
+    }
+    assert!(disk.mount("remount,size=64m"));
+    assert!(scans.build(&map, &how).status().unwrap().success());
+    assert_eq!(digest(&map), Ok((30, scans.digests[30].clone())));
+    assert!(is_whole(&map));
+}
+
+#[test]
+fn a_disk_that_is_only_for_reading_answers_and_is_not_written_to() {
+    let scans = Scans::new(6, 1);
+    let Some(disk) = SmallDisk::new(64 << 20) else {
+        println!("skipped: this process may not mount a small disk");
+        return;
+    };
+    let map = disk.path().join("map");
+    assert!(scans.build(&map, &[]).status().unwrap().success());
+    assert!(disk.mount("remount,ro"));
+    assert_eq!(digest(&map), Ok((6, scans.digests[6].clone())));
+    assert!(is_whole(&map));
+    let output = scans.build(&map, &["--append"]).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("Read-only file system"), "{message}");
+}
+
+#[test]
+fn too_many_open_files_lose_nothing() {
+    let scans = Scans::new(12, 1);
+    let (_folder, map) = folder_for_maps();
+    let how = ["--resume", "--flush-every", "3"];
+    for files in 4..12 {
+        let build = scans.build(&map, &how);
+        let mut limited = Command::new("sh");
+        limited.args(["-c", "ulimit -n $0; exec \"$@\""]).arg(files.to_string());
+        limited.arg(build.get_program()).args(build.get_args());
+        let output = limited.stdout(Stdio::null()).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(!message.contains("panicked"), "{message}");
+        if map.join("metadata.json").exists() {
+            let (number, seen) = digest(&map).unwrap();
+            assert_eq!(seen, scans.digests[number], "{files} files");
+        }
+    }
+    assert!(scans.build(&map, &how).status().unwrap().success());
+    assert_eq!(digest(&map), Ok((12, scans.digests[12].clone())));
+    assert!(is_whole(&map));
+}
