@@ -9,6 +9,7 @@ use crate::space::TileIndex;
 use crate::store::{Extension, Metadata, TileStore, hex};
 use crate::tile::Tile;
 use lru::LruCache;
+use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -178,6 +179,8 @@ impl Residency {
         for index in waiting {
             self.bring_in(index, scan_number)?;
         }
+        // The files hold the octrees, whose trees are independent of each other: all cores bring them up to date.
+        self.sync_octrees();
         for index in self.cached_tile_indices() {
             self.save(index, scan_number)?;
         }
@@ -217,9 +220,11 @@ impl Residency {
     }
 
     pub(super) fn sync_octrees(&mut self) {
-        for (_, tile) in &mut self.tiles {
-            Arc::make_mut(tile).sync_octree();
-        }
+        let stale = self.tiles.iter_mut().filter(|(_, tile)| !tile.is_octree_synced());
+        let stale: Vec<&mut Tile> = stale.map(|(_, tile)| Arc::make_mut(tile)).collect();
+        stale.into_par_iter().for_each(|tile| {
+            tile.sync_octree();
+        });
     }
 
     pub(super) fn statistics(&self, scan_number: u64) -> MapStatistics {

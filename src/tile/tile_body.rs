@@ -142,6 +142,11 @@ impl Tile {
         code.to_key().to_index_from(self.voxels.min)
     }
 
+    /// Whether no update waits in front of the octree.
+    pub fn is_octree_synced(&self) -> bool {
+        self.octree.synced().is_some()
+    }
+
     /// Brings the octree up to date and returns it.
     pub fn sync_octree(&mut self) -> &Octree {
         self.octree.sync()

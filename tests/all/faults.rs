@@ -240,6 +240,7 @@ fn the_power_goes_some_time_after_the_process_was_killed_at_every_operation() {
 #[test]
 fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
     let oracle = Oracle::new();
+    let mut points = 0;
     for at in 0..undisturbed(&oracle).changes() {
         let disk = FaultyDisk::new(Fault::Crashes(at));
         let reached = live(&disk, &oracle);
@@ -252,6 +253,7 @@ fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
                 if !recovering.has_crashed() {
                     break;
                 }
+                points += 1;
                 assert!(opened.is_err());
                 let what = format!("crash at {at}, {unsynced:?}, again at {again} of opening");
                 let left = recovering.after_crash(Unsynced::Shuffled(again));
@@ -270,4 +272,5 @@ fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
             }
         }
     }
+    println!("{points} second crashes");
 }
