@@ -11,8 +11,8 @@ use crate::space::TileIndex;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// A log longer than this many bytes, and than four times what one record of the whole map takes, is compacted.
-const COMPACT_LOG_BYTES: u64 = 1 << 20;
+/// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
+const COMPACT_LOG_BYTES: u64 = 2048;
 
 impl TileStore {
     /// Writes the next version of one of a tile's files; the committed version stays as it is.
@@ -276,7 +276,7 @@ impl TileStore {
     fn compact_log(&mut self) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
         let whole_bytes = (self.commits.tiles.len() * (12 + TileStamp::BYTES)) as u64;
-        if log.bytes() < COMPACT_LOG_BYTES.max(4 * whole_bytes) { Ok(()) } else { self.replace_log() }
+        if log.bytes() < COMPACT_LOG_BYTES.max(2 * whole_bytes) { Ok(()) } else { self.replace_log() }
     }
 
     /// Replaces the log by one record of the whole map.
