@@ -1,6 +1,6 @@
 use super::disk::Disk;
 use super::metadata::Metadata;
-use super::tile_stamp::TileStamp;
+use super::tile_stamp::{MAX_NUMBER, TileStamp};
 use crate::error::{DecodeError, FormatError};
 use crate::space::TileIndex;
 use rustc_hash::FxHashMap;
@@ -163,6 +163,9 @@ impl Commits {
             KIND_WHOLE_MAP => self.tiles.clear(),
             _ => return wrong(0, "a record of unknown kind"),
         }
+        if u64_at(8) > MAX_NUMBER || u64_at(16) > MAX_NUMBER {
+            return wrong(8, "flush or scan number is too high to be true");
+        }
         if u64_at(8) < self.flush_number {
             return wrong(8, "the flush number is lower than in the record before");
         }
@@ -177,10 +180,14 @@ impl Commits {
                 None => return wrong(at, "the metadata in the record cannot be read"),
             }
         }
-        for tile in tiles.chunks_exact(TILE_BYTES) {
+        for (number, tile) in (0..).zip(tiles.chunks_exact(TILE_BYTES)) {
             let index = |axis: usize| i32::from_le_bytes(std::array::from_fn(|k| tile[4 * axis + k]));
             let index = TileIndex::new(index(0), index(1), index(2));
-            self.tiles.insert(index, TileStamp::from_bytes(&std::array::from_fn(|k| tile[12 + k])));
+            let Some(stamp) = TileStamp::from_bytes(&std::array::from_fn(|k| tile[12 + k])) else {
+                let at = (PAYLOAD_HEADER_BYTES + TILE_BYTES * number) as u64;
+                return wrong(at, "numbers that no tile has");
+            };
+            self.tiles.insert(index, stamp);
             self.last_changed.push(index);
         }
         Ok(())

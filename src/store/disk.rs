@@ -226,16 +226,19 @@ fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> 
     }
     let next = AtomicUsize::new(0);
     let results: Vec<OnceLock<io::Result<()>>> = paths.iter().map(|_| OnceLock::new()).collect();
-    thread::scope(|scope| {
-        for _ in 0..AT_ONCE.min(paths.len()) {
-            scope.spawn(|| {
-                while let Some(number) = Some(next.fetch_add(1, Ordering::Relaxed))
-                    && let Some(path) = paths.get(number)
-                {
-                    let _ = results[number].set(sync(path));
-                }
-            });
+    let sync_next = || {
+        while let Some(number) = Some(next.fetch_add(1, Ordering::Relaxed))
+            && let Some(path) = paths.get(number)
+        {
+            let _ = results[number].set(sync(path));
         }
+    };
+    thread::scope(|scope| {
+        for _ in 1..AT_ONCE.min(paths.len()) {
+            // Where no thread is to be had, this one does it all.
+            let _ = thread::Builder::new().spawn_scoped(scope, sync_next);
+        }
+        sync_next();
     });
     let never_tried = || Err(io::Error::other("the sync was not tried"));
     results.into_iter().map(|result| result.into_inner().unwrap_or_else(never_tried)).collect()

@@ -191,7 +191,7 @@ impl TileStore {
             // Renamed by an earlier attempt: the table in place is the new one.
             return Ok(());
         }
-        let flush_number = self.commits.flush_number - 1;
+        let flush_number = self.commits.flush_number.saturating_sub(1);
         self.rename(&self.layout.current(tile, TileFile::Table), &self.layout.kept(tile, flush_number))?;
         self.readers.keep(tile, flush_number);
         Ok(())

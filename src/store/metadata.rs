@@ -1,3 +1,4 @@
+use super::tile_stamp::MAX_NUMBER;
 use crate::config::RayConfig;
 use crate::error::FormatError;
 use crate::sensor::SensorModel;
@@ -165,6 +166,13 @@ impl Metadata {
         // A checksum without `ext` is a damaged name of that key, not a file of the seed's.
         if document.ext.is_some() || text.contains("\"crc32\"") {
             check_crc(text)?;
+        }
+        if let Some(ext) = &document.ext
+            && [ext.flush_number, ext.scan_number, ext.input_first_scan]
+                .iter()
+                .any(|&number| number > MAX_NUMBER)
+        {
+            return Err(FormatError::at_offset(0, "flush or scan number is too high to be true"));
         }
         let is_empty = document.ext.as_ref().is_some_and(|ext| ext.empty);
         Ok(Self {

@@ -26,6 +26,7 @@ pub use layout::{Layout, QUARANTINE, TileFile, flush_of_kept, folder_name, tile_
 pub use map_folder::{Lock, read_log};
 pub use metadata::{Bounds, Extension, MapParameters, Metadata};
 pub use remains::Remains;
+pub(crate) use tile_stamp::MAX_NUMBER;
 pub use tile_stamp::{FileStamp, Stamping, TileStamp};
 pub(crate) use tile_store::hex;
 pub use tile_store::{StoredTile, TileStore};

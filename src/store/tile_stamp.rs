@@ -25,6 +25,9 @@ pub struct FileStamp {
     pub crc: u32,
 }
 
+/// The highest number of a scan or flush that is read: nobody counts that far, and one more always fits.
+pub(crate) const MAX_NUMBER: u64 = 1 << 62;
+
 impl TileStamp {
     pub(super) const BYTES: usize = 48;
 
@@ -48,7 +51,20 @@ impl TileStamp {
         bytes
     }
 
-    pub(super) fn from_bytes(bytes: &[u8; Self::BYTES]) -> Self {
+    /// `None` for numbers that no tile has; sums over all tiles of a map fit those that a tile can have.
+    pub(super) fn from_bytes(bytes: &[u8; Self::BYTES]) -> Option<Self> {
+        const MAX_FILE_BYTES: u64 = 1 << 36;
+        const MAX_VOXELS: u64 = 1 << 30;
+        let stamp = Self::from_any_bytes(bytes);
+        let is_possible = stamp.scan_number <= MAX_NUMBER
+            && stamp.table.bytes <= MAX_FILE_BYTES
+            && stamp.octree.bytes <= MAX_FILE_BYTES
+            && stamp.occupied <= stamp.voxels
+            && stamp.voxels <= MAX_VOXELS;
+        is_possible.then_some(stamp)
+    }
+
+    fn from_any_bytes(bytes: &[u8; Self::BYTES]) -> Self {
         let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
         let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
         Self {

@@ -5,8 +5,8 @@ use crate::error::{Error, FormatError, Result};
 use crate::mapper::tile_files::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
-    Commits, Disk, Extension, FileStamp, Layout, MapParameters, Metadata, Remains, Stamping, StoredTile,
-    TileFile, TileStamp, hex, tile_of_folder,
+    Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Stamping,
+    StoredTile, TileFile, TileStamp, hex, tile_of_folder,
 };
 use crate::tile::format::{Trailer, read_trailer};
 use rustc_hash::FxHashMap;
@@ -164,7 +164,8 @@ fn stamp_from(table: &ReadTable, config: &MapConfig) -> TileStamp {
     let occupied = table.table.iter().filter(|(_, evidence)| evidence.log_odds >= threshold).count();
     let trailer = table.trailer.as_ref();
     TileStamp {
-        scan_number: trailer.map_or(0, |trailer| trailer.scan_number),
+        // What a file says of itself is no reason to count from there if nobody counts that far.
+        scan_number: trailer.map_or(0, |trailer| trailer.scan_number.min(MAX_NUMBER)),
         table: table.file,
         octree: trailer.map_or(FileStamp::default(), |trailer| FileStamp {
             bytes: trailer.octree_bytes,

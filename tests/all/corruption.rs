@@ -326,3 +326,33 @@ fn the_power_goes_at_every_change_of_a_repair_and_another_repair_finishes_it() {
     }
     println!("{points} crashes");
 }
+
+#[test]
+fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
+    let whole = small_map();
+    let log = Path::new("/map/commits.log");
+    let bytes = whole.files()[log].clone();
+    // The last record, its fields from the beginning of its payload: flush, scan, and of the first tile: scan,
+    // lengths, voxels, occupied.
+    let mut last = 32;
+    while last + 12 + length(&bytes, last) < bytes.len() {
+        last += 12 + length(&bytes, last);
+    }
+    for field in [8, 16, 36, 44, 56, 68, 76] {
+        let mut hostile = bytes.clone();
+        let payload = last + 8..last + 8 + length(&bytes, last);
+        hostile[payload.start + field..][..8].copy_from_slice(&u64::MAX.to_le_bytes());
+        let crc = crc32fast::hash(&hostile[payload.clone()]);
+        hostile[payload.end..payload.end + 4].copy_from_slice(&crc.to_le_bytes());
+        let disk = whole.copy();
+        disk.put(log, &hostile);
+        let error = MapReader::open_on(disk.shared(), map(), 1).unwrap_err().to_string();
+        assert!(error.contains("too high to be true") || error.contains("numbers that no tile has"), "{error}");
+        repair(&disk).unwrap();
+        assert_eq!(contents(&disk).unwrap(), contents(&whole).unwrap());
+    }
+}
+
+fn length(log: &[u8], record: usize) -> usize {
+    u32::from_le_bytes(log[record..record + 4].try_into().unwrap()) as usize
+}
