@@ -3,13 +3,14 @@
 use super::commit_log::{CommitLog, Flush};
 use super::disk::EntryKind;
 use super::layout::TileFile;
+use super::map_folder;
 use super::metadata::{Bounds, Metadata};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use super::tile_store::TileStore;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
 const COMPACT_LOG_BYTES: u64 = 2048;
@@ -255,19 +256,12 @@ impl TileStore {
         let (flush_number, scan_number) = (self.commits.flush_number, self.commits.scan_number);
         self.metadata = self.fill_in(self.metadata.clone(), flush_number, scan_number);
         let text = self.metadata.to_text();
-        let path = self.layout.metadata();
-        let next = next_of(&path);
-        let replaced = || {
-            let mut out = self.disk.create(&next)?;
-            out.write_all(text.as_bytes())?;
-            out.sync()?;
-            drop(out);
+        let disk = &*self.disk;
+        let watch = map_folder::replace(disk, &self.layout.metadata(), |next| {
+            map_folder::write_text(disk, next, &text)?;
             // Before anybody can read it: no reader goes unseen.
-            let watch = self.disk.watch(&next)?;
-            self.disk.rename(&next, &path)?;
-            Ok(watch)
-        };
-        let watch = replaced().map_err(|error| Error::io(&path, "replace", error))?;
+            disk.watch(next)
+        })?;
         self.written_flush = Some(flush_number);
         self.readers.watch(flush_number, watch);
         self.sync_folder(self.layout.folder())
@@ -282,12 +276,10 @@ impl TileStore {
     /// Replaces the log by one record of the whole map.
     fn replace_log(&mut self) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
-        let path = self.layout.commit_log();
-        let next = next_of(&path);
-        let text = self.metadata.to_text();
-        let compacted = CommitLog::write_whole(&*self.disk, &next, log.map_id(), &self.commits, &text)
-            .map_err(|error| Error::io(&next, "write", error))?;
-        self.disk.rename(&next, &path).map_err(|error| Error::io(&next, "rename", error))?;
+        let (disk, text) = (&*self.disk, self.metadata.to_text());
+        let compacted = map_folder::replace(disk, &self.layout.commit_log(), |next| {
+            CommitLog::write_whole(disk, next, log.map_id(), &self.commits, &text)
+        })?;
         self.log = Some(compacted);
         // What is appended from now on is in this file only.
         self.is_log_settled = false;
@@ -299,8 +291,4 @@ impl TileStore {
     fn sync_folder(&self, folder: &Path) -> Result<()> {
         self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
     }
-}
-
-fn next_of(path: &Path) -> PathBuf {
-    path.with_added_extension("next")
 }

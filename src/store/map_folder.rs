@@ -8,7 +8,7 @@ use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::TileIndex;
 use rustc_hash::FxHashSet;
 use std::any::Any;
-use std::io;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// Held while a store may write; a process that ends, however it ends, lets go of it.
@@ -66,6 +66,29 @@ pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
         let _ = disk.remove_folder(folder);
         Error::io(parent, "sync", error)
     })
+}
+
+/// Replaces a file as a whole: `write` makes its successor beside it, synced, and that takes its name. The name is
+/// durable once the folder has been synced.
+pub(super) fn replace<T>(
+    disk: &dyn Disk,
+    path: &Path,
+    write: impl FnOnce(&Path) -> io::Result<T>,
+) -> Result<T> {
+    let next = path.with_added_extension("next");
+    let replaced = || {
+        let written = write(&next)?;
+        disk.rename(&next, path)?;
+        Ok(written)
+    };
+    replaced().map_err(|error| Error::io(path, "replace", error))
+}
+
+/// Writes a text to a file, synced.
+pub(super) fn write_text(disk: &dyn Disk, path: &Path, text: &str) -> io::Result<()> {
+    let mut out = disk.create(path)?;
+    out.write_all(text.as_bytes())?;
+    out.sync()
 }
 
 /// Reads `metadata.json`.

@@ -5,8 +5,6 @@ use super::map_folder;
 use super::metadata::{Bounds, Metadata};
 use crate::error::{DecodeError, Error, FormatError, Result};
 use std::io;
-use std::io::Write;
-use std::path::Path;
 
 /// What can still be read of the two files that say what a map is, when they cannot be read together.
 #[derive(Debug)]
@@ -74,23 +72,16 @@ impl Remains {
             (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
         }
         let text = metadata.to_text();
-        let replace = |path: &Path, write: &dyn Fn(&Path) -> io::Result<()>| {
-            let next = path.with_added_extension("next");
-            let replaced = || {
-                write(&next)?;
-                disk.rename(&next, path)?;
-                disk.sync_folder(layout.folder())
-            };
-            replaced().map_err(|error| Error::io(path, "replace", error))
+        let sync = || {
+            let folder = layout.folder();
+            disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
         };
-        replace(&layout.commit_log(), &|next| {
-            CommitLog::write_whole(disk, next, map_id, commits, &text).map(drop)
+        map_folder::replace(disk, &layout.commit_log(), |next| {
+            CommitLog::write_whole(disk, next, map_id, commits, &text)
         })?;
-        replace(&layout.metadata(), &|next| {
-            let mut out = disk.create(next)?;
-            out.write_all(text.as_bytes())?;
-            out.sync()
-        })
+        sync()?;
+        map_folder::replace(disk, &layout.metadata(), |next| map_folder::write_text(disk, next, &text))?;
+        sync()
     }
 }
 

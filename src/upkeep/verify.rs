@@ -128,7 +128,6 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let table = match check.table {
             Ok(table) => table,
             Err(error) => {
-                // Told about a tile that the present writer has changed since: that is a flush, not damage.
                 let finding = Finding::of(error)?;
                 self.report(finding);
                 return Ok(());

@@ -347,7 +347,10 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
         let disk = whole.copy();
         disk.put(log, &hostile);
         let error = MapReader::open_on(disk.shared(), map(), 1).unwrap_err().to_string();
-        assert!(error.contains("too high to be true") || error.contains("numbers that no tile has"), "{error}");
+        assert!(
+            error.contains("too high to be true") || error.contains("numbers that no tile has"),
+            "{error}"
+        );
         repair(&disk).unwrap();
         assert_eq!(contents(&disk).unwrap(), contents(&whole).unwrap());
     }
