@@ -1,7 +1,6 @@
 use crate::error::{Error, Result};
 use nalgebra::Isometry3;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Tells one input from another: see [`ScanSource::fingerprint`](super::ScanSource::fingerprint).
@@ -11,9 +10,6 @@ pub(super) struct Fingerprint {
     files: u64,
     bytes: u64,
 }
-
-/// Read at either end of a file.
-const END_BYTES: u64 = 4096;
 
 impl Fingerprint {
     pub(super) fn of_file(path: &Path) -> Result<String> {
@@ -45,13 +41,9 @@ impl Fingerprint {
     }
 
     fn add_content(&mut self, path: &Path) -> std::io::Result<u64> {
-        let mut file = File::open(path)?;
+        let file = File::open(path)?;
         let bytes = file.metadata()?.len();
-        self.hasher.update_reader((&mut file).take(END_BYTES))?;
-        if bytes > END_BYTES {
-            file.seek(SeekFrom::Start(bytes - END_BYTES))?;
-            self.hasher.update_reader(file.take(END_BYTES))?;
-        }
+        self.hasher.update_reader(file)?;
         Ok(bytes)
     }
 }

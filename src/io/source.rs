@@ -33,8 +33,8 @@ pub trait ScanSource {
         Ok(scans)
     }
 
-    /// What tells this input from others, wherever it lies: number and size of its files, and a BLAKE3 over names,
-    /// sizes, poses and the first and last 4 KiB of every file. The rest of the points is not read for it.
+    /// What tells this input from others, wherever it lies: number and size of its files, and a BLAKE3 over their
+    /// names, sizes and bytes and the poses. Reads every file once.
     ///
     /// # Errors
     ///

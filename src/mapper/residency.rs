@@ -198,20 +198,19 @@ impl Residency {
         if self.is_dirty(index) && !discard_changes {
             return Err(Error::UnsavedChanges { tile: index });
         }
-        let before = self.tiles.pop(&index);
+        // All that may fail comes before anything is let go.
+        let loaded = tile_files::load(&self.store, &self.config, index)?;
+        if loaded.is_some() && !self.tiles.contains(&index) {
+            self.make_room(scan_number)?;
+        }
+        self.tiles.pop(&index);
         self.pending.applied(index);
-        if !self.exists(index) {
-            return Ok(false);
-        }
-        match self.bring_in(index, scan_number) {
-            Ok(_) => Ok(true),
-            Err(error) => {
-                if let Some(tile) = before {
-                    self.tiles.put(index, tile);
-                }
-                Err(error)
-            }
-        }
+        let Some((tile, bytes)) = loaded else { return Ok(false) };
+        self.io.loads += 1;
+        self.io.bytes_read += bytes;
+        self.known_whole.insert(index);
+        self.tiles.put(index, Arc::new(tile));
+        Ok(true)
     }
 
     /// The tiles written since the last call.
@@ -305,6 +304,8 @@ impl Residency {
         self.adopt()?;
         let Some(tile) = self.tiles.peek_mut(&index) else { return Ok(()) };
         let tile = Arc::make_mut(tile);
+        // Until it is written: what is on disk of it may be cut short by an attempt that fails.
+        tile.mark_dirty();
         let stamp = tile_files::save(&mut self.store, &self.config, tile, scan_number)?;
         tile.mark_clean();
         self.io.saves += 1;
@@ -322,7 +323,14 @@ impl Residency {
         }
         log::info!("{}: a map of the seed's format; its tiles get checksums", self.store.folder().display());
         self.store.adopt(new_map_id())?;
+        for index in self.store.suspects() {
+            // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
+            self.store.drop_next(index);
+        }
         for index in self.store.tiles().collect::<BTreeSet<_>>() {
+            if self.store.stamp(index).is_some() {
+                continue; // Written by an earlier attempt.
+            }
             if let Some((mut tile, _)) = tile_files::load(&self.store, &self.config, index)? {
                 tile_files::save(&mut self.store, &self.config, &mut tile, 0)?;
             }

@@ -44,7 +44,14 @@ pub(crate) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> R
 /// Reads the latest version of a tile's table; `None` if there is none.
 pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Result<Option<ReadTable>> {
     let read = |stored: Result<Option<StoredTile>>| {
-        stored?.map(|stored| read_stored_table(grid, index, stored)).transpose()
+        let Some(stored) = stored? else { return Ok(None) };
+        let path = stored.path.clone();
+        let table = read_stored_table(grid, index, stored)?;
+        if table.trailer.is_some() && store.map_id().is_none() && store.is_adopted_meanwhile()? {
+            let reason = "the file was written after the map was opened";
+            return Err(FormatError::at_offset(0, reason).in_map(&path, Some(index)));
+        }
+        Ok(Some(table))
     };
     let loaded = read(store.open_table(index));
     if matches!(loaded, Err(Error::Damaged { .. })) {

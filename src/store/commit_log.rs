@@ -62,6 +62,11 @@ const KIND_CHANGE: u32 = 0;
 const KIND_WHOLE_MAP: u32 = 1;
 
 impl CommitLog {
+    /// The log of a map of which nothing is written yet.
+    pub(super) fn of_map(map_id: [u8; 16]) -> Self {
+        Self { map_id, bytes: 0 }
+    }
+
     /// Length of the valid part in bytes.
     pub fn bytes(&self) -> u64 {
         self.bytes

@@ -12,7 +12,7 @@ use std::time::Duration;
 ///
 /// [`FsDisk`] is the real one; tests put in disks that fail, fill up or crash.
 pub trait Disk: Debug + Send + Sync {
-    /// Opens a file for reading. A symbolic link is an error.
+    /// Opens a file for reading. Anything else, a symbolic link too, is an error of the kind `InvalidInput`.
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
     /// Opens a file for reading and counts as its reader until the result is dropped: [`Disk::watch`] tells. Where
     /// the file system has no locks, the file is opened and nobody can tell.
@@ -21,7 +21,7 @@ pub trait Disk: Debug + Send + Sync {
     fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>>;
     /// Creates a file, or empties it, for writing from the beginning.
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>>;
-    /// Opens a file for writing from `offset` on; what stood there before is cut off.
+    /// Opens a file, which must be there and be that long, for writing from `offset` on; what stood there is cut off.
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>>;
     /// Makes a file's content durable.
     fn sync_file(&self, path: &Path) -> io::Result<()>;
@@ -94,16 +94,13 @@ struct FsRead {
 
 impl Disk for FsDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
-        let file = File::open(not_a_link(path)?)?;
-        let metadata = file.metadata()?;
-        if !metadata.is_file() {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
-        }
-        Ok(Box::new(FsRead { file, bytes: metadata.len() }))
+        let file = File::open(only_a_file(path)?)?;
+        let bytes = file.metadata()?.len();
+        Ok(Box::new(FsRead { file, bytes }))
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
-        let file = File::open(not_a_link(path)?)?;
+        let file = File::open(only_a_file(path)?)?;
         // A writer that looks for readers holds the lock for an instant.
         for _ in 0..LOCK_ATTEMPTS {
             match file.try_lock_shared() {
@@ -116,23 +113,28 @@ impl Disk for FsDisk {
     }
 
     fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
-        Ok(Box::new(File::open(not_a_link(path)?)?))
+        Ok(Box::new(File::open(only_a_file(path)?)?))
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
-        Ok(Box::new(File::create(not_a_link(path)?)?))
+        Ok(Box::new(File::create(only_a_file(path)?)?))
     }
 
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
-        let file = OpenOptions::new().append(true).create(true).open(not_a_link(path)?)?;
-        if file.metadata()?.len() != offset {
+        let file = OpenOptions::new().append(true).open(only_a_file(path)?)?;
+        let bytes = file.metadata()?.len();
+        if bytes < offset {
+            let reason = format!("{bytes} bytes, {offset} expected: somebody else changed the file");
+            return Err(io::Error::other(reason));
+        }
+        if bytes > offset {
             file.set_len(offset)?;
         }
         Ok(Box::new(file))
     }
 
     fn sync_file(&self, path: &Path) -> io::Result<()> {
-        OpenOptions::new().write(true).open(not_a_link(path)?)?.sync_all()
+        OpenOptions::new().write(true).open(only_a_file(path)?)?.sync_all()
     }
 
     fn sync_folder(&self, path: &Path) -> io::Result<()> {
@@ -176,7 +178,7 @@ impl Disk for FsDisk {
     }
 
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {
-        let file = OpenOptions::new().write(true).create(true).truncate(false).open(not_a_link(path)?)?;
+        let file = OpenOptions::new().write(true).create(true).truncate(false).open(only_a_file(path)?)?;
         match file.try_lock() {
             Ok(()) => Ok(Some(Box::new(file))),
             Err(TryLockError::WouldBlock) => Ok(None),
@@ -244,13 +246,18 @@ fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> 
     results.into_iter().map(|result| result.into_inner().unwrap_or_else(never_tried)).collect()
 }
 
-/// A link inside a map could lead anywhere: it is never followed.
-fn not_a_link(path: &Path) -> io::Result<&Path> {
+/// A link inside a map could lead anywhere, and a pipe would be waited for: only files are opened, and names that
+/// nothing has.
+fn only_a_file(path: &Path) -> io::Result<&Path> {
     match fs::symlink_metadata(path) {
-        Ok(metadata) if metadata.is_symlink() => Err(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "a symbolic link; links inside a map are not followed",
-        )),
+        Ok(metadata) if !metadata.is_file() => {
+            let reason = if metadata.is_symlink() {
+                "a symbolic link; links inside a map are not followed"
+            } else {
+                "not a regular file"
+            };
+            Err(io::Error::new(io::ErrorKind::InvalidInput, reason))
+        }
         _ => Ok(path),
     }
 }

@@ -51,6 +51,12 @@ impl TileStore {
         self.next.insert(tile, stamp);
     }
 
+    /// Forgets the next version of a tile, as if it had not been written.
+    pub fn drop_next(&mut self, tile: TileIndex) {
+        self.suspect.remove(&tile);
+        self.next.remove(&tile);
+    }
+
     /// The tiles whose next version must be written again before the next commit: the disk failed to sync it, and what
     /// it says of these files from then on proves nothing.
     pub fn suspects(&self) -> Vec<TileIndex> {
@@ -89,6 +95,8 @@ impl TileStore {
             let flush = Flush { number, scan_number, changed: &changed, metadata_text };
             if let Err(error) = log.append(&*self.disk, &log_path, &flush) {
                 self.is_log_settled = false;
+                // At once if it goes: another process may come next, and would see a record that is not on the medium.
+                let _ = self.settle();
                 return Err(Error::io(&log_path, "append to", error));
             }
             // Committed.
@@ -233,10 +241,10 @@ impl TileStore {
     /// until they have been written again.
     pub fn adopt(&mut self, map_id: [u8; 16]) -> Result<()> {
         if self.log.is_none() {
-            let path = self.layout.commit_log();
-            let text = self.metadata.to_text();
-            let log = CommitLog::write_whole(&*self.disk, &path, map_id, &self.commits, &text)
-                .map_err(|error| Error::io(&path, "write", error))?;
+            let (disk, text) = (&*self.disk, self.metadata.to_text());
+            let log = map_folder::replace(disk, &self.layout.commit_log(), |next| {
+                CommitLog::write_whole(disk, next, map_id, &self.commits, &text)
+            })?;
             self.log = Some(log);
         }
         Ok(())
@@ -274,7 +282,7 @@ impl TileStore {
     }
 
     /// Replaces the log by one record of the whole map.
-    fn replace_log(&mut self) -> Result<()> {
+    pub(super) fn replace_log(&mut self) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
         let (disk, text) = (&*self.disk, self.metadata.to_text());
         let compacted = map_folder::replace(disk, &self.layout.commit_log(), |next| {

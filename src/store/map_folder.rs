@@ -2,7 +2,7 @@
 
 use super::commit_log::{CommitLog, Commits};
 use super::disk::{Disk, DiskRead};
-use super::layout::{Layout, TileFile, tile_of_folder};
+use super::layout::{Layout, tile_of_folder};
 use super::metadata::Metadata;
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::TileIndex;
@@ -163,9 +163,16 @@ pub(super) fn list_foreign_tiles(disk: &dyn Disk, layout: &Layout) -> Result<FxH
     let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
     let mut tiles = FxHashSet::default();
     for tile in names.iter().filter_map(|name| tile_of_folder(name)) {
-        let path = layout.current(tile, TileFile::Table);
-        if disk.kind(&path).map_err(|error| Error::io(&path, "look at", error))?.is_some() {
-            tiles.insert(tile);
+        // One that holds anything is a tile, also if its table is missing; an empty one waits for its first flush.
+        let folder = layout.tile_folder(tile);
+        match disk.list(&folder) {
+            Ok(names) if names.is_empty() => {}
+            Err(error) if error.kind() != io::ErrorKind::NotADirectory => {
+                return Err(Error::io(&folder, "list", error));
+            }
+            _ => {
+                tiles.insert(tile);
+            }
         }
     }
     Ok(tiles)

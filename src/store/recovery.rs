@@ -1,5 +1,5 @@
 use super::commit_log::Commits;
-use super::disk::Disk;
+use super::disk::{Disk, EntryKind};
 use super::layout::{Layout, TileFile, flush_of_kept, tile_of_folder};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result};
@@ -8,6 +8,9 @@ use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
+
+/// What a writer may have left beside the map's own two files.
+const OWN_NEXT: [&str; 2] = ["metadata.json.next", "commits.log.next"];
 
 /// What a crash left behind that is not to be removed.
 #[derive(Debug, Default)]
@@ -31,7 +34,7 @@ pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Re
     let mut leftovers = Leftovers::default();
     for name in list(disk, layout.folder())? {
         let path = layout.folder().join(&name);
-        if name.ends_with(".next") {
+        if OWN_NEXT.contains(&&*name) {
             remove(disk, &path, &mut leftovers.removed)?;
         }
         let Some(tile) = tile_of_folder(&name) else { continue };
@@ -75,9 +78,7 @@ fn look_at_tile(
     removed: &mut u64,
 ) -> Result<State> {
     let folder = layout.tile_folder(tile);
-    if disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))?
-        != Some(super::EntryKind::Folder)
-    {
+    if disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? != Some(EntryKind::Folder) {
         // A file or a link with a tile's name: reading the tile, if there is one, tells.
         return Ok(State::Stray);
     }
@@ -117,7 +118,12 @@ fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
     disk.list(folder).map_err(|error| Error::io(folder, "list", error))
 }
 
+/// Removes a file; what has its name and is none is not voxtile's, and stays.
 fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
+    let kind = disk.kind(path).map_err(|error| Error::io(path, "look at", error))?;
+    if !matches!(kind, Some(EntryKind::File(_))) {
+        return Ok(());
+    }
     *removed += 1;
     disk.remove_file(path).map_err(|error| Error::io(path, "remove", error))
 }
@@ -127,7 +133,9 @@ fn has_stamp(disk: &dyn Disk, path: &Path, stamp: FileStamp) -> Result<bool> {
     let input = match disk.open(path) {
         Ok(input) if input.file_bytes() != stamp.bytes => return Ok(false),
         Ok(input) => input,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
+            return Ok(false);
+        }
         Err(error) => return Err(Error::io(path, "open", error)),
     };
     let mut input = Stamping::new(input);

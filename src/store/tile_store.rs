@@ -100,15 +100,16 @@ impl TileStore {
         let metadata = map_folder::read_metadata(&*disk, &layout)?;
         let mut store = Self::read(disk, layout, metadata)?;
         store.lock = Some(lock);
+        let path = store.layout.metadata();
+        let watch = store.disk.watch(&path).map_err(|error| Error::io(&path, "open", error))?;
+        store.readers.watch(store.written_flush.unwrap_or_default(), watch);
         if store.log.is_some() {
             store.is_log_settled = store.commits.torn.is_none();
-            let path = store.layout.metadata();
-            let watch = store.disk.watch(&path).map_err(|error| Error::io(&path, "open", error))?;
-            store.readers.watch(store.written_flush.unwrap_or_default(), watch);
-            // The last record may be one that a killed writer wrote and did not sync: durable before it is acted upon.
-            let log = store.layout.commit_log();
-            store.disk.sync_file(&log).map_err(|error| Error::io(&log, "sync", error))?;
-            store.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))?;
+            if store.is_metadata_behind() {
+                // The last record may be one that a killed writer wrote and could not sync, and syncing the same bytes
+                // again proves nothing: written anew, it is durable before it is acted upon.
+                store.replace_log()?;
+            }
             let leftovers = recover(&*store.disk, &store.layout, &store.commits)?;
             store.strays = leftovers.strays;
             store.leftovers_removed = leftovers.removed;
@@ -133,6 +134,17 @@ impl TileStore {
             }
         }
         Err(Error::Changed { path: folder.to_owned() })
+    }
+
+    /// The tiles of a map whose own two files cannot be read, by what else is known of it; for reading only.
+    pub fn of_commits(
+        disk: Arc<dyn Disk>,
+        folder: &Path,
+        map_id: [u8; 16],
+        metadata: Metadata,
+        commits: Commits,
+    ) -> Self {
+        Self::new(disk, Layout::new(folder), metadata, Some(CommitLog::of_map(map_id)), commits)
     }
 
     fn read(disk: Arc<dyn Disk>, layout: Layout, metadata: Metadata) -> Result<Self> {
@@ -230,6 +242,16 @@ impl TileStore {
     /// Whether `metadata.json` is older than the log: a crash came between the two.
     pub fn is_metadata_behind(&self) -> bool {
         self.log.is_some() && self.written_flush != Some(self.commits.flush_number)
+    }
+
+    /// Whether a map that was of the seed's format when it was opened has a log now: a writer has begun to change it.
+    pub fn is_adopted_meanwhile(&self) -> Result<bool> {
+        if self.log.is_some() {
+            return Ok(false);
+        }
+        let path = self.layout.commit_log();
+        let kind = self.disk.kind(&path).map_err(|error| Error::io(&path, "look at", error))?;
+        Ok(kind.is_some())
     }
 
     /// The tile folders that the log does not name, in order.

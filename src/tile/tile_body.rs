@@ -79,6 +79,11 @@ impl Tile {
         self.is_dirty
     }
 
+    /// Notes that the tile's content is to be written.
+    pub(crate) fn mark_dirty(&mut self) {
+        self.is_dirty = true;
+    }
+
     /// Notes that the tile's content is on disk.
     pub(crate) fn mark_clean(&mut self) {
         self.is_dirty = false;

@@ -106,31 +106,45 @@ impl Index {
         tile: TileIndex,
         known_scan: Option<u64>,
     ) -> Result<()> {
-        let read = |path: &Path| read_alone(disk, path, &config.grid, self.map_id, tile);
-        let next = layout.next(tile, TileFile::Table);
-        let table = match read(&layout.current(tile, TileFile::Table))? {
-            Some(Ok(table)) => table,
-            unusable => match read(&next)? {
-                // Written before the last flush that is known of, so it was part of it.
-                Some(Ok(table))
-                    if table.trailer.as_ref().map(|trailer| trailer.scan_number) <= known_scan =>
-                {
-                    self.waiting.push(tile);
-                    table
-                }
-                _ => {
-                    if let Some(Err(error)) = unusable {
-                        self.damaged.push((tile, error));
-                    }
-                    return Ok(());
-                }
-            },
+        let read = |file: &Path| read_alone(disk, file, &config.grid, self.map_id, tile);
+        let (current, next) = (layout.current(tile, TileFile::Table), layout.next(tile, TileFile::Table));
+        let table = match (read(&current)?, read(&next)?) {
+            (Some(Ok(table)), _) => table,
+            // Written before the last flush that is known of, so it was part of it.
+            (_, Some(Ok(table))) if scan_number_of(&table) <= known_scan => {
+                self.waiting.push(tile);
+                table
+            }
+            (Some(Err(error)), _) => {
+                self.damaged.push((tile, error));
+                return Ok(());
+            }
+            (None, next_table) => {
+                let folder = layout.tile_folder(tile);
+                let (path, reason) = match next_table {
+                    Some(_) => (&next, "nothing tells whether this version was committed"),
+                    None if disk.list(&folder).is_ok_and(|names| names.is_empty()) => return Ok(()),
+                    None => (&current, "the file is missing"),
+                };
+                self.damaged.push((tile, FormatError::at_offset(0, reason).in_map(path, Some(tile))));
+                return Ok(());
+            }
         };
         let stamp = stamp_from(&table, config);
+        if known_scan.is_none_or(|known| stamp.scan_number > known) {
+            // Nothing tells how many scans the tiles have in common: an input cannot be gone on with.
+            if let Some(ext) = &mut self.metadata.ext {
+                ext.input_fingerprint = None;
+            }
+        }
         self.commits.scan_number = self.commits.scan_number.max(stamp.scan_number);
         self.commits.tiles.insert(tile, stamp);
         Ok(())
     }
+}
+
+fn scan_number_of(table: &ReadTable) -> Option<u64> {
+    table.trailer.as_ref().map(|trailer| trailer.scan_number)
 }
 
 /// A table by itself, without a log: whole, of this map and tile; `None` if there is no file.

@@ -223,6 +223,10 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             (self.progress)(done, tiles.len() as u64);
         }
         if !lost.is_empty() {
+            if store.map_id().is_none() {
+                // The seed's own file, and perhaps with keys that voxtile does not know.
+                self.quarantine_copy(&self.layout.metadata(), "its bounds change")?;
+            }
             store.forget(&lost)?;
         } else if store.commits().torn.is_some() || store.is_metadata_behind() {
             store.tidy()?;

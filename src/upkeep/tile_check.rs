@@ -5,7 +5,7 @@ use crate::octree::write_bt;
 use crate::space::TileIndex;
 use crate::store::{Disk, FileStamp, Stamping, TileFile, TileStamp, TileStore};
 use crate::tile::Tile;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 /// What a look at both files of a tile gave.
@@ -96,7 +96,7 @@ pub(super) fn stamp_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileStamp>
 /// The first byte in which a file differs from what it should be, for people who look for the cause.
 pub(super) fn first_difference(disk: &dyn Disk, path: &Path, expected: &[u8]) -> Option<u64> {
     let mut found = Vec::new();
-    io::Read::read_to_end(&mut disk.open(path).ok()?, &mut found).ok()?;
+    disk.open(path).ok()?.take(expected.len() as u64 + 1).read_to_end(&mut found).ok()?;
     let common = found.iter().zip(expected).take_while(|(a, b)| a == b).count();
     (common < found.len().max(expected.len())).then_some(common as u64)
 }

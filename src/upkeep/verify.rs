@@ -6,9 +6,11 @@ use crate::error::{Error, FormatError, Result};
 use crate::mapper::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, TileFile, TileStore, flush_of_kept, tile_of_folder,
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, TileFile, TileStamp, TileStore, flush_of_kept,
+    read_log, tile_of_folder,
 };
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -68,16 +70,30 @@ pub fn verify_on(
     progress: impl FnMut(u64, u64),
 ) -> Result<Verification> {
     let layout = Layout::new(folder);
-    let mut verifier = Verifier { disk: &*disk, layout, found, progress, counts: Verification::default() };
-    let opened = TileStore::open_read_only(disk.clone(), folder).and_then(|store| {
-        config_from(store.metadata(), &store.layout().metadata()).map(|config| (store, config))
-    });
-    match opened {
-        Ok((store, config)) => verifier.verify_map(&store, &config)?,
+    let mut verifier = Verifier {
+        disk: &*disk,
+        layout,
+        found,
+        progress,
+        counts: Verification::default(),
+        told: BTreeSet::new(),
+    };
+    let store = match TileStore::open_read_only(disk.clone(), folder) {
+        Ok(store) => Some(store),
         Err(error) => {
             let finding = Finding::of(error)?;
             verifier.report(finding);
-            verifier.verify_without_index()?;
+            verifier.index_from_remains(&disk)?
+        }
+    };
+    if let Some(store) = store {
+        let path = store.layout().metadata();
+        match config_from(store.metadata(), &path) {
+            Ok(config) => verifier.verify_map(&store, &config)?,
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                verifier.report(finding);
+            }
         }
     }
     Ok(verifier.counts)
@@ -89,6 +105,8 @@ struct Verifier<'a, F, P> {
     found: F,
     progress: P,
     counts: Verification,
+    /// Tiles that are no longer in the list of tiles because they are damaged, which has been told.
+    told: BTreeSet<TileIndex>,
 }
 
 impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
@@ -113,6 +131,12 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 "a map of the seed's own format: no checksums, so only the form of its tables is checked";
             self.report(Finding::note(&self.layout.metadata(), None, reason));
         }
+        if let Some(torn) = &store.commits().torn {
+            let mut note = Finding::note(&self.layout.commit_log(), None, torn.reason.clone());
+            (note.offset, note.reason) =
+                (Some(torn.at), format!("a flush that never happened: {}", torn.reason));
+            self.report(note);
+        }
         let mut tiles: Vec<_> = store.tiles().collect();
         tiles.sort_unstable();
         self.counts.tiles = tiles.len() as u64;
@@ -127,6 +151,11 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let check = check_tile(self.disk, store, config, tile)?;
         let table = match check.table {
             Ok(table) => table,
+            Err(_) if self.has_changed_since(store, tile) => {
+                let folder = self.layout.tile_folder(tile);
+                self.report(Finding::note(&folder, Some(tile), "flushed anew while the map was verified"));
+                return Ok(());
+            }
             Err(error) => {
                 let finding = Finding::of(error)?;
                 self.report(finding);
@@ -148,30 +177,33 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    /// Whether a writer has flushed a tile since the store was opened. It keeps tables for readers, not octrees.
+    /// Whether a writer has flushed a tile since the store was opened. It keeps tables for readers, not octrees; and a
+    /// writer that was started since has not seen this reader.
     fn has_changed_since(&self, store: &TileStore, tile: TileIndex) -> bool {
-        let layout = store.layout();
-        let now = crate::store::read_log(self.disk, layout).ok().flatten();
-        now.is_some_and(|(_, commits)| commits.tiles.get(&tile).copied() != store.stamp(tile))
+        let now = self.stamp_now(tile);
+        now.is_some() && now != store.stamp(tile)
     }
 
-    /// Without a log, every table can only be checked by itself.
-    fn verify_without_index(&mut self) -> Result<()> {
-        let index = match Remains::read(self.disk, &self.layout) {
-            Ok(remains) => rebuild::index_of(self.disk, &self.layout, &remains, &mut |_, _| ())?,
-            // A writer is at work on what cannot be read by others; its own end will tell.
-            Err(Error::Locked { .. }) => return Ok(()),
-            Err(error) => return Err(error),
-        };
-        let Some(Index { commits, damaged, .. }) = index else { return Ok(()) };
-        self.counts.tiles = (commits.tiles.len() + damaged.len()) as u64;
-        self.counts.voxels = commits.tiles.values().map(|stamp| stamp.voxels).sum();
-        self.counts.table_bytes = commits.tiles.values().map(|stamp| stamp.table.bytes).sum();
-        for (_, error) in damaged {
-            let finding = Finding::of(error)?;
-            self.report(finding);
+    /// Where metadata or log cannot be read, the tiles are checked against what else tells of them.
+    fn index_from_remains(&mut self, disk: &Arc<dyn Disk>) -> Result<Option<TileStore>> {
+        let remains = Remains::read(self.disk, &self.layout)?;
+        match rebuild::index_of(self.disk, &self.layout, &remains, &mut |_, _| ()) {
+            Ok(Some(Index { map_id, metadata, commits, damaged, .. })) => {
+                for (tile, error) in damaged {
+                    self.told.insert(tile);
+                    let finding = Finding::of(error)?;
+                    self.report(finding);
+                }
+                let folder = self.layout.folder();
+                Ok(Some(TileStore::of_commits(disk.clone(), folder, map_id, metadata, commits)))
+            }
+            Ok(None) => Ok(None),
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                Ok(None)
+            }
         }
-        self.look_around(|_| true)
     }
 
     /// Looks for what is no part of the map.
@@ -184,7 +216,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 (QUARANTINE, _) => {
                     self.report(Finding::note(&path, None, "taken out of the map by a repair"))
                 }
-                (_, Some(tile)) => self.look_into(&path, tile, is_known(tile))?,
+                (_, Some(tile)) => {
+                    let is_known = is_known(tile) || self.told.contains(&tile);
+                    self.look_into(&path, tile, is_known)?;
+                }
                 (name, None) if name.ends_with(".next") => {
                     self.report(Finding::note(&path, None, "left behind, or being written"));
                 }
@@ -218,17 +253,17 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             }
         }
         // A writer may have added it since the log was read.
-        let is_new = || {
-            crate::store::read_log(self.disk, &self.layout)
-                .ok()
-                .flatten()
-                .is_some_and(|(_, commits)| commits.tiles.contains_key(&tile))
-        };
-        if is_stray && !is_new() {
+        if is_stray && self.stamp_now(tile).is_none() {
             let path = folder.join(TileFile::Table.name());
             self.damage(&path, Some(tile), "commits.log does not name this tile");
         }
         Ok(())
+    }
+
+    /// What the log says of a tile now.
+    fn stamp_now(&self, tile: TileIndex) -> Option<TileStamp> {
+        let (_, commits) = read_log(self.disk, &self.layout).ok()??;
+        commits.tiles.get(&tile).copied()
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<String>> {

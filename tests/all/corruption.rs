@@ -1,6 +1,6 @@
 use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use crate::support::random_scans::{Random, random_scan};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use voxtile::space::TileIndex;
 use voxtile::store::tile_of_folder;
@@ -95,7 +95,9 @@ fn every_flipped_byte_and_every_truncation_is_found_named_repaired_and_never_ove
         let (verification, found) = findings(&disk);
         assert!(!verification.is_whole(), "{what}");
         let named = found.iter().any(|finding| {
-            let same_file = finding.path == path || path.parent() == Some(map());
+            // What is wrong between metadata and log is told of the log, whichever was damaged.
+            let log = path.ends_with("metadata.json") && finding.path.ends_with("commits.log");
+            let same_file = finding.path == path || log;
             finding.severity == Severity::Damage
                 && same_file
                 && (finding.offset.is_some() || finding.line.is_some())
@@ -202,7 +204,7 @@ fn missing_swapped_older_and_foreign_files_are_found_and_repaired() {
                 let octree = tables[1].with_file_name("octree.bt");
                 disk.put(&table.with_file_name("octree.bt"), &files[&octree]);
             }),
-            "",
+            "the log names ",
             false,
         ),
         (
@@ -354,6 +356,113 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
         repair(&disk).unwrap();
         assert_eq!(contents(&disk).unwrap(), contents(&whole).unwrap());
     }
+}
+
+#[test]
+fn a_damaged_index_does_not_keep_the_tiles_from_being_checked() {
+    let whole = small_map();
+    for index in ["metadata.json", "commits.log"] {
+        for name in ["iwlo_meta.bin", "octree.bt"] {
+            let disk = whole.copy();
+            let mut damaged = vec![map().join(index)];
+            damaged.extend(whole.files().into_keys().filter(|path| path.ends_with(name)));
+            for path in &damaged {
+                let mut bytes = whole.files()[path].clone();
+                let middle = bytes.len() / 2;
+                bytes[middle] ^= 1;
+                disk.put(path, &bytes);
+            }
+            let (_, found) = findings(&disk);
+            for path in &damaged {
+                assert!(found.iter().any(|finding| finding.path == *path), "{index}, {name}: {found:?}");
+            }
+            assert_eq!(found.len(), damaged.len(), "{index}, {name}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn verify_beside_writers_finds_no_damage() {
+    let disk = small_map();
+    let config = || MapReader::config_of_on(disk.shared(), map()).unwrap();
+    let open = || OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap();
+    let (mut writer, mut seed) = (Some(open()), 10);
+    let found = &mut Vec::new();
+    let work = |_, _| {
+        // Another writer each time, which has not seen who reads.
+        let mut mapper = writer.take().unwrap();
+        for _ in 0..4 {
+            seed += 1;
+            mapper.insert_scan(&scan(seed)).unwrap();
+            mapper.flush().unwrap();
+        }
+        drop(mapper);
+        writer = Some(open());
+    };
+    let verification = verify_on(disk.shared(), map(), |finding| found.push(finding.clone()), work).unwrap();
+    assert!(verification.is_whole(), "{found:?}");
+}
+
+#[test]
+fn a_repair_without_a_log_loses_no_version_of_a_table() {
+    let tables = |disk: &FaultyDisk| -> BTreeSet<Vec<u8>> {
+        let files = disk.files().into_iter();
+        files
+            .filter(|(path, _)| path.to_string_lossy().contains("iwlo_meta"))
+            .map(|(_, bytes)| bytes)
+            .collect()
+    };
+    let mut crashes = 0;
+    for at in 0.. {
+        let disk = small_map();
+        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap();
+        for seed in [5, 6, 7] {
+            mapper.insert_scan(&scan(seed)).unwrap();
+        }
+        disk.set_fault(Fault::Crashes(at));
+        let _ = mapper.flush();
+        if !disk.has_crashed() {
+            break;
+        }
+        let left = disk.after_crash(Unsynced::Kept);
+        left.take(Path::new("/map/commits.log"));
+        let before: BTreeSet<_> = tables(&left);
+        let repaired = repair(&left).unwrap();
+        let kept = left.files().into_values().collect::<BTreeSet<_>>();
+        assert!(before.iter().all(|table| kept.contains(table)), "crash at {at}: {repaired:?}");
+        assert!(findings(&left).0.is_whole(), "crash at {at}");
+        crashes += 1;
+    }
+    assert!(crashes > 20);
+}
+
+#[test]
+fn what_is_not_voxtiles_stays_and_keeps_nobody_from_opening_the_map() {
+    let whole = small_map();
+    let tile = whole.files().into_keys().find(|path| path.ends_with("octree.bt")).unwrap();
+    let notes = Path::new("/map/notes.next");
+    let disk = whole.copy();
+    disk.put(notes, b"somebody's notes");
+    disk.shared().create_folder(Path::new("/map/old.next")).unwrap();
+    disk.shared().create_folder(&tile.with_file_name("octree.bt.next")).unwrap();
+    assert!(!findings(&disk).1.is_empty());
+    drop(OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap());
+    repair(&disk).unwrap();
+    assert_eq!(disk.files()[notes], b"somebody's notes");
+    assert_eq!(contents(&disk).unwrap(), contents(&whole).unwrap());
+    // Behind the log.
+    let disk = whole.copy();
+    let log = Path::new("/map/commits.log");
+    disk.put(log, &[&whole.files()[log][..], &[7; 1000]].concat());
+    let (verification, found) = findings(&disk);
+    assert_eq!((verification.damage, verification.notes), (0, 1), "{found:?}");
+    // Gone while it is written to.
+    let disk = whole.copy();
+    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap();
+    mapper.insert_scan(&scan(1)).unwrap();
+    disk.take(log);
+    assert!(mapper.flush().is_err());
+    assert!(disk.files().keys().all(|path| path != log), "a log without its beginning is none");
 }
 
 fn length(log: &[u8], record: usize) -> usize {

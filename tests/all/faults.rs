@@ -266,11 +266,206 @@ fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
                     Err(Error::NoMap { .. }) if reached.safe == 0 => {}
                     Err(error) => panic!("{what}: {error}"),
                 }
-                if let Ok(mapper) = open(&left) {
-                    oracle.check(&mapper, &what);
+                match open(&left) {
+                    Ok(mapper) => oracle.check(&mapper, &what),
+                    Err(Error::NoMap { .. }) if reached.safe == 0 => {}
+                    Err(error) => panic!("{what}: {error}"),
                 }
             }
         }
     }
     println!("{points} second crashes");
+}
+
+/// A flush that the disk refused is not tried again at once: the map goes on, and the power goes.
+#[test]
+fn a_flush_that_failed_leaves_nothing_behind_that_a_crash_could_bring_back() {
+    let oracle = Oracle::new();
+    let mut points = 0;
+    for at in 0..undisturbed(&oracle).changes() {
+        for later in [0, 1, 2, 3, 5, 8, 13, 21, 34] {
+            let disk = FaultyDisk::new(Fault::LosesSync(at));
+            let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(later)) else { break };
+            points += 1;
+            let unsynced =
+                [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(later)];
+            for unsynced in unsynced {
+                let what = format!("sync lost at {at}, crash {later} later, {unsynced:?}");
+                check_after_crash(&disk.after_crash(unsynced), &oracle, reached, &what);
+            }
+        }
+    }
+    println!("{points} crashes after a failed flush");
+}
+
+/// Inserts all scans and flushes as always, whatever a flush answers; after the first that fails comes another fault.
+/// `None` if none failed, or something else did.
+fn live_carelessly(disk: &FaultyDisk, oracle: &Oracle, then: Fault) -> Option<Reached> {
+    let mut mapper = create(disk).ok()?;
+    mapper.begin_input(INPUT).ok()?;
+    let (mut reached, mut has_failed) = (Reached::default(), false);
+    for (scan, number) in oracle.scans.iter().zip(1..) {
+        if mapper.insert_scan(scan).is_err() {
+            break;
+        }
+        if FLUSHED.contains(&number) {
+            reached.tried = number;
+            match mapper.flush() {
+                Ok(()) => reached.safe = number,
+                Err(_) if has_failed => break,
+                Err(_) => {
+                    has_failed = true;
+                    disk.set_fault(then);
+                }
+            }
+        }
+    }
+    has_failed.then_some(reached)
+}
+
+#[test]
+fn a_flush_that_failed_is_not_believed_by_the_next_process() {
+    let oracle = Oracle::new();
+    for at in 0..undisturbed(&oracle).changes() {
+        let disk = FaultyDisk::new(Fault::LosesSync(at));
+        // The process ends where the flush fails.
+        let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(0)) else { continue };
+        let next = disk.after_kill();
+        drop(open(&next).unwrap());
+        let left = next.after_crash(Unsynced::Dropped);
+        check_after_crash(&left, &oracle, reached, &format!("sync lost at {at}"));
+    }
+}
+
+#[test]
+fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
+    let oracle = Oracle::new();
+    for at in 0..60 {
+        for full in 0..12 {
+            let disk = FaultyDisk::new(Fault::None);
+            let mut mapper = create(&disk).unwrap();
+            for scan in &oracle.scans[..3] {
+                mapper.insert_scan(scan).unwrap();
+            }
+            disk.set_fault(Fault::LosesSync(at));
+            if mapper.flush().is_ok() {
+                continue;
+            }
+            disk.set_fault(Fault::IsFull(full));
+            let _ = mapper.flush();
+            disk.make_room();
+            // Questions push tiles out of memory.
+            for tile in mapper.tile_indices() {
+                mapper.tile(tile).unwrap();
+            }
+            mapper.flush().unwrap_or_else(|error| panic!("at {at}, full {full}: {error}"));
+            oracle.check(&mapper, "with room");
+            let left = disk.after_crash(Unsynced::Dropped);
+            oracle.check(&MapReader::open_on(left.shared(), &map(), 1).unwrap(), "after a crash");
+        }
+    }
+}
+
+#[test]
+fn a_reload_that_fails_changes_nothing() {
+    let oracle = Oracle::new();
+    let disk = FaultyDisk::new(Fault::None);
+    let roomy = config().with_pending_bytes(1 << 20);
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &map(), roomy).unwrap();
+    for (scan, number) in oracle.scans.iter().zip(1..) {
+        mapper.insert_scan(scan).unwrap();
+        if number == 3 {
+            mapper.flush().unwrap();
+        }
+    }
+    for tile in mapper.tile_indices() {
+        for at in 0..6 {
+            disk.set_fault(Fault::Fails(at));
+            let reloaded = mapper.is_tile_dirty(tile).then(|| mapper.reload(tile, true).is_ok());
+            disk.make_room();
+            if reloaded == Some(true) {
+                return;
+            }
+            oracle.check(&mapper, "after a reload that failed");
+        }
+    }
+}
+
+/// A map of the seed's own format, with the content of the first three scans.
+fn foreign(oracle: &Oracle) -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = create(&disk).unwrap();
+    for scan in &oracle.scans[..3] {
+        mapper.insert_scan(scan).unwrap();
+    }
+    mapper.flush().unwrap();
+    drop(mapper);
+    let disk = disk.copy();
+    disk.take(&map().join("commits.log"));
+    let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
+    disk.put(&map().join("metadata.json"), metadata);
+    for (path, bytes) in disk.files() {
+        if path.ends_with("iwlo_meta.bin") {
+            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
+            disk.put(&path, &bytes[..16 + 18 * count]);
+        }
+    }
+    disk
+}
+
+#[test]
+fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
+    let oracle = Oracle::new();
+    let foreign = foreign(&oracle);
+    let (before, after) = {
+        let mut mapper = open(&foreign.copy()).unwrap();
+        let before = mapper.digest().unwrap();
+        mapper.insert_scan(&oracle.scans[3]).unwrap();
+        (before, mapper.digest().unwrap())
+    };
+    let adopt = |disk: &FaultyDisk| -> Result<()> {
+        let mut mapper = open(disk)?;
+        mapper.insert_scan(&oracle.scans[3])?;
+        mapper.flush()
+    };
+    for at in 0.. {
+        let disk = foreign.copy();
+        disk.set_fault(Fault::Crashes(at));
+        let done = adopt(&disk).is_ok();
+        for unsynced in
+            [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(at + 7)]
+        {
+            let left = disk.after_crash(unsynced);
+            let what = format!("crash at {at}, {unsynced:?}");
+            let reader = MapReader::open_on(left.shared(), &map(), 1)
+                .unwrap_or_else(|error| panic!("{what}: {error}"));
+            let digest = reader.digest().unwrap_or_else(|error| panic!("{what}: {error}"));
+            assert!(digest == after || (!done && digest == before), "{what}");
+            let mapper = open(&left).unwrap_or_else(|error| panic!("{what}: {error}"));
+            assert_eq!(mapper.digest().unwrap(), digest, "{what}");
+        }
+        if !disk.has_crashed() {
+            break;
+        }
+    }
+    // Twice no room, at any two changes.
+    for first in (0..90).step_by(3) {
+        for second in (0..90).step_by(2) {
+            let disk = foreign.copy();
+            let mut mapper = open(&disk).unwrap();
+            mapper.insert_scan(&oracle.scans[3]).unwrap();
+            for full in [first, second] {
+                disk.set_fault(Fault::IsFull(full));
+                let _ = mapper.flush();
+            }
+            disk.make_room();
+            mapper.flush().unwrap_or_else(|error| panic!("full at {first}, at {second}: {error}"));
+            assert_eq!(mapper.digest().unwrap(), after);
+        }
+    }
+    // A reader that opened it before sees what it was.
+    let disk = foreign.copy();
+    let reader = MapReader::open_on(disk.shared(), &map(), 1).unwrap();
+    adopt(&disk).unwrap();
+    assert_eq!(reader.digest().unwrap(), before);
 }

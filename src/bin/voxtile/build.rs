@@ -54,11 +54,13 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     // What was accepted is kept, whatever ended the build.
     let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
     let Build { report, scans, .. } = build;
-    if let Err(error) = outcome {
-        flushed?;
-        return Err(error.context(format!("after {scans} scans, which are in the map")));
+    match (outcome, flushed) {
+        (Err(error), Ok(())) => {
+            return Err(error.context(format!("after {scans} scans, which are in the map")));
+        }
+        (Err(error), Err(flush_error)) => return Err(error.context(format!("{flush_error:#}; before that"))),
+        (Ok(()), flushed) => flushed?,
     }
-    flushed?;
     let interrupted = stop.load(Ordering::Relaxed);
     let summary = Summary::of(&args.output, scans, report, &mapper, started.elapsed())?;
     Summary { interrupted, resumed_after: done, ..summary }.print(args.json)?;
@@ -100,7 +102,8 @@ impl Build<'_> {
 /// After a flush that failed: what a user can rely on.
 fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
     let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
-    let hint = "once the cause is gone, the same command with --resume goes on from there";
+    let hint =
+        "once the cause is gone, the same command with --resume (in place of --append) goes on from there";
     anyhow::Error::new(error)
         .context(format!("{}: the map is as of scan {scan_number}; {hint}", folder.display()))
 }
@@ -169,14 +172,15 @@ fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig
         None => begun.map_or(InsertMode::PerScan, |rays| rays.insert_mode),
     };
     let min_range_m = args.min_range.unwrap_or(begun.map_or(0.0, |rays| rays.min_range_m));
-    let begun_max_m = begun.and_then(|rays| rays.max_range_m);
-    let max_range_m = args.max_range.unwrap_or(begun_max_m.unwrap_or(MAX_RANGE_M));
+    let begun_max_m = begun.map_or(Some(MAX_RANGE_M), |rays| rays.max_range_m);
     let sensor_model = sensor_model(args, config.sensor_model)?;
-    Ok(config
+    let mut config = config
         .with_sensor_model(sensor_model)
-        .with_range(min_range_m, max_range_m)
         .with_insert_mode(insert_mode)
-        .with_cache_tiles(args.cache_tiles))
+        .with_cache_tiles(args.cache_tiles);
+    config.rays.min_range_m = min_range_m;
+    config.rays.max_range_m = args.max_range.or(begun_max_m);
+    Ok(config)
 }
 
 fn sensor_model(args: &BuildArgs, own: SensorModel) -> anyhow::Result<SensorModel> {

@@ -36,7 +36,7 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
     if args.json {
         writeln!(out, "{}", serde_json::to_string(&Report { map: &args.map, repair, done })?)?;
     } else if repair.actions == 0 {
-        writeln!(out, "nothing to repair; {} tiles are whole", HumanCount(repair.tiles))?;
+        writeln!(out, "nothing to repair in {} tiles", HumanCount(repair.tiles))?;
     } else {
         let (tiles, lost) = (HumanCount(repair.tiles), HumanCount(repair.tiles_lost));
         writeln!(

@@ -99,6 +99,9 @@ fn read_header(
     Ok((count, after_entries))
 }
 
+/// Voxels of a brick.
+const BRICK_VOXELS: usize = 512;
+
 /// Decodes entries into a table, brick by brick.
 struct Entries<'a> {
     voxels: &'a VoxelBox,
@@ -136,6 +139,9 @@ impl<'a> Entries<'a> {
             if previous.brick() != code.brick() {
                 self.end_run()?;
             }
+        }
+        if self.run.len() >= BRICK_VOXELS {
+            return wrong(0, format!("key {:?} or another of its 8 x 8 x 8 voxels comes twice", key.0));
         }
         self.run.push((code, Evidence { log_odds, observation_count }, offset));
         Ok(())

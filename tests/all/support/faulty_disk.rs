@@ -500,10 +500,13 @@ impl Disk for FaultyDisk {
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
         let mut state = self.state();
         state.attempt(Kind::Changes)?;
-        let inode = state.file_or_new(path)?;
+        let inode = state.file(path)?;
         let content = state.content(inode);
+        if (content.seen.len() as u64) < offset {
+            return Err(io::Error::other("shorter than expected"));
+        }
         if content.seen.len() as u64 != offset {
-            content.seen.resize(offset as usize, 0);
+            content.seen.truncate(offset as usize);
             content.lost = false;
         }
         Ok(Box::new(Writer { disk: self.clone(), inode }))
