@@ -289,11 +289,8 @@ impl TileStore {
             CommitLog::write_whole(disk, next, log.map_id(), &self.commits, &text)
         })?;
         self.log = Some(compacted);
-        // What is appended from now on is in this file only.
-        self.is_log_settled = false;
-        self.sync_folder(self.layout.folder())?;
-        self.is_log_settled = true;
-        Ok(())
+        // What is appended from now on is in this file only; every commit syncs the folder first.
+        self.sync_folder(self.layout.folder())
     }
 
     fn sync_folder(&self, folder: &Path) -> Result<()> {
