@@ -52,7 +52,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let outcome = build.insert_all(&mut *source, &stop);
     build.progress.say("flushing");
     // What was accepted is kept, whatever ended the build.
-    let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
+    let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper, args.append));
     let Build { report, scans, .. } = build;
     match (outcome, flushed) {
         (Err(error), Ok(())) => {
@@ -100,12 +100,13 @@ impl Build<'_> {
 }
 
 /// After a flush that failed: what a user can rely on.
-fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
+fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper, is_appending: bool) -> anyhow::Error {
     let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
-    let hint =
-        "once the cause is gone, the same command with --resume (in place of --append) goes on from there";
-    anyhow::Error::new(error)
-        .context(format!("{}: the map is as of scan {scan_number}; {hint}", folder.display()))
+    let how = if is_appending { "with --resume in place of --append" } else { "with --resume" };
+    anyhow::Error::new(error).context(format!(
+        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command {how} goes on from there",
+        folder.display()
+    ))
 }
 
 /// Whether there is a map to go on with.
