@@ -12,8 +12,12 @@ use voxtile::simulation::Survey;
 use voxtile::store::{Disk, FsDisk};
 use voxtile::{MapConfig, MapView, Mapper, OutOfCoreTileMapper, Scan};
 
-fn disks() -> [(&'static str, Arc<dyn Disk>); 2] {
-    [("synced", Arc::new(FsDisk)), ("not synced", UnsyncedDisk::shared())]
+fn disks() -> [(&'static str, Arc<dyn Disk>); 3] {
+    [
+        ("synced", Arc::new(FsDisk)),
+        ("not synced", UnsyncedDisk::shared()),
+        ("5 ms a sync", UnsyncedDisk::taking(Duration::from_millis(5))),
+    ]
 }
 
 /// Room for every tile, so that nothing is written but by a flush.

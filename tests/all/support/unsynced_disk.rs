@@ -2,19 +2,35 @@ use std::any::Any;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
 use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
 
 /// The file system without waiting for the medium: for tests that are not about crashes.
 #[derive(Debug)]
-pub struct UnsyncedDisk;
+pub struct UnsyncedDisk {
+    /// What a sync takes in place of what the medium takes.
+    sync_time: Duration,
+}
 
 impl UnsyncedDisk {
     pub fn shared() -> Arc<dyn Disk> {
-        Arc::new(Self)
+        Self::taking(Duration::ZERO)
+    }
+
+    /// A medium that takes so long for a sync, 16 of them at once, whatever has been written.
+    pub fn taking(sync_time: Duration) -> Arc<dyn Disk> {
+        Arc::new(Self { sync_time })
     }
 }
 
-struct Unsynced(Box<dyn DiskWrite>);
+fn wait(time: Duration) {
+    if !time.is_zero() {
+        thread::sleep(time);
+    }
+}
+
+struct Unsynced(Box<dyn DiskWrite>, Duration);
 
 impl io::Write for Unsynced {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
@@ -28,6 +44,7 @@ impl io::Write for Unsynced {
 
 impl DiskWrite for Unsynced {
     fn sync(&mut self) -> io::Result<()> {
+        wait(self.1);
         Ok(())
     }
 }
@@ -46,23 +63,28 @@ impl Disk for UnsyncedDisk {
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
-        Ok(Box::new(Unsynced(FsDisk.create(path)?)))
+        Ok(Box::new(Unsynced(FsDisk.create(path)?, self.sync_time)))
     }
 
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
-        Ok(Box::new(Unsynced(FsDisk.append(path, offset)?)))
+        Ok(Box::new(Unsynced(FsDisk.append(path, offset)?, self.sync_time)))
     }
 
     fn sync_file(&self, _: &Path) -> io::Result<()> {
+        wait(self.sync_time);
         Ok(())
     }
 
     fn sync_folder(&self, _: &Path) -> io::Result<()> {
+        wait(self.sync_time);
         Ok(())
     }
 
     fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
-        [files, folders].map(|paths| paths.iter().map(|_| Ok(())).collect())
+        [files, folders].map(|paths| {
+            wait(self.sync_time * paths.len().div_ceil(16) as u32);
+            paths.iter().map(|_| Ok(())).collect()
+        })
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
