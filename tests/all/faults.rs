@@ -326,15 +326,55 @@ fn live_carelessly(disk: &FaultyDisk, oracle: &Oracle, then: Fault) -> Option<Re
 #[test]
 fn a_flush_that_failed_is_not_believed_by_the_next_process() {
     let oracle = Oracle::new();
+    let mut points = 0;
     for at in 0..undisturbed(&oracle).changes() {
-        let disk = FaultyDisk::new(Fault::LosesSync(at));
-        // The process ends where the flush fails.
-        let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(0)) else { continue };
-        let next = disk.after_kill();
-        drop(open(&next).unwrap());
-        let left = next.after_crash(Unsynced::Dropped);
-        check_after_crash(&left, &oracle, reached, &format!("sync lost at {at}"));
+        for fault in [Fault::LosesSync(at), Fault::LosesSyncAndDies(at)] {
+            let disk = FaultyDisk::new(fault);
+            // The process ends where the flush fails.
+            let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(0)) else { continue };
+            points += 1;
+            let next = disk.after_kill();
+            drop(open(&next).unwrap());
+            let left = next.after_crash(Unsynced::Dropped);
+            check_after_crash(&left, &oracle, reached, &format!("{fault:?}"));
+        }
     }
+    println!("{points} failed flushes and new processes");
+}
+
+/// What a map was built from is known from the commit on, not from when `metadata.json` says it too.
+#[test]
+fn the_input_is_that_of_the_last_commit() {
+    let oracle = Oracle::new();
+    let begin = |fault| {
+        let disk = FaultyDisk::new(Fault::None);
+        let mut mapper = create(&disk).unwrap();
+        mapper.insert_scan(&oracle.scans[0]).unwrap();
+        mapper.begin_input("other scans").unwrap();
+        disk.set_fault(fault);
+        let begun = mapper.begin_input(INPUT).is_ok();
+        (disk, begun)
+    };
+    // The commit is the whole record in the log; that is longest before it is compacted, after `metadata.json`.
+    let log_bytes = |disk: &FaultyDisk| disk.files()[&map().join("commits.log")].len();
+    let says_so = |disk: &FaultyDisk| {
+        String::from_utf8_lossy(&disk.files()[&map().join("metadata.json")]).contains(INPUT)
+    };
+    let crash = |at| {
+        let (disk, begun) = begin(Fault::Crashes(at));
+        disk.has_crashed().then(|| (disk.after_crash(Unsynced::Kept), begun))
+    };
+    let crashes: Vec<_> = (0..).map_while(crash).collect();
+    let longest = crashes.iter().map(|(left, _)| log_bytes(left)).max().unwrap();
+    let (mut committed, mut not_committed) = (0, 0);
+    for (at, (left, begun)) in crashes.iter().enumerate() {
+        let is_committed = log_bytes(left) == longest || says_so(left);
+        assert!(is_committed || !begun);
+        *(if is_committed { &mut committed } else { &mut not_committed }) += 1;
+        let resumed = open(left).unwrap().resume_input(if is_committed { INPUT } else { "other scans" });
+        assert!(resumed.is_ok(), "crash at {at}: {resumed:?}");
+    }
+    assert!(committed > 1 && not_committed > 0);
 }
 
 #[test]

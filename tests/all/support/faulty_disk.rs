@@ -25,6 +25,8 @@ pub enum Fault {
     /// The change fails; and a sync that fails leaves the file as it was on the medium, while later syncs of the same
     /// bytes report success, as Linux does.
     LosesSync(u64),
+    /// The same, and the process is killed before it can do anything about it: every later operation fails.
+    LosesSyncAndDies(u64),
     /// From this change on there is no room for anything new, until [`FaultyDisk::make_room`].
     IsFull(u64),
     /// From this change on only reading works, until [`FaultyDisk::make_room`].
@@ -295,13 +297,17 @@ impl State {
         self.changes += u64::from(kind != Kind::Reads);
         let error = |kind: io::ErrorKind| Verdict::Fails(kind.into());
         match self.fault {
-            _ if self.crashed => Verdict::Fails(io::Error::other("the power is off")),
+            _ if self.crashed => Verdict::Fails(io::Error::other("the power is off, or the process dead")),
             Fault::Crashes(at) if change == at && kind != Kind::Reads => {
                 self.crashed = true;
                 Verdict::Fails(io::Error::other("the power is off"))
             }
             Fault::Fails(at) if number == at => Verdict::Fails(io::Error::other("input/output error")),
             Fault::LosesSync(at) if change == at && kind != Kind::Reads => {
+                Verdict::Fails(io::Error::other("input/output error"))
+            }
+            Fault::LosesSyncAndDies(at) if change == at && kind != Kind::Reads => {
+                self.crashed = true;
                 Verdict::Fails(io::Error::other("input/output error"))
             }
             Fault::IsFull(at) if change >= at && kind == Kind::NeedsRoom => {
@@ -358,7 +364,8 @@ impl State {
     }
 
     fn sync(&mut self, inode: Inode) -> io::Result<()> {
-        let loses = matches!(self.fault, Fault::LosesSync(at) if at == self.changes);
+        let loses =
+            matches!(self.fault, Fault::LosesSync(at) | Fault::LosesSyncAndDies(at) if at == self.changes);
         match self.operation(Kind::Changes) {
             Verdict::Goes => {
                 let content = self.content(inode);
