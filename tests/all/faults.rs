@@ -315,6 +315,9 @@ fn live_carelessly(disk: &FaultyDisk, oracle: &Oracle, then: Fault) -> Option<Re
                 Err(_) if has_failed => break,
                 Err(_) => {
                     has_failed = true;
+                    if disk.has_crashed() {
+                        break;
+                    }
                     disk.set_fault(then);
                 }
             }
