@@ -1,4 +1,4 @@
-use super::grouping::OrderedCollector;
+use super::ordered::OrderedCollector;
 use super::trace::check_intensities;
 use super::{ScanReport, ScanUpdates};
 use crate::error::{Error, Result};

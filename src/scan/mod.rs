@@ -7,12 +7,18 @@
 //! The updates know nothing of what a tile holds: they can be kept and applied later.
 
 mod batch;
-mod grouping;
+mod marks;
+mod once;
+mod ordered;
 mod range;
 mod ray;
 mod report;
+mod slab_masks;
+mod slab_walk;
+mod tile_order;
 mod trace;
 mod updates;
+mod window;
 mod world_scan;
 
 pub use batch::PointBatch;

@@ -1,11 +1,19 @@
-use super::grouping::{MaskCollector, OrderedCollector};
+use super::once::OnceCollector;
+use super::ordered::OrderedCollector;
 use super::range::{Ranged, in_range};
-use super::ray::{MAX_RAY_STEPS, RayWalk};
+use super::ray::MAX_RAY_STEPS;
+use super::slab_walk::SlabRay;
+use super::window::Window;
 use super::{Scan, ScanReport, ScanUpdates};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
 use crate::space::{Grid, Point, VoxelIndex};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rays that a thread walks at least: fewer are not worth a thread's own marks.
+const LEAST_RAYS_A_THREAD: usize = 4096;
 
 /// What a scan says about voxels: its rays walked, and the updates grouped by tile.
 ///
@@ -54,9 +62,9 @@ struct Tracer<'a> {
 
 /// A ray that counts.
 struct Ray {
-    walk: RayWalk,
-    /// The voxel and observation at its end, if its end is evidence.
-    end: Option<(VoxelIndex, Observation)>,
+    path: SlabRay,
+    /// The observation at its end, if its end is evidence.
+    end: Option<Observation>,
 }
 
 impl<'a> Tracer<'a> {
@@ -68,34 +76,70 @@ impl<'a> Tracer<'a> {
         Ok(Self { grid, model, rays, scan, origin: grid.to_voxel_units(scan.origin), start })
     }
 
-    /// One update a voxel, a hit over any miss.
+    /// One update a voxel, a hit over any miss. Which voxels these are does not depend on the order of the rays, so
+    /// each thread walks some of them.
     fn once_a_voxel(&self) -> ScanUpdates {
-        let mut collector = MaskCollector::default();
+        let points = self.scan.points.len();
+        let threads = rayon::current_num_threads().min(points / LEAST_RAYS_A_THREAD).max(1);
+        let parts: Vec<Range<usize>> =
+            (0..threads).map(|k| points * k / threads..points * (k + 1) / threads).collect();
+        let window = Window::around(self.start, self.bounds());
+        let collected = parts.into_par_iter().map(|part| self.collect_once(window, part));
+        let merged = collected.reduce_with(|(mut collector, mut report), (other, other_report)| {
+            collector.absorb(other);
+            report += other_report;
+            (collector, report)
+        });
+        let (collector, report) =
+            merged.unwrap_or_else(|| (OnceCollector::new(window), ScanReport::default()));
+        collector.into_updates(self.grid, report)
+    }
+
+    fn collect_once(&self, window: Window, points: Range<usize>) -> (OnceCollector, ScanReport) {
+        let mut collector = OnceCollector::new(window);
         let needs_intensity = self.model.needs_intensity();
-        let report = self.for_each_ray(|ray| {
-            ray.walk.for_each_before_end(|voxel| collector.miss(voxel));
-            if let Some((voxel, Observation::Hit(intensity))) = ray.end {
-                collector.hit(voxel, needs_intensity.then_some(intensity));
+        let report = self.for_each_ray(points, |ray| {
+            collector.pass_along(&ray.path);
+            if let Some(Observation::Hit(intensity)) = ray.end {
+                collector.hit(ray.path.last, needs_intensity.then_some(intensity));
             }
         });
-        collector.into_updates(self.grid, report)
+        (collector, report)
+    }
+
+    /// Bounds of the points, cut at the max range, in units of voxels; whatever is not finite is left out.
+    fn bounds(&self) -> (Point, Point) {
+        let (mut low, mut high) = (self.scan.origin, self.scan.origin);
+        for point in self.scan.points.iter().filter(|point| point.iter().all(|x| x.is_finite())) {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(point[axis]);
+                high[axis] = high[axis].max(point[axis]);
+            }
+        }
+        if let Some(range_m) = self.rays.max_range_m {
+            for axis in 0..3 {
+                low[axis] = low[axis].max(self.scan.origin[axis] - range_m);
+                high[axis] = high[axis].min(self.scan.origin[axis] + range_m);
+            }
+        }
+        (self.grid.to_voxel_units(low), self.grid.to_voxel_units(high))
     }
 
     /// Every ray counts: its misses from the sensor outward, then its hit, in the order of the points.
     fn every_ray(&self) -> ScanUpdates {
         let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
-        let report = self.for_each_ray(|ray| {
-            ray.walk.for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
-            if let Some((voxel, observation)) = ray.end {
-                collector.push(voxel, observation);
+        let report = self.for_each_ray(0..self.scan.points.len(), |ray| {
+            ray.path.walk().for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
+            if let Some(observation) = ray.end {
+                collector.push(ray.path.last, observation);
             }
         });
         collector.into_updates(report)
     }
 
-    fn for_each_ray(&self, mut visit: impl FnMut(Ray)) -> ScanReport {
-        let mut report = ScanReport { points: self.scan.points.len() as u64, ..ScanReport::default() };
-        for number in 0..self.scan.points.len() {
+    fn for_each_ray(&self, points: Range<usize>, mut visit: impl FnMut(Ray)) -> ScanReport {
+        let mut report = ScanReport { points: points.len() as u64, ..ScanReport::default() };
+        for number in points {
             if let Some(ray) = self.ray(number, &mut report) {
                 visit(ray);
             }
@@ -119,13 +163,15 @@ impl<'a> Tracer<'a> {
             skipped.out_of_range += 1;
             return None;
         };
-        let walk = RayWalk::between(self.origin, self.start, self.grid.to_voxel_units(end_m), last);
-        if walk.steps() > MAX_RAY_STEPS {
+        let steps: u64 = (0..3).map(|k| u64::from(self.start[k].abs_diff(last[k]))).sum();
+        if steps > MAX_RAY_STEPS {
             skipped.ray_too_long += 1;
             return None;
         }
         report.cut_at_max_range += u64::from(!is_hit);
         let hit = Observation::Hit(intensity);
-        Some(Ray { walk, end: (is_hit && self.model.is_evidence(hit)).then_some((last, hit)) })
+        let end = self.grid.to_voxel_units(end_m);
+        let path = SlabRay { origin: self.origin, start: self.start, end, last };
+        Some(Ray { path, end: (is_hit && self.model.is_evidence(hit)).then_some(hit) })
     }
 }

@@ -52,16 +52,37 @@ pub const fn place_of_voxel(voxel: VoxelIndex) -> usize {
 
 /// The places of a brick whose voxel satisfies `min <= local < end` along every axis, each in 0..=8.
 pub fn mask_of_box(min: [i32; 3], end: [i32; 3]) -> BrickMask {
-    let mut mask = [0; 8];
-    for x in min[0].max(0)..end[0].min(BRICK_EDGE) {
-        for y in min[1].max(0)..end[1].min(BRICK_EDGE) {
-            for z in min[2].max(0)..end[2].min(BRICK_EDGE) {
-                let place = place_of_voxel([x, y, z]);
-                mask[place / 64] |= 1 << (place % 64);
-            }
-        }
+    let below = |axis: usize, k: i32| &BELOW[axis][k.clamp(0, BRICK_EDGE) as usize];
+    let mut mask = [u64::MAX; 8];
+    for axis in 0..3 {
+        let (low, high) = (below(axis, min[axis]), below(axis, end[axis]));
+        (0..8).for_each(|word| mask[word] &= high[word] & !low[word]);
     }
     mask
+}
+
+/// For each axis and `k` from 0 to 8, the places whose voxel's index along the axis is below `k`.
+static BELOW: [[BrickMask; 9]; 3] = below_masks();
+
+const fn below_masks() -> [[BrickMask; 9]; 3] {
+    let mut masks = [[[0; 8]; 9]; 3];
+    let mut code = 0;
+    while code < BRICK_VOXELS {
+        // Not a place: all voxels, whatever their order.
+        let voxel = [code as i32 & 7, code as i32 >> 3 & 7, code as i32 >> 6];
+        let place = place_of_voxel(voxel);
+        let mut axis = 0;
+        while axis < 3 {
+            let mut k = voxel[axis] as usize + 1;
+            while k <= 8 {
+                masks[axis][k][place / 64] |= 1 << (place % 64);
+                k += 1;
+            }
+            axis += 1;
+        }
+        code += 1;
+    }
+    masks
 }
 
 /// The places of a mask, ascending.
@@ -91,6 +112,11 @@ mod tests {
     #[test]
     fn masks_hold_what_was_put_in() {
         assert_eq!(mask_of_box([0; 3], [8; 3]), [u64::MAX; 8]);
+        assert_eq!(mask_of_box([3; 3], [3; 3]), [0; 8]);
+        let voxels = places(mask_of_box([2, -5, 6], [5, 1, 9])).collect::<Vec<_>>();
+        let mut expected = [2, 3, 4].map(|x| [6, 7].map(|z| place_of_voxel([x, 0, z]))).concat();
+        expected.sort_unstable();
+        assert_eq!(voxels, expected);
         assert_eq!(places(mask_of_box([0; 3], [2; 3])).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(places(mask_of_box([7; 3], [99; 3])).collect::<Vec<_>>(), [511]);
         assert_eq!(places([0; 8]).count(), 0);

@@ -128,12 +128,14 @@ impl Grid {
 fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
     let mut voxel = [0; 3];
     for axis in 0..3 {
-        let floor = point[axis].floor();
+        let coordinate = point[axis];
         // False for NaN too.
-        if !(floor >= f64::from(i32::MIN) && floor < f64::from(i32::MAX)) {
+        if !(coordinate >= f64::from(i32::MIN) && coordinate < f64::from(i32::MAX)) {
             return None;
         }
-        voxel[axis] = floor as i32;
+        // Its floor, for which not every processor has an instruction.
+        let truncated = coordinate as i32;
+        voxel[axis] = truncated - i32::from(f64::from(truncated) > coordinate);
     }
     Some(voxel)
 }

@@ -1,0 +1,55 @@
+use crate::space::{Point, VoxelIndex};
+
+/// Voxels along the edge of a page of 8 x 8 x 8 bricks.
+pub(super) const PAGE_EDGE: i64 = 64;
+
+/// A window reaches at most so many voxels and a page from the sensor, along each axis and to both sides.
+const MAX_REACH: i64 = 1984;
+
+/// A voxel relative to the lowest of a window.
+pub(super) type Local = [u32; 3];
+
+/// A box of voxels around a sensor, whole pages along every axis, in which the rays of a scan are marked without
+/// looking bricks up in a hash map. Rays that leave it are walked the slow way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    base: VoxelIndex,
+    pages: [u32; 3],
+}
+
+impl Window {
+    /// The window around `center` for points with these bounds, both in units of voxels.
+    pub(super) fn around(center: VoxelIndex, bounds: (Point, Point)) -> Self {
+        let page = |axis: usize, coordinate: f64| {
+            let center = i64::from(center[axis]);
+            // Saturates; NaN, which no bound is, would be 0.
+            let voxel = (coordinate.floor() as i64).clamp(center - MAX_REACH, center + MAX_REACH);
+            voxel
+                .clamp(i64::from(i32::MIN) + PAGE_EDGE, i64::from(i32::MAX) - PAGE_EDGE)
+                .div_euclid(PAGE_EDGE)
+        };
+        let first: [i64; 3] = std::array::from_fn(|k| page(k, bounds.0[k].min(f64::from(center[k]))));
+        let last: [i64; 3] = std::array::from_fn(|k| page(k, bounds.1[k].max(f64::from(center[k]))));
+        Self {
+            base: first.map(|page| (page * PAGE_EDGE) as i32),
+            pages: std::array::from_fn(|k| (last[k] - first[k]).max(0) as u32 + 1),
+        }
+    }
+
+    /// Pages along each axis.
+    pub(super) fn pages(&self) -> [u32; 3] {
+        self.pages
+    }
+
+    /// The lowest voxel.
+    pub(super) fn base(&self) -> VoxelIndex {
+        self.base
+    }
+
+    /// A voxel relative to the lowest; `None` outside.
+    #[inline]
+    pub(super) fn local(&self, voxel: VoxelIndex) -> Option<Local> {
+        let local: Local = std::array::from_fn(|k| voxel[k].wrapping_sub(self.base[k]) as u32);
+        (0..3).all(|k| local[k] < self.pages[k] * PAGE_EDGE as u32).then_some(local)
+    }
+}
