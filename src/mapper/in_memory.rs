@@ -1,7 +1,7 @@
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
-use crate::scan::{PointBatch, Scan, ScanReport, ScanUpdates, trace_scan};
+use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates};
 use crate::space::TileIndex;
 use crate::tile::Tile;
 use rustc_hash::FxHashMap;
@@ -12,6 +12,7 @@ use rustc_hash::FxHashMap;
 pub struct InMemoryMapper {
     config: MapConfig,
     tiles: FxHashMap<TileIndex, Tile>,
+    tracer: ScanTracer,
     scan_number: u64,
 }
 
@@ -22,7 +23,8 @@ impl InMemoryMapper {
     ///
     /// The first argument of the configuration that is wrong.
     pub fn new(config: MapConfig) -> Result<Self> {
-        Ok(Self { config: config.validated()?, tiles: FxHashMap::default(), scan_number: 0 })
+        let config = config.validated()?;
+        Ok(Self { config, tiles: FxHashMap::default(), tracer: ScanTracer::default(), scan_number: 0 })
     }
 
     fn accept(&mut self, updates: ScanUpdates) -> ScanReport {
@@ -79,7 +81,7 @@ impl MapView for InMemoryMapper {
 impl Mapper for InMemoryMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
         let MapConfig { grid, sensor_model, rays, .. } = &self.config;
-        let updates = trace_scan(grid, sensor_model, rays, scan)?;
+        let updates = self.tracer.trace(grid, sensor_model, rays, scan)?;
         Ok(self.accept(updates))
     }
 

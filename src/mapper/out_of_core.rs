@@ -3,7 +3,7 @@ use super::residency::{Input, Residency, new_metadata};
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
-use crate::scan::{PointBatch, Scan, ScanReport, ScanUpdates, trace_scan};
+use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates};
 use crate::space::TileIndex;
 use crate::store::{Disk, FsDisk, Metadata, TileStore};
 use std::path::Path;
@@ -18,6 +18,7 @@ pub struct OutOfCoreTileMapper {
     scan_number: u64,
     /// Questions take `&self` and may bring tiles in.
     residency: Mutex<Residency>,
+    tracer: ScanTracer,
 }
 
 impl OutOfCoreTileMapper {
@@ -58,7 +59,8 @@ impl OutOfCoreTileMapper {
 
     fn new(config: MapConfig, store: TileStore) -> Self {
         let scan_number = store.commits().scan_number;
-        Self { residency: Mutex::new(Residency::new(config.clone(), store)), config, scan_number }
+        let residency = Mutex::new(Residency::new(config.clone(), store));
+        Self { residency, config, tracer: ScanTracer::default(), scan_number }
     }
 
     /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
@@ -208,7 +210,7 @@ impl MapView for OutOfCoreTileMapper {
 impl Mapper for OutOfCoreTileMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
         let MapConfig { grid, sensor_model, rays, .. } = &self.config;
-        let updates = trace_scan(grid, sensor_model, rays, scan)?;
+        let updates = self.tracer.trace(grid, sensor_model, rays, scan)?;
         self.accept(updates)
     }
 

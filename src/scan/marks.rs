@@ -1,30 +1,47 @@
 use super::slab_masks::{Slabs, add_slabs, slab_bit};
 use super::window::{Local, Window};
 use crate::space::{BRICK_EDGE, BrickMask, VoxelIndex, place_of_voxel};
+use rayon::prelude::*;
 
 /// The voxels of a window that a scan's rays pass or end in: each voxel once.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Marks {
     window: Window,
     /// Page number, plus one, of each page of the window; 0 for a page without bricks.
-    directory: Box<[u32]>,
+    directory: Vec<u32>,
     /// Slot, plus one, of each brick of a page; 0 for a brick without marks.
     pages: Vec<[u32; 512]>,
     bricks: Vec<MarkedBrick>,
+    /// Index of each brick: its voxels' indices over 8.
+    indices: Vec<VoxelIndex>,
 }
 
 /// The marks of one brick.
+#[derive(Clone, Debug, Default)]
 #[repr(align(64))]
-pub(super) struct MarkedBrick {
+struct MarkedBrick {
     /// Passed voxels as slabs along x, along y and along z.
     passed: [Slabs; 3],
     hits: BrickMask,
-    index: VoxelIndex,
 }
 
 impl Marks {
-    pub(super) fn new(window: Window) -> Self {
-        let directory = vec![0; window.pages().map(|pages| pages as usize).iter().product()].into();
-        Self { window, directory, pages: Vec::new(), bricks: Vec::new() }
+    /// Forgets all marks, and takes others in another window; the memory is kept.
+    pub(super) fn clear(&mut self, window: Window) {
+        self.window = window;
+        self.directory.clear();
+        self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
+        self.pages.clear();
+        self.bricks.clear();
+        self.indices.clear();
+    }
+
+    /// Bytes of memory on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        self.directory.capacity() * size_of::<u32>()
+            + self.pages.capacity() * size_of::<[u32; 512]>()
+            + self.bricks.capacity() * size_of::<MarkedBrick>()
+            + self.indices.capacity() * size_of::<VoxelIndex>()
     }
 
     pub(super) fn window(&self) -> &Window {
@@ -58,7 +75,8 @@ impl Marks {
         let local = [x, y, z];
         let base = self.window.base();
         let index = std::array::from_fn(|k| base[k].wrapping_add(local[k] as i32).div_euclid(BRICK_EDGE));
-        self.bricks.push(MarkedBrick { passed: [[0; 8]; 3], hits: [0; 8], index });
+        self.bricks.push(MarkedBrick::default());
+        self.indices.push(index);
         let brick = (x / 8 % 8 * 64 + y / 8 % 8 * 8 + z / 8 % 8) as usize;
         self.pages[*page as usize - 1][brick] = self.bricks.len() as u32;
         self.bricks.len() - 1
@@ -87,8 +105,8 @@ impl Marks {
     /// Adds the marks of another with the same window.
     pub(super) fn absorb(&mut self, other: &Self) {
         let base = self.window.base();
-        for brick in &other.bricks {
-            let local = std::array::from_fn(|k| (brick.index[k] * BRICK_EDGE).wrapping_sub(base[k]) as u32);
+        for (brick, index) in other.bricks.iter().zip(&other.indices) {
+            let local = std::array::from_fn(|k| (index[k] * BRICK_EDGE).wrapping_sub(base[k]) as u32);
             let slot = self.slot_of(local);
             let mine = &mut self.bricks[slot];
             let words = mine.passed.iter_mut().chain([&mut mine.hits]).flatten();
@@ -98,24 +116,29 @@ impl Marks {
         }
     }
 
-    /// The bricks with marks, by slot.
-    pub(super) fn bricks(&self) -> &[MarkedBrick] {
-        &self.bricks
+    /// Index of each brick with marks, by slot: its voxels' indices over 8.
+    pub(super) fn bricks(&self) -> &[VoxelIndex] {
+        &self.indices
+    }
+
+    /// Ends the marking: puts what was passed into masks in Morton order.
+    pub(super) fn finish(&mut self) {
+        self.bricks.par_iter_mut().with_min_len(1024).for_each(MarkedBrick::finish);
+    }
+
+    /// Voxels of a brick that were hit, and voxels that were passed, whether hit or not; after [`Marks::finish`].
+    pub(super) fn masks(&self, slot: usize) -> (BrickMask, BrickMask) {
+        let brick = &self.bricks[slot];
+        (brick.hits, brick.passed[0])
     }
 }
 
 impl MarkedBrick {
-    /// Index of the brick: its voxels' indices over 8.
-    pub(super) fn index(&self) -> VoxelIndex {
-        self.index
-    }
-
-    /// Voxels that were hit, and voxels that were passed, whether hit or not.
-    pub(super) fn masks(&self) -> (BrickMask, BrickMask) {
+    fn finish(&mut self) {
         let mut passed = [0; 8];
         add_slabs::<0>(&self.passed[0], &mut passed);
         add_slabs::<1>(&self.passed[1], &mut passed);
         add_slabs::<2>(&self.passed[2], &mut passed);
-        (self.hits, passed)
+        self.passed[0] = passed;
     }
 }

@@ -24,6 +24,6 @@ mod world_scan;
 pub use batch::PointBatch;
 pub use ray::{MAX_RAY_STEPS, RayWalk};
 pub use report::{ScanReport, SkippedPoints};
-pub use trace::trace_scan;
+pub use trace::ScanTracer;
 pub use updates::{BrickUpdate, OrderedUpdates, ScanUpdates, TileUpdates};
 pub use world_scan::Scan;

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Collects what one scan says about voxels, each once: a hit over any miss, and of its hits the largest intensity.
+#[derive(Clone, Debug, Default)]
 pub(super) struct OnceCollector {
     /// What lies in the window around the sensor; nearly everything.
     marks: Marks,
@@ -21,13 +22,13 @@ pub(super) struct OnceCollector {
 }
 
 /// A brick outside the window.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct FarBrick {
     hits: BrickMask,
     passed: BrickMask,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct HitIntensity {
     brick: VoxelIndex,
     place: u16,
@@ -42,8 +43,19 @@ enum Source {
 }
 
 impl OnceCollector {
-    pub(super) fn new(window: Window) -> Self {
-        Self { marks: Marks::new(window), far: FxHashMap::default(), intensities: Vec::new() }
+    /// Forgets everything, and begins anew with another window; the memory is kept.
+    pub(super) fn clear(&mut self, window: Window) {
+        self.marks.clear(window);
+        self.far.clear();
+        self.intensities.clear();
+    }
+
+    /// Bytes of memory on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        let far_brick = size_of::<(VoxelIndex, FarBrick)>() + 1;
+        self.marks.bytes()
+            + self.far.capacity() * 8 / 7 * far_brick
+            + self.intensities.capacity() * size_of::<HitIntensity>()
     }
 
     /// A ray passes all voxels before its last.
@@ -81,26 +93,28 @@ impl OnceCollector {
     }
 
     /// Adds what another collector with the same window has seen.
-    pub(super) fn absorb(&mut self, other: Self) {
+    pub(super) fn absorb(&mut self, other: &Self) {
         self.marks.absorb(&other.marks);
-        for (index, brick) in other.far {
-            let mine = self.far.entry(index).or_default();
+        for (index, brick) in &other.far {
+            let mine = self.far.entry(*index).or_default();
             add(&mut mine.hits, &brick.hits);
             add(&mut mine.passed, &brick.passed);
         }
-        self.intensities.extend(other.intensities);
+        self.intensities.extend_from_slice(&other.intensities);
     }
 
     /// The updates, each brick cut at the borders of the tiles.
-    pub(super) fn into_updates(mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
+    pub(super) fn updates(&mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
+        self.marks.finish();
         // The largest of a voxel comes first.
         self.intensities.sort_unstable_by(|a, b| {
             (a.brick, a.place).cmp(&(b.brick, b.place)).then(b.intensity.total_cmp(&a.intensity))
         });
         self.intensities.dedup_by_key(|hit| (hit.brick, hit.place));
         let tiles: Vec<_> = self.bricks_by_tile(grid).into_iter().collect();
+        let this = &*self;
         let updates =
-            tiles.into_par_iter().map(|(tile, bricks)| (tile, self.updates_of_tile(grid, tile, bricks)));
+            tiles.into_par_iter().map(|(tile, bricks)| (tile, this.updates_of_tile(grid, tile, bricks)));
         let mut tiles: Vec<(TileIndex, Vec<BrickUpdate>)> = updates.collect();
         tiles.retain(|(_, bricks)| !bricks.is_empty());
         for brick in tiles.iter().flat_map(|(_, bricks)| bricks) {
@@ -113,8 +127,7 @@ impl OnceCollector {
 
     /// For each tile the bricks that reach into it: index and marks.
     fn bricks_by_tile(&self, grid: &Grid) -> FxHashMap<TileIndex, Vec<(VoxelIndex, Source)>> {
-        let near =
-            self.marks.bricks().iter().enumerate().map(|(slot, brick)| (brick.index(), Source::Window(slot)));
+        let near = self.marks.bricks().iter().enumerate().map(|(slot, index)| (*index, Source::Window(slot)));
         let far = self.far.iter().map(|(index, brick)| (*index, Source::Far(*brick)));
         let mut tiles: FxHashMap<TileIndex, Vec<_>> = FxHashMap::default();
         for (index, source) in near.chain(far) {
@@ -139,7 +152,7 @@ impl OnceCollector {
         let mut updates = Vec::with_capacity(coded.len());
         for (brick, index, source) in coded {
             let (mut hits, mut misses) = match source {
-                Source::Window(slot) => self.marks.bricks()[slot].masks(),
+                Source::Window(slot) => self.marks.masks(slot),
                 Source::Far(FarBrick { hits, passed }) => (hits, passed),
             };
             let min = index.map(|k| k * BRICK_EDGE);

@@ -20,14 +20,16 @@ pub(super) fn slab_bit(b: u32, c: u32) -> u64 {
 /// A bit of a slab has the number `b0 c0 b1 c1 b2 c2` (lowest first), a place of a mask `x0 y0 z0 x1 y1 z1 x2 y2 z2`:
 /// the slab's own index goes in between, bit by bit.
 pub(super) fn add_slabs<const AXIS: usize>(slabs: &Slabs, mask: &mut BrickMask) {
+    // Most bricks are met along one axis.
+    if *slabs == [0; 8] {
+        return;
+    }
     for (slab, &word) in slabs.iter().enumerate() {
         let (low, middle, high) = (slab & 1, slab >> 1 & 1, slab >> 2);
+        let shift = (low + 8 * middle) << AXIS;
         for quarter in 0..4 {
             let bits = (word >> (16 * quarter)) as u16;
-            if bits != 0 {
-                let shift = (low + 8 * middle) << AXIS;
-                mask[between::<AXIS>(quarter, high)] |= spread::<AXIS>(bits) << shift;
-            }
+            mask[between::<AXIS>(quarter, high)] |= spread::<AXIS>(bits) << shift;
         }
     }
 }

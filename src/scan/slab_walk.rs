@@ -57,38 +57,48 @@ impl SlabRay {
                 Path::along::<A, B, C>(self, marks.window().base(), a, is_up);
             let mut bit = slab_bit(b, c);
             // Once around for every brick that the ray comes into.
+            let mut came_in_by = 0;
             while slabs > 0 {
                 let slot = marks.slot_of(voxel::<A, B, C>(a, b, c));
                 let in_brick = marks.slabs(slot, A);
+                in_brick[(a.wrapping_sub(step) & 7) as usize] |= came_in_by;
+                came_in_by = 0;
                 loop {
                     if is_near_border(at_b) || is_near_border(at_c) {
                         return false;
                     }
                     let (exit_b, exit_c) = ((at_b >> 32) as u32, (at_c >> 32) as u32);
                     let (change_b, change_c) = (b ^ exit_b, c ^ exit_c);
+                    // One branch that is seldom taken, where two would often be guessed wrong.
+                    let is_diagonal = change_b * change_c != 0;
                     let exit_bit = slab_bit(exit_b, exit_c);
                     (at_b, at_c, slabs) = (at_b + slope_b, at_c + slope_c, slabs - 1);
-                    let slab = (a & 7) as usize;
+                    let (slab, entry_bit) = (a, std::mem::replace(&mut bit, exit_bit));
+                    let entry = (b, c);
                     a = a.wrapping_add(step);
+                    let is_at_end = slabs == 0 || a & 7 == first_of_brick;
                     if (change_b | change_c) < 8 {
-                        in_brick[slab] |= bit | exit_bit;
-                        if change_b != 0 && change_c != 0 {
-                            let (b, c) = order.between([b, c], [exit_b, exit_c]);
-                            in_brick[slab] |= slab_bit(b, c);
+                        in_brick[(slab & 7) as usize] |= entry_bit | exit_bit;
+                        if is_diagonal {
+                            let (b, c) = order.between(entry, (exit_b, exit_c));
+                            in_brick[(slab & 7) as usize] |= slab_bit(b, c);
                         }
-                        (b, c, bit) = (exit_b, exit_c, exit_bit);
-                        if slabs == 0 || a & 7 == first_of_brick {
+                        (b, c) = (exit_b, exit_c);
+                        if is_at_end {
                             break;
                         }
                     } else {
-                        in_brick[slab] |= bit;
-                        let a = a.wrapping_sub(step);
-                        if change_b != 0 && change_c != 0 {
-                            let (b, c) = order.between([b, c], [exit_b, exit_c]);
-                            mark_voxel::<A, B, C>(marks, a, b, c);
+                        in_brick[(slab & 7) as usize] |= entry_bit;
+                        if is_diagonal {
+                            let (b, c) = order.between(entry, (exit_b, exit_c));
+                            mark_voxel::<A, B, C>(marks, slab, b, c);
                         }
-                        mark_voxel::<A, B, C>(marks, a, exit_b, exit_c);
-                        (b, c, bit) = (exit_b, exit_c, exit_bit);
+                        (b, c) = (exit_b, exit_c);
+                        if is_at_end {
+                            mark_voxel::<A, B, C>(marks, slab, b, c);
+                        } else {
+                            came_in_by = exit_bit;
+                        }
                         break;
                     }
                 }
@@ -137,7 +147,7 @@ impl SlabRay {
         }
         if ahead_b + ahead_c == 2 {
             let order = CrossingOrder::<B, C>::of(self, marks.window().base());
-            let (b, c) = order.between([b, c], [last[B], last[C]]);
+            let (b, c) = order.between((b, c), (last[B], last[C]));
             mark_voxel::<A, B, C>(marks, last[A], b, c);
         }
         true
@@ -194,7 +204,7 @@ impl<const B: usize, const C: usize> CrossingOrder<B, C> {
     /// The voxel between two neighbors of a neighbor, which a ray goes through from one to the other; of equal times
     /// the lower axis is first, and `B` is lower.
     #[inline]
-    fn between(&self, [b, c]: [u32; 2], [exit_b, exit_c]: [u32; 2]) -> (u32, u32) {
+    fn between(&self, (b, c): (u32, u32), (exit_b, exit_c): (u32, u32)) -> (u32, u32) {
         let time = |k: usize, border: u32| {
             (self.base[k] + f64::from(border) - self.origin[k]) * self.inv_direction[k]
         };
@@ -235,13 +245,13 @@ mod tests {
 
     fn marked(marks: &Marks) -> BTreeSet<VoxelIndex> {
         let mut voxels = BTreeSet::new();
-        for brick in marks.bricks() {
-            let (_, passed) = brick.masks();
+        for (slot, brick) in marks.bricks().iter().enumerate() {
+            let (_, passed) = marks.masks(slot);
             let passed: BTreeSet<usize> = places(passed).collect();
             for k in 0..512 {
                 let offset = [k & 7, k >> 3 & 7, k >> 6];
                 if passed.contains(&place_of_voxel(offset)) {
-                    voxels.insert(std::array::from_fn(|axis| brick.index()[axis] * 8 + offset[axis]));
+                    voxels.insert(std::array::from_fn(|axis| brick[axis] * 8 + offset[axis]));
                 }
             }
         }
@@ -264,8 +274,10 @@ mod tests {
             (std::array::from_fn(|k| low[k].min(end[k])), std::array::from_fn(|k| high[k].max(end[k])))
         });
         let rays: Vec<_> = ends.iter().map(|&end| ray(origin, end)).collect();
-        let mut marks = Marks::new(Window::around(rays[0].start, bounds));
+        let mut marks = Marks::default();
+        marks.clear(Window::around(rays[0].start, bounds));
         let left: Vec<_> = rays.iter().filter(|ray| !ray.mark(&mut marks)).copied().collect();
+        marks.finish();
         let (marked, visited) = (marked(&marks), visited(&rays));
         assert!(marked.is_subset(&visited), "{origin:?} to {ends:?}: more than the rays visit");
         let told = rays.iter().filter(|ray| !left.iter().any(|other| other.end == ray.end)).copied();

@@ -15,19 +15,39 @@ use std::ops::Range;
 /// Rays that a thread walks at least: fewer are not worth a thread's own marks.
 const LEAST_RAYS_A_THREAD: usize = 4096;
 
-/// What a scan says about voxels: its rays walked, and the updates grouped by tile.
-///
-/// Points that cannot count are skipped and reported.
-///
-/// # Errors
-///
-/// An origin without a voxel, intensities that do not match the points, or none where the sensor model needs them.
-pub fn trace_scan(grid: &Grid, model: &SensorModel, rays: &RayConfig, scan: &Scan) -> Result<ScanUpdates> {
-    check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
-    let tracer = Tracer::new(grid, model, rays, scan)?;
-    match rays.insert_mode {
-        InsertMode::PerScan => Ok(tracer.once_a_voxel()),
-        InsertMode::PerRay => Ok(tracer.every_ray()),
+/// Finds out what scans say about voxels; from scan to scan it keeps the memory that this takes.
+#[derive(Clone, Debug, Default)]
+pub struct ScanTracer {
+    /// One for every thread that takes part.
+    collectors: Vec<OnceCollector>,
+}
+
+impl ScanTracer {
+    /// What a scan says about voxels: its rays walked, and the updates grouped by tile.
+    ///
+    /// Points that cannot count are skipped and reported.
+    ///
+    /// # Errors
+    ///
+    /// An origin without a voxel, intensities that do not match the points, or none where the sensor model needs them.
+    pub fn trace(
+        &mut self,
+        grid: &Grid,
+        model: &SensorModel,
+        rays: &RayConfig,
+        scan: &Scan,
+    ) -> Result<ScanUpdates> {
+        check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
+        let fan = Fan::new(grid, model, rays, scan)?;
+        match rays.insert_mode {
+            InsertMode::PerScan => Ok(fan.once_a_voxel(&mut self.collectors)),
+            InsertMode::PerRay => Ok(fan.every_ray()),
+        }
+    }
+
+    /// Bytes of memory that are kept.
+    pub fn bytes(&self) -> usize {
+        self.collectors.iter().map(|collector| size_of::<OnceCollector>() + collector.bytes()).sum()
     }
 }
 
@@ -50,7 +70,8 @@ pub(super) fn check_intensities(
     }
 }
 
-struct Tracer<'a> {
+/// The rays of a scan, from one origin.
+struct Fan<'a> {
     grid: &'a Grid,
     model: &'a SensorModel,
     rays: &'a RayConfig,
@@ -67,7 +88,7 @@ struct Ray {
     end: Option<Observation>,
 }
 
-impl<'a> Tracer<'a> {
+impl<'a> Fan<'a> {
     fn new(grid: &'a Grid, model: &'a SensorModel, rays: &'a RayConfig, scan: &'a Scan) -> Result<Self> {
         let start = grid.voxel_of(scan.origin).ok_or_else(|| {
             let reason = format!("{:?} m is not finite or too far away for a voxel index", scan.origin);
@@ -78,33 +99,34 @@ impl<'a> Tracer<'a> {
 
     /// One update a voxel, a hit over any miss. Which voxels these are does not depend on the order of the rays, so
     /// each thread walks some of them.
-    fn once_a_voxel(&self) -> ScanUpdates {
+    fn once_a_voxel(&self, collectors: &mut Vec<OnceCollector>) -> ScanUpdates {
         let points = self.scan.points.len();
         let threads = rayon::current_num_threads().min(points / LEAST_RAYS_A_THREAD).max(1);
-        let parts: Vec<Range<usize>> =
-            (0..threads).map(|k| points * k / threads..points * (k + 1) / threads).collect();
+        if collectors.len() < threads {
+            collectors.resize_with(threads, OnceCollector::default);
+        }
         let window = Window::around(self.start, self.bounds());
-        let collected = parts.into_par_iter().map(|part| self.collect_once(window, part));
-        let merged = collected.reduce_with(|(mut collector, mut report), (other, other_report)| {
-            collector.absorb(other);
-            report += other_report;
-            (collector, report)
-        });
-        let (collector, report) =
-            merged.unwrap_or_else(|| (OnceCollector::new(window), ScanReport::default()));
-        collector.into_updates(self.grid, report)
+        let collect = |(part, collector): (usize, &mut OnceCollector)| {
+            collector.clear(window);
+            self.collect_once(collector, points * part / threads..points * (part + 1) / threads)
+        };
+        let reports: Vec<ScanReport> =
+            collectors[..threads].par_iter_mut().enumerate().map(collect).collect();
+        let mut report = ScanReport::default();
+        reports.into_iter().for_each(|part| report += part);
+        let (first, others) = collectors.split_at_mut(1);
+        others[..threads - 1].iter().for_each(|other| first[0].absorb(other));
+        first[0].updates(self.grid, report)
     }
 
-    fn collect_once(&self, window: Window, points: Range<usize>) -> (OnceCollector, ScanReport) {
-        let mut collector = OnceCollector::new(window);
+    fn collect_once(&self, collector: &mut OnceCollector, points: Range<usize>) -> ScanReport {
         let needs_intensity = self.model.needs_intensity();
-        let report = self.for_each_ray(points, |ray| {
+        self.for_each_ray(points, |ray| {
             collector.pass_along(&ray.path);
             if let Some(Observation::Hit(intensity)) = ray.end {
                 collector.hit(ray.path.last, needs_intensity.then_some(intensity));
             }
-        });
-        (collector, report)
+        })
     }
 
     /// Bounds of the points, cut at the max range, in units of voxels; whatever is not finite is left out.

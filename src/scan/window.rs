@@ -11,7 +11,7 @@ pub(super) type Local = [u32; 3];
 
 /// A box of voxels around a sensor, whole pages along every axis, in which the rays of a scan are marked without
 /// looking bricks up in a hash map. Rays that leave it are walked the slow way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Window {
     base: VoxelIndex,
     pages: [u32; 3],

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use voxtile::io::{ScanSource, open_scans};
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
-use voxtile::scan::{ScanReport, trace_scan};
+use voxtile::scan::{ScanReport, ScanTracer};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
 use voxtile::{Error, InsertMode, MapConfig, Scan};
@@ -128,7 +128,7 @@ fn exists(args: &BuildArgs) -> anyhow::Result<bool> {
 
 fn check_first_scan(source: &mut dyn ScanSource, config: &MapConfig) -> anyhow::Result<()> {
     if let Some(scan) = next_scan(source)? {
-        trace_scan(&config.grid, &config.sensor_model, &config.rays, &scan)?;
+        ScanTracer::default().trace(&config.grid, &config.sensor_model, &config.rays, &scan)?;
     }
     Ok(())
 }
