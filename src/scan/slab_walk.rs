@@ -10,6 +10,11 @@ use crate::space::{Point, VoxelIndex};
 /// side, and the closed form's times, rounded to `f64`, by less than 2^-38 voxels.
 const NEAR_BORDER: u32 = 1 << 12;
 
+/// Two crossings in one slab that are nearer to each other than this, in units of 2^-64 voxels, are left to the exact
+/// walk: each side of the comparison is the product of a position, off by less than 2^12 units of 2^-32 voxels, and a
+/// slope below 1, off by one unit.
+const NEAR_EDGE: u64 = 1 << 46;
+
 /// A ray from a scan's origin, in the terms of [`RayWalk`]: units of voxels, world frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlabRay {
@@ -50,11 +55,9 @@ impl SlabRay {
         let [mut a, mut b, mut c] = [start[A], start[B], start[C]];
         let mut slabs = last[A].abs_diff(a);
         if slabs > 0 {
-            let order = CrossingOrder::<B, C>::of(self, marks.window().base());
             let is_up = last[A] > a;
             let (step, first_of_brick) = if is_up { (1, 0) } else { (u32::MAX, 7) };
-            let Path { mut at_b, mut at_c, slope_b, slope_c } =
-                Path::along::<A, B, C>(self, marks.window().base(), a, is_up);
+            let mut path = Path::along::<A, B, C>(self, marks.window().base(), a, is_up);
             let mut bit = slab_bit(b, c);
             // Once around for every brick that the ray comes into.
             let mut came_in_by = 0;
@@ -64,36 +67,38 @@ impl SlabRay {
                 in_brick[(a.wrapping_sub(step) & 7) as usize] |= came_in_by;
                 came_in_by = 0;
                 loop {
-                    if is_near_border(at_b) || is_near_border(at_c) {
+                    if is_near_border(path.at_b) || is_near_border(path.at_c) {
                         return false;
                     }
-                    let (exit_b, exit_c) = ((at_b >> 32) as u32, (at_c >> 32) as u32);
+                    let (exit_b, exit_c) = ((path.at_b >> 32) as u32, (path.at_c >> 32) as u32);
                     let (change_b, change_c) = (b ^ exit_b, c ^ exit_c);
                     // One branch that is seldom taken, where two would often be guessed wrong.
                     let is_diagonal = change_b * change_c != 0;
                     let exit_bit = slab_bit(exit_b, exit_c);
-                    (at_b, at_c, slabs) = (at_b + slope_b, at_c + slope_c, slabs - 1);
                     let (slab, entry_bit) = (a, std::mem::replace(&mut bit, exit_bit));
-                    let entry = (b, c);
-                    a = a.wrapping_add(step);
+                    (a, slabs) = (a.wrapping_add(step), slabs - 1);
                     let is_at_end = slabs == 0 || a & 7 == first_of_brick;
                     if (change_b | change_c) < 8 {
                         in_brick[(slab & 7) as usize] |= entry_bit | exit_bit;
                         if is_diagonal {
-                            let (b, c) = order.between(entry, (exit_b, exit_c));
+                            let Some(is_b_first) = path.is_b_crossed_first() else { return false };
+                            let (b, c) = if is_b_first { (exit_b, c) } else { (b, exit_c) };
                             in_brick[(slab & 7) as usize] |= slab_bit(b, c);
                         }
                         (b, c) = (exit_b, exit_c);
+                        path.advance();
                         if is_at_end {
                             break;
                         }
                     } else {
                         in_brick[(slab & 7) as usize] |= entry_bit;
                         if is_diagonal {
-                            let (b, c) = order.between(entry, (exit_b, exit_c));
+                            let Some(is_b_first) = path.is_b_crossed_first() else { return false };
+                            let (b, c) = if is_b_first { (exit_b, c) } else { (b, exit_c) };
                             mark_voxel::<A, B, C>(marks, slab, b, c);
                         }
                         (b, c) = (exit_b, exit_c);
+                        path.advance();
                         if is_at_end {
                             mark_voxel::<A, B, C>(marks, slab, b, c);
                         } else {
@@ -146,11 +151,22 @@ impl SlabRay {
             mark_voxel::<A, B, C>(marks, last[A], b, c);
         }
         if ahead_b + ahead_c == 2 {
-            let order = CrossingOrder::<B, C>::of(self, marks.window().base());
-            let (b, c) = order.between((b, c), (last[B], last[C]));
-            mark_voxel::<A, B, C>(marks, last[A], b, c);
+            match self.crosses_first::<B, C>(marks.window().base(), b.max(last[B]), c.max(last[C])) {
+                true => mark_voxel::<A, B, C>(marks, last[A], last[B], c),
+                false => mark_voxel::<A, B, C>(marks, last[A], b, last[C]),
+            }
         }
         true
+    }
+
+    /// Whether the border below voxel `b` along `B` is crossed before the border below voxel `c` along `C`, by the
+    /// closed form; of equal times the lower axis is first, and `B` is lower.
+    fn crosses_first<const B: usize, const C: usize>(&self, base: VoxelIndex, b: u32, c: u32) -> bool {
+        let time = |axis: usize, border: u32| {
+            let inv_direction = 1.0 / (self.end[axis] - self.origin[axis]);
+            (f64::from(base[axis]) + f64::from(border) - self.origin[axis]) * inv_direction
+        };
+        time(B, b) <= time(C, c)
     }
 }
 
@@ -182,33 +198,23 @@ impl Path {
         };
         Self { at_b: fixed(at(B)), at_c: fixed(at(C)), slope_b: fixed(slope(B)), slope_c: fixed(slope(C)) }
     }
-}
 
-/// Which of two borders a ray crosses first, by the closed form.
-struct CrossingOrder<const B: usize, const C: usize> {
-    origin: [f64; 2],
-    inv_direction: [f64; 2],
-    base: [f64; 2],
-}
-
-impl<const B: usize, const C: usize> CrossingOrder<B, C> {
+    /// Goes to the next crossing.
     #[inline]
-    fn of(ray: &SlabRay, base: VoxelIndex) -> Self {
-        Self {
-            origin: [ray.origin[B], ray.origin[C]],
-            inv_direction: [B, C].map(|axis| 1.0 / (ray.end[axis] - ray.origin[axis])),
-            base: [f64::from(base[B]), f64::from(base[C])],
-        }
+    fn advance(&mut self) {
+        self.at_b += self.slope_b;
+        self.at_c += self.slope_c;
     }
 
-    /// The voxel between two neighbors of a neighbor, which a ray goes through from one to the other; of equal times
-    /// the lower axis is first, and `B` is lower.
+    /// Whether the border along `B` was crossed before the one along `C`, in a slab in which both were crossed; `None`
+    /// if they are too near to each other to tell without the closed form.
     #[inline]
-    fn between(&self, (b, c): (u32, u32), (exit_b, exit_c): (u32, u32)) -> (u32, u32) {
-        let time = |k: usize, border: u32| {
-            (self.base[k] + f64::from(border) - self.origin[k]) * self.inv_direction[k]
-        };
-        if time(0, b.max(exit_b)) <= time(1, c.max(exit_c)) { (exit_b, c) } else { (b, exit_c) }
+    fn is_b_crossed_first(&self) -> Option<bool> {
+        // How far the ray is past its border, by how steep it is, is how long ago that was.
+        let past = |at: i64, slope: i64| u64::from(if slope < 0 { !at as u32 } else { at as u32 });
+        let b = past(self.at_b, self.slope_b) * self.slope_c.unsigned_abs();
+        let c = past(self.at_c, self.slope_c) * self.slope_b.unsigned_abs();
+        (b.abs_diff(c) > NEAR_EDGE).then_some(b > c)
     }
 }
 
