@@ -1,9 +1,10 @@
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
-use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates};
+use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates};
 use crate::space::TileIndex;
 use crate::tile::Tile;
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// A map that lives in memory and ends with it. It has tiles too, and gives the answers of an
@@ -11,7 +12,8 @@ use rustc_hash::FxHashMap;
 #[derive(Debug)]
 pub struct InMemoryMapper {
     config: MapConfig,
-    tiles: FxHashMap<TileIndex, Tile>,
+    /// Boxed, so that those a scan touches can be taken out, changed at the same time, and put back.
+    tiles: FxHashMap<TileIndex, Box<Tile>>,
     tracer: ScanTracer,
     scan_number: u64,
 }
@@ -28,10 +30,14 @@ impl InMemoryMapper {
     }
 
     fn accept(&mut self, updates: ScanUpdates) -> ScanReport {
-        for (index, tile_updates) in &updates.tiles {
-            let tile = self.tiles.entry(*index).or_insert_with(|| Tile::empty(&self.config, *index));
-            tile.apply(&self.config.sensor_model, tile_updates);
-        }
+        let take_out = |(index, updates): (TileIndex, TileUpdates)| {
+            let tile = self.tiles.remove(&index);
+            (tile.unwrap_or_else(|| Box::new(Tile::empty(&self.config, index))), updates)
+        };
+        let mut touched: Vec<(Box<Tile>, TileUpdates)> = updates.tiles.into_iter().map(take_out).collect();
+        let model = &self.config.sensor_model;
+        touched.par_iter_mut().for_each(|(tile, updates)| tile.apply(model, updates));
+        self.tiles.extend(touched.into_iter().map(|(tile, _)| (tile.index(), tile)));
         self.scan_number += 1;
         updates.report
     }
@@ -57,7 +63,7 @@ impl MapView for InMemoryMapper {
     }
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        Ok(self.tiles.get(&index).map(TileRef::borrowed))
+        Ok(self.tiles.get(&index).map(|tile| TileRef::borrowed(tile)))
     }
 
     fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
@@ -95,7 +101,7 @@ impl Mapper for InMemoryMapper {
     }
 
     fn sync_octrees(&mut self) {
-        self.tiles.values_mut().for_each(|tile| {
+        self.tiles.par_iter_mut().for_each(|(_, tile)| {
             tile.sync_octree();
         });
     }

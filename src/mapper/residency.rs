@@ -4,13 +4,13 @@ use super::statistics::{IoCounts, MapStatistics};
 use super::tile_files;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::scan::ScanUpdates;
+use crate::scan::{ScanUpdates, TileUpdates};
 use crate::space::TileIndex;
 use crate::store::{Extension, Metadata, TileStore, hex};
 use crate::tile::Tile;
 use lru::LruCache;
 use rayon::prelude::*;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -84,6 +84,7 @@ impl Residency {
 
     /// Takes the updates: into tiles in memory at once, for the others they wait. Cannot fail.
     pub(super) fn accept(&mut self, updates: ScanUpdates) {
+        let mut resident = FxHashMap::default();
         for (index, tile_updates) in updates.tiles {
             if !self.tiles.contains(&index)
                 && !self.exists(index)
@@ -91,14 +92,19 @@ impl Residency {
             {
                 self.tiles.put(index, Arc::new(Tile::empty(&self.config, index)));
             }
-            match self.tiles.get_mut(&index) {
-                Some(tile) => {
+            // The tile becomes the one used last.
+            match self.tiles.get(&index) {
+                Some(_) => {
                     self.io.hits += 1;
-                    Arc::make_mut(tile).apply(&self.config.sensor_model, &tile_updates);
+                    resident.insert(index, tile_updates);
                 }
                 None => self.pending.push(index, tile_updates),
             }
         }
+        let touched = self.tiles.iter_mut().filter_map(|(index, tile)| Some((tile, resident.remove(index)?)));
+        let touched: Vec<(&mut Arc<Tile>, TileUpdates)> = touched.collect();
+        let model = &self.config.sensor_model;
+        touched.into_par_iter().for_each(|(tile, updates)| Arc::make_mut(tile).apply(model, &updates));
     }
 
     /// A tile, brought into memory; `None` if nothing was observed in it.
