@@ -146,14 +146,14 @@ static Answers ask(const octomap::OcTree& tree, const std::string& path, double 
   uint64_t asked = 0;
   do {
     answers.known = answers.occupied = 0;
-    const double start = wall_s();
+    const double start = cpu_s();
     for (const octomap::point3d& point : points) {
       const octomap::OcTreeNode* node = tree.search(point);
       if (!node) continue;
       ++answers.known;
       answers.occupied += tree.isNodeOccupied(node);
     }
-    seconds += wall_s() - start;
+    seconds += cpu_s() - start;
     asked += points.size();
   } while (seconds < least_seconds && !points.empty());
   answers.ns = asked ? 1e9 * seconds / double(asked) : 0.0;

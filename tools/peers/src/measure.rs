@@ -116,8 +116,8 @@ impl Samples {
             ("memory, growth of the process, octrees up to date", &self.synced_resident, None),
         ];
         let questions = [
-            ("point question, anywhere", &self.anywhere, targets.question),
-            ("point question, known voxels", &self.known, None),
+            ("point question, anywhere, CPU", &self.anywhere, targets.question),
+            ("point question, known voxels, CPU", &self.known, None),
         ];
         let mut rows: Vec<Row> =
             times.map(|(what, pairs, target)| row(what, workload, pairs, target, milliseconds)).into();

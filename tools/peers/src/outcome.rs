@@ -40,7 +40,7 @@ pub struct QuestionsOutcome {
 /// The answers to one file of points.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Answers {
-    /// Nanoseconds on the clock a question.
+    /// Nanoseconds of CPU a question; asked on one thread.
     pub ns: f64,
     /// How many of the points were known.
     pub known: u64,

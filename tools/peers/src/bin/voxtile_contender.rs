@@ -244,10 +244,10 @@ fn questions(arguments: &QuestionsArguments) -> Result<()> {
     let answers = |file: &Path| -> Result<Answers> {
         let points: Vec<Point> =
             peers::read_points(file)?.into_iter().map(|point| point.map(f64::from)).collect();
-        let (mut asked, mut wall) = (0_usize, Duration::ZERO);
+        let (mut asked, mut cpu) = (0_usize, Duration::ZERO);
         loop {
             let (mut known, mut occupied) = (0, 0);
-            let start = Instant::now();
+            let stopwatch = Stopwatch::start()?;
             for &point in &points {
                 match mapper.occupancy_at(point)? {
                     Occupancy::Unknown => {}
@@ -255,10 +255,10 @@ fn questions(arguments: &QuestionsArguments) -> Result<()> {
                     Occupancy::Occupied(_) => (known, occupied) = (known + 1, occupied + 1),
                 }
             }
-            wall += start.elapsed();
+            cpu += stopwatch.stop()?.cpu;
             asked += points.len();
-            if wall.as_secs_f64() >= arguments.least_seconds || points.is_empty() {
-                let ns = wall.as_secs_f64() * 1e9 / asked.max(1) as f64;
+            if cpu.as_secs_f64() >= arguments.least_seconds || points.is_empty() {
+                let ns = cpu.as_secs_f64() * 1e9 / asked.max(1) as f64;
                 return Ok(Answers { ns, known, occupied });
             }
         }
