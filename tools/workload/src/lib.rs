@@ -1,0 +1,10 @@
+//! The scans of the made-up surveys, and the stream of bytes in which tools hand scans to one another.
+//!
+//! Per scan, little-endian: count `u32`, origin 3 x `f32`, points 3 x `f32` each, in metres in the world frame. The
+//! intensities, one `f32` a point, are a stream of their own beside it, so that who needs none reads none.
+
+mod stream;
+mod survey;
+
+pub use stream::{ScanReader, ScanWriter};
+pub use survey::SurveyName;
