@@ -7,7 +7,10 @@
 //! The updates know nothing of what a tile holds: they can be kept and applied later.
 
 mod batch;
-mod marks;
+mod brick_map;
+mod counted_brick;
+mod footprint;
+mod marked_brick;
 mod once;
 mod ordered;
 mod range;

@@ -1,6 +1,6 @@
-use super::marks::Marks;
+use super::brick_map::BrickMap;
+use super::footprint::Footprint;
 use super::ray::RayWalk;
-use super::slab_masks::slab_bit;
 use super::window::Local;
 use crate::space::{Point, VoxelIndex};
 
@@ -30,133 +30,170 @@ impl SlabRay {
         RayWalk::between(self.origin, self.start, self.end, self.last)
     }
 
-    /// Marks the voxels that [`RayWalk`] visits from the first up to, not including, the last; false if a crossing is
-    /// too near to a border to tell without the closed form. What was marked until then is right.
+    /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last.
+    pub(super) fn pass<F: Footprint>(&self, bricks: &mut BrickMap<F>) {
+        if let Err(from) = self.pass_slabs(bricks) {
+            let mut is_left = true;
+            self.walk().for_each_before_end(|voxel| {
+                is_left &= voxel != from;
+                if !is_left {
+                    let slot = bricks.slot_of(voxel);
+                    let [x, y, z] = voxel.map(|k| k as u32);
+                    bricks.bricks_mut()[slot].pass::<0>(x, F::cell::<1, 2>(y, z));
+                }
+            });
+        }
+    }
+
+    /// Passes the voxels from the first on, in order, as far as they can be told without the closed form. The error is
+    /// the first that cannot.
     ///
     /// The walk goes in slabs, one voxel thick, along the axis of the ray's longest part. Where the ray crosses from
     /// slab to slab is a sum of fixed-point numbers, and the voxels it meets in a slab are the one it comes in by, the
     /// one it goes out by and, if these differ along both other axes, the one between them. That this is what the
-    /// closed form says is certain as long as no crossing is next to a border.
-    pub(super) fn mark(&self, marks: &mut Marks) -> bool {
+    /// closed form says is certain as long as no crossing is next to a border, and no two are next to each other.
+    fn pass_slabs<F: Footprint>(&self, bricks: &mut BrickMap<F>) -> Result<(), VoxelIndex> {
         let length: Point = std::array::from_fn(|k| (self.end[k] - self.origin[k]).abs());
         if length[0] >= length[1] && length[0] >= length[2] {
-            self.mark_along::<0, 1, 2>(marks)
+            self.pass_along::<0, 1, 2, F>(bricks)
         } else if length[1] >= length[2] {
-            self.mark_along::<1, 0, 2>(marks)
+            self.pass_along::<1, 0, 2, F>(bricks)
         } else {
-            self.mark_along::<2, 0, 1>(marks)
+            self.pass_along::<2, 0, 1, F>(bricks)
         }
     }
 
     /// `A` is the axis of the longest part, `B` and `C` are the others, the lower first.
-    fn mark_along<const A: usize, const B: usize, const C: usize>(&self, marks: &mut Marks) -> bool {
-        let Some(last) = marks.window().local(self.last) else { return false };
-        let Some(start) = self.leave_borders(marks) else { return false };
+    fn pass_along<const A: usize, const B: usize, const C: usize, F: Footprint>(
+        &self,
+        bricks: &mut BrickMap<F>,
+    ) -> Result<(), VoxelIndex> {
+        let base = bricks.window().base();
+        let last = bricks.window().local(self.last).ok_or(self.start)?;
+        let start = self.leave_borders(bricks)?;
         let [mut a, mut b, mut c] = [start[A], start[B], start[C]];
+        let unknown = |a, b, c| {
+            let local = voxel::<A, B, C>(a, b, c);
+            Err(std::array::from_fn(|k| base[k] + local[k] as i32))
+        };
         let mut slabs = last[A].abs_diff(a);
         if slabs > 0 {
             let is_up = last[A] > a;
             let (step, first_of_brick) = if is_up { (1, 0) } else { (u32::MAX, 7) };
-            let mut path = Path::along::<A, B, C>(self, marks.window().base(), a, is_up);
-            let mut bit = slab_bit(b, c);
+            let mut path = Path::along::<A, B, C>(self, base, a, is_up);
+            let mut entry = F::cell::<B, C>(b, c);
+            // The voxel by which the ray came into a brick, if not from slab to slab.
+            let mut came_in_by = None;
             // Once around for every brick that the ray comes into.
-            let mut came_in_by = 0;
             while slabs > 0 {
-                let slot = marks.slot_of(voxel::<A, B, C>(a, b, c));
-                let in_brick = marks.slabs(slot, A);
-                in_brick[(a.wrapping_sub(step) & 7) as usize] |= came_in_by;
-                came_in_by = 0;
+                let brick = bricks.at(voxel::<A, B, C>(a, b, c));
+                if let Some(cell) = came_in_by.take() {
+                    brick.pass::<A>(a.wrapping_sub(step), cell);
+                }
                 loop {
                     if is_near_border(path.at_b) || is_near_border(path.at_c) {
-                        return false;
+                        return unknown(a, b, c);
                     }
                     let (exit_b, exit_c) = ((path.at_b >> 32) as u32, (path.at_c >> 32) as u32);
                     let (change_b, change_c) = (b ^ exit_b, c ^ exit_c);
                     // One branch that is seldom taken, where two would often be guessed wrong.
                     let is_diagonal = change_b * change_c != 0;
-                    let exit_bit = slab_bit(exit_b, exit_c);
-                    let (slab, entry_bit) = (a, std::mem::replace(&mut bit, exit_bit));
+                    let is_in_brick = (change_b | change_c) < 8;
+                    let exit = F::cell::<B, C>(exit_b, exit_c);
+                    let slab = a;
                     (a, slabs) = (a.wrapping_add(step), slabs - 1);
                     let is_at_end = slabs == 0 || a & 7 == first_of_brick;
-                    if (change_b | change_c) < 8 {
-                        in_brick[(slab & 7) as usize] |= entry_bit | exit_bit;
+                    let cell = std::mem::replace(&mut entry, exit);
+                    if is_in_brick {
                         if is_diagonal {
-                            let Some(is_b_first) = path.is_b_crossed_first() else { return false };
+                            let Some(is_b_first) = path.is_b_crossed_first() else {
+                                return unknown(slab, b, c);
+                            };
                             let (b, c) = if is_b_first { (exit_b, c) } else { (b, exit_c) };
-                            in_brick[(slab & 7) as usize] |= slab_bit(b, c);
+                            brick.pass::<A>(slab, F::cell::<B, C>(b, c));
                         }
+                        brick.pass_through::<A>(slab, cell, exit);
                         (b, c) = (exit_b, exit_c);
                         path.advance();
                         if is_at_end {
                             break;
                         }
                     } else {
-                        in_brick[(slab & 7) as usize] |= entry_bit;
-                        if is_diagonal {
-                            let Some(is_b_first) = path.is_b_crossed_first() else { return false };
+                        let is_b_first = match is_diagonal.then(|| path.is_b_crossed_first()) {
+                            Some(None) => return unknown(slab, b, c),
+                            Some(order) => order,
+                            None => None,
+                        };
+                        brick.pass::<A>(slab, cell);
+                        if let Some(is_b_first) = is_b_first {
                             let (b, c) = if is_b_first { (exit_b, c) } else { (b, exit_c) };
-                            mark_voxel::<A, B, C>(marks, slab, b, c);
+                            bricks.at(voxel::<A, B, C>(slab, b, c)).pass::<A>(slab, F::cell::<B, C>(b, c));
                         }
                         (b, c) = (exit_b, exit_c);
                         path.advance();
                         if is_at_end {
-                            mark_voxel::<A, B, C>(marks, slab, b, c);
+                            bricks.at(voxel::<A, B, C>(slab, b, c)).pass::<A>(slab, exit);
                         } else {
-                            came_in_by = exit_bit;
+                            came_in_by = Some(exit);
                         }
                         break;
                     }
                 }
             }
         }
-        self.mark_last_slab::<A, B, C>(marks, [b, c], start, last)
+        match self.before_last::<B, C>(base, (b, c), start, last) {
+            Some(cells) => {
+                for (b, c) in cells.into_iter().flatten() {
+                    bricks.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
+                }
+                Ok(())
+            }
+            None => unknown(a, b, c),
+        }
     }
 
     /// The crossings at time 0: an origin on a border between voxels belongs to the upper one, and a ray downward
-    /// leaves it at once, the lowest axis first. Returns the voxel after them; `None` outside the window.
+    /// leaves it at once, the lowest axis first. Returns the voxel after them.
     #[inline]
-    fn leave_borders(&self, marks: &mut Marks) -> Option<Local> {
-        let mut voxel = marks.window().local(self.start)?;
-        for axis in 0..3 {
-            if self.last[axis] < self.start[axis] && f64::from(self.start[axis]) == self.origin[axis] {
-                // The closed form has no number for a crossing of such a ray.
-                if self.end[axis] - self.origin[axis] > -f64::MIN_POSITIVE {
-                    return None;
-                }
-                marks.pass(voxel);
-                voxel[axis] -= 1;
-            }
+    fn leave_borders<F: Footprint>(&self, bricks: &mut BrickMap<F>) -> Result<Local, VoxelIndex> {
+        let mut voxel = bricks.window().local(self.start).ok_or(self.start)?;
+        let is_left = |axis: usize| {
+            self.last[axis] < self.start[axis] && f64::from(self.start[axis]) == self.origin[axis]
+        };
+        // The closed form has no number for a crossing of a ray that hardly moves.
+        if (0..3).any(|axis| is_left(axis) && self.end[axis] - self.origin[axis] > -f64::MIN_POSITIVE) {
+            return Err(self.start);
         }
-        Some(voxel)
+        for axis in (0..3).filter(|&axis| is_left(axis)) {
+            bricks.at(voxel).pass::<0>(voxel[0], F::cell::<1, 2>(voxel[1], voxel[2]));
+            voxel[axis] -= 1;
+        }
+        Ok(voxel)
     }
 
-    /// The slab of the last voxel, from where the ray enters it: at most two voxels before the last.
+    /// The voxels of the last slab before the last voxel, at most two; the ray comes into the slab by `(b, c)`. `None`
+    /// if it cannot get from there to the last.
     #[inline]
-    fn mark_last_slab<const A: usize, const B: usize, const C: usize>(
+    fn before_last<const B: usize, const C: usize>(
         &self,
-        marks: &mut Marks,
-        [b, c]: [u32; 2],
+        base: VoxelIndex,
+        (b, c): (u32, u32),
         start: Local,
         last: Local,
-    ) -> bool {
+    ) -> Option<[Option<(u32, u32)>; 2]> {
         let ahead = |axis: usize, at: u32| match last[axis] < start[axis] {
             true => at.wrapping_sub(last[axis]),
             false => last[axis].wrapping_sub(at),
         };
-        let (ahead_b, ahead_c) = (ahead(B, b), ahead(C, c));
-        if ahead_b > 1 || ahead_c > 1 {
-            return false;
+        match (ahead(B, b), ahead(C, c)) {
+            (0, 0) => Some([None, None]),
+            (0 | 1, 0 | 1) if b == last[B] || c == last[C] => Some([Some((b, c)), None]),
+            (1, 1) => match self.crosses_first::<B, C>(base, b.max(last[B]), c.max(last[C])) {
+                true => Some([Some((b, c)), Some((last[B], c))]),
+                false => Some([Some((b, c)), Some((b, last[C]))]),
+            },
+            _ => None,
         }
-        if ahead_b + ahead_c > 0 {
-            mark_voxel::<A, B, C>(marks, last[A], b, c);
-        }
-        if ahead_b + ahead_c == 2 {
-            match self.crosses_first::<B, C>(marks.window().base(), b.max(last[B]), c.max(last[C])) {
-                true => mark_voxel::<A, B, C>(marks, last[A], last[B], c),
-                false => mark_voxel::<A, B, C>(marks, last[A], b, last[C]),
-            }
-        }
-        true
     }
 
     /// Whether the border below voxel `b` along `B` is crossed before the border below voxel `c` along `C`, by the
@@ -223,11 +260,6 @@ fn is_near_border(position: i64) -> bool {
     (position as u32).wrapping_add(NEAR_BORDER) < 2 * NEAR_BORDER
 }
 
-fn mark_voxel<const A: usize, const B: usize, const C: usize>(marks: &mut Marks, a: u32, b: u32, c: u32) {
-    let slot = marks.slot_of(voxel::<A, B, C>(a, b, c));
-    marks.slabs(slot, A)[(a & 7) as usize] |= slab_bit(b, c);
-}
-
 /// The voxel with these indices along the axes `A`, `B` and `C`.
 #[inline]
 fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u32, c: u32) -> Local {
@@ -238,58 +270,69 @@ fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u32, c: u32)
 
 #[cfg(test)]
 mod tests {
+    use super::super::counted_brick::CountedBrick;
+    use super::super::marked_brick::MarkedBrick;
     use super::super::window::Window;
     use super::*;
-    use crate::space::{place_of_voxel, places};
+    use crate::space::place_of_voxel;
     use proptest::prelude::*;
-    use std::collections::BTreeSet;
+    use std::collections::BTreeMap;
 
     fn ray(origin: Point, end: Point) -> SlabRay {
         let voxel = |point: Point| point.map(|x| x.floor() as i32);
         SlabRay { origin, start: voxel(origin), end, last: voxel(end) }
     }
 
-    fn marked(marks: &Marks) -> BTreeSet<VoxelIndex> {
-        let mut voxels = BTreeSet::new();
-        for (slot, brick) in marks.bricks().iter().enumerate() {
-            let (_, passed) = marks.masks(slot);
-            let passed: BTreeSet<usize> = places(passed).collect();
+    /// How often each voxel was passed.
+    type Passes = BTreeMap<VoxelIndex, u32>;
+
+    fn passes<F: Footprint>(bricks: &BrickMap<F>, passes_at: impl Fn(&F, usize) -> u32) -> Passes {
+        let mut passes = Passes::new();
+        for (brick, index) in bricks.bricks().iter().zip(bricks.indices()) {
             for k in 0..512 {
                 let offset = [k & 7, k >> 3 & 7, k >> 6];
-                if passed.contains(&place_of_voxel(offset)) {
-                    voxels.insert(std::array::from_fn(|axis| brick[axis] * 8 + offset[axis]));
+                let count = passes_at(brick, place_of_voxel(offset));
+                if count > 0 {
+                    passes.insert(std::array::from_fn(|axis| index[axis] * 8 + offset[axis]), count);
                 }
             }
         }
-        voxels
+        passes
     }
 
-    fn visited(rays: &[SlabRay]) -> BTreeSet<VoxelIndex> {
-        let mut voxels = BTreeSet::new();
+    fn visits(rays: &[SlabRay]) -> Passes {
+        let mut visits = Passes::new();
         for ray in rays {
-            ray.walk().for_each_before_end(|voxel| {
-                voxels.insert(voxel);
-            });
+            ray.walk().for_each_before_end(|voxel| *visits.entry(voxel).or_default() += 1);
         }
-        voxels
+        visits
     }
 
-    /// Marks the rays from one origin and compares with the exact walk; returns how many were left to it.
+    /// Passes along the rays from one origin, and compares with the exact walk; returns how many rays the slabs could
+    /// not tell all of.
     fn check(origin: Point, ends: &[Point]) -> usize {
         let bounds = ends.iter().fold((origin, origin), |(low, high), end| {
             (std::array::from_fn(|k| low[k].min(end[k])), std::array::from_fn(|k| high[k].max(end[k])))
         });
         let rays: Vec<_> = ends.iter().map(|&end| ray(origin, end)).collect();
-        let mut marks = Marks::default();
-        marks.clear(Window::around(rays[0].start, bounds));
-        let left: Vec<_> = rays.iter().filter(|ray| !ray.mark(&mut marks)).copied().collect();
-        marks.finish();
-        let (marked, visited) = (marked(&marks), visited(&rays));
-        assert!(marked.is_subset(&visited), "{origin:?} to {ends:?}: more than the rays visit");
-        let told = rays.iter().filter(|ray| !left.iter().any(|other| other.end == ray.end)).copied();
-        let told = self::visited(&told.collect::<Vec<_>>());
-        assert!(told.is_subset(&marked), "{origin:?} to {ends:?}: less than the rays visit");
-        left.len()
+        let window = Window::around(rays[0].start, bounds);
+        let (mut marked, mut counted) =
+            (BrickMap::<MarkedBrick>::default(), BrickMap::<CountedBrick>::default());
+        marked.clear(window);
+        counted.clear(window);
+        for ray in &rays {
+            ray.pass(&mut marked);
+            ray.pass(&mut counted);
+        }
+        marked.bricks_mut().iter_mut().for_each(MarkedBrick::finish);
+        let expected = visits(&rays);
+        let counted = passes(&counted, |brick, place| u32::from(brick.passes[place]));
+        assert_eq!(counted, expected, "{origin:?} to {ends:?}");
+        let marked = passes(&marked, |brick, place| (brick.passed()[place / 64] >> (place % 64)) as u32 & 1);
+        assert!(marked.keys().eq(expected.keys()), "{origin:?} to {ends:?}");
+        let mut again = BrickMap::<MarkedBrick>::default();
+        again.clear(window);
+        rays.iter().filter(|ray| ray.pass_slabs(&mut again).is_err()).count()
     }
 
     proptest! {

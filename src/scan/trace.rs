@@ -122,7 +122,7 @@ impl<'a> Fan<'a> {
     fn collect_once(&self, collector: &mut OnceCollector, points: Range<usize>) -> ScanReport {
         let needs_intensity = self.model.needs_intensity();
         self.for_each_ray(points, |ray| {
-            collector.pass_along(&ray.path);
+            collector.pass(&ray.path);
             if let Some(Observation::Hit(intensity)) = ray.end {
                 collector.hit(ray.path.last, needs_intensity.then_some(intensity));
             }

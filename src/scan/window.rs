@@ -36,6 +36,13 @@ impl Window {
         }
     }
 
+    /// Number of the page that holds a voxel.
+    #[inline]
+    pub(super) fn page_of(&self, [x, y, z]: Local) -> usize {
+        let [_, height, depth] = self.pages;
+        ((x / 64 * height + y / 64) * depth + z / 64) as usize
+    }
+
     /// Pages along each axis.
     pub(super) fn pages(&self) -> [u32; 3] {
         self.pages
