@@ -1,96 +1,268 @@
-use crate::sensor::Evidence;
-use crate::space::{BrickMask, places};
+use super::cells::Cells;
+use super::palette::{Full, Palette, StateId, UNKNOWN};
+use crate::scan::BrickUpdate;
+use crate::sensor::{Evidence, Observation, SensorModel};
+use crate::space::{BrickCode, BrickMask, places};
 
-/// The evidence of the observed voxels of one brick, packed in Morton order: a mask says which voxels are there,
-/// and a voxel's rank in the mask is its position in the arrays. Unobserved voxels cost one bit.
-#[derive(Clone, Debug, Default)]
+/// The evidence of the observed voxels of one brick.
+#[derive(Clone, Debug)]
 pub(super) struct Brick {
+    code: BrickCode,
     observed: BrickMask,
-    /// Number of observed voxels in the words before each word.
-    before: [u16; 8],
-    log_odds: Box<[f64]>,
-    counts: Box<[i32]>,
+    evidence: Storage,
+}
+
+#[derive(Clone, Debug)]
+enum Storage {
+    /// The number of each voxel's state in the tile's palette; [`UNKNOWN`] where nothing was observed.
+    Interned(Cells<StateId>),
+    /// The evidence itself, for histories too many for a palette; anything where nothing was observed.
+    Plain(Cells<Packed>),
+}
+
+/// Evidence without the padding that it has in memory.
+#[derive(Clone, Copy, Debug)]
+struct Packed {
+    log_odds_bits: [u32; 2],
+    observation_count: i32,
+}
+
+/// What is left to do of an update of a brick.
+pub(super) struct Rest<'a> {
+    hits: BrickMask,
+    misses: BrickMask,
+    /// Of the hits that are left, in order; empty for sensor models that need none.
+    intensities: &'a [f32],
+}
+
+impl<'a> Rest<'a> {
+    pub(super) fn of(update: &'a BrickUpdate) -> Self {
+        let misses = std::array::from_fn(|word| update.misses[word] & !update.hits[word]);
+        Self { hits: update.hits, misses, intensities: &update.intensities }
+    }
+
+    pub(super) fn of_voxel(place: usize, observation: &'a Observation) -> Self {
+        let mut mask = [0; 8];
+        mask[place / 64] = 1 << (place % 64);
+        match observation {
+            Observation::Miss => Self { hits: [0; 8], misses: mask, intensities: &[] },
+            Observation::Hit(intensity) => {
+                Self { hits: mask, misses: [0; 8], intensities: std::slice::from_ref(intensity) }
+            }
+        }
+    }
+
+    /// The words in which something is left, bit `k` for word `k`.
+    fn words(&self) -> u8 {
+        (0..8).fold(0, |words, word| words | u8::from(self.hits[word] | self.misses[word] != 0) << word)
+    }
 }
 
 impl Brick {
-    pub(super) fn len(&self) -> usize {
-        self.counts.len()
+    /// A brick in which nothing was observed yet.
+    pub(super) fn new(code: BrickCode) -> Self {
+        Self { code, observed: [0; 8], evidence: Storage::Interned(Cells::empty()) }
     }
 
+    pub(super) fn code(&self) -> BrickCode {
+        self.code
+    }
+
+    /// Bytes of memory on the heap.
+    #[inline]
     pub(super) fn heap_bytes(&self) -> usize {
-        self.len() * (size_of::<f64>() + size_of::<i32>())
+        match &self.evidence {
+            Storage::Interned(cells) => cells.bytes(),
+            Storage::Plain(cells) => cells.bytes(),
+        }
     }
 
-    pub(super) fn get(&self, place: usize) -> Option<Evidence> {
+    pub(super) fn get(&self, place: usize, palette: &Palette) -> Option<Evidence> {
         let (word, bit) = (place / 64, place % 64);
         if self.observed[word] >> bit & 1 == 0 {
             return None;
         }
-        Some(self.at(self.rank(word, bit)))
-    }
-
-    /// Applies `update` to the voxels of `touched`, in Morton order; it gets the place and what was known.
-    pub(super) fn update(
-        &mut self,
-        touched: BrickMask,
-        mut update: impl FnMut(usize, Option<Evidence>) -> Evidence,
-    ) {
-        let known = self.observed;
-        self.make_room(touched);
-        for place in places(touched) {
-            let (word, bit) = (place / 64, place % 64);
-            let rank = self.rank(word, bit);
-            let before = (known[word] >> bit & 1 == 1).then(|| self.at(rank));
-            let after = update(place, before);
-            self.log_odds[rank] = after.log_odds;
-            self.counts[rank] = after.observation_count;
+        match &self.evidence {
+            Storage::Interned(cells) => cells.cell(word).map(|cell| palette.evidence(cell[bit])),
+            Storage::Plain(cells) => cells.cell(word).map(|cell| cell[bit].into()),
         }
     }
 
     /// The observed voxels in Morton order: place and evidence.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, Evidence)> {
-        places(self.observed).enumerate().map(|(rank, place)| (place, self.at(rank)))
+    pub(super) fn iter(&self, palette: &Palette) -> impl Iterator<Item = (usize, Evidence)> {
+        places(self.observed).filter_map(|place| Some((place, self.get(place, palette)?)))
     }
 
-    fn at(&self, rank: usize) -> Evidence {
-        Evidence { log_odds: self.log_odds[rank], observation_count: self.counts[rank] }
+    /// Applies an update, and returns how many voxels are observed for the first time. If the palette takes no
+    /// more states, what is left stays in `rest`: it is to be applied again once there is room, or the brick plain.
+    pub(super) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
+        match &mut self.evidence {
+            Storage::Interned(cells) => update_interned(cells, &mut self.observed, rest, palette),
+            Storage::Plain(cells) => (update_plain(cells, &mut self.observed, rest, palette.model()), Ok(())),
+        }
     }
 
+    /// Applies one update of one voxel whose cell is there, if the palette has room for it. Returns whether the
+    /// voxel is observed for the first time, `None` if nothing was done.
     #[inline]
-    fn rank(&self, word: usize, bit: usize) -> usize {
-        let below = self.observed[word] & ((1 << bit) - 1);
-        usize::from(self.before[word]) + below.count_ones() as usize
+    pub(super) fn update_one(
+        &mut self,
+        place: usize,
+        observation: Observation,
+        palette: &mut Palette,
+    ) -> Option<bool> {
+        let (word, bit) = (place / 64, place % 64);
+        let Storage::Interned(cells) = &mut self.evidence else { return None };
+        let state = &mut cells.cell_mut(word)?[bit];
+        let before = *state;
+        let after = match observation {
+            Observation::Miss => palette.after_miss(before),
+            Observation::Hit(intensity) => palette.after_hit(before, intensity),
+        };
+        *state = after.ok()?;
+        let is_new = before == UNKNOWN;
+        if is_new {
+            self.observed[word] |= 1 << bit;
+        }
+        Some(is_new)
     }
 
-    /// Adds the voxels of `touched` that are not there yet, with zeros.
-    fn make_room(&mut self, touched: BrickMask) {
-        let union: BrickMask = std::array::from_fn(|word| self.observed[word] | touched[word]);
-        if union == self.observed {
-            return;
+    /// Sets voxels that were not observed yet, in Morton order, and returns how many were set before the palette
+    /// took no more states.
+    pub(super) fn insert(&mut self, voxels: &[(usize, Evidence)], palette: &mut Palette) -> usize {
+        let words = voxels.iter().fold(0, |words, (place, _)| words | 1 << (place / 64));
+        match &mut self.evidence {
+            Storage::Interned(cells) => cells.make(words, UNKNOWN),
+            Storage::Plain(cells) => cells.make(words, Packed::from(Evidence::PRIOR)),
         }
-        let mut log_odds = Vec::with_capacity(total(union));
-        let mut counts = Vec::with_capacity(total(union));
-        let mut rank = 0;
-        for place in places(union) {
-            let was_there = self.observed[place / 64] >> (place % 64) & 1 == 1;
-            log_odds.push(if was_there { self.log_odds[rank] } else { 0.0 });
-            counts.push(if was_there { self.counts[rank] } else { 0 });
-            rank += usize::from(was_there);
+        for (done, &(place, evidence)) in voxels.iter().enumerate() {
+            let (word, bit) = (place / 64, place % 64);
+            match &mut self.evidence {
+                Storage::Interned(cells) => {
+                    let Ok(state) = palette.intern(evidence) else { return done };
+                    cells.cell_mut(word).expect(MADE)[bit] = state;
+                }
+                Storage::Plain(cells) => cells.cell_mut(word).expect(MADE)[bit] = evidence.into(),
+            }
+            self.observed[word] |= 1 << bit;
         }
-        *self =
-            Self { observed: union, before: before(union), log_odds: log_odds.into(), counts: counts.into() };
+        voxels.len()
+    }
+
+    /// Lets the brick hold its evidence itself, without the palette.
+    pub(super) fn make_plain(&mut self, palette: &Palette) {
+        if let Storage::Interned(cells) = &self.evidence {
+            self.evidence = Storage::Plain(cells.map(|state| palette.evidence(state).into()));
+        }
+    }
+
+    /// Notes the states that the brick's voxels are in.
+    pub(super) fn mark_states(&self, in_use: &mut [bool]) {
+        if let Storage::Interned(cells) = &self.evidence {
+            cells.all().iter().flatten().for_each(|&state| in_use[usize::from(state)] = true);
+        }
+    }
+
+    /// Follows the palette's states to their new numbers.
+    pub(super) fn renumber_states(&mut self, numbers: &[StateId]) {
+        if let Storage::Interned(cells) = &mut self.evidence {
+            cells.all_mut().iter_mut().flatten().for_each(|state| *state = numbers[usize::from(*state)]);
+        }
     }
 }
 
-fn total(mask: BrickMask) -> usize {
-    mask.iter().map(|word| word.count_ones() as usize).sum()
+const MADE: &str = "the cells of the touched words were made before";
+
+fn update_interned(
+    cells: &mut Cells<StateId>,
+    observed: &mut BrickMask,
+    rest: &mut Rest<'_>,
+    palette: &mut Palette,
+) -> (usize, Result<(), Full>) {
+    let words = rest.words();
+    cells.make(words, UNKNOWN);
+    let mut new = 0;
+    for word in (0..8).filter(|word| words >> word & 1 == 1) {
+        let cell = cells.cell_mut(word).expect(MADE);
+        let (mut misses, mut hits) = (rest.misses[word], rest.hits[word]);
+        let touched = misses | hits;
+        let mut result = Ok(());
+        // A voxel never observed needs no case of its own: its state has its steps like any other.
+        while misses != 0 {
+            let state = &mut cell[misses.trailing_zeros() as usize];
+            match palette.after_miss(*state) {
+                Ok(after) => *state = after,
+                Err(full) => {
+                    result = Err(full);
+                    break;
+                }
+            }
+            misses &= misses - 1;
+        }
+        while hits != 0 && result.is_ok() {
+            let state = &mut cell[hits.trailing_zeros() as usize];
+            let (intensity, later) = rest.intensities.split_first().map_or((0.0, &[][..]), |(i, l)| (*i, l));
+            match palette.after_hit(*state, intensity) {
+                Ok(after) => *state = after,
+                Err(full) => {
+                    result = Err(full);
+                    break;
+                }
+            }
+            rest.intensities = later;
+            hits &= hits - 1;
+        }
+        let first = touched & !(misses | hits) & !observed[word];
+        if first != 0 {
+            observed[word] |= first;
+            new += first.count_ones() as usize;
+        }
+        (rest.misses[word], rest.hits[word]) = (misses, hits);
+        if result.is_err() {
+            return (new, result);
+        }
+    }
+    (new, Ok(()))
 }
 
-fn before(mask: BrickMask) -> [u16; 8] {
-    let mut sum = 0;
-    mask.map(|word| {
-        let before = sum;
-        sum += word.count_ones() as u16;
-        before
-    })
+fn update_plain(
+    cells: &mut Cells<Packed>,
+    observed: &mut BrickMask,
+    rest: &mut Rest<'_>,
+    model: &SensorModel,
+) -> usize {
+    cells.make(rest.words(), Packed::from(Evidence::PRIOR));
+    let mut new = 0;
+    let mut intensities = rest.intensities.iter();
+    for place in places(std::array::from_fn(|word| rest.hits[word] | rest.misses[word])) {
+        let (word, bit) = (place / 64, place % 64);
+        let observation = if rest.hits[word] >> bit & 1 == 1 {
+            Observation::Hit(intensities.next().copied().unwrap_or_default())
+        } else {
+            Observation::Miss
+        };
+        let is_known = observed[word] >> bit & 1 == 1;
+        let packed = &mut cells.cell_mut(word).expect(MADE)[bit];
+        let before = is_known.then(|| Evidence::from(*packed));
+        *packed = model.update(before, observation).into();
+        observed[word] |= 1 << bit;
+        new += usize::from(!is_known);
+    }
+    (rest.hits, rest.misses) = ([0; 8], [0; 8]);
+    new
+}
+
+impl From<Evidence> for Packed {
+    fn from(evidence: Evidence) -> Self {
+        let bits = evidence.log_odds.to_bits();
+        let log_odds_bits = [bits as u32, (bits >> 32) as u32];
+        Self { log_odds_bits, observation_count: evidence.observation_count }
+    }
+}
+
+impl From<Packed> for Evidence {
+    fn from(packed: Packed) -> Self {
+        let [low, high] = packed.log_odds_bits.map(u64::from);
+        Self { log_odds: f64::from_bits(low | high << 32), observation_count: packed.observation_count }
+    }
 }

@@ -10,7 +10,9 @@
 
 mod brick;
 mod cached_octree;
+mod cells;
 pub mod format;
+mod palette;
 mod table;
 mod tile_body;
 mod voxel_cache;
@@ -19,3 +21,6 @@ pub use cached_octree::CachedOctree;
 pub use table::Table;
 pub use tile_body::{Tile, TileCounts, Voxel};
 pub use voxel_cache::{VoxelCache, VoxelCacheCounts};
+
+#[cfg(test)]
+mod tests;

@@ -95,24 +95,19 @@ impl Tile {
         match updates {
             TileUpdates::Once(bricks) => {
                 for brick in bricks {
-                    let mut observations = brick.observations();
-                    self.table.update_brick(brick.brick, brick.touched(), |place, before| {
-                        let observation =
-                            observations.next().expect("one observation for each touched voxel");
-                        let after = model.update(before, observation);
-                        self.octree.put(brick.brick.voxel(place), after.log_odds);
-                        after
-                    });
+                    self.table.update_brick(model, brick);
+                    for (code, evidence) in self.table.voxels_of_mask(brick.brick, brick.touched()) {
+                        self.octree.put(code, evidence.log_odds);
+                    }
                 }
             }
             TileUpdates::Ordered(updates) => {
                 for (offset, observation) in updates.iter() {
                     let code = self.code_of_offset(offset);
-                    self.table.update(code, |before| {
-                        let after = model.update(before, observation);
-                        self.octree.put(code, after.log_odds);
-                        after
-                    });
+                    self.table.update(model, code, observation);
+                    if let Some(evidence) = self.table.get(code) {
+                        self.octree.put(code, evidence.log_odds);
+                    }
                 }
             }
         }

@@ -109,11 +109,14 @@ struct Entries<'a> {
     table: Table,
     /// The entries of one brick, with their offsets.
     run: Vec<(MortonCode, Evidence, u64)>,
+    /// The same as the table takes them: place and evidence.
+    voxels_of_run: Vec<(usize, Evidence)>,
 }
 
 impl<'a> Entries<'a> {
     fn new(voxels: &'a VoxelBox, must_ascend: bool) -> Self {
-        Self { voxels, must_ascend, table: Table::default(), run: Vec::with_capacity(512) }
+        let (run, voxels_of_run) = (Vec::with_capacity(512), Vec::with_capacity(512));
+        Self { voxels, must_ascend, table: Table::default(), run, voxels_of_run }
     }
 
     fn take(&mut self, entry: &[u8], offset: u64) -> Result<(), FormatError> {
@@ -151,24 +154,21 @@ impl<'a> Entries<'a> {
     fn end_run(&mut self) -> Result<(), FormatError> {
         let Some(&(first, ..)) = self.run.first() else { return Ok(()) };
         self.run.sort_unstable_by_key(|&(code, _, offset)| (code, offset));
-        let mut touched = [0; 8];
-        for (code, ..) in &self.run {
-            touched[code.place_in_brick() / 64] |= 1 << (code.place_in_brick() % 64);
+        let in_run = self.run.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].2);
+        let in_table = || {
+            let known = |&&(code, ..): &&(MortonCode, Evidence, u64)| self.table.get(code).is_some();
+            let may_be = self.table.has_brick(first.brick());
+            may_be.then(|| self.run.iter().find(known)).flatten().map(|&(.., offset)| offset)
+        };
+        if let Some(offset) = in_run.or_else(in_table) {
+            return Err(FormatError::at_offset(offset, "the key comes twice"));
         }
-        let mut twice = self.run.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].2);
-        if twice.is_none() {
-            let mut run = self.run.iter();
-            self.table.update_brick(first.brick(), touched, |_, before| {
-                let (_, evidence, offset) = run.next().expect("one entry for each touched voxel");
-                twice = twice.or(before.map(|_| *offset));
-                *evidence
-            });
-        }
+        self.voxels_of_run.clear();
+        self.voxels_of_run
+            .extend(self.run.iter().map(|&(code, evidence, _)| (code.place_in_brick(), evidence)));
+        self.table.insert(first.brick(), &self.voxels_of_run);
         self.run.clear();
-        match twice {
-            Some(offset) => Err(FormatError::at_offset(offset, "the key comes twice")),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     fn into_table(mut self) -> Result<Table, FormatError> {

@@ -1,0 +1,64 @@
+/// Voxels of a cell: one word of a brick's mask.
+pub(super) const CELL_VOXELS: usize = 64;
+
+/// A value for every voxel of a brick, in cells of 4 x 4 x 4: a cell takes memory once one of its voxels is set.
+///
+/// Finer packing would save a third of the memory on a street, and every update would have to count bits.
+#[derive(Clone, Debug)]
+pub(super) struct Cells<T> {
+    /// Where the cell of each word of a mask lies, or [`ABSENT`].
+    places: [u8; 8],
+    cells: Vec<[T; CELL_VOXELS]>,
+}
+
+const ABSENT: u8 = u8::MAX;
+
+impl<T: Copy> Cells<T> {
+    pub(super) fn empty() -> Self {
+        Self { places: [ABSENT; 8], cells: Vec::new() }
+    }
+
+    /// Bytes of memory on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        self.cells.capacity() * size_of::<[T; CELL_VOXELS]>()
+    }
+
+    /// The cell of a word, if it is there.
+    #[inline]
+    pub(super) fn cell(&self, word: usize) -> Option<&[T; CELL_VOXELS]> {
+        self.cells.get(usize::from(self.places[word]))
+    }
+
+    /// The cell of a word, if it is there.
+    #[inline]
+    pub(super) fn cell_mut(&mut self, word: usize) -> Option<&mut [T; CELL_VOXELS]> {
+        self.cells.get_mut(usize::from(self.places[word]))
+    }
+
+    /// Makes the cells of the given words (bit `k` for word `k`) that are not there yet, filled with `value`.
+    pub(super) fn make(&mut self, words: u8, value: T) {
+        let missing = (0..8).filter(|&word| words >> word & 1 == 1 && self.places[word] == ABSENT);
+        let missing: Vec<usize> = missing.collect();
+        // No slack: eight times at most in a brick's life.
+        self.cells.reserve_exact(missing.len());
+        for word in missing {
+            self.places[word] = self.cells.len() as u8;
+            self.cells.push([value; CELL_VOXELS]);
+        }
+    }
+
+    /// All cells, in no particular order.
+    pub(super) fn all(&self) -> &[[T; CELL_VOXELS]] {
+        &self.cells
+    }
+
+    /// All cells, in no particular order.
+    pub(super) fn all_mut(&mut self) -> &mut [[T; CELL_VOXELS]] {
+        &mut self.cells
+    }
+
+    /// The same cells with other values.
+    pub(super) fn map<U: Copy>(&self, value: impl Fn(T) -> U) -> Cells<U> {
+        Cells { places: self.places, cells: self.cells.iter().map(|cell| cell.map(&value)).collect() }
+    }
+}

@@ -1,0 +1,210 @@
+use crate::sensor::{Evidence, Observation, SensorModel};
+
+/// Number of a state in a [`Palette`].
+pub(super) type StateId = u16;
+
+/// The state of a voxel that was never observed. As a *next* state it means that the step was not taken yet: no
+/// update leads back to it.
+pub(super) const UNKNOWN: StateId = 0;
+
+/// The distinct states of evidence of a tile's voxels, each kept once, with the steps between them.
+///
+/// Voxels with the same history have the same evidence, and few histories are common: a tile of a million voxels has
+/// some hundreds of states. A step (state, observation) -> state is a pure function, so it is computed once and
+/// looked up from then on: an update is one read and one write of two bytes.
+///
+/// The number of states is limited. The limit follows what is in use, so that states which no voxel is in any
+/// longer do not pile up: at the limit the owner is to [`retain`](Palette::retain) those in use.
+#[derive(Clone, Debug)]
+pub(super) struct Palette {
+    model: SensorModel,
+    evidence: Vec<Evidence>,
+    next: Vec<Next>,
+    /// Hash table of the states by evidence, open addressing, [`UNKNOWN`] where nothing is.
+    slots: Vec<StateId>,
+    /// Most states before some are to be dropped; at most `most`.
+    limit: usize,
+    most: usize,
+}
+
+/// Where an observation leads, or [`UNKNOWN`].
+#[derive(Clone, Copy, Debug, Default)]
+struct Next {
+    miss: StateId,
+    hit: StateId,
+}
+
+/// No further state can be taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Full;
+
+const FIRST_LIMIT: usize = 1 << 10;
+const MOST_STATES: usize = 1 << 16;
+
+impl Default for Palette {
+    fn default() -> Self {
+        Self::limited(FIRST_LIMIT, MOST_STATES)
+    }
+}
+
+impl Palette {
+    /// A palette that takes `limit` states at first and never more than `most`; both powers of two.
+    pub(super) fn limited(limit: usize, most: usize) -> Self {
+        Self {
+            model: SensorModel::default(),
+            evidence: vec![Evidence::PRIOR],
+            next: vec![Next::default()],
+            slots: Vec::new(),
+            limit,
+            most,
+        }
+    }
+
+    /// The sensor model by which steps are taken.
+    pub(super) fn model(&self) -> &SensorModel {
+        &self.model
+    }
+
+    /// Takes another sensor model, if it is another: steps known so far are forgotten.
+    pub(super) fn use_model(&mut self, model: &SensorModel) {
+        if self.model != *model {
+            self.model = *model;
+            self.next.fill(Next::default());
+        }
+    }
+
+    /// Number of states, the one of unknown voxels included.
+    pub(super) fn len(&self) -> usize {
+        self.evidence.len()
+    }
+
+    /// Bytes of memory on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        self.evidence.capacity() * size_of::<Evidence>()
+            + self.next.capacity() * size_of::<Next>()
+            + self.slots.capacity() * size_of::<StateId>()
+    }
+
+    /// The evidence of a state.
+    #[inline]
+    pub(super) fn evidence(&self, state: StateId) -> Evidence {
+        self.evidence[usize::from(state)]
+    }
+
+    /// The state after a miss.
+    #[inline]
+    pub(super) fn after_miss(&mut self, before: StateId) -> Result<StateId, Full> {
+        match self.next[usize::from(before)].miss {
+            UNKNOWN => self.first_miss(before),
+            after => Ok(after),
+        }
+    }
+
+    /// The state after a hit.
+    #[inline]
+    pub(super) fn after_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {
+        match self.next[usize::from(before)].hit {
+            UNKNOWN => self.first_hit(before, intensity),
+            after => Ok(after),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn first_miss(&mut self, before: StateId) -> Result<StateId, Full> {
+        let after = self.intern(self.model.update(Some(self.evidence(before)), Observation::Miss))?;
+        self.next[usize::from(before)].miss = after;
+        Ok(after)
+    }
+
+    #[inline(never)]
+    fn first_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {
+        let hit = Observation::Hit(intensity);
+        let after = self.intern(self.model.update(Some(self.evidence(before)), hit))?;
+        // Where the intensity counts, the next hit leads elsewhere.
+        if !self.model.needs_intensity() {
+            self.next[usize::from(before)].hit = after;
+        }
+        Ok(after)
+    }
+
+    /// The state of some evidence, a new one if need be.
+    pub(super) fn intern(&mut self, evidence: Evidence) -> Result<StateId, Full> {
+        if 4 * self.len() >= 3 * self.slots.len() {
+            self.rehash();
+        }
+        let mut slot = self.slot_of(evidence);
+        loop {
+            match self.slots[slot] {
+                UNKNOWN => break,
+                state if is_same(self.evidence(state), evidence) => return Ok(state),
+                _ => slot = (slot + 1) & (self.slots.len() - 1),
+            }
+        }
+        if self.len() >= self.limit {
+            return Err(Full);
+        }
+        let state = self.len() as StateId;
+        self.evidence.push(evidence);
+        self.next.push(Next::default());
+        self.slots[slot] = state;
+        Ok(state)
+    }
+
+    /// Keeps the states that are in use and gives the number of each after that; of the others it is
+    /// [`UNKNOWN`]. Where most are in use, the limit rises as far as it may.
+    pub(super) fn retain(&mut self, in_use: &[bool]) -> Vec<StateId> {
+        let mut kept = 0;
+        let number = |(state, &in_use): (usize, &bool)| {
+            let stays = in_use && state != usize::from(UNKNOWN);
+            kept += StateId::from(stays);
+            if stays { kept } else { UNKNOWN }
+        };
+        let numbers: Vec<StateId> = in_use.iter().enumerate().map(number).collect();
+        let stays = |state: usize| state == usize::from(UNKNOWN) || numbers[state] != UNKNOWN;
+        let renumbered =
+            |next: &Next| Next { miss: numbers[usize::from(next.miss)], hit: numbers[usize::from(next.hit)] };
+        self.next =
+            (0..self.len()).filter(|&state| stays(state)).map(|s| renumbered(&self.next[s])).collect();
+        self.evidence = (0..self.len()).filter(|&state| stays(state)).map(|s| self.evidence[s]).collect();
+        if self.len() > self.limit / 2 {
+            self.limit = (self.limit * 2).min(self.most);
+        }
+        self.rehash();
+        numbers
+    }
+
+    /// Whether there is room for another state.
+    pub(super) fn has_room(&self) -> bool {
+        self.len() < self.limit
+    }
+
+    /// Whether the limit can rise.
+    pub(super) fn can_grow(&self) -> bool {
+        self.limit < self.most
+    }
+
+    /// Makes the hash table anew, half full at most.
+    fn rehash(&mut self) {
+        self.slots = vec![UNKNOWN; (2 * self.len()).next_power_of_two().max(16)];
+        for state in 1..self.len() {
+            let mut slot = self.slot_of(self.evidence[state]);
+            while self.slots[slot] != UNKNOWN {
+                slot = (slot + 1) & (self.slots.len() - 1);
+            }
+            self.slots[slot] = state as StateId;
+        }
+    }
+
+    fn slot_of(&self, evidence: Evidence) -> usize {
+        let bits = evidence.log_odds.to_bits() ^ (evidence.observation_count as u64).rotate_left(20);
+        // Fibonacci hashing: the upper bits of the product depend on all bits.
+        let hash = (bits ^ bits >> 29).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        (hash >> 32) as usize & (self.slots.len() - 1)
+    }
+}
+
+/// Whether both are the same to the bit.
+fn is_same(a: Evidence, b: Evidence) -> bool {
+    a.log_odds.to_bits() == b.log_odds.to_bits() && a.observation_count == b.observation_count
+}
