@@ -3,7 +3,7 @@
 use criterion::measurement::WallTime;
 use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use std::collections::BTreeMap;
-use voxtile::scan::{ScanUpdates, TileUpdates, trace_scan};
+use voxtile::scan::{ScanTracer, ScanUpdates, TileUpdates};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
 use voxtile::space::TileIndex;
@@ -18,6 +18,7 @@ fn apply(tables: &mut Tables, config: &MapConfig, updates: &ScanUpdates) {
         let table = tables.entry(*tile).or_default();
         match updates {
             TileUpdates::Once(bricks) => bricks.iter().for_each(|brick| table.update_brick(model, brick)),
+            TileUpdates::Runs(bricks) => bricks.iter().for_each(|brick| table.update_runs(model, brick)),
             TileUpdates::Ordered(updates) => {
                 table.update_in_order(model, config.grid.voxels_of_tile(*tile).min, updates);
             }
@@ -27,7 +28,9 @@ fn apply(tables: &mut Tables, config: &MapConfig, updates: &ScanUpdates) {
 
 fn bench(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, config: &MapConfig) {
     let scan = Survey::street(1).next().expect("a survey never ends");
-    let updates = trace_scan(&config.grid, &config.sensor_model, &config.rays, &scan).expect("a good scan");
+    let updates = ScanTracer::default()
+        .trace(&config.grid, &config.sensor_model, &config.rays, &scan)
+        .expect("a good scan");
     group.throughput(Throughput::Elements(updates.tiles.iter().map(|(_, tile)| tile.len() as u64).sum()));
     group.bench_function(format!("{name}, fresh"), |bencher| {
         bencher.iter_batched_ref(

@@ -9,6 +9,7 @@
 mod batch;
 mod brick_map;
 mod counted_brick;
+mod every_ray;
 mod footprint;
 mod marked_brick;
 mod once;
@@ -28,5 +29,5 @@ pub use batch::PointBatch;
 pub use ray::{MAX_RAY_STEPS, RayWalk};
 pub use report::{ScanReport, SkippedPoints};
 pub use trace::ScanTracer;
-pub use updates::{BrickUpdate, OrderedUpdates, ScanUpdates, TileUpdates};
+pub use updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, ScanUpdates, TileUpdates};
 pub use world_scan::Scan;

@@ -1,5 +1,6 @@
+use super::counted_brick::MAX_RAYS;
+use super::every_ray::{EveryRayCollector, updates_in_order};
 use super::once::OnceCollector;
-use super::ordered::OrderedCollector;
 use super::range::{Ranged, in_range};
 use super::ray::MAX_RAY_STEPS;
 use super::slab_walk::SlabRay;
@@ -19,7 +20,9 @@ const LEAST_RAYS_A_THREAD: usize = 4096;
 #[derive(Clone, Debug, Default)]
 pub struct ScanTracer {
     /// One for every thread that takes part.
-    collectors: Vec<OnceCollector>,
+    once: Vec<OnceCollector>,
+    /// One for every part of the rays.
+    every_ray: Vec<EveryRayCollector>,
 }
 
 impl ScanTracer {
@@ -40,14 +43,17 @@ impl ScanTracer {
         check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
         let fan = Fan::new(grid, model, rays, scan)?;
         match rays.insert_mode {
-            InsertMode::PerScan => Ok(fan.once_a_voxel(&mut self.collectors)),
-            InsertMode::PerRay => Ok(fan.every_ray()),
+            InsertMode::PerScan => Ok(fan.once_a_voxel(&mut self.once)),
+            InsertMode::PerRay => Ok(fan.every_ray(&mut self.every_ray)),
         }
     }
 
     /// Bytes of memory that are kept.
     pub fn bytes(&self) -> usize {
-        self.collectors.iter().map(|collector| size_of::<OnceCollector>() + collector.bytes()).sum()
+        let once = self.once.iter().map(|collector| size_of::<OnceCollector>() + collector.bytes());
+        let every_ray =
+            self.every_ray.iter().map(|collector| size_of::<EveryRayCollector>() + collector.bytes());
+        once.sum::<usize>() + every_ray.sum::<usize>()
     }
 }
 
@@ -84,8 +90,8 @@ struct Fan<'a> {
 /// A ray that counts.
 struct Ray {
     path: SlabRay,
-    /// The observation at its end, if its end is evidence.
-    end: Option<Observation>,
+    /// The intensity at its end, if its end is evidence.
+    hit: Option<f32>,
 }
 
 impl<'a> Fan<'a> {
@@ -100,33 +106,57 @@ impl<'a> Fan<'a> {
     /// One update a voxel, a hit over any miss. Which voxels these are does not depend on the order of the rays, so
     /// each thread walks some of them.
     fn once_a_voxel(&self, collectors: &mut Vec<OnceCollector>) -> ScanUpdates {
-        let points = self.scan.points.len();
-        let threads = rayon::current_num_threads().min(points / LEAST_RAYS_A_THREAD).max(1);
-        if collectors.len() < threads {
-            collectors.resize_with(threads, OnceCollector::default);
-        }
-        let window = Window::around(self.start, self.bounds());
-        let collect = |(part, collector): (usize, &mut OnceCollector)| {
+        let needs_intensity = self.model.needs_intensity();
+        let (collectors, report) = self.collect(collectors, usize::MAX, |collector, window, points| {
             collector.clear(window);
-            self.collect_once(collector, points * part / threads..points * (part + 1) / threads)
-        };
-        let reports: Vec<ScanReport> =
-            collectors[..threads].par_iter_mut().enumerate().map(collect).collect();
-        let mut report = ScanReport::default();
-        reports.into_iter().for_each(|part| report += part);
+            self.for_each_ray(points, |ray| {
+                collector.pass(&ray.path);
+                if let Some(intensity) = ray.hit {
+                    collector.hit(ray.path.last, needs_intensity.then_some(intensity));
+                }
+            })
+        });
         let (first, others) = collectors.split_at_mut(1);
-        others[..threads - 1].iter().for_each(|other| first[0].absorb(other));
+        others.iter().for_each(|other| first[0].absorb(other));
         first[0].updates(self.grid, report)
     }
 
-    fn collect_once(&self, collector: &mut OnceCollector, points: Range<usize>) -> ScanReport {
-        let needs_intensity = self.model.needs_intensity();
-        self.for_each_ray(points, |ray| {
-            collector.pass(&ray.path);
-            if let Some(Observation::Hit(intensity)) = ray.end {
-                collector.hit(ray.path.last, needs_intensity.then_some(intensity));
-            }
-        })
+    /// Every ray counts: its misses from the sensor outward, then its hit, in the order of the points.
+    fn every_ray(&self, collectors: &mut Vec<EveryRayCollector>) -> ScanUpdates {
+        let (collectors, report) = self.collect(collectors, MAX_RAYS, |collector, window, points| {
+            collector.clear(window);
+            self.for_each_ray(points, |ray| {
+                collector.pass(&ray.path);
+                if let Some(intensity) = ray.hit {
+                    collector.hit(ray.path.last, intensity);
+                }
+            })
+        });
+        updates_in_order(self.grid, collectors, report)
+    }
+
+    /// Gives each thread a part of the points, and each part a collector, in order. No part has more than `most` points.
+    fn collect<'c, C: Default + Send>(
+        &self,
+        collectors: &'c mut Vec<C>,
+        most: usize,
+        collect: impl Fn(&mut C, Window, Range<usize>) -> ScanReport + Sync,
+    ) -> (&'c mut [C], ScanReport) {
+        let points = self.scan.points.len();
+        let threads = rayon::current_num_threads().min(points / LEAST_RAYS_A_THREAD);
+        let parts = threads.max(points.div_ceil(most)).max(1);
+        if collectors.len() < parts {
+            collectors.resize_with(parts, C::default);
+        }
+        let collectors = &mut collectors[..parts];
+        let window = Window::around(self.start, self.bounds());
+        let reports = collectors.par_iter_mut().enumerate().map(|(part, collector)| {
+            collect(collector, window, points * part / parts..points * (part + 1) / parts)
+        });
+        let reports: Vec<ScanReport> = reports.collect();
+        let mut report = ScanReport::default();
+        reports.into_iter().for_each(|part| report += part);
+        (collectors, report)
     }
 
     /// Bounds of the points, cut at the max range, in units of voxels; whatever is not finite is left out.
@@ -145,18 +175,6 @@ impl<'a> Fan<'a> {
             }
         }
         (self.grid.to_voxel_units(low), self.grid.to_voxel_units(high))
-    }
-
-    /// Every ray counts: its misses from the sensor outward, then its hit, in the order of the points.
-    fn every_ray(&self) -> ScanUpdates {
-        let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
-        let report = self.for_each_ray(0..self.scan.points.len(), |ray| {
-            ray.path.walk().for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
-            if let Some(observation) = ray.end {
-                collector.push(ray.path.last, observation);
-            }
-        });
-        collector.into_updates(report)
     }
 
     fn for_each_ray(&self, points: Range<usize>, mut visit: impl FnMut(Ray)) -> ScanReport {
@@ -194,6 +212,6 @@ impl<'a> Fan<'a> {
         let hit = Observation::Hit(intensity);
         let end = self.grid.to_voxel_units(end_m);
         let path = SlabRay { origin: self.origin, start: self.start, end, last };
-        Some(Ray { path, end: (is_hit && self.model.is_evidence(hit)).then_some(hit) })
+        Some(Ray { path, hit: (is_hit && self.model.is_evidence(hit)).then_some(intensity) })
     }
 }

@@ -16,7 +16,9 @@ pub struct ScanUpdates {
 pub enum TileUpdates {
     /// At most one update a voxel: masks a brick, in Morton order.
     Once(Vec<BrickUpdate>),
-    /// Any number of updates a voxel, in order.
+    /// Any number of updates a voxel, those of a voxel in order: runs a brick, in Morton order.
+    Runs(Vec<BrickRuns>),
+    /// Any number of updates a voxel, all in order.
     Ordered(OrderedUpdates),
 }
 
@@ -31,6 +33,38 @@ pub struct BrickUpdate {
     pub misses: BrickMask,
     /// The largest intensity of each hit voxel, in the order of the mask; empty for sensor models that need none.
     pub intensities: Box<[f32]>,
+}
+
+/// Updates of voxels of one brick, any number a voxel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickRuns {
+    /// Which brick.
+    pub brick: BrickCode,
+    /// The runs in Morton order of their voxels; those of a voxel in the order in which they count.
+    pub runs: Box<[Run]>,
+}
+
+/// Consecutive updates of one voxel: misses, and then a hit or nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Run {
+    /// The voxel's place in its brick's Morton order.
+    pub place: u16,
+    /// How many misses come first.
+    pub misses: u16,
+    /// The hit after them, if any: its intensity, which matters to some sensor models.
+    pub hit: Option<f32>,
+}
+
+impl Run {
+    /// Number of updates.
+    pub fn len(&self) -> usize {
+        usize::from(self.misses) + usize::from(self.hit.is_some())
+    }
+
+    /// Whether there is no update.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// Updates of voxels of one tile in the order in which they count.
@@ -113,6 +147,7 @@ impl TileUpdates {
                 .flat_map(|brick| brick.hits.iter().chain(&brick.misses))
                 .map(|word| word.count_ones() as usize)
                 .sum(),
+            Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).map(Run::len).sum(),
             Self::Ordered(updates) => updates.len(),
         }
     }
@@ -128,6 +163,10 @@ impl TileUpdates {
             Self::Once(bricks) => {
                 let intensities: usize = bricks.iter().map(|brick| size_of_val(&*brick.intensities)).sum();
                 bricks.capacity() * size_of::<BrickUpdate>() + intensities
+            }
+            Self::Runs(bricks) => {
+                let runs: usize = bricks.iter().map(|brick| size_of_val(&*brick.runs)).sum();
+                bricks.capacity() * size_of::<BrickRuns>() + runs
             }
             Self::Ordered(updates) => (updates.voxels.capacity() + updates.intensities.capacity()) * 4,
         };

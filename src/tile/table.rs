@@ -1,6 +1,6 @@
 use super::brick::{Brick, Rest};
 use super::palette::Palette;
-use crate::scan::{BrickUpdate, OrderedUpdates};
+use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickCode, BrickMask, MortonCode, VoxelIndex, VoxelKey, place_of_voxel, places};
 use rustc_hash::FxHashMap;
@@ -64,6 +64,18 @@ impl Table {
         }
     }
 
+    /// Applies what the rays of a scan say about one brick, where every ray counts.
+    pub fn update_runs(&mut self, model: &SensorModel, updates: &BrickRuns) {
+        self.palette.use_model(model);
+        let number = self.number_of(updates.brick);
+        for run in &updates.runs {
+            let hit = run.hit.map(Observation::Hit);
+            for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
+                self.step(number, run.place.into(), observation);
+            }
+        }
+    }
+
     /// Applies one update of one voxel.
     pub fn update(&mut self, model: &SensorModel, code: MortonCode, observation: Observation) {
         self.palette.use_model(model);
@@ -85,11 +97,16 @@ impl Table {
             if entry.0 != brick {
                 *entry = (brick, self.number_of(VoxelKey(key).morton().brick()));
             }
-            let (number, place) = (entry.1, place_of_voxel(key.map(i32::from)));
-            match self.bricks[number].update_one(place, observation, &mut self.palette) {
-                Some(is_new) => self.len += usize::from(is_new),
-                None => self.update_rest(number, &mut Rest::of_voxel(place, &observation)),
-            }
+            self.step(entry.1, place_of_voxel(key.map(i32::from)), observation);
+        }
+    }
+
+    /// Applies one update of a voxel of a brick.
+    #[inline]
+    fn step(&mut self, number: usize, place: usize, observation: Observation) {
+        match self.bricks[number].update_one(place, observation, &mut self.palette) {
+            Some(is_new) => self.len += usize::from(is_new),
+            None => self.update_rest(number, &mut Rest::of_voxel(place, &observation)),
         }
     }
 

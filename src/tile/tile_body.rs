@@ -101,6 +101,17 @@ impl Tile {
                     }
                 }
             }
+            TileUpdates::Runs(bricks) => {
+                for brick in bricks {
+                    self.table.update_runs(model, brick);
+                    for run in &brick.runs {
+                        let code = brick.brick.voxel(run.place.into());
+                        if let Some(evidence) = self.table.get(code) {
+                            self.octree.put(code, evidence.log_odds);
+                        }
+                    }
+                }
+            }
             TileUpdates::Ordered(updates) => {
                 for (offset, observation) in updates.iter() {
                     let code = self.code_of_offset(offset);
