@@ -1,5 +1,5 @@
 use super::footprint::Footprint;
-use crate::space::BRICK_VOXELS;
+use crate::space::{BRICK_EDGE, BRICK_VOXELS};
 
 /// How many rays pass each voxel of a brick, in Morton order; since the voxel was last hit.
 ///
@@ -27,6 +27,8 @@ fn part_of_place(axis: usize, index: u32) -> u16 {
 }
 
 impl Footprint for CountedBrick {
+    const EDGE: u32 = BRICK_EDGE as u32;
+
     /// The part of the voxel's place that its indices along the slab make.
     type Cell = u16;
 

@@ -1,5 +1,5 @@
 use super::ScanReport;
-use super::brick_map::BrickMap;
+use super::block_map::BlockMap;
 use super::counted_brick::CountedBrick;
 use super::slab_walk::SlabRay;
 use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
@@ -15,7 +15,7 @@ use rustc_hash::FxHashMap;
 /// about other voxels in between makes no difference.
 #[derive(Clone, Debug, Default)]
 pub(super) struct EveryRayCollector {
-    bricks: BrickMap<CountedBrick>,
+    bricks: BlockMap<CountedBrick>,
     /// The runs that a hit has ended, in order.
     ended: Vec<(u32, Run)>,
 }
@@ -40,7 +40,7 @@ impl EveryRayCollector {
     /// A ray ends in a voxel, with an intensity if it matters.
     pub(super) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
         let (slot, place) = (self.bricks.slot_of(voxel), place_of_voxel(voxel));
-        let misses = std::mem::take(&mut self.bricks.bricks_mut()[slot].passes[place]);
+        let misses = std::mem::take(&mut self.bricks.blocks_mut()[slot].passes[place]);
         self.ended.push((slot as u32, Run { place: place as u16, misses, hit: Some(intensity) }));
     }
 
@@ -65,7 +65,7 @@ impl EveryRayCollector {
         let start = self.ended.partition_point(|&(other, _)| other < slot);
         let mut ended = self.ended[start..].iter().take_while(|&&(other, _)| other == slot).peekable();
         let mut runs = Vec::new();
-        for (place, &misses) in self.bricks.bricks()[slot as usize].passes.iter().enumerate() {
+        for (place, &misses) in self.bricks.blocks()[slot as usize].passes.iter().enumerate() {
             while let Some((_, run)) = ended.next_if(|(_, run)| usize::from(run.place) == place) {
                 if is_in_part(place) {
                     runs.push(*run);

@@ -7,17 +7,16 @@
 //! The updates know nothing of what a tile holds: they can be kept and applied later.
 
 mod batch;
-mod brick_map;
+mod block_map;
 mod counted_brick;
 mod every_ray;
 mod footprint;
-mod marked_brick;
+mod marked_page;
 mod once;
 mod ordered;
 mod range;
 mod ray;
 mod report;
-mod slab_masks;
 mod slab_walk;
 mod tile_order;
 mod trace;

@@ -1,4 +1,4 @@
-use super::brick_map::BrickMap;
+use super::block_map::BlockMap;
 use super::footprint::Footprint;
 use super::ray::RayWalk;
 use super::window::Local;
@@ -31,15 +31,15 @@ impl SlabRay {
     }
 
     /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last.
-    pub(super) fn pass<F: Footprint>(&self, bricks: &mut BrickMap<F>) {
-        if let Err(from) = self.pass_slabs(bricks) {
+    pub(super) fn pass<F: Footprint>(&self, blocks: &mut BlockMap<F>) {
+        if let Err(from) = self.pass_slabs(blocks) {
             let mut is_left = true;
             self.walk().for_each_before_end(|voxel| {
                 is_left &= voxel != from;
                 if !is_left {
-                    let slot = bricks.slot_of(voxel);
+                    let slot = blocks.slot_of(voxel);
                     let [x, y, z] = voxel.map(|k| k as u32);
-                    bricks.bricks_mut()[slot].pass::<0>(x, F::cell::<1, 2>(y, z));
+                    blocks.blocks_mut()[slot].pass::<0>(x, F::cell::<1, 2>(y, z));
                 }
             });
         }
@@ -52,25 +52,25 @@ impl SlabRay {
     /// slab to slab is a sum of fixed-point numbers, and the voxels it meets in a slab are the one it comes in by, the
     /// one it goes out by and, if these differ along both other axes, the one between them. That this is what the
     /// closed form says is certain as long as no crossing is next to a border, and no two are next to each other.
-    fn pass_slabs<F: Footprint>(&self, bricks: &mut BrickMap<F>) -> Result<(), VoxelIndex> {
+    fn pass_slabs<F: Footprint>(&self, blocks: &mut BlockMap<F>) -> Result<(), VoxelIndex> {
         let length: Point = std::array::from_fn(|k| (self.end[k] - self.origin[k]).abs());
         if length[0] >= length[1] && length[0] >= length[2] {
-            self.pass_along::<0, 1, 2, F>(bricks)
+            self.pass_along::<0, 1, 2, F>(blocks)
         } else if length[1] >= length[2] {
-            self.pass_along::<1, 0, 2, F>(bricks)
+            self.pass_along::<1, 0, 2, F>(blocks)
         } else {
-            self.pass_along::<2, 0, 1, F>(bricks)
+            self.pass_along::<2, 0, 1, F>(blocks)
         }
     }
 
     /// `A` is the axis of the longest part, `B` and `C` are the others, the lower first.
     fn pass_along<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
-        bricks: &mut BrickMap<F>,
+        blocks: &mut BlockMap<F>,
     ) -> Result<(), VoxelIndex> {
-        let base = bricks.window().base();
-        let last = bricks.window().local(self.last).ok_or(self.start)?;
-        let start = self.leave_borders(bricks)?;
+        let base = blocks.window().base();
+        let last = blocks.window().local(self.last).ok_or(self.start)?;
+        let start = self.leave_borders(blocks)?;
         let [mut a, mut b, mut c] = [start[A], start[B], start[C]];
         let unknown = |a, b, c| {
             let local = voxel::<A, B, C>(a, b, c);
@@ -79,16 +79,16 @@ impl SlabRay {
         let mut slabs = last[A].abs_diff(a);
         if slabs > 0 {
             let is_up = last[A] > a;
-            let (step, first_of_brick) = if is_up { (1, 0) } else { (u32::MAX, 7) };
+            let (step, first_of_block) = if is_up { (1, 0) } else { (u32::MAX, F::EDGE - 1) };
             let mut path = Path::along::<A, B, C>(self, base, a, is_up);
             let mut entry = F::cell::<B, C>(b, c);
-            // The voxel by which the ray came into a brick, if not from slab to slab.
+            // The voxel by which the ray came into a block, if not from slab to slab.
             let mut came_in_by = None;
-            // Once around for every brick that the ray comes into.
+            // Once around for every block that the ray comes into.
             while slabs > 0 {
-                let brick = bricks.at(voxel::<A, B, C>(a, b, c));
+                let block = blocks.at(voxel::<A, B, C>(a, b, c));
                 if let Some(cell) = came_in_by.take() {
-                    brick.pass::<A>(a.wrapping_sub(step), cell);
+                    block.pass::<A>(a.wrapping_sub(step), cell);
                 }
                 loop {
                     if is_near_border(path.at_b) || is_near_border(path.at_c) {
@@ -98,21 +98,21 @@ impl SlabRay {
                     let (change_b, change_c) = (b ^ exit_b, c ^ exit_c);
                     // One branch that is seldom taken, where two would often be guessed wrong.
                     let is_diagonal = change_b * change_c != 0;
-                    let is_in_brick = (change_b | change_c) < 8;
+                    let is_in_block = (change_b | change_c) < F::EDGE;
                     let exit = F::cell::<B, C>(exit_b, exit_c);
                     let slab = a;
                     (a, slabs) = (a.wrapping_add(step), slabs - 1);
-                    let is_at_end = slabs == 0 || a & 7 == first_of_brick;
+                    let is_at_end = slabs == 0 || a & (F::EDGE - 1) == first_of_block;
                     let cell = std::mem::replace(&mut entry, exit);
-                    if is_in_brick {
+                    if is_in_block {
                         if is_diagonal {
                             let Some(is_b_first) = path.is_b_crossed_first() else {
                                 return unknown(slab, b, c);
                             };
                             let (b, c) = if is_b_first { (exit_b, c) } else { (b, exit_c) };
-                            brick.pass::<A>(slab, F::cell::<B, C>(b, c));
+                            block.pass::<A>(slab, F::cell::<B, C>(b, c));
                         }
-                        brick.pass_through::<A>(slab, cell, exit);
+                        block.pass_through::<A>(slab, cell, exit);
                         (b, c) = (exit_b, exit_c);
                         path.advance();
                         if is_at_end {
@@ -124,15 +124,15 @@ impl SlabRay {
                             Some(order) => order,
                             None => None,
                         };
-                        brick.pass::<A>(slab, cell);
+                        block.pass::<A>(slab, cell);
                         if let Some(is_b_first) = is_b_first {
                             let (b, c) = if is_b_first { (exit_b, c) } else { (b, exit_c) };
-                            bricks.at(voxel::<A, B, C>(slab, b, c)).pass::<A>(slab, F::cell::<B, C>(b, c));
+                            blocks.at(voxel::<A, B, C>(slab, b, c)).pass::<A>(slab, F::cell::<B, C>(b, c));
                         }
                         (b, c) = (exit_b, exit_c);
                         path.advance();
                         if is_at_end {
-                            bricks.at(voxel::<A, B, C>(slab, b, c)).pass::<A>(slab, exit);
+                            blocks.at(voxel::<A, B, C>(slab, b, c)).pass::<A>(slab, exit);
                         } else {
                             came_in_by = Some(exit);
                         }
@@ -144,7 +144,7 @@ impl SlabRay {
         match self.before_last::<B, C>(base, (b, c), start, last) {
             Some(cells) => {
                 for (b, c) in cells.into_iter().flatten() {
-                    bricks.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
+                    blocks.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
                 }
                 Ok(())
             }
@@ -155,8 +155,8 @@ impl SlabRay {
     /// The crossings at time 0: an origin on a border between voxels belongs to the upper one, and a ray downward
     /// leaves it at once, the lowest axis first. Returns the voxel after them.
     #[inline]
-    fn leave_borders<F: Footprint>(&self, bricks: &mut BrickMap<F>) -> Result<Local, VoxelIndex> {
-        let mut voxel = bricks.window().local(self.start).ok_or(self.start)?;
+    fn leave_borders<F: Footprint>(&self, blocks: &mut BlockMap<F>) -> Result<Local, VoxelIndex> {
+        let mut voxel = blocks.window().local(self.start).ok_or(self.start)?;
         let is_left = |axis: usize| {
             self.last[axis] < self.start[axis] && f64::from(self.start[axis]) == self.origin[axis]
         };
@@ -165,7 +165,7 @@ impl SlabRay {
             return Err(self.start);
         }
         for axis in (0..3).filter(|&axis| is_left(axis)) {
-            bricks.at(voxel).pass::<0>(voxel[0], F::cell::<1, 2>(voxel[1], voxel[2]));
+            blocks.at(voxel).pass::<0>(voxel[0], F::cell::<1, 2>(voxel[1], voxel[2]));
             voxel[axis] -= 1;
         }
         Ok(voxel)
@@ -271,7 +271,7 @@ fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u32, c: u32)
 #[cfg(test)]
 mod tests {
     use super::super::counted_brick::CountedBrick;
-    use super::super::marked_brick::MarkedBrick;
+    use super::super::marked_page::MarkedPage;
     use super::super::window::Window;
     use super::*;
     use crate::space::place_of_voxel;
@@ -286,18 +286,14 @@ mod tests {
     /// How often each voxel was passed.
     type Passes = BTreeMap<VoxelIndex, u32>;
 
-    fn passes<F: Footprint>(bricks: &BrickMap<F>, passes_at: impl Fn(&F, usize) -> u32) -> Passes {
-        let mut passes = Passes::new();
-        for (brick, index) in bricks.bricks().iter().zip(bricks.indices()) {
-            for k in 0..512 {
-                let offset = [k & 7, k >> 3 & 7, k >> 6];
-                let count = passes_at(brick, place_of_voxel(offset));
-                if count > 0 {
-                    passes.insert(std::array::from_fn(|axis| index[axis] * 8 + offset[axis]), count);
-                }
+    fn add(passes: &mut Passes, brick: VoxelIndex, passes_at: impl Fn(usize) -> u32) {
+        for k in 0..512 {
+            let offset = [k & 7, k >> 3 & 7, k >> 6];
+            let count = passes_at(place_of_voxel(offset));
+            if count > 0 {
+                passes.insert(std::array::from_fn(|axis| brick[axis] * 8 + offset[axis]), count);
             }
         }
-        passes
     }
 
     fn visits(rays: &[SlabRay]) -> Passes {
@@ -316,23 +312,32 @@ mod tests {
         });
         let rays: Vec<_> = ends.iter().map(|&end| ray(origin, end)).collect();
         let window = Window::around(rays[0].start, bounds);
-        let (mut marked, mut counted) =
-            (BrickMap::<MarkedBrick>::default(), BrickMap::<CountedBrick>::default());
+        let mut marked = BlockMap::<MarkedPage>::default();
+        let mut counted = BlockMap::<CountedBrick>::default();
         marked.clear(window);
         counted.clear(window);
+        let unknown = rays
+            .iter()
+            .filter(|ray| ray.pass_slabs(&mut BlockMap::<MarkedPage>::clone(&marked)).is_err())
+            .count();
         for ray in &rays {
             ray.pass(&mut marked);
             ray.pass(&mut counted);
         }
-        marked.bricks_mut().iter_mut().for_each(MarkedBrick::finish);
         let expected = visits(&rays);
-        let counted = passes(&counted, |brick, place| u32::from(brick.passes[place]));
-        assert_eq!(counted, expected, "{origin:?} to {ends:?}");
-        let marked = passes(&marked, |brick, place| (brick.passed()[place / 64] >> (place % 64)) as u32 & 1);
-        assert!(marked.keys().eq(expected.keys()), "{origin:?} to {ends:?}");
-        let mut again = BrickMap::<MarkedBrick>::default();
-        again.clear(window);
-        rays.iter().filter(|ray| ray.pass_slabs(&mut again).is_err()).count()
+        let mut passes = Passes::new();
+        for (brick, index) in counted.blocks().iter().zip(counted.indices()) {
+            add(&mut passes, *index, |place| u32::from(brick.passes[place]));
+        }
+        assert_eq!(passes, expected, "{origin:?} to {ends:?}");
+        let mut passes = Passes::new();
+        for (page, index) in marked.blocks().iter().zip(marked.indices()) {
+            for brick in page.bricks(*index) {
+                add(&mut passes, brick.index, |place| (brick.passed[place / 64] >> (place % 64)) as u32 & 1);
+            }
+        }
+        assert!(passes.keys().eq(expected.keys()), "{origin:?} to {ends:?}");
+        unknown
     }
 
     proptest! {
