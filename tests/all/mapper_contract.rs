@@ -7,6 +7,7 @@ use voxtile::mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileM
 use voxtile::query::Questions;
 use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::simulation::Survey;
 use voxtile::space::{TileIndex, VoxelKey};
 use voxtile::{InsertMode, MapConfig};
 
@@ -106,6 +107,34 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             digests.push(reader.digest().unwrap());
         }
         assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
+    }
+}
+
+/// Enough rays that every thread gets some, and in all forms in which rays count.
+#[test]
+fn the_answer_does_not_depend_on_the_number_of_threads() {
+    let scans: Vec<_> = Survey::street(3).take(2).collect();
+    for mode in [InsertMode::PerScan, InsertMode::PerRay] {
+        for model in [SensorModel::default(), SensorModel::Iwlo(Iwlo::default())] {
+            let config = MapConfig::new(0.5, 8.0).unwrap().with_sensor_model(model).with_insert_mode(mode);
+            let build = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| {
+                    let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
+                    let reports = scans.iter().map(|scan| mapper.insert_scan(scan).unwrap());
+                    (reports.collect::<Vec<_>>(), mapper.digest().unwrap())
+                })
+            };
+            let alone = build(1);
+            for threads in [2, 4] {
+                assert_eq!(build(threads), alone, "{mode:?}, {threads} threads");
+            }
+            let mut reference = ReferenceMap::new(&config);
+            scans.iter().for_each(|scan| reference.insert_scan(scan));
+            let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
+            scans.iter().for_each(|scan| drop(mapper.insert_scan(scan).unwrap()));
+            assert_eq!(voxels_of(&mapper), reference.voxels, "{mode:?}");
+        }
     }
 }
 

@@ -26,7 +26,15 @@ fn main() -> ExitCode {
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn"))
         .format_timestamp(None)
         .init();
-    let outcome = match Cli::parse().command {
+    let Cli { command, threads } = Cli::parse();
+    if let Some(threads) = threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        if let Err(error) = pool.build_global() {
+            eprintln!("voxtile: cannot start {threads} threads: {error}");
+            return ExitCode::FAILURE;
+        }
+    }
+    let outcome = match command {
         Command::Build(args) => build::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Query(args) => query::run(&args),
