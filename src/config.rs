@@ -159,8 +159,10 @@ impl MapConfig {
     }
 
     /// Log-odds from which a voxel counts as occupied.
+    #[inline]
     pub fn occupied_log_odds(&self) -> f64 {
-        logit(self.occupancy_threshold)
+        // Asked with every question: the default needs no logarithm.
+        if self.occupancy_threshold == 0.5 { 0.0 } else { logit(self.occupancy_threshold) }
     }
 }
 
