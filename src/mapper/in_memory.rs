@@ -93,8 +93,6 @@ impl Mapper for InMemoryMapper {
     }
 
     fn sync_octrees(&mut self) {
-        self.tiles.values_mut().for_each(|tile| {
-            tile.sync_octree();
-        });
+        self.tiles.values_mut().for_each(Tile::sync_octree);
     }
 }
