@@ -19,8 +19,8 @@ pub struct MapConfig {
     pub occupancy_threshold: f64,
     /// Which part of a ray counts, and how often.
     pub rays: RayConfig,
-    /// Shape of the voxel cache in front of each tile's octree.
-    pub voxel_cache: VoxelCacheConfig,
+    /// What each tile keeps for coarse questions. Default: a view of the table's bricks.
+    pub octree: OctreeConfig,
     /// Most tiles kept in memory by an out-of-core mapper, at least 1. Default: 16.
     pub cache_tiles: usize,
     /// Most bytes of updates that wait in memory for tiles on disk before those are fetched; one scan may come
@@ -52,6 +52,17 @@ pub enum InsertMode {
     PerRay,
 }
 
+/// What each tile keeps for coarse questions. The answers and the files are the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OctreeConfig {
+    /// A view of the table's bricks: a few bytes a brick, and an update costs it nothing.
+    #[default]
+    Bricks,
+    /// OctoMap's pointer tree behind a voxel cache (OctoCache), for study and comparison.
+    Cached(VoxelCacheConfig),
+}
+
 /// Shape of the voxel cache in front of each tile's octree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -70,7 +81,7 @@ impl Default for MapConfig {
             sensor_model: SensorModel::default(),
             occupancy_threshold: 0.5,
             rays: RayConfig::default(),
-            voxel_cache: VoxelCacheConfig::default(),
+            octree: OctreeConfig::default(),
             cache_tiles: 16,
             pending_bytes: 32 << 20,
         }
@@ -122,9 +133,14 @@ impl MapConfig {
         Self { pending_bytes, ..self }
     }
 
-    /// The same with voxel caches of another shape.
+    /// The same with another form of octree.
+    pub fn with_octree(self, octree: OctreeConfig) -> Self {
+        Self { octree, ..self }
+    }
+
+    /// The same with pointer trees behind voxel caches of this shape.
     pub fn with_voxel_cache(self, tau: usize, buckets: Option<usize>) -> Self {
-        Self { voxel_cache: VoxelCacheConfig { tau, buckets }, ..self }
+        self.with_octree(OctreeConfig::Cached(VoxelCacheConfig { tau, buckets }))
     }
 
     /// The configuration, or the first argument that is wrong.
@@ -148,12 +164,8 @@ impl MapConfig {
         if self.cache_tiles == 0 {
             return Err(wrong("cache tiles", self.cache_tiles, "at least 1"));
         }
-        let VoxelCacheConfig { tau, buckets } = self.voxel_cache;
-        if tau == 0 || tau > 1 << 16 {
-            return Err(wrong("tau", tau, "1 to 65536 voxels a bucket"));
-        }
-        if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 30) {
-            return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^30"));
+        if let OctreeConfig::Cached(cache) = self.octree {
+            cache.check()?;
         }
         Ok(self)
     }
@@ -163,6 +175,19 @@ impl MapConfig {
     pub fn occupied_log_odds(&self) -> f64 {
         // Asked with every question: the default needs no logarithm.
         if self.occupancy_threshold == 0.5 { 0.0 } else { logit(self.occupancy_threshold) }
+    }
+}
+
+impl VoxelCacheConfig {
+    fn check(&self) -> Result<()> {
+        let Self { tau, buckets } = *self;
+        if tau == 0 || tau > 1 << 16 {
+            return Err(wrong("tau", tau, "1 to 65536 voxels a bucket"));
+        }
+        if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 30) {
+            return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^30"));
+        }
+        Ok(())
     }
 }
 

@@ -27,7 +27,7 @@
 //! ```text
 //! io::ScanSource -> Scan -> rays -> updates by tile        io, scan
 //!   -> mapper::insert_scan                                 mapper
-//!      -> resident tiles: table, voxel cache, octree       tile, octree, sensor
+//!      -> resident tiles: table, octree                    tile, octree, sensor
 //!      -> pending updates for tiles on disk                mapper
 //!      -> eviction and flush: bytes, one commit            tile::format, store
 //! questions <- tile by tile <- memory or disk              query
@@ -70,7 +70,7 @@ pub mod store;
 pub mod tile;
 pub mod upkeep;
 
-pub use config::{InsertMode, MapConfig, RayConfig, VoxelCacheConfig};
+pub use config::{InsertMode, MapConfig, OctreeConfig, RayConfig, VoxelCacheConfig};
 pub use error::{DecodeError, Error, FormatError, Place, Result};
 pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 pub use query::{Occupancy, Questions};

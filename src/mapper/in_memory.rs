@@ -101,8 +101,6 @@ impl Mapper for InMemoryMapper {
     }
 
     fn sync_octrees(&mut self) {
-        self.tiles.par_iter_mut().for_each(|(_, tile)| {
-            tile.sync_octree();
-        });
+        self.tiles.par_iter_mut().for_each(|(_, tile)| tile.sync_octree());
     }
 }

@@ -185,7 +185,8 @@ impl Residency {
         for index in waiting {
             self.bring_in(index, scan_number)?;
         }
-        // The files hold the octrees, whose trees are independent of each other: all cores bring them up to date.
+        // The files are made of the tables alone. But what statistics say of octrees is as of the flush, and tables
+        // whose bricks are in order are written sooner.
         self.sync_octrees();
         for index in self.cached_tile_indices() {
             self.save(index, scan_number)?;
@@ -227,9 +228,7 @@ impl Residency {
     pub(super) fn sync_octrees(&mut self) {
         let stale = self.tiles.iter_mut().filter(|(_, tile)| !tile.is_octree_synced());
         let stale: Vec<&mut Tile> = stale.map(|(_, tile)| Arc::make_mut(tile)).collect();
-        stale.into_par_iter().for_each(|tile| {
-            tile.sync_octree();
-        });
+        stale.into_par_iter().for_each(Tile::sync_octree);
     }
 
     pub(super) fn statistics(&self, scan_number: u64) -> MapStatistics {
@@ -337,8 +336,8 @@ impl Residency {
             if self.store.stamp(index).is_some() {
                 continue; // Written by an earlier attempt.
             }
-            if let Some((mut tile, _)) = tile_files::load(&self.store, &self.config, index)? {
-                tile_files::save(&mut self.store, &self.config, &mut tile, 0)?;
+            if let Some((tile, _)) = tile_files::load(&self.store, &self.config, index)? {
+                tile_files::save(&mut self.store, &self.config, &tile, 0)?;
             }
         }
         self.store.commit(self.metadata(), 0)

@@ -2,25 +2,23 @@
 
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
-use crate::octree::write_bt;
 use crate::space::{Grid, TileIndex};
 use crate::store::{FileStamp, MapParameters, StoredTile, TileFile, TileStamp, TileStore, hex};
 use crate::tile::format::{DecodedTable, Trailer, read_table, write_table};
 use crate::tile::{Table, Tile};
 
-/// Writes the next version of a tile's files. Its octree is brought up to date.
+/// Writes the next version of a tile's files.
 pub(crate) fn save(
     store: &mut TileStore,
     config: &MapConfig,
-    tile: &mut Tile,
+    tile: &Tile,
     scan_number: u64,
 ) -> Result<TileStamp> {
     let index = tile.index();
     let threshold = config.occupied_log_odds();
     let map_id = store.map_id().unwrap_or_default();
-    let octree = tile.sync_octree();
     let octree = store.write_next(index, TileFile::Octree, |mut out| {
-        write_bt(octree, config.grid.resolution_m(), threshold as f32, &mut out).map(drop)
+        tile.table().write_bt(config.grid.resolution_m(), threshold as f32, &mut out)
     })?;
     let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
     let parameters = map_parameters(config).to_text();
@@ -29,7 +27,7 @@ pub(crate) fn save(
     let table = store.write_next(index, TileFile::Table, |mut out| {
         write_table(tile.table(), trailer, &mut out).map(drop)
     })?;
-    let occupied = tile.table().iter().filter(|(_, evidence)| evidence.log_odds >= threshold).count() as u64;
+    let occupied = tile.table().count_from(threshold) as u64;
     let stamp = TileStamp { scan_number, table, octree, voxels: tile.table().len() as u64, occupied };
     store.note_next(index, stamp);
     Ok(stamp)

@@ -1,6 +1,8 @@
 use crate::error::Result;
 use crate::mapper::MapView;
 use crate::tile::Tile;
+use crate::tile::format::encode_entries;
+use std::convert::Infallible;
 
 const LABEL: &[u8] = b"voxtile-digest-1";
 
@@ -26,16 +28,9 @@ pub(super) fn digest(view: &impl MapView) -> Result<blake3::Hash> {
 /// Over key, log-odds and count of every entry, as in `iwlo_meta.bin`.
 fn digest_of_tile(tile: &Tile) -> blake3::Hash {
     let mut hasher = blake3::Hasher::new();
-    let mut chunk = Vec::with_capacity(1 << 14);
-    for (code, evidence) in tile.table().iter() {
-        code.to_key().0.iter().for_each(|key| chunk.extend_from_slice(&key.to_le_bytes()));
-        chunk.extend_from_slice(&evidence.log_odds.to_bits().to_le_bytes());
-        chunk.extend_from_slice(&evidence.observation_count.to_le_bytes());
-        if chunk.len() > (1 << 14) - 18 {
-            hasher.update(&chunk);
-            chunk.clear();
-        }
-    }
-    hasher.update(&chunk);
+    let Ok(()) = encode_entries(tile.table(), |entries| {
+        hasher.update(entries);
+        Ok::<(), Infallible>(())
+    });
     hasher.finalize()
 }

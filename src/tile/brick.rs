@@ -1,67 +1,32 @@
-use super::cells::Cells;
-use super::palette::{Full, Palette, StateId, UNKNOWN};
-use crate::scan::BrickUpdate;
-use crate::sensor::{Evidence, Observation, SensorModel};
+use super::cells::{CELL_VOXELS, Cells};
+use super::packed::Packed;
+use super::palette::{Palette, StateId};
+use super::summary::{Summary, larger, nodes_of};
+use crate::octree::BrickNodes;
+use crate::sensor::Evidence;
 use crate::space::{BrickCode, BrickMask, places};
 
 /// The evidence of the observed voxels of one brick.
 #[derive(Clone, Debug)]
 pub(super) struct Brick {
     code: BrickCode,
-    observed: BrickMask,
-    evidence: Storage,
+    pub(super) observed: BrickMask,
+    pub(super) evidence: Storage,
+    pub(super) summary: Summary,
 }
 
 #[derive(Clone, Debug)]
-enum Storage {
-    /// The number of each voxel's state in the tile's palette; [`UNKNOWN`] where nothing was observed.
+pub(super) enum Storage {
+    /// The number of each voxel's state in the tile's palette; that of unknown voxels where nothing was observed.
     Interned(Cells<StateId>),
     /// The evidence itself, for histories too many for a palette; anything where nothing was observed.
     Plain(Cells<Packed>),
 }
 
-/// Evidence without the padding that it has in memory.
-#[derive(Clone, Copy, Debug)]
-struct Packed {
-    log_odds_bits: [u32; 2],
-    observation_count: i32,
-}
-
-/// What is left to do of an update of a brick.
-pub(super) struct Rest<'a> {
-    hits: BrickMask,
-    misses: BrickMask,
-    /// Of the hits that are left, in order; empty for sensor models that need none.
-    intensities: &'a [f32],
-}
-
-impl<'a> Rest<'a> {
-    pub(super) fn of(update: &'a BrickUpdate) -> Self {
-        let misses = std::array::from_fn(|word| update.misses[word] & !update.hits[word]);
-        Self { hits: update.hits, misses, intensities: &update.intensities }
-    }
-
-    pub(super) fn of_voxel(place: usize, observation: &'a Observation) -> Self {
-        let mut mask = [0; 8];
-        mask[place / 64] = 1 << (place % 64);
-        match observation {
-            Observation::Miss => Self { hits: [0; 8], misses: mask, intensities: &[] },
-            Observation::Hit(intensity) => {
-                Self { hits: mask, misses: [0; 8], intensities: std::slice::from_ref(intensity) }
-            }
-        }
-    }
-
-    /// The words in which something is left, bit `k` for word `k`.
-    fn words(&self) -> u8 {
-        (0..8).fold(0, |words, word| words | u8::from(self.hits[word] | self.misses[word] != 0) << word)
-    }
-}
-
 impl Brick {
     /// A brick in which nothing was observed yet.
     pub(super) fn new(code: BrickCode) -> Self {
-        Self { code, observed: [0; 8], evidence: Storage::Interned(Cells::empty()) }
+        Self { code, observed: [0; 8], evidence: Storage::Interned(Cells::empty()), summary: Summary::STALE }
     }
 
     pub(super) fn code(&self) -> BrickCode {
@@ -93,66 +58,90 @@ impl Brick {
         places(self.observed).filter_map(|place| Some((place, self.get(place, palette)?)))
     }
 
-    /// Applies an update, and returns how many voxels are observed for the first time. If the palette takes no
-    /// more states, what is left stays in `rest`: it is to be applied again once there is room, or the brick plain.
-    pub(super) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
-        match &mut self.evidence {
-            Storage::Interned(cells) => update_interned(cells, &mut self.observed, rest, palette),
-            Storage::Plain(cells) => (update_plain(cells, &mut self.observed, rest, palette.model()), Ok(())),
-        }
-    }
-
-    /// Applies one update of one voxel whose cell is there, if the palette has room for it. Returns whether the
-    /// voxel is observed for the first time, `None` if nothing was done.
-    #[inline]
-    pub(super) fn update_one(
-        &mut self,
-        place: usize,
-        observation: Observation,
-        palette: &mut Palette,
-    ) -> Option<bool> {
-        let (word, bit) = (place / 64, place % 64);
-        let Storage::Interned(cells) = &mut self.evidence else { return None };
-        let state = &mut cells.cell_mut(word)?[bit];
-        let before = *state;
-        let after = match observation {
-            Observation::Miss => palette.after_miss(before),
-            Observation::Hit(intensity) => palette.after_hit(before, intensity),
-        };
-        *state = after.ok()?;
-        let is_new = before == UNKNOWN;
-        if is_new {
-            self.observed[word] |= 1 << bit;
-        }
-        Some(is_new)
-    }
-
-    /// Sets voxels that were not observed yet, in Morton order, and returns how many were set before the palette
-    /// took no more states.
-    pub(super) fn insert(&mut self, voxels: &[(usize, Evidence)], palette: &mut Palette) -> usize {
-        let words = voxels.iter().fold(0, |words, (place, _)| words | 1 << (place / 64));
-        match &mut self.evidence {
-            Storage::Interned(cells) => cells.make(words, UNKNOWN),
-            Storage::Plain(cells) => cells.make(words, Packed::from(Evidence::PRIOR)),
-        }
-        for (done, &(place, evidence)) in voxels.iter().enumerate() {
-            let (word, bit) = (place / 64, place % 64);
-            match &mut self.evidence {
-                Storage::Interned(cells) => {
-                    let Ok(state) = palette.intern(evidence) else { return done };
-                    cells.cell_mut(word).expect(MADE)[bit] = state;
-                }
-                Storage::Plain(cells) => cells.cell_mut(word).expect(MADE)[bit] = evidence.into(),
+    /// Visits what [`Brick::iter`] gives, a cell at a time.
+    pub(super) fn for_each(&self, palette: &Palette, mut visit: impl FnMut(usize, Evidence)) {
+        match &self.evidence {
+            Storage::Interned(cells) => {
+                cells.for_each(self.observed, |place, state| visit(place, palette.evidence(state)));
             }
-            self.observed[word] |= 1 << bit;
+            Storage::Plain(cells) => {
+                cells.for_each(self.observed, |place, packed| visit(place, packed.into()))
+            }
         }
-        voxels.len()
     }
 
     /// Lets the brick hold its evidence itself, without the palette.
     pub(super) fn make_plain(&mut self, palette: &Palette) {
         if let Storage::Interned(cells) = &self.evidence {
             self.evidence = Storage::Plain(cells.map(|state| palette.evidence(state).into()));
+        }
+    }
+
+    /// Largest log-odds of the observed voxels among `span` (a power of eight) places from `first` on.
+    pub(super) fn max_of(&self, first: usize, span: usize, palette: &Palette) -> Option<f32> {
+        let run = if span < 64 { ((1 << span) - 1) << (first % 64) } else { u64::MAX };
+        let words = first / 64..(first + span).div_ceil(64);
+        let mask =
+            std::array::from_fn(|word| if words.contains(&word) { self.observed[word] & run } else { 0 });
+        let mut max: Option<f32> = None;
+        let mut take = |evidence: Evidence| {
+            let value = evidence.log_odds as f32;
+            max = Some(max.map_or(value, |max| larger(max, value)));
+        };
+        match &self.evidence {
+            Storage::Interned(cells) => cells.for_each(mask, |_, state| take(palette.evidence(state))),
+            Storage::Plain(cells) => cells.for_each(mask, |_, packed| take(packed.into())),
+        }
+        max
+    }
+
+    /// Largest log-odds of all observed voxels, of which there is at least one.
+    pub(super) fn max(&self, palette: &Palette) -> Option<f32> {
+        if self.summary.is_stale { self.max_of(0, 512, palette) } else { Some(self.summary.max) }
+    }
+
+    /// What an octree has under the brick, and the largest value. A voxel of at least the threshold is occupied.
+    pub(super) fn nodes(&self, threshold: Option<f32>, palette: &Palette) -> (BrickNodes, f32) {
+        const NONE: f32 = f32::NEG_INFINITY;
+        match &self.evidence {
+            Storage::Interned(cells) => nodes_of(self.code, self.observed, threshold, |word| {
+                cells.cell(word).map_or([NONE; CELL_VOXELS], |cell| palette.values(cell))
+            }),
+            Storage::Plain(cells) => nodes_of(self.code, self.observed, threshold, |word| {
+                let mut values = [NONE; CELL_VOXELS];
+                let mut mask = [0; 8];
+                mask[word] = self.observed[word];
+                cells.for_each(mask, |place, packed| {
+                    values[place % 64] = Evidence::from(packed).log_odds as f32
+                });
+                values
+            }),
+        }
+    }
+
+    /// What an octree needs to know of the brick, as of the last [`Brick::sum_up`].
+    pub(super) fn summary(&self) -> Summary {
+        self.summary
+    }
+
+    /// Brings the summary up to date.
+    pub(super) fn sum_up(&mut self, palette: &Palette) {
+        if self.summary.is_stale {
+            self.summary = self.nodes(None, palette).into();
+        }
+    }
+
+    /// Number of observed voxels whose state is one of `states`, or whose own evidence satisfies `holds`.
+    pub(super) fn count(&self, states: &[bool], holds: impl Fn(Evidence) -> bool) -> usize {
+        match &self.evidence {
+            Storage::Interned(cells) => {
+                cells.all().iter().flatten().filter(|&&state| states[usize::from(state)]).count()
+            }
+            Storage::Plain(cells) => {
+                let mut count = 0;
+                cells.for_each(self.observed, |_, packed| count += usize::from(holds(packed.into())));
+                count
+            }
         }
     }
 
@@ -168,101 +157,5 @@ impl Brick {
         if let Storage::Interned(cells) = &mut self.evidence {
             cells.all_mut().iter_mut().flatten().for_each(|state| *state = numbers[usize::from(*state)]);
         }
-    }
-}
-
-const MADE: &str = "the cells of the touched words were made before";
-
-fn update_interned(
-    cells: &mut Cells<StateId>,
-    observed: &mut BrickMask,
-    rest: &mut Rest<'_>,
-    palette: &mut Palette,
-) -> (usize, Result<(), Full>) {
-    let words = rest.words();
-    cells.make(words, UNKNOWN);
-    let mut new = 0;
-    for word in (0..8).filter(|word| words >> word & 1 == 1) {
-        let cell = cells.cell_mut(word).expect(MADE);
-        let (mut misses, mut hits) = (rest.misses[word], rest.hits[word]);
-        let touched = misses | hits;
-        let mut result = Ok(());
-        // A voxel never observed needs no case of its own: its state has its steps like any other.
-        while misses != 0 {
-            let state = &mut cell[misses.trailing_zeros() as usize];
-            match palette.after_miss(*state) {
-                Ok(after) => *state = after,
-                Err(full) => {
-                    result = Err(full);
-                    break;
-                }
-            }
-            misses &= misses - 1;
-        }
-        while hits != 0 && result.is_ok() {
-            let state = &mut cell[hits.trailing_zeros() as usize];
-            let (intensity, later) = rest.intensities.split_first().map_or((0.0, &[][..]), |(i, l)| (*i, l));
-            match palette.after_hit(*state, intensity) {
-                Ok(after) => *state = after,
-                Err(full) => {
-                    result = Err(full);
-                    break;
-                }
-            }
-            rest.intensities = later;
-            hits &= hits - 1;
-        }
-        let first = touched & !(misses | hits) & !observed[word];
-        if first != 0 {
-            observed[word] |= first;
-            new += first.count_ones() as usize;
-        }
-        (rest.misses[word], rest.hits[word]) = (misses, hits);
-        if result.is_err() {
-            return (new, result);
-        }
-    }
-    (new, Ok(()))
-}
-
-fn update_plain(
-    cells: &mut Cells<Packed>,
-    observed: &mut BrickMask,
-    rest: &mut Rest<'_>,
-    model: &SensorModel,
-) -> usize {
-    cells.make(rest.words(), Packed::from(Evidence::PRIOR));
-    let mut new = 0;
-    let mut intensities = rest.intensities.iter();
-    for place in places(std::array::from_fn(|word| rest.hits[word] | rest.misses[word])) {
-        let (word, bit) = (place / 64, place % 64);
-        let observation = if rest.hits[word] >> bit & 1 == 1 {
-            Observation::Hit(intensities.next().copied().unwrap_or_default())
-        } else {
-            Observation::Miss
-        };
-        let is_known = observed[word] >> bit & 1 == 1;
-        let packed = &mut cells.cell_mut(word).expect(MADE)[bit];
-        let before = is_known.then(|| Evidence::from(*packed));
-        *packed = model.update(before, observation).into();
-        observed[word] |= 1 << bit;
-        new += usize::from(!is_known);
-    }
-    (rest.hits, rest.misses) = ([0; 8], [0; 8]);
-    new
-}
-
-impl From<Evidence> for Packed {
-    fn from(evidence: Evidence) -> Self {
-        let bits = evidence.log_odds.to_bits();
-        let log_odds_bits = [bits as u32, (bits >> 32) as u32];
-        Self { log_odds_bits, observation_count: evidence.observation_count }
-    }
-}
-
-impl From<Packed> for Evidence {
-    fn from(packed: Packed) -> Self {
-        let [low, high] = packed.log_odds_bits.map(u64::from);
-        Self { log_odds: f64::from_bits(low | high << 32), observation_count: packed.observation_count }
     }
 }

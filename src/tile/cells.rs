@@ -1,3 +1,5 @@
+use crate::space::BrickMask;
+
 /// Voxels of a cell: one word of a brick's mask.
 pub(super) const CELL_VOXELS: usize = 64;
 
@@ -44,6 +46,19 @@ impl<T: Copy> Cells<T> {
         for word in missing {
             self.places[word] = self.cells.len() as u8;
             self.cells.push([value; CELL_VOXELS]);
+        }
+    }
+
+    /// Visits the values of a mask whose cells are there, in Morton order: place and value.
+    #[inline]
+    pub(super) fn for_each(&self, mask: BrickMask, mut visit: impl FnMut(usize, T)) {
+        for (word, mut bits) in mask.into_iter().enumerate() {
+            let Some(cell) = self.cell(word) else { continue };
+            while bits != 0 {
+                let bit = bits.trailing_zeros() as usize;
+                visit(CELL_VOXELS * word + bit, cell[bit]);
+                bits &= bits - 1;
+            }
         }
     }
 

@@ -1,20 +1,27 @@
 //! A tile: three stores, one truth.
 //!
 //! ```text
-//! updates -> Table (exact, the truth) -> VoxelCache (accumulated values) -> Octree (coarse answers, octree.bt)
+//! updates -> Table (exact, the truth) -> octree (coarse answers, octree.bt)
 //! ```
 //!
 //! The table answers every question about a finest voxel. The octree is derived from it and serves coarse
-//! questions; the voxel cache in front keeps it from seeing every update (OctoCache). [`mod@format`] turns a tile
-//! into the bytes of its two files and back; nothing here knows a path.
+//! questions. It is a view of the table's bricks, or a tree of its own with a voxel cache in front that keeps it
+//! from seeing every update (OctoCache). [`mod@format`] turns a tile into the bytes of its two files and back;
+//! nothing here knows a path.
 
 mod brick;
+mod brick_octree;
+mod brick_update;
 mod cached_octree;
 mod cells;
 pub mod format;
+mod packed;
 mod palette;
+mod summary;
 mod table;
+mod table_update;
 mod tile_body;
+mod tile_octree;
 mod voxel_cache;
 
 pub use cached_octree::CachedOctree;

@@ -1,3 +1,4 @@
+use super::cells::CELL_VOXELS;
 use crate::sensor::{Evidence, Observation, SensorModel};
 
 /// Number of a state in a [`Palette`].
@@ -20,6 +21,8 @@ pub(super) struct Palette {
     model: SensorModel,
     evidence: Vec<Evidence>,
     next: Vec<Next>,
+    /// The log-odds as `f32`, as the octree has them; negative infinity for unknown voxels.
+    values: Vec<f32>,
     /// Hash table of the states by evidence, open addressing, [`UNKNOWN`] where nothing is.
     slots: Vec<StateId>,
     /// Most states before some are to be dropped; at most `most`.
@@ -54,6 +57,7 @@ impl Palette {
             model: SensorModel::default(),
             evidence: vec![Evidence::PRIOR],
             next: vec![Next::default()],
+            values: vec![f32::NEG_INFINITY],
             slots: Vec::new(),
             limit,
             most,
@@ -82,6 +86,7 @@ impl Palette {
     pub(super) fn bytes(&self) -> usize {
         self.evidence.capacity() * size_of::<Evidence>()
             + self.next.capacity() * size_of::<Next>()
+            + self.values.capacity() * size_of::<f32>()
             + self.slots.capacity() * size_of::<StateId>()
     }
 
@@ -89,6 +94,19 @@ impl Palette {
     #[inline]
     pub(super) fn evidence(&self, state: StateId) -> Evidence {
         self.evidence[usize::from(state)]
+    }
+
+    /// The log-odds of states as `f32`; negative infinity where a voxel is unknown.
+    #[inline]
+    pub(super) fn values(&self, states: &[StateId; CELL_VOXELS]) -> [f32; CELL_VOXELS] {
+        states.map(|state| self.values[usize::from(state)])
+    }
+
+    /// By number, whether a state is one of an observed voxel and satisfies `holds`.
+    pub(super) fn states_with(&self, holds: impl Fn(Evidence) -> bool) -> Vec<bool> {
+        let mut states: Vec<bool> = self.evidence.iter().map(|&evidence| holds(evidence)).collect();
+        states[usize::from(UNKNOWN)] = false;
+        states
     }
 
     /// The state after a miss.
@@ -147,6 +165,7 @@ impl Palette {
         let state = self.len() as StateId;
         self.evidence.push(evidence);
         self.next.push(Next::default());
+        self.values.push(evidence.log_odds as f32);
         self.slots[slot] = state;
         Ok(state)
     }
@@ -167,6 +186,8 @@ impl Palette {
         self.next =
             (0..self.len()).filter(|&state| stays(state)).map(|s| renumbered(&self.next[s])).collect();
         self.evidence = (0..self.len()).filter(|&state| stays(state)).map(|s| self.evidence[s]).collect();
+        self.values = self.evidence.iter().map(|evidence| evidence.log_odds as f32).collect();
+        self.values[usize::from(UNKNOWN)] = f32::NEG_INFINITY;
         if self.len() > self.limit / 2 {
             self.limit = (self.limit * 2).min(self.most);
         }
@@ -199,8 +220,8 @@ impl Palette {
     fn slot_of(&self, evidence: Evidence) -> usize {
         let bits = evidence.log_odds.to_bits() ^ (evidence.observation_count as u64).rotate_left(20);
         // Fibonacci hashing: the upper bits of the product depend on all bits.
-        let hash = (bits ^ bits >> 29).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        (hash >> 32) as usize & (self.slots.len() - 1)
+        let hash = (bits ^ bits >> 29).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+        ((hash * self.slots.len() as u64) >> 32) as usize
     }
 }
 

@@ -1,9 +1,12 @@
-use super::brick::{Brick, Rest};
+use super::brick::Brick;
 use super::palette::Palette;
-use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates};
-use crate::sensor::{Evidence, Observation, SensorModel};
-use crate::space::{BrickCode, BrickMask, MortonCode, VoxelIndex, VoxelKey, place_of_voxel, places};
+use super::summary::{Summary, larger};
+use crate::octree::write_bt_of_bricks;
+use crate::sensor::Evidence;
+use crate::space::{BrickCode, BrickMask, MortonCode, places};
 use rustc_hash::FxHashMap;
+use std::io::{self, Write};
+use std::ops::Range;
 
 /// The exact evidence of every observed voxel of a tile: the truth, from which all else is derived.
 ///
@@ -13,14 +16,16 @@ use rustc_hash::FxHashMap;
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     /// In order of their first update.
-    bricks: Vec<Brick>,
-    numbers: FxHashMap<BrickCode, u32>,
-    palette: Palette,
-    len: usize,
+    pub(super) bricks: Vec<Brick>,
+    pub(super) numbers: FxHashMap<BrickCode, u32>,
+    /// The numbers of the bricks in Morton order, as of the last [`Table::sum_up`].
+    order: Vec<u32>,
+    pub(super) palette: Palette,
+    pub(super) len: usize,
     /// Bytes of the bricks' cells; all else is added in [`Table::bytes`].
-    cell_bytes: usize,
+    pub(super) cell_bytes: usize,
     /// Bricks made plain since the palette's states were last looked through.
-    made_plain: usize,
+    pub(super) made_plain: usize,
 }
 
 impl Table {
@@ -40,6 +45,7 @@ impl Table {
         let slot = size_of::<(BrickCode, u32)>() + 1;
         self.bricks.capacity() * size_of::<Brick>()
             + self.numbers.capacity() * 8 / 7 * slot
+            + self.order.capacity() * size_of::<u32>()
             + self.palette.bytes()
             + self.cell_bytes
     }
@@ -54,82 +60,6 @@ impl Table {
         self.numbers.contains_key(&brick)
     }
 
-    /// Applies what one scan says about one brick.
-    pub fn update_brick(&mut self, model: &SensorModel, update: &BrickUpdate) {
-        self.palette.use_model(model);
-        let mut rest = Rest::of(update);
-        if update.hits != [0; 8] || update.misses != [0; 8] {
-            let number = self.number_of(update.brick);
-            self.update_rest(number, &mut rest);
-        }
-    }
-
-    /// Applies what the rays of a scan say about one brick, where every ray counts.
-    pub fn update_runs(&mut self, model: &SensorModel, updates: &BrickRuns) {
-        self.palette.use_model(model);
-        let number = self.number_of(updates.brick);
-        for run in &updates.runs {
-            let hit = run.hit.map(Observation::Hit);
-            for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
-                self.step(number, run.place.into(), observation);
-            }
-        }
-    }
-
-    /// Applies one update of one voxel.
-    pub fn update(&mut self, model: &SensorModel, code: MortonCode, observation: Observation) {
-        self.palette.use_model(model);
-        let number = self.number_of(code.brick());
-        self.update_rest(number, &mut Rest::of_voxel(code.place_in_brick(), &observation));
-    }
-
-    /// Applies updates of single voxels in their order; `first` is the tile's lowest voxel.
-    pub fn update_in_order(&mut self, model: &SensorModel, first: VoxelIndex, updates: &OrderedUpdates) {
-        self.palette.use_model(model);
-        let first = VoxelKey::from_index(first).0;
-        // Rays fan out through the same few bricks again and again: those near each other have each their entry.
-        let mut recent = [(u64::MAX, 0); 512];
-        for (offset, observation) in updates.iter() {
-            let key: [u16; 3] = std::array::from_fn(|k| first[k].wrapping_add(offset[k] as u16));
-            let [x, y, z] = key.map(|k| u64::from(k / 8));
-            let entry = &mut recent[(x & 7 | (y & 7) << 3 | (z & 7) << 6) as usize];
-            let brick = x | y << 16 | z << 32;
-            if entry.0 != brick {
-                *entry = (brick, self.number_of(VoxelKey(key).morton().brick()));
-            }
-            self.step(entry.1, place_of_voxel(key.map(i32::from)), observation);
-        }
-    }
-
-    /// Applies one update of a voxel of a brick.
-    #[inline]
-    fn step(&mut self, number: usize, place: usize, observation: Observation) {
-        match self.bricks[number].update_one(place, observation, &mut self.palette) {
-            Some(is_new) => self.len += usize::from(is_new),
-            None => self.update_rest(number, &mut Rest::of_voxel(place, &observation)),
-        }
-    }
-
-    /// Sets voxels of a brick, in Morton order, none of which was observed before: place and evidence.
-    pub fn insert(&mut self, brick: BrickCode, mut voxels: &[(usize, Evidence)]) {
-        if voxels.is_empty() {
-            return;
-        }
-        let number = self.number_of(brick);
-        loop {
-            let brick = &mut self.bricks[number];
-            let bytes = brick.heap_bytes();
-            let done = brick.insert(voxels, &mut self.palette);
-            self.len += done;
-            self.cell_bytes += brick.heap_bytes() - bytes;
-            voxels = &voxels[done..];
-            if voxels.is_empty() {
-                return;
-            }
-            self.make_room_for(number);
-        }
-    }
-
     /// The bricks that hold an observed voxel, in Morton order.
     pub fn bricks(&self) -> impl Iterator<Item = BrickCode> {
         self.bricks_in_order().map(Brick::code)
@@ -138,6 +68,13 @@ impl Table {
     /// The observed voxels of one brick, in Morton order.
     pub fn voxels_of_brick(&self, brick: BrickCode) -> impl Iterator<Item = (MortonCode, Evidence)> {
         self.brick(brick).into_iter().flat_map(|brick| self.voxels_in(brick))
+    }
+
+    /// Visits the observed voxels of one brick, in Morton order: place and evidence.
+    pub fn for_each_in(&self, brick: BrickCode, visit: impl FnMut(usize, Evidence)) {
+        if let Some(brick) = self.brick(brick) {
+            brick.for_each(&self.palette, visit);
+        }
     }
 
     /// The observed voxels among those of a mask, in Morton order.
@@ -157,68 +94,82 @@ impl Table {
         self.bricks_in_order().flat_map(|brick| self.voxels_in(brick))
     }
 
+    /// Number of observed voxels whose log-odds are at least a threshold.
+    pub fn count_from(&self, threshold: f64) -> usize {
+        let holds = |evidence: Evidence| evidence.log_odds >= threshold;
+        let states = self.palette.states_with(holds);
+        self.bricks.iter().map(|brick| brick.count(&states, holds)).sum()
+    }
+
+    /// Writes the `.bt` file that OctoMap's `writeBinary` writes for the octree of the table. A voxel is occupied
+    /// if its log-odds as `f32` are at least the threshold.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`write_bt`](crate::octree::write_bt).
+    pub fn write_bt(&self, resolution_m: f64, threshold: f32, out: &mut impl Write) -> io::Result<()> {
+        let bricks: Vec<&Brick> = self.bricks_in_order().collect();
+        let codes: Vec<BrickCode> = bricks.iter().map(|brick| brick.code()).collect();
+        let nodes_of = |position: usize| bricks[position].nodes(Some(threshold), &self.palette).0;
+        write_bt_of_bricks(&codes, nodes_of, resolution_m, out)
+    }
+
+    /// Largest log-odds under the octree node at `depth` (13, a brick, to 16) that holds a voxel; `None` if all are
+    /// unknown.
+    pub(super) fn max_under(&self, code: MortonCode, depth: u8) -> Option<f32> {
+        let brick = self.brick(code.brick())?;
+        let span = MortonCode::span(depth) as usize;
+        match span {
+            512 => brick.max(&self.palette),
+            _ => brick.max_of(code.ancestor(depth).place_in_brick(), span, &self.palette),
+        }
+    }
+
+    /// Largest log-odds in a range of bricks; `None` if all are unknown.
+    pub(super) fn max_of_bricks(&self, range: Range<BrickCode>) -> Option<f32> {
+        if range.end.0 - range.start.0 <= self.bricks.len() as u64 {
+            let bricks = (range.start.0..range.end.0).filter_map(|code| self.brick(BrickCode(code)));
+            return bricks.filter_map(|brick| brick.max(&self.palette)).reduce(larger);
+        }
+        let bricks = self.bricks.iter().filter(|brick| range.contains(&brick.code()));
+        bricks.filter_map(|brick| brick.max(&self.palette)).reduce(larger)
+    }
+
+    /// Brings the bricks' summaries up to date, and their order.
+    pub(super) fn sum_up(&mut self) {
+        self.bricks.iter_mut().for_each(|brick| brick.sum_up(&self.palette));
+        if !self.is_in_order() {
+            self.order = self.sorted_numbers();
+        }
+    }
+
+    /// The bricks' summaries in Morton order, as of the last [`Table::sum_up`].
+    pub(super) fn summaries(&self) -> impl Iterator<Item = (BrickCode, Summary)> {
+        self.bricks_in_order().map(|brick| (brick.code(), brick.summary()))
+    }
+
     fn voxels_in<'a>(&'a self, brick: &'a Brick) -> impl Iterator<Item = (MortonCode, Evidence)> {
         brick.iter(&self.palette).map(|(place, evidence)| (brick.code().voxel(place), evidence))
     }
 
     fn bricks_in_order(&self) -> impl Iterator<Item = &Brick> {
-        let mut codes: Vec<_> = self.numbers.iter().map(|(&code, &number)| (code, number)).collect();
-        codes.sort_unstable();
-        codes.into_iter().map(|(_, number)| &self.bricks[number as usize])
+        let in_order = if self.is_in_order() { Vec::new() } else { self.sorted_numbers() };
+        let order = if self.is_in_order() { self.order.iter() } else { [].iter() };
+        order.copied().chain(in_order).map(|number| &self.bricks[number as usize])
+    }
+
+    fn is_in_order(&self) -> bool {
+        self.order.len() == self.bricks.len()
+    }
+
+    fn sorted_numbers(&self) -> Vec<u32> {
+        let mut numbers: Vec<u32> = (0..self.bricks.len() as u32).collect();
+        numbers.sort_unstable_by_key(|&number| self.bricks[number as usize].code());
+        numbers
     }
 
     fn brick(&self, code: BrickCode) -> Option<&Brick> {
         self.numbers.get(&code).map(|&number| &self.bricks[number as usize])
-    }
-
-    /// The number of a brick, which is made if it is not there.
-    fn number_of(&mut self, code: BrickCode) -> usize {
-        let number = *self.numbers.entry(code).or_insert_with(|| {
-            if self.bricks.len() == self.bricks.capacity() {
-                // Less slack than a vector gives by itself.
-                self.bricks.reserve_exact((self.bricks.len() / 4).max(4));
-            }
-            self.bricks.push(Brick::new(code));
-            (self.bricks.len() - 1) as u32
-        });
-        number as usize
-    }
-
-    fn update_rest(&mut self, number: usize, rest: &mut Rest<'_>) {
-        loop {
-            let brick = &mut self.bricks[number];
-            let bytes = brick.heap_bytes();
-            let (new, done) = brick.update(rest, &mut self.palette);
-            self.len += new;
-            self.cell_bytes += brick.heap_bytes() - bytes;
-            match done {
-                Ok(()) => return,
-                Err(_) => self.make_room_for(number),
-            }
-        }
-    }
-
-    /// Sees to it that a brick can take states that the full palette does not have: drops states no longer in use,
-    /// or else lets the brick do without the palette.
-    #[cold]
-    fn make_room_for(&mut self, number: usize) {
-        // At its largest, the palette is looked through again only when enough bricks have left it, so that the
-        // effort stays in proportion.
-        if self.palette.can_grow() || self.made_plain * 8 >= self.bricks.len() {
-            let mut in_use = vec![false; self.palette.len()];
-            self.bricks.iter().for_each(|brick| brick.mark_states(&mut in_use));
-            let numbers = self.palette.retain(&in_use);
-            self.bricks.iter_mut().for_each(|brick| brick.renumber_states(&numbers));
-            self.made_plain = 0;
-            if self.palette.has_room() {
-                return;
-            }
-        }
-        let brick = &mut self.bricks[number];
-        self.cell_bytes -= brick.heap_bytes();
-        brick.make_plain(&self.palette);
-        self.cell_bytes += brick.heap_bytes();
-        self.made_plain += 1;
     }
 
     #[cfg(test)]

@@ -1,7 +1,10 @@
-//! The table against the simplest thing that could be right: a map from voxels to evidence.
+//! The table against the simplest thing that could be right, a map from voxels to evidence; its view as an octree and
+//! its files against those of the pointer tree.
 
+use super::brick_octree::BrickOctree;
 use super::palette::Palette;
 use super::table::Table;
+use crate::octree::{Octree, write_bt};
 use crate::scan::BrickUpdate;
 use crate::sensor::{Evidence, Iwlo, Observation, SensorModel};
 use crate::space::{BrickCode, BrickMask, MortonCode};
@@ -150,4 +153,78 @@ fn more_states_than_a_palette_holds_are_kept_by_the_bricks() {
     }
     assert_is(&table, &naive);
     assert_eq!(table.bytes(), table.counted_bytes());
+}
+
+/// Runs of voxels with one value: single ones, whole nodes of every size up to eight bricks, and parts of them.
+fn any_run() -> impl Strategy<Value = (u64, u64, f64)> {
+    let value =
+        prop_oneof![4 => Just(-2.0), 2 => Just(1.0), 1 => Just(0.0), 1 => Just(-0.0), 1 => -3.0..3.0_f64];
+    let run = (0..=12_u32, any::<u64>()).prop_map(|(log, first)| {
+        let (span, base) = (1 << log, 0x1234_5678_9000);
+        (base + first % 16_384 / span * span, span)
+    });
+    let run = prop_oneof![3 => run, 1 => (0x1234_5678_9000..0x1234_5678_d000_u64, 1..3000_u64)];
+    (run, value).prop_map(|((first, span), value)| (first, span, value))
+}
+
+/// A table with these runs, the later over the earlier, and the tree that it stands for.
+fn table_of(runs: &[(u64, u64, f64)], palette: Palette) -> (Table, Octree) {
+    let mut voxels = BTreeMap::new();
+    for &(first, span, value) in runs {
+        voxels.extend((first..first + span).map(|code| (MortonCode(code), value)));
+    }
+    let voxels: Vec<_> = voxels.into_iter().collect();
+    let mut table = Table::with_palette(palette);
+    for brick in voxels.chunk_by(|a, b| a.0.brick() == b.0.brick()) {
+        let evidence = |&(code, log_odds): &(MortonCode, f64)| {
+            // Equal values of different age are one value to an octree.
+            let observation_count = (code.0 % 3) as i32;
+            (code.place_in_brick(), Evidence { log_odds, observation_count })
+        };
+        table.insert(brick[0].0.brick(), &brick.iter().map(evidence).collect::<Vec<_>>());
+    }
+    (table, Octree::from_sorted(voxels.into_iter().map(|(code, value)| (code, value as f32))))
+}
+
+fn assert_same_answers(octree: &BrickOctree, table: &Table, tree: &Octree, asked: &[u64]) {
+    for &code in asked {
+        let code = MortonCode(0x1234_5678_9000 + code);
+        for depth in 1..=16 {
+            assert_eq!(octree.max_under(table, code, depth), tree.get(code, depth), "{code:?} at {depth}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn the_bricks_answer_as_the_pointer_tree_and_write_its_bytes(
+        palette in any_palette(),
+        runs in prop::collection::vec(any_run(), 0..16),
+        more in any_update(),
+        threshold in prop_oneof![Just(0.0_f32), Just(-2.0), Just(1.0), -3.0..3.0_f32],
+        asked in prop::collection::vec(0..0x4800_u64, 1..20),
+    ) {
+        let (mut table, tree) = table_of(&runs, palette);
+        let mut octree = BrickOctree::default();
+        assert_same_answers(&octree, &table, &tree, &asked);
+        octree.sync(&mut table);
+        assert_same_answers(&octree, &table, &tree, &asked);
+        assert_eq!(octree.node_count(), tree.node_count());
+
+        let (mut by_bricks, mut by_tree) = (Vec::new(), Vec::new());
+        table.write_bt(0.1, threshold, &mut by_bricks).unwrap();
+        write_bt(&tree, 0.1, threshold, &mut by_tree).unwrap();
+        assert!(by_bricks == by_tree);
+        let voxels = table.iter().filter(|(_, evidence)| evidence.log_odds >= f64::from(threshold)).count();
+        assert_eq!(table.count_from(f64::from(threshold)), voxels);
+
+        let update = BrickUpdate { brick: BrickCode((0x1234_5678_9000 >> 9) + more.brick.0 % 32), ..more };
+        table.update_brick(&SensorModel::default(), &update);
+        octree.note_change();
+        let tree = Octree::from_sorted(table.iter().map(|(code, evidence)| (code, evidence.log_odds as f32)));
+        assert_same_answers(&octree, &table, &tree, &asked);
+        octree.sync(&mut table);
+        assert_same_answers(&octree, &table, &tree, &asked);
+        assert_eq!(octree.node_count(), tree.node_count());
+    }
 }

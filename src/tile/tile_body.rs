@@ -1,5 +1,5 @@
-use super::cached_octree::CachedOctree;
 use super::table::Table;
+use super::tile_octree::TileOctree;
 use super::voxel_cache::VoxelCacheCounts;
 use crate::config::MapConfig;
 use crate::octree::Octree;
@@ -10,13 +10,13 @@ use serde::Serialize;
 use std::borrow::Cow;
 use std::ops::AddAssign;
 
-/// One tile of the map: its exact table, and its octree behind a voxel cache.
+/// One tile of the map: its exact table, and its octree.
 #[derive(Clone, Debug)]
 pub struct Tile {
     index: TileIndex,
     voxels: VoxelBox,
     table: Table,
-    octree: CachedOctree,
+    octree: TileOctree,
     is_dirty: bool,
 }
 
@@ -35,7 +35,7 @@ pub struct Voxel {
 pub struct TileCounts {
     /// Observed voxels.
     pub voxels: u64,
-    /// Nodes of the octrees.
+    /// Nodes of the octrees, as far as these are up to date.
     pub octree_nodes: u64,
     /// Bytes of memory in tables.
     pub table_bytes: u64,
@@ -54,8 +54,8 @@ impl Tile {
     }
 
     /// The tile of a table, its octree derived.
-    pub fn from_table(config: &MapConfig, index: TileIndex, table: Table) -> Self {
-        let octree = CachedOctree::from_voxels(&config.voxel_cache, table.iter());
+    pub fn from_table(config: &MapConfig, index: TileIndex, mut table: Table) -> Self {
+        let octree = TileOctree::of_table(&config.octree, &mut table);
         Self { index, voxels: config.grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }
 
@@ -92,37 +92,7 @@ impl Tile {
     /// Applies the updates of one scan or batch.
     pub fn apply(&mut self, model: &SensorModel, updates: &TileUpdates) {
         self.is_dirty |= !updates.is_empty();
-        match updates {
-            TileUpdates::Once(bricks) => {
-                for brick in bricks {
-                    self.table.update_brick(model, brick);
-                    for (code, evidence) in self.table.voxels_of_mask(brick.brick, brick.touched()) {
-                        self.octree.put(code, evidence.log_odds);
-                    }
-                }
-            }
-            TileUpdates::Runs(bricks) => {
-                for brick in bricks {
-                    self.table.update_runs(model, brick);
-                    for run in &brick.runs {
-                        let code = brick.brick.voxel(run.place.into());
-                        if let Some(evidence) = self.table.get(code) {
-                            self.octree.put(code, evidence.log_odds);
-                        }
-                    }
-                }
-            }
-            TileUpdates::Ordered(updates) => {
-                for (offset, observation) in updates.iter() {
-                    let code = self.code_of_offset(offset);
-                    self.table.update(model, code, observation);
-                    if let Some(evidence) = self.table.get(code) {
-                        self.octree.put(code, evidence.log_odds);
-                    }
-                }
-            }
-        }
-        self.octree.end_scan();
+        self.octree.apply(&mut self.table, model, self.voxels.min, updates);
     }
 
     /// The evidence of a voxel of this tile; `None` if it was never observed or belongs to another tile.
@@ -133,7 +103,7 @@ impl Tile {
     /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that holds
     /// the voxel; `None` if all are unknown.
     pub fn max_log_odds_under(&self, voxel: VoxelIndex, depth: u8) -> Option<f32> {
-        self.octree.max_under(VoxelKey::from_index(voxel).morton(), depth)
+        self.octree.max_under(&self.table, VoxelKey::from_index(voxel).morton(), depth)
     }
 
     /// The observed voxels in Morton order.
@@ -153,22 +123,19 @@ impl Tile {
         code.to_key().to_index_from(self.voxels.min)
     }
 
-    /// Whether no update waits in front of the octree.
+    /// Whether the octree has taken all updates.
     pub fn is_octree_synced(&self) -> bool {
-        self.octree.synced().is_some()
+        self.octree.is_synced()
     }
 
-    /// Brings the octree up to date and returns it.
-    pub fn sync_octree(&mut self) -> &Octree {
-        self.octree.sync()
+    /// Brings the octree up to date. Answers do not depend on it, only how long they take.
+    pub fn sync_octree(&mut self) {
+        self.octree.sync(&mut self.table);
     }
 
-    /// The octree brought up to date without changing the tile: borrowed if nothing waits, else derived anew.
+    /// OctoMap's tree of the tile, up to date: borrowed where the tile has one that is, else made.
     pub fn octree(&self) -> Cow<'_, Octree> {
-        match self.octree.synced() {
-            Some(octree) => Cow::Borrowed(octree),
-            None => Cow::Owned(self.octree.clone().into_octree()),
-        }
+        self.octree.tree(&self.table)
     }
 
     /// Sizes of the tile.
@@ -188,10 +155,6 @@ impl Tile {
     pub fn bytes(&self) -> usize {
         let (octree_bytes, cache_bytes) = self.octree.bytes();
         size_of::<Self>() + self.table.bytes() + octree_bytes + cache_bytes
-    }
-
-    fn code_of_offset(&self, offset: VoxelIndex) -> MortonCode {
-        VoxelKey::from_index(std::array::from_fn(|k| self.voxels.min[k].wrapping_add(offset[k]))).morton()
     }
 }
 

@@ -264,19 +264,14 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             self.quarantine(&path, "no file")?;
         }
         let expected = store.stamp(tile).map(|stamp| stamp.octree);
-        let trailer = table.trailer.clone();
-        let mut again = Some(table);
-        let written = store.write_next(tile, TileFile::Octree, |out| match again.take() {
-            Some(table) => write_octree(config, tile, table, out),
-            None => Ok(()),
-        })?;
+        let written = store.write_next(tile, TileFile::Octree, |out| write_octree(config, &table, out))?;
         if Some(written) == expected {
             store.place_octree(tile)?;
-        } else if let Some(read) = tile_files::load_table(store, &config.grid, tile)? {
+        } else {
             // Another writer's octree cannot be had again: the tile is written anew with the present one.
-            let scan_number = trailer.map_or(0, |trailer| trailer.scan_number);
-            let mut tile = Tile::from_table(config, tile, read.table);
-            tile_files::save(store, config, &mut tile, scan_number)?;
+            let scan_number = table.trailer.map_or(0, |trailer| trailer.scan_number);
+            let tile = Tile::from_table(config, tile, table.table);
+            tile_files::save(store, config, &tile, scan_number)?;
             let (metadata, scan_number) = (store.metadata().clone(), store.commits().scan_number);
             store.commit(metadata, scan_number)?;
         }

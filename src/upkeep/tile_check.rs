@@ -1,10 +1,8 @@
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::mapper::tile_files::{self, ReadTable};
-use crate::octree::write_bt;
 use crate::space::TileIndex;
 use crate::store::{Disk, FileStamp, Stamping, TileFile, TileStamp, TileStore};
-use crate::tile::Tile;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -68,15 +66,9 @@ fn check_octree(
 }
 
 /// The octree file of a table, written to `out`.
-pub(super) fn write_octree(
-    config: &MapConfig,
-    tile: TileIndex,
-    table: ReadTable,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    let mut tile = Tile::from_table(config, tile, table.table);
+pub(super) fn write_octree(config: &MapConfig, table: &ReadTable, out: &mut dyn Write) -> io::Result<()> {
     let threshold = config.occupied_log_odds() as f32;
-    write_bt(tile.sync_octree(), config.grid.resolution_m(), threshold, &mut &mut *out)
+    table.table.write_bt(config.grid.resolution_m(), threshold, &mut &mut *out)
 }
 
 /// Length and checksum of a file; `None` if there is none.

@@ -169,7 +169,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         {
             let path = self.layout.current(tile, TileFile::Octree);
             let mut expected = Vec::new();
-            if write_octree(config, tile, table, &mut expected).is_ok() {
+            if write_octree(config, &table, &mut expected).is_ok() {
                 cause.at = first_difference(self.disk, &path, &expected).unwrap_or(cause.at);
             }
             self.report(Finding::damage(&path, Some(tile), &cause));

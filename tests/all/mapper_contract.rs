@@ -132,17 +132,23 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
             let mut reference = ReferenceMap::new(&config);
             scans.iter().for_each(|scan| reference.insert_scan(scan));
             let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
-            scans.iter().for_each(|scan| drop(mapper.insert_scan(scan).unwrap()));
+            for scan in &scans {
+                mapper.insert_scan(scan).unwrap();
+            }
             assert_eq!(voxels_of(&mapper), reference.voxels, "{mode:?}");
         }
     }
 }
 
 #[test]
-fn the_answer_does_not_depend_on_the_voxel_cache_and_coarse_answers_are_the_tables_maxima_at_every_moment() {
+fn the_answer_does_not_depend_on_the_form_of_the_octree_and_coarse_answers_are_the_tables_maxima_at_every_moment()
+ {
     let mut digests = Vec::new();
-    for (tau, buckets) in [(1, Some(1)), (2, Some(64)), (4, None), (16, Some(4096))] {
-        let mut mapper = InMemoryMapper::new(config().with_voxel_cache(tau, buckets)).unwrap();
+    let mut nodes = Vec::new();
+    let cached = [(1, Some(1)), (2, Some(64)), (4, None), (16, Some(4096))];
+    let cached = cached.map(|(tau, buckets)| config().with_voxel_cache(tau, buckets));
+    for config in cached.into_iter().chain([config()]) {
+        let mut mapper = InMemoryMapper::new(config).unwrap();
         let mut random = Random(5);
         for step in 0..10 {
             mapper.insert_scan(&random_scan(&mut random, [0.0, 0.0, 0.0], 50)).unwrap();
@@ -152,8 +158,11 @@ fn the_answer_does_not_depend_on_the_voxel_cache_and_coarse_answers_are_the_tabl
             assert_coarse_answers_are_maxima(&mapper);
         }
         digests.push(mapper.digest().unwrap());
+        mapper.sync_octrees();
+        nodes.push(mapper.statistics().cached.octree_nodes);
     }
     assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
+    assert!(nodes.windows(2).all(|pair| pair[0] == pair[1]), "{nodes:?}");
 }
 
 fn assert_coarse_answers_are_maxima(view: &impl MapView) {

@@ -8,7 +8,9 @@ use voxtile::octree::{
     Leaf, OCTOMAP_MAX_LOG_ODDS as OCCUPIED, OCTOMAP_MIN_LOG_ODDS as FREE, Octree, OctreeFormat, read,
     read_bt, read_ot, read_with_limit, write_bt, write_bt_unpruned, write_ot,
 };
+use voxtile::sensor::Evidence;
 use voxtile::space::{MortonCode, VoxelKey};
+use voxtile::tile::Table;
 
 const COMMENTS: &str = "# (feel free to add / change comments, but leave the first line as it is!)\n#\n";
 
@@ -66,6 +68,31 @@ fn real_maps_are_read_to_the_last_node_and_written_back_to_the_byte() {
             OctreeFormat::Ot => written_ot(&file.tree, file.resolution_m),
         };
         assert!(again == bytes, "{}: not the same bytes", path.display());
+    }
+}
+
+#[test]
+fn a_table_of_a_real_map_writes_the_bytes_of_its_tree() {
+    for path in real_maps() {
+        let file = read(std::fs::read(&path).unwrap().as_slice()).unwrap();
+        if file.tree.expanded_leaf_count() > 20_000_000 {
+            continue;
+        }
+        let mut voxels: Vec<(MortonCode, f32)> = Vec::new();
+        for leaf in file.tree.leaves() {
+            let end = leaf.code.0 + MortonCode::span(leaf.depth);
+            voxels.extend((leaf.code.0..end).map(|code| (MortonCode(code), leaf.value)));
+        }
+        let mut table = Table::default();
+        for brick in voxels.chunk_by(|a, b| a.0.brick() == b.0.brick()) {
+            let evidence = |value| Evidence { log_odds: f64::from(value), observation_count: 1 };
+            let places = brick.iter().map(|&(code, value)| (code.place_in_brick(), evidence(value)));
+            table.insert(brick[0].0.brick(), &places.collect::<Vec<_>>());
+        }
+        assert_eq!(table.len(), voxels.len());
+        let mut bytes = Vec::new();
+        table.write_bt(file.resolution_m, 0.0, &mut bytes).unwrap();
+        assert!(bytes == written_bt(&file.tree, file.resolution_m), "{}: not the same bytes", path.display());
     }
 }
 

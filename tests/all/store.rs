@@ -265,9 +265,18 @@ fn octree_files_are_what_the_octree_of_the_table_gives() {
 #[test]
 fn the_example_in_the_repository_has_the_digest_that_its_city_gives() {
     let golden = "a6c7d4295b7b4c7095b24eac4ea6227dfb799ad759fa1b4428543507e5ac7b7b";
-    let example =
-        MapReader::open(Path::new(env!("CARGO_MANIFEST_DIR")).join("map_tiles_example"), 4).unwrap();
+    let example_folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("map_tiles_example");
+    let example = MapReader::open(&example_folder, 4).unwrap();
     assert_eq!(example.digest().unwrap().to_string(), golden);
+    for tile in example.tiles() {
+        let tile = tile.unwrap();
+        let (mut by_table, mut by_tree) = (Vec::new(), Vec::new());
+        tile.table().write_bt(1.0, 0.0, &mut by_table).unwrap();
+        voxtile::octree::write_bt(&tile.octree(), 1.0, 0.0, &mut by_tree).unwrap();
+        let TileIndex { x, y, z } = tile.index();
+        let file = fs::read(example_folder.join(format!("tile_{x}_{y}_{z}/octree.bt"))).unwrap();
+        assert!(by_table == file && by_tree == file, "tile {x} {y} {z}");
+    }
     let config = MapConfig::new(1.0, 10.0).unwrap().with_range(0.0, 40.0);
     let mut mapper = voxtile::InMemoryMapper::new(config).unwrap();
     let survey = Survey::new(City::new(1), Drive::new(1, 2.0), Lidar::demo(), 1);

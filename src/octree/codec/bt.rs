@@ -16,7 +16,7 @@ pub const OCTOMAP_MAX_LOG_ODDS: f32 = f32::from_bits(0x4060_b4ba);
 
 /// What two bits say about a child.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Code {
+pub(super) enum Code {
     Unknown,
     Free,
     Occupied,
@@ -36,15 +36,28 @@ impl Code {
         std::array::from_fn(|child| Self::ALL[usize::from(bits >> (2 * child) & 3)])
     }
 
-    fn pack(codes: [Self; 8]) -> [u8; 2] {
+    pub(super) fn pack(codes: [Self; 8]) -> [u8; 2] {
         codes.iter().rev().fold(0, |bits: u16, &code| bits << 2 | code as u16).to_le_bytes()
     }
 
+    /// The two bytes of eight voxels of which some are known, and some of these occupied.
+    pub(super) fn pack_voxels(known: u8, occupied: u8) -> [u8; 2] {
+        (spread(known & !occupied) | spread(occupied) << 1).to_le_bytes()
+    }
+
     /// What a node with these children becomes if it is pruned, where it can be.
-    fn pruned(children: [Self; 8]) -> Option<Self> {
+    pub(super) fn pruned(children: [Self; 8]) -> Option<Self> {
         let prunable = matches!(children[0], Self::Free | Self::Occupied);
         (prunable && children.iter().all(|&code| code == children[0])).then_some(children[0])
     }
+}
+
+/// Puts bit `k` at bit `2k`.
+fn spread(bits: u8) -> u16 {
+    let bits = u16::from(bits);
+    let bits = (bits | bits << 4) & 0x0f0f;
+    let bits = (bits | bits << 2) & 0x3333;
+    (bits | bits << 1) & 0x5555
 }
 
 pub(super) fn read_nodes(
@@ -112,7 +125,9 @@ pub fn write_bt(
     threshold_log_odds: f32,
     out: &mut impl Write,
 ) -> io::Result<()> {
-    let depths = PrunedDepths::of(tree, threshold_log_odds);
+    let mut prunable = [0; DEPTH as usize];
+    count_prunable(tree, tree.root, 0, threshold_log_odds, &mut prunable);
+    let depths = PrunedDepths::of(&prunable);
     write_encoded(tree, resolution_m, threshold_log_odds, depths, out)
 }
 
@@ -149,18 +164,28 @@ fn write_encoded(
 
 /// Nodes at this depth and deeper are pruned where they can be.
 #[derive(Clone, Copy)]
-struct PrunedDepths(u8);
+pub(super) struct PrunedDepths(u8);
 
 impl PrunedDepths {
     const NONE: Self = Self(DEPTH);
+    /// All but the root, which is never pruned.
+    pub(super) const ALL: Self = Self(1);
 
-    /// How far OctoMap's `prune` gets: from the depth above the voxels upwards, not beyond the first depth where it
-    /// finds nothing to prune, and never to the root.
-    fn of(tree: &Octree, threshold: f32) -> Self {
-        let mut prunable = [0; DEPTH as usize];
-        count_prunable(tree, tree.root, 0, threshold, &mut prunable);
+    /// How far OctoMap's `prune` gets, given by depth how many nodes can be pruned once all below them are: from
+    /// the depth above the voxels upwards, not beyond the first depth where it finds nothing to prune.
+    pub(super) fn of(prunable: &[u64; DEPTH as usize]) -> Self {
         let lowest = (1..DEPTH).rev().take_while(|&depth| prunable[usize::from(depth)] > 0).last();
         lowest.map_or(Self::NONE, Self)
+    }
+
+    /// Whether nodes at a depth are pruned.
+    pub(super) fn include(self, depth: u8) -> bool {
+        depth >= self.0
+    }
+
+    /// Whether no node below the root that could be pruned stays.
+    pub(super) fn prune_all(self, prunable: &[u64; DEPTH as usize]) -> bool {
+        prunable[1..usize::from(self.0)].iter().all(|&count| count == 0)
     }
 }
 
@@ -209,7 +234,7 @@ impl Encoder<'_> {
             codes[index] = code;
             nodes += below;
         }
-        if depth >= self.depths.0
+        if self.depths.include(depth)
             && let Some(pruned) = Code::pruned(codes)
         {
             self.payload.truncate(begin);

@@ -5,6 +5,7 @@
 //! to an error; memory grows with the bytes that were really read, never with a number that a file states.
 
 mod bt;
+mod bt_bricks;
 mod header;
 mod input;
 mod number;
@@ -12,5 +13,6 @@ mod octree_file;
 mod ot;
 
 pub use bt::{OCTOMAP_MAX_LOG_ODDS, OCTOMAP_MIN_LOG_ODDS, write_bt, write_bt_unpruned};
+pub use bt_bricks::write_bt_of_bricks;
 pub use octree_file::{OctreeFile, OctreeFormat, read, read_bt, read_ot, read_with_limit};
 pub use ot::write_ot;

@@ -10,10 +10,12 @@
 //! All little-endian. A reader of version 1 stops after `count` entries and never sees the trailer. The byte
 //! tables are in `docs/format.md`.
 
+mod entries;
 mod reader;
 mod trailer;
 mod writer;
 
+pub use entries::encode_entries;
 pub use reader::{DecodedTable, read_table, read_trailer};
 pub use trailer::{TRAILER_BYTES, Trailer};
 pub use writer::{TableChecksums, write_table};

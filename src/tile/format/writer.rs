@@ -1,5 +1,6 @@
+use super::entries::encode_entries;
 use super::trailer::Trailer;
-use super::{ENTRY_BYTES, MAGIC, VERSION};
+use super::{HEADER_BYTES, MAGIC, VERSION};
 use crate::tile::Table;
 use std::io::{self, Write};
 
@@ -12,9 +13,6 @@ pub struct TableChecksums {
     pub bytes: u64,
 }
 
-/// Entries encoded between two writes: 64 KiB or so.
-const CHUNK_BYTES: usize = 4096 * ENTRY_BYTES as usize;
-
 /// Streams a table as `iwlo_meta.bin`. The checksum in `trailer.table_crc` is computed here; what the caller put
 /// there is ignored.
 pub fn write_table(table: &Table, trailer: Trailer, out: &mut impl Write) -> io::Result<TableChecksums> {
@@ -25,22 +23,12 @@ pub fn write_table(table: &Table, trailer: Trailer, out: &mut impl Write) -> io:
         bytes += chunk.len() as u64;
         out.write_all(chunk)
     };
-    let mut chunk = Vec::with_capacity(CHUNK_BYTES);
-    chunk.extend_from_slice(&MAGIC.to_le_bytes());
-    chunk.extend_from_slice(&VERSION.to_le_bytes());
-    chunk.extend_from_slice(&(table.len() as u64).to_le_bytes());
-    for (code, evidence) in table.iter() {
-        if chunk.len() + ENTRY_BYTES as usize > CHUNK_BYTES {
-            write(&chunk)?;
-            chunk.clear();
-        }
-        for key in code.to_key().0 {
-            chunk.extend_from_slice(&key.to_le_bytes());
-        }
-        chunk.extend_from_slice(&evidence.log_odds.to_le_bytes());
-        chunk.extend_from_slice(&evidence.observation_count.to_le_bytes());
-    }
-    write(&chunk)?;
+    let mut header = [0; HEADER_BYTES as usize];
+    header[0..4].copy_from_slice(&MAGIC.to_le_bytes());
+    header[4..8].copy_from_slice(&VERSION.to_le_bytes());
+    header[8..16].copy_from_slice(&(table.len() as u64).to_le_bytes());
+    write(&header)?;
+    encode_entries(table, write)?;
     let table_crc = crc.finalize();
     let trailer = Trailer { table_crc, ..trailer }.to_bytes();
     out.write_all(&trailer)?;
