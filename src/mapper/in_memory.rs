@@ -62,6 +62,7 @@ impl MapView for InMemoryMapper {
         self.tile_indices()
     }
 
+    #[inline]
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
         Ok(self.tiles.get(&index).map(|tile| TileRef::borrowed(tile)))
     }

@@ -61,22 +61,30 @@ impl EveryRayCollector {
     }
 
     fn runs_of_brick(&self, slot: u32, part: &BrickMask) -> Box<[Run]> {
-        let is_in_part = |place: usize| part[place / 64] >> (place % 64) & 1 == 1;
         let start = self.ended.partition_point(|&(other, _)| other < slot);
-        let mut ended = self.ended[start..].iter().take_while(|&&(other, _)| other == slot).peekable();
-        let mut runs = Vec::new();
-        for (place, &misses) in self.bricks.blocks()[slot as usize].passes.iter().enumerate() {
-            while let Some((_, run)) = ended.next_if(|(_, run)| usize::from(run.place) == place) {
-                if is_in_part(place) {
-                    runs.push(*run);
+        let ended = self.ended[start..].iter().take_while(|&&(other, _)| other == slot);
+        let mut ended = ended.map(|(_, run)| run).filter(|run| is_in(part, run.place)).peekable();
+        let passes = &self.bricks.blocks()[slot as usize].passes;
+        let mut runs = Vec::with_capacity(passes.iter().filter(|&&misses| misses > 0).count() + 8);
+        // Most voxels were not passed: eight at a time are passed over.
+        for (chunk, first) in passes.chunks_exact(8).zip((0..).step_by(8)) {
+            if chunk.iter().fold(0, |any, misses| any | misses) == 0 {
+                continue;
+            }
+            for (&misses, place) in chunk.iter().zip(first..) {
+                if misses > 0 && is_in(part, place) {
+                    runs.extend(std::iter::from_fn(|| ended.next_if(|run| run.place <= place)));
+                    runs.push(Run { place, misses, hit: None });
                 }
             }
-            if misses > 0 && is_in_part(place) {
-                runs.push(Run { place: place as u16, misses, hit: None });
-            }
         }
+        runs.extend(ended);
         runs.into()
     }
+}
+
+fn is_in(mask: &BrickMask, place: u16) -> bool {
+    mask[usize::from(place) / 64] >> (place % 64) & 1 == 1
 }
 
 /// The updates of several collectors, the first of which saw the first rays.

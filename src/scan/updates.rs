@@ -154,7 +154,11 @@ impl TileUpdates {
 
     /// Whether there is no update.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        match self {
+            Self::Once(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),
+            Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).all(Run::is_empty),
+            Self::Ordered(updates) => updates.is_empty(),
+        }
     }
 
     /// Bytes of memory that the updates occupy.

@@ -42,6 +42,7 @@ pub struct VoxelBox {
 
 impl VoxelBox {
     /// Whether the box holds the voxel.
+    #[inline]
     pub fn contains(&self, voxel: VoxelIndex) -> bool {
         (0..3).all(|k| self.min[k] <= voxel[k] && voxel[k] < self.end[k])
     }

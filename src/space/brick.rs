@@ -31,11 +31,13 @@ impl BrickCode {
 
 impl MortonCode {
     /// The brick that holds this voxel.
+    #[inline]
     pub const fn brick(self) -> BrickCode {
         BrickCode(self.0 >> 9)
     }
 
     /// This voxel's place (0 to 511) in its brick's Morton order.
+    #[inline]
     pub const fn place_in_brick(self) -> usize {
         (self.0 & 511) as usize
     }

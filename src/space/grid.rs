@@ -93,16 +93,19 @@ impl Grid {
     }
 
     /// A point in units of voxels: its floor is the voxel index.
+    #[inline]
     pub fn to_voxel_units(&self, point_m: Point) -> Point {
         point_m.map(|coordinate| coordinate * self.inv_resolution)
     }
 
     /// The voxel that holds a point; `None` for a point that is not finite or whose index leaves `i32`.
+    #[inline]
     pub fn voxel_of(&self, point_m: Point) -> Option<VoxelIndex> {
         voxel_of_units(self.to_voxel_units(point_m))
     }
 
     /// The tile that holds a voxel.
+    #[inline]
     pub fn tile_of_voxel(&self, voxel: VoxelIndex) -> TileIndex {
         // A quotient in floating point, for integer division is slow. The middle of a voxel is at least 2^-11 tiles
         // from a border between tiles, and the quotient is off by less than 2^-20.
@@ -110,6 +113,7 @@ impl Grid {
     }
 
     /// The tile that holds a point, decided from the point's voxel; `None` as for [`Grid::voxel_of`].
+    #[inline]
     pub fn tile_of(&self, point_m: Point) -> Option<TileIndex> {
         self.voxel_of(point_m).map(|voxel| self.tile_of_voxel(voxel))
     }
@@ -129,6 +133,7 @@ impl Grid {
 }
 
 /// The voxel of a point given in units of voxels; `None` when not finite or outside `i32`.
+#[inline]
 fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
     let mut voxel = [0; 3];
     for axis in 0..3 {

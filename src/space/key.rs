@@ -9,6 +9,7 @@ pub struct VoxelKey(pub [u16; 3]);
 
 impl VoxelKey {
     /// The key of a voxel index; exact for any index, unique within any 65536 consecutive voxels.
+    #[inline]
     pub const fn from_index(index: VoxelIndex) -> Self {
         Self([key_of(index[0]), key_of(index[1]), key_of(index[2])])
     }
@@ -28,6 +29,7 @@ impl VoxelKey {
     }
 
     /// The key's Morton code.
+    #[inline]
     pub const fn morton(self) -> MortonCode {
         MortonCode::from_key(self)
     }

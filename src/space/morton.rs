@@ -12,6 +12,7 @@ impl MortonCode {
     pub const END: u64 = 1 << 48;
 
     /// The code of a key.
+    #[inline]
     pub const fn from_key(key: VoxelKey) -> Self {
         Self(spread(key.0[0]) | spread(key.0[1]) << 1 | spread(key.0[2]) << 2)
     }

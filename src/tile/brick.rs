@@ -42,6 +42,7 @@ impl Brick {
         }
     }
 
+    #[inline]
     pub(super) fn get(&self, place: usize, palette: &Palette) -> Option<Evidence> {
         let (word, bit) = (place / 64, place % 64);
         if self.observed[word] >> bit & 1 == 0 {

@@ -2,7 +2,7 @@ use super::brick::{Brick, Storage};
 use super::cells::Cells;
 use super::packed::Packed;
 use super::palette::{Full, Palette, StateId, UNKNOWN};
-use crate::scan::BrickUpdate;
+use crate::scan::{BrickUpdate, Run};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickMask, places};
 
@@ -57,15 +57,28 @@ impl Brick {
         observation: Observation,
         palette: &mut Palette,
     ) -> Option<bool> {
+        self.step(place, |before| match observation {
+            Observation::Miss => palette.after_miss(before),
+            Observation::Hit(intensity) => palette.after_hit(before, intensity),
+        })
+    }
+
+    /// The same for a run of updates.
+    #[inline]
+    pub(super) fn update_run(&mut self, run: &Run, palette: &mut Palette) -> Option<bool> {
+        self.step(run.place.into(), |before| {
+            let missed = palette.after_misses(before, run.misses)?;
+            run.hit.map_or(Ok(missed), |intensity| palette.after_hit(missed, intensity))
+        })
+    }
+
+    #[inline]
+    fn step(&mut self, place: usize, after: impl FnOnce(StateId) -> Result<StateId, Full>) -> Option<bool> {
         let (word, bit) = (place / 64, place % 64);
         let Storage::Interned(cells) = &mut self.evidence else { return None };
         let state = &mut cells.cell_mut(word)?[bit];
         let before = *state;
-        let after = match observation {
-            Observation::Miss => palette.after_miss(before),
-            Observation::Hit(intensity) => palette.after_hit(before, intensity),
-        };
-        *state = after.ok()?;
+        *state = after(before).ok()?;
         self.summary.is_stale = true;
         let is_new = before == UNKNOWN;
         if is_new {

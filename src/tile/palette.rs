@@ -118,6 +118,19 @@ impl Palette {
         }
     }
 
+    /// The state after so many misses.
+    #[inline]
+    pub(super) fn after_misses(&mut self, before: StateId, misses: u16) -> Result<StateId, Full> {
+        // Of many, the states on the way are seldom met again: they are not kept.
+        const FEW: u16 = 4;
+        if misses <= FEW {
+            return (0..misses).try_fold(before, |state, _| self.after_miss(state));
+        }
+        let miss = |evidence, _| self.model.update(Some(evidence), Observation::Miss);
+        let after = (0..misses).fold(self.evidence(before), miss);
+        self.intern(after)
+    }
+
     /// The state after a hit.
     #[inline]
     pub(super) fn after_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {

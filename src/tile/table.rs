@@ -51,6 +51,7 @@ impl Table {
     }
 
     /// The evidence of a voxel; `None` if it was never observed.
+    #[inline]
     pub fn get(&self, code: MortonCode) -> Option<Evidence> {
         self.brick(code.brick())?.get(code.place_in_brick(), &self.palette)
     }
@@ -168,6 +169,7 @@ impl Table {
         numbers
     }
 
+    #[inline]
     fn brick(&self, code: BrickCode) -> Option<&Brick> {
         self.numbers.get(&code).map(|&number| &self.bricks[number as usize])
     }

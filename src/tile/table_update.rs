@@ -21,6 +21,10 @@ impl Table {
         self.palette.use_model(model);
         let number = self.number_of(updates.brick);
         for run in &updates.runs {
+            if let Some(is_new) = self.bricks[number].update_run(run, &mut self.palette) {
+                self.len += usize::from(is_new);
+                continue;
+            }
             let hit = run.hit.map(Observation::Hit);
             for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
                 self.step(number, run.place.into(), observation);

@@ -96,6 +96,7 @@ impl Tile {
     }
 
     /// The evidence of a voxel of this tile; `None` if it was never observed or belongs to another tile.
+    #[inline]
     pub fn evidence(&self, voxel: VoxelIndex) -> Option<Evidence> {
         self.voxels.contains(voxel).then(|| self.table.get(VoxelKey::from_index(voxel).morton()))?
     }

@@ -18,6 +18,8 @@ mod layering;
 mod mapper_contract;
 /// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
 mod model;
+/// What the OctoCache paper says, where it can be tried.
+mod octocache;
 /// OctoMap's own files, to the last node and byte.
 mod octomap_files;
 /// Questions against brute force.
