@@ -42,6 +42,7 @@ impl<B: Footprint> BlockMap<B> {
             + self.bricks_of_pages.capacity() * size_of::<[u32; 512]>()
             + self.far.capacity() * 8 / 7 * (size_of::<(VoxelIndex, u32)>() + 1)
             + self.blocks.capacity() * size_of::<B>()
+            + self.blocks.iter().map(B::heap_bytes).sum::<usize>()
             + self.indices.capacity() * size_of::<VoxelIndex>()
     }
 

@@ -32,6 +32,10 @@ impl Footprint for CountedBrick {
     /// The part of the voxel's place that its indices along the slab make.
     type Cell = u16;
 
+    fn heap_bytes(&self) -> usize {
+        0
+    }
+
     #[inline]
     fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> u16 {
         part_of_place(B, b) | part_of_place(C, c)

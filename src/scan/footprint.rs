@@ -9,6 +9,9 @@ pub(super) trait Footprint: Default {
     /// A voxel of a slab.
     type Cell: Copy;
 
+    /// Bytes of memory on the heap.
+    fn heap_bytes(&self) -> usize;
+
     /// The voxel of a slab with these indices along `B` and `C`.
     fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> Self::Cell;
 

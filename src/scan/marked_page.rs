@@ -9,7 +9,8 @@ use crate::space::{BrickMask, VoxelIndex};
 #[derive(Clone, Debug, Default)]
 pub(super) struct MarkedPage {
     passed: Columns,
-    hits: Columns,
+    /// Of few pages, beside a ground or a wall.
+    hits: Option<Columns>,
 }
 
 /// The marks of one brick.
@@ -40,9 +41,8 @@ impl Columns {
         self.0[((x & 63) << 6 | y & 63) as usize] |= 1 << (z & 63);
     }
 
-    /// The column at the lowest x and y of each brick of a page is at `64 * x + y` of these.
-    fn brick_columns() -> impl Iterator<Item = (usize, usize)> {
-        (0..8).flat_map(|x| (0..8).map(move |y| (x, y)))
+    fn absorb(&mut self, other: &Self) {
+        self.0.iter_mut().zip(other.0.iter()).for_each(|(column, other)| *column |= other);
     }
 
     /// The bits of the columns through the bricks at `(x, y)`, in bricks: byte `k` is not 0 if brick `k` has marks.
@@ -84,27 +84,30 @@ const fn spread() -> [u64; 16] {
 impl MarkedPage {
     /// A ray ends in a voxel.
     pub(super) fn hit(&mut self, [x, y, z]: VoxelIndex) {
-        self.hits.mark(x as u32, y as u32, z as u32);
+        self.hits.get_or_insert_default().mark(x as u32, y as u32, z as u32);
     }
 
     /// Adds the marks of another page.
     pub(super) fn absorb(&mut self, other: &Self) {
-        for (mine, others) in [(&mut self.passed, &other.passed), (&mut self.hits, &other.hits)] {
-            mine.0.iter_mut().zip(others.0.iter()).for_each(|(column, other)| *column |= other);
+        self.passed.absorb(&other.passed);
+        if let Some(hits) = &other.hits {
+            self.hits.get_or_insert_default().absorb(hits);
         }
     }
 
     /// The bricks with marks; `page` is the page's index, its voxels' indices over 64.
     pub(super) fn bricks(&self, page: VoxelIndex) -> Vec<MarkedBrick> {
         let mut bricks = Vec::new();
-        for (x, y) in Columns::brick_columns() {
-            let unions = [self.passed.union(x, y), self.hits.union(x, y)];
-            for z in (0..8).filter(|z| (unions[0] | unions[1]) >> (8 * z) & 0xff != 0) {
+        for (x, y) in (0..8).flat_map(|x| (0..8).map(move |y| (x, y))) {
+            let passed = self.passed.union(x, y);
+            let hit = self.hits.as_ref().map_or(0, |hits| hits.union(x, y));
+            let is_in = |bits: u64, z: usize| bits >> (8 * z) & 0xff != 0;
+            for z in (0..8).filter(|&z| is_in(passed | hit, z)) {
                 let local = [x as i32, y as i32, z as i32];
-                let is_hit = unions[1] >> (8 * z) & 0xff != 0;
+                let hits = self.hits.as_ref().filter(|_| is_in(hit, z));
                 bricks.push(MarkedBrick {
                     index: std::array::from_fn(|k| page[k] * 8 + local[k]),
-                    hits: if is_hit { self.hits.brick(x, y, z) } else { [0; 8] },
+                    hits: hits.map_or([0; 8], |hits| hits.brick(x, y, z)),
                     passed: self.passed.brick(x, y, z),
                 });
             }
@@ -118,6 +121,10 @@ impl Footprint for MarkedPage {
 
     /// The indices along the slab.
     type Cell = (u32, u32);
+
+    fn heap_bytes(&self) -> usize {
+        (1 + usize::from(self.hits.is_some())) * size_of::<[u64; COLUMNS]>()
+    }
 
     #[inline]
     fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> (u32, u32) {

@@ -1,7 +1,7 @@
 use super::ScanReport;
 use super::block_map::BlockMap;
 use super::marked_page::{MarkedBrick, MarkedPage};
-use super::slab_walk::SlabRay;
+use super::slab_ray::SlabRay;
 use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
 use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
 use super::window::{PAGE_EDGE, Window};

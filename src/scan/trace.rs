@@ -3,7 +3,7 @@ use super::every_ray::{EveryRayCollector, updates_in_order};
 use super::once::OnceCollector;
 use super::range::{Ranged, in_range};
 use super::ray::MAX_RAY_STEPS;
-use super::slab_walk::SlabRay;
+use super::slab_ray::SlabRay;
 use super::window::Window;
 use super::{Scan, ScanReport, ScanUpdates};
 use crate::config::{InsertMode, RayConfig};

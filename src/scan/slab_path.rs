@@ -1,0 +1,197 @@
+use super::footprint::Footprint;
+use super::slab_ray::SlabRay;
+use crate::space::{Point, VoxelIndex};
+
+/// A crossing nearer than this to a border between voxels, in units of 2^-32 voxels, is left to the exact walk.
+///
+/// That is 2^-20 voxels. A position is off by less than 2^-33 voxels a slab, of which a window has 2048 to either
+/// side, and the closed form's times, rounded to `f64`, by less than 2^-38 voxels.
+const NEAR_BORDER: u32 = 1 << 12;
+
+/// Two crossings in one slab that are nearer to each other than this, in units of 2^-32 voxels, are left to the exact
+/// walk: a position is off by less than 2^13 of them.
+const NEAR_EDGE: u64 = 1 << 15;
+
+/// The same in a block, in units of 2^-32 voxels: positions there have six bits less, and are off by one of these more
+/// for each slab of the block, which has 64 at most.
+const NEAR_BORDER_IN_BLOCK: u64 = 1 << 13;
+
+/// Where a ray crosses from one slab to the next, in units of 2^-32 voxels relative to the window's lowest voxel.
+#[derive(Clone, Copy)]
+pub(super) struct SlabPath {
+    at_b: i64,
+    at_c: i64,
+    slope_b: i64,
+    slope_c: i64,
+    /// Slabs for a voxel along `B` and `C`, infinite for slopes of 0.
+    slabs_per_voxel: [f64; 2],
+}
+
+impl SlabPath {
+    /// The first crossing of a ray that starts in slab `a`, and what is added from crossing to crossing.
+    #[inline]
+    pub(super) fn along<const A: usize, const B: usize, const C: usize>(
+        ray: &SlabRay,
+        base: VoxelIndex,
+        a: u32,
+        is_up: bool,
+    ) -> Self {
+        let direction: Point = std::array::from_fn(|k| ray.end[k] - ray.origin[k]);
+        let per_slab = 1.0 / direction[A].abs();
+        let first = (f64::from(base[A]) + f64::from(a) + f64::from(is_up) - ray.origin[A]).abs();
+        let slope = |axis: usize| direction[axis] * per_slab;
+        let at = |axis: usize| ray.origin[axis] - f64::from(base[axis]) + first * slope(axis);
+        // Added to a number below 2^51, this leaves its nearest whole number in the lowest bits.
+        const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
+        let fixed = |voxels: f64| {
+            (voxels * (1_u64 << 32) as f64 + ROUND).to_bits().wrapping_sub(ROUND.to_bits()) as i64
+        };
+        Self {
+            at_b: fixed(at(B)),
+            at_c: fixed(at(C)),
+            slope_b: fixed(slope(B)),
+            slope_c: fixed(slope(C)),
+            slabs_per_voxel: [B, C].map(|axis| (direction[A] / direction[axis]).abs()),
+        }
+    }
+
+    /// The crossing after so many others.
+    #[inline]
+    pub(super) fn after(&self, crossings: u32) -> Self {
+        let crossings = i64::from(crossings);
+        let (at_b, at_c) = (self.at_b + crossings * self.slope_b, self.at_c + crossings * self.slope_c);
+        Self { at_b, at_c, ..*self }
+    }
+
+    /// Indices of the voxels along `B` and `C`.
+    #[inline]
+    pub(super) fn voxel(&self) -> (u32, u32) {
+        ((self.at_b >> 32) as u32, (self.at_c >> 32) as u32)
+    }
+
+    /// The slabs after `done` others that the ray passes in the block of `[a, b, c]`, by which it comes into the first.
+    #[inline]
+    pub(super) fn stretch<F: Footprint>(
+        &self,
+        [a, b, c]: [u32; 3],
+        done: u32,
+        slabs: u32,
+        is_up: bool,
+    ) -> Stretch {
+        let first = self.after(done);
+        let to_end = if is_up { F::EDGE - (a & (F::EDGE - 1)) } else { (a & (F::EDGE - 1)) + 1 };
+        let most = to_end.min(slabs - done);
+        // How many crossings are in the block for certain, by how far its side is away.
+        let crossings = |at: i64, slope: i64, index: u32, per_voxel: f64| {
+            let low = i64::from(index & !(F::EDGE - 1)) << 32;
+            let high = low + (i64::from(F::EDGE) << 32);
+            let left = if slope < 0 { at - low } else { high - 1 - at };
+            if left < 0 {
+                return 0;
+            }
+            let left_voxels = left as f64 * (1.0 / (1_u64 << 32) as f64);
+            // A little less, so that rounding does not make it one too many.
+            ((left_voxels * per_voxel * (1.0 - 1e-6)) as u32).saturating_add(1)
+        };
+        let [b_per_voxel, c_per_voxel] = self.slabs_per_voxel;
+        let along_b = crossings(first.at_b, self.slope_b, b, b_per_voxel);
+        let along_c = crossings(first.at_c, self.slope_c, c, c_per_voxel);
+        let sideways = along_b.min(along_c);
+        // As many bits before the point as an index in the block has.
+        let shift = F::EDGE.trailing_zeros();
+        let local = |at: i64| (at >> shift) as u32;
+        Stretch {
+            at: u64::from(local(first.at_b)) << 32 | u64::from(local(first.at_c)),
+            slope: ((self.slope_b >> shift) << 32).wrapping_add(self.slope_c >> shift) as u64,
+            entry: (b & (F::EDGE - 1), c & (F::EDGE - 1)),
+            slabs: most.min(sideways),
+            leaves_sideways: sideways < most,
+            is_up,
+        }
+    }
+
+    /// The voxel between the one by which the ray came into a slab and the one by which it goes out, if these differ along
+    /// both axes. `None` if crossings are too near to a border, or to each other, to tell without the closed form.
+    #[inline]
+    pub(super) fn between(&self, (b, c): (u32, u32)) -> Option<Option<(u32, u32)>> {
+        let is_near = |at: i64| (at as u32).wrapping_add(NEAR_BORDER) < 2 * NEAR_BORDER;
+        if is_near(self.at_b) || is_near(self.at_c) {
+            return None;
+        }
+        let (exit_b, exit_c) = self.voxel();
+        if b == exit_b || c == exit_c {
+            return Some(None);
+        }
+        let is_b_first =
+            is_b_crossed_first([self.at_b as u32, self.at_c as u32], [self.slope_b, self.slope_c])?;
+        Some(Some(if is_b_first { (exit_b, c) } else { (b, exit_c) }))
+    }
+}
+
+/// Slabs that a ray passes in one block.
+pub(super) struct Stretch {
+    /// Where the ray goes out of the first slab, relative to the block: along `B` in the upper half, along `C` in the
+    /// lower, each with as many bits before the point as an index in the block has.
+    at: u64,
+    /// What is added from slab to slab.
+    slope: u64,
+    /// The voxel in the block by which the ray comes in.
+    entry: (u32, u32),
+    pub(super) slabs: u32,
+    /// Whether the ray leaves the block in the next slab, and not from slab to slab.
+    pub(super) leaves_sideways: bool,
+    is_up: bool,
+}
+
+impl Stretch {
+    /// Passes the voxels, and returns in how many slabs that is certain.
+    #[inline]
+    pub(super) fn pass<const A: usize, const B: usize, const C: usize, F: Footprint>(
+        &self,
+        block: &mut F,
+        mut a: u32,
+    ) -> u32 {
+        let bits = F::EDGE.trailing_zeros();
+        // Of both halves, the fraction without what is next to a border.
+        let near = NEAR_BORDER_IN_BLOCK >> bits;
+        let fraction = ((1_u64 << (32 - bits)) - 1) & !(2 * near - 1);
+        let near_border = near << 32 | near;
+        let indices = |at: u64| ((at >> (64 - bits)) as u32, (at as u32) >> (32 - bits));
+        let step = if self.is_up { 1 } else { u32::MAX };
+        let (mut at, mut entry) = (self.at, self.entry);
+        for done in 0..self.slabs {
+            let moved = at.wrapping_add(near_border);
+            if moved >> 32 & fraction == 0 || moved & fraction == 0 {
+                return done;
+            }
+            let exit = indices(at);
+            // One branch that is seldom taken, where two would often be guessed wrong.
+            if (exit.0 ^ entry.0) * (exit.1 ^ entry.1) != 0 {
+                let slopes = [(self.slope as i64) >> 32, self.slope as i32 as i64];
+                let past = [(at >> 32 << bits) as u32, (at << bits) as u32];
+                let Some(is_b_first) = is_b_crossed_first(past, slopes) else { return done };
+                let between = if is_b_first { (exit.0, entry.1) } else { (entry.0, exit.1) };
+                block.pass::<A>(a, F::cell::<B, C>(between.0, between.1));
+            }
+            block.pass_through::<A>(a, F::cell::<B, C>(entry.0, entry.1), F::cell::<B, C>(exit.0, exit.1));
+            entry = exit;
+            a = a.wrapping_add(step);
+            at = at.wrapping_add(self.slope);
+        }
+        self.slabs
+    }
+}
+
+/// Of the borders along two axes that a ray crossed, whether the first was crossed before the second; `None` if they
+/// are too near to each other to tell without the closed form. `past` are the fractions of a voxel behind each border
+/// below, in units of 2^-32.
+#[inline]
+fn is_b_crossed_first(past: [u32; 2], slopes: [i64; 2]) -> Option<bool> {
+    // How far the ray is past its border, by how steep it is, is how long ago that was.
+    let past = |k: usize| u64::from(if slopes[k] < 0 { !past[k] } else { past[k] });
+    let b = past(0) * slopes[1].unsigned_abs();
+    let c = past(1) * slopes[0].unsigned_abs();
+    // What positions and slopes, by a unit each, may be off by.
+    let near = NEAR_EDGE * slopes[0].unsigned_abs().max(slopes[1].unsigned_abs()) + (1 << 34);
+    (b.abs_diff(c) > near).then_some(b > c)
+}
