@@ -63,7 +63,7 @@ fn flush(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("one flush");
     group.sample_size(10).sampling_mode(SamplingMode::Flat);
     group.warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(5));
-    for mib in [64, 256] {
+    for mib in [16, 64] {
         for (name, disk) in disks() {
             let folder = temporary_folder();
             let mut grown = None;
