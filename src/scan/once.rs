@@ -7,11 +7,14 @@ use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
 use super::window::{PAGE_EDGE, Window};
 use crate::space::{BRICK_EDGE, BrickMask, Grid, TileIndex, VoxelIndex, place_of_voxel, places};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 /// Collects what one scan says about voxels, each once: a hit over any miss, and of its hits the largest intensity.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OnceCollector {
     pages: BlockMap<MarkedPage>,
+    /// Bricks outside the window, by index: a page for each would be large for the few voxels of a stray ray.
+    far: FxHashMap<VoxelIndex, MarkedBrick>,
     /// The intensity of every hit; empty for sensor models that need none.
     intensities: Vec<HitIntensity>,
 }
@@ -27,23 +30,30 @@ impl OnceCollector {
     /// Forgets everything, and begins anew with another window; the memory is kept.
     pub(super) fn clear(&mut self, window: Window) {
         self.pages.clear(window);
+        self.far.clear();
         self.intensities.clear();
     }
 
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
-        self.pages.bytes() + self.intensities.capacity() * size_of::<HitIntensity>()
+        let far_brick = size_of::<(VoxelIndex, MarkedBrick)>() + 1;
+        self.pages.bytes()
+            + self.far.capacity() * 8 / 7 * far_brick
+            + self.intensities.capacity() * size_of::<HitIntensity>()
     }
 
     /// A ray passes all voxels before its last.
     pub(super) fn pass(&mut self, ray: &SlabRay) {
-        ray.pass(&mut self.pages);
+        let Self { pages, far, .. } = self;
+        ray.pass(pages, |voxel| set(&mut far_brick(far, voxel).passed, voxel));
     }
 
     /// A ray ends in a voxel.
     pub(super) fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
-        let slot = self.pages.slot_of(voxel);
-        self.pages.blocks_mut()[slot].hit(voxel);
+        match self.pages.window().local(voxel) {
+            Some(near) => self.pages.at(near).hit(voxel),
+            None => set(&mut far_brick(&mut self.far, voxel).hits, voxel),
+        }
         if let Some(intensity) = intensity {
             let brick = voxel.map(|k| k.div_euclid(BRICK_EDGE));
             self.intensities.push(HitIntensity { brick, place: place_of_voxel(voxel) as u16, intensity });
@@ -56,13 +66,22 @@ impl OnceCollector {
             let slot = self.pages.slot_of(index.map(|k| k * PAGE_EDGE as i32));
             self.pages.blocks_mut()[slot].absorb(page);
         }
+        for (index, brick) in &other.far {
+            let mine =
+                self.far.entry(*index).or_insert(MarkedBrick { hits: [0; 8], passed: [0; 8], ..*brick });
+            for word in 0..8 {
+                mine.hits[word] |= brick.hits[word];
+                mine.passed[word] |= brick.passed[word];
+            }
+        }
         self.intensities.extend_from_slice(&other.intensities);
     }
 
     /// The updates, each brick cut at the borders of the tiles.
     pub(super) fn updates(&mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
         let pages = self.pages.blocks().par_iter().zip(self.pages.indices());
-        let bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
+        let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
+        bricks.extend(self.far.values());
         let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
         // The largest of a voxel comes first.
         self.intensities.sort_unstable_by(|a, b| {
@@ -122,6 +141,16 @@ impl OnceCollector {
             .map(|hit| hit.intensity)
             .collect()
     }
+}
+
+fn far_brick(bricks: &mut FxHashMap<VoxelIndex, MarkedBrick>, voxel: VoxelIndex) -> &mut MarkedBrick {
+    let index = voxel.map(|k| k.div_euclid(BRICK_EDGE));
+    bricks.entry(index).or_insert(MarkedBrick { index, hits: [0; 8], passed: [0; 8] })
+}
+
+fn set(mask: &mut BrickMask, voxel: VoxelIndex) {
+    let place = place_of_voxel(voxel);
+    mask[place / 64] |= 1 << (place % 64);
 }
 
 fn ones(mask: &BrickMask) -> u64 {

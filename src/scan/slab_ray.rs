@@ -20,16 +20,17 @@ impl SlabRay {
         RayWalk::between(self.origin, self.start, self.end, self.last)
     }
 
-    /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last.
-    pub(super) fn pass<F: Footprint>(&self, blocks: &mut BlockMap<F>) {
+    /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last; those outside the window
+    /// of the blocks are left to `pass_far`.
+    pub(super) fn pass<F: Footprint>(&self, blocks: &mut BlockMap<F>, mut pass_far: impl FnMut(VoxelIndex)) {
         if let Err(from) = self.pass_slabs(blocks) {
             let mut is_left = true;
             self.walk().for_each_before_end(|voxel| {
                 is_left &= voxel != from;
-                if !is_left {
-                    let slot = blocks.slot_of(voxel);
-                    let [x, y, z] = voxel.map(|k| k as u32);
-                    blocks.blocks_mut()[slot].pass::<0>(x, F::cell::<1, 2>(y, z));
+                match blocks.window().local(voxel) {
+                    _ if is_left => {}
+                    Some(near) => blocks.at(near).pass::<0>(near[0], F::cell::<1, 2>(near[1], near[2])),
+                    None => pass_far(voxel),
                 }
             });
         }
@@ -229,8 +230,8 @@ mod tests {
             .filter(|ray| ray.pass_slabs(&mut BlockMap::<MarkedPage>::clone(&marked)).is_err())
             .count();
         for ray in &rays {
-            ray.pass(&mut marked);
-            ray.pass(&mut counted);
+            ray.pass(&mut marked, |_| unreachable!("the window holds all ends"));
+            ray.pass(&mut counted, |_| unreachable!("the window holds all ends"));
         }
         let expected = visits(&rays);
         let mut passes = Passes::new();

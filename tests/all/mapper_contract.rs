@@ -110,6 +110,24 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
     }
 }
 
+/// Rays that leave the window around the sensor, in which nearly all are marked.
+#[test]
+fn stray_points_far_away_are_mapped_like_others() {
+    for mode in [InsertMode::PerScan, InsertMode::PerRay] {
+        let config = MapConfig::new(0.1, 10.0).unwrap().with_insert_mode(mode);
+        let mut scan = random_scan(&mut Random(5), [0.05, 0.0, 1.0], 50);
+        scan.points.extend([[1500.3, 900.1, 40.7], [1500.3, 900.1, 40.7], [-1.0, -2100.0, 0.2]]);
+        scan.intensities = None;
+        let mut reference = ReferenceMap::new(&config);
+        let mut mapper = InMemoryMapper::new(config).unwrap();
+        for _ in 0..2 {
+            reference.insert_scan(&scan);
+            mapper.insert_scan(&scan).unwrap();
+        }
+        assert_eq!(voxels_of(&mapper), reference.voxels, "{mode:?}");
+    }
+}
+
 /// Enough rays that every thread gets some, and in all forms in which rays count.
 #[test]
 fn the_answer_does_not_depend_on_the_number_of_threads() {
