@@ -1,4 +1,5 @@
 use super::footprint::Footprint;
+use super::marked_page::MarkedPage;
 use super::window::{Local, PAGE_EDGE, Window};
 use crate::space::VoxelIndex;
 use rustc_hash::FxHashMap;
@@ -119,6 +120,21 @@ impl<B: Footprint> BlockMap<B> {
         self.blocks.push(B::default());
         self.indices.push(index);
         self.blocks.len() - 1
+    }
+}
+
+impl BlockMap<MarkedPage> {
+    /// Whether all voxels from `low` to `high`, both in the window, are marked.
+    #[inline]
+    pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
+        let is_one_page = (0..3).all(|k| (low[k] ^ high[k]) < PAGE_EDGE as u32);
+        if is_one_page {
+            return self.slot(low).is_some_and(|page| self.blocks[page].are_marked(low, high));
+        }
+        let is_marked =
+            |voxel| self.slot(voxel).is_some_and(|page| self.blocks[page].are_marked(voxel, voxel));
+        let [x, y, z] = [0, 1, 2].map(|k| low[k]..=high[k]);
+        x.into_iter().all(|x| y.clone().all(|y| z.clone().all(|z| is_marked([x, y, z]))))
     }
 }
 

@@ -35,7 +35,7 @@ impl EveryRayCollector {
     /// A ray passes all voxels before its last. At most [`MAX_RAYS`](super::counted_brick::MAX_RAYS) of them.
     pub(super) fn pass(&mut self, ray: &SlabRay) {
         let mut far = Vec::new();
-        ray.pass(&mut self.bricks, |voxel| far.push(voxel));
+        ray.pass(&mut self.bricks, 0, false, |voxel| far.push(voxel));
         for voxel in far {
             let slot = self.bricks.slot_of(voxel);
             self.bricks.blocks_mut()[slot].passes[place_of_voxel(voxel)] += 1;

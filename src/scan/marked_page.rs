@@ -1,5 +1,5 @@
 use super::footprint::Footprint;
-use super::window::PAGE_EDGE;
+use super::window::{Local, PAGE_EDGE};
 use crate::space::{BrickMask, VoxelIndex};
 
 /// Which voxels of a page the rays of a scan pass or end in.
@@ -85,6 +85,23 @@ impl MarkedPage {
     /// A ray ends in a voxel.
     pub(super) fn hit(&mut self, [x, y, z]: VoxelIndex) {
         self.hits.get_or_insert_default().mark(x as u32, y as u32, z as u32);
+    }
+
+    /// Whether all voxels of the page from `low` to `high` are passed or hit.
+    #[inline]
+    pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
+        let [x0, y0, z0] = low.map(|k| k & 63);
+        let [x1, y1, z1] = high.map(|k| k & 63);
+        let wanted = u64::MAX >> (63 - z1) & u64::MAX << z0;
+        for column in (x0 << 6..=x1 << 6).step_by(64) {
+            for column in (column | y0) as usize..=(column | y1) as usize {
+                let left = wanted & !self.passed.0[column];
+                if left != 0 && self.hits.as_ref().is_none_or(|hits| left & !hits.0[column] != 0) {
+                    return false;
+                }
+            }
+        }
+        true
     }
 
     /// Adds the marks of another page.

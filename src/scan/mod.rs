@@ -8,15 +8,20 @@
 
 mod batch;
 mod block_map;
+mod cone;
 mod counted_brick;
 mod every_ray;
 mod footprint;
+mod head_start;
 mod marked_page;
 mod once;
 mod ordered;
 mod range;
 mod ray;
+mod ray_end;
+mod ray_origin;
 mod report;
+mod rounds;
 mod slab_path;
 mod slab_ray;
 mod tile_order;

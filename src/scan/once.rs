@@ -1,6 +1,9 @@
 use super::ScanReport;
 use super::block_map::BlockMap;
+use super::head_start::HeadStarts;
 use super::marked_page::{MarkedBrick, MarkedPage};
+use super::ray_end::RayEnd;
+use super::ray_origin::RayOrigin;
 use super::slab_ray::SlabRay;
 use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
 use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
@@ -9,10 +12,14 @@ use crate::space::{BRICK_EDGE, BrickMask, Grid, TileIndex, VoxelIndex, place_of_
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+/// Most rays that are taken at a time.
+pub(super) const BATCH: usize = 256;
+
 /// Collects what one scan says about voxels, each once: a hit over any miss, and of its hits the largest intensity.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OnceCollector {
     pages: BlockMap<MarkedPage>,
+    head_starts: HeadStarts,
     /// Bricks outside the window, by index: a page for each would be large for the few voxels of a stray ray.
     far: FxHashMap<VoxelIndex, MarkedBrick>,
     /// The intensity of every hit; empty for sensor models that need none.
@@ -30,6 +37,7 @@ impl OnceCollector {
     /// Forgets everything, and begins anew with another window; the memory is kept.
     pub(super) fn clear(&mut self, window: Window) {
         self.pages.clear(window);
+        self.head_starts.clear();
         self.far.clear();
         self.intensities.clear();
     }
@@ -38,18 +46,39 @@ impl OnceCollector {
     pub(super) fn bytes(&self) -> usize {
         let far_brick = size_of::<(VoxelIndex, MarkedBrick)>() + 1;
         self.pages.bytes()
+            + self.head_starts.bytes()
             + self.far.capacity() * 8 / 7 * far_brick
             + self.intensities.capacity() * size_of::<HitIntensity>()
     }
 
-    /// A ray passes all voxels before its last.
-    pub(super) fn pass(&mut self, ray: &SlabRay) {
+    /// Takes some rays from one origin, at most [`BATCH`]: their hits, and the voxels before their last.
+    pub(super) fn take(&mut self, origin: &RayOrigin, ends: &[RayEnd], needs_intensity: bool) {
+        for end in ends {
+            if let Some(intensity) = end.hit {
+                self.hit(end.voxel, needs_intensity.then_some(intensity));
+            }
+        }
+        // The rays that are left to walk, without a branch: it would often be guessed wrong.
+        let (mut left, mut count) = ([(0, 0); BATCH], 0);
+        for (number, &end) in ends.iter().enumerate() {
+            let slabs = self.head_starts.of(&SlabRay::new(origin, end));
+            left[count % BATCH] = (number, slabs.unwrap_or(0));
+            count += usize::from(slabs.is_some());
+        }
         let Self { pages, far, .. } = self;
-        ray.pass(pages, |voxel| set(&mut far_brick(far, voxel).passed, voxel));
+        for &(number, slabs) in &left[..count] {
+            let end = ends[number];
+            SlabRay::new(origin, end)
+                .pass(pages, slabs, end.hit.is_some(), |voxel| set(&mut far_brick(far, voxel).passed, voxel));
+        }
     }
 
-    /// A ray ends in a voxel.
-    pub(super) fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
+    /// Spares the rays to come what those so far have marked; see [`HeadStarts::extend`] for `edges`.
+    pub(super) fn share(&mut self, origin: &RayOrigin, edges: &[usize]) {
+        self.head_starts.extend(&self.pages, origin, edges);
+    }
+
+    fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
         match self.pages.window().local(voxel) {
             Some(near) => self.pages.at(near).hit(voxel),
             None => set(&mut far_brick(&mut self.far, voxel).hits, voxel),
@@ -155,4 +184,101 @@ fn set(mask: &mut BrickMask, voxel: VoxelIndex) {
 
 fn ones(mask: &BrickMask) -> u64 {
     mask.iter().map(|word| u64::from(word.count_ones())).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::Point;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn end(point: Point, hit: bool) -> RayEnd {
+        RayEnd { point, voxel: point.map(|x| x.floor() as i32), hit: hit.then_some(0.0) }
+    }
+
+    /// Ends of rays in all directions of a part of a sphere, near and far as over a rough surface.
+    fn fan(origin: Point, rays: usize, reach: f64, roughness: f64, opening: f64) -> Vec<RayEnd> {
+        let ray = |k: usize| {
+            let (azimuth, up) =
+                (k as f64 * 2.399_963, opening * (2.0 * (k as f64 + 0.5) / rays as f64 - 1.0));
+            let reach = reach * (1.0 + roughness * ((3.0 * azimuth).sin() + (7.0 * up).cos()));
+            let flat = (1.0 - up * up).sqrt() * reach;
+            let point =
+                [origin[0] + flat * azimuth.cos(), origin[1] + flat * azimuth.sin(), origin[2] + up * reach];
+            end(point, k % 11 != 0)
+        };
+        (0..rays).map(ray).collect()
+    }
+
+    /// Voxels that are hit, and voxels that are only passed.
+    type Marks = [BTreeSet<VoxelIndex>; 2];
+
+    fn walked(origin: &RayOrigin, ends: &[RayEnd]) -> Marks {
+        let [mut hits, mut passed] = Marks::default();
+        for &end in ends {
+            SlabRay::new(origin, end).walk().for_each_before_end(|voxel| {
+                passed.insert(voxel);
+            });
+            hits.extend(end.hit.map(|_| end.voxel));
+        }
+        let missed = passed.difference(&hits).copied().collect();
+        [hits, missed]
+    }
+
+    fn collected(collector: &OnceCollector) -> Marks {
+        let mut marks = Marks::default();
+        for (page, index) in collector.pages.blocks().iter().zip(collector.pages.indices()) {
+            for brick in page.bricks(*index) {
+                for place in 0..512_usize {
+                    let voxel = std::array::from_fn(|axis| {
+                        let bit = |level: usize| (place >> (3 * level + axis) & 1) << level;
+                        brick.index[axis] * BRICK_EDGE + (bit(0) | bit(1) | bit(2)) as i32
+                    });
+                    let is_set = |mask: &BrickMask| mask[place / 64] >> (place % 64) & 1 != 0;
+                    match (is_set(&brick.hits), is_set(&brick.passed)) {
+                        (true, _) => marks[0].insert(voxel),
+                        (false, true) => marks[1].insert(voxel),
+                        (false, false) => false,
+                    };
+                }
+            }
+        }
+        marks
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn rays_that_begin_after_what_is_shared_leave_the_marks_of_whole_rays(
+            origin in prop::array::uniform3(-100.0..100.0_f64),
+            is_on_border in prop::array::uniform3(prop::bool::ANY),
+            reach in 3.0..40.0_f64,
+            roughness in prop::sample::select(vec![0.0, 0.1, 0.4]),
+            opening in prop::sample::select(vec![1.0, 0.2]),
+        ) {
+            let origin: Point =
+                std::array::from_fn(|k| if is_on_border[k] { origin[k].floor() } else { origin[k] });
+            let ends = fan(origin, 6000, reach, roughness, opening);
+            let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
+            let mut collector = OnceCollector::default();
+            collector.clear(Window::around(origin.voxel, (
+                origin.point.map(|x| x - 2.0 * reach),
+                origin.point.map(|x| x + 2.0 * reach),
+            )));
+            let mut shared = 0;
+            for round in 0..8 {
+                let part: Vec<RayEnd> = ends.iter().skip(round).step_by(8).copied().collect();
+                shared += part
+                    .iter()
+                    .filter(|end| collector.head_starts.of(&SlabRay::new(origin, **end)) != Some(0))
+                    .count();
+                part.chunks(BATCH).for_each(|batch| collector.take(origin, batch, false));
+                collector.share(origin, &[8, 4, 2, 1]);
+            }
+            prop_assert_eq!(collected(&collector), walked(origin, &ends));
+            prop_assert!(shared > 100, "only {} rays were spared something", shared);
+        }
+    }
 }

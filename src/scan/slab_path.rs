@@ -1,6 +1,6 @@
 use super::footprint::Footprint;
 use super::slab_ray::SlabRay;
-use crate::space::{Point, VoxelIndex};
+use crate::space::VoxelIndex;
 
 /// A crossing nearer than this to a border between voxels, in units of 2^-32 voxels, is left to the exact walk.
 ///
@@ -23,8 +23,9 @@ pub(super) struct SlabPath {
     at_c: i64,
     slope_b: i64,
     slope_c: i64,
-    /// Slabs for a voxel along `B` and `C`, infinite for slopes of 0.
-    slabs_per_voxel: [f64; 2],
+    /// Voxels along `B` and `C` for a voxel along `A`.
+    slopes: [f64; 2],
+    is_up: bool,
 }
 
 impl SlabPath {
@@ -36,11 +37,10 @@ impl SlabPath {
         a: u32,
         is_up: bool,
     ) -> Self {
-        let direction: Point = std::array::from_fn(|k| ray.end[k] - ray.origin[k]);
-        let per_slab = 1.0 / direction[A].abs();
-        let first = (f64::from(base[A]) + f64::from(a) + f64::from(is_up) - ray.origin[A]).abs();
-        let slope = |axis: usize| direction[axis] * per_slab;
-        let at = |axis: usize| ray.origin[axis] - f64::from(base[axis]) + first * slope(axis);
+        let origin = &ray.origin.point;
+        let first = (f64::from(base[A]) + f64::from(a) + f64::from(is_up) - origin[A]).abs();
+        let slope = |axis: usize| ray.direction[axis] * ray.per_slab;
+        let at = |axis: usize| origin[axis] - f64::from(base[axis]) + first * slope(axis);
         // Added to a number below 2^51, this leaves its nearest whole number in the lowest bits.
         const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
         let fixed = |voxels: f64| {
@@ -51,7 +51,8 @@ impl SlabPath {
             at_c: fixed(at(C)),
             slope_b: fixed(slope(B)),
             slope_c: fixed(slope(C)),
-            slabs_per_voxel: [B, C].map(|axis| (direction[A] / direction[axis]).abs()),
+            slopes: [slope(B), slope(C)],
+            is_up,
         }
     }
 
@@ -69,34 +70,22 @@ impl SlabPath {
         ((self.at_b >> 32) as u32, (self.at_c >> 32) as u32)
     }
 
-    /// The slabs after `done` others that the ray passes in the block of `[a, b, c]`, by which it comes into the first.
+    /// The slabs after `done` of `slabs` others that the ray passes in the block of `[a, b, c]`, by which it comes into
+    /// the first; it ends in the voxel `last`.
     #[inline]
     pub(super) fn stretch<F: Footprint>(
         &self,
         [a, b, c]: [u32; 3],
+        last: [u32; 3],
         done: u32,
         slabs: u32,
-        is_up: bool,
     ) -> Stretch {
         let first = self.after(done);
-        let to_end = if is_up { F::EDGE - (a & (F::EDGE - 1)) } else { (a & (F::EDGE - 1)) + 1 };
-        let most = to_end.min(slabs - done);
-        // How many crossings are in the block for certain, by how far its side is away.
-        let crossings = |at: i64, slope: i64, index: u32, per_voxel: f64| {
-            let low = i64::from(index & !(F::EDGE - 1)) << 32;
-            let high = low + (i64::from(F::EDGE) << 32);
-            let left = if slope < 0 { at - low } else { high - 1 - at };
-            if left < 0 {
-                return 0;
-            }
-            let left_voxels = left as f64 * (1.0 / (1_u64 << 32) as f64);
-            // A little less, so that rounding does not make it one too many.
-            ((left_voxels * per_voxel * (1.0 - 1e-6)) as u32).saturating_add(1)
+        let is_in_block = (a ^ last[0] | b ^ last[1] | c ^ last[2]) < F::EDGE;
+        let (slabs, leaves_sideways) = match is_in_block {
+            true => (slabs - done, false),
+            false => first.slabs_in_block::<F>([a, b, c], slabs - done),
         };
-        let [b_per_voxel, c_per_voxel] = self.slabs_per_voxel;
-        let along_b = crossings(first.at_b, self.slope_b, b, b_per_voxel);
-        let along_c = crossings(first.at_c, self.slope_c, c, c_per_voxel);
-        let sideways = along_b.min(along_c);
         // As many bits before the point as an index in the block has.
         let shift = F::EDGE.trailing_zeros();
         let local = |at: i64| (at >> shift) as u32;
@@ -104,18 +93,45 @@ impl SlabPath {
             at: u64::from(local(first.at_b)) << 32 | u64::from(local(first.at_c)),
             slope: ((self.slope_b >> shift) << 32).wrapping_add(self.slope_c >> shift) as u64,
             entry: (b & (F::EDGE - 1), c & (F::EDGE - 1)),
-            slabs: most.min(sideways),
-            leaves_sideways: sideways < most,
-            is_up,
+            slabs,
+            leaves_sideways,
+            is_up: self.is_up,
         }
+    }
+
+    /// How many of `slabs` slabs from here on the ray passes in the block of `[a, b, c]`, and whether it leaves the block in
+    /// the midst of the next.
+    fn slabs_in_block<F: Footprint>(&self, [a, b, c]: [u32; 3], slabs: u32) -> (u32, bool) {
+        let to_end = if self.is_up { F::EDGE - (a & (F::EDGE - 1)) } else { (a & (F::EDGE - 1)) + 1 };
+        let most = to_end.min(slabs);
+        // How many crossings are in the block for certain, by how far its side is away.
+        let crossings = |at: i64, slope: f64, index: u32| {
+            let low = i64::from(index & !(F::EDGE - 1)) << 32;
+            let high = low + (i64::from(F::EDGE) << 32);
+            let left = if slope < 0.0 { at - low } else { high - 1 - at };
+            if left < 0 {
+                return 0;
+            }
+            let left_voxels = left as f64 * (1.0 / (1_u64 << 32) as f64);
+            // A little less, so that rounding does not make it one too many.
+            ((left_voxels / slope.abs() * (1.0 - 1e-6)) as u32).saturating_add(1)
+        };
+        let sideways = crossings(self.at_b, self.slopes[0], b).min(crossings(self.at_c, self.slopes[1], c));
+        (most.min(sideways), sideways < most)
+    }
+
+    /// Whether the crossing is too near to a border between voxels to tell without the closed form which it is in.
+    #[inline]
+    pub(super) fn is_near_border(&self) -> bool {
+        let is_near = |at: i64| (at as u32).wrapping_add(NEAR_BORDER) < 2 * NEAR_BORDER;
+        is_near(self.at_b) || is_near(self.at_c)
     }
 
     /// The voxel between the one by which the ray came into a slab and the one by which it goes out, if these differ along
     /// both axes. `None` if crossings are too near to a border, or to each other, to tell without the closed form.
     #[inline]
     pub(super) fn between(&self, (b, c): (u32, u32)) -> Option<Option<(u32, u32)>> {
-        let is_near = |at: i64| (at as u32).wrapping_add(NEAR_BORDER) < 2 * NEAR_BORDER;
-        if is_near(self.at_b) || is_near(self.at_c) {
+        if self.is_near_border() {
             return None;
         }
         let (exit_b, exit_c) = self.voxel();

@@ -1,39 +1,99 @@
 use super::block_map::BlockMap;
 use super::footprint::Footprint;
 use super::ray::RayWalk;
+use super::ray_end::RayEnd;
+use super::ray_origin::RayOrigin;
 use super::slab_path::SlabPath;
 use super::window::Local;
 use crate::space::{Point, VoxelIndex};
 
 /// A ray from a scan's origin, in the terms of [`RayWalk`]: units of voxels, world frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SlabRay {
-    pub(super) origin: Point,
-    pub(super) start: VoxelIndex,
+pub(super) struct SlabRay<'a> {
+    pub(super) origin: &'a RayOrigin,
     pub(super) end: Point,
     pub(super) last: VoxelIndex,
+    /// From the origin to the end.
+    pub(super) direction: Point,
+    /// The axis of the longest part: slabs lie across it.
+    pub(super) axis: usize,
+    /// One over the longest part; infinite for next to nothing.
+    pub(super) per_slab: f64,
 }
 
-impl SlabRay {
+impl<'a> SlabRay<'a> {
+    /// The ray from `origin` to `end`.
+    #[inline]
+    pub(super) fn new(origin: &'a RayOrigin, RayEnd { point: end, voxel: last, .. }: RayEnd) -> Self {
+        let direction: Point = std::array::from_fn(|k| end[k] - origin.point[k]);
+        let [x, y, z] = direction.map(f64::abs);
+        let (axis, longest) = if x >= y && x >= z {
+            (0, x)
+        } else if y >= z {
+            (1, y)
+        } else {
+            (2, z)
+        };
+        Self { origin, end, last, direction, axis, per_slab: 1.0 / longest }
+    }
+
+    /// How many slabs there are after the origin's.
+    #[inline]
+    pub(super) fn slabs(&self) -> u32 {
+        let [x, y, z]: [u32; 3] = std::array::from_fn(|k| self.last[k].abs_diff(self.origin.voxel[k]));
+        // Not by index: that would go through memory.
+        match self.axis {
+            0 => x,
+            1 => y,
+            _ => z,
+        }
+    }
+
     /// The exact walk of the ray, one voxel after the other.
     pub(super) fn walk(&self) -> RayWalk {
-        RayWalk::between(self.origin, self.start, self.end, self.last)
+        RayWalk::between(self.origin.point, self.origin.voxel, self.end, self.last)
     }
 
     /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last; those outside the window
     /// of the blocks are left to `pass_far`.
-    pub(super) fn pass<F: Footprint>(&self, blocks: &mut BlockMap<F>, mut pass_far: impl FnMut(VoxelIndex)) {
-        if let Err(from) = self.pass_slabs(blocks) {
-            let mut is_left = true;
-            self.walk().for_each_before_end(|voxel| {
-                is_left &= voxel != from;
-                match blocks.window().local(voxel) {
-                    _ if is_left => {}
-                    Some(near) => blocks.at(near).pass::<0>(near[0], F::cell::<1, 2>(near[1], near[2])),
-                    None => pass_far(voxel),
-                }
-            });
+    ///
+    /// The first `skipped` slabs, counted from the origin's, may be left out, and if `may_pass_last`, the last voxel may be
+    /// passed.
+    #[inline]
+    pub(super) fn pass<F: Footprint>(
+        &self,
+        blocks: &mut BlockMap<F>,
+        skipped: u32,
+        may_pass_last: bool,
+        pass_far: impl FnMut(VoxelIndex),
+    ) {
+        let passed = match self.axis {
+            0 => self.pass_slabs::<0, 1, 2, F>(blocks, skipped, may_pass_last),
+            1 => self.pass_slabs::<1, 0, 2, F>(blocks, skipped, may_pass_last),
+            _ => self.pass_slabs::<2, 0, 1, F>(blocks, skipped, may_pass_last),
+        };
+        if let Err(from) = passed {
+            self.pass_exactly(blocks, from, pass_far);
         }
+    }
+
+    /// The same by the closed form, for the voxels from `from` on.
+    #[cold]
+    fn pass_exactly<F: Footprint>(
+        &self,
+        blocks: &mut BlockMap<F>,
+        from: VoxelIndex,
+        mut pass_far: impl FnMut(VoxelIndex),
+    ) {
+        let mut is_left = true;
+        self.walk().for_each_before_end(|voxel| {
+            is_left &= voxel != from;
+            match blocks.window().local(voxel) {
+                _ if is_left => {}
+                Some(near) => blocks.at(near).pass::<0>(near[0], F::cell::<1, 2>(near[1], near[2])),
+                None => pass_far(voxel),
+            }
+        });
     }
 
     /// Passes the voxels from the first on, in order, as far as they can be told without the closed form. The error is
@@ -43,25 +103,20 @@ impl SlabRay {
     /// slab to slab is a sum of fixed-point numbers, and the voxels it meets in a slab are the one it comes in by, the
     /// one it goes out by and, if these differ along both other axes, the one between them. That this is what the
     /// closed form says is certain as long as no crossing is next to a border, and no two are next to each other.
-    fn pass_slabs<F: Footprint>(&self, blocks: &mut BlockMap<F>) -> Result<(), VoxelIndex> {
-        let length: Point = std::array::from_fn(|k| (self.end[k] - self.origin[k]).abs());
-        if length[0] >= length[1] && length[0] >= length[2] {
-            self.pass_along::<0, 1, 2, F>(blocks)
-        } else if length[1] >= length[2] {
-            self.pass_along::<1, 0, 2, F>(blocks)
-        } else {
-            self.pass_along::<2, 0, 1, F>(blocks)
-        }
-    }
-
+    ///
     /// `A` is the axis of the longest part, `B` and `C` are the others, the lower first.
-    fn pass_along<const A: usize, const B: usize, const C: usize, F: Footprint>(
+    fn pass_slabs<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
         blocks: &mut BlockMap<F>,
+        skipped: u32,
+        may_pass_last: bool,
     ) -> Result<(), VoxelIndex> {
         let base = blocks.window().base();
-        let last = blocks.window().local(self.last).ok_or(self.start)?;
-        let start = self.leave_borders(blocks)?;
+        let last = blocks.window().local(self.last).ok_or(self.origin.voxel)?;
+        let start = match self.origin.is_on_border {
+            true => self.leave_borders(blocks)?,
+            false => blocks.window().local(self.origin.voxel).ok_or(self.origin.voxel)?,
+        };
         let [mut a, mut b, mut c] = [start[A], start[B], start[C]];
         let unknown = |a, b, c| {
             let local = voxel::<A, B, C>(a, b, c);
@@ -71,9 +126,19 @@ impl SlabRay {
         if slabs > 0 {
             let is_up = last[A] > a;
             let path = SlabPath::along::<A, B, C>(self, base, a, is_up);
-            let mut done = 0;
+            // Leaving a border may have been a slab.
+            let mut done =
+                skipped.saturating_sub(a.abs_diff((self.origin.voxel[A] - base[A]) as u32)).min(slabs);
+            if done > 0 {
+                let crossing = path.after(done - 1);
+                if crossing.is_near_border() {
+                    return Err(self.origin.voxel);
+                }
+                (b, c) = crossing.voxel();
+                a = if is_up { a + done } else { a - done };
+            }
             while done < slabs {
-                let stretch = path.stretch::<F>([a, b, c], done, slabs, is_up);
+                let stretch = path.stretch::<F>([a, b, c], [last[A], last[B], last[C]], done, slabs);
                 let block = blocks.at(voxel::<A, B, C>(a, b, c));
                 let certain = stretch.pass::<A, B, C, F>(block, a);
                 if certain > 0 {
@@ -103,67 +168,53 @@ impl SlabRay {
                 a = if is_up { a + 1 } else { a - 1 };
             }
         }
-        match self.before_last::<B, C>(base, (b, c), start, last) {
-            Some(cells) => {
-                for (b, c) in cells.into_iter().flatten() {
-                    blocks.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
-                }
-                Ok(())
-            }
-            None => unknown(a, b, c),
-        }
-    }
-
-    /// The crossings at time 0: an origin on a border between voxels belongs to the upper one, and a ray downward
-    /// leaves it at once, the lowest axis first. Returns the voxel after them.
-    #[inline]
-    fn leave_borders<F: Footprint>(&self, blocks: &mut BlockMap<F>) -> Result<Local, VoxelIndex> {
-        let mut voxel = blocks.window().local(self.start).ok_or(self.start)?;
-        let is_left = |axis: usize| {
-            self.last[axis] < self.start[axis] && f64::from(self.start[axis]) == self.origin[axis]
-        };
-        // The closed form has no number for a crossing of a ray that hardly moves.
-        if (0..3).any(|axis| is_left(axis) && self.end[axis] - self.origin[axis] > -f64::MIN_POSITIVE) {
-            return Err(self.start);
-        }
-        for axis in (0..3).filter(|&axis| is_left(axis)) {
-            blocks.at(voxel).pass::<0>(voxel[0], F::cell::<1, 2>(voxel[1], voxel[2]));
-            voxel[axis] -= 1;
-        }
-        Ok(voxel)
-    }
-
-    /// The voxels of the last slab before the last voxel, at most two; the ray comes into the slab by `(b, c)`. `None`
-    /// if it cannot get from there to the last.
-    #[inline]
-    fn before_last<const B: usize, const C: usize>(
-        &self,
-        base: VoxelIndex,
-        (b, c): (u32, u32),
-        start: Local,
-        last: Local,
-    ) -> Option<[Option<(u32, u32)>; 2]> {
         let ahead = |axis: usize, at: u32| match last[axis] < start[axis] {
             true => at.wrapping_sub(last[axis]),
             false => last[axis].wrapping_sub(at),
         };
-        match (ahead(B, b), ahead(C, c)) {
-            (0, 0) => Some([None, None]),
-            (0 | 1, 0 | 1) if b == last[B] || c == last[C] => Some([Some((b, c)), None]),
-            (1, 1) => match self.crosses_first::<B, C>(base, b.max(last[B]), c.max(last[C])) {
-                true => Some([Some((b, c)), Some((last[B], c))]),
-                false => Some([Some((b, c)), Some((b, last[C]))]),
-            },
-            _ => None,
+        let (ahead_b, ahead_c) = (ahead(B, b), ahead(C, c));
+        if ahead_b | ahead_c > 1 {
+            return unknown(a, b, c);
         }
+        if may_pass_last || ahead_b | ahead_c > 0 {
+            blocks.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
+        }
+        if ahead_b & ahead_c > 0 {
+            (b, c) = match self.crosses_first::<B, C>(base, b.max(last[B]), c.max(last[C])) {
+                true => (last[B], c),
+                false => (b, last[C]),
+            };
+            blocks.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
+        }
+        Ok(())
+    }
+
+    /// The crossings at time 0: an origin on a border between voxels belongs to the upper one, and a ray downward
+    /// leaves it at once, the lowest axis first. Returns the voxel after them.
+    fn leave_borders<F: Footprint>(&self, blocks: &mut BlockMap<F>) -> Result<Local, VoxelIndex> {
+        let origin = self.origin;
+        let mut voxel = blocks.window().local(origin.voxel).ok_or(origin.voxel)?;
+        let is_left: [bool; 3] =
+            std::array::from_fn(|k| origin.is_on_border_along[k] && self.last[k] < origin.voxel[k]);
+        // The closed form has no number for a crossing of a ray that hardly moves.
+        if (0..3).any(|k| is_left[k] && self.direction[k] > -f64::MIN_POSITIVE) {
+            return Err(origin.voxel);
+        }
+        for axis in 0..3 {
+            if is_left[axis] {
+                blocks.at(voxel).pass::<0>(voxel[0], F::cell::<1, 2>(voxel[1], voxel[2]));
+                voxel[axis] -= 1;
+            }
+        }
+        Ok(voxel)
     }
 
     /// Whether the border below voxel `b` along `B` is crossed before the border below voxel `c` along `C`, by the
     /// closed form; of equal times the lower axis is first, and `B` is lower.
     fn crosses_first<const B: usize, const C: usize>(&self, base: VoxelIndex, b: u32, c: u32) -> bool {
         let time = |axis: usize, border: u32| {
-            let inv_direction = 1.0 / (self.end[axis] - self.origin[axis]);
-            (f64::from(base[axis]) + f64::from(border) - self.origin[axis]) * inv_direction
+            let inv_direction = 1.0 / self.direction[axis];
+            (f64::from(base[axis]) + f64::from(border) - self.origin.point[axis]) * inv_direction
         };
         time(B, b) <= time(C, c)
     }
@@ -171,7 +222,7 @@ impl SlabRay {
 
 /// The voxel with these indices along the axes `A`, `B` and `C`.
 #[inline]
-fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u32, c: u32) -> Local {
+pub(super) fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u32, c: u32) -> Local {
     let mut voxel = [0; 3];
     (voxel[A], voxel[B], voxel[C]) = (a, b, c);
     voxel
@@ -187,9 +238,8 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    fn ray(origin: Point, end: Point) -> SlabRay {
-        let voxel = |point: Point| point.map(|x| x.floor() as i32);
-        SlabRay { origin, start: voxel(origin), end, last: voxel(end) }
+    fn voxel_of(point: Point) -> VoxelIndex {
+        point.map(|x| x.floor() as i32)
     }
 
     /// How often each voxel was passed.
@@ -205,12 +255,21 @@ mod tests {
         }
     }
 
-    fn visits(rays: &[SlabRay]) -> Passes {
+    fn visits(rays: &[SlabRay<'_>]) -> Passes {
         let mut visits = Passes::new();
         for ray in rays {
             ray.walk().for_each_before_end(|voxel| *visits.entry(voxel).or_default() += 1);
         }
         visits
+    }
+
+    fn is_unknown(ray: &SlabRay, pages: &mut BlockMap<MarkedPage>) -> bool {
+        let passed = match ray.axis {
+            0 => ray.pass_slabs::<0, 1, 2, _>(pages, 0, false),
+            1 => ray.pass_slabs::<1, 0, 2, _>(pages, 0, false),
+            _ => ray.pass_slabs::<2, 0, 1, _>(pages, 0, false),
+        };
+        passed.is_err()
     }
 
     /// Passes along the rays from one origin, and compares with the exact walk; returns how many rays the slabs could
@@ -219,19 +278,21 @@ mod tests {
         let bounds = ends.iter().fold((origin, origin), |(low, high), end| {
             (std::array::from_fn(|k| low[k].min(end[k])), std::array::from_fn(|k| high[k].max(end[k])))
         });
-        let rays: Vec<_> = ends.iter().map(|&end| ray(origin, end)).collect();
-        let window = Window::around(rays[0].start, bounds);
+        let origin = &RayOrigin::new(origin, voxel_of(origin));
+        let rays: Vec<_> = ends
+            .iter()
+            .map(|&end| SlabRay::new(origin, RayEnd { point: end, voxel: voxel_of(end), hit: None }))
+            .collect();
+        let window = Window::around(origin.voxel, bounds);
         let mut marked = BlockMap::<MarkedPage>::default();
         let mut counted = BlockMap::<CountedBrick>::default();
         marked.clear(window);
         counted.clear(window);
-        let unknown = rays
-            .iter()
-            .filter(|ray| ray.pass_slabs(&mut BlockMap::<MarkedPage>::clone(&marked)).is_err())
-            .count();
+        let unknown =
+            rays.iter().filter(|ray| is_unknown(ray, &mut BlockMap::<MarkedPage>::clone(&marked))).count();
         for ray in &rays {
-            ray.pass(&mut marked, |_| unreachable!("the window holds all ends"));
-            ray.pass(&mut counted, |_| unreachable!("the window holds all ends"));
+            ray.pass(&mut marked, 0, false, |_| unreachable!("the window holds all ends"));
+            ray.pass(&mut counted, 0, false, |_| unreachable!("the window holds all ends"));
         }
         let expected = visits(&rays);
         let mut passes = Passes::new();

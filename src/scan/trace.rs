@@ -1,15 +1,18 @@
 use super::counted_brick::MAX_RAYS;
 use super::every_ray::{EveryRayCollector, updates_in_order};
-use super::once::OnceCollector;
-use super::range::{Ranged, in_range};
+use super::once::{BATCH, OnceCollector};
+use super::range::{RangeRule, Ranged};
 use super::ray::MAX_RAY_STEPS;
+use super::ray_end::RayEnd;
+use super::ray_origin::RayOrigin;
+use super::rounds::rounds;
 use super::slab_ray::SlabRay;
 use super::window::Window;
 use super::{Scan, ScanReport, ScanUpdates};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
-use crate::space::{Grid, Point, VoxelIndex};
+use crate::space::{Grid, Point};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -82,25 +85,24 @@ struct Fan<'a> {
     model: &'a SensorModel,
     rays: &'a RayConfig,
     scan: &'a Scan,
-    /// The sensor in units of voxels, and its voxel.
-    origin: Point,
-    start: VoxelIndex,
-}
-
-/// A ray that counts.
-struct Ray {
-    path: SlabRay,
-    /// The intensity at its end, if its end is evidence.
-    hit: Option<f32>,
+    origin: RayOrigin,
+    range: RangeRule,
 }
 
 impl<'a> Fan<'a> {
     fn new(grid: &'a Grid, model: &'a SensorModel, rays: &'a RayConfig, scan: &'a Scan) -> Result<Self> {
-        let start = grid.voxel_of(scan.origin).ok_or_else(|| {
+        let voxel = grid.voxel_of(scan.origin).ok_or_else(|| {
             let reason = format!("{:?} m is not finite or too far away for a voxel index", scan.origin);
             Error::argument("scan origin", reason)
         })?;
-        Ok(Self { grid, model, rays, scan, origin: grid.to_voxel_units(scan.origin), start })
+        Ok(Self {
+            grid,
+            model,
+            rays,
+            scan,
+            origin: RayOrigin::new(grid.to_voxel_units(scan.origin), voxel),
+            range: RangeRule::new(rays, scan.origin),
+        })
     }
 
     /// One update a voxel, a hit over any miss. Which voxels these are does not depend on the order of the rays, so
@@ -109,12 +111,21 @@ impl<'a> Fan<'a> {
         let needs_intensity = self.model.needs_intensity();
         let (collectors, report) = self.collect(collectors, usize::MAX, |collector, window, points| {
             collector.clear(window);
-            self.for_each_ray(points, |ray| {
-                collector.pass(&ray.path);
-                if let Some(intensity) = ray.hit {
-                    collector.hit(ray.path.last, needs_intensity.then_some(intensity));
+            let mut report = ScanReport { points: points.len() as u64, ..ScanReport::default() };
+            let mut batch = Vec::with_capacity(BATCH);
+            for round in rounds(points) {
+                collector.share(&self.origin, round.shared_squares);
+                for number in round.points() {
+                    batch.extend(self.ray(number, &mut report));
+                    if batch.len() == BATCH {
+                        collector.take(&self.origin, &batch, needs_intensity);
+                        batch.clear();
+                    }
                 }
-            })
+                collector.take(&self.origin, &batch, needs_intensity);
+                batch.clear();
+            }
+            report
         });
         let (first, others) = collectors.split_at_mut(1);
         others.iter().for_each(|other| first[0].absorb(other));
@@ -125,12 +136,14 @@ impl<'a> Fan<'a> {
     fn every_ray(&self, collectors: &mut Vec<EveryRayCollector>) -> ScanUpdates {
         let (collectors, report) = self.collect(collectors, MAX_RAYS, |collector, window, points| {
             collector.clear(window);
-            self.for_each_ray(points, |ray| {
-                collector.pass(&ray.path);
-                if let Some(intensity) = ray.hit {
-                    collector.hit(ray.path.last, intensity);
+            let mut report = ScanReport { points: points.len() as u64, ..ScanReport::default() };
+            for end in points.filter_map(|number| self.ray(number, &mut report)) {
+                collector.pass(&SlabRay::new(&self.origin, end));
+                if let Some(intensity) = end.hit {
+                    collector.hit(end.voxel, intensity);
                 }
-            })
+            }
+            report
         });
         updates_in_order(self.grid, collectors, report)
     }
@@ -149,7 +162,7 @@ impl<'a> Fan<'a> {
             collectors.resize_with(parts, C::default);
         }
         let collectors = &mut collectors[..parts];
-        let window = Window::around(self.start, self.bounds());
+        let window = Window::around(self.origin.voxel, self.bounds());
         let reports = collectors.par_iter_mut().enumerate().map(|(part, collector)| {
             collect(collector, window, points * part / parts..points * (part + 1) / parts)
         });
@@ -177,41 +190,33 @@ impl<'a> Fan<'a> {
         (self.grid.to_voxel_units(low), self.grid.to_voxel_units(high))
     }
 
-    fn for_each_ray(&self, points: Range<usize>, mut visit: impl FnMut(Ray)) -> ScanReport {
-        let mut report = ScanReport { points: points.len() as u64, ..ScanReport::default() };
-        for number in points {
-            if let Some(ray) = self.ray(number, &mut report) {
-                visit(ray);
-            }
-        }
-        report
-    }
-
-    fn ray(&self, number: usize, report: &mut ScanReport) -> Option<Ray> {
+    /// Where the ray to a point ends; `None` if it does not count.
+    #[inline]
+    fn ray(&self, number: usize, report: &mut ScanReport) -> Option<RayEnd> {
         let intensity = self.scan.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
         let skipped = &mut report.skipped;
         if self.model.needs_intensity() && intensity.is_nan() {
             skipped.no_intensity += 1;
             return None;
         }
-        let (end_m, is_hit) = match in_range(self.rays, self.scan.origin, self.scan.points[number], skipped) {
+        let (end_m, is_hit) = match self.range.apply(self.scan.points[number], skipped) {
             Ranged::Hit(point) => (point, true),
             Ranged::Cut(point) => (point, false),
             Ranged::Skipped => return None,
         };
-        let Some(last) = self.grid.voxel_of(end_m) else {
+        let end = self.grid.to_voxel_units(end_m);
+        let Some(last) = Grid::voxel_of_units(end) else {
             skipped.out_of_range += 1;
             return None;
         };
-        let steps: u64 = (0..3).map(|k| u64::from(self.start[k].abs_diff(last[k]))).sum();
+        let steps: u64 = (0..3).map(|k| u64::from(self.origin.voxel[k].abs_diff(last[k]))).sum();
         if steps > MAX_RAY_STEPS {
             skipped.ray_too_long += 1;
             return None;
         }
         report.cut_at_max_range += u64::from(!is_hit);
         let hit = Observation::Hit(intensity);
-        let end = self.grid.to_voxel_units(end_m);
-        let path = SlabRay { origin: self.origin, start: self.start, end, last };
-        Some(Ray { path, hit: (is_hit && self.model.is_evidence(hit)).then_some(intensity) })
+        let hit = (is_hit && self.model.is_evidence(hit)).then_some(intensity);
+        Some(RayEnd { point: end, voxel: last, hit })
     }
 }

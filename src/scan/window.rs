@@ -53,10 +53,16 @@ impl Window {
         self.base
     }
 
+    /// Whether a voxel, relative to the lowest, is inside.
+    #[inline]
+    pub(super) fn holds(&self, local: Local) -> bool {
+        (0..3).all(|k| local[k] < self.pages[k] * PAGE_EDGE as u32)
+    }
+
     /// A voxel relative to the lowest; `None` outside.
     #[inline]
     pub(super) fn local(&self, voxel: VoxelIndex) -> Option<Local> {
         let local: Local = std::array::from_fn(|k| voxel[k].wrapping_sub(self.base[k]) as u32);
-        (0..3).all(|k| local[k] < self.pages[k] * PAGE_EDGE as u32).then_some(local)
+        self.holds(local).then_some(local)
     }
 }

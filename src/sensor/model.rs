@@ -43,6 +43,7 @@ impl SensorModel {
     }
 
     /// Whether an observation is evidence at all; with [`Iwlo`] an echo of no weight is none.
+    #[inline]
     pub fn is_evidence(&self, observation: Observation) -> bool {
         match (self, observation) {
             (Self::Iwlo(model), Observation::Hit(intensity)) => model.weight(intensity) != 0.0,

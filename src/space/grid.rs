@@ -101,7 +101,15 @@ impl Grid {
     /// The voxel that holds a point; `None` for a point that is not finite or whose index leaves `i32`.
     #[inline]
     pub fn voxel_of(&self, point_m: Point) -> Option<VoxelIndex> {
-        voxel_of_units(self.to_voxel_units(point_m))
+        Self::voxel_of_units(self.to_voxel_units(point_m))
+    }
+
+    /// The voxel of a point in units of voxels; `None` as for [`Grid::voxel_of`].
+    #[inline]
+    pub(crate) fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
+        // False for NaN, too.
+        let is_in_range = |x: f64| x >= f64::from(i32::MIN) && x < f64::from(i32::MAX);
+        point.iter().all(|&x| is_in_range(x)).then(|| point.map(floor))
     }
 
     /// The tile that holds a voxel.
@@ -130,21 +138,6 @@ impl Grid {
         let end = tile.to_array().map(|index| clamp_to_i32((i64::from(index) + 1) * n));
         VoxelBox { min, end }
     }
-}
-
-/// The voxel of a point given in units of voxels; `None` when not finite or outside `i32`.
-#[inline]
-fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
-    let mut voxel = [0; 3];
-    for axis in 0..3 {
-        let coordinate = point[axis];
-        // False for NaN too.
-        if !(coordinate >= f64::from(i32::MIN) && coordinate < f64::from(i32::MAX)) {
-            return None;
-        }
-        voxel[axis] = floor(coordinate);
-    }
-    Some(voxel)
 }
 
 /// The floor of a number in the range of `i32`; not every processor has an instruction for it.
