@@ -1,6 +1,7 @@
 use super::counted_brick::MAX_RAYS;
 use super::every_ray::{EveryRayCollector, updates_in_order};
 use super::once::OnceCollector;
+use super::ordered::OrderedCollector;
 use super::range::{Ranged, in_range};
 use super::ray::MAX_RAY_STEPS;
 use super::slab_ray::SlabRay;
@@ -45,6 +46,28 @@ impl ScanTracer {
         match rays.insert_mode {
             InsertMode::PerScan => Ok(fan.once_a_voxel(&mut self.once)),
             InsertMode::PerRay => Ok(fan.every_ray(&mut self.every_ray)),
+        }
+    }
+
+    /// The same, but where every ray counts the updates of a tile come one by one, in the order in which the rays
+    /// make them: for whom the order of different voxels matters too.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanTracer::trace`].
+    pub fn trace_in_order(
+        &mut self,
+        grid: &Grid,
+        model: &SensorModel,
+        rays: &RayConfig,
+        scan: &Scan,
+    ) -> Result<ScanUpdates> {
+        match rays.insert_mode {
+            InsertMode::PerScan => self.trace(grid, model, rays, scan),
+            InsertMode::PerRay => {
+                check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
+                Ok(Fan::new(grid, model, rays, scan)?.every_ray_in_order())
+            }
         }
     }
 
@@ -133,6 +156,18 @@ impl<'a> Fan<'a> {
             })
         });
         updates_in_order(self.grid, collectors, report)
+    }
+
+    /// The same, with every update for itself.
+    fn every_ray_in_order(&self) -> ScanUpdates {
+        let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
+        let report = self.for_each_ray(0..self.scan.points.len(), |ray| {
+            ray.path.walk().for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
+            if let Some(intensity) = ray.hit {
+                collector.push(ray.path.last, Observation::Hit(intensity));
+            }
+        });
+        collector.into_updates(report)
     }
 
     /// Gives each thread a part of the points, and each part a collector, in order. No part has more than `most` points.

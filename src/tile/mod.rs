@@ -12,19 +12,26 @@
 mod brick;
 mod brick_octree;
 mod brick_update;
-mod cached_octree;
 mod cells;
 pub mod format;
+mod octree_factory;
+mod octree_statistics;
+mod octree_worker;
 mod packed;
 mod palette;
+mod pointer_octree;
+mod shared_tree;
 mod summary;
 mod table;
 mod table_update;
 mod tile_body;
 mod tile_octree;
+mod update_stream;
 mod voxel_cache;
+mod work_queue;
 
-pub use cached_octree::CachedOctree;
+pub use octree_factory::OctreeFactory;
+pub use octree_statistics::{OctreeQueueCounts, OctreeStatistics, OctreeTimes};
 pub use table::Table;
 pub use tile_body::{Tile, TileCounts, Voxel};
 pub use voxel_cache::{VoxelCache, VoxelCacheCounts};
