@@ -80,7 +80,7 @@ pub enum VoxelCacheMode {
 pub struct VoxelCacheConfig {
     /// Most voxels that a bucket keeps after a scan, 1 to 65536. Default: 4.
     pub tau: usize,
-    /// Number of buckets of each tile's cache, a power of two up to 2^30; `None` fits it to the scans that a tile
+    /// Number of buckets of each tile's cache, a power of two up to 2^24; `None` fits it to the scans that a tile
     /// sees: the fewest with which `tau * buckets` is three times the distinct voxels of one. Default: `None`.
     pub buckets: Option<usize>,
 }
@@ -212,8 +212,8 @@ impl VoxelCacheConfig {
         if tau == 0 || tau > 1 << 16 {
             return Err(wrong("tau", tau, "1 to 65536 voxels a bucket"));
         }
-        if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 30) {
-            return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^30"));
+        if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 24) {
+            return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^24"));
         }
         Ok(())
     }

@@ -37,4 +37,6 @@ pub use tile_body::{Tile, TileCounts, Voxel};
 pub use voxel_cache::{VoxelCache, VoxelCacheCounts};
 
 #[cfg(test)]
+mod octree_tests;
+#[cfg(test)]
 mod tests;

@@ -151,6 +151,11 @@ impl Tile {
         }
     }
 
+    #[cfg(test)]
+    pub(super) fn tile_octree(&self) -> &TileOctree {
+        &self.octree
+    }
+
     /// Bytes of memory that the tile occupies.
     pub fn bytes(&self) -> usize {
         let (octree_bytes, cache_bytes) = self.octree.bytes();
