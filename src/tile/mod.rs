@@ -5,8 +5,8 @@
 //! ```
 //!
 //! The table answers every question about a finest voxel. The octree is derived from it and serves coarse
-//! questions. It is a view of the table's bricks, or a tree of its own with a voxel cache in front that keeps it
-//! from seeing every update (OctoCache). [`mod@format`] turns a tile into the bytes of its two files and back;
+//! questions. It is a view of the table's bricks, or a tree of its own: written at once, or behind a voxel cache that
+//! keeps it from seeing every update (OctoCache), or by another thread at that. [`mod@format`] turns a tile into the bytes of its two files and back;
 //! nothing here knows a path.
 
 mod brick;
