@@ -15,8 +15,8 @@ pub(super) type Batch = Vec<(MortonCode, f32)>;
 pub(super) struct SharedTree {
     /// `None` while it is being written, and after a panic in that: then it must be derived from the table.
     tree: RwLock<Option<Octree>>,
-    /// The oldest first. Whoever takes one out holds the lock of the tree for writing, so that whoever holds it for
-    /// reading finds every update in one of the two. Locked after the tree, never before.
+    /// The oldest first. Whoever takes one out of them for a whole tree holds the lock of the tree for writing, so that
+    /// whoever holds it for reading finds every update in one of the two. Locked after the tree, never before.
     in_flight: Mutex<VecDeque<Batch>>,
     /// Nodes and bytes of the tree as of its last change, so that counting waits for nobody.
     nodes: AtomicU64,
@@ -36,14 +36,19 @@ impl SharedTree {
 
     /// Writes all that is in flight and returns its voxels; `None` if the tree is broken.
     pub(super) fn write_all(&self) -> Option<usize> {
-        self.change(|tree| {
+        let written = self.change(|tree| {
             let mut voxels = 0;
             while let Some(batch) = self.take_oldest() {
                 tree.write_sorted(&batch);
                 voxels += batch.len();
             }
             voxels
-        })
+        });
+        if written.is_none() {
+            // The table has it, from which the tree will be derived.
+            self.in_flight().clear();
+        }
+        written
     }
 
     /// Changes the tree, if it is whole. After a panic in `change` it is not.
