@@ -59,18 +59,29 @@ pub enum OctreeConfig {
     /// A view of the table's bricks: a few bytes a brick, and an update costs it nothing.
     #[default]
     Bricks,
-    /// OctoMap's pointer tree behind a voxel cache (OctoCache), for study and comparison.
-    Cached(VoxelCacheConfig),
+    /// OctoMap's pointer tree, which must be told of updates: the form of the literature, for study and comparison.
+    Pointers(VoxelCacheMode),
 }
 
-/// Shape of the voxel cache in front of each tile's octree.
+/// What stands between the updates of a tile and its pointer tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VoxelCacheMode {
+    /// Nothing: every update goes straight into the tree, one by one (OctoMap).
+    Off,
+    /// A voxel cache; after each scan, what leaves it goes into the tree (OctoCache, serial).
+    Serial(VoxelCacheConfig),
+    /// The same, and the trees are written by a thread of their own, one a mapper (OctoCache, parallel).
+    Parallel(VoxelCacheConfig),
+}
+
+/// Shape of the voxel cache in front of each tile's pointer tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct VoxelCacheConfig {
-    /// Most voxels a bucket keeps between two scans, at least 1. Default: 4.
+    /// Most voxels that a bucket keeps after a scan, 1 to 65536. Default: 4.
     pub tau: usize,
-    /// Number of buckets of each tile's cache, a power of two; `None` fits it to the scans a tile sees, so that
-    /// the cache holds three times the voxels of one. Default: `None`.
+    /// Number of buckets of each tile's cache, a power of two up to 2^24; `None` fits it to the scans that a tile
+    /// sees: the fewest with which `tau * buckets` is three times the distinct voxels of one. Default: `None`.
     pub buckets: Option<usize>,
 }
 
@@ -138,9 +149,9 @@ impl MapConfig {
         Self { octree, ..self }
     }
 
-    /// The same with pointer trees behind voxel caches of this shape.
-    pub fn with_voxel_cache(self, tau: usize, buckets: Option<usize>) -> Self {
-        self.with_octree(OctreeConfig::Cached(VoxelCacheConfig { tau, buckets }))
+    /// The same with pointer trees, behind voxel caches or not.
+    pub fn with_voxel_cache(self, mode: VoxelCacheMode) -> Self {
+        self.with_octree(OctreeConfig::Pointers(mode))
     }
 
     /// The configuration, or the first argument that is wrong.
@@ -164,7 +175,9 @@ impl MapConfig {
         if self.cache_tiles == 0 {
             return Err(wrong("cache tiles", self.cache_tiles, "at least 1"));
         }
-        if let OctreeConfig::Cached(cache) = self.octree {
+        if let OctreeConfig::Pointers(mode) = self.octree
+            && let Some(cache) = mode.cache()
+        {
             cache.check()?;
         }
         Ok(self)
@@ -178,14 +191,29 @@ impl MapConfig {
     }
 }
 
+impl VoxelCacheMode {
+    /// The shape of the caches, if there are any.
+    pub fn cache(self) -> Option<VoxelCacheConfig> {
+        match self {
+            Self::Off => None,
+            Self::Serial(cache) | Self::Parallel(cache) => Some(cache),
+        }
+    }
+}
+
 impl VoxelCacheConfig {
+    /// Caches with this `tau` and number of buckets; what they may be is checked with the [`MapConfig`].
+    pub fn new(tau: usize, buckets: impl Into<Option<usize>>) -> Self {
+        Self { tau, buckets: buckets.into() }
+    }
+
     fn check(&self) -> Result<()> {
         let Self { tau, buckets } = *self;
         if tau == 0 || tau > 1 << 16 {
             return Err(wrong("tau", tau, "1 to 65536 voxels a bucket"));
         }
-        if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 30) {
-            return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^30"));
+        if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 24) {
+            return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^24"));
         }
         Ok(())
     }

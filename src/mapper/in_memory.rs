@@ -1,9 +1,10 @@
+use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates};
 use crate::space::TileIndex;
-use crate::tile::Tile;
+use crate::tile::{OctreeFactory, Tile};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -14,6 +15,8 @@ pub struct InMemoryMapper {
     config: MapConfig,
     /// Boxed, so that those a scan touches can be taken out, changed at the same time, and put back.
     tiles: FxHashMap<TileIndex, Box<Tile>>,
+    /// After the tiles: what is in flight to octrees goes with these, and need not be written any more.
+    octrees: OctreeFactory,
     tracer: ScanTracer,
     scan_number: u64,
 }
@@ -26,13 +29,15 @@ impl InMemoryMapper {
     /// The first argument of the configuration that is wrong.
     pub fn new(config: MapConfig) -> Result<Self> {
         let config = config.validated()?;
-        Ok(Self { config, tiles: FxHashMap::default(), tracer: ScanTracer::default(), scan_number: 0 })
+        let octrees = OctreeFactory::new(config.octree);
+        let (tiles, tracer) = Default::default();
+        Ok(Self { config, tiles, octrees, tracer, scan_number: 0 })
     }
 
     fn accept(&mut self, updates: ScanUpdates) -> ScanReport {
         let take_out = |(index, updates): (TileIndex, TileUpdates)| {
             let tile = self.tiles.remove(&index);
-            (tile.unwrap_or_else(|| Box::new(Tile::empty(&self.config, index))), updates)
+            (tile.unwrap_or_else(|| Box::new(Tile::empty(&self.config.grid, &self.octrees, index))), updates)
         };
         let mut touched: Vec<(Box<Tile>, TileUpdates)> = updates.tiles.into_iter().map(take_out).collect();
         let model = &self.config.sensor_model;
@@ -78,6 +83,7 @@ impl MapView for InMemoryMapper {
             tiles,
             cached_tiles: tiles,
             dirty_tiles: tiles,
+            octrees: self.octrees.statistics(),
             ..MapStatistics::default()
         };
         self.tiles.values().for_each(|tile| statistics.cached += tile.counts());
@@ -87,8 +93,7 @@ impl MapView for InMemoryMapper {
 
 impl Mapper for InMemoryMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        let MapConfig { grid, sensor_model, rays, .. } = &self.config;
-        let updates = self.tracer.trace(grid, sensor_model, rays, scan)?;
+        let updates = trace(&mut self.tracer, &self.config, scan)?;
         Ok(self.accept(updates))
     }
 

@@ -5,7 +5,7 @@ use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
 use crate::store::{Disk, FsDisk, Metadata, TileStore};
-use crate::tile::Tile;
+use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,6 +18,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Debug)]
 pub struct MapReader {
     config: MapConfig,
+    octrees: OctreeFactory,
     store: TileStore,
     disk: Arc<dyn Disk>,
     cache: Mutex<ReaderCache>,
@@ -46,7 +47,8 @@ impl MapReader {
         config.cache_tiles = cache_tiles;
         let config = config.validated()?;
         let cache = ReaderCache { tiles: LruCache::unbounded(), io: IoCounts::default() };
-        Ok(Self { config, store, disk, cache: Mutex::new(cache) })
+        let octrees = OctreeFactory::default();
+        Ok(Self { config, octrees, store, disk, cache: Mutex::new(cache) })
     }
 
     /// The configuration that a map was made with, to go on with it. What only concerns a run has its defaults.
@@ -102,7 +104,8 @@ impl MapReader {
     }
 
     fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-        tile_files::load(&self.store, &self.config, index).map_err(|error| self.explain(error))
+        tile_files::load(&self.store, &self.config.grid, &self.octrees, index)
+            .map_err(|error| self.explain(error))
     }
 
     /// A tile that does not match the log is damage, unless a writer has flushed since and did not see this reader.

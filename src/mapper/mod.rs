@@ -21,6 +21,7 @@ mod residency;
 mod statistics;
 pub(crate) mod tile_files;
 mod tile_ref;
+mod trace;
 mod traits;
 
 pub use in_memory::InMemoryMapper;

@@ -1,5 +1,6 @@
 use super::map_id::new_map_id;
 use super::residency::{Input, Residency, new_metadata};
+use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
@@ -209,8 +210,7 @@ impl MapView for OutOfCoreTileMapper {
 
 impl Mapper for OutOfCoreTileMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        let MapConfig { grid, sensor_model, rays, .. } = &self.config;
-        let updates = self.tracer.trace(grid, sensor_model, rays, scan)?;
+        let updates = trace(&mut self.tracer, &self.config, scan)?;
         self.accept(updates)
     }
 

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::scan::{ScanUpdates, TileUpdates};
 use crate::space::TileIndex;
 use crate::store::{Extension, Metadata, TileStore, hex};
-use crate::tile::Tile;
+use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -22,6 +22,8 @@ pub(super) struct Residency {
     config: MapConfig,
     store: TileStore,
     tiles: LruCache<TileIndex, Arc<Tile>>,
+    /// After the tiles: what is in flight to octrees goes with these, and need not be written any more.
+    octrees: OctreeFactory,
     pending: Pending,
     /// Tiles on disk that were read or written since the map was opened, and so are known to be whole. Updates wait
     /// only for these, so that a damaged tile is found before a scan is accepted.
@@ -47,6 +49,7 @@ impl Residency {
             ext.input_fingerprint.clone().map(|fingerprint| Input { fingerprint, first_scan })
         });
         Self {
+            octrees: OctreeFactory::new(config.octree),
             config,
             store,
             tiles: LruCache::unbounded(),
@@ -90,7 +93,7 @@ impl Residency {
                 && !self.exists(index)
                 && self.tiles.len() < self.config.cache_tiles
             {
-                self.tiles.put(index, Arc::new(Tile::empty(&self.config, index)));
+                self.tiles.put(index, Arc::new(Tile::empty(&self.config.grid, &self.octrees, index)));
             }
             // The tile becomes the one used last.
             match self.tiles.get(&index) {
@@ -206,7 +209,7 @@ impl Residency {
             return Err(Error::UnsavedChanges { tile: index });
         }
         // All that may fail comes before anything is let go.
-        let loaded = tile_files::load(&self.store, &self.config, index)?;
+        let loaded = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)?;
         if loaded.is_some() && !self.tiles.contains(&index) {
             self.make_room(scan_number)?;
         }
@@ -246,6 +249,7 @@ impl Residency {
                 .filter_map(|tile| self.store.stamp(tile))
                 .map(|stamp| stamp.table.bytes + stamp.octree.bytes)
                 .sum(),
+            octrees: self.octrees.statistics(),
             io: self.io,
             ..MapStatistics::default()
         };
@@ -270,14 +274,14 @@ impl Residency {
 
     /// The tile as it is on disk, with what waits for it applied.
     fn read(&mut self, index: TileIndex) -> Result<Tile> {
-        let mut tile = match tile_files::load(&self.store, &self.config, index)? {
+        let mut tile = match tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
             Some((tile, bytes)) => {
                 self.io.loads += 1;
                 self.io.bytes_read += bytes;
                 self.known_whole.insert(index);
                 tile
             }
-            None => Tile::empty(&self.config, index),
+            None => Tile::empty(&self.config.grid, &self.octrees, index),
         };
         for updates in self.pending.of(index) {
             tile.apply(&self.config.sensor_model, updates);
@@ -336,7 +340,7 @@ impl Residency {
             if self.store.stamp(index).is_some() {
                 continue; // Written by an earlier attempt.
             }
-            if let Some((tile, _)) = tile_files::load(&self.store, &self.config, index)? {
+            if let Some((tile, _)) = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
                 tile_files::save(&mut self.store, &self.config, &tile, 0)?;
             }
         }

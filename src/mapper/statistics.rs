@@ -1,4 +1,4 @@
-use crate::tile::TileCounts;
+use crate::tile::{OctreeStatistics, TileCounts};
 use serde::Serialize;
 
 /// Sizes of a map and of what it holds in memory.
@@ -23,6 +23,8 @@ pub struct MapStatistics {
     pub pending_bytes: u64,
     /// Bytes on disk in tables and octrees, the latest version of each tile.
     pub disk_bytes: u64,
+    /// The work done for pointer trees since the map was opened.
+    pub octrees: OctreeStatistics,
     /// What went to disk and came back.
     pub io: IoCounts,
 }

@@ -5,7 +5,7 @@ use crate::error::{Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
 use crate::store::{FileStamp, MapParameters, StoredTile, TileFile, TileStamp, TileStore, hex};
 use crate::tile::format::{DecodedTable, Trailer, read_table, write_table};
-use crate::tile::{Table, Tile};
+use crate::tile::{OctreeFactory, Table, Tile};
 
 /// Writes the next version of a tile's files.
 pub(crate) fn save(
@@ -34,9 +34,14 @@ pub(crate) fn save(
 }
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
-pub(crate) fn load(store: &TileStore, config: &MapConfig, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-    let Some(read) = load_table(store, &config.grid, index)? else { return Ok(None) };
-    Ok(Some((Tile::from_table(config, index, read.table), read.file.bytes)))
+pub(crate) fn load(
+    store: &TileStore,
+    grid: &Grid,
+    octrees: &OctreeFactory,
+    index: TileIndex,
+) -> Result<Option<(Tile, u64)>> {
+    let Some(read) = load_table(store, grid, index)? else { return Ok(None) };
+    Ok(Some((Tile::from_table(grid, octrees, index, read.table), read.file.bytes)))
 }
 
 /// Reads the latest version of a tile's table; `None` if there is none.

@@ -206,7 +206,7 @@ mod tests {
             let flat = (1.0 - up * up).sqrt() * reach;
             let point =
                 [origin[0] + flat * azimuth.cos(), origin[1] + flat * azimuth.sin(), origin[2] + up * reach];
-            end(point, k % 11 != 0)
+            end(point, !k.is_multiple_of(11))
         };
         (0..rays).map(ray).collect()
     }

@@ -86,7 +86,7 @@ mod tests {
     fn at(rule: &RangeRule, x: f64) -> &'static str {
         match rule.apply([x, 0.0, 0.0], &mut SkippedPoints::default()) {
             Ranged::Hit(point) if point == [x, 0.0, 0.0] => "hit",
-            Ranged::Cut(point) if point == [2.0, 0.0, 0.0] => "cut",
+            Ranged::Cut([2.0, 0.0, 0.0]) => "cut",
             Ranged::Skipped => "skipped",
             _ => "elsewhere",
         }

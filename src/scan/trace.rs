@@ -1,6 +1,7 @@
 use super::counted_brick::MAX_RAYS;
 use super::every_ray::{EveryRayCollector, updates_in_order};
 use super::once::{BATCH, OnceCollector};
+use super::ordered::OrderedCollector;
 use super::range::{RangeRule, Ranged};
 use super::ray::MAX_RAY_STEPS;
 use super::ray_end::RayEnd;
@@ -48,6 +49,28 @@ impl ScanTracer {
         match rays.insert_mode {
             InsertMode::PerScan => Ok(fan.once_a_voxel(&mut self.once)),
             InsertMode::PerRay => Ok(fan.every_ray(&mut self.every_ray)),
+        }
+    }
+
+    /// The same, but where every ray counts the updates of a tile come one by one, in the order in which the rays
+    /// make them: for whom the order of different voxels matters too.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanTracer::trace`].
+    pub fn trace_in_order(
+        &mut self,
+        grid: &Grid,
+        model: &SensorModel,
+        rays: &RayConfig,
+        scan: &Scan,
+    ) -> Result<ScanUpdates> {
+        match rays.insert_mode {
+            InsertMode::PerScan => self.trace(grid, model, rays, scan),
+            InsertMode::PerRay => {
+                check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
+                Ok(Fan::new(grid, model, rays, scan)?.every_ray_in_order())
+            }
         }
     }
 
@@ -146,6 +169,21 @@ impl<'a> Fan<'a> {
             report
         });
         updates_in_order(self.grid, collectors, report)
+    }
+
+    /// The same, with every update for itself.
+    fn every_ray_in_order(&self) -> ScanUpdates {
+        let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
+        let points = 0..self.scan.points.len();
+        let mut report = ScanReport { points: points.len() as u64, ..ScanReport::default() };
+        for end in points.filter_map(|number| self.ray(number, &mut report)) {
+            let walk = SlabRay::new(&self.origin, end).walk();
+            walk.for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
+            if let Some(intensity) = end.hit {
+                collector.push(end.voxel, Observation::Hit(intensity));
+            }
+        }
+        collector.into_updates(report)
     }
 
     /// Gives each thread a part of the points, and each part a collector, in order. No part has more than `most` points.

@@ -95,22 +95,28 @@ impl BrickOctree {
 
     /// Largest log-odds under the node at `depth` (1 to 16) that holds `code`; `None` if all are unknown.
     pub(super) fn max_under(&self, table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
-        if depth >= BRICK_DEPTH {
-            return table.max_under(code, depth);
-        }
-        if self.is_synced {
+        if self.is_synced && depth < BRICK_DEPTH {
             let level = usize::from(BRICK_DEPTH - 1 - depth);
             let nodes = &self.nodes[self.begin(level)..self.ends[level] as usize];
             let prefix = code.0 / MortonCode::span(depth);
             let found = nodes.binary_search_by_key(&prefix, |node| node.prefix);
             return found.ok().map(|number| nodes[number].max);
         }
-        let first = code.ancestor(depth).brick().0;
-        let bricks = first..first + MortonCode::span(depth) / MortonCode::span(BRICK_DEPTH);
-        table.max_of_bricks(BrickCode(bricks.start)..BrickCode(bricks.end))
+        max_in_table(table, code, depth)
     }
 
     fn begin(&self, level: usize) -> usize {
         if level == 0 { 0 } else { self.ends[level - 1] as usize }
     }
+}
+
+/// Largest log-odds of a table's voxels under the node at `depth` (1 to 16) that holds `code`, from the voxels
+/// themselves; `None` if all are unknown.
+pub(super) fn max_in_table(table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
+    if depth >= BRICK_DEPTH {
+        return table.max_under(code, depth);
+    }
+    let first = code.ancestor(depth).brick().0;
+    let bricks = first..first + MortonCode::span(depth) / MortonCode::span(BRICK_DEPTH);
+    table.max_of_bricks(BrickCode(bricks.start)..BrickCode(bricks.end))
 }

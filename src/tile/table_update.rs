@@ -41,6 +41,33 @@ impl Table {
 
     /// Applies updates of single voxels in their order; `first` is the tile's lowest voxel.
     pub fn update_in_order(&mut self, model: &SensorModel, first: VoxelIndex, updates: &OrderedUpdates) {
+        self.update_each(model, first, updates, |_, _, _| {});
+    }
+
+    /// The same, and after each update its voxel's log-odds are told.
+    pub(super) fn update_in_order_and_tell(
+        &mut self,
+        model: &SensorModel,
+        first: VoxelIndex,
+        updates: &OrderedUpdates,
+        mut tell: impl FnMut(MortonCode, f64),
+    ) {
+        self.update_each(model, first, updates, |table, number, place| {
+            let brick = &table.bricks[number];
+            if let Some(evidence) = brick.get(place, &table.palette) {
+                tell(brick.code().voxel(place), evidence.log_odds);
+            }
+        });
+    }
+
+    /// Applies updates of single voxels in their order; after each, `visit` is given the brick's number and the place.
+    fn update_each(
+        &mut self,
+        model: &SensorModel,
+        first: VoxelIndex,
+        updates: &OrderedUpdates,
+        mut visit: impl FnMut(&Self, usize, usize),
+    ) {
         self.palette.use_model(model);
         let first = VoxelKey::from_index(first).0;
         // Rays fan out through the same few bricks again and again: those near each other have each their entry.
@@ -53,7 +80,9 @@ impl Table {
             if entry.0 != brick {
                 *entry = (brick, self.number_of(VoxelKey(key).morton().brick()));
             }
-            self.step(entry.1, place_of_voxel(key.map(i32::from)), observation);
+            let (number, place) = (entry.1, place_of_voxel(key.map(i32::from)));
+            self.step(number, place, observation);
+            visit(self, number, place);
         }
     }
 

@@ -1,13 +1,12 @@
+use super::OctreeFactory;
 use super::table::Table;
 use super::tile_octree::TileOctree;
 use super::voxel_cache::VoxelCacheCounts;
-use crate::config::MapConfig;
 use crate::octree::Octree;
 use crate::scan::TileUpdates;
 use crate::sensor::{Evidence, SensorModel};
-use crate::space::{BrickCode, MortonCode, TileIndex, VoxelBox, VoxelIndex, VoxelKey};
+use crate::space::{BrickCode, Grid, MortonCode, TileIndex, VoxelBox, VoxelIndex, VoxelKey};
 use serde::Serialize;
-use std::borrow::Cow;
 use std::ops::AddAssign;
 
 /// One tile of the map: its exact table, and its octree.
@@ -41,22 +40,22 @@ pub struct TileCounts {
     pub table_bytes: u64,
     /// Bytes of memory in octrees.
     pub octree_bytes: u64,
-    /// Bytes of memory in voxel caches.
+    /// Bytes of memory in voxel caches, and on the way from these to octrees.
     pub voxel_cache_bytes: u64,
-    /// What the voxel caches have seen.
+    /// What the voxel caches of these tiles have seen.
     pub voxel_cache: VoxelCacheCounts,
 }
 
 impl Tile {
     /// A tile in which nothing was observed yet.
-    pub fn empty(config: &MapConfig, index: TileIndex) -> Self {
-        Self::from_table(config, index, Table::default())
+    pub fn empty(grid: &Grid, octrees: &OctreeFactory, index: TileIndex) -> Self {
+        Self::from_table(grid, octrees, index, Table::default())
     }
 
     /// The tile of a table, its octree derived.
-    pub fn from_table(config: &MapConfig, index: TileIndex, mut table: Table) -> Self {
-        let octree = TileOctree::of_table(&config.octree, &mut table);
-        Self { index, voxels: config.grid.voxels_of_tile(index), table, octree, is_dirty: false }
+    pub fn from_table(grid: &Grid, octrees: &OctreeFactory, index: TileIndex, mut table: Table) -> Self {
+        let octree = octrees.octree_of(&mut table);
+        Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }
 
     /// Which tile this is.
@@ -134,8 +133,8 @@ impl Tile {
         self.octree.sync(&mut self.table);
     }
 
-    /// OctoMap's tree of the tile, up to date: borrowed where the tile has one that is, else made.
-    pub fn octree(&self) -> Cow<'_, Octree> {
+    /// OctoMap's tree of the tile, up to date.
+    pub fn octree(&self) -> Octree {
         self.octree.tree(&self.table)
     }
 
@@ -150,6 +149,11 @@ impl Tile {
             voxel_cache_bytes: cache_bytes as u64,
             voxel_cache: self.octree.cache_counts(),
         }
+    }
+
+    #[cfg(test)]
+    pub(super) fn tile_octree(&self) -> &TileOctree {
+        &self.octree
     }
 
     /// Bytes of memory that the tile occupies.

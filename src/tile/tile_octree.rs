@@ -1,36 +1,20 @@
 use super::brick_octree::BrickOctree;
-use super::cached_octree::CachedOctree;
+use super::pointer_octree::PointerOctree;
 use super::table::Table;
 use super::voxel_cache::VoxelCacheCounts;
-use crate::config::OctreeConfig;
 use crate::octree::Octree;
 use crate::scan::TileUpdates;
 use crate::sensor::SensorModel;
-use crate::space::{MortonCode, VoxelIndex, VoxelKey};
-use std::borrow::Cow;
+use crate::space::{MortonCode, VoxelIndex};
 
 /// The octree of a tile, in the form that was chosen. Both forms give the same answers.
 #[derive(Clone, Debug)]
 pub(super) enum TileOctree {
     Bricks(BrickOctree),
-    Cached(Box<CachedOctree>),
+    Pointers(Box<PointerOctree>),
 }
 
 impl TileOctree {
-    /// The octree of a table, up to date.
-    pub(super) fn of_table(config: &OctreeConfig, table: &mut Table) -> Self {
-        match config {
-            OctreeConfig::Bricks => {
-                let mut octree = BrickOctree::default();
-                octree.sync(table);
-                Self::Bricks(octree)
-            }
-            OctreeConfig::Cached(cache) => {
-                Self::Cached(Box::new(CachedOctree::from_voxels(cache, table.iter())))
-            }
-        }
-    }
-
     /// Applies updates to the table, and learns of them; `first` is the tile's lowest voxel.
     pub(super) fn apply(
         &mut self,
@@ -52,7 +36,7 @@ impl TileOctree {
                     TileUpdates::Ordered(updates) => table.update_in_order(model, first, updates),
                 }
             }
-            Self::Cached(octree) => apply_cached(octree, table, model, first, updates),
+            Self::Pointers(octree) => octree.apply(table, model, first, updates),
         }
     }
 
@@ -61,7 +45,7 @@ impl TileOctree {
     pub(super) fn max_under(&self, table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
         match self {
             Self::Bricks(octree) => octree.max_under(table, code, depth),
-            Self::Cached(octree) => octree.max_under(code, depth),
+            Self::Pointers(octree) => octree.max_under(table, code, depth),
         }
     }
 
@@ -69,7 +53,7 @@ impl TileOctree {
     pub(super) fn is_synced(&self) -> bool {
         match self {
             Self::Bricks(octree) => octree.is_synced(),
-            Self::Cached(octree) => octree.synced().is_some(),
+            Self::Pointers(octree) => octree.is_synced(),
         }
     }
 
@@ -77,23 +61,18 @@ impl TileOctree {
     pub(super) fn sync(&mut self, table: &mut Table) {
         match self {
             Self::Bricks(octree) => octree.sync(table),
-            Self::Cached(octree) => {
-                octree.sync();
-            }
+            Self::Pointers(octree) => octree.sync(table),
         }
     }
 
-    /// OctoMap's tree, up to date: borrowed where there is one, else made.
-    pub(super) fn tree(&self, table: &Table) -> Cow<'_, Octree> {
+    /// OctoMap's tree, up to date.
+    pub(super) fn tree(&self, table: &Table) -> Octree {
         match self {
             Self::Bricks(_) => {
                 let voxels = table.iter().map(|(code, evidence)| (code, evidence.log_odds as f32));
-                Cow::Owned(Octree::from_sorted(voxels))
+                Octree::from_sorted(voxels)
             }
-            Self::Cached(octree) => match octree.synced() {
-                Some(octree) => Cow::Borrowed(octree),
-                None => Cow::Owned(octree.clone().into_octree()),
-            },
+            Self::Pointers(octree) => octree.tree(table),
         }
     }
 
@@ -101,7 +80,7 @@ impl TileOctree {
     pub(super) fn node_count(&self) -> u64 {
         match self {
             Self::Bricks(octree) => octree.node_count(),
-            Self::Cached(octree) => octree.node_count(),
+            Self::Pointers(octree) => octree.node_count(),
         }
     }
 
@@ -109,9 +88,9 @@ impl TileOctree {
     pub(super) fn bytes(&self) -> (usize, usize) {
         match self {
             Self::Bricks(octree) => (octree.bytes(), 0),
-            Self::Cached(octree) => {
+            Self::Pointers(octree) => {
                 let (tree, cache) = octree.bytes();
-                (tree + size_of::<CachedOctree>(), cache)
+                (tree + size_of::<PointerOctree>(), cache)
             }
         }
     }
@@ -120,49 +99,7 @@ impl TileOctree {
     pub(super) fn cache_counts(&self) -> VoxelCacheCounts {
         match self {
             Self::Bricks(_) => VoxelCacheCounts::default(),
-            Self::Cached(octree) => octree.cache_counts(),
+            Self::Pointers(octree) => octree.cache_counts(),
         }
     }
-}
-
-/// The cache sees every update, one by one.
-fn apply_cached(
-    octree: &mut CachedOctree,
-    table: &mut Table,
-    model: &SensorModel,
-    first: VoxelIndex,
-    updates: &TileUpdates,
-) {
-    match updates {
-        TileUpdates::Once(bricks) => {
-            for update in bricks {
-                table.update_brick(model, update);
-                for (code, evidence) in table.voxels_of_mask(update.brick, update.touched()) {
-                    octree.put(code, evidence.log_odds);
-                }
-            }
-        }
-        TileUpdates::Runs(bricks) => {
-            for update in bricks {
-                table.update_runs(model, update);
-                for run in &update.runs {
-                    let code = update.brick.voxel(run.place.into());
-                    if let Some(evidence) = table.get(code) {
-                        octree.put(code, evidence.log_odds);
-                    }
-                }
-            }
-        }
-        TileUpdates::Ordered(updates) => {
-            for (offset, observation) in updates.iter() {
-                let voxel = std::array::from_fn(|k| first[k].wrapping_add(offset[k]));
-                let code = VoxelKey::from_index(voxel).morton();
-                table.update(model, code, observation);
-                if let Some(evidence) = table.get(code) {
-                    octree.put(code, evidence.log_odds);
-                }
-            }
-        }
-    }
-    octree.end_scan();
 }

@@ -1,6 +1,6 @@
 use crate::space::MortonCode;
 use serde::Serialize;
-use std::ops::AddAssign;
+use std::ops::{AddAssign, Sub};
 
 /// The cache of OctoCache (Chen et al., ASPLOS 2025, sections 4.1 to 4.3): it takes every update of a voxel and
 /// passes on to the octree only what leaves it.
@@ -32,8 +32,17 @@ pub struct VoxelCacheCounts {
     pub hits: u64,
     /// Updates of voxels that were not.
     pub misses: u64,
-    /// Voxels passed on to the octree.
+    /// Voxels passed on to the octree because their buckets were full.
     pub evictions: u64,
+    /// Voxels passed on because the octree was brought up to date.
+    pub drained: u64,
+}
+
+impl VoxelCacheCounts {
+    /// Hits among all updates, 0 to 1; 0 if there were none.
+    pub fn hit_rate(&self) -> f64 {
+        self.hits as f64 / (self.hits + self.misses).max(1) as f64
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -140,13 +149,15 @@ impl VoxelCache {
             let surplus = bucket.len() - self.tau;
             evicted.extend(bucket.drain(..surplus).map(|cell| (cell.code, cell.log_odds)));
         }
+        self.counts.evictions += evicted.len() as u64;
         self.in_morton_order(evicted)
     }
 
     /// Empties the cache and returns its voxels in Morton order.
     pub fn drain(&mut self) -> Vec<(MortonCode, f32)> {
         let cells = self.buckets.iter_mut().flat_map(|bucket| bucket.drain(..));
-        let drained = cells.map(|cell| (cell.code, cell.log_odds)).collect();
+        let drained: Vec<_> = cells.map(|cell| (cell.code, cell.log_odds)).collect();
+        self.counts.drained += drained.len() as u64;
         self.overfull.clear();
         (self.scan, self.voxels_of_scan) = (self.scan.wrapping_add(1), 0);
         self.in_morton_order(drained)
@@ -155,7 +166,6 @@ impl VoxelCache {
     fn in_morton_order(&mut self, mut evicted: Vec<(MortonCode, f32)>) -> Vec<(MortonCode, f32)> {
         evicted.sort_unstable_by_key(|&(code, _)| code);
         self.len -= evicted.len();
-        self.counts.evictions += evicted.len() as u64;
         evicted
     }
 
@@ -171,11 +181,26 @@ impl VoxelCache {
     }
 }
 
+impl Sub for VoxelCacheCounts {
+    type Output = Self;
+
+    /// What came after `before`.
+    fn sub(self, before: Self) -> Self {
+        Self {
+            hits: self.hits - before.hits,
+            misses: self.misses - before.misses,
+            evictions: self.evictions - before.evictions,
+            drained: self.drained - before.drained,
+        }
+    }
+}
+
 impl AddAssign for VoxelCacheCounts {
     fn add_assign(&mut self, other: Self) {
         self.hits += other.hits;
         self.misses += other.misses;
         self.evictions += other.evictions;
+        self.drained += other.drained;
     }
 }
 
@@ -202,8 +227,9 @@ mod tests {
         assert_eq!(cache.evict(), [(MortonCode(8), 80.0), (MortonCode(16), 16.0)]);
         assert_eq!(cache.get(MortonCode(12)), Some(12.0));
         assert_eq!(cache.get(MortonCode(16)), None);
-        assert_eq!(cache.counts(), VoxelCacheCounts { hits: 2, misses: 6, evictions: 2 });
+        assert_eq!(cache.counts(), VoxelCacheCounts { hits: 2, misses: 6, evictions: 2, drained: 0 });
         assert_eq!(codes(cache.drain()), [1, 4, 5, 12]);
+        assert_eq!(cache.counts().drained, 4);
         assert!(cache.is_empty());
     }
 
@@ -218,6 +244,21 @@ mod tests {
         }
         assert_eq!(cache.counts().misses, 1000);
         assert_eq!(cache.counts().hits, 1000);
+    }
+
+    #[test]
+    fn a_cache_that_fits_itself_has_three_to_six_times_the_room_of_the_largest_scan() {
+        for tau in [1, 4, 6] {
+            let mut cache = VoxelCache::new(tau, None);
+            for voxels in [1000, 37, 1750, 600] {
+                (0..voxels).for_each(|code| cache.put(MortonCode(code * 5), 1.0));
+                (0..voxels).for_each(|code| cache.put(MortonCode(code * 5), 2.0));
+                cache.evict();
+                let room = cache.buckets.len() * tau;
+                let largest = if voxels < 1750 && room < 3 * 1750 { 1000 } else { 1750 };
+                assert!((3 * largest..6 * largest).contains(&room), "{room} for {largest}, tau {tau}");
+            }
+        }
     }
 
     #[test]

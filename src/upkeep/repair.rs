@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::mapper::{config_from, tile_files};
 use crate::space::TileIndex;
 use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Remains, TileFile, TileStore, hex};
-use crate::tile::Tile;
+use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -270,7 +270,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         } else {
             // Another writer's octree cannot be had again: the tile is written anew with the present one.
             let scan_number = table.trailer.map_or(0, |trailer| trailer.scan_number);
-            let tile = Tile::from_table(config, tile, table.table);
+            let tile = Tile::from_table(&config.grid, &OctreeFactory::default(), tile, table.table);
             tile_files::save(store, config, &tile, scan_number)?;
             let (metadata, scan_number) = (store.metadata().clone(), store.commits().scan_number);
             store.commit(metadata, scan_number)?;

@@ -149,6 +149,55 @@ fn the_same_scans_give_the_same_digest_whatever_the_cache() {
     assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
+#[test]
+fn the_same_scans_give_the_same_digest_whatever_the_octree_and_its_cache() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let choices: [(&[&str], _); 7] = [
+        (&[], None),
+        (&["--octree", "bricks", "--voxel-cache", "off"], None),
+        (&["--octree", "pointers"], Some("none")),
+        (&["--octree", "pointers", "--voxel-cache", "off"], Some("none")),
+        (&["--voxel-cache", "serial"], Some("serial")),
+        (&["--voxel-cache", "serial", "--tau", "1", "--buckets", "1"], Some("serial")),
+        (
+            &["--octree", "pointers", "--voxel-cache", "parallel", "--tau", "1", "--buckets", "2"],
+            Some("parallel"),
+        ),
+    ];
+    let mut digests = Vec::new();
+    for (number, (choice, cache)) in choices.into_iter().enumerate() {
+        let map = folder.path().join(number.to_string());
+        let build =
+            ["build", text(&scans), "-o", text(&map), "--insert", "per-ray", "--cache-tiles", "2", "--json"];
+        let summary = json(&[&build, choice].concat());
+        let of = |name: &str| summary.pointer(&format!("/octrees/{name}")).and_then(Value::as_u64);
+        assert_eq!(summary.get("octrees").is_some(), cache.is_some(), "{choice:?}");
+        assert_eq!(of("voxels_written").is_some_and(|voxels| voxels > 0), cache.is_some(), "{summary}");
+        let has_cache = matches!(cache, Some("serial" | "parallel"));
+        assert_eq!(of("voxel_cache/hits").is_some_and(|hits| hits > 0), has_cache, "{summary}");
+        assert_eq!(summary.pointer("/octrees/hit_rate").is_some(), has_cache, "{summary}");
+        assert_eq!(
+            of("queue/voxels_in").is_some_and(|voxels| voxels > 0),
+            cache == Some("parallel"),
+            "{summary}"
+        );
+        digests.push(output(&["digest", text(&map)]));
+    }
+    assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
+
+    let map = folder.path().join("told");
+    let told = output(&["build", text(&scans), "-o", text(&map), "--voxel-cache", "parallel"]);
+    for line in ["cache     ", "hit rate", "octrees   ", "queue     ", "stages    "] {
+        assert!(told.contains(line), "{told}");
+    }
+    let told = output(&["build", text(&scans), "-o", text(&map), "--append", "--voxel-cache", "serial"]);
+    assert!(told.contains("hit rate") && !told.contains("queue"), "{told}");
+    let out = folder.path().join("demo");
+    let demo = ["demo", "--out", text(&out), "--length", "4", "--voxel-cache", "parallel", "--json"];
+    assert!(json(&demo).pointer("/octrees/voxel_cache/misses").and_then(Value::as_u64) > Some(0));
+}
+
 /// What was typed, the exit code, and what the message must say.
 #[test]
 fn bad_inputs_get_one_line_that_says_what_to_do() {
@@ -204,6 +253,37 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
             "max range: 0 is not a length above the min range",
         ),
         (vec!["build", scans, "-o", new, "--cache-tiles", "0"], 2, "cache tiles: 0 is not at least 1"),
+        (vec!["build", scans, "-o", new, "--octree", "trees"], 2, "--octree"),
+        (vec!["build", scans, "-o", new, "--voxel-cache", "maybe"], 2, "--voxel-cache"),
+        (vec!["build", scans, "-o", new, "--voxel-cache", "serial", "--tau", "x"], 2, "--tau"),
+        (vec!["build", scans, "-o", new, "--voxel-cache", "serial", "--tau", "-1"], 2, "--tau"),
+        (
+            vec!["build", scans, "-o", new, "--voxel-cache", "serial", "--tau", "0"],
+            2,
+            "tau: 0 is not 1 to 65536",
+        ),
+        (
+            vec!["build", scans, "-o", new, "--voxel-cache", "parallel", "--buckets", "48"],
+            2,
+            "buckets: 48 is not a power of two up to 2^24",
+        ),
+        (
+            vec!["build", scans, "-o", new, "--voxel-cache", "serial", "--buckets", "33554432"],
+            2,
+            "buckets: 33554432 is not a power of two up to 2^24",
+        ),
+        (vec!["build", scans, "-o", new, "--tau", "4"], 2, "--tau, --buckets: only voxel caches have these"),
+        (
+            vec!["build", scans, "-o", new, "--octree", "pointers", "--voxel-cache", "off", "--buckets", "4"],
+            2,
+            "add --voxel-cache serial or --voxel-cache parallel",
+        ),
+        (
+            vec!["build", scans, "-o", new, "--octree", "bricks", "--voxel-cache", "serial"],
+            2,
+            "--voxel-cache: bricks have no voxel cache",
+        ),
+        (vec!["demo", "--out", new, "--tau", "4"], 2, "--tau, --buckets: only voxel caches have these"),
         (
             vec!["build", scans, "-o", map, "--append", "--resolution", "0.2"],
             2,

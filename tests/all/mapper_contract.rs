@@ -9,7 +9,7 @@ use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
 use voxtile::space::{TileIndex, VoxelKey};
-use voxtile::{InsertMode, MapConfig};
+use voxtile::{InsertMode, MapConfig, VoxelCacheConfig, VoxelCacheMode};
 
 /// Small tiles, so that a scan of a few metres touches many.
 fn config() -> MapConfig {
@@ -164,7 +164,9 @@ fn the_answer_does_not_depend_on_the_form_of_the_octree_and_coarse_answers_are_t
     let mut digests = Vec::new();
     let mut nodes = Vec::new();
     let cached = [(1, Some(1)), (2, Some(64)), (4, None), (16, Some(4096))];
-    let cached = cached.map(|(tau, buckets)| config().with_voxel_cache(tau, buckets));
+    let cached = cached.map(|(tau, buckets)| {
+        config().with_voxel_cache(VoxelCacheMode::Serial(VoxelCacheConfig::new(tau, buckets)))
+    });
     for config in cached.into_iter().chain([config()]) {
         let mut mapper = InMemoryMapper::new(config).unwrap();
         let mut random = Random(5);

@@ -9,6 +9,9 @@
 
 /// SIGKILL at random times, resumed until the end.
 mod killed;
+/// The thread that writes octrees: one, asleep when idle, gone with its mapper.
+#[cfg(target_os = "linux")]
+mod octree_worker;
 /// Readers beside a writer see one flush whole.
 mod readers;
 /// A disk that is full or only for reading, and too many open files.

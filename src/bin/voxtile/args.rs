@@ -91,6 +91,45 @@ pub struct BuildArgs {
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub octree: OctreeArgs,
+}
+
+/// What tiles keep for coarse questions; no answer and no file depends on it.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Octrees (the map is the same with any)")]
+pub struct OctreeArgs {
+    /// What tiles keep for coarse questions [default: bricks, or pointers with a voxel cache]
+    #[arg(long, value_name = "FORM")]
+    pub octree: Option<OctreeName>,
+    /// What stands between updates and the pointer octree; serial and parallel imply --octree pointers [default: off]
+    #[arg(long, value_name = "MODE")]
+    pub voxel_cache: Option<VoxelCacheName>,
+    /// Most voxels that a bucket of a voxel cache keeps after a scan, 1 to 65536 [default: 4]
+    #[arg(long, value_name = "N")]
+    pub tau: Option<usize>,
+    /// Number of buckets of each tile's voxel cache, a power of two [default: as many as hold 3 times the voxels that a
+    /// scan has in the tile]
+    #[arg(long, value_name = "N")]
+    pub buckets: Option<usize>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OctreeName {
+    /// A view of the voxels themselves, which needs no cache
+    Bricks,
+    /// OctoMap's pointer tree, for study and comparison: much slower, ten times the memory
+    Pointers,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum VoxelCacheName {
+    /// None: every update goes straight into a pointer octree (OctoMap); bricks never have one
+    Off,
+    /// After each scan, what leaves the cache goes into the pointer octree (OctoCache)
+    Serial,
+    /// The same, with the pointer octrees written by a thread of their own
+    Parallel,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -236,4 +275,6 @@ pub struct DemoArgs {
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub octree: OctreeArgs,
 }

@@ -1,6 +1,7 @@
 use crate::INTERRUPTED;
 use crate::args::{BuildArgs, InsertName, ModelName};
 use crate::flush_schedule::FlushSchedule;
+use crate::octree_choice::octree_config;
 use crate::progress::Progress;
 use crate::summary::Summary;
 use std::path::Path;
@@ -178,6 +179,7 @@ fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig
     let mut config = config
         .with_sensor_model(sensor_model)
         .with_insert_mode(insert_mode)
+        .with_octree(octree_config(&args.octree)?)
         .with_cache_tiles(args.cache_tiles);
     config.rays.min_range_m = min_range_m;
     config.rays.max_range_m = args.max_range.or(begun_max_m);

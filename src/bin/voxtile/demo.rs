@@ -1,4 +1,5 @@
 use crate::args::{ColorName, DemoArgs};
+use crate::octree_choice::octree_config;
 use crate::picture::{ColorBy, TopDown, View};
 use crate::progress::Progress;
 use crate::summary::Summary;
@@ -26,6 +27,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     // Few tiles and little room for what waits, so that the demo shows the disk at work.
     let config = MapConfig::new(args.resolution, 10.0)?
         .with_range(0.0, 40.0)
+        .with_octree(octree_config(&args.octree)?)
         .with_cache_tiles(args.cache_tiles)
         .with_pending_bytes(4 << 20);
     let mut mapper = OutOfCoreTileMapper::create(&map, config)?;

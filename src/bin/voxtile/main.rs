@@ -9,6 +9,7 @@ mod flush_schedule;
 mod info;
 mod map_at;
 mod memory;
+mod octree_choice;
 mod octree_file;
 mod picture;
 mod progress;

@@ -1,11 +1,13 @@
 use crate::memory;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use voxtile::OctreeConfig;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::scan::ScanReport;
-use voxtile::tile::TileCounts;
+use voxtile::tile::{OctreeStatistics, TileCounts};
 
 /// What a build did, and what the map now is.
 #[derive(Debug, Serialize)]
@@ -24,11 +26,24 @@ pub struct Summary {
     pub cached_tiles: u64,
     /// Sizes of the tiles in memory at the end.
     pub cached: TileCounts,
+    /// The work for pointer octrees; missing where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub octrees: Option<OctreeWork>,
     pub disk_bytes: u64,
     pub loads: u64,
     pub saves: u64,
     pub seconds: f64,
     pub peak_memory_bytes: Option<u64>,
+}
+
+/// What was done for pointer octrees, from the start to the last flush.
+#[derive(Debug, Serialize)]
+pub struct OctreeWork {
+    /// Hits of the voxel caches among all updates; missing where there are no caches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hit_rate: Option<f64>,
+    #[serde(flatten)]
+    pub statistics: OctreeStatistics,
 }
 
 impl Summary {
@@ -55,6 +70,7 @@ impl Summary {
             tiles: statistics.tiles,
             cached_tiles: statistics.cached_tiles,
             cached: statistics.cached,
+            octrees: OctreeWork::of(mapper),
             disk_bytes: statistics.disk_bytes,
             loads: statistics.io.loads,
             saves: statistics.io.saves,
@@ -65,7 +81,6 @@ impl Summary {
 
     /// Prints the summary for a person, or as JSON.
     pub fn print(&self, json: bool) -> anyhow::Result<()> {
-        use std::io::Write;
         let mut out = std::io::stdout().lock();
         if json {
             writeln!(out, "{}", serde_json::to_string(self)?)?;
@@ -98,10 +113,50 @@ impl Summary {
             HumanBytes(octree_bytes),
             HumanBytes(voxel_cache_bytes)
         )?;
+        if let Some(octrees) = &self.octrees {
+            octrees.print(&mut out)?;
+        }
         writeln!(out, "tile I/O  {} read, {} written", HumanCount(self.loads), HumanCount(self.saves))?;
         if let Some(bytes) = self.peak_memory_bytes {
             writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
         }
         Ok(())
+    }
+}
+
+impl OctreeWork {
+    fn of(mapper: &impl MapView) -> Option<Self> {
+        let OctreeConfig::Pointers(cache) = mapper.config().octree else { return None };
+        let statistics = mapper.statistics().octrees;
+        let hit_rate = cache.cache().map(|_| statistics.voxel_cache.hit_rate());
+        Some(Self { hit_rate, statistics })
+    }
+
+    fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let OctreeStatistics { voxel_cache, voxels_written, queue, times, .. } = self.statistics;
+        if let Some(hit_rate) = self.hit_rate {
+            let (hits, misses) = (HumanCount(voxel_cache.hits), HumanCount(voxel_cache.misses));
+            let (evictions, drained) = (HumanCount(voxel_cache.evictions), HumanCount(voxel_cache.drained));
+            writeln!(out, "cache     {hits} hits, {misses} misses, hit rate {:.1} %", 100.0 * hit_rate)?;
+            writeln!(out, "          {evictions} voxels evicted, {drained} drained")?;
+        }
+        writeln!(out, "octrees   {} voxels written", HumanCount(voxels_written))?;
+        if queue.limit_voxels > 0 {
+            let (batches, voxels) = (HumanCount(queue.batches_in), HumanCount(queue.voxels_in));
+            let (peak, waits) = (HumanCount(queue.peak_voxels), HumanCount(queue.waits));
+            writeln!(
+                out,
+                "queue     {batches} batches of {voxels} voxels, {peak} at most at once, {waits} waits"
+            )?;
+        }
+        let stages = [
+            ("tables", times.table_update_ns),
+            ("cache", times.cache_insertion_ns),
+            ("eviction", times.eviction_ns),
+            ("enqueuing", times.enqueue_ns),
+            ("octrees", times.octree_update_ns),
+        ];
+        let stages = stages.map(|(name, ns)| format!("{name} {:.2} s", ns as f64 * 1e-9));
+        writeln!(out, "stages    {}", stages.join(", "))
     }
 }

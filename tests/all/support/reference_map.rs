@@ -12,11 +12,13 @@ pub type Voxels = BTreeMap<VoxelIndex, (u64, i32)>;
 pub struct ReferenceMap {
     pub config: MapConfig,
     pub voxels: Voxels,
+    /// The voxel of every update so far, in order.
+    pub updated: Vec<VoxelIndex>,
 }
 
 impl ReferenceMap {
     pub fn new(config: &MapConfig) -> Self {
-        Self { config: config.clone(), voxels: Voxels::new() }
+        Self { config: config.clone(), voxels: Voxels::new(), updated: Vec::new() }
     }
 
     pub fn insert_scan(&mut self, scan: &Scan) {
@@ -57,6 +59,7 @@ impl ReferenceMap {
         });
         let after = self.config.sensor_model.update(before, seen);
         self.voxels.insert(voxel, (after.log_odds.to_bits(), after.observation_count));
+        self.updated.push(voxel);
     }
 
     /// The voxels that a ray passes, and the one it hits.
