@@ -16,6 +16,7 @@ mod head_start;
 mod marked_page;
 mod once;
 mod ordered;
+mod packed_updates;
 mod range;
 mod ray;
 mod ray_end;
@@ -31,6 +32,7 @@ mod window;
 mod world_scan;
 
 pub use batch::PointBatch;
+pub use packed_updates::PackedUpdates;
 pub use ray::{MAX_RAY_STEPS, RayWalk};
 pub use report::{ScanReport, SkippedPoints};
 pub use trace::ScanTracer;

@@ -94,6 +94,15 @@ impl OrderedUpdates {
         }
     }
 
+    /// The packed voxels and the intensities, as [`OrderedUpdates::from_parts`] takes them.
+    pub(super) fn parts(&self) -> (&[u32], &[f32]) {
+        (&self.voxels, &self.intensities)
+    }
+
+    pub(super) fn from_parts(voxels: Vec<u32>, intensities: Vec<f32>) -> Self {
+        Self { voxels, intensities }
+    }
+
     /// The updates in order: the voxel relative to the tile's lowest, and what was observed.
     pub fn iter(&self) -> impl Iterator<Item = (VoxelIndex, Observation)> {
         let mut intensities = self.intensities.iter();
