@@ -40,12 +40,11 @@ impl Answer {
     pub fn markdown(&self, folder: &str, command: &str, machine: &str) -> String {
         let mut text = format!("`{command}`; {machine}.\n");
         for table in &self.tables {
-            text += &format!(
-                "\n{caption} ([CSV]({folder}/{file}.csv))\n\n{rows}",
-                caption = table.caption,
-                file = table.file,
-                rows = table.markdown()
-            );
+            let Table { caption, file, .. } = table;
+            text += &format!("\n{caption} ([CSV]({folder}/{file}.csv))\n");
+            if !table.is_only_csv {
+                text += &format!("\n{}", table.markdown());
+            }
         }
         for plot in &self.plots {
             text +=

@@ -1,6 +1,7 @@
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use voxtile::io::open_scans;
+use voxtile::space::MAX_VOXELS_PER_TILE_EDGE;
 use voxtile::{MapConfig, Scan};
 use workload::SurveyName;
 
@@ -9,6 +10,8 @@ use workload::SurveyName;
 pub struct Dataset {
     /// What tables and plots call it.
     pub name: &'static str,
+    /// Scans that together have some 30 million updates of rays where voxels have 0.1 m.
+    pub some_scans: usize,
     source: Source,
 }
 
@@ -28,15 +31,19 @@ const TILE_SIZE_M: f64 = 10.0;
 
 /// The made-up surveys, and the recorded sets that are in the folder `data`.
 pub fn datasets(data: &Path) -> Vec<Dataset> {
-    let made_up = [("street", SurveyName::Street), ("indoor", SurveyName::Indoor)];
-    let made_up = made_up.map(|(name, survey)| Dataset { name, source: Source::MadeUp(survey) });
-    let recorded =
-        [("riverside", "mulran_riverside02_a"), ("courtyard", "fastlio_hku_1"), ("hall", "balm_os0_hall")];
-    let mut datasets: Vec<Dataset> = made_up.into();
-    for (name, folder) in recorded {
+    let made_up = [("street", 3, SurveyName::Street), ("indoor", 8, SurveyName::Indoor)];
+    let mut datasets: Vec<Dataset> = made_up
+        .map(|(name, some_scans, survey)| Dataset { name, some_scans, source: Source::MadeUp(survey) })
+        .into();
+    let recorded = [
+        ("riverside", 8, "mulran_riverside02_a"),
+        ("courtyard", 20, "fastlio_hku_1"),
+        ("hall", 4, "balm_os0_hall"),
+    ];
+    for (name, some_scans, folder) in recorded {
         let path = data.join(folder);
         if path.join("scans").is_dir() {
-            datasets.push(Dataset { name, source: Source::Recorded(path) });
+            datasets.push(Dataset { name, some_scans, source: Source::Recorded(path) });
         } else {
             eprintln!("octocache: {name} is skipped: no folder {}", path.display());
         }
@@ -74,6 +81,16 @@ pub fn map_config(resolution_m: f64) -> Result<MapConfig> {
     Ok(MapConfig::new(resolution_m, voxels_per_tile_edge * resolution_m)?.with_range(0.0, MAX_RANGE_M))
 }
 
+/// The same with one large tile, and the scans moved so that they begin in the middle of one: as in the paper, there is
+/// one voxel cache and one octree, unless the scans go far.
+pub fn in_one_tile(resolution_m: f64, scans: Vec<Scan>) -> Result<(MapConfig, Vec<Scan>)> {
+    let tile_size_m = f64::from(MAX_VOXELS_PER_TILE_EDGE) * resolution_m;
+    let config = MapConfig::new(resolution_m, tile_size_m)?.with_range(0.0, MAX_RANGE_M);
+    let Some(first) = scans.first() else { return Ok((config, scans)) };
+    let by_m = first.origin.map(|x| tile_size_m / 2.0 - x);
+    Ok((config, scans.into_iter().map(|scan| scan.translated(by_m)).collect()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -84,6 +101,17 @@ mod tests {
             let config = map_config(f64::from(tenths) * 0.1).unwrap();
             assert!((9.0..11.0).contains(&config.grid.tile_size_m()), "{tenths}");
         }
+    }
+
+    #[test]
+    fn scans_that_stay_near_are_in_one_tile() {
+        use voxtile::{InMemoryMapper, MapView, Mapper};
+        let (config, scans) = in_one_tile(0.2, datasets(Path::new(""))[0].scans(2).unwrap()).unwrap();
+        let mut mapper = InMemoryMapper::new(config).unwrap();
+        for scan in &scans {
+            mapper.insert_scan(scan).unwrap();
+        }
+        assert_eq!(mapper.statistics().tiles, 1);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The command `octocache`: puts the questions of the OctoCache paper to voxtile and writes tables and plots.
 
 mod answer;
+mod contender;
 mod dataset;
 mod machine;
 mod page;
@@ -59,8 +60,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     let output = arguments.output.as_ref().unwrap_or(&arguments.page);
     let folder = output.with_extension("");
     fs::create_dir_all(&folder).with_context(|| format!("{}: cannot make the folder", folder.display()))?;
-    let mut page = fs::read_to_string(&arguments.page)
-        .with_context(|| format!("{}: cannot read", arguments.page.display()))?;
+    if *output != arguments.page {
+        fs::write(output, read(&arguments.page)?).with_context(|| cannot_write(output))?;
+    }
     let setting = Setting {
         datasets: dataset::datasets(&arguments.data),
         is_short: arguments.short,
@@ -77,13 +79,22 @@ fn run(arguments: &Arguments) -> Result<()> {
         answer.write(&folder)?;
         let section =
             answer.markdown(name_of(&folder)?, &command(arguments, question.name), &machine::description());
-        page = page::with_section(&page, question.name, &section)
-            .with_context(|| arguments.page.display().to_string())?;
-        // After every question, so that a long run that is stopped leaves what it found.
-        fs::write(output, &page).with_context(|| format!("{}: cannot write", output.display()))?;
+        // After every question, so that a long run that is stopped leaves what it found, and read anew, so that who edits
+        // the page meanwhile loses nothing.
+        let page = page::with_section(&read(output)?, question.name, &section);
+        let page = page.with_context(|| output.display().to_string())?;
+        fs::write(output, page).with_context(|| cannot_write(output))?;
         eprintln!("{:.0} s", begin.elapsed().as_secs_f64());
     }
     Ok(())
+}
+
+fn read(page: &Path) -> Result<String> {
+    fs::read_to_string(page).with_context(|| format!("{}: cannot read the page", page.display()))
+}
+
+fn cannot_write(page: &Path) -> String {
+    format!("{}: cannot write the page", page.display())
 }
 
 /// What to type to measure a question again.

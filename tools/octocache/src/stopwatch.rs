@@ -1,5 +1,6 @@
 use anyhow::{Context, Result};
 use rustix::time::{ClockId, clock_gettime};
+use std::ops::Add;
 use std::time::{Duration, Instant};
 
 /// Three clocks: of this thread, of the whole process, and on the wall.
@@ -43,6 +44,18 @@ impl Took {
     /// CPU time of all threads, in seconds.
     pub fn cpu_s(&self) -> f64 {
         self.own_s + self.others_s
+    }
+}
+
+impl Add for Took {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            own_s: self.own_s + other.own_s,
+            others_s: self.others_s + other.others_s,
+            wall_s: self.wall_s + other.wall_s,
+        }
     }
 }
 

@@ -7,6 +7,8 @@ pub struct Table {
     pub file: &'static str,
     /// What it shows, in one sentence.
     pub caption: String,
+    /// Whether it is too long to read, and only its CSV file is linked.
+    pub is_only_csv: bool,
     columns: Vec<String>,
     rows: Vec<Vec<Cell>>,
 }
@@ -26,9 +28,18 @@ pub enum Cell {
 
 impl Table {
     /// A table without rows.
-    pub fn new(file: &'static str, caption: impl Into<String>, columns: &[&str]) -> Self {
-        let columns = columns.iter().map(|&column| column.to_owned()).collect();
-        Self { file, caption: caption.into(), columns, rows: Vec::new() }
+    pub fn new(
+        file: &'static str,
+        caption: impl Into<String>,
+        columns: impl IntoIterator<Item: Into<String>>,
+    ) -> Self {
+        let columns = columns.into_iter().map(Into::into).collect();
+        Self { file, caption: caption.into(), is_only_csv: false, columns, rows: Vec::new() }
+    }
+
+    /// The same, too long to read.
+    pub fn only_csv(self) -> Self {
+        Self { is_only_csv: true, ..self }
     }
 
     /// Adds a row, a cell a column.
@@ -117,7 +128,7 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        let mut table = Table::new("numbers", "Some.", &["set", "voxels", "ms", "hits"]);
+        let mut table = Table::new("numbers", "Some.", ["set", "voxels", "ms", "hits"]);
         table.push(["street, wet".into(), 1_234_567.into(), Cell::Number(1.25, 1), Cell::Share(0.5)]);
         table.push(["hall".into(), 12.into(), Cell::Number(f64::NAN, 1), Cell::Share(1.0)]);
         table

@@ -43,9 +43,13 @@ impl Plot {
     }
 
     fn svg(&self) -> Result<String> {
-        let columns = self.panels.len().clamp(1, MOST_PANELS_A_ROW);
+        let columns = match self.panels.len() {
+            4 => 2,
+            count => count.clamp(1, MOST_PANELS_A_ROW),
+        };
         let rows = self.panels.len().div_ceil(columns).max(1);
-        let size = (PANEL_PIXELS.0 * columns as u32, PANEL_PIXELS.1 * rows as u32 + LEGEND_PIXELS);
+        let width = (PANEL_PIXELS.0 * columns as u32).max(self.legend_pixels());
+        let size = (width, PANEL_PIXELS.1 * rows as u32 + LEGEND_PIXELS);
         let mut svg = String::new();
         {
             let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
@@ -76,13 +80,16 @@ impl Plot {
         COLORS[number.unwrap_or_default() % COLORS.len()]
     }
 
+    fn legend_pixels(&self) -> u32 {
+        20 + self.names().iter().map(|name| entry_pixels(name)).sum::<i32>() as u32
+    }
+
     fn draw_legend(&self, area: &Area<'_>) -> Result<()> {
         let mut x = 20;
         for name in self.names() {
             area.draw(&Rectangle::new([(x, 10), (x + 14, 20)], self.color(name).filled()))?;
             area.draw(&Text::new(name.to_owned(), (x + 20, 8), ("sans-serif", 14)))?;
-            // Wide enough for most letters: without fonts nobody knows the width of a word.
-            x += 40 + 7 * name.chars().count() as i32;
+            x += entry_pixels(name);
         }
         Ok(())
     }
@@ -135,6 +142,11 @@ impl Plot {
     }
 }
 
+/// Room for a name in the legend; wide enough for most letters, for without fonts nobody knows the width of a word.
+fn entry_pixels(name: &str) -> i32 {
+    40 + 7 * name.chars().count() as i32
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::Scale;
@@ -168,8 +180,8 @@ mod tests {
             "wet",
             "τ",
             "ms",
-            ">80<",
-            ">10<",
+            "\n80\n",
+            "\n10\n",
             "<polyline",
             "<circle",
         ] {

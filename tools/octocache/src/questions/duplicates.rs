@@ -51,11 +51,11 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
         "duplicates",
         "Updates if every ray counts, by the distinct voxels of each scan and of the map; *overlap*: share of a scan's \
          voxels that one of the three scans before has too, and how many scans have at least 80 %.",
-        &columns,
+        columns,
     );
     let mut lines = Vec::new();
     for dataset in &setting.datasets {
-        let scans = dataset.scans(setting.size(40, 5))?;
+        let scans = dataset.scans(setting.size(30, 5))?;
         for resolution_m in RESOLUTIONS_M.into_iter().skip(setting.size(0, 1)) {
             let counts = count(&map_config(resolution_m)?, &scans)?;
             let overlaps = counts.overlaps.sorted();

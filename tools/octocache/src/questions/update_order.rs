@@ -1,7 +1,7 @@
 //! Figure 10: the same updates to the octree in other orders.
 
 use crate::answer::{Answer, Setting};
-use crate::dataset::map_config;
+use crate::dataset::{Dataset, map_config};
 use crate::plot::{Bars, Content, Panel, Plot};
 use crate::samples::Samples;
 use crate::stopwatch::Stopwatch;
@@ -18,7 +18,7 @@ use voxtile::space::{MortonCode, VoxelKey};
 const RESOLUTION_M: f64 = 0.1;
 
 /// An order in which the same updates come.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     Original,
     Random,
@@ -43,74 +43,89 @@ const ORDERS: [(Order, &str); 7] = [
 /// An order's updates, and what was measured with it.
 struct Contender {
     order: Order,
-    name: &'static str,
     updates: Vec<(MortonCode, f32)>,
     ns_per_update: Samples,
 }
 
 pub fn answer(setting: &Setting) -> Result<Answer> {
-    let most = setting.size(2_000_000, 50_000);
-    let columns = [
-        "set",
-        "updates",
-        "order",
-        "ns an update",
-        "spread",
-        "times Morton",
-        "steps between neighbors (F / N)",
-    ];
-    let mut table = Table::new(
-        "update_order",
-        "CPU time of `Octree::set` an update, into an empty tree of 0.1 m, median of the runs; *spread* is largest less \
-         smallest by median. *all*: every update of every ray; *distinct*: each voxel once, with its last value.",
-        &columns,
-    );
+    let columns = || ["set", "updates"].into_iter().chain(ORDERS.map(|(_, name)| name));
+    let caption = "CPU nanoseconds an update in `Octree::set`, by order, into an empty tree of voxels of 0.1 m, median of \
+                   the runs. *all*: every update of every ray; *distinct*: each voxel once, with its last value.";
+    let mut times = Table::new("update_order", caption, columns().chain(["largest spread"]));
+    let caption =
+        "Steps in the tree from a voxel to the next, up and down, on average: the paper's F by the updates.";
+    let mut steps = Table::new("update_order_steps", caption, columns());
     let mut panels = Vec::new();
-    for (what, is_distinct) in [("all updates of the rays", false), ("distinct voxels", true)] {
-        let mut categories = Vec::new();
-        let mut series: Vec<(String, Vec<f64>)> =
-            ORDERS.iter().map(|(_, name)| ((*name).to_owned(), Vec::new())).collect();
+    for (kind, is_distinct) in [("all", false), ("distinct", true)] {
+        let mut sets = Vec::new();
         for dataset in &setting.datasets {
-            let config = map_config(RESOLUTION_M)?;
-            let stream = updates(&config.grid, &dataset.scans(setting.size(40, 2))?, most);
-            let mut contenders = contenders(&config.sensor_model, &stream, is_distinct);
-            measure(&mut contenders, setting.runs)?;
-            let morton = median_of(&contenders, Order::Morton);
-            let kind = if is_distinct { "distinct" } else { "all" };
-            for contender in &contenders {
-                let ns = contender.ns_per_update.median();
-                table.push([
-                    format!("{}, {kind}", dataset.name).as_str().into(),
-                    (contender.updates.len() as u64).into(),
-                    contender.name.into(),
-                    Cell::Number(ns, 0),
-                    Cell::Share(contender.ns_per_update.spread()),
-                    Cell::Number(ns / morton, 2),
-                    Cell::Number(mean_distance(&contender.updates), 2),
-                ]);
-            }
-            for ((order, _), (_, values)) in ORDERS.iter().zip(&mut series) {
-                values.push(median_of(&contenders, *order));
-            }
-            categories.push(dataset.name.to_owned());
+            let contenders = measure(setting, dataset, is_distinct)?;
+            let set = format!("{}, {kind}", dataset.name);
+            let spread =
+                contenders.iter().map(|contender| contender.ns_per_update.spread()).fold(0.0, f64::max);
+            let ns = |contender: &Contender| contender.ns_per_update.median();
+            times.push(row(&set, &contenders, ns, 0).chain([Cell::Share(spread)]));
+            steps.push(row(&set, &contenders, |contender| mean_distance(&contender.updates), 2));
+            sets.push((dataset.name, contenders));
         }
-        series.retain(|(_, values)| values.iter().any(|value| value.is_finite()));
-        panels.push(Panel {
-            title: what.to_owned(),
-            x_label: String::new(),
-            y_label: "ns an update".to_owned(),
-            content: Content::Bars(Bars { categories, series, are_stacked: false }),
-        });
+        panels.push(panel(kind, &sets));
     }
     let caption = "Time of an update of the octree by the order of the updates".to_owned();
-    Ok(Answer { tables: vec![table], plots: vec![Plot { file: "update_order", caption, panels }] })
+    Ok(Answer { tables: vec![times, steps], plots: vec![Plot { file: "update_order", caption, panels }] })
+}
+
+/// A row with a value an order; orders that did not take part have none.
+fn row(
+    set: &str,
+    contenders: &[Contender],
+    value: impl Fn(&Contender) -> f64,
+    digits: usize,
+) -> impl Iterator<Item = Cell> {
+    let updates = contenders.first().map_or(0, |contender| contender.updates.len() as u64);
+    let values =
+        ORDERS.map(|(order, _)| Cell::Number(of_order(contenders, order).map_or(f64::NAN, &value), digits));
+    [set.into(), updates.into()].into_iter().chain(values)
+}
+
+fn of_order(contenders: &[Contender], order: Order) -> Option<&Contender> {
+    contenders.iter().find(|contender| contender.order == order)
+}
+
+fn panel(kind: &str, sets: &[(&str, Vec<Contender>)]) -> Panel {
+    let series = ORDERS.map(|(order, name)| {
+        let of_sets = sets.iter().filter_map(|(_, contenders)| of_order(contenders, order));
+        (name.to_owned(), of_sets.map(|contender| contender.ns_per_update.median()).collect::<Vec<_>>())
+    });
+    let bars = Bars {
+        categories: sets.iter().map(|(set, _)| (*set).to_owned()).collect(),
+        series: series.into_iter().filter(|(_, values)| !values.is_empty()).collect(),
+        are_stacked: false,
+    };
+    Panel {
+        title: format!("{kind} updates"),
+        x_label: String::new(),
+        y_label: "ns an update".to_owned(),
+        content: Content::Bars(bars),
+    }
+}
+
+/// Lets all orders run in turn.
+fn measure(setting: &Setting, dataset: &Dataset, is_distinct: bool) -> Result<Vec<Contender>> {
+    let config = map_config(RESOLUTION_M)?;
+    let scans = dataset.scans(setting.size(40, 2))?;
+    let stream = updates(&config.grid, &scans, setting.size(2_000_000, 50_000));
+    let mut contenders = contenders(&config.sensor_model, &stream, is_distinct);
+    for _ in 0..setting.runs {
+        contenders.iter_mut().try_for_each(Contender::run)?;
+    }
+    Ok(contenders)
 }
 
 /// The same updates in all orders. Where every update counts, its value is the one that its voxel has by then.
 fn contenders(model: &SensorModel, stream: &[Update], is_distinct: bool) -> Vec<Contender> {
     let distinct = if is_distinct { last_values(&accumulated(model, stream)) } else { Vec::new() };
     let mut contenders = Vec::new();
-    for (order, name) in ORDERS {
+    for (order, _) in ORDERS {
         let updates = if is_distinct {
             ordered(order, &distinct, |(code, _)| *code)
         } else if order == Order::MortonAtOnce {
@@ -120,7 +135,7 @@ fn contenders(model: &SensorModel, stream: &[Update], is_distinct: bool) -> Vec<
             let stream = ordered(order, stream, |update| VoxelKey::from_index(update.voxel).morton());
             accumulated(model, &stream)
         };
-        contenders.push(Contender { order, name, updates, ns_per_update: Samples::default() });
+        contenders.push(Contender { order, updates, ns_per_update: Samples::default() });
     }
     contenders
 }
@@ -163,28 +178,21 @@ fn shuffle<T>(items: &mut [T]) {
     }
 }
 
-/// Runs the contenders in turn.
-fn measure(contenders: &mut [Contender], runs: usize) -> Result<()> {
-    for _ in 0..runs {
-        for contender in contenders.iter_mut() {
-            let mut octree = Octree::new();
-            let stopwatch = Stopwatch::start()?;
-            if contender.order == Order::MortonAtOnce {
-                octree.write_sorted(&contender.updates);
-            } else {
-                contender.updates.iter().for_each(|&(code, value)| octree.set(code, value));
-            }
-            let took = stopwatch.stop()?;
-            black_box(&octree);
-            contender.ns_per_update.push(took.own_s * 1e9 / contender.updates.len().max(1) as f64);
+impl Contender {
+    /// One run, into a tree of its own.
+    fn run(&mut self) -> Result<()> {
+        let mut octree = Octree::new();
+        let stopwatch = Stopwatch::start()?;
+        if self.order == Order::MortonAtOnce {
+            octree.write_sorted(&self.updates);
+        } else {
+            self.updates.iter().for_each(|&(code, value)| octree.set(code, value));
         }
+        let took = stopwatch.stop()?;
+        black_box(&octree);
+        self.ns_per_update.push(took.own_s * 1e9 / self.updates.len().max(1) as f64);
+        Ok(())
     }
-    Ok(())
-}
-
-fn median_of(contenders: &[Contender], order: Order) -> f64 {
-    let found = contenders.iter().find(|contender| contender.order == order);
-    found.map_or(f64::NAN, |contender| contender.ns_per_update.median())
 }
 
 /// The paper's F by the number of updates: steps in the tree from a voxel to the next, up and down.
@@ -216,7 +224,7 @@ mod tests {
         let trees: Vec<_> = trees.collect();
         assert!(trees.windows(2).all(|pair| pair[0] == pair[1]) && trees.len() == ORDERS.len());
         for contender in contenders(&config.sensor_model, &stream, false) {
-            assert_eq!(contender.updates.len(), stream.len(), "{}", contender.name);
+            assert_eq!(contender.updates.len(), stream.len(), "{:?}", contender.order);
         }
     }
 
@@ -225,12 +233,7 @@ mod tests {
         let config = map_config(0.4).unwrap();
         let stream = updates(&config.grid, &datasets(Path::new(""))[0].scans(1).unwrap(), 20_000);
         let contenders = contenders(&config.sensor_model, &stream, true);
-        let distance = |order| {
-            contenders
-                .iter()
-                .find(|contender| contender.order == order)
-                .map(|found| mean_distance(&found.updates))
-        };
+        let distance = |order| of_order(&contenders, order).map(|found| mean_distance(&found.updates));
         for (order, name) in ORDERS {
             assert!(distance(Order::Morton) <= distance(order), "{name}");
         }
