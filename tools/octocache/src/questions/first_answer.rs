@@ -2,7 +2,7 @@
 
 use crate::answer::{Answer, Setting};
 use crate::contender::Contender;
-use crate::dataset::{Dataset, map_config};
+use crate::dataset::map_config;
 use crate::plot::{Bars, Content, Panel, Plot};
 use crate::samples::Samples;
 use crate::stopwatch::Stopwatch;
@@ -48,44 +48,44 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
     );
     let mut table = Table::new("first_answer", caption, columns);
     let mut panels = Vec::new();
-    for (insert_mode, scans_factor, what) in
+    for (insert_mode, scans_factor, counting) in
         [(InsertMode::PerRay, 1, "every ray"), (InsertMode::PerScan, 2, "once a scan")]
     {
-        let mut series: Vec<(String, Vec<f64>)> =
-            Contender::ALL.map(|contender| (contender.name().to_owned(), Vec::new())).into();
+        let config = map_config(resolution_m)?.with_insert_mode(insert_mode);
+        let mut sets = Vec::new();
         for dataset in &setting.datasets {
-            let scans = dataset.scans(setting.size(dataset.some_scans * scans_factor, 1))?;
-            let times = measure(&map_config(resolution_m)?.with_insert_mode(insert_mode), &scans)?;
-            for ((contender, times_of_one), (_, values)) in
-                Contender::ALL.into_iter().zip(&times).zip(&mut series)
-            {
-                let all_ms = times_of_one.all_ms.median();
-                table.push([
-                    dataset.name.into(),
-                    what.into(),
-                    contender.name().into(),
-                    Cell::Number(times_of_one.inserted_ms.median(), 2),
-                    Cell::Number(times_of_one.first_ms.median(), 2),
-                    Cell::Number(times_of_one.first_ms.quantile(0.95), 2),
-                    Cell::Number(all_ms, 2),
-                    Cell::Number(times[0].all_ms.median() / all_ms, 2),
-                ]);
-                values.push(all_ms);
+            let times =
+                measure(&config, &dataset.scans(setting.size(dataset.some_scans * scans_factor, 1))?)?;
+            for (contender, of_one) in Contender::ALL.into_iter().zip(&times) {
+                let by_off = times[0].all_ms.median() / of_one.all_ms.median();
+                table.push([dataset.name, counting, contender.name()].map(Cell::from).into_iter().chain([
+                    Cell::Number(of_one.inserted_ms.median(), 2),
+                    Cell::Number(of_one.first_ms.median(), 2),
+                    Cell::Number(of_one.first_ms.quantile(0.95), 2),
+                    Cell::Number(of_one.all_ms.median(), 2),
+                    Cell::Number(by_off, 2),
+                ]));
             }
+            sets.push((dataset.name, times));
         }
-        panels.push(Panel {
-            title: what.to_owned(),
-            x_label: String::new(),
-            y_label: format!("ms to {PLACES} answers"),
-            content: Content::Bars(Bars { categories: names(&setting.datasets), series, are_stacked: false }),
-        });
+        panels.push(panel(counting, &sets));
     }
     let caption = format!("Time from a scan to {PLACES} answers that know it");
     Ok(Answer { tables: vec![table], plots: vec![Plot { file: "first_answer", caption, panels }] })
 }
 
-fn names(datasets: &[Dataset]) -> Vec<String> {
-    datasets.iter().map(|dataset| dataset.name.to_owned()).collect()
+fn panel(counting: &str, sets: &[(&str, [Times; 4])]) -> Panel {
+    let series = Contender::ALL.into_iter().enumerate().map(|(number, contender)| {
+        let values = sets.iter().map(|(_, times)| times[number].all_ms.median());
+        (contender.name().to_owned(), values.collect())
+    });
+    let categories = sets.iter().map(|(set, _)| (*set).to_owned()).collect();
+    Panel {
+        title: counting.to_owned(),
+        x_label: String::new(),
+        y_label: format!("ms to {PLACES} answers"),
+        content: Content::Bars(Bars { categories, series: series.collect(), are_stacked: false }),
+    }
 }
 
 /// Lets the contenders map the scans in turn, scan by scan.

@@ -9,6 +9,7 @@ use crate::table::{Cell, Table};
 use anyhow::Result;
 use voxtile::{InsertMode, VoxelCacheConfig};
 
+const OCTREE_UPDATE: &str = "octree update";
 /// Stages of the thread that maps, in the order in which they are stacked.
 const STAGES: [&str; 8] = [
     "ray tracing",
@@ -17,7 +18,7 @@ const STAGES: [&str; 8] = [
     "cache eviction",
     "into the queue",
     "waiting for room",
-    "octree update",
+    OCTREE_UPDATE,
     "after the last scan",
 ];
 /// Stages of the thread that writes trees.
@@ -87,7 +88,7 @@ fn panel(title: &str, contenders: &[Contender], stages: &[Stages]) -> Panel {
     let own = STAGES.iter().enumerate().map(|(stage, name)| {
         let mut values: Vec<f64> = stages.iter().map(|stages| stages.own_ms[stage].median()).collect();
         // The same color in whichever thread.
-        let is_octree_update = *name == WORKER_STAGES[0].trim_end_matches(", thread 2");
+        let is_octree_update = *name == OCTREE_UPDATE;
         let of_worker = stages.last().map_or(0.0, |last| last.worker_ms[0].median());
         values.push(if is_octree_update { of_worker } else { 0.0 });
         ((*name).to_owned(), values)
