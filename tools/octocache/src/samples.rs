@@ -31,11 +31,10 @@ impl Samples {
         sorted
     }
 
-    /// Largest less smallest, as a share of the median: how noisy the measurements were. NaN of nothing.
+    /// Largest less smallest, as a share of the median: how noisy the measurements were. NaN of fewer than two.
     pub fn spread(&self) -> f64 {
-        let sorted = self.sorted();
-        match (sorted.first(), sorted.last()) {
-            (Some(least), Some(most)) => (most - least) / self.median(),
+        match &self.sorted()[..] {
+            [least, .., most] => (most - least) / self.median(),
             _ => f64::NAN,
         }
     }
@@ -66,5 +65,6 @@ mod tests {
     fn nothing_has_no_median() {
         let nothing = Samples::default();
         assert!([nothing.median(), nothing.quantile(0.5), nothing.spread()].iter().all(|x| x.is_nan()));
+        assert!(Samples(vec![3.0]).spread().is_nan());
     }
 }

@@ -11,7 +11,7 @@ use voxtile::{InsertMode, VoxelCacheConfig};
 const TAU: usize = 4;
 
 pub fn answer(setting: &Setting) -> Result<Answer> {
-    let exponents: &[u32] = setting.size(&[6, 8, 10, 12, 14, 16, 18, 20], &[8, 16]);
+    let exponents: &[u32] = setting.size(&[10, 12, 14, 16, 18, 20], &[8, 16]);
     let resolution_m = setting.size(0.2, 0.8);
     let columns = [
         "set",

@@ -62,7 +62,7 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
             let contenders = measure(setting, dataset, is_distinct)?;
             let set = format!("{}, {kind}", dataset.name);
             let spread =
-                contenders.iter().map(|contender| contender.ns_per_update.spread()).fold(0.0, f64::max);
+                contenders.iter().map(|contender| contender.ns_per_update.spread()).fold(f64::NAN, f64::max);
             let ns = |contender: &Contender| contender.ns_per_update.median();
             times.push(row(&set, &contenders, ns, 0).chain([Cell::Share(spread)]));
             steps.push(row(&set, &contenders, |contender| mean_distance(&contender.updates), 2));
