@@ -1,0 +1,9 @@
+//! Plots as SVG files: panels side by side, of lines or of bars.
+
+mod axis;
+mod draw;
+mod panel;
+
+pub use axis::Scale;
+pub use draw::Plot;
+pub use panel::{Bars, Content, Line, Panel};

@@ -1,0 +1,32 @@
+//! The questions, one a file.
+
+mod bucket_depth;
+mod cache_size;
+mod duplicates;
+mod first_answer;
+mod stages;
+mod update_order;
+mod workflows;
+
+use crate::answer::{Answer, Setting};
+use anyhow::Result;
+
+/// A question of the paper.
+pub struct Question {
+    /// Its section in the page, and what `--only` takes.
+    pub name: &'static str,
+    /// Measures.
+    pub answer: fn(&Setting) -> Result<Answer>,
+}
+
+/// All of them, in the order of the page.
+pub const QUESTIONS: [Question; 8] = [
+    Question { name: "update-order", answer: update_order::answer },
+    Question { name: "duplicates", answer: duplicates::answer },
+    Question { name: "every-ray", answer: workflows::every_ray },
+    Question { name: "once-a-scan", answer: workflows::once_a_scan },
+    Question { name: "stages", answer: stages::answer },
+    Question { name: "cache-size", answer: cache_size::answer },
+    Question { name: "bucket-depth", answer: bucket_depth::answer },
+    Question { name: "first-answer", answer: first_answer::answer },
+];
