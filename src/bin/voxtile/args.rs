@@ -41,7 +41,7 @@ pub enum Command {
 #[command(allow_negative_numbers = true)]
 pub struct BuildArgs {
     /// A folder of PCD files in the sensor frame (or one that holds it as scans/), an OctoMap scan graph (.graph) or
-    /// scan log (.log)
+    /// scan log (.log), a scan stream (.scans), or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
     /// Folder of the map

@@ -159,7 +159,7 @@ impl Workload {
 fn write_made_up(survey: SurveyName, scans: usize, stream: &Path, intensities: &Path) -> std::io::Result<()> {
     let created = |path| File::create(path).map(BufWriter::new);
     let mut writer = ScanWriter::new(created(stream)?, Some(created(intensities)?));
-    survey.scans(SEED, 0).take(scans).try_for_each(|scan| writer.write(&scan))?;
+    survey.scans(SEED, 0, SurveyName::RAYS).take(scans).try_for_each(|scan| writer.write(&scan))?;
     writer.flush()
 }
 
