@@ -170,6 +170,10 @@ impl MapView for MapReader {
         Ok(self.load(index)?.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
     }
 
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.store.stamp(index).map(|stamp| stamp.voxels)
+    }
+
     fn statistics(&self) -> MapStatistics {
         let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         let disk_bytes = self.disk_bytes().map_or(0, |(table, octree)| table + octree);

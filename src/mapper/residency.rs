@@ -139,6 +139,12 @@ impl Residency {
         self.read(index).map(|tile| Some(Arc::new(tile)))
     }
 
+    /// The voxels of a tile in memory, or of its latest version on disk; what waits for it is left out.
+    pub(super) fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        let resident = self.tiles.peek(&index).map(|tile| tile.table().len() as u64);
+        resident.or_else(|| self.store.stamp(index).map(|stamp| stamp.voxels))
+    }
+
     /// Every tile in which something was observed, in order.
     pub(super) fn tile_indices(&self) -> Vec<TileIndex> {
         let resident = self.tiles.iter().map(|(index, _)| *index);
