@@ -136,7 +136,8 @@ impl Residency {
         if !self.exists(index) {
             return Ok(None);
         }
-        self.read(index).map(|tile| Some(Arc::new(tile)))
+        let loaded = tile_files::load_in_passing(&self.store, &self.config.grid, index)?;
+        Ok(Some(Arc::new(self.with_waiting(index, loaded))))
     }
 
     /// The voxels of a tile in memory, or of its latest version on disk; what waits for it is left out.
@@ -280,7 +281,13 @@ impl Residency {
 
     /// The tile as it is on disk, with what waits for it applied.
     fn read(&mut self, index: TileIndex) -> Result<Tile> {
-        let mut tile = match tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
+        let loaded = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)?;
+        Ok(self.with_waiting(index, loaded))
+    }
+
+    /// A tile as it is on disk, given with its bytes if it is there, and what waits for it applied.
+    fn with_waiting(&mut self, index: TileIndex, loaded: Option<(Tile, u64)>) -> Tile {
+        let mut tile = match loaded {
             Some((tile, bytes)) => {
                 self.io.loads += 1;
                 self.io.bytes_read += bytes;
@@ -292,7 +299,7 @@ impl Residency {
         for updates in self.pending.of(index) {
             tile.apply(&self.config.sensor_model, updates);
         }
-        Ok(tile)
+        tile
     }
 
     /// Pushes out the least recently used tiles until one more fits. Tiles in use stay; if all are, one more comes

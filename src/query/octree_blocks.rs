@@ -17,10 +17,6 @@ pub struct OctreeExport<'a> {
     pub memory_bytes: usize,
 }
 
-/// Bytes of a block's values, of those that it takes in all: the values themselves, their bytes in an `.ot` file, and
-/// what a vector takes more than it holds.
-const SHARE_OF_VALUES: usize = 4;
-
 /// The depth of bricks, which are not divided further.
 const BRICK_DEPTH: u8 = 13;
 
@@ -41,7 +37,11 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
             OctreeFormat::Bt => OctreeStream::bt(config.occupied_log_odds() as f32, pruning, &mut *spool),
             OctreeFormat::Ot => OctreeStream::ot(&mut *spool),
         };
-        let block_bytes = export.memory_bytes / SHARE_OF_VALUES;
+        // Of the memory, the rest is for the bytes that the values become: up to six a voxel in `.ot`.
+        let block_bytes = match export.format {
+            OctreeFormat::Bt => export.memory_bytes / 3 * 2,
+            OctreeFormat::Ot => export.memory_bytes / 3,
+        };
         for_each_block(
             view,
             export.region,
