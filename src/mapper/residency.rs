@@ -155,6 +155,15 @@ impl Residency {
         indices
     }
 
+    /// Number of tiles in which something was observed.
+    fn count_tiles(&self) -> usize {
+        let is_new = |index: &TileIndex| !self.store.contains(*index);
+        let resident = self.tiles.iter().filter(|(index, _)| is_new(index)).count();
+        let waiting =
+            self.pending.tiles().filter(|index| is_new(index) && !self.tiles.contains(index)).count();
+        self.store.tiles().count() + resident + waiting
+    }
+
     /// The tiles in memory, in order.
     pub(super) fn cached_tile_indices(&self) -> Vec<TileIndex> {
         let mut indices: Vec<_> = self.tiles.iter().map(|(index, _)| *index).collect();
@@ -244,7 +253,7 @@ impl Residency {
     pub(super) fn statistics(&self, scan_number: u64) -> MapStatistics {
         let mut statistics = MapStatistics {
             scan_number,
-            tiles: self.tile_indices().len() as u64,
+            tiles: self.count_tiles() as u64,
             cached_tiles: self.tiles.len() as u64,
             dirty_tiles: self.tiles.iter().filter(|(_, tile)| tile.is_dirty()).count() as u64,
             pending_tiles: self.pending.len() as u64,
