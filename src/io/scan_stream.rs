@@ -43,7 +43,7 @@ struct ScanStream<R> {
 }
 
 /// Room made at once for the points of a scan: the count in a damaged stream may be any.
-const MOST_RESERVED: usize = 1 << 20;
+const MOST_RESERVED: usize = 1 << 16;
 
 impl<R: Read> ScanStream<R> {
     fn read_header(&mut self) -> Result<()> {
