@@ -29,10 +29,8 @@ impl<'a> AnyOrderEntries<'a> {
         }
         check_evidence(evidence, offset)?;
         let code = key.morton();
-        if let Some(&(previous, ..)) = self.run.last() {
-            if previous.brick() != code.brick() {
-                self.end_run()?;
-            }
+        if self.run.last().is_some_and(|(previous, ..)| previous.brick() != code.brick()) {
+            self.end_run()?;
         }
         if self.run.len() >= BRICK_VOXELS {
             let reason = format!("key {:?} or another of its 8 x 8 x 8 voxels comes twice", key.0);

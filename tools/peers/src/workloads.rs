@@ -88,10 +88,7 @@ pub fn short() -> Vec<Workload> {
 /// `numbers`: floor and goal of one thread, of two threads, floors of synced and flushed, most nanoseconds a question.
 fn workload(survey: SurveyName, resolution_m: f64, scans: usize, numbers: [f64; 7]) -> Workload {
     let [one, one_goal, two, two_goal, synced, flushed, question_ns] = numbers;
-    let name = match survey {
-        SurveyName::Street => "street",
-        SurveyName::Indoor => "indoor",
-    };
+    let name = survey.name();
     Workload {
         name: format!("{name} {resolution_m} m"),
         source: Source::MadeUp(survey),

@@ -50,12 +50,51 @@ impl SurveyName {
         }
     }
 
+    /// What it is called on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Street => "street",
+            Self::Indoor => "indoor",
+            Self::Drive => "drive",
+            Self::Laps => "laps",
+            Self::Teleport => "teleport",
+            Self::Mast => "mast",
+        }
+    }
+
     /// What tells these scans from others, in a scan stream.
     pub fn label(self, seed: u64, first: usize, rays: u32) -> String {
-        let name = self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        let name = self.name();
         match self {
             Self::Street | Self::Indoor => format!("workload {name}, seed {seed}, from scan {first}"),
             _ => format!("workload {name}, seed {seed}, {rays} rays, from scan {first}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_the_command_line_and_labels_tell_surveys_apart() {
+        let mut labels = std::collections::BTreeSet::new();
+        for survey in SurveyName::value_variants() {
+            assert_eq!(SurveyName::from_str(survey.name(), false).as_ref(), Ok(survey));
+            for (seed, first, rays) in [(1, 0, 8_000), (2, 0, 8_000), (1, 5, 8_000), (1, 0, 100)] {
+                labels.insert(survey.label(seed, first, rays));
+            }
+        }
+        // Two surveys have their own number of rays.
+        assert_eq!(labels.len(), 6 * 4 - 2);
+    }
+
+    #[test]
+    fn scans_begin_at_the_number_asked_for() {
+        for &survey in SurveyName::value_variants() {
+            let mut scans = survey.scans(1, 0, 200);
+            let (second, alone) = (scans.nth(1), survey.scans(1, 1, 200).next());
+            assert!(second.is_some() && second == alone, "{}", survey.name());
         }
     }
 }
