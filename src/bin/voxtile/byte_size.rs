@@ -1,4 +1,3 @@
-use std::fmt;
 use std::str::FromStr;
 
 /// A number of bytes as it is typed: `256MiB`, `1GiB`, `64MB`, `1000000`.
@@ -34,12 +33,6 @@ impl FromStr for ByteSize {
             None | Some(0) => Err("not a size such as 256MiB, 1GiB or 64MB".to_owned()),
             Some(bytes) => Ok(Self(bytes)),
         }
-    }
-}
-
-impl fmt::Display for ByteSize {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", indicatif::BinaryBytes(self.0))
     }
 }
 
