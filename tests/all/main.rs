@@ -35,7 +35,7 @@ mod space;
 /// Files of a map: what a flush leaves, what damage is told, what is never overwritten.
 mod store;
 mod support;
-/// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
-mod voxel_cache;
 /// Drives that a cache of tiles likes and some that it does not.
 mod trajectories;
+/// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
+mod voxel_cache;

@@ -9,11 +9,11 @@
 
 /// SIGKILL at random times, resumed until the end.
 mod killed;
+/// What a command takes of memory, told by itself.
+mod memory;
 /// The thread that writes octrees: one, asleep when idle, gone with its mapper.
 #[cfg(target_os = "linux")]
 mod octree_worker;
-/// What a command takes of memory, told by itself.
-mod memory;
 /// Readers beside a writer see one flush whole.
 mod readers;
 /// A disk that is full or only for reading, and too many open files.
