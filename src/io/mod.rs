@@ -1,9 +1,10 @@
-//! Other people's files, one format a file; knows no mapper.
+//! Other people's files, one format a file, and a stream of scans of our own; knows no mapper.
 //!
 //! ```text
 //! folder of PCD + poses ┐                                  ┌ .ply .pcd .csv
 //! OctoMap scan graph    ├ ScanSource -> SensorScan   Voxel ┤
-//! OctoMap scan log      ┘                                  └ VoxelWriter
+//! OctoMap scan log      │                                  └ VoxelWriter
+//! voxtile's scan stream ┘
 //! ```
 
 mod fingerprint;
@@ -14,6 +15,8 @@ mod points;
 mod poses;
 mod scan_graph;
 mod scan_log;
+mod scan_stream;
+mod scan_stream_writer;
 mod sensor_scan;
 mod source;
 mod voxel_writer;
@@ -23,6 +26,8 @@ pub use points::read_points;
 pub use poses::{parse_poses, read_poses};
 pub use scan_graph::read_scan_graph;
 pub use scan_log::read_scan_log;
+pub use scan_stream::read_scan_stream;
+pub use scan_stream_writer::ScanStreamWriter;
 pub use sensor_scan::SensorScan;
 pub use source::{ScanSource, open_scans};
 pub use voxel_writer::{VoxelFormat, VoxelRecord, VoxelWriter};

@@ -1,6 +1,7 @@
 use super::pcd_folder::PcdFolder;
 use super::scan_graph::read_scan_graph;
 use super::scan_log::read_scan_log;
+use super::scan_stream::read_scan_stream;
 use super::sensor_scan::SensorScan;
 use crate::error::{Error, Result};
 use std::fs::File;
@@ -34,16 +35,16 @@ pub trait ScanSource {
     }
 
     /// What tells this input from others, wherever it lies: number and size of its files, and a BLAKE3 over their
-    /// names, sizes and bytes and the poses. Reads every file once.
+    /// names, sizes and bytes and the poses. Reads every file once. Of a stream that can be read but once: its label.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read.
+    /// A file that cannot be read, a stream without a label.
     fn fingerprint(&self) -> Result<String>;
 }
 
 /// Opens scans by what the path is: a folder of PCD files (or one that holds it as `scans/`), one PCD file, an
-/// OctoMap scan graph (`.graph`) or scan log (`.log`).
+/// OctoMap scan graph (`.graph`) or scan log (`.log`), a scan stream of voxtile's (`.scans`).
 ///
 /// Poses of PCD files come from `poses`, or from `poses_tum.txt` or `poses_kitti.txt` in or beside the folder, or from
 /// the `VIEWPOINT` of each file.
@@ -75,8 +76,12 @@ pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSourc
             needs_no_poses("scan log")?;
             Ok(Box::new(read_scan_log(open()?, path)))
         }
+        "scans" => {
+            needs_no_poses("scan stream")?;
+            Ok(Box::new(read_scan_stream(open()?, path, true)?))
+        }
         _ => {
-            let reason = "not a folder of .pcd files, nor a .pcd, .graph or .log file";
+            let reason = "not a folder of .pcd files, nor a .pcd, .graph, .log or .scans file";
             Err(Error::argument(path.display().to_string(), reason))
         }
     }

@@ -76,6 +76,10 @@ impl MapView for InMemoryMapper {
         self.tile(index)
     }
 
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.tiles.get(&index).map(|tile| tile.table().len() as u64)
+    }
+
     fn statistics(&self) -> MapStatistics {
         let tiles = self.tiles.len() as u64;
         let mut statistics = MapStatistics {

@@ -167,7 +167,13 @@ impl MapView for MapReader {
         if let Some(tile) = cached {
             return Ok(Some(TileRef::shared(tile)));
         }
-        Ok(self.load(index)?.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
+        let loaded = tile_files::load_in_passing(&self.store, &self.config.grid, index);
+        let loaded = loaded.map_err(|error| self.explain(error))?;
+        Ok(loaded.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
+    }
+
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.store.stamp(index).map(|stamp| stamp.voxels)
     }
 
     fn statistics(&self) -> MapStatistics {

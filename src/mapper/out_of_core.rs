@@ -203,6 +203,10 @@ impl MapView for OutOfCoreTileMapper {
         Ok(self.lock().tile_in_passing(index)?.map(TileRef::shared))
     }
 
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.lock().voxels_of_tile_hint(index)
+    }
+
     fn statistics(&self) -> MapStatistics {
         self.lock().statistics(self.scan_number)
     }

@@ -136,7 +136,14 @@ impl Residency {
         if !self.exists(index) {
             return Ok(None);
         }
-        self.read(index).map(|tile| Some(Arc::new(tile)))
+        let loaded = tile_files::load_in_passing(&self.store, &self.config.grid, index)?;
+        Ok(Some(Arc::new(self.with_waiting(index, loaded))))
+    }
+
+    /// The voxels of a tile in memory, or of its latest version on disk; what waits for it is left out.
+    pub(super) fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        let resident = self.tiles.peek(&index).map(|tile| tile.table().len() as u64);
+        resident.or_else(|| self.store.stamp(index).map(|stamp| stamp.voxels))
     }
 
     /// Every tile in which something was observed, in order.
@@ -146,6 +153,15 @@ impl Residency {
         indices.sort_unstable();
         indices.dedup();
         indices
+    }
+
+    /// Number of tiles in which something was observed.
+    fn count_tiles(&self) -> usize {
+        let is_new = |index: &TileIndex| !self.store.contains(*index);
+        let resident = self.tiles.iter().filter(|(index, _)| is_new(index)).count();
+        let waiting =
+            self.pending.tiles().filter(|index| is_new(index) && !self.tiles.contains(index)).count();
+        self.store.tiles().count() + resident + waiting
     }
 
     /// The tiles in memory, in order.
@@ -237,7 +253,7 @@ impl Residency {
     pub(super) fn statistics(&self, scan_number: u64) -> MapStatistics {
         let mut statistics = MapStatistics {
             scan_number,
-            tiles: self.tile_indices().len() as u64,
+            tiles: self.count_tiles() as u64,
             cached_tiles: self.tiles.len() as u64,
             dirty_tiles: self.tiles.iter().filter(|(_, tile)| tile.is_dirty()).count() as u64,
             pending_tiles: self.pending.len() as u64,
@@ -274,7 +290,13 @@ impl Residency {
 
     /// The tile as it is on disk, with what waits for it applied.
     fn read(&mut self, index: TileIndex) -> Result<Tile> {
-        let mut tile = match tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
+        let loaded = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)?;
+        Ok(self.with_waiting(index, loaded))
+    }
+
+    /// A tile as it is on disk, given with its bytes if it is there, and what waits for it applied.
+    fn with_waiting(&mut self, index: TileIndex, loaded: Option<(Tile, u64)>) -> Tile {
+        let mut tile = match loaded {
             Some((tile, bytes)) => {
                 self.io.loads += 1;
                 self.io.bytes_read += bytes;
@@ -286,7 +308,7 @@ impl Residency {
         for updates in self.pending.of(index) {
             tile.apply(&self.config.sensor_model, updates);
         }
-        Ok(tile)
+        tile
     }
 
     /// Pushes out the least recently used tiles until one more fits. Tiles in use stay; if all are, one more comes

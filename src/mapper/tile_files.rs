@@ -44,6 +44,16 @@ pub(crate) fn load(
     Ok(Some((Tile::from_table(grid, octrees, index, read.table), read.file.bytes)))
 }
 
+/// [`load`] for a tile that is looked at once.
+pub(crate) fn load_in_passing(
+    store: &TileStore,
+    grid: &Grid,
+    index: TileIndex,
+) -> Result<Option<(Tile, u64)>> {
+    let Some(read) = load_table(store, grid, index)? else { return Ok(None) };
+    Ok(Some((Tile::in_passing(grid, index, read.table), read.file.bytes)))
+}
+
 /// Reads the latest version of a tile's table; `None` if there is none.
 pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Result<Option<ReadTable>> {
     let read = |stored: Result<Option<StoredTile>>| {

@@ -37,6 +37,9 @@ pub trait MapView {
     /// A tile that cannot be read.
     fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
+    /// About how many voxels were observed in a tile, where that is known without reading it.
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64>;
+
     /// Sizes of the map and of what is in memory.
     fn statistics(&self) -> MapStatistics;
 

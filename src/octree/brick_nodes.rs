@@ -19,6 +19,44 @@ pub struct BrickNodes {
 }
 
 impl BrickNodes {
+    /// What an octree has under a brick, and the largest of its values. A voxel of at least the threshold is occupied;
+    /// without one none is.
+    ///
+    /// `values_of` gives the values of a word's 64 voxels, and negative infinity for those that are unknown.
+    #[inline]
+    pub(crate) fn of_values(
+        brick: BrickCode,
+        known: BrickMask,
+        threshold: Option<f32>,
+        values_of: impl Fn(usize) -> [f32; 64],
+    ) -> (Self, f32) {
+        let mut nodes = Self { brick, known, occupied: [0; 8], leaves_15: 0, leaves_14: 0, leaf: None };
+        let mut maxima = [f32::NEG_INFINITY; 8];
+        let mut words = Uniform::default();
+        for word in (0..8).filter(|&word| known[word] != 0) {
+            let values = values_of(word);
+            let mut bytes = Uniform::default();
+            for (byte, eight) in values.as_chunks::<8>().0.iter().enumerate() {
+                maxima = std::array::from_fn(|k| larger(maxima[k], eight[k]));
+                if let Some(threshold) = threshold {
+                    nodes.occupied[word] |= at_least(threshold, eight) << (8 * byte);
+                }
+                let bits = eight.map(f32::to_bits);
+                if (known[word] >> (8 * byte)) as u8 == u8::MAX && bits == [bits[0]; 8] {
+                    nodes.leaves_15 |= 1 << (8 * word + byte);
+                    bytes.add(eight[0]);
+                }
+            }
+            nodes.occupied[word] &= known[word];
+            if let Some(value) = bytes.value_of_all() {
+                nodes.leaves_14 |= 1 << word;
+                words.add(value);
+            }
+        }
+        nodes.leaf = words.value_of_all();
+        (nodes, maxima.into_iter().fold(f32::NEG_INFINITY, larger))
+    }
+
     /// Number of nodes, the one at depth 13 included; 0 if no voxel is known.
     pub fn node_count(&self) -> u32 {
         let words = self.known.iter().filter(|&&word| word != 0).count() as u32;
@@ -39,4 +77,36 @@ fn nonzero_bytes(word: u64) -> u64 {
     let word = word | word >> 4;
     let word = word | word >> 2;
     (word | word >> 1) & 0x0101_0101_0101_0101
+}
+
+/// Bit `k` for each value `k` of at least a threshold. Without branches, for the vector unit.
+#[inline]
+fn at_least(threshold: f32, values: &[f32; 8]) -> u64 {
+    let bits: [u32; 8] = std::array::from_fn(|k| if values[k] >= threshold { 1 << k } else { 0 });
+    u64::from(bits.iter().fold(0, |all, bit| all | bit))
+}
+
+/// Whether eight leaves have one value, to the bit.
+#[derive(Default)]
+struct Uniform {
+    first: f32,
+    count: u8,
+}
+
+impl Uniform {
+    fn add(&mut self, value: f32) {
+        if self.count == 0 {
+            self.first = value;
+        }
+        self.count += u8::from(value.to_bits() == self.first.to_bits());
+    }
+
+    fn value_of_all(&self) -> Option<f32> {
+        (self.count == 8).then_some(self.first)
+    }
+}
+
+#[inline]
+fn larger(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Octree       16 levels below the root, f32 log-odds, pruned at once     tree, block, leaves, overrides
-//! read, write  `.bt` (occupied / free) and `.ot` (all values), by bytes   codec, brick_nodes
+//! read, write  `.bt` (occupied / free) and `.ot` (all values), by bytes   codec, brick_nodes, brick_values
 //! ```
 //!
 //! A tree knows neither metres nor tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds
@@ -10,15 +10,18 @@
 
 mod block;
 mod brick_nodes;
+mod brick_values;
 mod codec;
 mod leaves;
 mod overrides;
 mod tree;
 
 pub use brick_nodes::BrickNodes;
+pub use brick_values::BrickValues;
 pub use codec::{
-    OCTOMAP_MAX_LOG_ODDS, OCTOMAP_MIN_LOG_ODDS, OctreeFile, OctreeFormat, read, read_bt, read_ot,
-    read_with_limit, write_bt, write_bt_of_bricks, write_bt_unpruned, write_ot,
+    BtPruning, OCTOMAP_MAX_LOG_ODDS, OCTOMAP_MIN_LOG_ODDS, OctreeFile, OctreeFormat, OctreeStream,
+    StreamOutcome, read, read_bt, read_ot, read_with_limit, write_bt, write_bt_of_bricks, write_bt_unpruned,
+    write_ot,
 };
 pub use leaves::{Leaf, Leaves};
 pub use tree::{Octree, VoxelCounts};

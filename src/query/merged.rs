@@ -1,3 +1,4 @@
+use super::octree_blocks::{REACH, out_of_reach};
 use super::region::{for_each_occupied, for_each_voxel_in};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
@@ -10,7 +11,7 @@ pub(super) fn merged_octree(view: &impl MapView, region: Option<&Aabb>, max_voxe
     let mut count = 0;
     let mut outside: Option<VoxelIndex> = None;
     let take = |voxel: Voxel| {
-        if voxel.index.iter().any(|index| !(-32768..32768).contains(index)) {
+        if !REACH.contains(voxel.index) {
             outside = Some(voxel.index);
             return;
         }
@@ -24,13 +25,7 @@ pub(super) fn merged_octree(view: &impl MapView, region: Option<&Aabb>, max_voxe
         None => for_each_occupied(view, Some(0.0), None, take)?,
     }
     if let Some(voxel) = outside {
-        let half_m = 32768.0 * view.config().grid.resolution_m();
-        let center = view.config().grid.center_m(voxel);
-        let reason = format!(
-            "the voxel at {center:?} m is outside the {half_m} m around the origin that OctoMap's keys reach at this \
-             resolution; name a region (--region) inside"
-        );
-        return Err(Error::argument("merged octree", reason));
+        return Err(out_of_reach(view, voxel));
     }
     if count > max_voxels {
         let hint = "name a smaller region (--region)";

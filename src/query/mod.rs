@@ -9,6 +9,7 @@
 //! | a sphere, a box | the first occupied voxel that it touches |
 //! | nearest occupied | the occupied voxel with the nearest center |
 //! | digest | one number for the whole content |
+//! | merged octree | OctoMap's tree of a region, or a `.bt` or `.ot` file of the whole map, streamed |
 
 mod coarse;
 mod collision;
@@ -16,6 +17,7 @@ mod digest;
 mod merged;
 mod nearest;
 mod occupancy;
+mod octree_blocks;
 mod point;
 mod questions;
 mod ray;
@@ -25,5 +27,6 @@ mod tile_cursor;
 pub use collision::Shape;
 pub use nearest::Nearest;
 pub use occupancy::{Occupancy, UnknownAs};
+pub use octree_blocks::OctreeExport;
 pub use questions::Questions;
 pub use ray::{RayHit, RayQuery};

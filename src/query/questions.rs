@@ -1,12 +1,13 @@
 use super::collision::{self, Shape};
 use super::nearest::{self, Nearest};
 use super::ray::{self, RayHit, RayQuery};
-use super::{Occupancy, UnknownAs, coarse, digest, merged, point, region};
-use crate::error::Result;
+use super::{Occupancy, OctreeExport, UnknownAs, coarse, digest, merged, octree_blocks, point, region};
+use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::octree::Octree;
 use crate::space::{Aabb, Point, VoxelIndex};
 use crate::tile::Voxel;
+use std::io::{self, Read, Seek, Write};
 
 /// The questions; bring this trait into scope to ask any map.
 ///
@@ -102,13 +103,32 @@ pub trait Questions: MapView + Sized {
         digest::digest(self)
     }
 
-    /// One octree of the whole map or of a region, as OctoMap has it.
+    /// One octree of the whole map or of a region, as OctoMap has it, in memory. Maps that are larger are written by
+    /// [`Questions::write_octree`].
     ///
     /// # Errors
     ///
     /// Voxels outside OctoMap's key range of 65536 voxels an axis around the origin; more than `max_voxels`.
     fn merged_octree(&self, region: Option<&Aabb>, max_voxels: u64) -> Result<Octree> {
         merged::merged_octree(self, region, max_voxels)
+    }
+
+    /// Writes the `.bt` or `.ot` file of [`Questions::merged_octree`]'s tree without that tree, whatever its size; returns
+    /// the number of its voxels.
+    ///
+    /// The spool, an empty file or a [`Cursor`](std::io::Cursor), gets as many bytes as the file. Nothing goes to `out`
+    /// before all tiles were read.
+    ///
+    /// # Errors
+    ///
+    /// Voxels outside OctoMap's key range, a spool or an `out` that refuses.
+    fn write_octree<E: From<Error> + From<io::Error>>(
+        &self,
+        export: &OctreeExport<'_>,
+        spool: &mut (impl Read + Write + Seek),
+        out: &mut impl Write,
+    ) -> std::result::Result<u64, E> {
+        octree_blocks::write_octree(self, export, spool, out)
     }
 }
 

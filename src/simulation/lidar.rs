@@ -57,6 +57,26 @@ impl Lidar {
         Self { beams: 16, rays_per_beam: 360, max_range_m: 40.0, ..Self::street() }
     }
 
+    /// The street lidar with about so many rays a turn (at least 1): 64 beams from 32 768 rays on, else 32 from 4096 on,
+    /// else 16.
+    pub fn of_rays(rays: u32) -> Self {
+        let beams = match rays {
+            32_768.. => 64,
+            4_096.. => 32,
+            _ => 16,
+        };
+        Self { beams, rays_per_beam: (rays.saturating_add(beams / 2) / beams).max(1), ..Self::street() }
+    }
+
+    /// A lidar on a mast of [`Lidar::MAST_M`], with about so many rays a turn: it looks down on the city around, as far
+    /// as [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
+    pub fn mast(rays: u32) -> Self {
+        Self { elevation_deg: [-40.0, -4.0], max_range_m: super::Scene::MAX_RADIUS_M, ..Self::of_rays(rays) }
+    }
+
+    /// Height of the mast of [`Lidar::mast`] above the ground, in metres: above all roofs.
+    pub const MAST_M: f64 = 50.0;
+
     /// What the lidar sees from a pose: points in the world frame, intensities from 0 to 255.
     ///
     /// The points come in the order of a turn, all beams of one direction together. The noise is that of
@@ -157,6 +177,16 @@ mod tests {
         assert!(intensities.iter().all(|i| (0.0..=255.0).contains(i) && i.fract() == 0.0));
         let bright = intensities.iter().filter(|&&i| i > 100.0).count();
         assert!(bright > intensities.len() / 10 && bright < intensities.len());
+    }
+
+    #[test]
+    fn a_lidar_has_about_as_many_rays_as_asked_for() {
+        for rays in [0, 1, 100, 4_000, 8_000, 65_536, 1_000_000] {
+            let lidar = Lidar::of_rays(rays);
+            let has = lidar.beams * lidar.rays_per_beam;
+            assert!(has.abs_diff(rays) <= lidar.beams, "{has} for {rays}");
+        }
+        assert_eq!(Lidar::of_rays(u32::MAX).beams, 64);
     }
 
     #[test]

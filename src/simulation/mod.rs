@@ -1,8 +1,8 @@
 //! A made-up world to map: seeded, endless, and the same to the last bit on every platform.
 //!
 //! ```text
-//! City, Building  (World)  what there is: boxes and a ground plane      block, solid, scene
-//! Drive, Walk     (Route)  where the sensor is at step k
+//! City, Building  (World)  what there is: boxes and a ground plane   block, solid, scene
+//! Drive, Teleport, Walk  (Route)  where the sensor is at step k      leg, plan
 //! Lidar                    what it sees from there: a Scan in the world frame
 //! Survey                   the three together: scan k, or one scan after another
 //! ```
@@ -22,12 +22,15 @@ mod block;
 mod building;
 mod city;
 mod drive;
+mod leg;
 mod lidar;
+mod plan;
 mod random;
 mod route;
 mod scene;
 mod solid;
 mod survey;
+mod teleport;
 mod walk;
 mod world;
 
@@ -40,5 +43,6 @@ pub use route::Route;
 pub use scene::{Hit, Scene};
 pub use solid::Solid;
 pub use survey::Survey;
+pub use teleport::Teleport;
 pub use walk::Walk;
 pub use world::World;

@@ -1,4 +1,4 @@
-use super::{Building, City, Drive, Lidar, Route, Walk, World};
+use super::{Building, City, Drive, Lidar, Route, Teleport, Walk, World};
 use crate::scan::Scan;
 
 /// A world, a way through it and a lidar: the scans of a whole drive, made one at a time.
@@ -41,6 +41,33 @@ impl Survey<City, Drive> {
     /// A quick look: [`Lidar::demo`] every metre of the same drive.
     pub fn demo(seed: u64) -> Self {
         Self::new(City::new(seed), Drive::new(seed, 1.0), Lidar::demo(), seed)
+    }
+}
+
+/// For maps of any length: scans of about `rays` rays.
+impl Survey<City, Drive> {
+    /// A scan every metre of a drive over mostly new streets: [`Drive::tour`].
+    pub fn tour(seed: u64, rays: u32) -> Self {
+        Self::new(City::new(seed), Drive::tour(seed, 1.0), Lidar::of_rays(rays), seed)
+    }
+
+    /// A scan every metre of the same round, again and again: [`Drive::laps`].
+    pub fn laps(seed: u64, edge_blocks: u64, rays: u32) -> Self {
+        Self::new(City::new(seed), Drive::laps(edge_blocks, 1.0), Lidar::of_rays(rays), seed)
+    }
+}
+
+/// Scans of about `rays` rays, each from somewhere else within `reach_m` metres of the origin.
+impl Survey<City, Teleport> {
+    /// From streets.
+    pub fn teleports(seed: u64, reach_m: f64, rays: u32) -> Self {
+        Self::new(City::new(seed), Teleport::new(seed, reach_m), Lidar::of_rays(rays), seed)
+    }
+
+    /// From masts, over all roofs and far: a scan touches more than a thousand tiles of ten metres.
+    pub fn masts(seed: u64, reach_m: f64, rays: u32) -> Self {
+        let places = Teleport::new(seed, reach_m).at_height(Lidar::MAST_M);
+        Self::new(City::new(seed), places, Lidar::mast(rays), seed)
     }
 }
 
@@ -129,6 +156,14 @@ mod tests {
             let mean_m = mean_range_m(Survey::street(seed), 20);
             assert!((10.0..14.0).contains(&mean_m), "{mean_m} m");
         }
+    }
+
+    #[test]
+    fn a_scan_from_a_mast_touches_more_than_a_thousand_tiles() {
+        let grid = crate::space::Grid::new(0.2, 10.0).unwrap();
+        let scan = Survey::masts(1, 1_000.0, 65_536).scan_at(0);
+        let tiles: std::collections::BTreeSet<_> = scan.points.iter().map(|p| grid.tile_of(*p)).collect();
+        assert!(tiles.len() > 1_000, "{}", tiles.len());
     }
 
     #[test]

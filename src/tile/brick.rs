@@ -1,7 +1,7 @@
 use super::cells::{CELL_VOXELS, Cells};
 use super::packed::Packed;
 use super::palette::{Palette, StateId};
-use super::summary::{Summary, larger, nodes_of};
+use super::summary::{Summary, larger};
 use crate::octree::BrickNodes;
 use crate::sensor::Evidence;
 use crate::space::{BrickCode, BrickMask, places};
@@ -105,10 +105,10 @@ impl Brick {
     pub(super) fn nodes(&self, threshold: Option<f32>, palette: &Palette) -> (BrickNodes, f32) {
         const NONE: f32 = f32::NEG_INFINITY;
         match &self.evidence {
-            Storage::Interned(cells) => nodes_of(self.code, self.observed, threshold, |word| {
+            Storage::Interned(cells) => BrickNodes::of_values(self.code, self.observed, threshold, |word| {
                 cells.cell(word).map_or([NONE; CELL_VOXELS], |cell| palette.values(cell))
             }),
-            Storage::Plain(cells) => nodes_of(self.code, self.observed, threshold, |word| {
+            Storage::Plain(cells) => BrickNodes::of_values(self.code, self.observed, threshold, |word| {
                 let mut values = [NONE; CELL_VOXELS];
                 let mut mask = [0; 8];
                 mask[word] = self.observed[word];

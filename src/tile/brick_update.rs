@@ -96,12 +96,17 @@ impl Brick {
             Storage::Interned(cells) => cells.make(words, UNKNOWN),
             Storage::Plain(cells) => cells.make(words, Packed::from(Evidence::PRIOR)),
         }
+        // Neighbors are often equal.
+        let mut last = (Evidence::PRIOR, UNKNOWN);
         for (done, &(place, evidence)) in voxels.iter().enumerate() {
             let (word, bit) = (place / 64, place % 64);
             match &mut self.evidence {
                 Storage::Interned(cells) => {
-                    let Ok(state) = palette.intern(evidence) else { return done };
-                    cells.cell_mut(word).expect(MADE)[bit] = state;
+                    if last.1 == UNKNOWN || !is_same(last.0, evidence) {
+                        let Ok(state) = palette.intern(evidence) else { return done };
+                        last = (evidence, state);
+                    }
+                    cells.cell_mut(word).expect(MADE)[bit] = last.1;
                 }
                 Storage::Plain(cells) => cells.cell_mut(word).expect(MADE)[bit] = evidence.into(),
             }
@@ -109,6 +114,12 @@ impl Brick {
         }
         voxels.len()
     }
+}
+
+/// Whether both are the same to the bit.
+#[inline]
+fn is_same(a: Evidence, b: Evidence) -> bool {
+    a.log_odds.to_bits() == b.log_odds.to_bits() && a.observation_count == b.observation_count
 }
 
 const MADE: &str = "the cells of the touched words were made before";

@@ -1,4 +1,5 @@
 use super::OctreeFactory;
+use super::brick_octree::BrickOctree;
 use super::table::Table;
 use super::tile_octree::TileOctree;
 use super::voxel_cache::VoxelCacheCounts;
@@ -55,6 +56,13 @@ impl Tile {
     /// The tile of a table, its octree derived.
     pub fn from_table(grid: &Grid, octrees: &OctreeFactory, index: TileIndex, mut table: Table) -> Self {
         let octree = octrees.octree_of(&mut table);
+        Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
+    }
+
+    /// The tile of a table that is looked at once. Its octree is a view of the bricks, whatever form the map's octrees
+    /// have, and not summed up: the same answers, of which the coarse ones take longer.
+    pub(crate) fn in_passing(grid: &Grid, index: TileIndex, table: Table) -> Self {
+        let octree = TileOctree::Bricks(BrickOctree::default());
         Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }
 

@@ -229,7 +229,11 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
         (vec!["build", scans, "-o", map], 2, "use --resume to go on with these scans"),
         (vec!["build", "nowhere", "-o", new], 1, "nowhere: cannot open"),
         (vec!["build", text(&empty_folder), "-o", new], 2, "no .pcd file in this folder"),
-        (vec!["build", &other, "-o", new], 2, "not a folder of .pcd files, nor a .pcd, .graph or .log file"),
+        (
+            vec!["build", &other, "-o", new],
+            2,
+            "not a folder of .pcd files, nor a .pcd, .graph, .log or .scans file",
+        ),
         (vec!["build", scans, "-o", new, "--poses", &few], 2, "1 poses for 3 scan files"),
         (vec!["build", scans, "-o", new, "--poses", &many], 2, "4 poses for 3 scan files"),
         (vec!["build", &wrong_header, "-o", new], 1, "line 7: the points have no field z"),

@@ -22,14 +22,20 @@ mod model;
 mod octocache;
 /// OctoMap's own files, to the last node and byte.
 mod octomap_files;
+/// Octree files of maps beyond memory: those of the whole tree, to the byte.
+mod octree_export;
 /// Questions against brute force.
 mod questions;
 /// Scans from files, good and bad.
 mod readers;
+/// The stream of scans, in files and from standard input.
+mod scan_stream;
 /// Numbers that are large, negative or on a border.
 mod space;
 /// Files of a map: what a flush leaves, what damage is told, what is never overwritten.
 mod store;
 mod support;
+/// Drives that a cache of tiles likes and some that it does not.
+mod trajectories;
 /// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
 mod voxel_cache;

@@ -9,6 +9,8 @@
 
 /// SIGKILL at random times, resumed until the end.
 mod killed;
+/// What a command takes of memory, told by itself.
+mod memory;
 /// The thread that writes octrees: one, asleep when idle, gone with its mapper.
 #[cfg(target_os = "linux")]
 mod octree_worker;

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Compares voxtile with the OctoMap library: maps of real scans, and every tile's octree.bt.
+# Compares voxtile with the OctoMap library: maps of real scans, every tile's octree.bt, and the .bt and .ot of the map.
 #
 #   tools/octomap_compat/run.sh [--short]
 #
@@ -13,8 +13,8 @@ target=${CARGO_TARGET_DIR:-target}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-cargo build --release --quiet --no-default-features --example insert_stream
-for tool in insert tiles; do
+cargo build --release --quiet --example insert_stream --bin voxtile
+for tool in insert tiles merged; do
     # Without contracted operations, like Debian's library: fused multiply-add visits slightly other voxels.
     # OctoMap's headers hold the ray walk, so it is compiled here, not only in the library. NDEBUG silences it.
     g++ -std=c++17 -O2 -DNDEBUG -ffp-contract=off -Wall -o "$work/$tool" "$here/$tool.cpp" -loctomap -loctomath
@@ -32,6 +32,11 @@ compare() { # data set, resolution in metres, most scans
     "$target/release/examples/insert_stream" "$work/stream" "$2" "$work/map"
     "$work/insert" "$work/stream" "$2" "$work/map" || failed=1
     "$work/tiles" "$work/map" "$2" || failed=1
+    # In little memory, so that the files are put together from many blocks.
+    for format in bt ot; do
+        "$target/release/voxtile" export "$work/map" -o "$work/whole.$format" --memory 1MiB > /dev/null
+    done
+    "$work/merged" "$work/map" "$2" "$work/whole.bt" "$work/whole.ot" || failed=1
     rm -r "$work/map"
 }
 

@@ -1,3 +1,4 @@
+use crate::byte_size::ByteSize;
 use crate::flush_schedule::FlushEvery;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -41,7 +42,7 @@ pub enum Command {
 #[command(allow_negative_numbers = true)]
 pub struct BuildArgs {
     /// A folder of PCD files in the sensor frame (or one that holds it as scans/), an OctoMap scan graph (.graph) or
-    /// scan log (.log)
+    /// scan log (.log), a scan stream (.scans), or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
     /// Folder of the map
@@ -218,6 +219,9 @@ pub struct ExportArgs {
     /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,
+    /// Memory for putting a .bt or .ot file together, beside that of one tile (64MiB, 1GiB)
+    #[arg(long, value_name = "SIZE", default_value = "64MiB")]
+    pub memory: ByteSize,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,

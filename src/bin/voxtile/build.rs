@@ -4,12 +4,13 @@ use crate::flush_schedule::FlushSchedule;
 use crate::octree_choice::octree_config;
 use crate::progress::Progress;
 use crate::summary::Summary;
+use std::io::BufReader;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use voxtile::io::{ScanSource, open_scans};
+use voxtile::io::{ScanSource, open_scans, read_scan_stream};
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::{ScanReport, ScanTracer};
 use voxtile::sensor::{Iwlo, SensorModel};
@@ -22,15 +23,17 @@ const MAX_RANGE_M: f64 = 100.0;
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let stop = stop_signal()?;
-    let mut source = open_scans(&args.scans, args.poses.as_deref())?;
-    let fingerprint = source.fingerprint()?;
+    let mut source = open_source(args)?;
+    let fingerprint = fingerprint(args, &*source)?;
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
+    let mut first = None;
     let mut mapper = if exists {
         OutOfCoreTileMapper::open(&args.output, config)?
     } else {
         // A first scan that cannot be mapped should not leave an empty map behind.
-        check_first_scan(&mut *open_scans(&args.scans, args.poses.as_deref())?, &config)?;
+        first = next_scan(&mut *source)?;
+        check(first.as_ref(), &config)?;
         OutOfCoreTileMapper::create(&args.output, config)?
     };
     let done = if args.resume {
@@ -50,7 +53,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
         report: ScanReport::default(),
         scans: 0,
     };
-    let outcome = build.insert_all(&mut *source, &stop);
+    let outcome = build.insert_all(first, &mut *source, &stop);
     build.progress.say("flushing");
     // What was accepted is kept, whatever ended the build.
     let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper, args.append));
@@ -82,8 +85,13 @@ struct Build<'a> {
 }
 
 impl Build<'_> {
-    fn insert_all(&mut self, source: &mut dyn ScanSource, stop: &AtomicBool) -> anyhow::Result<()> {
-        while let Some(scan) = next_scan(source)? {
+    fn insert_all(
+        &mut self,
+        mut first: Option<Scan>,
+        source: &mut dyn ScanSource,
+        stop: &AtomicBool,
+    ) -> anyhow::Result<()> {
+        while let Some(scan) = first.take().map_or_else(|| next_scan(source), |scan| Ok(Some(scan)))? {
             if stop.load(Ordering::Relaxed) {
                 break;
             }
@@ -127,11 +135,34 @@ fn exists(args: &BuildArgs) -> anyhow::Result<bool> {
     Ok(exists)
 }
 
-fn check_first_scan(source: &mut dyn ScanSource, config: &MapConfig) -> anyhow::Result<()> {
-    if let Some(scan) = next_scan(source)? {
-        ScanTracer::default().trace(&config.grid, &config.sensor_model, &config.rays, &scan)?;
+fn open_source(args: &BuildArgs) -> voxtile::Result<Box<dyn ScanSource>> {
+    if !is_standard_input(args) {
+        return open_scans(&args.scans, args.poses.as_deref());
     }
-    Ok(())
+    if args.poses.is_some() {
+        return Err(Error::argument("--poses", "a scan stream has its own poses; leave the option out"));
+    }
+    let input = BufReader::with_capacity(1 << 18, std::io::stdin().lock());
+    Ok(Box::new(read_scan_stream(input, Path::new("standard input"), false)?))
+}
+
+fn is_standard_input(args: &BuildArgs) -> bool {
+    args.scans == Path::new("-")
+}
+
+/// What the map remembers of its input. Only who wants to resume needs to tell one stream from another.
+fn fingerprint(args: &BuildArgs, source: &dyn ScanSource) -> voxtile::Result<String> {
+    match source.fingerprint() {
+        Err(Error::InvalidArgument { .. }) if is_standard_input(args) && !args.resume => {
+            Ok("a stream without a label".to_owned())
+        }
+        fingerprint => fingerprint,
+    }
+}
+
+fn check(scan: Option<&Scan>, config: &MapConfig) -> voxtile::Result<()> {
+    let Some(scan) = scan else { return Ok(()) };
+    ScanTracer::default().trace(&config.grid, &config.sensor_model, &config.rays, scan).map(drop)
 }
 
 /// Passes over scans that are in the map.

@@ -1,5 +1,6 @@
 use crate::args::DigestArgs;
 use crate::map_at::read_map;
+use crate::memory;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::Questions;
@@ -10,7 +11,10 @@ pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.json {
         let digest = digest.to_string();
-        writeln!(out, "{}", serde_json::json!({ "digest": digest, "scan_number": scan_number }))?;
+        let peak = memory::peak_bytes();
+        let answer =
+            serde_json::json!({ "digest": digest, "scan_number": scan_number, "peak_rss_bytes": peak });
+        writeln!(out, "{answer}")?;
     } else {
         writeln!(out, "{digest}")?;
     }

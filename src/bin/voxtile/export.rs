@@ -1,5 +1,6 @@
 use crate::args::ExportArgs;
 use crate::map_at::{point_of, read_map};
+use crate::memory;
 use crate::octree_file;
 use crate::progress::Progress;
 use indicatif::HumanCount;
@@ -11,11 +12,9 @@ use voxtile::io::{VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::maths::logit;
 use voxtile::octree::{Octree, OctreeFormat, write_bt, write_ot};
+use voxtile::query::OctreeExport;
 use voxtile::space::Aabb;
 use voxtile::{Error, Questions};
-
-/// Most voxels of one merged octree, which is built in memory: about 2 GB.
-const MAX_OCTREE_VOXELS: u64 = 100_000_000;
 
 #[derive(Clone, Copy)]
 enum ExportFormat {
@@ -55,15 +54,15 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
         ExportFormat::Voxels(format) => {
             read_map(&args.map, |reader| export_voxels(args, format, region, reader))?
         }
-        ExportFormat::Octree(format) => read_map(&args.map, |reader| {
-            let tree = reader.merged_octree(region, MAX_OCTREE_VOXELS)?;
-            let threshold = reader.config().occupied_log_odds() as f32;
-            write_octree(args, format, &tree, reader.config().grid.resolution_m(), threshold)
-        })?,
+        ExportFormat::Octree(format) => {
+            read_map(&args.map, |reader| export_octree(args, format, region, reader))?
+        }
     };
     let mut out = io::stdout().lock();
     if args.json {
-        writeln!(out, "{}", serde_json::json!({ "file": args.output, "voxels": count }))?;
+        let peak = memory::peak_bytes();
+        let summary = serde_json::json!({ "file": args.output, "voxels": count, "peak_rss_bytes": peak });
+        writeln!(out, "{summary}")?;
     } else {
         writeln!(out, "{} voxels in {}", HumanCount(count), args.output.display())?;
     }
@@ -77,9 +76,7 @@ fn export_voxels(
     reader: &MapReader,
 ) -> anyhow::Result<u64> {
     let grid = reader.config().grid;
-    // Two passes in constant memory: the header names the count.
-    let mut count = 0;
-    reader.for_each_occupied(args.min_probability, region, |_| count += 1)?;
+    let count = count_voxels(args, region, reader)?;
     write_whole(&args.output, |out| {
         let progress = Progress::over_tiles(reader.tile_indices().len());
         let mut writer = VoxelWriter::new(format, count, grid.resolution_m(), out)?;
@@ -104,6 +101,35 @@ fn export_voxels(
         writer.finish()?;
         Ok(count)
     })
+}
+
+/// How many voxels there are to export: the headers name it before the first. In constant memory, and without reading
+/// a tile where the log of the map knows.
+fn count_voxels(args: &ExportArgs, region: Option<&Aabb>, reader: &MapReader) -> voxtile::Result<u64> {
+    match (reader.voxel_counts(), args.min_probability, region) {
+        (Some((_, occupied)), None, None) => return Ok(occupied),
+        (Some((voxels, _)), Some(0.0), None) => return Ok(voxels),
+        _ => {}
+    }
+    let mut count = 0;
+    reader.for_each_occupied(args.min_probability, region, |_| count += 1)?;
+    Ok(count)
+}
+
+/// Writes an octree file of any size. Its parts lie in a file beside it until all of them are known.
+fn export_octree(
+    args: &ExportArgs,
+    format: OctreeFormat,
+    region: Option<&Aabb>,
+    reader: &MapReader,
+) -> anyhow::Result<u64> {
+    let path = args.output.with_added_extension("spool");
+    let spool = File::options().read(true).write(true).create(true).truncate(true).open(&path);
+    let mut spool = spool.map_err(|error| Error::io(&path, "create", error))?;
+    let export = OctreeExport { format, region, memory_bytes: args.memory.bytes() };
+    let outcome = write_whole(&args.output, |mut out| reader.write_octree(&export, &mut spool, &mut out));
+    fs::remove_file(&path).ok();
+    outcome
 }
 
 fn write_octree(

@@ -2,6 +2,7 @@
 
 mod args;
 mod build;
+mod byte_size;
 mod demo;
 mod digest;
 mod export;

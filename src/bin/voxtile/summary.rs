@@ -33,7 +33,8 @@ pub struct Summary {
     pub loads: u64,
     pub saves: u64,
     pub seconds: f64,
-    pub peak_memory_bytes: Option<u64>,
+    /// Largest resident memory of the process.
+    pub peak_rss_bytes: Option<u64>,
 }
 
 /// What was done for pointer octrees, from the start to the last flush.
@@ -75,7 +76,7 @@ impl Summary {
             loads: statistics.io.loads,
             saves: statistics.io.saves,
             seconds: elapsed.as_secs_f64(),
-            peak_memory_bytes: memory::peak_bytes(),
+            peak_rss_bytes: memory::peak_bytes(),
         })
     }
 
@@ -117,7 +118,7 @@ impl Summary {
             octrees.print(&mut out)?;
         }
         writeln!(out, "tile I/O  {} read, {} written", HumanCount(self.loads), HumanCount(self.saves))?;
-        if let Some(bytes) = self.peak_memory_bytes {
+        if let Some(bytes) = self.peak_rss_bytes {
             writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
         }
         Ok(())

@@ -1,4 +1,5 @@
 use crate::args::VerifyArgs;
+use crate::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -16,6 +17,7 @@ struct Report<'a> {
     #[serde(flatten)]
     verification: Verification,
     findings: Vec<Finding>,
+    peak_rss_bytes: Option<u64>,
 }
 
 pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
@@ -36,7 +38,8 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let whole = verification.is_whole();
     let mut out = std::io::stdout().lock();
     if args.json {
-        let report = Report { map: &args.map, whole, verification, findings };
+        let peak_rss_bytes = memory::peak_bytes();
+        let report = Report { map: &args.map, whole, verification, findings, peak_rss_bytes };
         writeln!(out, "{}", serde_json::to_string(&report)?)?;
     } else {
         print(args, &verification, &mut out)?;

@@ -15,7 +15,7 @@ pub const OCTOMAP_MIN_LOG_ODDS: f32 = f32::from_bits(0xc000_0075);
 pub const OCTOMAP_MAX_LOG_ODDS: f32 = f32::from_bits(0x4060_b4ba);
 
 /// What two bits say about a child.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Code {
     Unknown,
     Free,
@@ -163,7 +163,7 @@ fn write_encoded(
 }
 
 /// Nodes at this depth and deeper are pruned where they can be.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PrunedDepths(u8);
 
 impl PrunedDepths {

@@ -8,11 +8,16 @@ mod bt;
 mod bt_bricks;
 mod header;
 mod input;
+mod node_encoder;
 mod number;
 mod octree_file;
+mod octree_stream;
 mod ot;
+mod ot_bricks;
+mod spine;
 
 pub use bt::{OCTOMAP_MAX_LOG_ODDS, OCTOMAP_MIN_LOG_ODDS, write_bt, write_bt_unpruned};
 pub use bt_bricks::write_bt_of_bricks;
 pub use octree_file::{OctreeFile, OctreeFormat, read, read_bt, read_ot, read_with_limit};
+pub use octree_stream::{BtPruning, OctreeStream, StreamOutcome};
 pub use ot::write_ot;

@@ -10,7 +10,10 @@
 //! All little-endian. A reader of version 1 stops after `count` entries and never sees the trailer. The byte
 //! tables are in `docs/format.md`.
 
+mod any_order_entries;
+mod ascending_entries;
 mod entries;
+mod entry;
 mod reader;
 mod trailer;
 mod writer;
@@ -25,3 +28,5 @@ const MAGIC: u32 = 0x4957_4C4F;
 const VERSION: u32 = 1;
 const HEADER_BYTES: u64 = 16;
 const ENTRY_BYTES: u64 = 18;
+/// An entry as it stands in the file.
+type EntryBytes = [u8; ENTRY_BYTES as usize];

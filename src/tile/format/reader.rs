@@ -1,10 +1,20 @@
+use super::any_order_entries::AnyOrderEntries;
+use super::ascending_entries::AscendingEntries;
 use super::trailer::Trailer;
-use super::{ENTRY_BYTES, HEADER_BYTES, MAGIC, VERSION};
+use super::{ENTRY_BYTES, EntryBytes, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
-use crate::sensor::Evidence;
-use crate::space::{MortonCode, VoxelBox, VoxelKey};
+use crate::space::VoxelBox;
 use crate::tile::Table;
 use std::io::{self, Read};
+
+/// Decodes entries into a table.
+pub(super) trait TakeEntries {
+    /// Takes the next entries, which begin at `offset` of the file.
+    fn take(&mut self, entries: &[EntryBytes], offset: u64) -> Result<(), FormatError>;
+
+    /// The table of all entries.
+    fn end(&mut self) -> Result<Table, FormatError>;
+}
 
 /// What `iwlo_meta.bin` holds.
 #[derive(Debug)]
@@ -30,7 +40,10 @@ pub fn read_table(
 ) -> Result<DecodedTable, DecodeError> {
     let mut crc = crc32fast::Hasher::new();
     let (count, trailer_bytes) = read_header(input, file_bytes, &mut crc)?;
-    let mut entries = Entries::new(voxels, trailer_bytes > 0);
+    let mut entries: Box<dyn TakeEntries> = match trailer_bytes {
+        0 => Box::new(AnyOrderEntries::new(voxels)),
+        _ => Box::new(AscendingEntries::new(voxels)),
+    };
     let mut chunk = vec![0; 4096 * ENTRY_BYTES as usize];
     let mut done = 0;
     while done < count {
@@ -38,12 +51,10 @@ pub fn read_table(
         let bytes = &mut chunk[..(entries_here * ENTRY_BYTES) as usize];
         input.read_exact(bytes)?;
         crc.update(bytes);
-        for (number, entry) in (done..).zip(bytes.chunks_exact(ENTRY_BYTES as usize)) {
-            entries.take(entry, HEADER_BYTES + number * ENTRY_BYTES)?;
-        }
+        entries.take(bytes.as_chunks().0, HEADER_BYTES + done * ENTRY_BYTES)?;
         done += entries_here;
     }
-    let table = entries.into_table()?;
+    let table = entries.end()?;
     if trailer_bytes == 0 {
         return Ok(DecodedTable { table, trailer: None });
     }
@@ -97,82 +108,4 @@ fn read_header(
         return wrong(8, format!("a count of {count} entries does not fit into {file_bytes} bytes"));
     };
     Ok((count, after_entries))
-}
-
-/// Voxels of a brick.
-const BRICK_VOXELS: usize = 512;
-
-/// Decodes entries into a table, brick by brick.
-struct Entries<'a> {
-    voxels: &'a VoxelBox,
-    must_ascend: bool,
-    table: Table,
-    /// The entries of one brick, with their offsets.
-    run: Vec<(MortonCode, Evidence, u64)>,
-    /// The same as the table takes them: place and evidence.
-    voxels_of_run: Vec<(usize, Evidence)>,
-}
-
-impl<'a> Entries<'a> {
-    fn new(voxels: &'a VoxelBox, must_ascend: bool) -> Self {
-        let (run, voxels_of_run) = (Vec::with_capacity(512), Vec::with_capacity(512));
-        Self { voxels, must_ascend, table: Table::default(), run, voxels_of_run }
-    }
-
-    fn take(&mut self, entry: &[u8], offset: u64) -> Result<(), FormatError> {
-        let key =
-            VoxelKey(std::array::from_fn(|axis| u16::from_le_bytes([entry[2 * axis], entry[2 * axis + 1]])));
-        let log_odds = f64::from_le_bytes(std::array::from_fn(|k| entry[6 + k]));
-        let observation_count = i32::from_le_bytes(std::array::from_fn(|k| entry[14 + k]));
-        let wrong = |at, reason| Err(FormatError::at_offset(offset + at, reason));
-        if !self.voxels.contains(key.to_index_from(self.voxels.min)) {
-            return wrong(0, format!("key {:?} belongs to another tile", key.0));
-        }
-        if !log_odds.is_finite() {
-            return wrong(6, format!("log-odds {log_odds} are not finite"));
-        }
-        if observation_count < 0 {
-            return wrong(14, format!("observation count {observation_count} is negative"));
-        }
-        let code = key.morton();
-        if let Some(&(previous, ..)) = self.run.last() {
-            if self.must_ascend && previous >= code {
-                return wrong(0, format!("key {:?} is not in Morton order", key.0));
-            }
-            if previous.brick() != code.brick() {
-                self.end_run()?;
-            }
-        }
-        if self.run.len() >= BRICK_VOXELS {
-            return wrong(0, format!("key {:?} or another of its 8 x 8 x 8 voxels comes twice", key.0));
-        }
-        self.run.push((code, Evidence { log_odds, observation_count }, offset));
-        Ok(())
-    }
-
-    /// Moves the run into the table, all voxels of the brick at once.
-    fn end_run(&mut self) -> Result<(), FormatError> {
-        let Some(&(first, ..)) = self.run.first() else { return Ok(()) };
-        self.run.sort_unstable_by_key(|&(code, _, offset)| (code, offset));
-        let in_run = self.run.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].2);
-        let in_table = || {
-            let known = |&&(code, ..): &&(MortonCode, Evidence, u64)| self.table.get(code).is_some();
-            let may_be = self.table.has_brick(first.brick());
-            may_be.then(|| self.run.iter().find(known)).flatten().map(|&(.., offset)| offset)
-        };
-        if let Some(offset) = in_run.or_else(in_table) {
-            return Err(FormatError::at_offset(offset, "the key comes twice"));
-        }
-        self.voxels_of_run.clear();
-        self.voxels_of_run
-            .extend(self.run.iter().map(|&(code, evidence, _)| (code.place_in_brick(), evidence)));
-        self.table.insert(first.brick(), &self.voxels_of_run);
-        self.run.clear();
-        Ok(())
-    }
-
-    fn into_table(mut self) -> Result<Table, FormatError> {
-        self.end_run()?;
-        Ok(self.table)
-    }
 }

@@ -4,6 +4,7 @@ use super::targets::{TILES, entries_end, grid};
 use crate::readers::{graph, pcd, points};
 use std::fs;
 use tempfile::TempDir;
+use voxtile::io::ScanStreamWriter;
 use voxtile::octree::{Octree, write_bt, write_bt_unpruned, write_ot};
 use voxtile::space::{MortonCode, TileIndex, VoxelKey};
 use voxtile::store::{Layout, TileFile};
@@ -113,7 +114,27 @@ fn clouds() -> Seeds {
 fn scans() -> Seeds {
     let log = "# a log\nNODE 10 0 1 0 0 1.2\n1 2 3\n-1 0.5 0.25\n\n skipped\nNODE 0 0 0 0.1 -3 0\n";
     let no_points = [&1_u32.to_le_bytes(), &[0; 4], &graph()[64..132]].concat();
-    vec![("graph", "two", graph()), ("graph", "no-points", no_points), ("log", "two", log.into())]
+    vec![
+        ("graph", "two", graph()),
+        ("graph", "no-points", no_points),
+        ("log", "two", log.into()),
+        ("scan_stream", "intensities", scan_stream("two scans", true)),
+        ("scan_stream", "bare", scan_stream("", false)),
+    ]
+}
+
+fn scan_stream(label: &str, has_intensities: bool) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut writer = ScanStreamWriter::new(&mut bytes, label, has_intensities).unwrap();
+    for count in [2, 0] {
+        let scan = Scan {
+            origin: [1.0, -2.0, 0.5],
+            points: vec![[1.5, 2.0, 3.0]; count],
+            intensities: Some(vec![7.0; count]),
+        };
+        writer.write_world(&scan).unwrap();
+    }
+    bytes
 }
 
 fn texts() -> Seeds {

@@ -6,7 +6,10 @@
 
 use nalgebra::Isometry3;
 use std::path::Path;
-use voxtile::io::{PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log};
+use voxtile::io::{
+    PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log,
+    read_scan_stream,
+};
 use voxtile::octree::{
     OctreeFile, OctreeFormat, read, read_with_limit, write_bt, write_bt_unpruned, write_ot,
 };
@@ -17,7 +20,7 @@ use voxtile::tile::format::{TRAILER_BYTES, read_table, write_table};
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by the name of its corpus.
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 11] = [
     ("bt", octree),
     ("ot", octree),
     ("table", table),
@@ -26,6 +29,7 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("pcd", pcd),
     ("graph", graph),
     ("log", log),
+    ("scan_stream", scan_stream),
     ("poses", poses),
     ("points", points),
 ];
@@ -206,6 +210,18 @@ pub fn log(data: &[u8]) -> bool {
     let points = all_points(read_scan_log(data, Path::new("fuzz.log")));
     assert!(points.is_none_or(|points| points <= data.len()));
     points.is_some()
+}
+
+/// voxtile's scan stream, scan by scan.
+pub fn scan_stream(data: &[u8]) -> bool {
+    const POINT_BYTES: usize = 12;
+    read_scan_stream(data, Path::new("fuzz.scans"), false).is_ok_and(|source| {
+        // Tells the stream by its label, or says that it has none.
+        source.fingerprint().unwrap_or_default();
+        let points = all_points(source);
+        assert!(points.is_none_or(|points| points * POINT_BYTES <= data.len()));
+        points.is_some()
+    })
 }
 
 /// Number of points in all scans; `None` if one could not be read.

@@ -88,10 +88,7 @@ pub fn short() -> Vec<Workload> {
 /// `numbers`: floor and goal of one thread, of two threads, floors of synced and flushed, most nanoseconds a question.
 fn workload(survey: SurveyName, resolution_m: f64, scans: usize, numbers: [f64; 7]) -> Workload {
     let [one, one_goal, two, two_goal, synced, flushed, question_ns] = numbers;
-    let name = match survey {
-        SurveyName::Street => "street",
-        SurveyName::Indoor => "indoor",
-    };
+    let name = survey.name();
     Workload {
         name: format!("{name} {resolution_m} m"),
         source: Source::MadeUp(survey),
@@ -159,7 +156,7 @@ impl Workload {
 fn write_made_up(survey: SurveyName, scans: usize, stream: &Path, intensities: &Path) -> std::io::Result<()> {
     let created = |path| File::create(path).map(BufWriter::new);
     let mut writer = ScanWriter::new(created(stream)?, Some(created(intensities)?));
-    survey.scans(SEED, 0).take(scans).try_for_each(|scan| writer.write(&scan))?;
+    survey.scans(SEED, 0, SurveyName::RAYS).take(scans).try_for_each(|scan| writer.write(&scan))?;
     writer.flush()
 }
 

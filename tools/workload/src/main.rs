@@ -1,25 +1,35 @@
 //! The command `workload`: scans of a made-up survey to a file or to a pipe.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Parser;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use workload::{ScanWriter, SurveyName};
+use voxtile::Scan;
+use voxtile::io::ScanStreamWriter;
+use workload::{Length, ScanWriter, SurveyName};
 
-/// Writes the scans of a made-up survey as a stream of world points.
+/// Writes the scans of a made-up survey, as a scan stream that `voxtile build` reads.
 ///
-/// Per scan, little-endian: count u32, origin 3 x f32, points 3 x f32 each; metres in the world frame. The same
-/// arguments give the same bytes on every platform.
+/// Nothing is kept: a survey of any length takes the memory of a scan. The same arguments give the same bytes on every
+/// platform.
+///
+///     workload drive --length 5km | voxtile build - -o MAP
 #[derive(Debug, Parser)]
-#[command(name = "workload", version)]
+#[command(name = "workload", version, verbatim_doc_comment)]
 struct Arguments {
     /// Which survey
     survey: SurveyName,
     /// How many scans to write
-    #[arg(long, value_name = "N")]
-    scans: usize,
+    #[arg(long, value_name = "N", required_unless_present = "length")]
+    scans: Option<usize>,
+    /// How far to go, in km or m (5km, 800m)
+    #[arg(long, value_name = "LENGTH", conflicts_with = "scans")]
+    length: Option<Length>,
+    /// Rays of a scan, more or less; street and indoor have their own number
+    #[arg(long, value_name = "N", default_value_t = SurveyName::RAYS)]
+    rays: u32,
     /// Number of the first scan, counted from 0
     #[arg(long, value_name = "K", default_value_t = 0)]
     first: usize,
@@ -29,8 +39,12 @@ struct Arguments {
     /// File of the stream [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write the intensities (0 to 255) to this file too: one f32 a point, little-endian, scan after scan
-    #[arg(long, value_name = "FILE")]
+    /// Write the plain stream of world points for other mappers instead: per scan, little-endian, count u32, origin
+    /// 3 x f32, points 3 x f32 each, in metres
+    #[arg(long)]
+    plain: bool,
+    /// Beside the plain stream, write the intensities (0 to 255) to this file: one f32 a point, little-endian
+    #[arg(long, value_name = "FILE", requires = "plain")]
     intensities: Option<PathBuf>,
 }
 
@@ -46,23 +60,47 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let scans: Box<dyn Write> = match &arguments.output {
+    let &Arguments { survey, seed, first, rays, .. } = arguments;
+    let count = scan_count(arguments)?;
+    let out: Box<dyn Write> = match &arguments.output {
         Some(path) => Box::new(created(path)?),
         None => Box::new(io::stdout().lock()),
     };
-    let intensities = match &arguments.intensities {
-        Some(path) => Some(buffered(Box::new(created(path)?))),
-        None => None,
+    let scans = survey.scans(seed, first, rays).take(count);
+    let written = if arguments.plain {
+        write_plain(scans, out, arguments.intensities.as_deref())?
+    } else {
+        write_stream(scans, out, &survey.label(seed, first, rays))
     };
-    let mut writer = ScanWriter::new(buffered(scans), intensities);
-    for scan in arguments.survey.scans(arguments.seed, arguments.first).take(arguments.scans) {
-        writer.write(&scan).context("cannot write the scans")?;
+    written.context("cannot write the scans")
+}
+
+fn scan_count(arguments: &Arguments) -> Result<usize> {
+    match (arguments.scans, arguments.length, arguments.survey.spacing_m()) {
+        (Some(scans), ..) => Ok(scans),
+        (None, Some(length), Some(spacing_m)) => Ok((length.metres / spacing_m).ceil() as usize),
+        _ => bail!("--length: there is no way between the scans of this survey; say how many with --scans"),
     }
-    writer.flush().context("cannot write the scans")
+}
+
+fn write_stream(mut scans: impl Iterator<Item = Scan>, out: Box<dyn Write>, label: &str) -> io::Result<()> {
+    let mut writer = ScanStreamWriter::new(buffered(out), label, true)?;
+    scans.try_for_each(|scan| writer.write_world(&scan))?;
+    writer.flush()
+}
+
+fn write_plain(
+    mut scans: impl Iterator<Item = Scan>,
+    out: Box<dyn Write>,
+    intensities: Option<&Path>,
+) -> Result<io::Result<()>> {
+    let intensities = intensities.map(created).transpose()?.map(|file| buffered(Box::new(file)));
+    let mut writer = ScanWriter::new(buffered(out), intensities);
+    Ok(scans.try_for_each(|scan| writer.write(&scan)).and_then(|()| writer.flush()))
 }
 
 fn buffered(out: Box<dyn Write>) -> BufWriter<Box<dyn Write>> {
-    BufWriter::with_capacity(1 << 20, out)
+    BufWriter::with_capacity(1 << 18, out)
 }
 
 fn created(path: &Path) -> Result<File> {

@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_rounded_to_f32() {
-        let scans: Vec<Scan> = SurveyName::Indoor.scans(3, 5).take(2).collect();
+        let scans: Vec<Scan> = SurveyName::Indoor.scans(3, 5, SurveyName::RAYS).take(2).collect();
         let [points, intensities] = written(&scans);
         let read: io::Result<Vec<Scan>> = ScanReader::new(&points[..], Some(&intensities[..])).collect();
         assert_eq!(read.unwrap(), scans.iter().map(rounded).collect::<Vec<_>>());

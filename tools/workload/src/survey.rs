@@ -9,14 +9,92 @@ pub enum SurveyName {
     Street,
     /// 90 000 rays, every half metre of a walk through a building; mean range 2.3 m, at most 20 m
     Indoor,
+    /// Every metre of a drive through an endless city: mostly new streets, a fifth of them driven again
+    Drive,
+    /// Every metre of the same round of 4 km through the city, again and again
+    Laps,
+    /// Every scan from another street within 5 km
+    Teleport,
+    /// Every scan from another mast of 50 m within 5 km, with rays of up to 400 m
+    Mast,
 }
 
+/// Streets along each side of a lap: 4 x 17 x 60 m.
+const LAP_BLOCKS: u64 = 17;
+/// How far from the origin teleports and masts are, in metres.
+const REACH_M: f64 = 5_000.0;
+
 impl SurveyName {
-    /// The scans from number `first` on, without end. The same seed gives the same scans on every platform.
-    pub fn scans(self, seed: u64, first: usize) -> Box<dyn Iterator<Item = Scan>> {
+    /// Rays of a scan where nothing else is asked for.
+    pub const RAYS: u32 = 8_000;
+
+    /// The scans from number `first` on, without end, those of city surveys of about `rays` rays (street and indoor have
+    /// their own number). The same seed gives the same scans on every platform.
+    pub fn scans(self, seed: u64, first: usize, rays: u32) -> Box<dyn Iterator<Item = Scan>> {
         match self {
             Self::Street => Box::new(Survey::street(seed).skip(first)),
             Self::Indoor => Box::new(Survey::indoor(seed).skip(first)),
+            Self::Drive => Box::new(Survey::tour(seed, rays).skip(first)),
+            Self::Laps => Box::new(Survey::laps(seed, LAP_BLOCKS, rays).skip(first)),
+            Self::Teleport => Box::new(Survey::teleports(seed, REACH_M, rays).skip(first)),
+            Self::Mast => Box::new(Survey::masts(seed, REACH_M, rays).skip(first)),
+        }
+    }
+
+    /// Metres from one scan to the next; `None` where there is no way between them.
+    pub fn spacing_m(self) -> Option<f64> {
+        match self {
+            Self::Street | Self::Drive | Self::Laps => Some(1.0),
+            Self::Indoor => Some(0.5),
+            Self::Teleport | Self::Mast => None,
+        }
+    }
+
+    /// What it is called on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Street => "street",
+            Self::Indoor => "indoor",
+            Self::Drive => "drive",
+            Self::Laps => "laps",
+            Self::Teleport => "teleport",
+            Self::Mast => "mast",
+        }
+    }
+
+    /// What tells these scans from others, in a scan stream.
+    pub fn label(self, seed: u64, first: usize, rays: u32) -> String {
+        let name = self.name();
+        match self {
+            Self::Street | Self::Indoor => format!("workload {name}, seed {seed}, from scan {first}"),
+            _ => format!("workload {name}, seed {seed}, {rays} rays, from scan {first}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_the_command_line_and_labels_tell_surveys_apart() {
+        let mut labels = std::collections::BTreeSet::new();
+        for survey in SurveyName::value_variants() {
+            assert_eq!(SurveyName::from_str(survey.name(), false).as_ref(), Ok(survey));
+            for (seed, first, rays) in [(1, 0, 8_000), (2, 0, 8_000), (1, 5, 8_000), (1, 0, 100)] {
+                labels.insert(survey.label(seed, first, rays));
+            }
+        }
+        // Two surveys have their own number of rays.
+        assert_eq!(labels.len(), 6 * 4 - 2);
+    }
+
+    #[test]
+    fn scans_begin_at_the_number_asked_for() {
+        for &survey in SurveyName::value_variants() {
+            let mut scans = survey.scans(1, 0, 200);
+            let (second, alone) = (scans.nth(1), survey.scans(1, 1, 200).next());
+            assert!(second.is_some() && second == alone, "{}", survey.name());
         }
     }
 }

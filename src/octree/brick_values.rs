@@ -1,0 +1,112 @@
+use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
+use std::ops::Range;
+
+/// The values of many voxels, gathered in parts of bricks: what a block of an octree is encoded from.
+///
+/// Four bytes a voxel and 80 a part. The parts of one brick may come from several places: a brick on the border of two
+/// tiles has voxels of both.
+#[derive(Debug, Default)]
+pub struct BrickValues {
+    parts: Vec<Part>,
+    values: Vec<f32>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    brick: BrickCode,
+    known: BrickMask,
+    /// Where its values begin: those of the known voxels, in Morton order.
+    first: u64,
+}
+
+/// All voxels of one brick.
+#[derive(Debug)]
+pub(super) struct BrickContent {
+    pub(super) known: BrickMask,
+    /// Negative infinity where nothing is known.
+    pub(super) values: [f32; BRICK_VOXELS],
+}
+
+impl BrickValues {
+    /// Bytes in use.
+    pub fn bytes(&self) -> usize {
+        self.parts.len() * size_of::<Part>() + self.values.len() * size_of::<f32>()
+    }
+
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Whether there is no voxel.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Forgets the voxels and keeps the room.
+    pub fn clear(&mut self) {
+        self.parts.clear();
+        self.values.clear();
+    }
+
+    /// Begins the next part of a brick; [`BrickValues::add`] adds its voxels, and [`BrickValues::end`] ends it.
+    pub fn begin(&mut self, brick: BrickCode) {
+        self.parts.push(Part { brick, known: [0; 8], first: self.values.len() as u64 });
+    }
+
+    /// Adds a voxel to the part that was begun last, at a place (0 to 511) after those added before.
+    #[inline]
+    pub fn add(&mut self, place: usize, value: f32) {
+        if let Some(part) = self.parts.last_mut() {
+            part.known[place / 64] |= 1 << (place % 64);
+            self.values.push(value);
+        }
+    }
+
+    /// Ends a part; one without voxels is forgotten.
+    pub fn end(&mut self) {
+        if self.parts.last().is_some_and(|part| part.known == [0; 8]) {
+            self.parts.pop();
+        }
+    }
+
+    /// Brings the bricks into Morton order, and returns the brick of each part.
+    pub(super) fn sorted(&mut self) -> Vec<BrickCode> {
+        // Stable, and quick where the parts come in a few ascending runs.
+        self.parts.sort_by_key(|part| part.brick);
+        self.parts.iter().map(|part| part.brick).collect()
+    }
+
+    /// Lays out the voxels of parts of one brick.
+    pub(super) fn gather(&self, parts: Range<usize>, content: &mut BrickContent) {
+        content.clear();
+        for part in &self.parts[parts] {
+            let mut values = self.values[part.first as usize..].iter();
+            for (word, &known) in part.known.iter().enumerate() {
+                content.known[word] |= known;
+                let mut bits = known;
+                while bits != 0 {
+                    let place = 64 * word + bits.trailing_zeros() as usize;
+                    content.values[place] = values.next().copied().unwrap_or(f32::NEG_INFINITY);
+                    bits &= bits - 1;
+                }
+            }
+        }
+    }
+}
+
+impl BrickContent {
+    pub(super) fn new() -> Self {
+        Self { known: [0; 8], values: [f32::NEG_INFINITY; BRICK_VOXELS] }
+    }
+
+    fn clear(&mut self) {
+        self.known = [0; 8];
+        self.values.fill(f32::NEG_INFINITY);
+    }
+
+    /// The values of a word's voxels.
+    pub(super) fn word(&self, word: usize) -> [f32; 64] {
+        std::array::from_fn(|bit| self.values[64 * word + bit])
+    }
+}

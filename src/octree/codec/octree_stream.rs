@@ -1,0 +1,146 @@
+use super::OctreeFormat;
+use super::bt::PrunedDepths;
+use super::bt_bricks::{BtEncoder, BtNode};
+use super::header::write_header;
+use super::node_encoder::{NodeEncoder, encode};
+use super::ot_bricks::{OtEncoder, OtNode};
+use super::spine::{Block, Spine};
+use crate::octree::BrickNodes;
+use crate::octree::brick_values::{BrickContent, BrickValues};
+use crate::space::MortonCode;
+use std::io::{self, BufWriter, Read, Seek, Write};
+
+/// Writes the `.bt` or `.ot` file of a tree that does not fit into memory, block by block: the bytes that
+/// [`write_bt`](super::write_bt) or [`write_ot`](super::write_ot) writes for the whole tree.
+///
+/// What a header says, and what stands before a block, is known only after the blocks behind it. So the blocks' own
+/// bytes go to a spool first, and a few bytes a block stay in memory.
+#[derive(Debug)]
+pub struct OctreeStream<S: Read + Write + Seek> {
+    blocks: Blocks,
+    spool: BufWriter<S>,
+    /// The bytes of one block.
+    payload: Vec<u8>,
+    voxels: u64,
+}
+
+#[derive(Debug)]
+enum Blocks {
+    Bt { encoder: BtEncoder, threshold: f32, pruned: PrunedDepths, blocks: Vec<Block<BtNode>> },
+    Ot { blocks: Vec<Block<OtNode>> },
+}
+
+/// How far a `.bt` file is pruned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BtPruning(Option<PrunedDepths>);
+
+/// What a finished [`OctreeStream`] gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StreamOutcome {
+    /// The file is written.
+    Written {
+        /// Known voxels.
+        voxels: u64,
+        /// Nodes of the tree.
+        nodes: u64,
+    },
+    /// OctoMap's `prune` leaves off at a depth where it finds nothing, and more was pruned here. Nothing is written:
+    /// all blocks are to be added once more, to a stream that prunes so far.
+    Again(BtPruning),
+}
+
+impl<S: Read + Write + Seek> OctreeStream<S> {
+    /// A `.bt` stream in which a voxel of at least `threshold_log_odds` is occupied. The spool, which is empty, gets
+    /// the bytes of the blocks. Begin with the default pruning.
+    pub fn bt(threshold_log_odds: f32, pruning: BtPruning, spool: S) -> Self {
+        let pruned = pruning.0.unwrap_or(PrunedDepths::ALL);
+        let encoder = BtEncoder::new(pruned);
+        Self::new(Blocks::Bt { encoder, threshold: threshold_log_odds, pruned, blocks: Vec::new() }, spool)
+    }
+
+    /// An `.ot` stream.
+    pub fn ot(spool: S) -> Self {
+        Self::new(Blocks::Ot { blocks: Vec::new() }, spool)
+    }
+
+    fn new(blocks: Blocks, spool: S) -> Self {
+        Self { blocks, spool: BufWriter::with_capacity(1 << 16, spool), payload: Vec::new(), voxels: 0 }
+    }
+
+    /// Adds all known voxels of the node at `depth` (0 to 13) whose first voxel is `first`. Nodes come in Morton order,
+    /// and none holds another.
+    ///
+    /// # Errors
+    ///
+    /// A spool that refuses.
+    pub fn add_block(&mut self, first: MortonCode, depth: u8, values: &mut BrickValues) -> io::Result<()> {
+        if values.is_empty() {
+            return Ok(());
+        }
+        self.voxels += values.len() as u64;
+        self.payload.clear();
+        let bricks = values.sorted();
+        let all = 0..bricks.len();
+        let (values, mut content) = (&*values, BrickContent::new());
+        match &mut self.blocks {
+            Blocks::Bt { encoder, threshold, blocks, .. } => {
+                let mut brick =
+                    |encoder: &mut BtEncoder, parts: std::ops::Range<usize>, out: &mut Vec<u8>| {
+                        let code = bricks[parts.start];
+                        values.gather(parts, &mut content);
+                        let word = |word| content.word(word);
+                        let (nodes, _) = BrickNodes::of_values(code, content.known, Some(*threshold), word);
+                        encoder.encode_brick(&nodes, out)
+                    };
+                let node = encode(encoder, &bricks, all, depth, &mut self.payload, &mut brick);
+                blocks.push(Block { first, depth, node, bytes: self.payload.len() as u64 });
+            }
+            Blocks::Ot { blocks } => {
+                let mut brick = |encoder: &mut OtEncoder, parts, out: &mut Vec<u8>| {
+                    values.gather(parts, &mut content);
+                    encoder.encode_brick(&content, out)
+                };
+                let node = encode(&mut OtEncoder, &bricks, all, depth, &mut self.payload, &mut brick);
+                blocks.push(Block { first, depth, node, bytes: self.payload.len() as u64 });
+            }
+        }
+        self.spool.write_all(&self.payload)
+    }
+
+    /// Writes the file, of a tree with this resolution.
+    ///
+    /// # Errors
+    ///
+    /// A spool or an `out` that refuses, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive,
+    /// finite length.
+    pub fn finish(self, resolution_m: f64, out: &mut impl Write) -> io::Result<StreamOutcome> {
+        let Self { blocks, spool, voxels, .. } = self;
+        let mut spool = spool.into_inner().map_err(io::IntoInnerError::into_error)?;
+        spool.rewind()?;
+        let mut out = BufWriter::with_capacity(1 << 16, out);
+        let nodes = match blocks {
+            Blocks::Bt { mut encoder, pruned, blocks, .. } => {
+                let spine = Spine::of(&mut encoder, &blocks);
+                if pruned == PrunedDepths::ALL
+                    && let Some(depths) = encoder.depths_of_octomap()
+                {
+                    return Ok(StreamOutcome::Again(BtPruning(Some(depths))));
+                }
+                let root = spine.node();
+                write_header(&mut out, OctreeFormat::Bt, BtEncoder::node_count(&root), resolution_m)?;
+                out.write_all(BtEncoder::before_root(&root))?;
+                spine.write(&mut spool, &mut out)?;
+                BtEncoder::node_count(&root)
+            }
+            Blocks::Ot { blocks } => {
+                let spine = Spine::of(&mut OtEncoder, &blocks);
+                let nodes = OtEncoder::node_count(&spine.node());
+                write_header(&mut out, OctreeFormat::Ot, nodes, resolution_m)?;
+                spine.write(&mut spool, &mut out)?;
+                nodes
+            }
+        };
+        out.flush()?;
+        Ok(StreamOutcome::Written { voxels, nodes })
+    }
+}

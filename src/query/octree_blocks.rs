@@ -1,0 +1,201 @@
+use super::region::voxels_around;
+use crate::error::{Error, Result};
+use crate::mapper::{MapView, TileRef};
+use crate::octree::{BrickValues, BtPruning, OctreeFormat, OctreeStream, StreamOutcome};
+use crate::space::{Aabb, BRICK_EDGE, MortonCode, TileIndex, VoxelBox, VoxelIndex};
+use std::io::{self, Read, Seek, Write};
+
+/// What [`Questions::write_octree`](super::Questions::write_octree) writes.
+#[derive(Clone, Copy, Debug)]
+pub struct OctreeExport<'a> {
+    /// `.bt` or `.ot`. In `.bt` a voxel is occupied from the map's occupancy threshold on.
+    pub format: OctreeFormat,
+    /// Only the voxels whose center is in this half-open box; `None` takes the whole map.
+    pub region: Option<&'a Aabb>,
+    /// Memory in bytes for the part of the tree that is put together at a time; beside it there are one tile and a few
+    /// bytes for each part. With less memory tiles are read more often.
+    pub memory_bytes: usize,
+}
+
+/// The depth of bricks, which are not divided further.
+const BRICK_DEPTH: u8 = 13;
+
+/// The voxels that OctoMap's keys reach.
+pub(super) const REACH: VoxelBox = VoxelBox { min: [-32768; 3], end: [32768; 3] };
+
+pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
+    view: &impl MapView,
+    export: &OctreeExport<'_>,
+    spool: &mut (impl Read + Write + Seek),
+    out: &mut impl Write,
+) -> std::result::Result<u64, E> {
+    let config = view.config();
+    let mut pruning = BtPruning::default();
+    loop {
+        spool.rewind()?;
+        let mut stream = match export.format {
+            OctreeFormat::Bt => OctreeStream::bt(config.occupied_log_odds() as f32, pruning, &mut *spool),
+            OctreeFormat::Ot => OctreeStream::ot(&mut *spool),
+        };
+        // Of the memory, the rest is for the bytes that the values become: up to six a voxel in `.ot`.
+        let block_bytes = match export.format {
+            OctreeFormat::Bt => export.memory_bytes / 3 * 2,
+            OctreeFormat::Ot => export.memory_bytes / 3,
+        };
+        for_each_block(
+            view,
+            export.region,
+            block_bytes,
+            |first, depth, values| -> std::result::Result<(), E> {
+                Ok(stream.add_block(first, depth, values)?)
+            },
+        )?;
+        match stream.finish(config.grid.resolution_m(), out)? {
+            StreamOutcome::Written { voxels, .. } => return Ok(voxels),
+            StreamOutcome::Again(further) => pruning = further,
+        }
+    }
+}
+
+/// Visits the map's voxels as blocks of OctoMap's tree, in Morton order: first voxel, depth, and the values. A block
+/// has `block_bytes` of values at most, unless it is a single brick.
+pub(super) fn for_each_block<E: From<Error>>(
+    view: &impl MapView,
+    region: Option<&Aabb>,
+    block_bytes: usize,
+    visit: impl FnMut(MortonCode, u8, &mut BrickValues) -> std::result::Result<(), E>,
+) -> std::result::Result<(), E> {
+    let tiles = tiles_of(view, region)?;
+    let mut blocks = Blocks { view, region, block_bytes, values: BrickValues::default(), visit };
+    blocks.descend(MortonCode(0), 0, &tiles)
+}
+
+/// The tiles that may have voxels for the tree, once it is known that none is out of reach.
+fn tiles_of(view: &impl MapView, region: Option<&Aabb>) -> Result<Vec<TileIndex>> {
+    let grid = &view.config().grid;
+    let around = region.map(|region| voxels_around(grid, region));
+    let mut tiles = Vec::new();
+    for index in view.tile_indices() {
+        let voxels = grid.voxels_of_tile(index);
+        if around.is_some_and(|around| around.intersection(&voxels).is_empty()) {
+            continue;
+        }
+        let in_reach = REACH.intersection(&voxels);
+        if in_reach != voxels
+            && let Some(tile) = view.tile_in_passing(index)?
+            && let Some(outside) = first_outside(view, &tile, region)
+        {
+            return Err(out_of_reach(view, outside));
+        }
+        if !in_reach.is_empty() {
+            tiles.push(index);
+        }
+    }
+    Ok(tiles)
+}
+
+fn first_outside(view: &impl MapView, tile: &TileRef<'_>, region: Option<&Aabb>) -> Option<VoxelIndex> {
+    let grid = &view.config().grid;
+    let wanted = |voxel| region.is_none_or(|region| region.contains(grid.center_m(voxel)));
+    tile.voxels().map(|voxel| voxel.index).find(|&voxel| !REACH.contains(voxel) && wanted(voxel))
+}
+
+/// The error of a voxel that OctoMap has no key for.
+pub(super) fn out_of_reach(view: &impl MapView, voxel: VoxelIndex) -> Error {
+    let half_m = 32768.0 * view.config().grid.resolution_m();
+    let center = view.config().grid.center_m(voxel);
+    let reason = format!(
+        "the voxel at {center:?} m is outside the {half_m} m around the origin that OctoMap's keys reach at this \
+         resolution; name a region (--region) inside"
+    );
+    Error::argument("merged octree", reason)
+}
+
+struct Blocks<'a, V, F> {
+    view: &'a V,
+    region: Option<&'a Aabb>,
+    block_bytes: usize,
+    values: BrickValues,
+    visit: F,
+}
+
+impl<V: MapView, F> Blocks<'_, V, F> {
+    /// The node at `depth` whose first voxel is `first`, or its children if it is too large; `tiles` are those that
+    /// reach into it.
+    fn descend<E: From<Error>>(
+        &mut self,
+        first: MortonCode,
+        depth: u8,
+        tiles: &[TileIndex],
+    ) -> std::result::Result<(), E>
+    where
+        F: FnMut(MortonCode, u8, &mut BrickValues) -> std::result::Result<(), E>,
+    {
+        if tiles.is_empty() {
+            return Ok(());
+        }
+        if self.may_fit(first, depth, tiles) && self.gather(first, depth, tiles)? {
+            return (self.visit)(first, depth, &mut self.values);
+        }
+        for child in 0..8 {
+            let first = MortonCode(first.0 + child * MortonCode::span(depth + 1));
+            let voxels = voxels_of_node(first, depth + 1);
+            let grid = self.view.config().grid;
+            let reaches_in =
+                |tile: &&TileIndex| !grid.voxels_of_tile(**tile).intersection(&voxels).is_empty();
+            let tiles: Vec<TileIndex> = tiles.iter().filter(reaches_in).copied().collect();
+            self.descend(first, depth + 1, &tiles)?;
+        }
+        Ok(())
+    }
+
+    /// Whether it is worth trying: by what the map knows of its tiles without reading them.
+    fn may_fit(&self, first: MortonCode, depth: u8, tiles: &[TileIndex]) -> bool {
+        let grid = &self.view.config().grid;
+        let node = voxels_of_node(first, depth);
+        let expected = tiles.iter().map(|&index| {
+            let tile = grid.voxels_of_tile(index);
+            let share = volume(&tile.intersection(&node)) / volume(&tile);
+            self.view.voxels_of_tile_hint(index).map_or(0.0, |voxels| voxels as f64 * share)
+        });
+        // Values have four bytes, and parts of bricks some more.
+        depth == BRICK_DEPTH || 4.0 * expected.sum::<f64>() <= self.block_bytes as f64
+    }
+
+    /// Collects the voxels of a node; false, with some of them, if they are too many.
+    fn gather(&mut self, first: MortonCode, depth: u8, tiles: &[TileIndex]) -> Result<bool> {
+        self.values.clear();
+        let node = first.brick()..MortonCode(first.0 + MortonCode::span(depth)).brick();
+        let grid = &self.view.config().grid;
+        for &index in tiles {
+            let Some(tile) = self.view.tile_in_passing(index)? else { continue };
+            let table = tile.table();
+            for brick in table.bricks().filter(|brick| node.contains(brick)) {
+                self.values.begin(brick);
+                table.for_each_in(brick, |place, evidence| {
+                    let center_m = || grid.center_m(tile.index_of(brick.voxel(place)));
+                    if self.region.is_none_or(|region| region.contains(center_m())) {
+                        self.values.add(place, evidence.log_odds as f32);
+                    }
+                });
+                self.values.end();
+                if depth < BRICK_DEPTH && self.values.bytes() > self.block_bytes {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// The voxels of an octree node, by their indices.
+fn voxels_of_node(first: MortonCode, depth: u8) -> VoxelBox {
+    let min = first.to_key().to_index_from(REACH.min);
+    // The root's edge of 65536 voxels is the longest.
+    let edge = BRICK_EDGE << (BRICK_DEPTH - depth);
+    VoxelBox { min, end: min.map(|k| k + edge) }
+}
+
+fn volume(voxels: &VoxelBox) -> f64 {
+    (0..3).map(|k| (f64::from(voxels.end[k]) - f64::from(voxels.min[k])).max(0.0)).product()
+}

@@ -1,0 +1,44 @@
+use super::EntryBytes;
+use crate::error::FormatError;
+use crate::sensor::Evidence;
+use crate::space::VoxelKey;
+
+/// One entry as it is read.
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    pub(super) key: VoxelKey,
+    pub(super) evidence: Evidence,
+}
+
+impl Entry {
+    #[inline]
+    pub(super) fn of(bytes: &EntryBytes) -> Self {
+        let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        Self {
+            key: VoxelKey([u16_at(0), u16_at(2), u16_at(4)]),
+            evidence: Evidence {
+                log_odds: f64::from_le_bytes(std::array::from_fn(|k| bytes[6 + k])),
+                observation_count: i32::from_le_bytes(std::array::from_fn(|k| bytes[14 + k])),
+            },
+        }
+    }
+}
+
+/// The error of an entry at `offset` whose key is that of another tile.
+pub(super) fn of_another_tile(key: VoxelKey, offset: u64) -> FormatError {
+    FormatError::at_offset(offset, format!("key {:?} belongs to another tile", key.0))
+}
+
+/// Whether the values of an entry at `offset` can be evidence.
+#[inline]
+pub(super) fn check_evidence(evidence: Evidence, offset: u64) -> Result<(), FormatError> {
+    let Evidence { log_odds, observation_count } = evidence;
+    if !log_odds.is_finite() {
+        return Err(FormatError::at_offset(offset + 6, format!("log-odds {log_odds} are not finite")));
+    }
+    if observation_count < 0 {
+        let reason = format!("observation count {observation_count} is negative");
+        return Err(FormatError::at_offset(offset + 14, reason));
+    }
+    Ok(())
+}

@@ -1,0 +1,169 @@
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use std::path::Path;
+use tempfile::TempDir;
+use voxtile::io::{ScanSource, ScanStreamWriter, SensorScan, open_scans, read_scan_stream};
+use voxtile::simulation::Survey;
+use voxtile::{Error, Scan};
+
+fn sensor_scan(number: u32) -> SensorScan {
+    let point = |k: u32| [f64::from(k) * 0.25, -1.5, f64::from(number)];
+    let rotation = UnitQuaternion::new_normalize(Quaternion::new(0.5, 0.5, -0.5, 0.5));
+    SensorScan {
+        name: number.to_string(),
+        points_in_sensor: (0..number).map(point).collect(),
+        intensities: Some((0..number).map(|k| k as f32).collect()),
+        world_from_sensor: Isometry3::from_parts(Translation3::new(6_378_137.0, -2.0, 0.1), rotation),
+    }
+}
+
+fn written(label: &str, has_intensities: bool, scans: &[SensorScan]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut writer = ScanStreamWriter::new(&mut bytes, label, has_intensities).unwrap();
+    scans.iter().for_each(|scan| writer.write(scan).unwrap());
+    writer.flush().unwrap();
+    bytes
+}
+
+fn read(bytes: &[u8]) -> voxtile::Result<Vec<SensorScan>> {
+    let mut source = read_scan_stream(bytes, Path::new("standard input"), false)?;
+    let mut scans = Vec::new();
+    while let Some(scan) = source.next_scan()? {
+        scans.push(scan);
+    }
+    Ok(scans)
+}
+
+fn assert_same(a: &SensorScan, b: &SensorScan) {
+    assert_eq!((&a.points_in_sensor, &a.intensities), (&b.points_in_sensor, &b.intensities));
+    assert_eq!(a.world_from_sensor, b.world_from_sensor);
+}
+
+#[test]
+fn what_is_written_is_read() {
+    let scans: Vec<_> = [3, 0, 5].map(sensor_scan).to_vec();
+    let found = read(&written("three", true, &scans)).unwrap();
+    assert_eq!(found.len(), 3);
+    found.iter().zip(&scans).for_each(|(found, scan)| assert_same(found, scan));
+    let bare = read(&written("three", false, &scans)).unwrap();
+    for (found, scan) in bare.iter().zip(&scans) {
+        assert_same(found, &SensorScan { intensities: None, ..scan.clone() });
+    }
+    assert!(read(&written("", true, &[])).unwrap().is_empty());
+}
+
+#[test]
+fn scans_in_the_world_frame_are_as_exact_far_away_as_near() {
+    let scan = Survey::tour(1, 500).next().unwrap();
+    for shift_m in [0.0, 6.4e6] {
+        let scan: Scan = scan.clone().translated([shift_m; 3]);
+        let mut bytes = Vec::new();
+        ScanStreamWriter::new(&mut bytes, "", true).unwrap().write_world(&scan).unwrap();
+        let found = read(&bytes).unwrap().remove(0).into_scan();
+        assert_eq!((found.origin, &found.intensities), (scan.origin, &scan.intensities));
+        for (a, b) in found.points.iter().zip(&scan.points) {
+            assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn a_stream_that_ends_or_is_wrong_anywhere_is_an_error_with_its_place() {
+    let bytes = written("label", true, &[sensor_scan(2)]);
+    let header = written("label", true, &[]).len();
+    for end in (0..bytes.len()).filter(|&end| end != header) {
+        let error = read(&bytes[..end]).unwrap_err();
+        assert!(matches!(error, Error::Malformed { .. }), "{end}: {error}");
+    }
+    let nan = f64::NAN.to_le_bytes();
+    for (at, patch) in
+        [(0, &b"X"[..]), (8, &[2]), (12, &[9]), (16, &[255, 255]), (20, &[255]), (header + 4, &nan)]
+    {
+        let mut wrong = bytes.clone();
+        wrong[at..at + patch.len()].copy_from_slice(patch);
+        let error = read(&wrong).unwrap_err();
+        assert!(matches!(error, Error::Malformed { .. }), "{at}: {error}");
+    }
+    // A quaternion of no length.
+    let mut wrong = bytes.clone();
+    wrong[header + 28..header + 60].fill(0);
+    assert!(read(&wrong).is_err());
+    // A count that nothing stands behind takes no memory.
+    let mut wrong = bytes;
+    wrong[header..header + 4].fill(255);
+    assert!(read(&wrong).is_err());
+}
+
+#[test]
+fn a_scan_without_intensities_or_a_label_too_long_is_refused() {
+    let mut writer = ScanStreamWriter::new(Vec::new(), "", true).unwrap();
+    assert!(writer.write(&SensorScan { intensities: None, ..sensor_scan(1) }).is_err());
+    assert!(ScanStreamWriter::new(Vec::new(), &"x".repeat(5000), true).is_err());
+}
+
+#[test]
+fn a_stream_is_known_by_its_label_and_a_file_by_its_bytes() {
+    let source = |label: &str| {
+        let bytes = written(label, true, &[sensor_scan(2)]);
+        read_scan_stream(std::io::Cursor::new(bytes), Path::new("-"), false).unwrap().fingerprint()
+    };
+    assert_eq!(source("drive 1").unwrap(), "stream \"drive 1\"");
+    assert!(matches!(source(""), Err(Error::InvalidArgument { .. })));
+
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("drive.scans");
+    std::fs::write(&path, written("", true, &[sensor_scan(2)])).unwrap();
+    let mut file = open_scans(&path, None).unwrap();
+    assert!(file.fingerprint().unwrap().starts_with("1 file, "));
+    assert_same(&file.next_scan().unwrap().unwrap(), &sensor_scan(2));
+    assert!(open_scans(&path, Some(Path::new("poses.txt"))).is_err());
+}
+
+/// `voxtile build -`.
+#[cfg(feature = "cli")]
+mod command {
+    use super::*;
+    use crate::cli::{json, text, voxtile};
+
+    fn drive(label: &str, scans: usize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut writer = ScanStreamWriter::new(&mut bytes, label, true).unwrap();
+        Survey::tour(1, 300).take(scans).for_each(|scan| writer.write_world(&scan).unwrap());
+        bytes
+    }
+
+    fn digest(map: &Path) -> String {
+        json(&["digest", text(map), "--json"])["digest"].as_str().unwrap().to_owned()
+    }
+
+    #[test]
+    fn a_map_is_built_from_standard_input_and_resumed_by_the_label() {
+        let folder = TempDir::new().unwrap();
+        let (map, whole, file) =
+            (folder.path().join("map"), folder.path().join("whole"), folder.path().join("drive.scans"));
+        let build = |map: &Path, how: &[&str]| {
+            let mut arguments = vec!["build", "-", "-o", text(map), "--resolution", "0.5", "--json"];
+            arguments.extend(how);
+            voxtile(&arguments)
+        };
+        build(&map, &[]).write_stdin(drive("drive 1", 3)).assert().success();
+        // Another stream, or one that cannot be told from others, does not go on with it.
+        let other = build(&map, &["--resume"]).write_stdin(drive("drive 2", 5)).assert().code(2);
+        assert!(String::from_utf8_lossy(&other.get_output().stderr).contains("drive 1"));
+        let bare = build(&map, &["--resume"]).write_stdin(drive("", 5)).assert().code(2);
+        assert!(String::from_utf8_lossy(&bare.get_output().stderr).contains("label"));
+        // The same, longer, does: its first three scans are passed over.
+        let longer = build(&map, &["--resume"]).write_stdin(drive("drive 1", 5)).assert().success();
+        let summary: serde_json::Value = serde_json::from_slice(&longer.get_output().stdout).unwrap();
+        assert_eq!((summary["scans"].as_u64(), summary["resumed_after"].as_u64()), (Some(2), Some(3)));
+        build(&map, &["--resume"]).write_stdin(drive("drive 1", 2)).assert().code(2);
+
+        std::fs::write(&file, drive("", 5)).unwrap();
+        json(&["build", text(&file), "-o", text(&whole), "--resolution", "0.5", "--json"]);
+        assert_eq!(digest(&map), digest(&whole));
+        // Without a wish to resume no label is needed.
+        build(&folder.path().join("bare"), &[]).write_stdin(drive("", 1)).assert().success();
+        let nothing = folder.path().join("nothing");
+        build(&nothing, &[]).write_stdin(b"no scans".to_vec()).assert().code(1);
+        assert!(!nothing.exists());
+    }
+}

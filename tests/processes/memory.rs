@@ -1,0 +1,61 @@
+use crate::survey::{folder_for_maps, voxtile};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Stdio;
+use voxtile::io::ScanStreamWriter;
+use voxtile::simulation::Survey;
+
+/// Builds a map from a drive of so many metres, streamed into the command; the answer of the command.
+fn build(map: &Path, length_m: usize) -> Value {
+    let mut command = voxtile();
+    command.args(["build", "-", "--resolution", "0.2", "--cache-tiles", "8", "--json", "-o"]).arg(map);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut writer = ScanStreamWriter::new(child.stdin.take().unwrap(), "drive", true).unwrap();
+    // Every fifth scan: the same streets in less time.
+    Survey::tour(1, 1_500).step_by(5).take(length_m / 5).for_each(|scan| writer.write_world(&scan).unwrap());
+    drop(writer);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn answer(command: &str, map: &Path, how: &[&str]) -> Value {
+    let output =
+        voxtile().arg(command).arg(map).args(how).args(["--threads", "1", "--json"]).output().unwrap();
+    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn peak(answer: &Value) -> u64 {
+    answer["peak_rss_bytes"].as_u64().expect("this system tells the peak")
+}
+
+/// What looks at a whole map takes no more memory for a long drive than for a short one, and octree files keep to the
+/// memory that they are given.
+#[cfg(target_os = "linux")]
+#[test]
+fn whole_maps_are_looked_at_in_constant_memory() {
+    const MEMORY: u64 = 2 << 20;
+    let (folder, _) = folder_for_maps();
+    let (short, long) = (folder.path().join("short"), folder.path().join("long"));
+    build(&short, 20);
+    let built = build(&long, crate::survey::setting("VOXTILE_DRIVE_METRES", 600) as usize);
+    let map_bytes = answer("info", &long, &[])["table_bytes"].as_u64().unwrap();
+    assert!(map_bytes > 20 * MEMORY, "{map_bytes} bytes");
+    assert!(peak(&built) > 0);
+    let out = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (ply, bt, ot) = (out("map.ply"), out("map.bt"), out("map.ot"));
+    let memory = MEMORY.to_string();
+    let cases: [(&str, &[&str], u64); 5] = [
+        ("digest", &[], 0),
+        ("verify", &[], 0),
+        ("export", &["-o", &ply], 0),
+        ("export", &["-o", &bt, "--memory", &memory], MEMORY),
+        ("export", &["-o", &ot, "--memory", &memory], MEMORY),
+    ];
+    for (command, how, memory) in cases {
+        let (few, many) = (peak(&answer(command, &short, how)), peak(&answer(command, &long, how)));
+        // A tile of the long drive may be fuller, and allocators keep some of what they had.
+        assert!(many < few + memory + (2 << 20), "{command} {how:?}: {few} bytes, then {many}");
+    }
+}
