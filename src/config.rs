@@ -21,11 +21,26 @@ pub struct MapConfig {
     pub rays: RayConfig,
     /// What each tile keeps for coarse questions. Default: a view of the table's bricks.
     pub octree: OctreeConfig,
-    /// Most tiles kept in memory by an out-of-core mapper, at least 1. Default: 16.
-    pub cache_tiles: usize,
-    /// Most bytes of updates that wait in memory for tiles on disk before those are fetched; one scan may come
-    /// on top. Larger: fewer reads and writes. Default: 32 MiB.
-    pub pending_bytes: usize,
+    /// How much an out-of-core mapper keeps in memory. Default: 16 tiles, and 32 MiB of updates for others.
+    pub memory: MemoryLimit,
+}
+
+/// How much an out-of-core mapper keeps in memory. The map does not depend on it, only the work to make it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MemoryLimit {
+    /// Tiles are counted, however large they are.
+    #[non_exhaustive]
+    Tiles {
+        /// Most tiles, at least 1.
+        tiles: usize,
+        /// Most bytes of updates that wait for tiles on disk before those are fetched; one scan may come on top.
+        /// Larger: fewer reads and writes.
+        pending_bytes: usize,
+    },
+    /// Most bytes of all that grows: tiles, updates that wait for tiles, what a scan takes while it is inserted, what is
+    /// known of the tiles on disk. At least [`MemoryLimit::least_bytes`].
+    Bytes(usize),
 }
 
 /// Which part of a ray counts, and how often.
@@ -93,9 +108,14 @@ impl Default for MapConfig {
             occupancy_threshold: 0.5,
             rays: RayConfig::default(),
             octree: OctreeConfig::default(),
-            cache_tiles: 16,
-            pending_bytes: 32 << 20,
+            memory: MemoryLimit::default(),
         }
+    }
+}
+
+impl Default for MemoryLimit {
+    fn default() -> Self {
+        Self::Tiles { tiles: 16, pending_bytes: DEFAULT_PENDING_BYTES }
     }
 }
 
@@ -136,12 +156,29 @@ impl MapConfig {
 
     /// The same with at most so many tiles in memory.
     pub fn with_cache_tiles(self, cache_tiles: usize) -> Self {
-        Self { cache_tiles, ..self }
+        let pending_bytes = self.pending_bytes();
+        Self { memory: MemoryLimit::Tiles { tiles: cache_tiles, pending_bytes }, ..self }
     }
 
     /// The same with at most so many bytes of updates waiting for tiles on disk.
     pub fn with_pending_bytes(self, pending_bytes: usize) -> Self {
-        Self { pending_bytes, ..self }
+        let tiles = match self.memory {
+            MemoryLimit::Tiles { tiles, .. } => tiles,
+            MemoryLimit::Bytes(_) => usize::MAX,
+        };
+        Self { memory: MemoryLimit::Tiles { tiles, pending_bytes }, ..self }
+    }
+
+    /// The same with at most so many bytes for all that grows.
+    pub fn with_memory_bytes(self, bytes: usize) -> Self {
+        Self { memory: MemoryLimit::Bytes(bytes), ..self }
+    }
+
+    fn pending_bytes(&self) -> usize {
+        match self.memory {
+            MemoryLimit::Tiles { pending_bytes, .. } => pending_bytes,
+            MemoryLimit::Bytes(_) => DEFAULT_PENDING_BYTES,
+        }
     }
 
     /// The same with another form of octree.
@@ -172,9 +209,7 @@ impl MapConfig {
             let max = max_range_m.unwrap_or_default();
             return Err(wrong("max range", max, "a length above the min range, in metres"));
         }
-        if self.cache_tiles == 0 {
-            return Err(wrong("cache tiles", self.cache_tiles, "at least 1"));
-        }
+        self.memory.check(&self.grid)?;
         if let OctreeConfig::Pointers(mode) = self.octree
             && let Some(cache) = mode.cache()
         {
@@ -217,6 +252,44 @@ impl VoxelCacheConfig {
         }
         Ok(())
     }
+}
+
+/// Bytes of updates that wait, unless something else is asked for.
+const DEFAULT_PENDING_BYTES: usize = 32 << 20;
+
+impl MemoryLimit {
+    /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 (n / 8 + 1)^3)` for tiles of
+    /// `n` voxels along their edge. That is two tiles of which every voxel is observed and no two alike, one at work and
+    /// one on its way in or out, and what a scan takes.
+    pub fn least_bytes(grid: &Grid) -> usize {
+        least_bytes(grid.voxels_per_tile_edge() as usize)
+    }
+
+    fn check(self, grid: &Grid) -> Result<()> {
+        match self {
+            Self::Tiles { tiles: 0, .. } => Err(wrong("cache tiles", 0, "at least 1")),
+            Self::Bytes(bytes) if bytes < Self::least_bytes(grid) => {
+                let least = Self::least_bytes(grid);
+                let fits = (2..grid.voxels_per_tile_edge()).rev().find(|&n| least_bytes(n as usize) <= bytes);
+                let hint = fits.map_or(String::new(), |n| {
+                    format!(", or make tiles of at most {:.6} m", f64::from(n) * grid.resolution_m())
+                });
+                let reason = format!(
+                    "{bytes} bytes are too few for tiles of {} m at {} m: give at least {least} ({} MiB){hint}",
+                    grid.tile_size_m(),
+                    grid.resolution_m(),
+                    least.div_ceil(1 << 20)
+                );
+                Err(Error::argument("memory", reason))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn least_bytes(voxels_per_edge: usize) -> usize {
+    let bricks_per_edge = voxels_per_edge / 8 + 1;
+    (16 << 20) + 2 * (12 * voxels_per_edge.pow(3) + 256 * bricks_per_edge.pow(3))
 }
 
 fn wrong(argument: &str, value: impl std::fmt::Display, right: &str) -> Error {

@@ -70,7 +70,9 @@ pub mod store;
 pub mod tile;
 pub mod upkeep;
 
-pub use config::{InsertMode, MapConfig, OctreeConfig, RayConfig, VoxelCacheConfig, VoxelCacheMode};
+pub use config::{
+    InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, VoxelCacheConfig, VoxelCacheMode,
+};
 pub use error::{DecodeError, Error, FormatError, Place, Result};
 pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 pub use query::{Occupancy, Questions};

@@ -21,6 +21,7 @@ pub struct MapReader {
     octrees: OctreeFactory,
     store: TileStore,
     disk: Arc<dyn Disk>,
+    cache_tiles: usize,
     cache: Mutex<ReaderCache>,
 }
 
@@ -43,12 +44,11 @@ impl MapReader {
     /// [`MapReader::open`] on another disk than the file system.
     pub fn open_on(disk: Arc<dyn Disk>, folder: &Path, cache_tiles: usize) -> Result<Self> {
         let store = TileStore::open_read_only(disk.clone(), folder)?;
-        let mut config = config_from(store.metadata(), &store.layout().metadata())?;
-        config.cache_tiles = cache_tiles;
-        let config = config.validated()?;
+        let config = config_from(store.metadata(), &store.layout().metadata())?;
+        let config = config.with_cache_tiles(cache_tiles).validated()?;
         let cache = ReaderCache { tiles: LruCache::unbounded(), io: IoCounts::default() };
         let octrees = OctreeFactory::default();
-        Ok(Self { config, octrees, store, disk, cache: Mutex::new(cache) })
+        Ok(Self { config, octrees, store, disk, cache_tiles, cache: Mutex::new(cache) })
     }
 
     /// The configuration that a map was made with, to go on with it. What only concerns a run has its defaults.
@@ -154,7 +154,7 @@ impl MapView for MapReader {
         let Some((tile, bytes)) = self.load(index)? else { return Ok(None) };
         cache.io.loads += 1;
         cache.io.bytes_read += bytes;
-        while cache.tiles.len() >= self.config.cache_tiles {
+        while cache.tiles.len() >= self.cache_tiles {
             cache.tiles.pop_lru();
         }
         let tile = Arc::new(tile);

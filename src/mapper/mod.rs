@@ -15,9 +15,11 @@
 mod in_memory;
 mod map_id;
 mod map_reader;
+mod memory_plan;
 mod out_of_core;
 mod pending;
 mod residency;
+mod resident_tiles;
 mod statistics;
 pub(crate) mod tile_files;
 mod tile_ref;

@@ -161,8 +161,9 @@ impl OutOfCoreTileMapper {
 
     fn accept(&mut self, updates: ScanUpdates) -> Result<ScanReport> {
         let (report, scan_number) = (updates.report, self.scan_number);
+        let scan_bytes = self.tracer.bytes() + updates.bytes();
         let residency = self.residency_mut();
-        residency.prepare(&updates, scan_number)?;
+        residency.prepare(&updates, scan_bytes, scan_number)?;
         residency.accept(updates);
         self.scan_number += 1;
         Ok(report)

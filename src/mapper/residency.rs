@@ -1,15 +1,15 @@
 use super::map_id::new_map_id;
+use super::memory_plan::MemoryPlan;
 use super::pending::Pending;
+use super::resident_tiles::ResidentTiles;
 use super::statistics::{IoCounts, MapStatistics};
 use super::tile_files;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::scan::{ScanUpdates, TileUpdates};
+use crate::scan::ScanUpdates;
 use crate::space::TileIndex;
 use crate::store::{Extension, Metadata, TileStore, hex};
 use crate::tile::{OctreeFactory, Tile};
-use lru::LruCache;
-use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -21,7 +21,8 @@ use std::sync::Arc;
 pub(super) struct Residency {
     config: MapConfig,
     store: TileStore,
-    tiles: LruCache<TileIndex, Arc<Tile>>,
+    plan: MemoryPlan,
+    tiles: ResidentTiles,
     /// After the tiles: what is in flight to octrees goes with these, and need not be written any more.
     octrees: OctreeFactory,
     pending: Pending,
@@ -29,10 +30,18 @@ pub(super) struct Residency {
     /// only for these, so that a damaged tile is found before a scan is accepted.
     known_whole: FxHashSet<TileIndex>,
     saved: BTreeSet<TileIndex>,
+    /// Bytes of memory that inserting scans takes.
+    scan_bytes: usize,
     io: IoCounts,
     /// What the map is being built from, kept with it at the next flush.
     input: Option<Input>,
 }
+
+/// By how many bytes an update may be expected to make a tile larger, or what waits for it.
+const BYTES_OF_UPDATE: usize = 4;
+
+/// What a tile takes in the set of those that are known to be whole, and in that of those saved.
+const KNOWN_BYTES_OF_TILE: usize = 4 * size_of::<TileIndex>();
 
 /// An input that a map is built from, and how many scans the map had taken before.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,12 +59,14 @@ impl Residency {
         });
         Self {
             octrees: OctreeFactory::new(config.octree),
+            plan: MemoryPlan::new(config.memory),
             config,
             store,
-            tiles: LruCache::unbounded(),
+            tiles: ResidentTiles::default(),
             pending: Pending::default(),
             known_whole: FxHashSet::default(),
             saved: BTreeSet::new(),
+            scan_bytes: 0,
             io: IoCounts::default(),
             input,
         }
@@ -66,10 +77,18 @@ impl Residency {
     }
 
     /// Does all that may fail before the updates can be accepted. The map's content stays as it is.
-    pub(super) fn prepare(&mut self, updates: &ScanUpdates, scan_number: u64) -> Result<()> {
-        if self.pending.bytes() > self.config.pending_bytes {
+    ///
+    /// `scan_bytes` are the bytes of memory that inserting scans takes, with these updates.
+    pub(super) fn prepare(
+        &mut self,
+        updates: &ScanUpdates,
+        scan_bytes: usize,
+        scan_number: u64,
+    ) -> Result<()> {
+        self.scan_bytes = scan_bytes;
+        if self.pending.bytes() > self.plan.pending_bytes {
             // Half, so that tiles come in for many updates at a time.
-            while self.pending.bytes() > self.config.pending_bytes / 2
+            while self.pending.bytes() > self.plan.pending_bytes / 2
                 && let Some(tile) = self.pending.heaviest()
             {
                 self.bring_in(tile, scan_number)?;
@@ -77,42 +96,39 @@ impl Residency {
         }
         for (tile, _) in &updates.tiles {
             let is_unread = self.store.contains(*tile) && !self.known_whole.contains(tile);
-            let has_room = self.tiles.len() < self.config.cache_tiles;
-            if !self.tiles.contains(tile) && (is_unread || (has_room && self.exists(*tile))) {
+            if !self.tiles.contains(*tile) && (is_unread || (self.exists(*tile) && self.has_room_to_spare()))
+            {
                 self.bring_in(*tile, scan_number)?;
             }
         }
-        Ok(())
+        let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
+        // A tile that is made new by the updates is one tile more than there are.
+        self.make_room_for(BYTES_OF_UPDATE * all, self.plan.tiles, scan_number)
     }
 
     /// Takes the updates: into tiles in memory at once, for the others they wait. Cannot fail.
     pub(super) fn accept(&mut self, updates: ScanUpdates) {
         let mut resident = FxHashMap::default();
         for (index, tile_updates) in updates.tiles {
-            if !self.tiles.contains(&index)
-                && !self.exists(index)
-                && self.tiles.len() < self.config.cache_tiles
-            {
-                self.tiles.put(index, Arc::new(Tile::empty(&self.config.grid, &self.octrees, index)));
+            if !self.exists(index) && self.has_room_for(0) {
+                self.tiles.put(Arc::new(Tile::empty(&self.config.grid, &self.octrees, index)));
             }
             // The tile becomes the one used last.
-            match self.tiles.get(&index) {
+            match self.tiles.get(index) {
                 Some(_) => {
                     self.io.hits += 1;
                     resident.insert(index, tile_updates);
                 }
-                None => self.pending.push(index, tile_updates),
+                None => self.pending.push(index, &tile_updates),
             }
         }
-        let touched = self.tiles.iter_mut().filter_map(|(index, tile)| Some((tile, resident.remove(index)?)));
-        let touched: Vec<(&mut Arc<Tile>, TileUpdates)> = touched.collect();
         let model = &self.config.sensor_model;
-        touched.into_par_iter().for_each(|(tile, updates)| Arc::make_mut(tile).apply(model, &updates));
+        self.tiles.change_all(resident, |tile, updates| tile.apply(model, &updates));
     }
 
     /// A tile, brought into memory; `None` if nothing was observed in it.
     pub(super) fn tile(&mut self, index: TileIndex, scan_number: u64) -> Result<Option<Arc<Tile>>> {
-        if let Some(tile) = self.tiles.get(&index) {
+        if let Some(tile) = self.tiles.get(index) {
             self.io.hits += 1;
             return Ok(Some(tile.clone()));
         }
@@ -121,16 +137,16 @@ impl Residency {
         }
         let tile = Arc::new(self.read(index)?);
         // A disk that takes no tile in exchange does not keep a question from being answered.
-        if self.make_room(scan_number).is_ok() {
+        if self.make_room(&tile, scan_number).is_ok() {
             self.pending.applied(index);
-            self.tiles.put(index, tile.clone());
+            self.tiles.put(tile.clone());
         }
         Ok(Some(tile))
     }
 
     /// A tile as it is now, without bringing it into memory.
     pub(super) fn tile_in_passing(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
-        if let Some(tile) = self.tiles.peek(&index) {
+        if let Some(tile) = self.tiles.peek(index) {
             return Ok(Some(tile.clone()));
         }
         if !self.exists(index) {
@@ -142,13 +158,13 @@ impl Residency {
 
     /// The voxels of a tile in memory, or of its latest version on disk; what waits for it is left out.
     pub(super) fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
-        let resident = self.tiles.peek(&index).map(|tile| tile.table().len() as u64);
+        let resident = self.tiles.peek(index).map(|tile| tile.table().len() as u64);
         resident.or_else(|| self.store.stamp(index).map(|stamp| stamp.voxels))
     }
 
     /// Every tile in which something was observed, in order.
     pub(super) fn tile_indices(&self) -> Vec<TileIndex> {
-        let resident = self.tiles.iter().map(|(index, _)| *index);
+        let resident = self.tiles.iter().map(|tile| tile.index());
         let mut indices: Vec<_> = self.store.tiles().chain(resident).chain(self.pending.tiles()).collect();
         indices.sort_unstable();
         indices.dedup();
@@ -158,22 +174,22 @@ impl Residency {
     /// Number of tiles in which something was observed.
     fn count_tiles(&self) -> usize {
         let is_new = |index: &TileIndex| !self.store.contains(*index);
-        let resident = self.tiles.iter().filter(|(index, _)| is_new(index)).count();
+        let resident = self.tiles.iter().filter(|tile| is_new(&tile.index())).count();
         let waiting =
-            self.pending.tiles().filter(|index| is_new(index) && !self.tiles.contains(index)).count();
+            self.pending.tiles().filter(|index| is_new(index) && !self.tiles.contains(*index)).count();
         self.store.tiles().count() + resident + waiting
     }
 
     /// The tiles in memory, in order.
     pub(super) fn cached_tile_indices(&self) -> Vec<TileIndex> {
-        let mut indices: Vec<_> = self.tiles.iter().map(|(index, _)| *index).collect();
+        let mut indices: Vec<_> = self.tiles.iter().map(|tile| tile.index()).collect();
         indices.sort_unstable();
         indices
     }
 
     /// Whether a tile has updates that are not on disk.
     pub(super) fn is_dirty(&self, index: TileIndex) -> bool {
-        !self.pending.of(index).is_empty() || self.tiles.peek(&index).is_some_and(|tile| tile.is_dirty())
+        self.pending.contains(index) || self.tiles.peek(index).is_some_and(|tile| tile.is_dirty())
     }
 
     pub(super) fn input(&self) -> Option<&Input> {
@@ -194,7 +210,7 @@ impl Residency {
     pub(super) fn flush(&mut self, scan_number: u64) -> Result<()> {
         for index in self.store.suspects() {
             // Its file cannot be trusted to be on the medium; what can be read of it is checked as always.
-            if !self.tiles.contains(&index) {
+            if !self.tiles.contains(index) {
                 self.bring_in(index, scan_number)?;
             }
             self.write(index, scan_number)?;
@@ -226,16 +242,18 @@ impl Residency {
         }
         // All that may fail comes before anything is let go.
         let loaded = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)?;
-        if loaded.is_some() && !self.tiles.contains(&index) {
-            self.make_room(scan_number)?;
+        if let Some((tile, _)) = &loaded
+            && !self.tiles.contains(index)
+        {
+            self.make_room(tile, scan_number)?;
         }
-        self.tiles.pop(&index);
+        self.tiles.remove(index);
         self.pending.applied(index);
         let Some((tile, bytes)) = loaded else { return Ok(false) };
         self.io.loads += 1;
         self.io.bytes_read += bytes;
         self.known_whole.insert(index);
-        self.tiles.put(index, Arc::new(tile));
+        self.tiles.put(Arc::new(tile));
         Ok(true)
     }
 
@@ -245,9 +263,9 @@ impl Residency {
     }
 
     pub(super) fn sync_octrees(&mut self) {
-        let stale = self.tiles.iter_mut().filter(|(_, tile)| !tile.is_octree_synced());
-        let stale: Vec<&mut Tile> = stale.map(|(_, tile)| Arc::make_mut(tile)).collect();
-        stale.into_par_iter().for_each(Tile::sync_octree);
+        let stale = self.tiles.iter().filter(|tile| !tile.is_octree_synced());
+        let stale = stale.map(|tile| (tile.index(), ())).collect();
+        self.tiles.change_all(stale, |tile, ()| tile.sync_octree());
     }
 
     pub(super) fn statistics(&self, scan_number: u64) -> MapStatistics {
@@ -255,7 +273,7 @@ impl Residency {
             scan_number,
             tiles: self.count_tiles() as u64,
             cached_tiles: self.tiles.len() as u64,
-            dirty_tiles: self.tiles.iter().filter(|(_, tile)| tile.is_dirty()).count() as u64,
+            dirty_tiles: self.tiles.iter().filter(|tile| tile.is_dirty()).count() as u64,
             pending_tiles: self.pending.len() as u64,
             pending_updates: self.pending.updates() as u64,
             pending_bytes: self.pending.bytes() as u64,
@@ -269,22 +287,22 @@ impl Residency {
             io: self.io,
             ..MapStatistics::default()
         };
-        self.tiles.iter().for_each(|(_, tile)| statistics.cached += tile.counts());
+        self.tiles.iter().for_each(|tile| statistics.cached += tile.counts());
         statistics
     }
 
     /// Whether anything was observed in a tile.
     fn exists(&self, index: TileIndex) -> bool {
-        self.store.contains(index) || !self.pending.of(index).is_empty() || self.tiles.contains(&index)
+        self.store.contains(index) || self.pending.contains(index) || self.tiles.contains(index)
     }
 
     /// Puts a tile into memory with what waits for it, pushing out others first.
     fn bring_in(&mut self, index: TileIndex, scan_number: u64) -> Result<Arc<Tile>> {
         // Read first: a tile that cannot be read pushes nothing out.
         let tile = Arc::new(self.read(index)?);
-        self.make_room(scan_number)?;
+        self.make_room(&tile, scan_number)?;
         self.pending.applied(index);
-        self.tiles.put(index, tile.clone());
+        self.tiles.put(tile.clone());
         Ok(tile)
     }
 
@@ -306,26 +324,46 @@ impl Residency {
             None => Tile::empty(&self.config.grid, &self.octrees, index),
         };
         for updates in self.pending.of(index) {
-            tile.apply(&self.config.sensor_model, updates);
+            tile.apply(&self.config.sensor_model, &updates);
         }
         tile
     }
 
-    /// Pushes out the least recently used tiles until one more fits. Tiles in use stay; if all are, one more comes
-    /// on top.
-    fn make_room(&mut self, scan_number: u64) -> Result<()> {
-        while self.tiles.len() >= self.config.cache_tiles {
-            let unused = self.tiles.iter().rev().find(|(_, tile)| Arc::strong_count(tile) == 1);
-            let Some(index) = unused.map(|(index, _)| *index) else { return Ok(()) };
+    /// Bytes of memory of all that grows.
+    fn bytes(&self) -> usize {
+        let known_bytes = KNOWN_BYTES_OF_TILE * self.known_whole.len();
+        self.tiles.bytes() + self.pending.bytes() + self.scan_bytes + self.store.index_bytes() + known_bytes
+    }
+
+    /// Whether one more tile fits, and so many bytes with it.
+    fn has_room_for(&self, bytes: usize) -> bool {
+        self.tiles.len() < self.plan.tiles && self.bytes().saturating_add(bytes) <= self.plan.bytes
+    }
+
+    /// Whether a tile may come in before it has to: not when others would soon have to go for it.
+    fn has_room_to_spare(&self) -> bool {
+        self.has_room_for(self.plan.spare_bytes)
+    }
+
+    /// Pushes out the least recently used tiles until this one fits.
+    fn make_room(&mut self, tile: &Tile, scan_number: u64) -> Result<()> {
+        self.make_room_for(tile.bytes(), self.plan.tiles - 1, scan_number)
+    }
+
+    /// Pushes out the least recently used tiles until there are at most so many, and room for so many bytes. Tiles in use
+    /// stay; if all are, what is to come comes on top.
+    fn make_room_for(&mut self, bytes: usize, tiles: usize, scan_number: u64) -> Result<()> {
+        while self.tiles.len() > tiles || self.bytes().saturating_add(bytes) > self.plan.bytes {
+            let Some(index) = self.tiles.least_recently_used() else { return Ok(()) };
             self.save(index, scan_number)?;
-            self.tiles.pop(&index);
+            self.tiles.remove(index);
         }
         Ok(())
     }
 
     /// Writes a tile in memory if it is dirty; after an error it is as it was.
     fn save(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
-        if !self.tiles.peek(&index).is_some_and(|tile| tile.is_dirty()) {
+        if !self.tiles.peek(index).is_some_and(|tile| tile.is_dirty()) {
             return Ok(());
         }
         self.write(index, scan_number)
@@ -333,12 +371,11 @@ impl Residency {
 
     fn write(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
         self.adopt()?;
-        let Some(tile) = self.tiles.peek_mut(&index) else { return Ok(()) };
-        let tile = Arc::make_mut(tile);
         // Until it is written: what is on disk of it may be cut short by an attempt that fails.
-        tile.mark_dirty();
+        self.tiles.change(index, Tile::mark_dirty);
+        let Some(tile) = self.tiles.peek(index) else { return Ok(()) };
         let stamp = tile_files::save(&mut self.store, &self.config, tile, scan_number)?;
-        tile.mark_clean();
+        self.tiles.change(index, Tile::mark_clean);
         self.io.saves += 1;
         self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
         self.known_whole.insert(index);

@@ -11,6 +11,13 @@ pub struct ScanUpdates {
     pub report: ScanReport,
 }
 
+impl ScanUpdates {
+    /// Bytes of memory that the updates occupy.
+    pub fn bytes(&self) -> usize {
+        self.tiles.iter().map(|(_, updates)| updates.bytes()).sum()
+    }
+}
+
 /// What one call says about the voxels of one tile, in a form that can be kept and applied later.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TileUpdates {

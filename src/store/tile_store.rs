@@ -280,6 +280,14 @@ impl TileStore {
         self.commits.tiles.keys().chain(&self.foreign).chain(uncommitted).copied()
     }
 
+    /// Bytes of memory of what is known of the tiles without reading them: some 200 a tile.
+    pub fn index_bytes(&self) -> usize {
+        // A hash map fills up to 7 of 8 slots, and has as few as half as many entries.
+        let slot = size_of::<(TileIndex, TileStamp)>() + 1;
+        (self.commits.tiles.capacity() + self.next.capacity()) * 8 / 7 * slot
+            + (self.foreign.capacity() + self.strays.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
+    }
+
     /// What is known of the latest version of a tile on disk without reading it.
     pub fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
         self.next.get(&tile).or_else(|| self.commits.tiles.get(&tile)).copied()

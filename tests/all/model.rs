@@ -3,7 +3,7 @@ use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
 use crate::support::unsynced_disk::UnsyncedDisk;
 use tempfile::TempDir;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::{InsertMode, MapConfig, MapView, Mapper, OutOfCoreTileMapper, Questions};
+use voxtile::{InsertMode, MapConfig, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Questions};
 
 /// One random life of a map beside the naive one, which is set back to the last flush where the map crashes.
 fn live(seed: u64, config: &MapConfig) {
@@ -12,6 +12,7 @@ fn live(seed: u64, config: &MapConfig) {
     let mut random = Random(seed);
     let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
     let mut reference = ReferenceMap::new(config);
+    let MemoryLimit::Tiles { tiles: most_tiles, .. } = config.memory else { panic!("a limit in tiles") };
     let (mut scans, mut flushed): (u64, (Voxels, u64)) = (0, (Voxels::new(), 0));
     for _ in 0..60 {
         match random.below(10) {
@@ -41,7 +42,7 @@ fn live(seed: u64, config: &MapConfig) {
             }
             _ => assert_eq!(voxels_of(&mapper), reference.voxels, "seed {seed}"),
         }
-        assert!(mapper.cached_tile_indices().len() <= config.cache_tiles);
+        assert!(mapper.cached_tile_indices().len() <= most_tiles);
         assert_eq!(mapper.scan_number(), scans, "seed {seed}");
     }
     assert_eq!(voxels_of(&mapper), reference.voxels, "seed {seed}");

@@ -54,9 +54,13 @@ pub struct BuildArgs {
     /// Edge of a tile in metres, 2 to 1024 whole voxels [default: 10, or the map's own]
     #[arg(long, value_name = "M")]
     pub tile_size: Option<f64>,
-    /// Most tiles kept in memory
-    #[arg(long, value_name = "N", default_value_t = 256)]
-    pub cache_tiles: usize,
+    /// Most memory for all that grows with the map or with a scan (256MiB, 1GB); some 40 MB for the rest come on top
+    /// [default: 512MiB, or what tiles of this size need at least]
+    #[arg(long, value_name = "SIZE", conflicts_with = "cache_tiles")]
+    pub memory: Option<ByteSize>,
+    /// Most tiles kept in memory, however large, in place of --memory
+    #[arg(long, value_name = "N")]
+    pub cache_tiles: Option<usize>,
     /// Skip points nearer to the sensor than this, in metres [default: 0, or as begun with --resume]
     #[arg(long, value_name = "M")]
     pub min_range: Option<f64>,

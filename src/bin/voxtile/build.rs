@@ -15,10 +15,13 @@ use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::{ScanReport, ScanTracer};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
-use voxtile::{Error, InsertMode, MapConfig, Scan};
+use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, Scan};
 
 /// Where rays are cut unless something else is asked for.
 const MAX_RANGE_M: f64 = 100.0;
+
+/// What a build may use of memory unless something else is asked for.
+const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
 
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
@@ -210,8 +213,15 @@ fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig
     let mut config = config
         .with_sensor_model(sensor_model)
         .with_insert_mode(insert_mode)
-        .with_octree(octree_config(&args.octree)?)
-        .with_cache_tiles(args.cache_tiles);
+        .with_octree(octree_config(&args.octree)?);
+    config = match (args.cache_tiles, args.memory) {
+        (Some(tiles), _) => config.with_cache_tiles(tiles),
+        (None, Some(memory)) => config.with_memory_bytes(memory.bytes()),
+        (None, None) => {
+            let least = MemoryLimit::least_bytes(&config.grid);
+            config.with_memory_bytes(least.max(DEFAULT_MEMORY_BYTES))
+        }
+    };
     config.rays.min_range_m = min_range_m;
     config.rays.max_range_m = args.max_range.or(begun_max_m);
     Ok(config)

@@ -1,0 +1,28 @@
+use crate::config::MemoryLimit;
+
+/// How the memory that a mapper may use is shared out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct MemoryPlan {
+    /// Most tiles.
+    pub(super) tiles: usize,
+    /// Most bytes of all that grows.
+    pub(super) bytes: usize,
+    /// Most bytes of updates that wait for tiles on disk before those are fetched; one scan may come on top.
+    pub(super) pending_bytes: usize,
+    /// Bytes that stay free of tiles that need not come in yet.
+    pub(super) spare_bytes: usize,
+}
+
+impl MemoryPlan {
+    pub(super) fn new(limit: MemoryLimit) -> Self {
+        match limit {
+            MemoryLimit::Tiles { tiles, pending_bytes } => {
+                Self { tiles, bytes: usize::MAX, pending_bytes, spare_bytes: 0 }
+            }
+            // Waiting updates are small beside their tiles, and the more wait the fewer reads and writes there are.
+            MemoryLimit::Bytes(bytes) => {
+                Self { tiles: usize::MAX, bytes, pending_bytes: bytes / 4, spare_bytes: bytes / 4 }
+            }
+        }
+    }
+}

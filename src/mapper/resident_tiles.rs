@@ -1,0 +1,117 @@
+use crate::space::TileIndex;
+use crate::tile::Tile;
+use lru::LruCache;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// The tiles in memory, in the order of their last use, and how many bytes they are.
+#[derive(Debug)]
+pub(super) struct ResidentTiles {
+    tiles: LruCache<TileIndex, Resident>,
+    bytes: usize,
+}
+
+#[derive(Debug)]
+struct Resident {
+    tile: Arc<Tile>,
+    /// As they were counted: a tree that another thread writes grows meanwhile.
+    bytes: usize,
+}
+
+/// What a tile takes beside itself: its place in the table and in the order.
+const SLOT_BYTES: usize = size_of::<(TileIndex, Resident)>() + 64;
+
+impl Default for ResidentTiles {
+    fn default() -> Self {
+        Self { tiles: LruCache::unbounded(), bytes: 0 }
+    }
+}
+
+impl ResidentTiles {
+    pub(super) fn len(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Bytes of memory of all tiles.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    pub(super) fn contains(&self, index: TileIndex) -> bool {
+        self.tiles.contains(&index)
+    }
+
+    /// A tile, which becomes the one used last.
+    pub(super) fn get(&mut self, index: TileIndex) -> Option<&Arc<Tile>> {
+        self.tiles.get(&index).map(|resident| &resident.tile)
+    }
+
+    /// A tile, which keeps its place in the order.
+    pub(super) fn peek(&self, index: TileIndex) -> Option<&Arc<Tile>> {
+        self.tiles.peek(&index).map(|resident| &resident.tile)
+    }
+
+    /// The tiles, the one used last first.
+    pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = &Arc<Tile>> {
+        self.tiles.iter().map(|(_, resident)| &resident.tile)
+    }
+
+    /// Puts a tile in as the one used last.
+    pub(super) fn put(&mut self, tile: Arc<Tile>) {
+        let (index, bytes) = (tile.index(), bytes_of(&tile));
+        self.bytes += bytes;
+        if let Some(replaced) = self.tiles.put(index, Resident { tile, bytes }) {
+            self.bytes -= replaced.bytes;
+        }
+    }
+
+    pub(super) fn remove(&mut self, index: TileIndex) {
+        if let Some(removed) = self.tiles.pop(&index) {
+            self.bytes -= removed.bytes;
+        }
+    }
+
+    /// The tile whose last use is the longest ago, of those that nobody holds.
+    pub(super) fn least_recently_used(&self) -> Option<TileIndex> {
+        self.iter().rev().find(|tile| Arc::strong_count(tile) == 1).map(|tile| tile.index())
+    }
+
+    /// Changes a tile, which keeps its place in the order.
+    pub(super) fn change<T>(&mut self, index: TileIndex, change: impl FnOnce(&mut Tile) -> T) -> Option<T> {
+        let resident = self.tiles.peek_mut(&index)?;
+        self.bytes -= resident.bytes;
+        let answer = resident.change(change);
+        self.bytes += resident.bytes;
+        Some(answer)
+    }
+
+    /// Changes many tiles side by side, each with what is given for it.
+    pub(super) fn change_all<T: Send>(
+        &mut self,
+        mut given: FxHashMap<TileIndex, T>,
+        change: impl Fn(&mut Tile, T) + Sync,
+    ) {
+        let changed =
+            self.tiles.iter_mut().filter_map(|(index, resident)| Some((resident, given.remove(index)?)));
+        let mut changed: Vec<(&mut Resident, T)> = changed.collect();
+        self.bytes -= changed.iter().map(|(resident, _)| resident.bytes).sum::<usize>();
+        let bytes = changed.par_drain(..).map(|(resident, given)| {
+            resident.change(|tile| change(tile, given));
+            resident.bytes
+        });
+        self.bytes += bytes.sum::<usize>();
+    }
+}
+
+impl Resident {
+    fn change<T>(&mut self, change: impl FnOnce(&mut Tile) -> T) -> T {
+        let answer = change(Arc::make_mut(&mut self.tile));
+        self.bytes = bytes_of(&self.tile);
+        answer
+    }
+}
+
+fn bytes_of(tile: &Tile) -> usize {
+    SLOT_BYTES + tile.bytes()
+}
