@@ -20,6 +20,7 @@ mod pending;
 mod residency;
 mod statistics;
 pub(crate) mod tile_files;
+mod tile_map;
 mod tile_ref;
 mod trace;
 mod traits;
