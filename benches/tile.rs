@@ -18,7 +18,7 @@ fn apply(tables: &mut Tables, config: &MapConfig, updates: &ScanUpdates) {
         let table = tables.entry(*tile).or_default();
         match updates {
             TileUpdates::Once(bricks) => bricks.iter().for_each(|brick| table.update_brick(model, brick)),
-            TileUpdates::Runs(bricks) => bricks.iter().for_each(|brick| table.update_runs(model, brick)),
+            TileUpdates::Runs(bricks) => table.update_runs(model, bricks),
             TileUpdates::Ordered(updates) => {
                 table.update_in_order(model, config.grid.voxels_of_tile(*tile).min, updates);
             }

@@ -1,20 +1,20 @@
+use super::tile_map::TileMap;
 use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates};
-use crate::space::TileIndex;
+use crate::sensor::Evidence;
+use crate::space::{TileIndex, VoxelIndex};
 use crate::tile::{OctreeFactory, Tile};
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 /// A map that lives in memory and ends with it. It has tiles too, and gives the answers of an
 /// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper) to the bit.
 #[derive(Debug)]
 pub struct InMemoryMapper {
     config: MapConfig,
-    /// Boxed, so that those a scan touches can be taken out, changed at the same time, and put back.
-    tiles: FxHashMap<TileIndex, Box<Tile>>,
+    tiles: TileMap,
     /// After the tiles: what is in flight to octrees goes with these, and need not be written any more.
     octrees: OctreeFactory,
     tracer: ScanTracer,
@@ -29,20 +29,23 @@ impl InMemoryMapper {
     /// The first argument of the configuration that is wrong.
     pub fn new(config: MapConfig) -> Result<Self> {
         let config = config.validated()?;
+        let tiles = TileMap::new(&config.grid);
         let octrees = OctreeFactory::new(config.octree);
-        let (tiles, tracer) = Default::default();
-        Ok(Self { config, tiles, octrees, tracer, scan_number: 0 })
+        Ok(Self { config, tiles, octrees, tracer: ScanTracer::default(), scan_number: 0 })
     }
 
     fn accept(&mut self, updates: ScanUpdates) -> ScanReport {
-        let take_out = |(index, updates): (TileIndex, TileUpdates)| {
-            let tile = self.tiles.remove(&index);
-            (tile.unwrap_or_else(|| Box::new(Tile::empty(&self.config.grid, &self.octrees, index))), updates)
-        };
-        let mut touched: Vec<(Box<Tile>, TileUpdates)> = updates.tiles.into_iter().map(take_out).collect();
+        let mut updates_of: Vec<(usize, TileUpdates)> = Vec::with_capacity(updates.tiles.len());
+        for (index, updates) in updates.tiles {
+            updates_of.push((self.tiles.number_of(&self.config.grid, &self.octrees, index), updates));
+        }
+        updates_of.sort_unstable_by_key(|&(number, _)| number);
+        let mut updates_of = updates_of.into_iter().peekable();
+        let of_tile = |(number, tile)| updates_of.next_if(|next| next.0 == number).map(|(_, u)| (tile, u));
+        let touched: Vec<(&mut Tile, TileUpdates)> =
+            self.tiles.tiles_mut().iter_mut().enumerate().filter_map(of_tile).collect();
         let model = &self.config.sensor_model;
-        touched.par_iter_mut().for_each(|(tile, updates)| tile.apply(model, updates));
-        self.tiles.extend(touched.into_iter().map(|(tile, _)| (tile.index(), tile)));
+        touched.into_par_iter().for_each(|(tile, updates)| tile.apply(model, &updates));
         self.scan_number += 1;
         updates.report
     }
@@ -58,7 +61,7 @@ impl MapView for InMemoryMapper {
     }
 
     fn tile_indices(&self) -> Vec<TileIndex> {
-        let mut indices: Vec<_> = self.tiles.keys().copied().collect();
+        let mut indices: Vec<_> = self.tiles.tiles().iter().map(Tile::index).collect();
         indices.sort_unstable();
         indices
     }
@@ -69,19 +72,25 @@ impl MapView for InMemoryMapper {
 
     #[inline]
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        Ok(self.tiles.get(&index).map(|tile| TileRef::borrowed(tile)))
+        Ok(self.tiles.get(index).map(TileRef::borrowed))
     }
 
     fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
         self.tile(index)
     }
 
+    #[inline]
+    fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
+        let index = self.config.grid.tile_of_voxel(voxel);
+        Ok(self.tiles.get_or_nothing(index).evidence_of_own(voxel))
+    }
+
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
-        self.tiles.get(&index).map(|tile| tile.table().len() as u64)
+        self.tiles.get(index).map(|tile| tile.table().len() as u64)
     }
 
     fn statistics(&self) -> MapStatistics {
-        let tiles = self.tiles.len() as u64;
+        let tiles = self.tiles.tiles().len() as u64;
         let mut statistics = MapStatistics {
             scan_number: self.scan_number,
             tiles,
@@ -90,7 +99,7 @@ impl MapView for InMemoryMapper {
             octrees: self.octrees.statistics(),
             ..MapStatistics::default()
         };
-        self.tiles.values().for_each(|tile| statistics.cached += tile.counts());
+        self.tiles.tiles().iter().for_each(|tile| statistics.cached += tile.counts());
         statistics
     }
 }
@@ -111,6 +120,6 @@ impl Mapper for InMemoryMapper {
     }
 
     fn sync_octrees(&mut self) {
-        self.tiles.par_iter_mut().for_each(|(_, tile)| tile.sync_octree());
+        self.tiles.tiles_mut().par_iter_mut().for_each(Tile::sync_octree);
     }
 }

@@ -22,6 +22,7 @@ mod residency;
 mod resident_tiles;
 mod statistics;
 pub(crate) mod tile_files;
+mod tile_map;
 mod tile_ref;
 mod trace;
 mod traits;

@@ -5,7 +5,8 @@ use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates};
-use crate::space::TileIndex;
+use crate::sensor::Evidence;
+use crate::space::{TileIndex, VoxelIndex};
 use crate::store::{Disk, FsDisk, Metadata, TileStore};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -198,6 +199,10 @@ impl MapView for OutOfCoreTileMapper {
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
         Ok(self.lock().tile(index, self.scan_number)?.map(TileRef::shared))
+    }
+
+    fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
+        self.lock().evidence(voxel, self.scan_number)
     }
 
     fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {

@@ -7,7 +7,8 @@ use super::tile_files;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::scan::ScanUpdates;
-use crate::space::TileIndex;
+use crate::sensor::Evidence;
+use crate::space::{TileIndex, VoxelIndex};
 use crate::store::{Extension, Metadata, TileStore, hex};
 use crate::tile::{OctreeFactory, Tile};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -142,6 +143,16 @@ impl Residency {
             self.tiles.put(tile.clone());
         }
         Ok(Some(tile))
+    }
+
+    /// The evidence of a voxel, whose tile is brought into memory.
+    pub(super) fn evidence(&mut self, voxel: VoxelIndex, scan_number: u64) -> Result<Option<Evidence>> {
+        let index = self.config.grid.tile_of_voxel(voxel);
+        if let Some(tile) = self.tiles.get(index) {
+            self.io.hits += 1;
+            return Ok(tile.evidence_of_own(voxel));
+        }
+        Ok(self.tile(index, scan_number)?.and_then(|tile| tile.evidence_of_own(voxel)))
     }
 
     /// A tile as it is now, without bringing it into memory.

@@ -2,7 +2,8 @@ use super::{MapStatistics, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::scan::{PointBatch, Scan, ScanReport};
-use crate::space::TileIndex;
+use crate::sensor::Evidence;
+use crate::space::{TileIndex, VoxelIndex};
 
 /// A map that can be asked. Every question of [`Questions`](crate::query::Questions) is answered through these few
 /// methods.
@@ -37,6 +38,15 @@ pub trait MapView {
     /// A tile that cannot be read.
     fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
+    /// The evidence of a voxel; `None` if it was never observed.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapView::tile`].
+    fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
+        let tile = self.tile(self.config().grid.tile_of_voxel(voxel))?;
+        Ok(tile.and_then(|tile| tile.evidence(voxel)))
+    }
     /// About how many voxels were observed in a tile, where that is known without reading it.
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64>;
 

@@ -25,11 +25,13 @@ pub enum UnknownAs {
 
 impl Occupancy {
     /// The occupancy of a voxel's evidence; compared in log-odds, so that no rounding of a probability decides.
+    #[inline]
     pub fn of(config: &MapConfig, evidence: Option<Evidence>) -> Self {
         Self::of_log_odds(config, evidence.map(|evidence| evidence.log_odds))
     }
 
     /// The occupancy of log-odds.
+    #[inline]
     pub fn of_log_odds(config: &MapConfig, log_odds: Option<f64>) -> Self {
         match log_odds {
             None => Self::Unknown,

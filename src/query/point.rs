@@ -5,11 +5,11 @@ use crate::mapper::MapView;
 use crate::space::{Point, VoxelIndex};
 use crate::tile::Voxel;
 
+#[inline]
 pub(super) fn voxel_at(view: &impl MapView, point: Point) -> Result<Option<Voxel>> {
     let grid = &view.config().grid;
     let Some(index) = grid.voxel_of(point) else { return Ok(None) };
-    let tile = view.tile(grid.tile_of_voxel(index))?;
-    Ok(tile.and_then(|tile| tile.evidence(index)).map(|evidence| Voxel { index, evidence }))
+    Ok(view.evidence(index)?.map(|evidence| Voxel { index, evidence }))
 }
 
 pub(super) fn occupancy_at_points(view: &impl MapView, points: &[Point]) -> Result<Vec<Occupancy>> {

@@ -15,6 +15,7 @@ use std::io::{self, Read, Seek, Write};
 /// pushes out of memory cannot be written.
 pub trait Questions: MapView + Sized {
     /// What the map says of the voxel that holds a point; a point that is not finite is unknown.
+    #[inline]
     fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
         Ok(Occupancy::of(self.config(), self.voxel_at(point)?.map(|voxel| voxel.evidence)))
     }
@@ -25,6 +26,7 @@ pub trait Questions: MapView + Sized {
     }
 
     /// The observed voxel that holds a point, with its exact evidence.
+    #[inline]
     fn voxel_at(&self, point: Point) -> Result<Option<Voxel>> {
         point::voxel_at(self, point)
     }

@@ -1,11 +1,11 @@
 use super::ScanReport;
-use super::block_map::BlockMap;
-use super::counted_brick::CountedBrick;
+use super::counted_page::{CountedPage, Counts, brick_in_page, place_in_page};
+use super::page_map::PageMap;
 use super::slab_ray::SlabRay;
 use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
 use super::updates::{BrickRuns, Run, ScanUpdates, TileUpdates};
 use super::window::Window;
-use crate::space::{BrickMask, Grid, TileIndex, VoxelIndex, place_of_voxel};
+use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -15,76 +15,178 @@ use rustc_hash::FxHashMap;
 /// about other voxels in between makes no difference.
 #[derive(Clone, Debug, Default)]
 pub(super) struct EveryRayCollector {
-    bricks: BlockMap<CountedBrick>,
+    pages: PageMap<CountedPage>,
     /// The runs that a hit has ended, in order.
-    ended: Vec<(u32, Run)>,
+    ended: Vec<EndedRun>,
+}
+
+/// Misses and then a hit.
+#[derive(Clone, Copy, Debug)]
+struct EndedRun {
+    page: u32,
+    /// The voxel's place in the page.
+    place: u32,
+    misses: u16,
+    intensity: f32,
+}
+
+/// A brick in which rays left something.
+struct Brick<'a> {
+    counts: &'a Counts,
+    /// The runs that ended in it, in order.
+    ended: &'a [Run],
 }
 
 impl EveryRayCollector {
     /// Forgets everything, and begins anew with another window; the memory is kept.
     pub(super) fn clear(&mut self, window: Window) {
-        self.bricks.clear(window);
+        self.pages.clear(window);
         self.ended.clear();
     }
 
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
-        self.bricks.bytes() + self.ended.capacity() * size_of::<(u32, Run)>()
+        self.pages.bytes() + self.ended.capacity() * size_of::<EndedRun>()
     }
 
-    /// A ray passes all voxels before its last. At most [`MAX_RAYS`](super::counted_brick::MAX_RAYS) of them.
+    /// A ray passes all voxels before its last. At most [`MAX_RAYS`](super::counted_page::MAX_RAYS) of them.
     pub(super) fn pass(&mut self, ray: &SlabRay) {
         let mut far = Vec::new();
-        ray.pass(&mut self.bricks, 0, false, |voxel| far.push(voxel));
+        ray.pass(&mut self.pages, 0, false, |voxel| far.push(voxel));
         for voxel in far {
-            let slot = self.bricks.slot_of(voxel);
-            self.bricks.blocks_mut()[slot].passes[place_of_voxel(voxel)] += 1;
+            let page = self.pages.number_of(voxel);
+            *self.pages.pages_mut()[page].count(place_in_page(voxel)) += 1;
         }
     }
 
     /// A ray ends in a voxel, with an intensity if it matters.
     pub(super) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
-        let (slot, place) = (self.bricks.slot_of(voxel), place_of_voxel(voxel));
-        let misses = std::mem::take(&mut self.bricks.blocks_mut()[slot].passes[place]);
-        self.ended.push((slot as u32, Run { place: place as u16, misses, hit: Some(intensity) }));
+        let (page, place) = (self.pages.number_of(voxel), place_in_page(voxel));
+        let misses = std::mem::take(self.pages.pages_mut()[page].count(place));
+        self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
     }
 
-    /// The updates by tile, each brick cut at the borders of the tiles, and how many hits and misses they are.
-    fn runs_by_tile(&mut self, grid: &Grid) -> Vec<(TileIndex, Vec<BrickRuns>)> {
-        // Stable: a voxel's runs stay in order.
-        self.ended.sort_by_key(|&(slot, run)| (slot, run.place));
-        let this = &*self;
-        let runs_of_tile = |(tile, slots): (TileIndex, Vec<u32>)| {
-            let runs_of_brick = |slot: u32| {
-                let index = this.bricks.indices()[slot as usize];
-                let runs = this.runs_of_brick(slot, &part_in_tile(grid, tile, index));
+    /// Number of hits and of misses.
+    fn hits_and_misses(&self) -> (u64, u64) {
+        // At most 2^16 times 2^9.
+        let of_brick =
+            |counts: &Counts| u64::from(counts.iter().map(|&misses| u32::from(misses)).sum::<u32>());
+        let passed = self.pages.pages().iter().flat_map(CountedPage::bricks).map(of_brick);
+        let ended = self.ended.iter().map(|run| u64::from(run.misses));
+        (self.ended.len() as u64, passed.sum::<u64>() + ended.sum::<u64>())
+    }
+
+    /// The updates by tile, each brick cut at the borders of the tiles.
+    fn runs_by_tile(&self, grid: &Grid) -> Vec<(TileIndex, Vec<BrickRuns>)> {
+        let (bricks, indices) = self.bricks();
+        let ended = self.ended_by_brick(&bricks);
+        let runs_of_tile = |(tile, numbers): (TileIndex, Vec<u32>)| {
+            let mut scratch = [NO_RUN; BRICK_VOXELS];
+            let runs_of_brick = |number: u32| {
+                let index = indices[number as usize];
+                let brick = Brick { counts: bricks[number as usize], ended: ended.of_brick(number) };
+                let runs = brick.runs(&part_in_tile(grid, tile, index), &mut scratch);
                 (!runs.is_empty()).then(|| BrickRuns { brick: brick_code(index), runs })
             };
-            (tile, slots.into_iter().filter_map(runs_of_brick).collect())
+            (tile, numbers.into_iter().filter_map(runs_of_brick).collect())
         };
-        bricks_by_tile(grid, this.bricks.indices()).into_par_iter().map(runs_of_tile).collect()
+        bricks_by_tile(grid, &indices).into_par_iter().map(runs_of_tile).collect()
     }
 
-    fn runs_of_brick(&self, slot: u32, part: &BrickMask) -> Box<[Run]> {
-        let start = self.ended.partition_point(|&(other, _)| other < slot);
-        let ended = self.ended[start..].iter().take_while(|&&(other, _)| other == slot);
-        let mut ended = ended.map(|(_, run)| run).filter(|run| is_in(part, run.place)).peekable();
-        let passes = &self.bricks.blocks()[slot as usize].passes;
-        let mut runs = Vec::with_capacity(passes.iter().filter(|&&misses| misses > 0).count() + 8);
+    /// The bricks of all pages, page by page, and their indices: their voxels' over 8.
+    fn bricks(&self) -> (Vec<&Counts>, Vec<VoxelIndex>) {
+        let bricks: Vec<&Counts> = self.pages.pages().iter().flat_map(CountedPage::bricks).collect();
+        let mut indices = Vec::with_capacity(bricks.len());
+        for (page, &index) in self.pages.pages().iter().zip(self.pages.indices()) {
+            let first = indices.len();
+            indices.resize(first + page.bricks().len(), index);
+            page.places().for_each(|(place, brick)| indices[first + brick] = brick_in_page(index, place));
+        }
+        (bricks, indices)
+    }
+
+    /// The runs that hits have ended by brick, in one pass to count them and another to put each into its place.
+    fn ended_by_brick(&self, bricks: &[&Counts]) -> EndedByBrick {
+        let mut first_of_page = Vec::with_capacity(self.pages.pages().len());
+        let mut first = 0;
+        for page in self.pages.pages() {
+            first_of_page.push(first);
+            first += page.bricks().len();
+        }
+        let brick_of = |run: &EndedRun| {
+            let page = run.page as usize;
+            first_of_page[page] + self.pages.pages()[page].brick_of(run.place)
+        };
+        let mut ends = vec![0_u32; bricks.len() + 1];
+        self.ended.iter().for_each(|run| ends[brick_of(run) + 1] += 1);
+        (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
+        let mut runs = vec![NO_RUN; self.ended.len()];
+        for run in &self.ended {
+            // What begins as the start of the brick's runs becomes their end.
+            let next = &mut ends[brick_of(run)];
+            runs[*next as usize] = run.run();
+            *next += 1;
+        }
+        EndedByBrick { runs, ends }
+    }
+}
+
+/// The runs that hits have ended, brick by brick; those of a brick in the order of the rays.
+struct EndedByBrick {
+    runs: Vec<Run>,
+    /// Where those of each brick end.
+    ends: Vec<u32>,
+}
+
+impl EndedByBrick {
+    fn of_brick(&self, number: u32) -> &[Run] {
+        let number = number as usize;
+        let start = number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.runs[start as usize..self.ends[number] as usize]
+    }
+}
+
+const NO_RUN: Run = Run { place: 0, misses: 0, hit: None };
+
+impl EndedRun {
+    fn run(&self) -> Run {
+        let place = (self.place as usize % BRICK_VOXELS) as u16;
+        Run { place, misses: self.misses, hit: Some(self.intensity) }
+    }
+}
+
+impl Brick<'_> {
+    /// The runs of the voxels of a mask.
+    fn runs(&self, part: &BrickMask, scratch: &mut [Run; BRICK_VOXELS]) -> Box<[Run]> {
+        let count = self.passed(part, scratch);
+        let passed = &scratch[..count];
+        if self.ended.is_empty() {
+            return passed.into();
+        }
+        let mut runs: Vec<Run> = Vec::with_capacity(self.ended.len() + count);
+        runs.extend(self.ended.iter().filter(|run| is_in(part, run.place)));
+        // Stable, here and below: a voxel's runs stay in order, and what passed it after its last hit comes last.
+        runs.sort_by_key(|run| run.place);
+        runs.extend_from_slice(passed);
+        runs.sort_by_key(|run| run.place);
+        runs.into()
+    }
+
+    /// The misses since each voxel's last hit, if any, into `runs`; returns how many voxels have some.
+    fn passed(&self, part: &BrickMask, runs: &mut [Run; BRICK_VOXELS]) -> usize {
+        let mut count = 0;
         // Most voxels were not passed: eight at a time are passed over.
-        for (chunk, first) in passes.chunks_exact(8).zip((0..).step_by(8)) {
+        for (chunk, first) in self.counts.chunks_exact(8).zip((0..).step_by(8)) {
             if chunk.iter().fold(0, |any, misses| any | misses) == 0 {
                 continue;
             }
+            // Without a branch: which of the eight were passed cannot be guessed.
             for (&misses, place) in chunk.iter().zip(first..) {
-                if misses > 0 && is_in(part, place) {
-                    runs.extend(std::iter::from_fn(|| ended.next_if(|run| run.place <= place)));
-                    runs.push(Run { place, misses, hit: None });
-                }
+                runs[count] = Run { place, misses, hit: None };
+                count += usize::from(misses > 0 && is_in(part, place));
             }
         }
-        runs.extend(ended);
-        runs.into()
+        count
     }
 }
 
@@ -100,11 +202,10 @@ pub(super) fn updates_in_order(
 ) -> ScanUpdates {
     let mut tiles: FxHashMap<TileIndex, Vec<BrickRuns>> = FxHashMap::default();
     for collector in collectors {
+        let (hits, misses) = collector.hits_and_misses();
+        report.hits += hits;
+        report.misses += misses;
         for (tile, runs) in collector.runs_by_tile(grid) {
-            for run in runs.iter().flat_map(|brick| &brick.runs) {
-                report.misses += u64::from(run.misses);
-                report.hits += u64::from(run.hit.is_some());
-            }
             if !runs.is_empty() {
                 tiles.entry(tile).or_default().extend(runs);
             }

@@ -1,16 +1,18 @@
-/// What rays leave in a block of voxels.
+/// What rays leave in a page of voxels.
 ///
-/// A block is looked at as slabs, one voxel thick, along an axis `A`; `B` and `C` are the other axes, the lower first.
-/// A voxel is given by its slab and by a [`Footprint::Cell`] of the slab.
+/// A page is looked at as slabs, one voxel thick, along an axis `A`; `B` and `C` are the other axes, the lower first.
+/// A voxel is given by its slab and by a [`Footprint::Cell`] of the slab. Of indices only the lowest six bits count.
 pub(super) trait Footprint: Default {
-    /// Voxels along the edge of a block, a power of two. Of indices only the bits below it count.
-    const EDGE: u32;
-
     /// A voxel of a slab.
     type Cell: Copy;
 
     /// Bytes of memory on the heap.
     fn heap_bytes(&self) -> usize;
+
+    /// A page without rays in the memory of this one; `None` if that is not worth keeping.
+    fn cleared(self) -> Option<Self> {
+        None
+    }
 
     /// The voxel of a slab with these indices along `B` and `C`.
     fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> Self::Cell;

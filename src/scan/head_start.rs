@@ -1,6 +1,6 @@
-use super::block_map::BlockMap;
 use super::cone::{CELLS, CELLS_OF_SIDE, Cone, SIDES, cell_of};
 use super::marked_page::MarkedPage;
+use super::page_map::PageMap;
 use super::ray_origin::RayOrigin;
 use super::slab_ray::SlabRay;
 
@@ -54,7 +54,7 @@ impl HeadStarts {
 
     /// Learns from the marks that there are now, by squares of cells of these edges, powers of two: large ones are few and
     /// soon tell of what is near the sensor, small ones go on from there.
-    pub(super) fn extend(&mut self, pages: &BlockMap<MarkedPage>, origin: &RayOrigin, edges: &[usize]) {
+    pub(super) fn extend(&mut self, pages: &PageMap<MarkedPage>, origin: &RayOrigin, edges: &[usize]) {
         for (side, cones) in self.cones.chunks_mut(CELLS_OF_SIDE).enumerate() {
             for &edge in edges {
                 match side / 2 {
@@ -70,7 +70,7 @@ impl HeadStarts {
 fn extend_side<const A: usize, const B: usize, const C: usize>(
     cones: &mut [HeadStart],
     side: usize,
-    pages: &BlockMap<MarkedPage>,
+    pages: &PageMap<MarkedPage>,
     origin: &RayOrigin,
     edge: usize,
 ) {

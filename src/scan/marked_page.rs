@@ -134,8 +134,6 @@ impl MarkedPage {
 }
 
 impl Footprint for MarkedPage {
-    const EDGE: u32 = PAGE_EDGE as u32;
-
     /// The indices along the slab.
     type Cell = (u32, u32);
 

@@ -7,9 +7,8 @@
 //! The updates know nothing of what a tile holds: they can be kept and applied later.
 
 mod batch;
-mod block_map;
 mod cone;
-mod counted_brick;
+mod counted_page;
 mod every_ray;
 mod footprint;
 mod head_start;
@@ -17,6 +16,7 @@ mod marked_page;
 mod once;
 mod ordered;
 mod packed_updates;
+mod page_map;
 mod range;
 mod ray;
 mod ray_end;

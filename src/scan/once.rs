@@ -1,7 +1,7 @@
 use super::ScanReport;
-use super::block_map::BlockMap;
 use super::head_start::HeadStarts;
 use super::marked_page::{MarkedBrick, MarkedPage};
+use super::page_map::PageMap;
 use super::ray_end::RayEnd;
 use super::ray_origin::RayOrigin;
 use super::slab_ray::SlabRay;
@@ -18,7 +18,7 @@ pub(super) const BATCH: usize = 256;
 /// Collects what one scan says about voxels, each once: a hit over any miss, and of its hits the largest intensity.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OnceCollector {
-    pages: BlockMap<MarkedPage>,
+    pages: PageMap<MarkedPage>,
     head_starts: HeadStarts,
     /// Bricks outside the window, by index: a page for each would be large for the few voxels of a stray ray.
     far: FxHashMap<VoxelIndex, MarkedBrick>,
@@ -91,9 +91,9 @@ impl OnceCollector {
 
     /// Adds what another collector with the same window has seen.
     pub(super) fn absorb(&mut self, other: &Self) {
-        for (page, index) in other.pages.blocks().iter().zip(other.pages.indices()) {
-            let slot = self.pages.slot_of(index.map(|k| k * PAGE_EDGE as i32));
-            self.pages.blocks_mut()[slot].absorb(page);
+        for (page, index) in other.pages.pages().iter().zip(other.pages.indices()) {
+            let number = self.pages.number_of(index.map(|k| k * PAGE_EDGE as i32));
+            self.pages.pages_mut()[number].absorb(page);
         }
         for (index, brick) in &other.far {
             let mine =
@@ -108,7 +108,7 @@ impl OnceCollector {
 
     /// The updates, each brick cut at the borders of the tiles.
     pub(super) fn updates(&mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
-        let pages = self.pages.blocks().par_iter().zip(self.pages.indices());
+        let pages = self.pages.pages().par_iter().zip(self.pages.indices());
         let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
         bricks.extend(self.far.values());
         let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
@@ -228,7 +228,7 @@ mod tests {
 
     fn collected(collector: &OnceCollector) -> Marks {
         let mut marks = Marks::default();
-        for (page, index) in collector.pages.blocks().iter().zip(collector.pages.indices()) {
+        for (page, index) in collector.pages.pages().iter().zip(collector.pages.indices()) {
             for brick in page.bricks(*index) {
                 for place in 0..512_usize {
                     let voxel = std::array::from_fn(|axis| {

@@ -58,6 +58,13 @@ impl RayWalk {
         walk
     }
 
+    /// The same walk from a later voxel on, one that it visits.
+    pub(super) fn resumed_at(mut self, voxel: VoxelIndex) -> Self {
+        self.voxel = voxel;
+        self.next = std::array::from_fn(|axis| self.crossing(axis, voxel[axis]));
+        self
+    }
+
     /// Number of steps from the present voxel to the last.
     pub fn steps(&self) -> u64 {
         (0..3).map(|k| u64::from(self.voxel[k].abs_diff(self.last[k]))).sum()

@@ -1,6 +1,10 @@
 use super::footprint::Footprint;
 use super::slab_ray::SlabRay;
+use super::window::PAGE_EDGE;
 use crate::space::VoxelIndex;
+
+/// Voxels along the edge of a page.
+const EDGE: u32 = PAGE_EDGE as u32;
 
 /// A crossing nearer than this to a border between voxels, in units of 2^-32 voxels, is left to the exact walk.
 ///
@@ -12,9 +16,9 @@ const NEAR_BORDER: u32 = 1 << 12;
 /// walk: a position is off by less than 2^13 of them.
 const NEAR_EDGE: u64 = 1 << 15;
 
-/// The same in a block, in units of 2^-32 voxels: positions there have six bits less, and are off by one of these more
-/// for each slab of the block, which has 64 at most.
-const NEAR_BORDER_IN_BLOCK: u64 = 1 << 13;
+/// The same in a page, in units of 2^-32 voxels: positions there have six bits less, and are off by one of these more
+/// for each slab of the page, which has 64.
+const NEAR_BORDER_IN_PAGE: u64 = 1 << 13;
 
 /// Where a ray crosses from one slab to the next, in units of 2^-32 voxels relative to the window's lowest voxel.
 #[derive(Clone, Copy)]
@@ -70,44 +74,38 @@ impl SlabPath {
         ((self.at_b >> 32) as u32, (self.at_c >> 32) as u32)
     }
 
-    /// The slabs after `done` of `slabs` others that the ray passes in the block of `[a, b, c]`, by which it comes into
+    /// The slabs after `done` of `slabs` others that the ray passes in the page of `[a, b, c]`, by which it comes into
     /// the first; it ends in the voxel `last`.
     #[inline]
-    pub(super) fn stretch<F: Footprint>(
-        &self,
-        [a, b, c]: [u32; 3],
-        last: [u32; 3],
-        done: u32,
-        slabs: u32,
-    ) -> Stretch {
+    pub(super) fn stretch(&self, [a, b, c]: [u32; 3], last: [u32; 3], done: u32, slabs: u32) -> Stretch {
         let first = self.after(done);
-        let is_in_block = (a ^ last[0] | b ^ last[1] | c ^ last[2]) < F::EDGE;
-        let (slabs, leaves_sideways) = match is_in_block {
+        let is_in_page = (a ^ last[0] | b ^ last[1] | c ^ last[2]) < EDGE;
+        let (slabs, leaves_sideways) = match is_in_page {
             true => (slabs - done, false),
-            false => first.slabs_in_block::<F>([a, b, c], slabs - done),
+            false => first.slabs_in_page([a, b, c], slabs - done),
         };
-        // As many bits before the point as an index in the block has.
-        let shift = F::EDGE.trailing_zeros();
+        // As many bits before the point as an index in the page has.
+        let shift = EDGE.trailing_zeros();
         let local = |at: i64| (at >> shift) as u32;
         Stretch {
             at: u64::from(local(first.at_b)) << 32 | u64::from(local(first.at_c)),
             slope: ((self.slope_b >> shift) << 32).wrapping_add(self.slope_c >> shift) as u64,
-            entry: (b & (F::EDGE - 1), c & (F::EDGE - 1)),
+            entry: (b & (EDGE - 1), c & (EDGE - 1)),
             slabs,
             leaves_sideways,
             is_up: self.is_up,
         }
     }
 
-    /// How many of `slabs` slabs from here on the ray passes in the block of `[a, b, c]`, and whether it leaves the block in
+    /// How many of `slabs` slabs from here on the ray passes in the page of `[a, b, c]`, and whether it leaves the page in
     /// the midst of the next.
-    fn slabs_in_block<F: Footprint>(&self, [a, b, c]: [u32; 3], slabs: u32) -> (u32, bool) {
-        let to_end = if self.is_up { F::EDGE - (a & (F::EDGE - 1)) } else { (a & (F::EDGE - 1)) + 1 };
+    fn slabs_in_page(&self, [a, b, c]: [u32; 3], slabs: u32) -> (u32, bool) {
+        let to_end = if self.is_up { EDGE - (a & (EDGE - 1)) } else { (a & (EDGE - 1)) + 1 };
         let most = to_end.min(slabs);
-        // How many crossings are in the block for certain, by how far its side is away.
+        // How many crossings are in the page for certain, by how far its side is away.
         let crossings = |at: i64, slope: f64, index: u32| {
-            let low = i64::from(index & !(F::EDGE - 1)) << 32;
-            let high = low + (i64::from(F::EDGE) << 32);
+            let low = i64::from(index & !(EDGE - 1)) << 32;
+            let high = low + (i64::from(EDGE) << 32);
             let left = if slope < 0.0 { at - low } else { high - 1 - at };
             if left < 0 {
                 return 0;
@@ -144,17 +142,17 @@ impl SlabPath {
     }
 }
 
-/// Slabs that a ray passes in one block.
+/// Slabs that a ray passes in one page.
 pub(super) struct Stretch {
-    /// Where the ray goes out of the first slab, relative to the block: along `B` in the upper half, along `C` in the
-    /// lower, each with as many bits before the point as an index in the block has.
+    /// Where the ray goes out of the first slab, relative to the page: along `B` in the upper half, along `C` in the
+    /// lower, each with as many bits before the point as an index in the page has.
     at: u64,
     /// What is added from slab to slab.
     slope: u64,
-    /// The voxel in the block by which the ray comes in.
+    /// The voxel in the page by which the ray comes in.
     entry: (u32, u32),
     pub(super) slabs: u32,
-    /// Whether the ray leaves the block in the next slab, and not from slab to slab.
+    /// Whether the ray leaves the page in the next slab, and not from slab to slab.
     pub(super) leaves_sideways: bool,
     is_up: bool,
 }
@@ -164,17 +162,18 @@ impl Stretch {
     #[inline]
     pub(super) fn pass<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
-        block: &mut F,
+        page: &mut F,
         mut a: u32,
     ) -> u32 {
-        let bits = F::EDGE.trailing_zeros();
+        let bits = EDGE.trailing_zeros();
         // Of both halves, the fraction without what is next to a border.
-        let near = NEAR_BORDER_IN_BLOCK >> bits;
+        let near = NEAR_BORDER_IN_PAGE >> bits;
         let fraction = ((1_u64 << (32 - bits)) - 1) & !(2 * near - 1);
         let near_border = near << 32 | near;
         let indices = |at: u64| ((at >> (64 - bits)) as u32, (at as u32) >> (32 - bits));
         let step = if self.is_up { 1 } else { u32::MAX };
         let (mut at, mut entry) = (self.at, self.entry);
+        let mut entry_cell = F::cell::<B, C>(entry.0, entry.1);
         for done in 0..self.slabs {
             let moved = at.wrapping_add(near_border);
             if moved >> 32 & fraction == 0 || moved & fraction == 0 {
@@ -187,10 +186,11 @@ impl Stretch {
                 let past = [(at >> 32 << bits) as u32, (at << bits) as u32];
                 let Some(is_b_first) = is_b_crossed_first(past, slopes) else { return done };
                 let between = if is_b_first { (exit.0, entry.1) } else { (entry.0, exit.1) };
-                block.pass::<A>(a, F::cell::<B, C>(between.0, between.1));
+                page.pass::<A>(a, F::cell::<B, C>(between.0, between.1));
             }
-            block.pass_through::<A>(a, F::cell::<B, C>(entry.0, entry.1), F::cell::<B, C>(exit.0, exit.1));
-            entry = exit;
+            let exit_cell = F::cell::<B, C>(exit.0, exit.1);
+            page.pass_through::<A>(a, entry_cell, exit_cell);
+            (entry, entry_cell) = (exit, exit_cell);
             a = a.wrapping_add(step);
             at = at.wrapping_add(self.slope);
         }

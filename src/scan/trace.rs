@@ -1,4 +1,4 @@
-use super::counted_brick::MAX_RAYS;
+use super::counted_page::MAX_RAYS;
 use super::every_ray::{EveryRayCollector, updates_in_order};
 use super::once::{BATCH, OnceCollector};
 use super::ordered::OrderedCollector;

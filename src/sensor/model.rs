@@ -64,4 +64,60 @@ impl SensorModel {
             (Self::Iwlo(model), Observation::Miss) => model.miss(before),
         }
     }
+
+    /// The evidence after so many misses in a row, to the bit.
+    pub fn update_misses(&self, before: Evidence, misses: u16) -> Evidence {
+        let min = match self {
+            Self::LogOdds(model) => model.min,
+            Self::Iwlo(model) => model.min,
+        };
+        let mut evidence = before;
+        for done in 0..misses {
+            // Once clamped, by a miss a voxel can only grow older.
+            if done > 0 && evidence.log_odds.to_bits() == min.to_bits() {
+                let left = i32::from(misses - done);
+                let observation_count = evidence.observation_count.saturating_add(left);
+                return Evidence { observation_count, ..evidence };
+            }
+            evidence = self.update(Some(evidence), Observation::Miss);
+        }
+        evidence
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn any_model() -> impl Strategy<Value = SensorModel> {
+        let bounds = || (prop::sample::select(vec![-10.0, -2.0, -0.0, 0.0, 0.5]), 0.6..9.0_f64);
+        let log_odds = (bounds(), -3.0..-1e-9_f64).prop_map(|((min, max), miss)| {
+            SensorModel::LogOdds(LogOdds { min, max, miss, ..LogOdds::default() })
+        });
+        let iwlo = (bounds(), any::<bool>(), prop::sample::select(vec![0.0, 0.3, 1.0])).prop_map(
+            |((min, max), adaptive, ratio)| {
+                let iwlo =
+                    Iwlo { min, max, adaptive, min_alpha: ratio, adaptive_ratio: ratio, ..Iwlo::default() };
+                SensorModel::Iwlo(iwlo)
+            },
+        );
+        prop_oneof![log_odds, iwlo]
+    }
+
+    proptest! {
+        #[test]
+        fn many_misses_are_as_many_single_ones(
+            model in any_model(),
+            log_odds in -12.0..12.0_f64,
+            observation_count in prop_oneof![0..50_i32, i32::MAX - 50..=i32::MAX],
+            misses in prop_oneof![0..20_u16, any::<u16>()],
+        ) {
+            let before = Evidence { log_odds, observation_count };
+            let one_by_one = (0..misses).fold(before, |now, _| model.update(Some(now), Observation::Miss));
+            let at_once = model.validated().unwrap().update_misses(before, misses);
+            prop_assert_eq!(at_once.log_odds.to_bits(), one_by_one.log_odds.to_bits());
+            prop_assert_eq!(at_once.observation_count, one_by_one.observation_count);
+        }
+    }
 }

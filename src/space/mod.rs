@@ -14,6 +14,7 @@ mod grid;
 mod key;
 mod morton;
 mod tile_index;
+mod torus;
 
 pub use aabb::{Aabb, VoxelBox};
 pub use brick::{BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, mask_of_box, place_of_voxel, places};
@@ -21,6 +22,7 @@ pub use grid::{Grid, GridError, MAX_VOXELS_PER_TILE_EDGE};
 pub use key::VoxelKey;
 pub use morton::MortonCode;
 pub use tile_index::TileIndex;
+pub use torus::Torus;
 
 /// Index of a finest voxel along x, y and z: `floor(coordinate / resolution)`.
 pub type VoxelIndex = [i32; 3];

@@ -24,8 +24,11 @@ pub(super) enum Storage {
 }
 
 impl Brick {
+    /// In place of a brick that is not there.
+    pub(super) const NOTHING: &Self = &Self::new(BrickCode(0));
+
     /// A brick in which nothing was observed yet.
-    pub(super) fn new(code: BrickCode) -> Self {
+    pub(super) const fn new(code: BrickCode) -> Self {
         Self { code, observed: [0; 8], evidence: Storage::Interned(Cells::empty()), summary: Summary::STALE }
     }
 

@@ -1,5 +1,6 @@
 use super::brick::{Brick, Storage};
 use super::cells::Cells;
+use super::miss_runs::MissRuns;
 use super::packed::Packed;
 use super::palette::{Full, Palette, StateId, UNKNOWN};
 use crate::scan::{BrickUpdate, Run};
@@ -63,13 +64,35 @@ impl Brick {
         })
     }
 
-    /// The same for a run of updates.
-    #[inline]
-    pub(super) fn update_run(&mut self, run: &Run, palette: &mut Palette) -> Option<bool> {
-        self.step(run.place.into(), |before| {
-            let missed = palette.after_misses(before, run.misses)?;
-            run.hit.map_or(Ok(missed), |intensity| palette.after_hit(missed, intensity))
-        })
+    /// Applies runs of updates of voxels. Returns how many voxels are observed for the first time, and how many of the
+    /// runs are done: all of them, unless the palette takes no more states or the brick does without.
+    pub(super) fn update_runs(
+        &mut self,
+        runs: &[Run],
+        palette: &mut Palette,
+        known: &mut MissRuns,
+    ) -> (usize, usize) {
+        self.summary.is_stale = true;
+        let Storage::Interned(cells) = &mut self.evidence else { return (0, 0) };
+        cells.make(runs.iter().fold(0, |words, run| words | 1 << (run.place / 64)), UNKNOWN);
+        let mut new = 0;
+        for (done, run) in runs.iter().enumerate() {
+            let (word, bit) = (usize::from(run.place / 64), usize::from(run.place % 64));
+            let state = &mut cells.cell_mut(word).expect(MADE)[bit];
+            let before = *state;
+            let missed =
+                if run.misses == 0 { Ok(before) } else { palette.after_misses(before, run.misses, known) };
+            let after = missed.and_then(|missed| match run.hit {
+                Some(intensity) => palette.after_hit(missed, intensity),
+                None => Ok(missed),
+            });
+            let Ok(after) = after else { return (new, done) };
+            *state = after;
+            // An update leads to no voxel that was never observed, and no run is empty.
+            self.observed[word] |= u64::from(after != UNKNOWN) << bit;
+            new += usize::from(before == UNKNOWN && after != UNKNOWN);
+        }
+        (new, runs.len())
     }
 
     #[inline]

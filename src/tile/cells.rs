@@ -16,7 +16,7 @@ pub(super) struct Cells<T> {
 const ABSENT: u8 = u8::MAX;
 
 impl<T: Copy> Cells<T> {
-    pub(super) fn empty() -> Self {
+    pub(super) const fn empty() -> Self {
         Self { places: [ABSENT; 8], cells: Vec::new() }
     }
 

@@ -10,10 +10,12 @@
 //! nothing here knows a path.
 
 mod brick;
+mod brick_directory;
 mod brick_octree;
 mod brick_update;
 mod cells;
 pub mod format;
+mod miss_runs;
 mod octree_factory;
 mod octree_statistics;
 mod octree_worker;

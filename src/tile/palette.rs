@@ -1,4 +1,5 @@
 use super::cells::CELL_VOXELS;
+use super::miss_runs::MissRuns;
 use crate::sensor::{Evidence, Observation, SensorModel};
 
 /// Number of a state in a [`Palette`].
@@ -28,6 +29,7 @@ pub(super) struct Palette {
     /// Most states before some are to be dropped; at most `most`.
     limit: usize,
     most: usize,
+    renumberings: u64,
 }
 
 /// Where an observation leads, or [`UNKNOWN`].
@@ -61,6 +63,7 @@ impl Palette {
             slots: Vec::new(),
             limit,
             most,
+            renumberings: 0,
         }
     }
 
@@ -120,15 +123,18 @@ impl Palette {
 
     /// The state after so many misses.
     #[inline]
-    pub(super) fn after_misses(&mut self, before: StateId, misses: u16) -> Result<StateId, Full> {
-        // Of many, the states on the way are seldom met again: they are not kept.
-        const FEW: u16 = 4;
-        if misses <= FEW {
-            return (0..misses).try_fold(before, |state, _| self.after_miss(state));
+    pub(super) fn after_misses(
+        &mut self,
+        before: StateId,
+        misses: u16,
+        known: &mut MissRuns,
+    ) -> Result<StateId, Full> {
+        if let Some(after) = known.get(before, misses) {
+            return Ok(after);
         }
-        let miss = |evidence, _| self.model.update(Some(evidence), Observation::Miss);
-        let after = (0..misses).fold(self.evidence(before), miss);
-        self.intern(after)
+        let after = self.intern(self.model.update_misses(self.evidence(before), misses))?;
+        known.put(before, misses, after);
+        Ok(after)
     }
 
     /// The state after a hit.
@@ -205,7 +211,13 @@ impl Palette {
             self.limit = (self.limit * 2).min(self.most);
         }
         self.rehash();
+        self.renumberings += 1;
         numbers
+    }
+
+    /// How often states got other numbers.
+    pub(super) fn renumberings(&self) -> u64 {
+        self.renumberings
     }
 
     /// Whether there is room for another state.

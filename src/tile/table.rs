@@ -1,10 +1,10 @@
 use super::brick::Brick;
+use super::brick_directory::{Address, BrickDirectory};
 use super::palette::Palette;
 use super::summary::{Summary, larger};
 use crate::octree::write_bt_of_bricks;
 use crate::sensor::Evidence;
-use crate::space::{BrickCode, BrickMask, MortonCode, places};
-use rustc_hash::FxHashMap;
+use crate::space::{BrickCode, BrickMask, MortonCode, VoxelKey, places};
 use std::io::{self, Write};
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ use std::ops::Range;
 pub struct Table {
     /// In order of their first update.
     pub(super) bricks: Vec<Brick>,
-    pub(super) numbers: FxHashMap<BrickCode, u32>,
+    pub(super) directory: BrickDirectory,
     /// The numbers of the bricks in Morton order, as of the last [`Table::sum_up`].
     order: Vec<u32>,
     pub(super) palette: Palette,
@@ -41,10 +41,8 @@ impl Table {
 
     /// Bytes of memory on the heap.
     pub fn bytes(&self) -> usize {
-        // A slot of the hash map and its control byte; the map fills up to 7 of 8 slots.
-        let slot = size_of::<(BrickCode, u32)>() + 1;
         self.bricks.capacity() * size_of::<Brick>()
-            + self.numbers.capacity() * 8 / 7 * slot
+            + self.directory.bytes()
             + self.order.capacity() * size_of::<u32>()
             + self.palette.bytes()
             + self.cell_bytes
@@ -53,12 +51,18 @@ impl Table {
     /// The evidence of a voxel; `None` if it was never observed.
     #[inline]
     pub fn get(&self, code: MortonCode) -> Option<Evidence> {
-        self.brick(code.brick())?.get(code.place_in_brick(), &self.palette)
+        self.at(Address::of_code(code))
+    }
+
+    /// The evidence of the voxel with a key; `None` if it was never observed.
+    #[inline]
+    pub fn get_key(&self, key: VoxelKey) -> Option<Evidence> {
+        self.at(Address::of_key(key))
     }
 
     /// Whether any voxel of a brick was observed.
     pub fn has_brick(&self, brick: BrickCode) -> bool {
-        self.numbers.contains_key(&brick)
+        self.brick(brick).is_some()
     }
 
     /// The bricks that hold an observed voxel, in Morton order.
@@ -170,8 +174,18 @@ impl Table {
     }
 
     #[inline]
+    fn at(&self, at: Address) -> Option<Evidence> {
+        self.brick_at(at).unwrap_or(Brick::NOTHING).get(at.place, &self.palette)
+    }
+
+    #[inline]
     fn brick(&self, code: BrickCode) -> Option<&Brick> {
-        self.numbers.get(&code).map(|&number| &self.bricks[number as usize])
+        self.brick_at(Address::of_brick(code))
+    }
+
+    #[inline]
+    fn brick_at(&self, at: Address) -> Option<&Brick> {
+        self.bricks.get((self.directory.get(at) as usize).wrapping_sub(1))
     }
 
     #[cfg(test)]

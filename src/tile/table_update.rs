@@ -1,7 +1,9 @@
 use super::brick::Brick;
+use super::brick_directory::Address;
 use super::brick_update::Rest;
+use super::miss_runs::MissRuns;
 use super::table::Table;
-use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates};
+use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickCode, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
 
@@ -16,19 +18,37 @@ impl Table {
         }
     }
 
-    /// Applies what the rays of a scan say about one brick, where every ray counts.
-    pub fn update_runs(&mut self, model: &SensorModel, updates: &BrickRuns) {
+    /// Applies what the rays of a scan say about bricks, where every ray counts.
+    pub fn update_runs(&mut self, model: &SensorModel, bricks: &[BrickRuns]) {
         self.palette.use_model(model);
-        let number = self.number_of(updates.brick);
-        for run in &updates.runs {
-            if let Some(is_new) = self.bricks[number].update_run(run, &mut self.palette) {
-                self.len += usize::from(is_new);
-                continue;
+        let mut known = MissRuns::new();
+        for BrickRuns { brick, runs } in bricks {
+            let number = self.number_of(*brick);
+            let mut left = &runs[..];
+            while !left.is_empty() {
+                let brick = &mut self.bricks[number];
+                let bytes = brick.heap_bytes();
+                let (new, done) = brick.update_runs(left, &mut self.palette, &mut known);
+                self.len += new;
+                self.cell_bytes += brick.heap_bytes() - bytes;
+                left = &left[done..];
+                if let Some((run, later)) = left.split_first() {
+                    let renumberings = self.palette.renumberings();
+                    self.update_run(number, run);
+                    left = later;
+                    if self.palette.renumberings() != renumberings {
+                        known.clear();
+                    }
+                }
             }
-            let hit = run.hit.map(Observation::Hit);
-            for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
-                self.step(number, run.place.into(), observation);
-            }
+        }
+    }
+
+    /// Applies a run of updates one by one.
+    fn update_run(&mut self, number: usize, run: &Run) {
+        let hit = run.hit.map(Observation::Hit);
+        for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
+            self.step(number, run.place.into(), observation);
         }
     }
 
@@ -117,15 +137,16 @@ impl Table {
 
     /// The number of a brick, which is made if it is not there.
     fn number_of(&mut self, code: BrickCode) -> usize {
-        let number = *self.numbers.entry(code).or_insert_with(|| {
+        let number = self.directory.entry(Address::of_brick(code));
+        if *number == 0 {
             if self.bricks.len() == self.bricks.capacity() {
                 // Less slack than a vector gives by itself.
                 self.bricks.reserve_exact((self.bricks.len() / 4).max(4));
             }
             self.bricks.push(Brick::new(code));
-            (self.bricks.len() - 1) as u32
-        });
-        number as usize
+            *number = self.bricks.len() as u32;
+        }
+        *number as usize - 1
     }
 
     fn update_rest(&mut self, number: usize, rest: &mut Rest<'_>) {

@@ -124,7 +124,8 @@ fn evidence_is_kept_once_and_dropped_when_no_voxel_has_it() {
     let mut table = Table::default();
     table.update_brick(&model, &all);
     let bytes = table.bytes();
-    assert!(bytes < 4 * 512, "{bytes} bytes for 512 voxels");
+    // A palette, a block of the directory, and two bytes a voxel: half of what evidence of their own would take.
+    assert!(bytes < 6 * 512, "{bytes} bytes for 512 voxels");
     // Each time the whole brick is in a state that no voxel was in before.
     for _ in 0..100_000 {
         table.update_brick(&model, &all);

@@ -105,7 +105,13 @@ impl Tile {
     /// The evidence of a voxel of this tile; `None` if it was never observed or belongs to another tile.
     #[inline]
     pub fn evidence(&self, voxel: VoxelIndex) -> Option<Evidence> {
-        self.voxels.contains(voxel).then(|| self.table.get(VoxelKey::from_index(voxel).morton()))?
+        self.voxels.contains(voxel).then(|| self.evidence_of_own(voxel))?
+    }
+
+    /// The evidence of a voxel that belongs to this tile.
+    #[inline]
+    pub(crate) fn evidence_of_own(&self, voxel: VoxelIndex) -> Option<Evidence> {
+        self.table.get_key(VoxelKey::from_index(voxel))
     }
 
     /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that holds

@@ -30,9 +30,7 @@ impl TileOctree {
                     TileUpdates::Once(bricks) => {
                         bricks.iter().for_each(|brick| table.update_brick(model, brick));
                     }
-                    TileUpdates::Runs(bricks) => {
-                        bricks.iter().for_each(|brick| table.update_runs(model, brick));
-                    }
+                    TileUpdates::Runs(bricks) => table.update_runs(model, bricks),
                     TileUpdates::Ordered(updates) => table.update_in_order(model, first, updates),
                 }
             }

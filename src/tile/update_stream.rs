@@ -50,7 +50,7 @@ impl<'a> UpdateStream<'a> {
             // The order of rays is lost here, and with it what a voxel was in between: a run is one update.
             TileUpdates::Runs(bricks) => {
                 for update in bricks {
-                    table.update_runs(model, update);
+                    table.update_runs(model, std::slice::from_ref(update));
                     for run in &update.runs {
                         let code = update.brick.voxel(run.place.into());
                         if let Some(evidence) = table.get(code) {

@@ -1,0 +1,125 @@
+use super::footprint::Footprint;
+use super::marked_page::MarkedPage;
+use super::window::{Local, PAGE_EDGE, Window};
+use crate::space::VoxelIndex;
+use rustc_hash::FxHashMap;
+
+/// Pages of voxels in which the rays of a scan leave something.
+///
+/// Inside the window around the sensor, where nearly all are, a page is found by a look-up in a table; outside, in a
+/// hash map.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PageMap<F> {
+    window: Window,
+    /// Number, plus one, of each page of the window; 0 for none.
+    directory: Vec<u32>,
+    /// Number of each page outside the window.
+    far: FxHashMap<VoxelIndex, u32>,
+    pages: Vec<F>,
+    /// Index of each page: its voxels' indices over 64.
+    indices: Vec<VoxelIndex>,
+    /// Cleared pages of earlier scans.
+    spare: Vec<F>,
+}
+
+impl<F: Footprint> PageMap<F> {
+    /// Forgets all pages, and begins anew with another window; the memory is kept.
+    pub(super) fn clear(&mut self, window: Window) {
+        self.window = window;
+        self.directory.clear();
+        self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
+        self.far.clear();
+        // No more than the last scan had: a scan with stray rays far away leaves nothing for good.
+        self.spare.clear();
+        self.spare.extend(self.pages.drain(..).filter_map(F::cleared));
+        self.indices.clear();
+    }
+
+    /// Bytes of memory on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        self.directory.capacity() * size_of::<u32>()
+            + self.far.capacity() * 8 / 7 * (size_of::<(VoxelIndex, u32)>() + 1)
+            + (self.pages.capacity() + self.spare.capacity()) * size_of::<F>()
+            + self.pages.iter().chain(&self.spare).map(F::heap_bytes).sum::<usize>()
+            + self.indices.capacity() * size_of::<VoxelIndex>()
+    }
+
+    pub(super) fn window(&self) -> &Window {
+        &self.window
+    }
+
+    /// The page that holds a voxel of the window.
+    #[inline]
+    pub(super) fn at(&mut self, voxel: Local) -> &mut F {
+        let number = match self.directory[self.window.page_of(voxel)] {
+            0 => self.new_near(voxel),
+            number => number as usize - 1,
+        };
+        &mut self.pages[number]
+    }
+
+    /// The number of the page that holds a voxel, wherever it is.
+    pub(super) fn number_of(&mut self, voxel: VoxelIndex) -> usize {
+        if let Some(local) = self.window.local(voxel) {
+            return match self.directory[self.window.page_of(local)] {
+                0 => self.new_near(local),
+                number => number as usize - 1,
+            };
+        }
+        let index = voxel.map(|k| k.div_euclid(PAGE_EDGE as i32));
+        if let Some(&number) = self.far.get(&index) {
+            return number as usize;
+        }
+        let number = self.push(index);
+        self.far.insert(index, number as u32);
+        number
+    }
+
+    /// The pages, by number.
+    pub(super) fn pages(&self) -> &[F] {
+        &self.pages
+    }
+
+    /// The pages, by number, to change.
+    pub(super) fn pages_mut(&mut self) -> &mut [F] {
+        &mut self.pages
+    }
+
+    /// Index of each page, by number: its voxels' indices over 64.
+    pub(super) fn indices(&self) -> &[VoxelIndex] {
+        &self.indices
+    }
+
+    #[cold]
+    fn new_near(&mut self, voxel: Local) -> usize {
+        let base = self.window.base();
+        let index = |k: usize| (base[k] + voxel[k] as i32).div_euclid(PAGE_EDGE as i32);
+        let number = self.push(std::array::from_fn(index));
+        self.directory[self.window.page_of(voxel)] = self.pages.len() as u32;
+        number
+    }
+
+    fn push(&mut self, index: VoxelIndex) -> usize {
+        self.pages.push(self.spare.pop().unwrap_or_default());
+        self.indices.push(index);
+        self.pages.len() - 1
+    }
+}
+
+impl PageMap<MarkedPage> {
+    /// Whether all voxels from `low` to `high`, both in the window, are marked.
+    #[inline]
+    pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
+        let page = |voxel| {
+            let number = self.directory[self.window.page_of(voxel)] as usize;
+            self.pages.get(number.wrapping_sub(1))
+        };
+        let is_one_page = (0..3).all(|k| (low[k] ^ high[k]) < PAGE_EDGE as u32);
+        if is_one_page {
+            return page(low).is_some_and(|page| page.are_marked(low, high));
+        }
+        let is_marked = |voxel| page(voxel).is_some_and(|page| page.are_marked(voxel, voxel));
+        let [x, y, z] = [0, 1, 2].map(|k| low[k]..=high[k]);
+        x.into_iter().all(|x| y.clone().all(|y| z.clone().all(|z| is_marked([x, y, z]))))
+    }
+}

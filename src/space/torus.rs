@@ -1,0 +1,191 @@
+use rustc_hash::FxHashMap;
+use std::hint::select_unpredictable;
+
+/// Numbers of cells of an integer grid, such as tiles: which number, if any, has this cell?
+///
+/// The grid is wrapped around a torus that is as large along each axis as keeps apart the cells that are there, a
+/// power of two. Cells that lie together then never meet in a slot, and a look-up is one comparison without a branch
+/// to guess. A cell that would need too large a torus goes to a hash map.
+#[derive(Clone, Debug)]
+pub struct Torus {
+    /// Along each axis the size less one, and where its bits begin in a slot's number.
+    masks: [u32; 3],
+    shifts: [u32; 3],
+    slots: Vec<Slot>,
+    far: FxHashMap<Cell, u32>,
+    /// Number of cells.
+    len: usize,
+}
+
+/// Index along x, y and z.
+type Cell = [i32; 3];
+
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    cell: Cell,
+    number: u32,
+}
+
+impl Torus {
+    /// What a cell has that is not there: numbers begin with 1.
+    pub const NONE: u32 = 0;
+
+    /// Slots that a torus may have, whatever the number of cells, and for each of its cells.
+    const LEAST_SLOTS: usize = 64;
+    const MOST_SLOTS_A_CELL: usize = 16;
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no cell.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Bytes of memory on the heap.
+    pub fn bytes(&self) -> usize {
+        // A slot of the hash map and its control byte; the map fills up to 7 of 8 slots.
+        self.slots.capacity() * size_of::<Slot>()
+            + self.far.capacity() * 8 / 7 * (size_of::<(Cell, u32)>() + 1)
+    }
+
+    /// The number of a cell, or [`Torus::NONE`].
+    #[inline]
+    pub fn get(&self, cell: Cell) -> u32 {
+        let slot = &self.slots[self.slot_of(cell)];
+        if !self.far.is_empty() && slot.cell != cell {
+            return self.far.get(&cell).copied().unwrap_or(Self::NONE);
+        }
+        let differ = (0..3).fold(0, |differ, k| differ | (slot.cell[k] ^ cell[k]));
+        select_unpredictable(differ == 0, slot.number, Self::NONE)
+    }
+
+    /// Gives a cell a number, from 1, in place of the one it may have.
+    pub fn insert(&mut self, cell: Cell, number: u32) {
+        self.len += usize::from(self.get(cell) == Self::NONE);
+        if self.put(cell, number) {
+            return;
+        }
+        let occupant = self.slots[self.slot_of(cell)].cell;
+        if let Some((axis, bits)) = self.bits_to_part(cell, occupant) {
+            self.enlarge(axis, bits);
+        }
+        if !self.put(cell, number) {
+            self.far.insert(cell, number);
+        }
+    }
+
+    /// Puts a cell into its slot, unless another is there.
+    fn put(&mut self, cell: Cell, number: u32) -> bool {
+        let at = self.slot_of(cell);
+        let slot = &mut self.slots[at];
+        let is_free = slot.number == Self::NONE || slot.cell == cell;
+        if is_free {
+            *slot = Slot { cell, number };
+        }
+        is_free
+    }
+
+    /// How two cells that meet in a slot can be kept apart: by so many more bits along this axis. `None` if that
+    /// takes too many slots.
+    fn bits_to_part(&self, a: Cell, b: Cell) -> Option<(usize, u32)> {
+        let bits_along = |axis: usize| {
+            let differ = (a[axis] ^ b[axis]) as u32;
+            let bits = differ.trailing_zeros() + 1 - self.masks[axis].trailing_ones();
+            (differ != 0).then_some((axis, bits))
+        };
+        let (axis, bits) = (0..3).filter_map(bits_along).min_by_key(|&(_, bits)| bits)?;
+        let most = (Self::MOST_SLOTS_A_CELL * self.len).max(Self::LEAST_SLOTS);
+        // Shifted in 128 bits, in which nothing is lost: there are 32 bits more at most.
+        ((self.slots.len() as u128) << bits <= most as u128).then_some((axis, bits))
+    }
+
+    /// Makes the torus larger along an axis, and takes in what may no longer be too far for it.
+    fn enlarge(&mut self, axis: usize, bits: u32) {
+        self.masks[axis] = ((self.masks[axis] + 1) << bits) - 1;
+        self.shifts = shifts(self.masks);
+        let slots = vec![EMPTY; self.slots.len() << bits];
+        // Cells that were apart stay apart.
+        for slot in std::mem::replace(&mut self.slots, slots) {
+            if slot.number != Self::NONE {
+                self.put(slot.cell, slot.number);
+            }
+        }
+        let mut far = std::mem::take(&mut self.far);
+        far.retain(|&cell, &mut number| !self.put(cell, number));
+        self.far = far;
+    }
+
+    #[inline]
+    fn slot_of(&self, cell: Cell) -> usize {
+        let part = |k: usize| (cell[k] as u32 & self.masks[k]) << self.shifts[k];
+        (part(0) | part(1) | part(2)) as usize
+    }
+}
+
+impl Default for Torus {
+    fn default() -> Self {
+        Self { masks: [0; 3], shifts: [0; 3], slots: vec![EMPTY], far: FxHashMap::default(), len: 0 }
+    }
+}
+
+const EMPTY: Slot = Slot { cell: [0; 3], number: Torus::NONE };
+
+fn shifts(masks: [u32; 3]) -> [u32; 3] {
+    let [x, y, _] = masks.map(u32::trailing_ones);
+    [0, x, x + y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashMap;
+
+    /// Cells that lie together, along a line, and anywhere.
+    fn any_cell() -> impl Strategy<Value = Cell> {
+        prop_oneof![
+            3 => prop::array::uniform3(-6..6_i32),
+            1 => (-200..200_i32).prop_map(|x| [x, 2 * x, 0]),
+            1 => (0..31_u32, any::<bool>()).prop_map(|(bit, down)| [if down { -1 << bit } else { 1 << bit }, 0, 0]),
+            1 => any::<Cell>(),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn it_is_a_map(cells in prop::collection::vec((any_cell(), 1..1000_u32), 0..300)) {
+            let mut torus = Torus::default();
+            let mut naive = HashMap::new();
+            for &(cell, number) in &cells {
+                torus.insert(cell, number);
+                naive.insert(cell, number);
+                prop_assert_eq!(torus.get(cell), number);
+            }
+            prop_assert_eq!(torus.len(), naive.len());
+            prop_assert!(torus.slots.len() <= 64.max(16 * naive.len()));
+            for (&cell, &number) in &naive {
+                prop_assert_eq!(torus.get(cell), number);
+                for axis in 0..3 {
+                    let mut beside = cell;
+                    beside[axis] = beside[axis].wrapping_add(1);
+                    prop_assert_eq!(torus.get(beside), naive.get(&beside).copied().unwrap_or(Torus::NONE));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cells_that_lie_together_need_no_hash_map() {
+        let mut torus = Torus::default();
+        let cells = (-40..60).flat_map(|x| (10..70).flat_map(move |y| [-1, 0].map(|z| [x, y, z])));
+        cells.enumerate().for_each(|(number, cell)| torus.insert(cell, number as u32 + 1));
+        assert!(torus.far.is_empty());
+        assert_eq!((torus.len(), torus.slots.len()), (12_000, 128 * 64 * 2));
+        torus.insert([1 << 20, 10, 0], 7);
+        assert_eq!((torus.far.len(), torus.slots.len()), (1, 128 * 64 * 2));
+        assert_eq!((torus.get([1 << 20, 10, 0]), torus.get([1 << 20, 10, 1])), (7, Torus::NONE));
+    }
+}
