@@ -55,7 +55,7 @@ impl Dataset {
     /// Reads or makes the first scans, no more than so many, without intensities.
     pub fn scans(&self, count: usize) -> Result<Vec<Scan>> {
         let mut scans = match &self.source {
-            Source::MadeUp(survey) => survey.scans(SEED, 0).take(count).collect(),
+            Source::MadeUp(survey) => survey.scans(SEED, 0, SurveyName::RAYS).take(count).collect(),
             Source::Recorded(folder) => {
                 recorded(folder, count).with_context(|| format!("the set {}", self.name))?
             }
