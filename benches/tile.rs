@@ -3,7 +3,7 @@
 use criterion::measurement::WallTime;
 use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use std::collections::BTreeMap;
-use voxtile::scan::{ScanTracer, ScanUpdates, TileUpdates};
+use voxtile::scan::{ScanTracer, ScanUpdates};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
 use voxtile::space::TileIndex;
@@ -16,13 +16,7 @@ fn apply(tables: &mut Tables, config: &MapConfig, updates: &ScanUpdates) {
     let model = &config.sensor_model;
     for (tile, updates) in &updates.tiles {
         let table = tables.entry(*tile).or_default();
-        match updates {
-            TileUpdates::Once(bricks) => bricks.iter().for_each(|brick| table.update_brick(model, brick)),
-            TileUpdates::Runs(bricks) => table.update_runs(model, bricks),
-            TileUpdates::Ordered(updates) => {
-                table.update_in_order(model, config.grid.voxels_of_tile(*tile).min, updates);
-            }
-        }
+        table.apply(model, config.grid.voxels_of_tile(*tile).min, updates);
     }
 }
 

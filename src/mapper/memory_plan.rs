@@ -9,6 +9,10 @@ pub(super) struct MemoryPlan {
     pub(super) bytes: usize,
     /// Most bytes of updates that wait for tiles on disk before those are fetched; one scan may come on top.
     pub(super) pending_bytes: usize,
+    /// Most bytes of what is known of a scan while it is inserted.
+    pub(super) scan_bytes: usize,
+    /// Bytes that are kept free for inserting scans from the beginning.
+    pub(super) least_scan_bytes: usize,
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,
 }
@@ -16,13 +20,23 @@ pub(super) struct MemoryPlan {
 impl MemoryPlan {
     pub(super) fn new(limit: MemoryLimit) -> Self {
         match limit {
-            MemoryLimit::Tiles { tiles, pending_bytes } => {
-                Self { tiles, bytes: usize::MAX, pending_bytes, spare_bytes: 0 }
-            }
+            MemoryLimit::Tiles { tiles, pending_bytes } => Self {
+                tiles,
+                bytes: usize::MAX,
+                pending_bytes,
+                scan_bytes: usize::MAX,
+                least_scan_bytes: 0,
+                spare_bytes: 0,
+            },
             // Waiting updates are small beside their tiles, and the more wait the fewer reads and writes there are.
-            MemoryLimit::Bytes(bytes) => {
-                Self { tiles: usize::MAX, bytes, pending_bytes: bytes / 4, spare_bytes: bytes / 4 }
-            }
+            MemoryLimit::Bytes(bytes) => Self {
+                tiles: usize::MAX,
+                bytes,
+                pending_bytes: bytes / 4,
+                scan_bytes: bytes / 4,
+                least_scan_bytes: bytes / 8,
+                spare_bytes: bytes / 4,
+            },
         }
     }
 }

@@ -1,4 +1,5 @@
 use super::map_id::new_map_id;
+use super::memory_plan::MemoryPlan;
 use super::residency::{Input, Residency, new_metadata};
 use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
@@ -61,8 +62,9 @@ impl OutOfCoreTileMapper {
 
     fn new(config: MapConfig, store: TileStore) -> Self {
         let scan_number = store.commits().scan_number;
+        let scan_bytes = MemoryPlan::new(config.memory).scan_bytes;
         let residency = Mutex::new(Residency::new(config.clone(), store));
-        Self { residency, config, tracer: ScanTracer::default(), scan_number }
+        Self { residency, config, tracer: ScanTracer::with_memory_bytes(scan_bytes), scan_number }
     }
 
     /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan

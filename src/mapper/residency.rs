@@ -31,7 +31,7 @@ pub(super) struct Residency {
     /// only for these, so that a damaged tile is found before a scan is accepted.
     known_whole: FxHashSet<TileIndex>,
     saved: BTreeSet<TileIndex>,
-    /// Bytes of memory that inserting scans takes.
+    /// Bytes of memory that are kept free for inserting scans: what the largest so far took.
     scan_bytes: usize,
     io: IoCounts,
     /// What the map is being built from, kept with it at the next flush.
@@ -53,6 +53,7 @@ pub(super) struct Input {
 
 impl Residency {
     pub(super) fn new(config: MapConfig, store: TileStore) -> Self {
+        let plan = MemoryPlan::new(config.memory);
         let ext = store.metadata().ext.as_ref();
         let input = ext.and_then(|ext| {
             let first_scan = ext.input_first_scan;
@@ -60,14 +61,14 @@ impl Residency {
         });
         Self {
             octrees: OctreeFactory::new(config.octree),
-            plan: MemoryPlan::new(config.memory),
+            plan,
             config,
             store,
             tiles: ResidentTiles::default(),
             pending: Pending::default(),
             known_whole: FxHashSet::default(),
             saved: BTreeSet::new(),
-            scan_bytes: 0,
+            scan_bytes: plan.least_scan_bytes,
             io: IoCounts::default(),
             input,
         }
@@ -86,7 +87,7 @@ impl Residency {
         scan_bytes: usize,
         scan_number: u64,
     ) -> Result<()> {
-        self.scan_bytes = scan_bytes;
+        self.scan_bytes = self.scan_bytes.max(scan_bytes);
         if self.pending.bytes() > self.plan.pending_bytes {
             // Half, so that tiles come in for many updates at a time.
             while self.pending.bytes() > self.plan.pending_bytes / 2

@@ -1,5 +1,6 @@
 use super::ScanReport;
 use super::counted_page::{CountedPage, Counts, brick_in_page, place_in_page};
+use super::page_choice::PageChoice;
 use super::page_map::PageMap;
 use super::slab_ray::SlabRay;
 use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
@@ -39,9 +40,14 @@ struct Brick<'a> {
 
 impl EveryRayCollector {
     /// Forgets everything, and begins anew with another window; the memory is kept.
-    pub(super) fn clear(&mut self, window: Window) {
-        self.pages.clear(window);
+    pub(super) fn clear(&mut self, window: Window, choice: PageChoice<'_>) {
+        self.pages.clear(window, choice);
         self.ended.clear();
+    }
+
+    /// Number of pages with marks.
+    pub(super) fn pages(&self) -> usize {
+        self.pages.pages().len()
     }
 
     /// Bytes of memory on the heap.
@@ -63,7 +69,14 @@ impl EveryRayCollector {
     pub(super) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
         let (page, place) = (self.pages.number_of(voxel), place_in_page(voxel));
         let misses = std::mem::take(self.pages.pages_mut()[page].count(place));
-        self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
+        if !self.pages.is_scratch(page) {
+            self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
+        }
+    }
+
+    /// Forgets what is not looked at.
+    pub(super) fn finish(&mut self) {
+        self.pages.clear_scratch();
     }
 
     /// Number of hits and of misses.

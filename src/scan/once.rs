@@ -1,6 +1,7 @@
 use super::ScanReport;
 use super::head_start::HeadStarts;
 use super::marked_page::{MarkedBrick, MarkedPage};
+use super::page_choice::PageChoice;
 use super::page_map::PageMap;
 use super::ray_end::RayEnd;
 use super::ray_origin::RayOrigin;
@@ -35,11 +36,16 @@ struct HitIntensity {
 
 impl OnceCollector {
     /// Forgets everything, and begins anew with another window; the memory is kept.
-    pub(super) fn clear(&mut self, window: Window) {
-        self.pages.clear(window);
+    pub(super) fn clear(&mut self, window: Window, choice: PageChoice<'_>) {
+        self.pages.clear(window, choice);
         self.head_starts.clear();
         self.far.clear();
         self.intensities.clear();
+    }
+
+    /// Number of pages with marks.
+    pub(super) fn pages(&self) -> usize {
+        self.pages.pages().len()
     }
 
     /// Bytes of memory on the heap.
@@ -66,10 +72,14 @@ impl OnceCollector {
             count += usize::from(slabs.is_some());
         }
         let Self { pages, far, .. } = self;
+        let takes_far = pages.takes_far();
         for &(number, slabs) in &left[..count] {
             let end = ends[number];
-            SlabRay::new(origin, end)
-                .pass(pages, slabs, end.hit.is_some(), |voxel| set(&mut far_brick(far, voxel).passed, voxel));
+            SlabRay::new(origin, end).pass(pages, slabs, end.hit.is_some(), |voxel| {
+                if takes_far {
+                    set(&mut far_brick(far, voxel).passed, voxel);
+                }
+            });
         }
     }
 
@@ -79,14 +89,27 @@ impl OnceCollector {
     }
 
     fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
-        match self.pages.window().local(voxel) {
-            Some(near) => self.pages.at(near).hit(voxel),
-            None => set(&mut far_brick(&mut self.far, voxel).hits, voxel),
-        }
-        if let Some(intensity) = intensity {
+        let is_looked_at = match self.pages.window().local(voxel) {
+            Some(near) => {
+                let page = self.pages.number_at(near);
+                self.pages.pages_mut()[page].hit(voxel);
+                !self.pages.is_scratch(page)
+            }
+            None if self.pages.takes_far() => {
+                set(&mut far_brick(&mut self.far, voxel).hits, voxel);
+                true
+            }
+            None => false,
+        };
+        if let Some(intensity) = intensity.filter(|_| is_looked_at) {
             let brick = voxel.map(|k| k.div_euclid(BRICK_EDGE));
             self.intensities.push(HitIntensity { brick, place: place_of_voxel(voxel) as u16, intensity });
         }
+    }
+
+    /// Forgets what is not looked at.
+    pub(super) fn finish(&mut self) {
+        self.pages.clear_scratch();
     }
 
     /// Adds what another collector with the same window has seen.
@@ -263,10 +286,11 @@ mod tests {
             let ends = fan(origin, 6000, reach, roughness, opening);
             let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
             let mut collector = OnceCollector::default();
-            collector.clear(Window::around(origin.voxel, (
+            let window = Window::around(origin.voxel, (
                 origin.point.map(|x| x - 2.0 * reach),
                 origin.point.map(|x| x + 2.0 * reach),
-            )));
+            ));
+            collector.clear(window, PageChoice::All);
             let mut shared = 0;
             for round in 0..8 {
                 let part: Vec<RayEnd> = ends.iter().skip(round).step_by(8).copied().collect();

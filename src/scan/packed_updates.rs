@@ -19,6 +19,9 @@ impl PackedUpdates {
     /// Appends what one scan says.
     pub fn push(&mut self, updates: &TileUpdates) {
         self.updates += updates.len();
+        if let TileUpdates::Packed(packed) = updates {
+            return self.bytes.extend_from_slice(&packed.bytes);
+        }
         let out = &mut Packer { bytes: &mut self.bytes };
         match updates {
             TileUpdates::Once(bricks) => {
@@ -51,6 +54,7 @@ impl PackedUpdates {
                 out.number(intensities.len() as u64);
                 intensities.iter().for_each(|intensity| out.float(*intensity));
             }
+            TileUpdates::Packed(_) => {}
         }
     }
 

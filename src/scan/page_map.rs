@@ -1,8 +1,12 @@
 use super::footprint::Footprint;
 use super::marked_page::MarkedPage;
+use super::page_choice::PageChoice;
 use super::window::{Local, PAGE_EDGE, Window};
 use crate::space::VoxelIndex;
 use rustc_hash::FxHashMap;
+
+/// In the directory: a page that is not looked at.
+const SCRATCH: u32 = 1;
 
 /// Pages of voxels in which the rays of a scan leave something.
 ///
@@ -20,19 +24,49 @@ pub(super) struct PageMap<F> {
     indices: Vec<VoxelIndex>,
     /// Cleared pages of earlier scans.
     spare: Vec<F>,
+    /// Whether some pages of the window are not looked at: what would go there goes to the page with number 0.
+    has_scratch: bool,
+    /// Whether what lies outside the window is looked at.
+    takes_far: bool,
 }
 
 impl<F: Footprint> PageMap<F> {
     /// Forgets all pages, and begins anew with another window; the memory is kept.
-    pub(super) fn clear(&mut self, window: Window) {
+    pub(super) fn clear(&mut self, window: Window, choice: PageChoice<'_>) {
         self.window = window;
         self.directory.clear();
-        self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
+        let pages = window.pages().map(|pages| pages as usize).iter().product();
+        self.directory.resize(pages, u32::from(matches!(choice, PageChoice::Only(_))));
+        if let PageChoice::Only(pages) | PageChoice::AllBut(pages) = choice {
+            pages.iter().for_each(|&page| self.directory[page as usize] ^= SCRATCH);
+        }
+        self.has_scratch = !matches!(choice, PageChoice::All);
+        self.takes_far = !matches!(choice, PageChoice::Only(_));
         self.far.clear();
         // No more than the last scan had: a scan with stray rays far away leaves nothing for good.
         self.spare.clear();
         self.spare.extend(self.pages.drain(..).filter_map(F::cleared));
         self.indices.clear();
+        if self.has_scratch {
+            self.push(window.base().map(|k| k.div_euclid(PAGE_EDGE as i32)));
+        }
+    }
+
+    /// Forgets what went to pages that are not looked at.
+    pub(super) fn clear_scratch(&mut self) {
+        if self.has_scratch {
+            self.pages[0] = F::default();
+        }
+    }
+
+    /// Whether a page, by its number, stands for those that are not looked at.
+    pub(super) fn is_scratch(&self, number: usize) -> bool {
+        self.has_scratch && number == 0
+    }
+
+    /// Whether what lies outside the window is looked at.
+    pub(super) fn takes_far(&self) -> bool {
+        self.takes_far
     }
 
     /// Bytes of memory on the heap.
@@ -51,20 +85,26 @@ impl<F: Footprint> PageMap<F> {
     /// The page that holds a voxel of the window.
     #[inline]
     pub(super) fn at(&mut self, voxel: Local) -> &mut F {
-        let number = match self.directory[self.window.page_of(voxel)] {
+        let number = self.number_at(voxel);
+        &mut self.pages[number]
+    }
+
+    /// The number of the page that holds a voxel of the window.
+    #[inline]
+    pub(super) fn number_at(&mut self, voxel: Local) -> usize {
+        match self.directory[self.window.page_of(voxel)] {
             0 => self.new_near(voxel),
             number => number as usize - 1,
-        };
-        &mut self.pages[number]
+        }
     }
 
     /// The number of the page that holds a voxel, wherever it is.
     pub(super) fn number_of(&mut self, voxel: VoxelIndex) -> usize {
         if let Some(local) = self.window.local(voxel) {
-            return match self.directory[self.window.page_of(local)] {
-                0 => self.new_near(local),
-                number => number as usize - 1,
-            };
+            return self.number_at(local);
+        }
+        if !self.takes_far {
+            return 0;
         }
         let index = voxel.map(|k| k.div_euclid(PAGE_EDGE as i32));
         if let Some(&number) = self.far.get(&index) {
@@ -112,7 +152,9 @@ impl PageMap<MarkedPage> {
     pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
         let page = |voxel| {
             let number = self.directory[self.window.page_of(voxel)] as usize;
-            self.pages.get(number.wrapping_sub(1))
+            // What is in the scratch page is of many pages.
+            let is_known = number > usize::from(self.has_scratch);
+            is_known.then(|| &self.pages[number - 1])
         };
         let is_one_page = (0..3).all(|k| (low[k] ^ high[k]) < PAGE_EDGE as u32);
         if is_one_page {

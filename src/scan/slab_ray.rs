@@ -276,6 +276,7 @@ pub(super) fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u
 mod tests {
     use super::super::counted_page::{CountedPage, brick_in_page};
     use super::super::marked_page::MarkedPage;
+    use super::super::page_choice::PageChoice;
     use super::super::window::Window;
     use super::*;
     use crate::space::place_of_voxel;
@@ -330,8 +331,8 @@ mod tests {
         let window = Window::around(origin.voxel, bounds);
         let mut marked = PageMap::<MarkedPage>::default();
         let mut counted = PageMap::<CountedPage>::default();
-        marked.clear(window);
-        counted.clear(window);
+        marked.clear(window, PageChoice::All);
+        counted.clear(window, PageChoice::All);
         let unknown =
             rays.iter().filter(|ray| is_unknown(ray, &mut PageMap::<MarkedPage>::clone(&marked))).count();
         for ray in &rays {

@@ -2,12 +2,15 @@ use super::counted_page::MAX_RAYS;
 use super::every_ray::{EveryRayCollector, updates_in_order};
 use super::once::{BATCH, OnceCollector};
 use super::ordered::OrderedCollector;
+use super::packed_parts::PackedParts;
+use super::page_choice::{PageChoice, in_groups, pages_on_the_way};
 use super::range::{RangeRule, Ranged};
 use super::ray::MAX_RAY_STEPS;
 use super::ray_end::RayEnd;
 use super::ray_origin::RayOrigin;
 use super::rounds::rounds;
 use super::slab_ray::SlabRay;
+use super::trace_memory::TraceMemory;
 use super::window::Window;
 use super::{Scan, ScanReport, ScanUpdates};
 use crate::config::{InsertMode, RayConfig};
@@ -27,6 +30,7 @@ pub struct ScanTracer {
     once: Vec<OnceCollector>,
     /// One for every part of the rays.
     every_ray: Vec<EveryRayCollector>,
+    memory: TraceMemory,
 }
 
 impl ScanTracer {
@@ -46,10 +50,26 @@ impl ScanTracer {
     ) -> Result<ScanUpdates> {
         check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
         let fan = Fan::new(grid, model, rays, scan)?;
-        match rays.insert_mode {
-            InsertMode::PerScan => Ok(fan.once_a_voxel(&mut self.once)),
-            InsertMode::PerRay => Ok(fan.every_ray(&mut self.every_ray)),
+        let once_a_voxel = rays.insert_mode == InsertMode::PerScan;
+        let collectors = fan.parts(once_a_voxel);
+        let met = self.memory.may_be_short(&fan.window, collectors).then(|| fan.pages_on_the_way());
+        let groups = match &met {
+            Some(met) => in_groups(met, self.memory.pages_at_a_time(collectors)),
+            None => vec![PageChoice::All],
+        };
+        let mut parts = PackedParts::default();
+        for &choice in &groups {
+            let updates = match once_a_voxel {
+                true => fan.once_a_voxel(&mut self.once, choice),
+                false => fan.every_ray(&mut self.every_ray, choice),
+            };
+            self.note_memory();
+            if groups.len() == 1 {
+                return Ok(updates);
+            }
+            parts.add(updates);
         }
+        Ok(parts.into_updates(grid))
     }
 
     /// The same, but where every ray counts the updates of a tile come one by one, in the order in which the rays
@@ -72,6 +92,17 @@ impl ScanTracer {
                 Ok(Fan::new(grid, model, rays, scan)?.every_ray_in_order())
             }
         }
+    }
+
+    /// A tracer that keeps to so many bytes for its marks, if need be by following the rays several times.
+    pub fn with_memory_bytes(bytes: usize) -> Self {
+        Self { memory: TraceMemory::new(bytes), ..Self::default() }
+    }
+
+    fn note_memory(&mut self) {
+        let once = self.once.iter().map(OnceCollector::pages);
+        let every_ray = self.every_ray.iter().map(EveryRayCollector::pages);
+        self.memory.note(self.bytes(), once.chain(every_ray).sum());
     }
 
     /// Bytes of memory that are kept.
@@ -109,6 +140,7 @@ struct Fan<'a> {
     rays: &'a RayConfig,
     scan: &'a Scan,
     origin: RayOrigin,
+    window: Window,
     range: RangeRule,
 }
 
@@ -118,22 +150,20 @@ impl<'a> Fan<'a> {
             let reason = format!("{:?} m is not finite or too far away for a voxel index", scan.origin);
             Error::argument("scan origin", reason)
         })?;
-        Ok(Self {
-            grid,
-            model,
-            rays,
-            scan,
-            origin: RayOrigin::new(grid.to_voxel_units(scan.origin), voxel),
-            range: RangeRule::new(rays, scan.origin),
-        })
+        let origin = RayOrigin::new(grid.to_voxel_units(scan.origin), voxel);
+        let range = RangeRule::new(rays, scan.origin);
+        let mut fan = Self { grid, model, rays, scan, origin, window: Window::default(), range };
+        fan.window = Window::around(voxel, fan.bounds());
+        Ok(fan)
     }
 
     /// One update a voxel, a hit over any miss. Which voxels these are does not depend on the order of the rays, so
     /// each thread walks some of them.
-    fn once_a_voxel(&self, collectors: &mut Vec<OnceCollector>) -> ScanUpdates {
+    fn once_a_voxel(&self, collectors: &mut Vec<OnceCollector>, choice: PageChoice<'_>) -> ScanUpdates {
         let needs_intensity = self.model.needs_intensity();
-        let (collectors, report) = self.collect(collectors, usize::MAX, |collector, window, points| {
-            collector.clear(window);
+        let parts = self.parts(true);
+        let (collectors, report) = self.collect(collectors, parts, |collector, points| {
+            collector.clear(self.window, choice);
             let mut report = ScanReport { points: points.len() as u64, ..ScanReport::default() };
             let mut batch = Vec::with_capacity(BATCH);
             for round in rounds(points) {
@@ -148,6 +178,7 @@ impl<'a> Fan<'a> {
                 collector.take(&self.origin, &batch, needs_intensity);
                 batch.clear();
             }
+            collector.finish();
             report
         });
         let (first, others) = collectors.split_at_mut(1);
@@ -156,9 +187,10 @@ impl<'a> Fan<'a> {
     }
 
     /// Every ray counts: its misses from the sensor outward, then its hit, in the order of the points.
-    fn every_ray(&self, collectors: &mut Vec<EveryRayCollector>) -> ScanUpdates {
-        let (collectors, report) = self.collect(collectors, MAX_RAYS, |collector, window, points| {
-            collector.clear(window);
+    fn every_ray(&self, collectors: &mut Vec<EveryRayCollector>, choice: PageChoice<'_>) -> ScanUpdates {
+        let parts = self.parts(false);
+        let (collectors, report) = self.collect(collectors, parts, |collector, points| {
+            collector.clear(self.window, choice);
             let mut report = ScanReport { points: points.len() as u64, ..ScanReport::default() };
             for end in points.filter_map(|number| self.ray(number, &mut report)) {
                 collector.pass(&SlabRay::new(&self.origin, end));
@@ -166,6 +198,7 @@ impl<'a> Fan<'a> {
                     collector.hit(end.voxel, intensity);
                 }
             }
+            collector.finish();
             report
         });
         updates_in_order(self.grid, collectors, report)
@@ -186,24 +219,36 @@ impl<'a> Fan<'a> {
         collector.into_updates(report)
     }
 
-    /// Gives each thread a part of the points, and each part a collector, in order. No part has more than `most` points.
+    /// In how many parts the points are taken, each with a collector of its own.
+    fn parts(&self, once_a_voxel: bool) -> usize {
+        let points = self.scan.points.len();
+        let threads = rayon::current_num_threads().min(points / LEAST_RAYS_A_THREAD);
+        let least = if once_a_voxel { 1 } else { points.div_ceil(MAX_RAYS).max(1) };
+        threads.max(least)
+    }
+
+    fn pages_on_the_way(&self) -> Vec<u32> {
+        let mut report = ScanReport::default();
+        let ends = (0..self.scan.points.len()).filter_map(|number| self.ray(number, &mut report));
+        pages_on_the_way(&self.window, &self.origin, ends)
+    }
+
+    /// Gives each part of the points a collector, in order.
     fn collect<'c, C: Default + Send>(
         &self,
         collectors: &'c mut Vec<C>,
-        most: usize,
-        collect: impl Fn(&mut C, Window, Range<usize>) -> ScanReport + Sync,
+        parts: usize,
+        collect: impl Fn(&mut C, Range<usize>) -> ScanReport + Sync,
     ) -> (&'c mut [C], ScanReport) {
         let points = self.scan.points.len();
-        let threads = rayon::current_num_threads().min(points / LEAST_RAYS_A_THREAD);
-        let parts = threads.max(points.div_ceil(most)).max(1);
         if collectors.len() < parts {
             collectors.resize_with(parts, C::default);
         }
         let collectors = &mut collectors[..parts];
-        let window = Window::around(self.origin.voxel, self.bounds());
-        let reports = collectors.par_iter_mut().enumerate().map(|(part, collector)| {
-            collect(collector, window, points * part / parts..points * (part + 1) / parts)
-        });
+        let reports = collectors
+            .par_iter_mut()
+            .enumerate()
+            .map(|(part, collector)| collect(collector, points * part / parts..points * (part + 1) / parts));
         let reports: Vec<ScanReport> = reports.collect();
         let mut report = ScanReport::default();
         reports.into_iter().for_each(|part| report += part);
@@ -256,5 +301,72 @@ impl<'a> Fan<'a> {
         let hit = Observation::Hit(intensity);
         let hit = (is_hit && self.model.is_evidence(hit)).then_some(intensity);
         Some(RayEnd { point: end, voxel: last, hit })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::{BrickRuns, BrickUpdate, TileUpdates};
+    use crate::sensor::Iwlo;
+    use crate::space::TileIndex;
+    use proptest::prelude::*;
+
+    /// The bricks of every tile in order, however they come.
+    type Bricks = Vec<(TileIndex, Vec<BrickUpdate>, Vec<BrickRuns>)>;
+
+    fn bricks(updates: &ScanUpdates) -> Bricks {
+        let of_tile = |(tile, updates): &(TileIndex, TileUpdates)| {
+            let parts = match updates {
+                TileUpdates::Packed(packed) => packed.iter().collect(),
+                whole => vec![whole.clone()],
+            };
+            let (mut once, mut runs) = (Vec::new(), Vec::new());
+            for part in parts {
+                match part {
+                    TileUpdates::Once(bricks) => once.extend(bricks),
+                    TileUpdates::Runs(bricks) => runs.extend(bricks),
+                    other => panic!("{other:?}"),
+                }
+            }
+            once.sort_by_key(|brick| brick.brick);
+            runs.sort_by_key(|brick| brick.brick);
+            (*tile, once, runs)
+        };
+        updates.tiles.iter().map(of_tile).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+
+        #[test]
+        fn little_memory_makes_the_same_updates(
+            origin in prop::array::uniform3(-50.0..50.0_f64),
+            ends in prop::collection::vec((prop::array::uniform3(-120.0..120.0_f64), 0.0..255_f32), 1..60),
+            stray in any::<bool>(),
+            per_ray in any::<bool>(),
+        ) {
+            let grid = Grid::new(0.1, 10.0).unwrap();
+            let mut points: Vec<Point> =
+                ends.iter().map(|(way, _)| std::array::from_fn(|k| origin[k] + way[k])).collect();
+            if stray {
+                points[0] = [origin[0] + 900.0, origin[1], origin[2] - 700.0];
+            }
+            let intensities = Some(ends.iter().map(|(_, intensity)| *intensity).collect());
+            let scan = Scan { origin, points, intensities };
+            let insert_mode = if per_ray { InsertMode::PerRay } else { InsertMode::PerScan };
+            let rays = RayConfig { insert_mode, ..RayConfig::default() };
+            let model = SensorModel::Iwlo(Iwlo::default());
+            let whole = ScanTracer::default().trace(&grid, &model, &rays, &scan).unwrap();
+            let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
+            for _ in 0..2 {
+                let parts = tracer.trace(&grid, &model, &rays, &scan).unwrap();
+                prop_assert_eq!(parts.report, whole.report);
+                prop_assert_eq!(bricks(&parts), bricks(&whole));
+            }
+            let is_packed = |(_, updates): &(TileIndex, TileUpdates)| matches!(updates, TileUpdates::Packed(_));
+            let again = tracer.trace(&grid, &model, &rays, &scan).unwrap();
+            prop_assert!(again.tiles.len() < 20 || again.tiles.iter().any(is_packed));
+        }
     }
 }

@@ -1,4 +1,4 @@
-use super::ScanReport;
+use super::{PackedUpdates, ScanReport};
 use crate::sensor::Observation;
 use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, places};
 
@@ -27,6 +27,8 @@ pub enum TileUpdates {
     Runs(Vec<BrickRuns>),
     /// Any number of updates a voxel, all in order.
     Ordered(OrderedUpdates),
+    /// Any of these, packed.
+    Packed(PackedUpdates),
 }
 
 /// The voxels of one brick that one scan updates, each once.
@@ -165,6 +167,7 @@ impl TileUpdates {
                 .sum(),
             Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).map(Run::len).sum(),
             Self::Ordered(updates) => updates.len(),
+            Self::Packed(updates) => updates.len(),
         }
     }
 
@@ -174,6 +177,7 @@ impl TileUpdates {
             Self::Once(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),
             Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).all(Run::is_empty),
             Self::Ordered(updates) => updates.is_empty(),
+            Self::Packed(updates) => updates.is_empty(),
         }
     }
 
@@ -189,6 +193,7 @@ impl TileUpdates {
                 bricks.capacity() * size_of::<BrickRuns>() + runs
             }
             Self::Ordered(updates) => (updates.voxels.capacity() + updates.intensities.capacity()) * 4,
+            Self::Packed(updates) => updates.bytes(),
         };
         size_of::<Self>() + heap
     }

@@ -3,11 +3,23 @@ use super::brick_directory::Address;
 use super::brick_update::Rest;
 use super::miss_runs::MissRuns;
 use super::table::Table;
-use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run};
+use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdates};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickCode, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
 
 impl Table {
+    /// Applies updates of any form; `first` is the tile's lowest voxel.
+    pub fn apply(&mut self, model: &SensorModel, first: VoxelIndex, updates: &TileUpdates) {
+        match updates {
+            TileUpdates::Once(bricks) => bricks.iter().for_each(|brick| self.update_brick(model, brick)),
+            TileUpdates::Runs(bricks) => self.update_runs(model, bricks),
+            TileUpdates::Ordered(updates) => self.update_in_order(model, first, updates),
+            TileUpdates::Packed(packed) => {
+                packed.iter().for_each(|updates| self.apply(model, first, &updates));
+            }
+        }
+    }
+
     /// Applies what one scan says about one brick.
     pub fn update_brick(&mut self, model: &SensorModel, update: &BrickUpdate) {
         self.palette.use_model(model);

@@ -26,13 +26,7 @@ impl TileOctree {
         match self {
             Self::Bricks(octree) => {
                 octree.note_change();
-                match updates {
-                    TileUpdates::Once(bricks) => {
-                        bricks.iter().for_each(|brick| table.update_brick(model, brick));
-                    }
-                    TileUpdates::Runs(bricks) => table.update_runs(model, bricks),
-                    TileUpdates::Ordered(updates) => table.update_in_order(model, first, updates),
-                }
+                table.apply(model, first, updates);
             }
             Self::Pointers(octree) => octree.apply(table, model, first, updates),
         }

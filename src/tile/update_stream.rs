@@ -64,6 +64,9 @@ impl<'a> UpdateStream<'a> {
                     self.push(code, log_odds);
                 });
             }
+            TileUpdates::Packed(packed) => {
+                packed.iter().for_each(|updates| self.apply(table, model, first, &updates));
+            }
         }
         self.pass_on();
     }
