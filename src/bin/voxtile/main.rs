@@ -12,6 +12,7 @@ mod map_at;
 mod memory;
 mod octree_choice;
 mod octree_file;
+mod one_heap;
 mod picture;
 mod progress;
 mod query;
@@ -29,6 +30,12 @@ fn main() -> ExitCode {
         .format_timestamp(None)
         .init();
     let Cli { command, threads } = Cli::parse();
+    if let Command::Build(args) = &command
+        && args.cache_tiles.is_none()
+    {
+        // Before there is a second thread, and before anything is read from standard input.
+        one_heap::begin_with_one_heap();
+    }
     if let Some(threads) = threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
         if let Err(error) = pool.build_global() {
