@@ -258,8 +258,8 @@ impl VoxelCacheConfig {
 const DEFAULT_PENDING_BYTES: usize = 32 << 20;
 
 impl MemoryLimit {
-    /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 (n / 8 + 1)^3)` for tiles of
-    /// `n` voxels along their edge. That is two tiles of which every voxel is observed and no two alike, one at work and
+    /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles of `n` voxels and
+    /// `b = ceil(n / 8) + 1` bricks along their edge. That is two tiles of which every voxel is observed and no two alike, one at work and
     /// one on its way in or out, and what a scan takes.
     pub fn least_bytes(grid: &Grid) -> usize {
         least_bytes(grid.voxels_per_tile_edge() as usize)
@@ -272,7 +272,8 @@ impl MemoryLimit {
                 let least = Self::least_bytes(grid);
                 let fits = (2..grid.voxels_per_tile_edge()).rev().find(|&n| least_bytes(n as usize) <= bytes);
                 let hint = fits.map_or(String::new(), |n| {
-                    format!(", or make tiles of at most {:.6} m", f64::from(n) * grid.resolution_m())
+                    let length_m = (f64::from(n) * grid.resolution_m() * 1e6).round() / 1e6;
+                    format!(", or make tiles of at most {length_m} m")
                 });
                 let reason = format!(
                     "{bytes} bytes are too few for tiles of {} m at {} m: give at least {least} ({} MiB){hint}",
@@ -288,7 +289,8 @@ impl MemoryLimit {
 }
 
 fn least_bytes(voxels_per_edge: usize) -> usize {
-    let bricks_per_edge = voxels_per_edge / 8 + 1;
+    // One more, for tiles that begin in the midst of a brick.
+    let bricks_per_edge = voxels_per_edge.div_ceil(8) + 1;
     (16 << 20) + 2 * (12 * voxels_per_edge.pow(3) + 256 * bricks_per_edge.pow(3))
 }
 

@@ -6,7 +6,7 @@ use super::statistics::{IoCounts, MapStatistics};
 use super::tile_files;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::scan::ScanUpdates;
+use crate::scan::{ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, VoxelIndex};
 use crate::store::{Extension, Metadata, TileStore, hex};
@@ -40,6 +40,19 @@ pub(super) struct Residency {
 
 /// By how many bytes an update may be expected to make a tile larger, or what waits for it.
 const BYTES_OF_UPDATE: usize = 4;
+
+/// About how many bytes a new tile takes once it has these updates.
+fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
+    const TILE: usize = 2 << 10;
+    const BRICK: usize = 384;
+    TILE + match updates {
+        TileUpdates::Once(bricks) => BRICK * bricks.len(),
+        TileUpdates::Runs(bricks) => BRICK * bricks.len(),
+        // A brick of few voxels takes some 25 bytes packed, and of many as many as they.
+        TileUpdates::Packed(packed) => BRICK / 25 * packed.bytes(),
+        TileUpdates::Ordered(updates) => 8 * updates.len(),
+    }
+}
 
 /// What a tile takes in the set of those that are known to be whole, and in that of those saved.
 const KNOWN_BYTES_OF_TILE: usize = 4 * size_of::<TileIndex>();
@@ -111,8 +124,12 @@ impl Residency {
     /// Takes the updates: into tiles in memory at once, for the others they wait. Cannot fail.
     pub(super) fn accept(&mut self, updates: ScanUpdates) {
         let mut resident = FxHashMap::default();
+        // What new tiles take only when the updates are applied to them.
+        let mut coming = 0;
         for (index, tile_updates) in updates.tiles {
-            if !self.exists(index) && self.has_room_for(0) {
+            let with_it = coming + bytes_of_new_tile(&tile_updates);
+            if !self.exists(index) && self.has_room_for(with_it) {
+                coming = with_it;
                 self.tiles.put(Arc::new(Tile::empty(&self.config.grid, &self.octrees, index)));
             }
             // The tile becomes the one used last.

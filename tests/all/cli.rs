@@ -257,6 +257,15 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
             "max range: 0 is not a length above the min range",
         ),
         (vec!["build", scans, "-o", new, "--cache-tiles", "0"], 2, "cache tiles: 0 is not at least 1"),
+        (vec!["build", scans, "-o", new, "--memory", "0"], 2, "--memory"),
+        (vec!["build", scans, "-o", new, "--memory", "1 mile"], 2, "--memory"),
+        (vec!["build", scans, "-o", new, "--memory", "64MiB", "--cache-tiles", "3"], 2, "--cache-tiles"),
+        (
+            vec!["build", scans, "-o", new, "--memory", "20MiB"],
+            2,
+            "20971520 bytes are too few for tiles of 10 m at 0.1 m: give at least 42182144 (41 MiB), \
+             or make tiles of at most 5.4 m",
+        ),
         (vec!["build", scans, "-o", new, "--octree", "trees"], 2, "--octree"),
         (vec!["build", scans, "-o", new, "--voxel-cache", "maybe"], 2, "--voxel-cache"),
         (vec!["build", scans, "-o", new, "--voxel-cache", "serial", "--tau", "x"], 2, "--tau"),

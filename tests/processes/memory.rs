@@ -30,6 +30,39 @@ fn peak(answer: &Value) -> u64 {
     answer["peak_rss_bytes"].as_u64().expect("this system tells the peak")
 }
 
+/// A build keeps to its limit, whatever it maps, and maps the same: what it may use beside the limit are 48 MiB.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_build_keeps_to_its_memory() {
+    const MEMORY: u64 = 20 << 20;
+    let (folder, _) = folder_for_maps();
+    for (name, scans) in [
+        ("drive", Survey::tour(1, 4_000).step_by(4).take(60).collect::<Vec<_>>()),
+        ("teleports", Survey::teleports(1, 5_000.0, 4_000).take(40).collect()),
+    ] {
+        let build = |memory: u64| {
+            let map = folder.path().join(format!("{name}_{memory}"));
+            let memory = memory.to_string();
+            let how =
+                ["build", "-", "--resolution", "0.1", "--tile-size", "5", "--memory", &memory, "--json"];
+            let mut command = voxtile();
+            command.args(how).arg("-o").arg(&map);
+            let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+            let mut writer = ScanStreamWriter::new(child.stdin.take().unwrap(), name, true).unwrap();
+            scans.iter().for_each(|scan| writer.write_world(scan).unwrap());
+            drop(writer);
+            let output = child.wait_with_output().unwrap();
+            assert!(output.status.success());
+            let built: Value = serde_json::from_slice(&output.stdout).unwrap();
+            (answer("digest", &map, &[])["digest"].clone(), built)
+        };
+        let ((digest, small), (expected, large)) = (build(MEMORY), build(4 << 30));
+        assert_eq!(digest, expected, "{name}");
+        assert!(peak(&small) < MEMORY + (48 << 20), "{name}: {} bytes", peak(&small));
+        assert!(peak(&large) > MEMORY + (48 << 20), "{name} does not need more than the limit");
+    }
+}
+
 /// What looks at a whole map takes no more memory for a long drive than for a short one, and octree files keep to the
 /// memory that they are given.
 #[cfg(target_os = "linux")]
