@@ -9,7 +9,9 @@ use super::slab_ray::SlabRay;
 use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
 use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
 use super::window::{PAGE_EDGE, Window};
-use crate::space::{BRICK_EDGE, BrickMask, Grid, TileIndex, VoxelIndex, place_of_voxel, places};
+use crate::space::{
+    BRICK_EDGE, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, VoxelKey, place_of_voxel, places,
+};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -23,15 +25,8 @@ pub(super) struct OnceCollector {
     head_starts: HeadStarts,
     /// Bricks outside the window, by index: a page for each would be large for the few voxels of a stray ray.
     far: FxHashMap<VoxelIndex, MarkedBrick>,
-    /// The intensity of every hit; empty for sensor models that need none.
-    intensities: Vec<HitIntensity>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct HitIntensity {
-    brick: VoxelIndex,
-    place: u16,
-    intensity: f32,
+    /// The largest intensity of every hit voxel; empty for sensor models that need none.
+    intensities: FxHashMap<VoxelIndex, f32>,
 }
 
 impl OnceCollector {
@@ -54,7 +49,7 @@ impl OnceCollector {
         self.pages.bytes()
             + self.head_starts.bytes()
             + self.far.capacity() * 8 / 7 * far_brick
-            + self.intensities.capacity() * size_of::<HitIntensity>()
+            + self.intensities.capacity() * 8 / 7 * (size_of::<(VoxelIndex, f32)>() + 1)
     }
 
     /// Takes some rays from one origin, at most [`BATCH`]: their hits, and the voxels before their last.
@@ -102,8 +97,7 @@ impl OnceCollector {
             None => false,
         };
         if let Some(intensity) = intensity.filter(|_| is_looked_at) {
-            let brick = voxel.map(|k| k.div_euclid(BRICK_EDGE));
-            self.intensities.push(HitIntensity { brick, place: place_of_voxel(voxel) as u16, intensity });
+            keep_largest(&mut self.intensities, voxel, intensity);
         }
     }
 
@@ -126,7 +120,9 @@ impl OnceCollector {
                 mine.passed[word] |= brick.passed[word];
             }
         }
-        self.intensities.extend_from_slice(&other.intensities);
+        for (&voxel, &intensity) in &other.intensities {
+            keep_largest(&mut self.intensities, voxel, intensity);
+        }
     }
 
     /// The updates, each brick cut at the borders of the tiles.
@@ -135,11 +131,6 @@ impl OnceCollector {
         let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
         bricks.extend(self.far.values());
         let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
-        // The largest of a voxel comes first.
-        self.intensities.sort_unstable_by(|a, b| {
-            (a.brick, a.place).cmp(&(b.brick, b.place)).then(b.intensity.total_cmp(&a.intensity))
-        });
-        self.intensities.dedup_by_key(|hit| (hit.brick, hit.place));
         let this = &*self;
         let updates = bricks_by_tile(grid, &indices)
             .into_par_iter()
@@ -185,13 +176,19 @@ impl OnceCollector {
         if self.intensities.is_empty() {
             return Box::default();
         }
-        let start = self.intensities.partition_point(|hit| hit.brick < brick);
-        let of_brick = self.intensities[start..].iter().take_while(|hit| hit.brick == brick);
-        let mut wanted = places(*hits).peekable();
-        of_brick
-            .filter(|hit| wanted.next_if_eq(&usize::from(hit.place)).is_some())
-            .map(|hit| hit.intensity)
-            .collect()
+        let intensity = |place| {
+            let VoxelKey(local) = MortonCode(place as u64).to_key();
+            let voxel = std::array::from_fn(|k| brick[k] * BRICK_EDGE + i32::from(local[k]));
+            self.intensities.get(&voxel).copied().unwrap_or_default()
+        };
+        places(*hits).map(intensity).collect()
+    }
+}
+
+fn keep_largest(intensities: &mut FxHashMap<VoxelIndex, f32>, voxel: VoxelIndex, intensity: f32) {
+    let largest = intensities.entry(voxel).or_insert(intensity);
+    if intensity.total_cmp(largest).is_gt() {
+        *largest = intensity;
     }
 }
 
