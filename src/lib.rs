@@ -58,6 +58,7 @@
 mod config;
 mod error;
 pub mod io;
+pub mod local;
 pub mod mapper;
 pub mod maths;
 pub mod octree;
