@@ -1,3 +1,4 @@
+use super::frame::Frame;
 use super::inflation::Inflation;
 use super::parameters::LocalParameters;
 use super::reader::{LocalReader, Shared};
@@ -27,7 +28,7 @@ pub struct LocalMap {
     pub(super) inflation: Inflation,
     pub(super) sweep: Sweep,
     /// Kept from update to update for its memory.
-    pub(super) frame: super::frame::Frame,
+    pub(super) frame: Frame,
     pub(super) position: Option<Point>,
     update_number: u64,
     shared: Arc<Shared>,
@@ -56,7 +57,7 @@ impl LocalMap {
             voxels: Voxels::default(),
             inflation: Inflation::new(inflation_range_m, inflation_radius_m, resolution_m),
             sweep: Sweep::default(),
-            frame: Default::default(),
+            frame: Frame::default(),
             position: None,
             update_number: 0,
             shared: Arc::new(Shared::new(view.clone())),
@@ -166,7 +167,8 @@ impl LocalMap {
     pub(super) fn publish(&mut self) {
         self.update_number += 1;
         let dirty = self.tree.take_dirty();
-        let mut view = LocalView { occupied: self.occupied(), ..LocalView::clone(&self.view) };
+        let mut view = LocalView::clone(&self.view);
+        view.occupied = self.occupied();
         view.update_number = self.update_number;
         view.position = self.position;
         view.stored = self.voxels.len();
@@ -235,13 +237,7 @@ impl Clock {
     }
 }
 
-/// The stages have their own documentation; this is what they share.
+/// Whether a voxel of these log-odds leaves the map. What is occupied is not free, where the thresholds meet.
 pub(super) fn is_known_free(parameters: &LocalParameters, log_odds: f64) -> bool {
     log_odds <= parameters.free_log_odds && log_odds < parameters.occupied_log_odds
 }
-
-const _: fn() = || {
-    fn is_shareable<T: Send + Sync>() {}
-    is_shareable::<LocalMap>();
-    is_shareable::<StageTimes>();
-};

@@ -43,11 +43,6 @@ impl<T: Clone + Default> Slab<T> {
         &mut self.chunks[(id / CHUNK) as usize][(id % CHUNK) as usize]
     }
 
-    /// Values in use.
-    pub(super) fn len(&self) -> usize {
-        self.len as usize - self.free.len()
-    }
-
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.chunks.len() * (CHUNK as usize * size_of::<T>() + size_of::<Box<[T]>>())

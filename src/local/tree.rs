@@ -1,4 +1,4 @@
-use super::place::{cell_at, ones, place_of};
+use super::place::{cell_at, place_of};
 use super::slab::Slab;
 use super::sparse::{IdLists, Sparse64};
 use crate::space::VoxelIndex;
@@ -135,12 +135,6 @@ impl Tree {
         }
     }
 
-    /// The block beside another, relative to it in blocks.
-    pub(super) fn block_beside(&self, block: u32, offset: VoxelIndex) -> Option<u32> {
-        let index = self.block_index(block);
-        self.block_at(std::array::from_fn(|k| index[k] + offset[k]))
-    }
-
     /// Puts a voxel with occupancy into a block.
     pub(super) fn store(&mut self, block: u32, place: usize, voxel: u32) {
         let Block { node, place: in_node, voxels, .. } = self.blocks.get_mut(block);
@@ -236,12 +230,6 @@ impl Tree {
     /// The numbers of all blocks of a node.
     pub(super) fn blocks_of(&self, node: u32) -> &[u32] {
         self.nodes.get(node).blocks.ids(&self.lists)
-    }
-
-    /// The voxels of a block that are in a mask.
-    pub(super) fn voxels_of(&self, block: u32, mask: u64) -> impl Iterator<Item = VoxelIndex> {
-        let index = self.block_index(block);
-        ones(mask).map(move |place| cell_at(index, place))
     }
 
     /// Bytes of memory on the heap.
