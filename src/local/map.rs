@@ -2,7 +2,7 @@ use super::frame::Frame;
 use super::inflation::Inflation;
 use super::parameters::LocalParameters;
 use super::reader::{LocalReader, Shared};
-use super::report::{LocalReport, StageTimes};
+use super::report::LocalReport;
 use super::sweep::Sweep;
 use super::tree::Tree;
 use super::view::LocalView;
@@ -201,6 +201,11 @@ impl LocalMap {
     /// Inflated voxels (`n_inf`).
     pub fn inflated_voxels(&self) -> usize {
         self.inflation.inflated
+    }
+
+    /// Voxels that are in the occupancy or in the inflation map; looks at all of them.
+    pub fn voxels(&self) -> usize {
+        self.inflation.inflated + self.tree.stored_but_not_inflated()
     }
 
     /// Each voxel with occupancy and its log-odds, in the order in which they will be removed: longest without an update

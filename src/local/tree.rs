@@ -232,6 +232,13 @@ impl Tree {
         self.nodes.get(node).blocks.ids(&self.lists)
     }
 
+    /// Voxels with occupancy that nothing inflates.
+    pub(super) fn stored_but_not_inflated(&self) -> usize {
+        let nodes = self.page_ids().flat_map(|page| self.nodes_of(page));
+        let blocks = nodes.flat_map(|&node| self.blocks_of(node)).map(|&block| self.blocks.get(block));
+        blocks.map(|block| (block.voxels.mask & !block.inflated).count_ones() as usize).sum()
+    }
+
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.by_index.capacity() * 8 / 7 * (size_of::<(VoxelIndex, u32)>() + 1)

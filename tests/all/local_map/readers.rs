@@ -40,8 +40,9 @@ fn changes_lead_from_one_look_to_the_next() {
 #[test]
 fn readers_see_whole_updates_while_the_writer_goes_on() {
     let random = &mut Random(9);
+    // All is in the range of inflation, so that every occupied voxel is inflated.
     let mut map =
-        LocalMap::new(0.1, at_once(LocalParameters::local_mapping().with_max_voxels(2000))).unwrap();
+        LocalMap::new(0.1, at_once(LocalParameters::passive_perception().with_max_voxels(2000))).unwrap();
     let is_done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         for _ in 0..2 {
