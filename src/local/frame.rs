@@ -1,4 +1,5 @@
 use super::map::{LocalMap, is_known_free};
+use super::page_table::PageTable;
 use super::parameters::LocalParameters;
 use super::place::place_of;
 use super::ray_search::RaySearch;
@@ -16,6 +17,7 @@ pub(super) struct Frame {
     touches: Vec<Touch>,
     /// End points in units of voxels, and their voxels.
     ends: Vec<(Point, VoxelIndex)>,
+    pages: PageTable,
 }
 
 /// What the present scan says of one voxel.
@@ -31,7 +33,9 @@ struct Touch {
 
 impl Frame {
     pub(super) fn bytes(&self) -> usize {
-        self.touches.capacity() * size_of::<Touch>() + self.ends.capacity() * size_of::<(Point, VoxelIndex)>()
+        self.touches.capacity() * size_of::<Touch>()
+            + self.ends.capacity() * size_of::<(Point, VoxelIndex)>()
+            + self.pages.bytes()
     }
 
     /// What the scan says of a voxel so far.
@@ -117,13 +121,14 @@ impl LocalMap {
     pub(super) fn take_misses(&mut self, origin: Point, start: VoxelIndex) {
         let Self { grid, tree, voxels, frame, .. } = self;
         let origin = grid.to_voxel_units(origin);
-        let ends = std::mem::take(&mut frame.ends);
+        frame.pages.refill(tree);
+        let (ends, pages) = (std::mem::take(&mut frame.ends), std::mem::take(&mut frame.pages));
         for &(end, last) in &ends {
-            RaySearch::new(origin, start, end, last).for_each_stored(tree, end, |id| {
+            RaySearch::new(origin, start, end, last).for_each_stored(tree, &pages, end, |id| {
                 frame.touch(id, voxels.slab.get_mut(id)).misses += 1;
             });
         }
-        frame.ends = ends;
+        (frame.ends, frame.pages) = (ends, pages);
     }
 
     /// Occupancy check (equations 2 and 3): one sum a voxel, then the clamp, then its state.

@@ -1,4 +1,4 @@
-use super::place::{cell_at, ones};
+use super::place::{cell_at, ones, place_of};
 use super::range::{Ball, Relation};
 use super::slab::Slab;
 use super::stencil::Stencil;
@@ -24,6 +24,8 @@ pub(super) struct Inflation {
     emptied: Vec<u32>,
     /// Numbers of the blocks around the present one, as its stencil counts them.
     beside: Vec<u32>,
+    /// Index and number of the node in which one of them was found last.
+    last_node: (VoxelIndex, u32),
     pages: Vec<u32>,
     /// Inflated voxels.
     pub(super) inflated: usize,
@@ -58,6 +60,7 @@ impl Inflation {
             waiting: Vec::new(),
             emptied: Vec::new(),
             beside: Vec::new(),
+            last_node: ([0; 3], NONE),
             pages: Vec::new(),
             inflated: 0,
             changes: 0,
@@ -205,6 +208,7 @@ impl Inflation {
         self.beside.clear();
         self.beside.resize(stencil.blocks(), NONE);
         let index = tree.block_index(block);
+        self.last_node = (index.map(|k| k >> 2), tree.blocks.get(block).node);
         for place in ones(begin) {
             for &(number, mask) in stencil.of_place(place) {
                 let at = self.beside(tree, index, number, stencil);
@@ -233,7 +237,15 @@ impl Inflation {
             return known;
         }
         let offset = stencil.offset_of(number);
-        let block = tree.make_block(std::array::from_fn(|k| index[k] + offset[k]), self.current);
+        let at: VoxelIndex = std::array::from_fn(|k| index[k] + offset[k]);
+        // Mostly it is in the node of the one before.
+        let (node_index, node) = self.last_node;
+        let known = match node_index == at.map(|k| k >> 2) {
+            true => tree.nodes.get(node).blocks.get(&tree.lists, place_of(at)),
+            false => None,
+        };
+        let block = known.unwrap_or_else(|| tree.make_block(at, self.current));
+        self.last_node = (at.map(|k| k >> 2), tree.blocks.get(block).node);
         self.beside[number as usize] = block;
         block
     }

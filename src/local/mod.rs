@@ -30,6 +30,7 @@ mod changes;
 mod frame;
 mod inflation;
 mod map;
+mod page_table;
 mod parameters;
 mod place;
 mod questions;

@@ -1,5 +1,7 @@
+use super::page_table::PageTable;
 use super::place::place_of;
-use super::tree::{Page, Tree};
+use super::sparse::Sparse64;
+use super::tree::{Node, Page, Tree};
 use crate::scan::RayWalk;
 use crate::space::{Point, VoxelIndex};
 
@@ -15,6 +17,28 @@ pub(super) struct RaySearch {
     step: [i32; 3],
     start: VoxelIndex,
     last: VoxelIndex,
+    /// Which way it goes: bit `k` is set where it goes down along axis `k`.
+    octant: usize,
+}
+
+/// For each octant, as [`RaySearch`] counts them, and each place: the places that a ray can come to from there.
+static AHEAD: [[u64; 64]; 8] = places_ahead();
+
+const fn places_ahead() -> [[u64; 64]; 8] {
+    let mut ahead = [[0; 64]; 8];
+    let mut case = 0;
+    while case < 8 * 64 * 64 {
+        let (octant, from, to) = (case >> 12, case >> 6 & 63, case & 63);
+        let (mut axis, mut is_ahead) = (0, true);
+        while axis < 3 {
+            let (a, b) = (from >> (2 * axis) & 3, to >> (2 * axis) & 3);
+            is_ahead &= if octant >> axis & 1 != 0 { b <= a } else { b >= a };
+            axis += 1;
+        }
+        ahead[octant][from] |= (is_ahead as u64) << to;
+        case += 1;
+    }
+    ahead
 }
 
 /// The crossing by which a cell is entered: its time and its axis.
@@ -36,24 +60,30 @@ impl RaySearch {
             step: std::array::from_fn(|k| (last[k] - start[k]).signum()),
             start,
             last,
+            octant: (0..3).map(|k| usize::from(last[k] < start[k]) << k).sum(),
         }
     }
 
     /// Visits the number of each voxel with occupancy on the ray, from the first up to, not including, the last.
-    pub(super) fn for_each_stored(&self, tree: &Tree, end: Point, mut visit: impl FnMut(u32)) {
+    #[inline]
+    pub(super) fn for_each_stored(
+        &self,
+        tree: &Tree,
+        pages: &PageTable,
+        end: Point,
+        mut visit: impl FnMut(u32),
+    ) {
         // A ray that hardly moves along an axis has no number for the times there.
         let is_sound = |k: usize| self.step[k] == 0 || self.inv_direction[k].abs() < 1e30;
         if !(is_sound(0) && is_sound(1) && is_sound(2)) {
             return self.for_each_stored_by_steps(tree, end, visit);
         }
-        let mut pages = self.cursor::<6>(self.start.map(|k| k >> 6), None);
+        let mut at = self.cursor::<6>(self.start.map(|k| k >> 6), None);
         loop {
-            if let Some(page) = tree.page_at(pages.cell).map(|page| tree.pages.get(page))
-                && page.stored != 0
-            {
-                self.search_page(tree, page, &pages, &mut visit);
+            if let Some(page) = pages.get(tree, at.cell) {
+                self.search_page(tree, tree.pages.get(page), &at, &mut visit);
             }
-            if !self.advance(&mut pages) {
+            if self.advance(&mut at).is_none() {
                 return;
             }
         }
@@ -70,50 +100,53 @@ impl RaySearch {
     }
 
     fn search_page(&self, tree: &Tree, page: &Page, at: &Cursor<6>, visit: &mut impl FnMut(u32)) {
-        let mut nodes = self.descend::<6, 4>(at);
-        loop {
-            let place = place_of(nodes.cell);
-            if page.stored >> place & 1 != 0
-                && let Some(node) = page.nodes.get(&tree.lists, place)
-            {
-                self.search_node(tree, node, &nodes, visit);
+        self.search::<6, 4>(at, page.stored, |nodes, place| {
+            if let Some(node) = page.nodes.get(&tree.lists, place) {
+                self.search_node(tree, tree.nodes.get(node), nodes, visit);
             }
-            if !self.advance(&mut nodes) || nodes.cell.map(|k| k >> 2) != at.cell {
-                return;
-            }
-        }
+        });
     }
 
-    fn search_node(&self, tree: &Tree, node: u32, at: &Cursor<4>, visit: &mut impl FnMut(u32)) {
-        let node = tree.nodes.get(node);
-        let mut blocks = self.descend::<4, 2>(at);
-        loop {
-            let place = place_of(blocks.cell);
-            if node.stored >> place & 1 != 0
-                && let Some(block) = node.blocks.get(&tree.lists, place)
-            {
-                self.search_block(tree, block, &blocks, visit);
+    #[inline]
+    fn search_node(&self, tree: &Tree, node: &Node, at: &Cursor<4>, visit: &mut impl FnMut(u32)) {
+        self.search::<4, 2>(at, node.stored, |blocks, place| {
+            if let Some(block) = node.blocks.get(&tree.lists, place) {
+                self.search_block(tree, &tree.blocks.get(block).voxels, blocks, visit);
             }
-            if !self.advance(&mut blocks) || blocks.cell.map(|k| k >> 2) != at.cell {
-                return;
-            }
-        }
+        });
     }
 
-    fn search_block(&self, tree: &Tree, block: u32, at: &Cursor<2>, visit: &mut impl FnMut(u32)) {
-        let stored = &tree.blocks.get(block).voxels;
-        let mut voxels = self.descend::<2, 0>(at);
-        loop {
-            let place = place_of(voxels.cell);
-            let is_stored = stored.mask >> place & 1 != 0;
-            if is_stored
-                && voxels.cell != self.last
+    #[inline]
+    fn search_block(&self, tree: &Tree, stored: &Sparse64, at: &Cursor<2>, visit: &mut impl FnMut(u32)) {
+        self.search::<2, 0>(at, stored.mask, |voxels, place| {
+            if voxels.cell != self.last
                 && let Some(voxel) = stored.get(&tree.lists, place)
             {
                 visit(voxel);
             }
-            if !self.advance(&mut voxels) || voxels.cell.map(|k| k >> 2) != at.cell {
-                return;
+        });
+    }
+
+    /// Visits those cells in a cell that the ray meets and that are in the mask.
+    #[inline]
+    fn search<const SHIFT: u32, const CHILD: u32>(
+        &self,
+        parent: &Cursor<SHIFT>,
+        mut mask: u64,
+        mut visit: impl FnMut(&Cursor<CHILD>, usize),
+    ) {
+        let mut at = self.descend::<SHIFT, CHILD>(parent);
+        mask &= AHEAD[self.octant][place_of(at.cell)];
+        while mask != 0 {
+            let place = place_of(at.cell);
+            if mask >> place & 1 != 0 {
+                visit(&at, place);
+                // Often nothing is left ahead of the ray.
+                mask &= AHEAD[self.octant][place] & !(1 << place);
+            }
+            match self.advance(&mut at) {
+                Some(axis) if at.cell[axis] >> 2 == parent.cell[axis] => {}
+                _ => return,
             }
         }
     }
@@ -123,9 +156,9 @@ impl RaySearch {
         Cursor { cell, next: std::array::from_fn(|axis| self.crossing::<SHIFT>(axis, cell[axis])), entry }
     }
 
-    /// Goes to the next cell; false at the last.
+    /// Goes to the next cell, along the axis that is returned; `None` at the last.
     #[inline]
-    fn advance<const SHIFT: u32>(&self, at: &mut Cursor<SHIFT>) -> bool {
+    fn advance<const SHIFT: u32>(&self, at: &mut Cursor<SHIFT>) -> Option<usize> {
         let [x, y, z] = at.next;
         // Spelled out by axis: an index would go through memory.
         let (axis, time) = if x <= y && x <= z {
@@ -142,7 +175,7 @@ impl RaySearch {
             (2, z)
         };
         at.entry = Some((time, axis));
-        time < f64::INFINITY
+        (time < f64::INFINITY).then_some(axis)
     }
 
     /// Where the ray comes into a cell, as a walk among the cells in it.

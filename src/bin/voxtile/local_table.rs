@@ -105,7 +105,9 @@ impl Row {
         self.cpu_ms = Distribution::of(&mut self.cpu);
         self.t_tot_ms = Distribution::of(&mut self.clock);
         let Stages { input, rays, occupancy, removal, inflation, publishing } = &mut self.stages_ms;
-        [input, rays, occupancy, removal, inflation, publishing].map(|stage| *stage /= scans);
+        for stage in [input, rays, occupancy, removal, inflation, publishing] {
+            *stage /= scans;
+        }
         let bytes = map.bytes();
         self.bytes = self.bytes.max(bytes);
         self.bytes_per_voxel = bytes as f64 / map.voxels().max(1) as f64;

@@ -55,7 +55,8 @@ impl OverTime {
         let frame = self.frame();
         let Ok(frame) = frame else { return Canvas::new(8, 8, palette::UNKNOWN) };
         let zoom = (MAX_CELLS / frame.cells[0].max(frame.cells[1])).clamp(1, 8);
-        let size = frame.cells.map(|cells| (cells * zoom).max(260));
+        // The label needs a width.
+        let size = [(frame.cells[0] * zoom).max(260), frame.cells[1] * zoom];
         let across = self.panels.len().clamp(1, ACROSS);
         let down = self.panels.len().div_ceil(across);
         let line = font::HEIGHT * DOT + MARGIN / 2;
