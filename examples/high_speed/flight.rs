@@ -4,6 +4,7 @@ use super::planner::{distance_m, plan};
 use std::fmt;
 use std::time::Instant;
 use voxtile::Result;
+use voxtile::local::{LocalView, Obstacle};
 use voxtile::space::Point;
 
 /// The paper's limit.
@@ -13,6 +14,8 @@ const MAX_ACCELERATION_M_S2: f64 = 7.5;
 /// The paper's planning horizon.
 const HORIZON_M: f64 = 25.0;
 const RADIUS_M: f64 = 0.2;
+/// As far as it takes to stop, and more.
+const BRAKING_LOOK_M: f64 = 12.0;
 /// Between scans, each of which is followed by a plan.
 const SCAN_EVERY_S: f64 = 0.1;
 const STEP_S: f64 = 0.01;
@@ -65,6 +68,7 @@ pub fn fly(forest: &Forest, map: &mut impl PlannersMap) -> Result<Flight> {
         plans += 1;
         for _ in 0..(SCAN_EVERY_S / STEP_S).round() as usize {
             let wanted = path.as_deref().map_or([0.0; 3], |path| wanted_velocity(path, at, velocity));
+            let wanted = braked(map.view(), wanted, at, velocity);
             step(&mut at, &mut velocity, wanted);
             flight.length_m += speed(velocity) * STEP_S;
             flight.time_s += STEP_S;
@@ -105,6 +109,19 @@ fn wanted_velocity(path: &[Point], at: Point, velocity: Point) -> Point {
     let limit = speed_limit(&path[first..], at);
     let length_m = distance_m(at, target).max(1e-6);
     std::array::from_fn(|k| (target[k] - at[k]) / length_m * limit)
+}
+
+/// No faster than lets the drone stop before the first obstacle straight ahead.
+fn braked(view: &LocalView, wanted: Point, at: Point, velocity: Point) -> Point {
+    let ahead = |m: f64| std::array::from_fn(|k| at[k] + velocity[k] / speed(velocity).max(1e-9) * m);
+    let clear_m = match view.first_on_segment(at, ahead(BRAKING_LOOK_M), Obstacle::Inflated) {
+        Ok(Some(voxel)) => distance_m(at, voxel.map(|k| (f64::from(k) + 0.5) * view.resolution_m())),
+        _ => BRAKING_LOOK_M,
+    };
+    // Part of the acceleration is left to steer.
+    let limit = (2.0 * 0.7 * MAX_ACCELERATION_M_S2 * clear_m).sqrt().max(0.8);
+    let share = (limit / speed(wanted).max(1e-9)).min(1.0);
+    wanted.map(|x| x * share)
 }
 
 /// The leg of the path that is nearest.

@@ -2,7 +2,7 @@ use voxtile::Scan;
 use voxtile::simulation::{Random, Scene, Solid};
 use voxtile::space::Point;
 
-/// Trees on 200 m x 35 m, all from a seed.
+/// Trees and thickets on 200 m x 35 m, all from a seed.
 pub struct Forest {
     pub trees: Vec<Solid>,
     scene: Scene,
@@ -17,6 +17,8 @@ pub const GOAL: Point = [206.0, 0.0, 2.0];
 
 /// Trees a square metre.
 const DENSITY: f64 = 0.07;
+/// Share of these that are thickets.
+const THICKETS: f64 = 0.15;
 /// Between the middles of two trees.
 const LEAST_DISTANCE_M: f64 = 2.4;
 /// The paper's sensor.
@@ -37,7 +39,10 @@ impl Forest {
         }
         let tree = |[x, y]: [f64; 2]| {
             let half_m = random.between(0.15, 0.45);
-            Solid::new([x - half_m, y - half_m, 0.0], [x + half_m, y + half_m, 20.0], 0.4)
+            // A thicket stands across the way.
+            let is_thicket = random.chance(THICKETS) && x > 10.0;
+            let across_m = if is_thicket { random.between(1.0, 4.0) } else { half_m };
+            Solid::new([x - half_m, y - across_m, 0.0], [x + half_m, y + across_m, 20.0], 0.4)
         };
         let trees: Vec<Solid> = middles.into_iter().map(tree).collect();
         let scene = Scene::new(trees.clone(), 0.2, [LENGTH_M / 2.0, 0.0, 0.0], LENGTH_M);

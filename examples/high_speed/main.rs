@@ -24,8 +24,8 @@ use window::Window;
 
 /// Edge of a voxel.
 const RESOLUTION_M: f64 = 0.1;
-/// Half of the drone's width, and a little air: what obstacles are inflated by.
-const INFLATION_M: f64 = 0.4;
+/// Half of the drone's width, and air for what it is off its path: what obstacles are inflated by.
+const INFLATION_M: f64 = 0.6;
 
 /// A map that a planner flies by.
 trait PlannersMap {

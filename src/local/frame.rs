@@ -8,15 +8,15 @@ use super::tree::NONE;
 use super::voxels::Voxel;
 use crate::maths::logit;
 use crate::scan::MAX_RAY_STEPS;
-use crate::space::{Point, VoxelIndex};
+use crate::space::{Grid, Point, VoxelIndex};
 
 /// What the present scan says (the paper's task buffers).
 #[derive(Debug, Default)]
 pub(super) struct Frame {
     /// Voxels with evidence, in the order in which it came.
     touches: Vec<Touch>,
-    /// End points in units of voxels, and their voxels.
-    ends: Vec<(Point, VoxelIndex)>,
+    /// The numbers of the points that count.
+    counting: Vec<u32>,
     pages: PageTable,
 }
 
@@ -34,7 +34,7 @@ struct Touch {
 impl Frame {
     pub(super) fn bytes(&self) -> usize {
         self.touches.capacity() * size_of::<Touch>()
-            + self.ends.capacity() * size_of::<(Point, VoxelIndex)>()
+            + self.counting.capacity() * size_of::<u32>()
             + self.pages.bytes()
     }
 
@@ -59,12 +59,12 @@ impl LocalMap {
         points: &[Point],
         report: &mut LocalReport,
     ) {
-        self.frame.ends.clear();
+        self.frame.counting.clear();
         // Neighboring points are often in the same block.
         let mut last_block = None;
-        for &point in points {
+        for (number, &point) in points.iter().enumerate() {
             let Some(voxel) = self.voxel_that_counts(origin, start, point, report) else { continue };
-            self.frame.ends.push((self.grid.to_voxel_units(point), voxel));
+            self.frame.counting.push(number as u32);
             let index = voxel.map(|k| k >> 2);
             let block = match last_block {
                 Some((last_index, block)) if last_index == index => block,
@@ -118,17 +118,19 @@ impl LocalMap {
     /// Ray casting (Algorithm 1, line 20): a miss for each voxel in the map that a ray passes.
     ///
     /// After all hits, so that what is counted does not depend on the order of the points.
-    pub(super) fn take_misses(&mut self, origin: Point, start: VoxelIndex) {
+    pub(super) fn take_misses(&mut self, origin: Point, start: VoxelIndex, points: &[Point]) {
         let Self { grid, tree, voxels, frame, .. } = self;
         let origin = grid.to_voxel_units(origin);
         frame.pages.refill(tree);
-        let (ends, pages) = (std::mem::take(&mut frame.ends), std::mem::take(&mut frame.pages));
-        for &(end, last) in &ends {
+        let (counting, pages) = (std::mem::take(&mut frame.counting), std::mem::take(&mut frame.pages));
+        for &number in &counting {
+            let end = grid.to_voxel_units(points[number as usize]);
+            let Some(last) = Grid::voxel_of_units(end) else { continue };
             RaySearch::new(origin, start, end, last).for_each_stored(tree, &pages, end, |id| {
                 frame.touch(id, voxels.slab.get_mut(id)).misses += 1;
             });
         }
-        (frame.ends, frame.pages) = (ends, pages);
+        (frame.counting, frame.pages) = (counting, pages);
     }
 
     /// Occupancy check (equations 2 and 3): one sum a voxel, then the clamp, then its state.

@@ -115,7 +115,7 @@ impl LocalMap {
         self.take_hits(origin, start, points, &mut report);
         report.times.input = clock.lap();
         if has_rays {
-            self.take_misses(origin, start);
+            self.take_misses(origin, start, points);
         }
         report.times.rays = clock.lap();
         self.check_occupancy();
