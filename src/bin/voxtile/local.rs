@@ -24,7 +24,7 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     let setups = setups(args);
     // All arguments before the first scan.
     for setup in &setups {
-        setup.parameters.validated(Grid::new(args.resolution, 64.0 * args.resolution)?.resolution_m())?;
+        LocalMap::new(args.resolution, setup.parameters)?;
     }
     let mut rows = Vec::new();
     for (number, setup) in setups.iter().enumerate() {

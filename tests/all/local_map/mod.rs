@@ -1,4 +1,6 @@
 mod archive;
+#[cfg(feature = "cli")]
+mod command;
 mod mended;
 mod questions;
 mod random_lives;

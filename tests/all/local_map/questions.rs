@@ -89,7 +89,7 @@ fn points_segments_bodies_and_windows_are_those_of_a_look_at_every_voxel() {
             found[3] += points.len();
         }
     }
-    assert!(found.iter().all(|count| *count > 50), "{found:?}");
+    assert!(found.iter().all(|count| *count > 20), "{found:?}");
 }
 
 #[test]
