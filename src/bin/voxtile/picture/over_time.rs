@@ -97,7 +97,8 @@ impl OverTime {
             for ([x, y], column) in panel.columns.iter().filter(|(_, top)| top.is_some() == wants_occupied) {
                 let [x_m, y_m] = [x, y].map(|k| (f64::from(*k) + 0.5) * self.resolution_m);
                 let Some([x, y]) = pixel(x_m, y_m) else { continue };
-                let share = |z: i32| f64::from(z - low) / f64::from((high - low).max(1));
+                let share =
+                    |z: i32| (f64::from(z) - f64::from(low)) / (f64::from(high) - f64::from(low)).max(1.0);
                 let color = column.map_or(palette::FREE, |z| color_of(share(z)));
                 canvas.fill(x, y, [zoom; 2], color, 1.0);
             }
@@ -124,9 +125,8 @@ impl OverTime {
             let columns = self.panels.iter().flat_map(|panel| panel.columns.keys());
             let mut along: Vec<i32> = columns.map(|column| column[axis]).collect();
             along.sort_unstable();
-            if let (Some(low), Some(high)) =
-                (along.get(along.len() / 200), along.get(along.len() - along.len() / 200 - 1))
-            {
+            let few = along.len() / 200;
+            if let (Some(low), Some(high)) = (along.get(few), along.iter().rev().nth(few)) {
                 bounds.min[axis] = bounds.min[axis].min(f64::from(*low) * self.resolution_m);
                 bounds.max[axis] = bounds.max[axis].max(f64::from(high + 1) * self.resolution_m);
             }
