@@ -31,6 +31,8 @@
 //!      -> pending updates for tiles on disk                mapper
 //!      -> eviction and flush: bytes, one commit            tile::format, store
 //! questions <- tile by tile <- memory or disk              query
+//!
+//! Scan -> LocalMap -> views for planners                   local, beside an archive or alone
 //! ```
 //!
 //! # Words
@@ -58,6 +60,7 @@
 mod config;
 mod error;
 pub mod io;
+pub mod local;
 pub mod mapper;
 pub mod maths;
 pub mod octree;

@@ -25,7 +25,7 @@ const MAX_UNKNOWN_VOXELS: u64 = 1 << 28;
 pub(super) fn collision(view: &impl MapView, body: &Shape, unknown: UnknownAs) -> Result<Option<VoxelIndex>> {
     let config = view.config();
     let around = voxels_around(&config.grid, &body.bounds()?);
-    let touches = |voxel: VoxelIndex| body.touches(&voxel_bounds(&config.grid, voxel));
+    let touches = |voxel: VoxelIndex| body.touches_voxel(&config.grid, voxel);
     if unknown == UnknownAs::Obstacle {
         return first_not_free(view, &around, touches);
     }
@@ -75,7 +75,8 @@ fn first_not_free(
 }
 
 impl Shape {
-    fn bounds(&self) -> Result<Aabb> {
+    /// The smallest box around the body.
+    pub(crate) fn bounds(&self) -> Result<Aabb> {
         let bounds = match *self {
             Self::Sphere { radius_m, .. } if radius_m < 0.0 || radius_m.is_nan() => {
                 return Err(Error::argument("radius", format!("{radius_m} m is not a length of at least 0")));
@@ -87,6 +88,11 @@ impl Shape {
         };
         let finite = bounds.min.iter().chain(&bounds.max).all(|coordinate| coordinate.is_finite());
         if finite { Ok(bounds) } else { Err(Error::argument("body", format!("{self:?} is not finite"))) }
+    }
+
+    /// Whether the body touches a voxel.
+    pub(crate) fn touches_voxel(&self, grid: &Grid, voxel: VoxelIndex) -> bool {
+        self.touches(&voxel_bounds(grid, voxel))
     }
 
     fn touches(&self, voxel: &Aabb) -> bool {

@@ -8,6 +8,8 @@ mod digest;
 mod export;
 mod flush_schedule;
 mod info;
+mod local;
+mod local_table;
 mod map_at;
 mod memory;
 mod octree_choice;
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
         Command::Digest(args) => digest::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
+        Command::Local(args) => local::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     outcome.unwrap_or_else(|error| {

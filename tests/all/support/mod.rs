@@ -2,6 +2,7 @@
 
 pub mod faulty_disk;
 pub mod random_scans;
+pub mod reference_local;
 pub mod reference_map;
 pub mod unsynced_disk;
 

@@ -1,0 +1,53 @@
+use super::{INFLATION_M, PlannersMap, RESOLUTION_M};
+use std::collections::HashSet;
+use voxtile::local::{LocalMap, LocalParameters, LocalView};
+use voxtile::space::{Grid, Point, VoxelIndex};
+use voxtile::{Result, Scan};
+
+/// A fixed window around the robot, as array-based planners have it: what is outside is not there, and what leaves it is
+/// forgotten.
+///
+/// The answers come from a local map that is made anew for every scan from what the window holds; its time is not that of
+/// an array, and is not measured.
+pub struct Window {
+    grid: Grid,
+    occupied: HashSet<VoxelIndex>,
+    inflated: LocalMap,
+}
+
+const EDGE_M: f64 = 16.0;
+
+impl Window {
+    pub fn new() -> Result<Self> {
+        let grid = Grid::new(RESOLUTION_M, 64.0 * RESOLUTION_M)?;
+        Ok(Self { grid, occupied: HashSet::new(), inflated: empty()? })
+    }
+}
+
+fn empty() -> Result<LocalMap> {
+    let parameters = LocalParameters::passive_perception().with_max_voxels(None);
+    LocalMap::new(RESOLUTION_M, parameters.with_inflation_radius(INFLATION_M))
+}
+
+impl PlannersMap for Window {
+    fn insert(&mut self, scan: &Scan) -> Result<()> {
+        let is_inside = |point: Point| (0..3).all(|k| (point[k] - scan.origin[k]).abs() <= EDGE_M / 2.0);
+        let seen = scan.points.iter().filter(|point| is_inside(**point));
+        self.occupied.extend(seen.filter_map(|point| self.grid.voxel_of(*point)));
+        self.occupied.retain(|voxel| is_inside(self.grid.center_m(*voxel)));
+        let mut centers: Vec<Point> = self.occupied.iter().map(|voxel| self.grid.center_m(*voxel)).collect();
+        // The order of a hash set differs from run to run.
+        centers.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+        self.inflated = empty()?;
+        self.inflated.insert_relayed(scan.origin, &centers).map(drop)
+    }
+
+    fn view(&self) -> &LocalView {
+        self.inflated.view()
+    }
+
+    fn bytes(&self) -> usize {
+        // An array of a count of inflation and a log-odds of two bytes for every voxel of the window.
+        ((EDGE_M / RESOLUTION_M).powi(3) * 4.0) as usize
+    }
+}

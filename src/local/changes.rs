@@ -1,0 +1,79 @@
+use super::place::{cell_at, ones};
+use super::view::{BlockView, LocalState, LocalView, NodeView, PageView};
+use crate::space::VoxelIndex;
+use std::sync::Arc;
+
+/// A voxel that is not what it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VoxelChange {
+    /// Which voxel.
+    pub voxel: VoxelIndex,
+    /// What it was.
+    pub before: LocalState,
+    /// What it is.
+    pub after: LocalState,
+}
+
+impl LocalView {
+    /// The voxels that differ from an earlier view of the same map, in no stated order. What the two share is not looked
+    /// at.
+    pub fn changes_since(&self, earlier: &Self) -> Vec<VoxelChange> {
+        let mut changes = Vec::new();
+        for (index, page) in &self.pages {
+            compare_pages(*index, earlier.pages.get(index), Some(page), &mut changes);
+        }
+        for (index, page) in earlier.pages.iter().filter(|(index, _)| !self.pages.contains_key(*index)) {
+            compare_pages(*index, Some(page), None, &mut changes);
+        }
+        changes
+    }
+}
+
+/// Whether two parts of views are one.
+fn is_shared<T>(before: Option<&Arc<T>>, after: Option<&Arc<T>>) -> bool {
+    before.zip(after).is_some_and(|(before, after)| Arc::ptr_eq(before, after))
+}
+
+fn compare_pages(
+    index: VoxelIndex,
+    before: Option<&Arc<PageView>>,
+    after: Option<&Arc<PageView>>,
+    changes: &mut Vec<VoxelChange>,
+) {
+    if is_shared(before, after) {
+        return;
+    }
+    let mask = |page: Option<&Arc<PageView>>| page.map_or(0, |page| page.mask);
+    for place in ones(mask(before) | mask(after)) {
+        let node = |page: Option<&Arc<PageView>>| page.and_then(|page| page.node(place).cloned());
+        compare_nodes(cell_at(index, place), node(before), node(after), changes);
+    }
+}
+
+fn compare_nodes(
+    index: VoxelIndex,
+    before: Option<Arc<NodeView>>,
+    after: Option<Arc<NodeView>>,
+    changes: &mut Vec<VoxelChange>,
+) {
+    if is_shared(before.as_ref(), after.as_ref()) {
+        return;
+    }
+    let mask = |node: &Option<Arc<NodeView>>| node.as_ref().map_or(0, |node| node.mask);
+    for place in ones(mask(&before) | mask(&after)) {
+        let block = |node: &Option<Arc<NodeView>>| {
+            node.as_ref().and_then(|node| node.block(place).copied()).unwrap_or_default()
+        };
+        compare_blocks(cell_at(index, place), block(&before), block(&after), changes);
+    }
+}
+
+fn compare_blocks(index: VoxelIndex, before: BlockView, after: BlockView, changes: &mut Vec<VoxelChange>) {
+    for place in ones((before.occupied ^ after.occupied) | (before.inflated ^ after.inflated)) {
+        let (before, after) = (before.state(place), after.state(place));
+        // An occupied voxel may change from inflated to not inflated.
+        if before != after {
+            changes.push(VoxelChange { voxel: cell_at(index, place), before, after });
+        }
+    }
+}

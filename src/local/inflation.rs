@@ -1,0 +1,340 @@
+use super::place::{cell_at, ones, place_of};
+use super::range::{Ball, Relation};
+use super::slab::Slab;
+use super::stencil::Stencil;
+use super::tree::{NONE, Tree};
+use crate::space::{Grid, Point, VoxelIndex};
+use std::sync::Arc;
+
+/// The inflation map: how many voxels inflate each voxel, and who inflates whom by which rule.
+///
+/// The inflated set is the dilation of the occupied voxels in range. It is kept incrementally: a voxel that begins to
+/// inflate adds one to the counts of its stencil, one that ends takes it away again, whatever the reason.
+#[derive(Clone, Debug)]
+pub(super) struct Inflation {
+    narrow: Slab<Counts<u8>>,
+    /// For voxels that more than 255 inflate.
+    wide: Slab<Counts<u16>>,
+    /// The rule of each number; more than one only while parameters change.
+    rules: Vec<Option<Rule>>,
+    current: u8,
+    /// Blocks whose occupied voxels have changed.
+    waiting: Vec<u32>,
+    /// Blocks in which nothing may be left.
+    emptied: Vec<u32>,
+    /// Numbers of the blocks around the present one, as its stencil counts them.
+    beside: Vec<u32>,
+    /// Index and number of the node in which one of them was found last.
+    last_node: (VoxelIndex, u32),
+    pages: Vec<u32>,
+    /// Inflated voxels.
+    pub(super) inflated: usize,
+    /// Voxels that began or ended to inflate others, since this was set to 0.
+    pub(super) changes: usize,
+}
+
+/// Which occupied voxels inflate which.
+#[derive(Clone, Debug)]
+struct Rule {
+    range_m: f64,
+    stencil: Arc<Stencil>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Counts<T>([T; 64]);
+
+impl<T: Copy + Default> Default for Counts<T> {
+    fn default() -> Self {
+        Self([T::default(); 64])
+    }
+}
+
+impl Inflation {
+    pub(super) fn new(range_m: f64, radius_m: f64, resolution_m: f64) -> Self {
+        let stencil = Arc::new(Stencil::new(radius_m, resolution_m));
+        Self {
+            narrow: Slab::default(),
+            wide: Slab::default(),
+            rules: vec![Some(Rule { range_m, stencil })],
+            current: 0,
+            waiting: Vec::new(),
+            emptied: Vec::new(),
+            beside: Vec::new(),
+            last_node: ([0; 3], NONE),
+            pages: Vec::new(),
+            inflated: 0,
+            changes: 0,
+        }
+    }
+
+    /// Number of the rule for what is new.
+    pub(super) fn rule(&self) -> u8 {
+        self.current
+    }
+
+    /// Whether there is a number for one more rule.
+    pub(super) fn has_room(&self) -> bool {
+        self.rules.len() < 256 || self.rules.iter().any(Option::is_none)
+    }
+
+    /// Makes another rule the current one; the nodes keep theirs until [`Inflation::adopt`].
+    pub(super) fn set_rule(&mut self, range_m: f64, radius_m: f64, resolution_m: f64) {
+        let known = self.rules.iter().flatten().find(|rule| rule.stencil.radius_m() == radius_m);
+        let stencil = known.map(|rule| rule.stencil.clone());
+        let stencil = stencil.unwrap_or_else(|| Arc::new(Stencil::new(radius_m, resolution_m)));
+        let number = self.rules.iter().position(Option::is_none).unwrap_or_else(|| {
+            self.rules.push(None);
+            self.rules.len() - 1
+        });
+        self.rules[number] = Some(Rule { range_m, stencil });
+        self.current = number as u8;
+    }
+
+    /// Forgets all rules but the current one, which every node has by now.
+    pub(super) fn forget_old_rules(&mut self) {
+        for (number, rule) in self.rules.iter_mut().enumerate() {
+            if number != usize::from(self.current) {
+                *rule = None;
+            }
+        }
+    }
+
+    /// Gives a node the current rule; its voxels begin to inflate by it when [`Inflation::update`] comes.
+    pub(super) fn adopt(&mut self, tree: &mut Tree, node: u32) {
+        let old = tree.nodes.get(node).rule;
+        if old == self.current {
+            return;
+        }
+        let (before, after) = (self.stencil(old), self.stencil(self.current));
+        for block in tree.blocks_of(node).to_vec() {
+            if !Arc::ptr_eq(&before, &after) {
+                let inflating = tree.blocks.get(block).inflating;
+                self.change(tree, block, 0, inflating, &before);
+            }
+            self.wait(tree, block);
+        }
+        tree.nodes.get_mut(node).rule = self.current;
+    }
+
+    /// Notes that the occupied voxels of a block have changed.
+    #[inline]
+    pub(super) fn wait(&mut self, tree: &mut Tree, block: u32) {
+        if !std::mem::replace(&mut tree.blocks.get_mut(block).is_waiting, true) {
+            self.waiting.push(block);
+        }
+    }
+
+    /// Notes that a block may be empty.
+    pub(super) fn may_be_empty(&mut self, block: u32) {
+        self.emptied.push(block);
+    }
+
+    /// Brings the inflated set up to date: for the blocks that changed, and for the voxels that came into or left the
+    /// range of the sensor, which is now at `position`. With `has_old_rules` some nodes may have another rule than the
+    /// current one.
+    pub(super) fn update(&mut self, tree: &mut Tree, grid: Grid, position: Point, has_old_rules: bool) {
+        let mut waiting = std::mem::take(&mut self.waiting);
+        for block in waiting.drain(..) {
+            tree.blocks.get_mut(block).is_waiting = false;
+            let ball = self.ball(grid, position, tree.nodes.get(tree.blocks.get(block).node).rule);
+            self.reconcile(tree, block, &ball, Relation::Border);
+        }
+        self.waiting = waiting;
+        let mut pages = std::mem::take(&mut self.pages);
+        pages.extend(tree.page_ids());
+        for page in pages.drain(..) {
+            self.update_page(tree, grid, position, page, has_old_rules);
+        }
+        self.pages = pages;
+        let mut emptied = std::mem::take(&mut self.emptied);
+        emptied.sort_unstable();
+        emptied.dedup();
+        emptied.drain(..).for_each(|block| tree.drop_if_empty(block));
+        self.emptied = emptied;
+    }
+
+    fn update_page(&mut self, tree: &mut Tree, grid: Grid, position: Point, page: u32, has_old_rules: bool) {
+        let (index, occupied, inflating) = {
+            let page = tree.pages.get(page);
+            (page.index, page.occupied, page.inflating)
+        };
+        if occupied == 0 && inflating == 0 {
+            return;
+        }
+        if !has_old_rules {
+            match self.ball(grid, position, self.current).relation(index.map(|k| k << 6), 64) {
+                Relation::Inside if inflating == occupied => return,
+                Relation::Outside if inflating == 0 => return,
+                _ => {}
+            }
+        }
+        for node in tree.nodes_of(page).to_vec() {
+            let ball = self.ball(grid, position, tree.nodes.get(node).rule);
+            let relation = ball.relation(tree.node_index(node).map(|k| k << 4), 16);
+            for block in tree.blocks_of(node).to_vec() {
+                self.reconcile(tree, block, &ball, relation);
+            }
+        }
+    }
+
+    /// Lets those voxels of a block inflate others that should, and no others. `relation` is that of a cube that holds the
+    /// block.
+    fn reconcile(&mut self, tree: &mut Tree, block: u32, ball: &Ball, relation: Relation) {
+        let (occupied, inflating) = {
+            let block = tree.blocks.get(block);
+            (block.occupied, block.inflating)
+        };
+        if occupied | inflating == 0 || (relation == Relation::Inside && occupied == inflating) {
+            return;
+        }
+        let index = tree.block_index(block);
+        let relation = match relation {
+            Relation::Border => ball.relation(index.map(|k| k << 2), 4),
+            certain => certain,
+        };
+        let wanted = match relation {
+            Relation::Inside => occupied,
+            Relation::Outside => 0,
+            Relation::Border => in_ball(occupied, index, ball),
+        };
+        if wanted != inflating {
+            let stencil = self.stencil(tree.nodes.get(tree.blocks.get(block).node).rule);
+            self.change(tree, block, wanted & !inflating, inflating & !wanted, &stencil);
+        }
+    }
+
+    /// Lets voxels of a block begin and others end to inflate their stencil.
+    fn change(&mut self, tree: &mut Tree, block: u32, begin: u64, end: u64, stencil: &Stencil) {
+        self.beside.clear();
+        self.beside.resize(stencil.blocks(), NONE);
+        let index = tree.block_index(block);
+        self.last_node = (index.map(|k| k >> 2), tree.blocks.get(block).node);
+        for place in ones(begin) {
+            for &(number, mask) in stencil.of_place(place) {
+                let at = self.beside(tree, index, number, stencil);
+                self.count_up(tree, at, mask);
+            }
+        }
+        for place in ones(end) {
+            for &(number, mask) in stencil.of_place(place) {
+                let at = self.beside(tree, index, number, stencil);
+                self.count_down(tree, at, mask);
+            }
+        }
+        let block = tree.blocks.get_mut(block);
+        block.inflating = (block.inflating | begin) & !end;
+        let page = tree.nodes.get(block.node).page;
+        let inflating = &mut tree.pages.get_mut(page).inflating;
+        *inflating = *inflating + begin.count_ones() - end.count_ones();
+        self.changes += (begin.count_ones() + end.count_ones()) as usize;
+    }
+
+    /// The block with a number around the block at `index`.
+    #[inline]
+    fn beside(&mut self, tree: &mut Tree, index: VoxelIndex, number: u32, stencil: &Stencil) -> u32 {
+        let known = self.beside[number as usize];
+        if known != NONE {
+            return known;
+        }
+        let offset = stencil.offset_of(number);
+        let at: VoxelIndex = std::array::from_fn(|k| index[k] + offset[k]);
+        // Mostly it is in the node of the one before.
+        let (node_index, node) = self.last_node;
+        let known = match node_index == at.map(|k| k >> 2) {
+            true => tree.nodes.get(node).blocks.get(&tree.lists, place_of(at)),
+            false => None,
+        };
+        let block = known.unwrap_or_else(|| tree.make_block(at, self.current));
+        self.last_node = (at.map(|k| k >> 2), tree.blocks.get(block).node);
+        self.beside[number as usize] = block;
+        block
+    }
+
+    fn count_up(&mut self, tree: &mut Tree, id: u32, mask: u64) {
+        let block = tree.blocks.get_mut(id);
+        let new = mask & !block.inflated;
+        if new != 0 {
+            block.inflated |= mask;
+            self.inflated += new.count_ones() as usize;
+            let node = block.node;
+            tree.mark_dirty(node);
+        }
+        let block = tree.blocks.get_mut(id);
+        if block.counts == NONE {
+            block.counts = self.narrow.insert(Counts::default());
+        }
+        if !block.is_wide {
+            let Counts(counts) = self.narrow.get_mut(block.counts);
+            if !ones(mask).any(|place| counts[place] == u8::MAX) {
+                ones(mask).for_each(|place| counts[place] += 1);
+                return;
+            }
+            let wide = Counts(counts.map(u16::from));
+            self.narrow.remove(block.counts);
+            (block.counts, block.is_wide) = (self.wide.insert(wide), true);
+        }
+        let Counts(counts) = self.wide.get_mut(block.counts);
+        ones(mask).for_each(|place| counts[place] += 1);
+    }
+
+    fn count_down(&mut self, tree: &mut Tree, id: u32, mask: u64) {
+        let block = tree.blocks.get_mut(id);
+        let mut ended = 0_u64;
+        // A count is at least that of those that inflate: it never goes below 0.
+        if block.is_wide {
+            let Counts(counts) = self.wide.get_mut(block.counts);
+            for place in ones(mask) {
+                counts[place] -= 1;
+                ended |= u64::from(counts[place] == 0) << place;
+            }
+        } else {
+            let Counts(counts) = self.narrow.get_mut(block.counts);
+            for place in ones(mask) {
+                counts[place] -= 1;
+                ended |= u64::from(counts[place] == 0) << place;
+            }
+        }
+        if ended == 0 {
+            return;
+        }
+        block.inflated &= !ended;
+        self.inflated -= ended.count_ones() as usize;
+        if block.inflated == 0 {
+            match block.is_wide {
+                true => self.wide.remove(block.counts),
+                false => self.narrow.remove(block.counts),
+            }
+            (block.counts, block.is_wide) = (NONE, false);
+            self.emptied.push(id);
+        }
+        let node = block.node;
+        tree.mark_dirty(node);
+    }
+
+    fn stencil(&self, rule: u8) -> Arc<Stencil> {
+        self.in_force(rule).stencil.clone()
+    }
+
+    fn ball(&self, grid: Grid, center: Point, rule: u8) -> Ball {
+        Ball { grid, center, radius_m: self.in_force(rule).range_m }
+    }
+
+    fn in_force(&self, rule: u8) -> &Rule {
+        let current = usize::from(self.current);
+        let rule = self.rules[usize::from(rule)].as_ref().or(self.rules[current].as_ref());
+        rule.expect("the current rule is never forgotten")
+    }
+
+    /// Bytes of memory on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        let lists = [&self.waiting, &self.emptied, &self.beside, &self.pages];
+        self.narrow.bytes()
+            + self.wide.bytes()
+            + lists.iter().map(|list| list.capacity() * size_of::<u32>()).sum::<usize>()
+    }
+}
+
+/// The voxels of a block that are in a ball.
+fn in_ball(mask: u64, block: VoxelIndex, ball: &Ball) -> u64 {
+    ones(mask).filter(|&place| ball.holds(cell_at(block, place))).fold(0, |mask, place| mask | 1 << place)
+}

@@ -1,0 +1,248 @@
+use super::frame::Frame;
+use super::inflation::Inflation;
+use super::parameters::LocalParameters;
+use super::reader::{LocalReader, Shared};
+use super::report::LocalReport;
+use super::sweep::Sweep;
+use super::tree::Tree;
+use super::view::LocalView;
+use super::voxels::Voxels;
+use crate::error::{Error, Result};
+use crate::scan::Scan;
+use crate::space::{Grid, Point, VoxelIndex};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// A map of the voxels that a planner needs now: occupied, or inflated by an occupied one.
+///
+/// One writer, which takes scans; any number of readers, each of which sees whole updates and waits for none.
+#[derive(Debug)]
+pub struct LocalMap {
+    pub(super) grid: Grid,
+    /// What is asked for.
+    parameters: LocalParameters,
+    /// What the last update worked with.
+    pub(super) applied: LocalParameters,
+    pub(super) tree: Tree,
+    pub(super) voxels: Voxels,
+    pub(super) inflation: Inflation,
+    pub(super) sweep: Sweep,
+    /// Kept from update to update for its memory.
+    pub(super) frame: Frame,
+    pub(super) position: Option<Point>,
+    update_number: u64,
+    shared: Arc<Shared>,
+    view: Arc<LocalView>,
+}
+
+/// Voxel indices near the ends of `i32` have no neighbors to inflate.
+const MAX_INDEX: i32 = i32::MAX - (1 << 12);
+
+impl LocalMap {
+    /// An empty map of voxels of `resolution_m` metres.
+    ///
+    /// # Errors
+    ///
+    /// A resolution or a parameter that is wrong.
+    pub fn new(resolution_m: f64, parameters: LocalParameters) -> Result<Self> {
+        let grid = Grid::new(resolution_m, resolution_m * 64.0)?;
+        let parameters = parameters.validated(resolution_m)?;
+        let LocalParameters { inflation_range_m, inflation_radius_m, .. } = parameters;
+        let view = Arc::new(LocalView::empty(grid));
+        Ok(Self {
+            grid,
+            parameters,
+            applied: parameters,
+            tree: Tree::default(),
+            voxels: Voxels::default(),
+            inflation: Inflation::new(inflation_range_m, inflation_radius_m, resolution_m),
+            sweep: Sweep::default(),
+            frame: Frame::default(),
+            position: None,
+            update_number: 0,
+            shared: Arc::new(Shared::new(view.clone())),
+            view,
+        })
+    }
+
+    /// Edge of a voxel in metres.
+    pub fn resolution_m(&self) -> f64 {
+        self.grid.resolution_m()
+    }
+
+    /// The parameters that the next update works with.
+    pub fn parameters(&self) -> &LocalParameters {
+        &self.parameters
+    }
+
+    /// Takes other parameters, from the next update on. What they change in voxels that a scan does not touch is done a
+    /// part an update, nearest to the sensor first; see [`LocalParameters::work_per_update`] and
+    /// [`LocalReport::is_settled`].
+    ///
+    /// # Errors
+    ///
+    /// A parameter that is wrong: the map keeps those it has.
+    pub fn set_parameters(&mut self, parameters: LocalParameters) -> Result<()> {
+        self.parameters = parameters.validated(self.resolution_m())?;
+        Ok(())
+    }
+
+    /// Takes a scan: hits at its points, misses on the rays to them.
+    ///
+    /// # Errors
+    ///
+    /// An origin without a voxel: the map stays as it was.
+    pub fn insert_scan(&mut self, scan: &Scan) -> Result<LocalReport> {
+        self.update(scan.origin, &scan.points, true)
+    }
+
+    /// Takes points in metres, world frame, that another map sends: hits, and no rays. The robot is at `position`.
+    ///
+    /// # Errors
+    ///
+    /// A position without a voxel: the map stays as it was.
+    pub fn insert_relayed(&mut self, position: Point, points: &[Point]) -> Result<LocalReport> {
+        self.update(position, points, false)
+    }
+
+    fn update(&mut self, origin: Point, points: &[Point], has_rays: bool) -> Result<LocalReport> {
+        let start = self.check_position(origin)?;
+        let mut report = LocalReport { points: points.len() as u64, ..LocalReport::default() };
+        let mut clock = Clock::start();
+        self.take_over_parameters(&mut report);
+        self.position = Some(origin);
+        report.times.parameters = clock.lap();
+        self.take_hits(origin, start, points, &mut report);
+        report.times.input = clock.lap();
+        if has_rays {
+            self.take_misses(origin, start, points);
+        }
+        report.times.rays = clock.lap();
+        self.check_occupancy();
+        report.times.occupancy = clock.lap();
+        self.manage_history(&mut report);
+        report.times.removal = clock.lap();
+        self.inflate(origin, &mut report);
+        report.times.inflation = clock.lap();
+        self.publish();
+        report.times.publishing = clock.lap();
+        Ok(report)
+    }
+
+    pub(super) fn inflate(&mut self, position: Point, report: &mut LocalReport) {
+        self.inflation.update(&mut self.tree, self.grid, position, !self.sweep.is_done());
+        report.inflation_changes = std::mem::take(&mut self.inflation.changes) as u64;
+        report.is_settled = self.sweep.is_done() && !self.is_over_limit();
+    }
+
+    /// Whether there are more voxels than the limit: it was lowered, and they go a part an update.
+    pub(super) fn is_over_limit(&self) -> bool {
+        self.applied.max_voxels.is_some_and(|limit| self.voxels.len() > limit)
+    }
+
+    /// The voxel of a position where a sensor can be.
+    pub(super) fn check_position(&self, position: Point) -> Result<VoxelIndex> {
+        self.voxel_of(position).ok_or_else(|| {
+            let reason = format!("{position:?} m is not finite or too far away for a voxel index");
+            Error::argument("scan origin", reason)
+        })
+    }
+
+    /// The voxel of a point, if it can be in the map.
+    pub(super) fn voxel_of(&self, point: Point) -> Option<VoxelIndex> {
+        let voxel = self.grid.voxel_of(point)?;
+        voxel.iter().all(|k| (-MAX_INDEX..=MAX_INDEX).contains(k)).then_some(voxel)
+    }
+
+    /// Takes over parameters that were set since the last update, and does a part of what they change.
+    pub(super) fn take_over_parameters(&mut self, report: &mut LocalReport) {
+        if self.parameters != self.applied {
+            let before = std::mem::replace(&mut self.applied, self.parameters);
+            self.begin_sweep(&before, report);
+        }
+        self.sweep_some(self.applied.work_per_update, report);
+    }
+
+    /// Shows the map as it is to readers.
+    pub(super) fn publish(&mut self) {
+        self.update_number += 1;
+        let dirty = self.tree.take_dirty();
+        let mut view = LocalView::clone(&self.view);
+        view.occupied = self.occupied();
+        view.update_number = self.update_number;
+        view.position = self.position;
+        view.stored = self.voxels.len();
+        view.inflated = self.inflation.inflated;
+        view.replace_nodes(&self.tree, &dirty);
+        self.tree.reuse(dirty);
+        self.view = Arc::new(view);
+        self.shared.set(self.view.clone());
+    }
+
+    fn occupied(&self) -> usize {
+        self.tree.page_ids().map(|page| self.tree.pages.get(page).occupied as usize).sum()
+    }
+
+    /// The map after the last update, to be asked; it stays as it is.
+    pub fn view(&self) -> &Arc<LocalView> {
+        &self.view
+    }
+
+    /// A reader, for another thread.
+    pub fn reader(&self) -> LocalReader {
+        LocalReader::new(self.shared.clone())
+    }
+
+    /// Voxels with occupancy (`n_occ`): occupied, or not yet known to be free.
+    pub fn stored_voxels(&self) -> usize {
+        self.voxels.len()
+    }
+
+    /// Inflated voxels (`n_inf`).
+    pub fn inflated_voxels(&self) -> usize {
+        self.inflation.inflated
+    }
+
+    /// Voxels that are in the occupancy or in the inflation map; looks at all of them.
+    pub fn voxels(&self) -> usize {
+        self.inflation.inflated + self.tree.stored_but_not_inflated()
+    }
+
+    /// Each voxel with occupancy and its log-odds, in the order in which they will be removed: longest without an update
+    /// first.
+    pub fn history(&self) -> impl Iterator<Item = (VoxelIndex, f64)> + '_ {
+        self.voxels.in_order().map(|voxel| {
+            let (block, place) = voxel.home();
+            (super::place::cell_at(self.tree.block_index(block), place), voxel.log_odds)
+        })
+    }
+
+    /// Bytes of memory, what readers see included; some that are kept for the next update count too.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes()
+            + self.voxels.slab.bytes()
+            + self.inflation.bytes()
+            + self.frame.bytes()
+            + self.sweep.bytes()
+            + self.view.bytes()
+    }
+}
+
+/// Times stages that follow each other.
+struct Clock(Instant);
+
+impl Clock {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> Duration {
+        let now = Instant::now();
+        now - std::mem::replace(&mut self.0, now)
+    }
+}
+
+/// Whether a voxel of these log-odds leaves the map. What is occupied is not free, where the thresholds meet.
+pub(super) fn is_known_free(parameters: &LocalParameters, log_odds: f64) -> bool {
+    log_odds <= parameters.free_log_odds && log_odds < parameters.occupied_log_odds
+}

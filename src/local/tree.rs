@@ -1,0 +1,251 @@
+use super::place::{cell_at, place_of};
+use super::slab::Slab;
+use super::sparse::{IdLists, Sparse64};
+use crate::space::VoxelIndex;
+use rustc_hash::FxHashMap;
+
+/// No number.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Where the voxels of a local map are: a hash map of pages of 64 voxels along an edge, in it nodes of 16, in these
+/// blocks of 4. What is empty is not there, and is skipped at the largest of these sizes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree {
+    by_index: FxHashMap<VoxelIndex, u32>,
+    pub(super) pages: Slab<Page>,
+    pub(super) nodes: Slab<Node>,
+    pub(super) blocks: Slab<Block>,
+    pub(super) lists: IdLists,
+    /// Nodes, by index, whose masks have changed since they were last shown to readers.
+    dirty: Vec<VoxelIndex>,
+}
+
+/// 64 x 64 x 64 voxels.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Page {
+    /// Index of a voxel over 64.
+    pub(super) index: VoxelIndex,
+    pub(super) nodes: Sparse64,
+    /// Nodes that hold voxels with occupancy.
+    pub(super) stored: u64,
+    /// Occupied voxels.
+    pub(super) occupied: u32,
+    /// Voxels that inflate others.
+    pub(super) inflating: u32,
+}
+
+/// 16 x 16 x 16 voxels.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Node {
+    pub(super) page: u32,
+    pub(super) place: u8,
+    /// Number of the inflation rule that holds here.
+    pub(super) rule: u8,
+    is_dirty: bool,
+    pub(super) blocks: Sparse64,
+    /// Blocks that hold voxels with occupancy.
+    pub(super) stored: u64,
+}
+
+/// 4 x 4 x 4 voxels, each with what it is in the occupancy map and in the inflation map.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Block {
+    pub(super) node: u32,
+    pub(super) place: u8,
+    /// Whether the counts are wide.
+    pub(super) is_wide: bool,
+    /// Whether it waits to be inflated anew.
+    pub(super) is_waiting: bool,
+    /// The voxels with occupancy, and their numbers.
+    pub(super) voxels: Sparse64,
+    pub(super) occupied: u64,
+    /// Occupied voxels that inflate others now.
+    pub(super) inflating: u64,
+    /// Voxels that at least one inflates.
+    pub(super) inflated: u64,
+    /// Number of the inflation counts, if any voxel is inflated.
+    pub(super) counts: u32,
+}
+
+impl Tree {
+    pub(super) fn page_at(&self, index: VoxelIndex) -> Option<u32> {
+        self.by_index.get(&index).copied()
+    }
+
+    /// The numbers of all pages.
+    pub(super) fn page_ids(&self) -> impl Iterator<Item = u32> + '_ {
+        self.by_index.values().copied()
+    }
+
+    /// Index of a voxel of the node over 16.
+    pub(super) fn node_index(&self, node: u32) -> VoxelIndex {
+        let Node { page, place, .. } = *self.nodes.get(node);
+        cell_at(self.pages.get(page).index, place.into())
+    }
+
+    /// Index of a voxel of the block over 4.
+    pub(super) fn block_index(&self, block: u32) -> VoxelIndex {
+        let Block { node, place, .. } = *self.blocks.get(block);
+        cell_at(self.node_index(node), place.into())
+    }
+
+    /// The node with an index.
+    pub(super) fn node_at(&self, index: VoxelIndex) -> Option<u32> {
+        let page = self.page_at(index.map(|k| k >> 2))?;
+        self.pages.get(page).nodes.get(&self.lists, place_of(index))
+    }
+
+    /// The block with an index.
+    #[inline]
+    pub(super) fn block_at(&self, index: VoxelIndex) -> Option<u32> {
+        let node = self.node_at(index.map(|k| k >> 2))?;
+        self.nodes.get(node).blocks.get(&self.lists, place_of(index))
+    }
+
+    /// The block with an index, made if it is not there; a new node gets the rule.
+    pub(super) fn make_block(&mut self, index: VoxelIndex, rule: u8) -> u32 {
+        let node_index = index.map(|k| k >> 2);
+        let page_index = node_index.map(|k| k >> 2);
+        let page = match self.page_at(page_index) {
+            Some(page) => page,
+            None => {
+                let page = self.pages.insert(Page { index: page_index, ..Page::default() });
+                self.by_index.insert(page_index, page);
+                page
+            }
+        };
+        let in_page = place_of(node_index);
+        let node = match self.pages.get(page).nodes.get(&self.lists, in_page) {
+            Some(node) => node,
+            None => {
+                let node = self.nodes.insert(Node { page, place: in_page as u8, rule, ..Node::default() });
+                self.pages.get_mut(page).nodes.insert(&mut self.lists, in_page, node);
+                node
+            }
+        };
+        let in_node = place_of(index);
+        match self.nodes.get(node).blocks.get(&self.lists, in_node) {
+            Some(block) => block,
+            None => {
+                let block = Block { node, place: in_node as u8, counts: NONE, ..Block::default() };
+                let block = self.blocks.insert(block);
+                self.nodes.get_mut(node).blocks.insert(&mut self.lists, in_node, block);
+                block
+            }
+        }
+    }
+
+    /// Puts a voxel with occupancy into a block.
+    pub(super) fn store(&mut self, block: u32, place: usize, voxel: u32) {
+        let Block { node, place: in_node, voxels, .. } = self.blocks.get_mut(block);
+        voxels.insert(&mut self.lists, place, voxel);
+        let Node { page, place: in_page, stored, .. } = self.nodes.get_mut(*node);
+        *stored |= 1 << *in_node;
+        self.pages.get_mut(*page).stored |= 1 << *in_page;
+    }
+
+    /// Takes a voxel with occupancy out of a block.
+    pub(super) fn unstore(&mut self, block: u32, place: usize) {
+        let Block { node, place: in_node, voxels, .. } = self.blocks.get_mut(block);
+        voxels.remove(&mut self.lists, place);
+        if voxels.mask == 0 {
+            let Node { page, place: in_page, stored, .. } = self.nodes.get_mut(*node);
+            *stored &= !(1 << *in_node);
+            if *stored == 0 {
+                self.pages.get_mut(*page).stored &= !(1 << *in_page);
+            }
+        }
+    }
+
+    /// Says whether a voxel is occupied; returns whether that is new.
+    pub(super) fn set_occupied(&mut self, block: u32, place: usize, is_occupied: bool) -> bool {
+        let Block { node, occupied, .. } = self.blocks.get_mut(block);
+        let was_occupied = *occupied >> place & 1 != 0;
+        if was_occupied == is_occupied {
+            return false;
+        }
+        *occupied ^= 1 << place;
+        let node = *node;
+        let page = self.nodes.get(node).page;
+        let count = &mut self.pages.get_mut(page).occupied;
+        *count = if is_occupied { *count + 1 } else { *count - 1 };
+        self.mark_dirty(node);
+        true
+    }
+
+    /// Notes that what readers see of a node has changed.
+    #[inline]
+    pub(super) fn mark_dirty(&mut self, node: u32) {
+        if !std::mem::replace(&mut self.nodes.get_mut(node).is_dirty, true) {
+            let index = self.node_index(node);
+            self.dirty.push(index);
+        }
+    }
+
+    /// The nodes, by index, whose masks have changed since the last call; some may not be there any more.
+    pub(super) fn take_dirty(&mut self) -> Vec<VoxelIndex> {
+        let dirty = std::mem::take(&mut self.dirty);
+        for &index in &dirty {
+            if let Some(node) = self.node_at(index) {
+                self.nodes.get_mut(node).is_dirty = false;
+            }
+        }
+        dirty
+    }
+
+    /// Gives the memory back for the next call of [`Tree::take_dirty`].
+    pub(super) fn reuse(&mut self, mut dirty: Vec<VoxelIndex>) {
+        dirty.clear();
+        self.dirty = dirty;
+    }
+
+    /// Drops a block in which nothing is left, and its node and page if nothing is left in these.
+    pub(super) fn drop_if_empty(&mut self, block: u32) {
+        let Block { node, place, voxels, inflating, inflated, counts, .. } = self.blocks.get(block).clone();
+        if voxels.mask | inflating | inflated != 0 {
+            return;
+        }
+        debug_assert_eq!(counts, NONE);
+        self.blocks.remove(block);
+        let Node { page, place: in_page, blocks, .. } = self.nodes.get_mut(node);
+        blocks.remove(&mut self.lists, place.into());
+        if blocks.mask != 0 {
+            return;
+        }
+        let (page, in_page) = (*page, usize::from(*in_page));
+        self.nodes.remove(node);
+        let Page { index, nodes, .. } = self.pages.get_mut(page);
+        nodes.remove(&mut self.lists, in_page);
+        if nodes.mask == 0 {
+            self.by_index.remove(index);
+            self.pages.remove(page);
+        }
+    }
+
+    /// The numbers of all nodes of a page.
+    pub(super) fn nodes_of(&self, page: u32) -> &[u32] {
+        self.pages.get(page).nodes.ids(&self.lists)
+    }
+
+    /// The numbers of all blocks of a node.
+    pub(super) fn blocks_of(&self, node: u32) -> &[u32] {
+        self.nodes.get(node).blocks.ids(&self.lists)
+    }
+
+    /// Voxels with occupancy that nothing inflates.
+    pub(super) fn stored_but_not_inflated(&self) -> usize {
+        let nodes = self.page_ids().flat_map(|page| self.nodes_of(page));
+        let blocks = nodes.flat_map(|&node| self.blocks_of(node)).map(|&block| self.blocks.get(block));
+        blocks.map(|block| (block.voxels.mask & !block.inflated).count_ones() as usize).sum()
+    }
+
+    /// Bytes of memory on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        self.by_index.capacity() * 8 / 7 * (size_of::<(VoxelIndex, u32)>() + 1)
+            + self.pages.bytes()
+            + self.nodes.bytes()
+            + self.blocks.bytes()
+            + self.lists.bytes()
+            + self.dirty.capacity() * size_of::<VoxelIndex>()
+    }
+}

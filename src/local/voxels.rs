@@ -1,0 +1,111 @@
+use super::slab::Slab;
+use super::tree::NONE;
+
+/// What is known of a voxel with occupancy, and its place in the history.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Voxel {
+    /// Sum of the evidence so far, clamped.
+    pub(super) log_odds: f64,
+    /// Number of its block times 64, plus its place in that.
+    pub(super) home: u32,
+    /// The voxel updated before it, in the history.
+    older: u32,
+    /// The voxel updated after it.
+    newer: u32,
+    /// Number of what the present scan says of it.
+    pub(super) touch: u32,
+}
+
+impl Default for Voxel {
+    fn default() -> Self {
+        Self { log_odds: 0.0, home: 0, older: NONE, newer: NONE, touch: NONE }
+    }
+}
+
+impl Voxel {
+    pub(super) fn new(block: u32, place: usize, log_odds: f64) -> Self {
+        Self { log_odds, home: block << 6 | place as u32, ..Self::default() }
+    }
+
+    /// Number of its block, and its place in that.
+    #[inline]
+    pub(super) fn home(&self) -> (u32, usize) {
+        (self.home >> 6, (self.home & 63) as usize)
+    }
+}
+
+/// All voxels with occupancy, and the order in which they were updated last (the paper's history buffer): a list with
+/// links in both directions, so that a voxel moves to its end at once.
+#[derive(Clone, Debug)]
+pub(super) struct Voxels {
+    pub(super) slab: Slab<Voxel>,
+    oldest: u32,
+    newest: u32,
+    len: usize,
+}
+
+impl Default for Voxels {
+    fn default() -> Self {
+        Self { slab: Slab::default(), oldest: NONE, newest: NONE, len: 0 }
+    }
+}
+
+impl Voxels {
+    /// Voxels in the history.
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// The voxel whose last update is longest ago.
+    pub(super) fn oldest(&self) -> Option<u32> {
+        (self.oldest != NONE).then_some(self.oldest)
+    }
+
+    /// Puts a voxel that is not in the history at its end.
+    pub(super) fn push_newest(&mut self, id: u32) {
+        let last = std::mem::replace(&mut self.newest, id);
+        let voxel = self.slab.get_mut(id);
+        (voxel.older, voxel.newer) = (last, NONE);
+        match last {
+            NONE => self.oldest = id,
+            last => self.slab.get_mut(last).newer = id,
+        }
+        self.len += 1;
+    }
+
+    /// Puts a voxel that is not in the history at its beginning.
+    pub(super) fn push_oldest(&mut self, id: u32) {
+        let first = std::mem::replace(&mut self.oldest, id);
+        let voxel = self.slab.get_mut(id);
+        (voxel.older, voxel.newer) = (NONE, first);
+        match first {
+            NONE => self.newest = id,
+            first => self.slab.get_mut(first).older = id,
+        }
+        self.len += 1;
+    }
+
+    /// Takes a voxel out of the history.
+    pub(super) fn unlink(&mut self, id: u32) {
+        let Voxel { older, newer, .. } = *self.slab.get(id);
+        match older {
+            NONE => self.oldest = newer,
+            older => self.slab.get_mut(older).newer = newer,
+        }
+        match newer {
+            NONE => self.newest = older,
+            newer => self.slab.get_mut(newer).older = older,
+        }
+        self.len -= 1;
+    }
+
+    /// The history, oldest first.
+    pub(super) fn in_order(&self) -> impl Iterator<Item = &Voxel> {
+        let mut next = self.oldest;
+        std::iter::from_fn(move || {
+            let voxel = (next != NONE).then(|| self.slab.get(next))?;
+            next = voxel.newer;
+            Some(voxel)
+        })
+    }
+}

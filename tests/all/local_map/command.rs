@@ -1,0 +1,44 @@
+use crate::cli::{failure, json, output, scans, text};
+use std::fs;
+use tempfile::TempDir;
+
+#[test]
+fn scans_run_through_a_local_map_give_a_table_and_a_picture() {
+    let folder = TempDir::new().unwrap();
+    let (scans, picture) = (scans(&folder), folder.path().join("local.png"));
+    let row = json(&["local", text(&scans), "-o", text(&picture), "--json"]);
+    assert_eq!((row["setup"].as_str(), row["scans"].as_u64()), (Some("local"), Some(3)));
+    // A wall of 40 points a tenth of a metre apart; every scan has a point that is none and one at the sensor.
+    assert_eq!((row["n_occ"].as_u64(), row["skipped"].as_u64()), (Some(40), Some(6)));
+    assert!(row["n_inf"].as_f64().unwrap() > 40.0 && row["bytes"].as_u64().unwrap() > 0);
+    assert!(fs::read(&picture).unwrap().starts_with(b"\x89PNG"));
+
+    let limited = json(&["local", text(&scans), "-o", text(&picture), "--json", "--n-lim", "7"]);
+    assert_eq!(limited["n_occ"].as_u64(), Some(7));
+    let near = json(&["local", text(&scans), "-o", text(&picture), "--json", "--d-inf", "0"]);
+    assert_eq!(near["n_inf"].as_f64(), Some(0.0));
+    let few =
+        json(&["local", text(&scans), "-o", text(&picture), "--json", "--points", "10", "--d-in", "inf"]);
+    assert_eq!(few["points"].as_u64(), Some(30));
+
+    let table = output(&["local", text(&scans), "-o", text(&picture), "--preset", "table"]);
+    let setups: Vec<&str> = table.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(setups[..6], ["setup", "a", "b", "c", "d", "e"]);
+    // What is relayed is what the other map found, whole.
+    let n_occ = |row: usize| table.lines().nth(row).unwrap().split_whitespace().nth(4).unwrap().to_owned();
+    assert_eq!(n_occ(1), "40");
+    assert_eq!(n_occ(4), "40");
+}
+
+#[test]
+fn wrong_parameters_end_with_usage_and_no_picture() {
+    let folder = TempDir::new().unwrap();
+    let (scans, picture) = (scans(&folder), folder.path().join("local.png"));
+    for wrong in [["--radius", "5"], ["--d-in", "-1"], ["--p-init", "1"], ["--resolution", "0"]] {
+        let (code, message) = failure(&["local", text(&scans), "-o", text(&picture), wrong[0], wrong[1]]);
+        assert_eq!(code, 2, "{message}");
+        assert!(!picture.exists());
+    }
+    assert_eq!(failure(&["local", text(&scans), "--preset", "other"]).0, 2);
+    assert_eq!(failure(&["local", "no/such/folder"]).0, 1);
+}
