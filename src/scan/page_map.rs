@@ -152,9 +152,8 @@ impl PageMap<MarkedPage> {
     pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
         let page = |voxel| {
             let number = self.directory[self.window.page_of(voxel)] as usize;
-            // What is in the scratch page is of many pages.
-            let is_known = number > usize::from(self.has_scratch);
-            is_known.then(|| &self.pages[number - 1])
+            // What the scratch page says is of many pages, and right or wrong: nothing is asked of what rays leave there.
+            self.pages.get(number.wrapping_sub(1))
         };
         let is_one_page = (0..3).all(|k| (low[k] ^ high[k]) < PAGE_EDGE as u32);
         if is_one_page {

@@ -336,6 +336,24 @@ mod tests {
         updates.tiles.iter().map(of_tile).collect()
     }
 
+    #[test]
+    fn dense_rays_with_little_memory_make_the_same_updates() {
+        let grid = Grid::new(0.1, 10.0).unwrap();
+        let origin = [0.03, -0.02, 0.05];
+        let point = |k: u32| -> Point {
+            let (azimuth, up) = (f64::from(k) * 2.399_963, f64::from(k) / 10_000.0 - 1.0);
+            let (flat, reach) = ((1.0 - up * up).sqrt(), 9.0 + 3.0 * (5.0 * azimuth).sin());
+            [origin[0] + reach * flat * azimuth.cos(), origin[1] + reach * flat * azimuth.sin(), reach * up]
+        };
+        let scan = Scan { origin, points: (0..20_000).map(point).collect(), intensities: None };
+        let (model, rays) = (SensorModel::default(), RayConfig::default());
+        let whole = ScanTracer::default().trace(&grid, &model, &rays, &scan).unwrap();
+        let parts = ScanTracer::with_memory_bytes(1 << 20).trace(&grid, &model, &rays, &scan).unwrap();
+        assert!(parts.tiles.iter().any(|(_, updates)| matches!(updates, TileUpdates::Packed(_))));
+        assert_eq!(parts.report, whole.report);
+        assert!(bricks(&parts) == bricks(&whole));
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
 
