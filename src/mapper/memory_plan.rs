@@ -15,6 +15,8 @@ pub(super) struct MemoryPlan {
     pub(super) least_scan_bytes: usize,
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,
+    /// Most bytes of tiles in the compact form while others have to go.
+    pub(super) cold_bytes: usize,
 }
 
 impl MemoryPlan {
@@ -27,6 +29,7 @@ impl MemoryPlan {
                 scan_bytes: usize::MAX,
                 least_scan_bytes: 0,
                 spare_bytes: 0,
+                cold_bytes: 0,
             },
             // Waiting updates are small beside their tiles, and the more wait the fewer reads and writes there are.
             MemoryLimit::Bytes(bytes) => Self {
@@ -36,6 +39,7 @@ impl MemoryPlan {
                 scan_bytes: bytes / 4,
                 least_scan_bytes: bytes / 8,
                 spare_bytes: bytes / 4,
+                cold_bytes: bytes / 8 * 3,
             },
         }
     }

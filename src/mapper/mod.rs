@@ -12,7 +12,10 @@
 //! flush       -> pending lists -> tiles -> store -> one commit
 //! ```
 
+mod cold_tiles;
+mod flush;
 mod in_memory;
+mod look_ahead;
 mod map_id;
 mod map_reader;
 mod memory_plan;
@@ -20,17 +23,22 @@ mod out_of_core;
 mod pending;
 mod residency;
 mod resident_tiles;
+mod room;
+mod side_worker;
+mod stalls;
 mod statistics;
 pub(crate) mod tile_files;
 mod tile_map;
 mod tile_ref;
+mod tile_traffic;
 mod trace;
 mod traits;
+mod waiting;
 
 pub use in_memory::InMemoryMapper;
 pub use map_reader::MapReader;
 pub(crate) use map_reader::config_from;
 pub use out_of_core::OutOfCoreTileMapper;
-pub use statistics::{IoCounts, MapStatistics};
+pub use statistics::{IoCounts, MapStatistics, MemoryCounts, StallCounts};
 pub use tile_ref::TileRef;
 pub use traits::{MapView, Mapper};

@@ -3,7 +3,7 @@
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
-use crate::store::{FileStamp, MapParameters, StoredTile, TileFile, TileStamp, TileStore, hex};
+use crate::store::{FileStamp, MapParameters, StoredTile, TileFile, TileStamp, TileStore, TileWriter, hex};
 use crate::tile::format::{DecodedTable, Trailer, read_table, write_table};
 use crate::tile::{OctreeFactory, Table, Tile};
 
@@ -14,23 +14,31 @@ pub(crate) fn save(
     tile: &Tile,
     scan_number: u64,
 ) -> Result<TileStamp> {
-    let index = tile.index();
+    let stamp = write(&store.writer()?, config, tile.index(), tile.table(), scan_number)?;
+    store.note_next(tile.index(), stamp);
+    Ok(stamp)
+}
+
+/// Writes the next version of a tile's files, of which the store is still to be told.
+pub(crate) fn write(
+    writer: &TileWriter,
+    config: &MapConfig,
+    index: TileIndex,
+    table: &Table,
+    scan_number: u64,
+) -> Result<TileStamp> {
     let threshold = config.occupied_log_odds();
-    let map_id = store.map_id().unwrap_or_default();
-    let octree = store.write_next(index, TileFile::Octree, |mut out| {
-        tile.table().write_bt(config.grid.resolution_m(), threshold as f32, &mut out)
+    let octree = writer.write_next(index, TileFile::Octree, |mut out| {
+        table.write_bt(config.grid.resolution_m(), threshold as f32, &mut out)
     })?;
+    let (map_id, parameters) = (writer.map_id(), map_parameters(config).to_text());
     let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
-    let parameters = map_parameters(config).to_text();
     let trailer =
         Trailer { map_id, tile: index, scan_number, table_crc: 0, octree_crc, octree_bytes, parameters };
-    let table = store.write_next(index, TileFile::Table, |mut out| {
-        write_table(tile.table(), trailer, &mut out).map(drop)
-    })?;
-    let occupied = tile.table().count_from(threshold) as u64;
-    let stamp = TileStamp { scan_number, table, octree, voxels: tile.table().len() as u64, occupied };
-    store.note_next(index, stamp);
-    Ok(stamp)
+    let (voxels, occupied) = (table.len() as u64, table.count_from(threshold) as u64);
+    let table = writer
+        .write_next(index, TileFile::Table, |mut out| write_table(table, trailer, &mut out).map(drop))?;
+    Ok(TileStamp { scan_number, table, octree, voxels, occupied })
 }
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.

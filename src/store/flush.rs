@@ -1,15 +1,15 @@
 //! The writing half of [`TileStore`]: versions beside the committed ones, and the commit that puts them in place.
 
 use super::commit_log::{CommitLog, Flush};
-use super::disk::EntryKind;
 use super::layout::TileFile;
 use super::map_folder;
 use super::metadata::{Bounds, Metadata};
-use super::tile_stamp::{FileStamp, Stamping, TileStamp};
+use super::tile_stamp::{FileStamp, TileStamp};
 use super::tile_store::TileStore;
+use super::tile_writer::TileWriter;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
@@ -23,26 +23,19 @@ impl TileStore {
         file: TileFile,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<FileStamp> {
+        self.writer()?.write_next(tile, file, write)
+    }
+
+    /// What writes next versions, for another thread too, until the next commit.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses to finish what the last commit left to do.
+    pub fn writer(&mut self) -> Result<TileWriter> {
         // A committed version may still be there under the name that is written to now.
         self.settle()?;
-        let folder = self.layout.tile_folder(tile);
-        match self.disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
-            Some(EntryKind::Folder) => {}
-            None => self.disk.create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?,
-            Some(_) => {
-                let cause =
-                    io::Error::new(io::ErrorKind::NotADirectory, "something else has the folder's name");
-                return Err(Error::io(&folder, "create", cause));
-            }
-        }
-        let path = self.layout.next(tile, file);
-        let stamp_file = || {
-            let mut out = Stamping::new(BufWriter::with_capacity(1 << 16, self.disk.create(&path)?));
-            write(&mut out)?;
-            out.flush()?;
-            Ok(out.finish().0)
-        };
-        stamp_file().map_err(|error| Error::io(&path, "write", error))
+        let map_id = self.map_id().unwrap_or_default();
+        Ok(TileWriter { disk: self.disk.clone(), layout: self.layout.clone(), map_id })
     }
 
     /// Notes that the next version of a tile is written, both files.

@@ -79,6 +79,11 @@ impl Layout {
         self.tile_folder(tile).join(format!("{KEPT_PREFIX}{flush_number}"))
     }
 
+    /// Updates that wait for a tile while the map is written to.
+    pub fn waiting(&self, tile: TileIndex) -> PathBuf {
+        self.tile_folder(tile).join(WAITING)
+    }
+
     /// Where repair puts what it takes out of the map.
     pub fn quarantine(&self) -> PathBuf {
         self.folder.join(QUARANTINE)
@@ -89,6 +94,9 @@ impl Layout {
         self.tile_folder(tile).join(file.next_name())
     }
 }
+
+/// The name of the file of updates that wait for a tile. Like all that no commit names, it ends with `.next`.
+pub(super) const WAITING: &str = "updates.next";
 
 /// The name of the folder for what repair takes out of the map.
 pub const QUARANTINE: &str = "quarantine";

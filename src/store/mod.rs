@@ -19,6 +19,8 @@ mod recovery;
 mod remains;
 mod tile_stamp;
 mod tile_store;
+mod tile_writer;
+mod waiting_file;
 
 pub use commit_log::{CommitLog, Commits, Flush};
 pub use disk::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
@@ -30,3 +32,5 @@ pub(crate) use tile_stamp::MAX_NUMBER;
 pub use tile_stamp::{FileStamp, Stamping, TileStamp};
 pub(crate) use tile_store::hex;
 pub use tile_store::{StoredTile, TileStore};
+pub use tile_writer::TileWriter;
+pub use waiting_file::WaitingFile;

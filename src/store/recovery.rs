@@ -1,6 +1,6 @@
 use super::commit_log::Commits;
 use super::disk::{Disk, EntryKind};
-use super::layout::{Layout, TileFile, flush_of_kept, tile_of_folder};
+use super::layout::{Layout, TileFile, WAITING, flush_of_kept, tile_of_folder};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
@@ -103,7 +103,7 @@ fn look_at_tile(
         remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
-    for name in names.extract_if(.., |name| flush_of_kept(name).is_some()) {
+    for name in names.extract_if(.., |name| name == WAITING || flush_of_kept(name).is_some()) {
         remove(disk, &folder.join(name), removed)?;
     }
     Ok(match stamp {

@@ -1,0 +1,106 @@
+use crate::space::TileIndex;
+use lru::LruCache;
+use std::sync::Arc;
+
+/// Tiles that nobody uses at the moment, in the compact form, in the order in which they were put here: between the tiles
+/// in memory and those on disk.
+#[derive(Debug)]
+pub(super) struct ColdTiles {
+    tiles: LruCache<TileIndex, ColdTile>,
+    bytes: usize,
+    dirty: usize,
+}
+
+/// A tile in the compact form.
+#[derive(Clone, Debug)]
+pub(super) struct ColdTile {
+    pub(super) compact: Arc<[u8]>,
+    pub(super) voxels: u64,
+    /// What the tile's table takes in memory, as it last was there.
+    pub(super) table_bytes: usize,
+    pub(super) is_dirty: bool,
+    /// Whether it is on its way to disk.
+    pub(super) is_leaving: bool,
+}
+
+/// What a tile takes beside its bytes.
+const SLOT_BYTES: usize = size_of::<(TileIndex, ColdTile)>() + 80;
+
+impl Default for ColdTiles {
+    fn default() -> Self {
+        Self { tiles: LruCache::unbounded(), bytes: 0, dirty: 0 }
+    }
+}
+
+impl ColdTiles {
+    pub(super) fn len(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Number of tiles that are not on disk as they are.
+    pub(super) fn dirty(&self) -> usize {
+        self.dirty
+    }
+
+    pub(super) fn contains(&self, index: TileIndex) -> bool {
+        self.tiles.contains(&index)
+    }
+
+    pub(super) fn get(&self, index: TileIndex) -> Option<&ColdTile> {
+        self.tiles.peek(&index)
+    }
+
+    /// The tiles, the one put here last first.
+    pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = (TileIndex, &ColdTile)> {
+        self.tiles.iter().map(|(&index, tile)| (index, tile))
+    }
+
+    pub(super) fn put(&mut self, index: TileIndex, tile: ColdTile) {
+        self.bytes += tile.bytes();
+        self.dirty += usize::from(tile.is_dirty);
+        let replaced = self.tiles.put(index, tile);
+        self.take_off(replaced);
+    }
+
+    pub(super) fn remove(&mut self, index: TileIndex) -> Option<ColdTile> {
+        let removed = self.tiles.pop(&index);
+        self.take_off(removed.clone());
+        removed
+    }
+
+    /// Notes that a tile is on its way to disk.
+    pub(super) fn leaves(&mut self, index: TileIndex) {
+        if let Some(tile) = self.tiles.peek_mut(&index) {
+            tile.is_leaving = true;
+        }
+    }
+
+    /// Notes that the way of a tile to disk has ended, if it still is the one that was sent.
+    pub(super) fn has_left(&mut self, index: TileIndex, compact: &Arc<[u8]>, is_on_disk: bool) {
+        if let Some(tile) = self.tiles.peek_mut(&index).filter(|tile| Arc::ptr_eq(&tile.compact, compact)) {
+            tile.is_leaving = false;
+            if is_on_disk && tile.is_dirty {
+                tile.is_dirty = false;
+                self.dirty -= 1;
+            }
+        }
+    }
+
+    fn take_off(&mut self, tile: Option<ColdTile>) {
+        if let Some(tile) = tile {
+            self.bytes -= tile.bytes();
+            self.dirty -= usize::from(tile.is_dirty);
+        }
+    }
+}
+
+impl ColdTile {
+    fn bytes(&self) -> usize {
+        SLOT_BYTES + self.compact.len()
+    }
+}
