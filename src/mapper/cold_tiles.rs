@@ -73,6 +73,22 @@ impl ColdTiles {
         removed
     }
 
+    /// The tiles that are not on disk as they are, in no particular order.
+    pub(super) fn dirty_tiles(&self) -> Vec<TileIndex> {
+        self.iter().filter(|(_, tile)| tile.is_dirty).map(|(index, _)| index).collect()
+    }
+
+    /// The tile that was put here the longest ago.
+    pub(super) fn oldest(&self) -> Option<TileIndex> {
+        self.iter().next_back().map(|(index, _)| index)
+    }
+
+    /// The oldest tile that is not on disk as it is, nor on its way there.
+    pub(super) fn next_to_leave(&self) -> Option<TileIndex> {
+        let mut oldest_first = self.iter().rev();
+        oldest_first.find(|(_, tile)| tile.is_dirty && !tile.is_leaving).map(|(index, _)| index)
+    }
+
     /// Notes that a tile is on its way to disk.
     pub(super) fn leaves(&mut self, index: TileIndex) {
         if let Some(tile) = self.tiles.peek_mut(&index) {
@@ -89,6 +105,11 @@ impl ColdTiles {
                 self.dirty -= 1;
             }
         }
+    }
+
+    /// Notes that no tile is on its way to disk.
+    pub(super) fn none_leaves(&mut self) {
+        self.tiles.iter_mut().for_each(|(_, tile)| tile.is_leaving = false);
     }
 
     fn take_off(&mut self, tile: Option<ColdTile>) {

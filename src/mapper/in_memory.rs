@@ -106,7 +106,7 @@ impl MapView for InMemoryMapper {
 
 impl Mapper for InMemoryMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        let updates = trace(&mut self.tracer, &self.config, scan)?;
+        let updates = trace(&mut self.tracer, &self.config, scan, usize::MAX, &mut |_| Ok(()))?;
         Ok(self.accept(updates))
     }
 

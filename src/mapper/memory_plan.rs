@@ -11,6 +11,8 @@ pub(super) struct MemoryPlan {
     pub(super) pending_bytes: usize,
     /// Most bytes of what is known of a scan while it is inserted.
     pub(super) scan_bytes: usize,
+    /// Most bytes of packed updates of a scan; what comes on top goes to files.
+    pub(super) updates_bytes: usize,
     /// Bytes that are kept free for inserting scans from the beginning.
     pub(super) least_scan_bytes: usize,
     /// Bytes that stay free of tiles that need not come in yet.
@@ -27,6 +29,7 @@ impl MemoryPlan {
                 bytes: usize::MAX,
                 pending_bytes,
                 scan_bytes: usize::MAX,
+                updates_bytes: usize::MAX,
                 least_scan_bytes: 0,
                 spare_bytes: 0,
                 cold_bytes: 0,
@@ -37,6 +40,7 @@ impl MemoryPlan {
                 bytes,
                 pending_bytes: bytes / 4,
                 scan_bytes: bytes / 4,
+                updates_bytes: bytes / 8,
                 least_scan_bytes: bytes / 8,
                 spare_bytes: bytes / 4,
                 cold_bytes: bytes / 8 * 3,

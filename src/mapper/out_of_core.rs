@@ -1,6 +1,7 @@
 use super::map_id::new_map_id;
 use super::memory_plan::MemoryPlan;
-use super::residency::{Input, Residency, new_metadata};
+use super::flush::new_metadata;
+use super::residency::{Input, Residency};
 use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
@@ -167,6 +168,7 @@ impl OutOfCoreTileMapper {
         let scan_bytes = self.tracer.bytes() + updates.bytes();
         let residency = self.residency_mut();
         residency.prepare(&updates, scan_bytes, scan_number)?;
+        residency.look_ahead(&updates.tiles);
         residency.accept(updates);
         self.scan_number += 1;
         Ok(report)
@@ -222,11 +224,17 @@ impl MapView for OutOfCoreTileMapper {
 
 impl Mapper for OutOfCoreTileMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        let updates = trace(&mut self.tracer, &self.config, scan)?;
+        let scan_number = self.scan_number;
+        let residency = self.residency.get_mut().unwrap_or_else(PoisonError::into_inner);
+        residency.begin_scan();
+        let most_bytes = MemoryPlan::new(self.config.memory).updates_bytes;
+        let put_in_files = &mut |part| residency.put_in_files(part, scan_number);
+        let updates = trace(&mut self.tracer, &self.config, scan, most_bytes, put_in_files)?;
         self.accept(updates)
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
+        self.residency_mut().begin_scan();
         let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
         self.accept(updates)
     }

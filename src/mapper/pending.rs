@@ -94,6 +94,12 @@ impl Pending {
         self.tiles.values().map(|waiting| waiting.in_file.updates + waiting.packed.len()).sum()
     }
 
+    /// The tiles of which the file has more than so many bytes, in no particular order.
+    pub(super) fn longest_files(&self, bytes: u64) -> Vec<TileIndex> {
+        let is_long = |(_, waiting): &(&TileIndex, &Waiting)| waiting.in_file.file.bytes > bytes;
+        self.tiles.iter().filter(is_long).map(|(tile, _)| *tile).collect()
+    }
+
     /// The tiles by how many bytes of memory wait for them, the most first and the lowest tile of equals, as far as
     /// these make up so many bytes.
     pub(super) fn heaviest(&self, bytes: usize) -> Vec<TileIndex> {

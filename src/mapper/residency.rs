@@ -1,41 +1,61 @@
-use super::map_id::new_map_id;
+use super::cold_tiles::ColdTiles;
+use super::look_ahead::LookAhead;
 use super::memory_plan::MemoryPlan;
-use super::pending::Pending;
+use super::pending::{InFile, Pending};
 use super::resident_tiles::ResidentTiles;
+use super::stalls::Stalls;
 use super::statistics::{IoCounts, MapStatistics};
 use super::tile_files;
+use super::tile_traffic::{TileTraffic, unpack};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::scan::{ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, VoxelIndex};
-use crate::store::{Extension, Metadata, TileStore, hex};
-use crate::tile::{OctreeFactory, Tile};
+use crate::store::TileStore;
+use crate::tile::{OctreeFactory, Table, Tile};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Which tiles are in memory: an LRU in front of the store, and the updates that wait for tiles behind it.
+/// Which tiles are in memory, and the updates that wait for the others.
 ///
-/// Resident tiles have no pending updates; what waits is applied when its tile comes in.
+/// ```text
+/// ResidentTiles   ready for use, an LRU             <- updates, questions
+///   ColdTiles     in the compact form               (with a limit in bytes)
+///     TileStore   on disk
+/// Pending         updates for tiles that are not resident, in memory and, where that is short, in files
+/// ```
+///
+/// A tile is in one of the first two at most. Resident tiles have no pending updates; what waits is applied when its
+/// tile comes in. This file takes updates and answers questions; `room` moves tiles down to make room, `waiting` sees to
+/// waiting updates, `look_ahead` fetches tiles before they are needed, and `flush` makes the map durable.
 #[derive(Debug)]
 pub(super) struct Residency {
-    config: MapConfig,
-    store: TileStore,
-    plan: MemoryPlan,
-    tiles: ResidentTiles,
+    pub(super) config: MapConfig,
+    pub(super) store: TileStore,
+    pub(super) plan: MemoryPlan,
+    pub(super) tiles: ResidentTiles,
     /// After the tiles: what is in flight to octrees goes with these, and need not be written any more.
-    octrees: OctreeFactory,
-    pending: Pending,
+    pub(super) octrees: OctreeFactory,
+    pub(super) cold: ColdTiles,
+    pub(super) traffic: TileTraffic,
+    pub(super) pending: Pending,
+    /// What the scan that is being inserted has in files already; it counts when the scan is accepted.
+    pub(super) coming: FxHashMap<TileIndex, InFile>,
+    pub(super) ahead: LookAhead,
     /// Tiles on disk that were read or written since the map was opened, and so are known to be whole. Updates wait
     /// only for these, so that a damaged tile is found before a scan is accepted.
-    known_whole: FxHashSet<TileIndex>,
-    saved: BTreeSet<TileIndex>,
+    pub(super) known_whole: FxHashSet<TileIndex>,
+    pub(super) saved: BTreeSet<TileIndex>,
+    /// Why a tile could not be saved beside the mapping; it is dirty still.
+    pub(super) save_error: Option<Error>,
     /// Bytes of memory that are kept free for inserting scans: what the largest so far took.
-    scan_bytes: usize,
-    io: IoCounts,
+    pub(super) scan_bytes: usize,
+    pub(super) io: IoCounts,
+    pub(super) stalls: Stalls,
     /// What the map is being built from, kept with it at the next flush.
-    input: Option<Input>,
+    pub(super) input: Option<Input>,
 }
 
 /// By how many bytes an update may be expected to make a tile larger, or what waits for it.
@@ -54,8 +74,11 @@ fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     }
 }
 
-/// What a tile takes in the set of those that are known to be whole, and in that of those saved.
-const KNOWN_BYTES_OF_TILE: usize = 4 * size_of::<TileIndex>();
+/// A table from below, and whether it is not on disk as it is.
+pub(super) struct Fetched {
+    pub(super) table: Table,
+    pub(super) is_dirty: bool,
+}
 
 /// An input that a map is built from, and how many scans the map had taken before.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,15 +98,21 @@ impl Residency {
         Self {
             octrees: OctreeFactory::new(config.octree),
             plan,
-            config,
             store,
             tiles: ResidentTiles::default(),
+            cold: ColdTiles::default(),
+            traffic: TileTraffic::new(&config),
             pending: Pending::default(),
+            coming: FxHashMap::default(),
+            ahead: LookAhead::default(),
             known_whole: FxHashSet::default(),
             saved: BTreeSet::new(),
+            save_error: None,
             scan_bytes: plan.least_scan_bytes,
             io: IoCounts::default(),
+            stalls: Stalls::default(),
             input,
+            config,
         }
     }
 
@@ -101,18 +130,12 @@ impl Residency {
         scan_number: u64,
     ) -> Result<()> {
         self.scan_bytes = self.scan_bytes.max(scan_bytes);
-        if self.pending.bytes() > self.plan.pending_bytes {
-            // Half, so that tiles come in for many updates at a time.
-            while self.pending.bytes() > self.plan.pending_bytes / 2
-                && let Some(tile) = self.pending.heaviest()
-            {
-                self.bring_in(tile, scan_number)?;
-            }
-        }
+        self.take_arrived(scan_number)?;
+        self.work_off(scan_number)?;
         for (tile, _) in &updates.tiles {
-            let is_unread = self.store.contains(*tile) && !self.known_whole.contains(tile);
-            if !self.tiles.contains(*tile) && (is_unread || (self.exists(*tile) && self.has_room_to_spare()))
-            {
+            let is_wanted = self.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
+            // What is in its file of this scan must come after what waits, which is there too.
+            if is_wanted && !self.tiles.contains(*tile) && !self.coming.contains_key(tile) {
                 self.bring_in(*tile, scan_number)?;
             }
         }
@@ -121,8 +144,12 @@ impl Residency {
         self.make_room_for(BYTES_OF_UPDATE * all, self.plan.tiles, scan_number)
     }
 
-    /// Takes the updates: into tiles in memory at once, for the others they wait. Cannot fail.
+    /// Takes the updates, those that are in files already first: into tiles in memory at once, for the others they
+    /// wait. Cannot fail.
     pub(super) fn accept(&mut self, updates: ScanUpdates) {
+        for (index, in_file) in std::mem::take(&mut self.coming) {
+            self.pending.moved_to_file(index, in_file);
+        }
         let mut resident = FxHashMap::default();
         // What new tiles take only when the updates are applied to them.
         let mut coming = 0;
@@ -154,11 +181,10 @@ impl Residency {
         if !self.exists(index) {
             return Ok(None);
         }
-        let tile = Arc::new(self.read(index)?);
+        let tile = Arc::new(self.read(index, scan_number)?);
         // A disk that takes no tile in exchange does not keep a question from being answered.
         if self.make_room(&tile, scan_number).is_ok() {
-            self.pending.applied(index);
-            self.tiles.put(tile.clone());
+            self.has_come_in(tile.clone());
         }
         Ok(Some(tile))
     }
@@ -181,20 +207,26 @@ impl Residency {
         if !self.exists(index) {
             return Ok(None);
         }
-        let loaded = tile_files::load_in_passing(&self.store, &self.config.grid, index)?;
-        Ok(Some(Arc::new(self.with_waiting(index, loaded))))
+        let fetched = self.fetch(index)?;
+        let table = fetched.map(|fetched| fetched.table).unwrap_or_default();
+        let mut tile = Tile::in_passing(&self.config.grid, index, table);
+        self.apply_waiting(&mut tile)?;
+        Ok(Some(Arc::new(tile)))
     }
 
     /// The voxels of a tile in memory, or of its latest version on disk; what waits for it is left out.
     pub(super) fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
         let resident = self.tiles.peek(index).map(|tile| tile.table().len() as u64);
-        resident.or_else(|| self.store.stamp(index).map(|stamp| stamp.voxels))
+        let cold = || self.cold.get(index).map(|tile| tile.voxels);
+        resident.or_else(cold).or_else(|| self.store.stamp(index).map(|stamp| stamp.voxels))
     }
 
     /// Every tile in which something was observed, in order.
     pub(super) fn tile_indices(&self) -> Vec<TileIndex> {
         let resident = self.tiles.iter().map(|tile| tile.index());
-        let mut indices: Vec<_> = self.store.tiles().chain(resident).chain(self.pending.tiles()).collect();
+        let cold = self.cold.iter().map(|(index, _)| index);
+        let mut indices: Vec<_> =
+            self.store.tiles().chain(resident).chain(cold).chain(self.pending.tiles()).collect();
         indices.sort_unstable();
         indices.dedup();
         indices
@@ -204,9 +236,10 @@ impl Residency {
     fn count_tiles(&self) -> usize {
         let is_new = |index: &TileIndex| !self.store.contains(*index);
         let resident = self.tiles.iter().filter(|tile| is_new(&tile.index())).count();
-        let waiting =
-            self.pending.tiles().filter(|index| is_new(index) && !self.tiles.contains(*index)).count();
-        self.store.tiles().count() + resident + waiting
+        let cold = self.cold.iter().filter(|(index, _)| is_new(index)).count();
+        let is_in_memory = |index| self.tiles.contains(index) || self.cold.contains(index);
+        let waiting = self.pending.tiles().filter(|index| is_new(index) && !is_in_memory(*index)).count();
+        self.store.tiles().count() + resident + cold + waiting
     }
 
     /// The tiles in memory, in order.
@@ -218,45 +251,13 @@ impl Residency {
 
     /// Whether a tile has updates that are not on disk.
     pub(super) fn is_dirty(&self, index: TileIndex) -> bool {
-        self.pending.contains(index) || self.tiles.peek(index).is_some_and(|tile| tile.is_dirty())
+        self.pending.contains(index)
+            || self.tiles.peek(index).is_some_and(|tile| tile.is_dirty())
+            || self.cold.get(index).is_some_and(|tile| tile.is_dirty)
     }
 
     pub(super) fn input(&self) -> Option<&Input> {
         self.input.as_ref()
-    }
-
-    /// Flushes, and with the flush what the map is being built from now.
-    pub(super) fn begin_input(&mut self, input: Input, scan_number: u64) -> Result<()> {
-        let before = self.input.replace(input);
-        let flushed = self.flush(scan_number);
-        if flushed.is_err() {
-            self.input = before;
-        }
-        flushed
-    }
-
-    /// Applies what waits, writes every dirty tile and commits.
-    pub(super) fn flush(&mut self, scan_number: u64) -> Result<()> {
-        for index in self.store.suspects() {
-            // Its file cannot be trusted to be on the medium; what can be read of it is checked as always.
-            if !self.tiles.contains(index) {
-                self.bring_in(index, scan_number)?;
-            }
-            self.write(index, scan_number)?;
-        }
-        let mut waiting: Vec<_> = self.pending.tiles().collect();
-        waiting.sort_unstable();
-        for index in waiting {
-            self.bring_in(index, scan_number)?;
-        }
-        // The files are made of the tables alone. But what statistics say of octrees is as of the flush, and tables
-        // whose bricks are in order are written sooner.
-        self.sync_octrees();
-        for index in self.cached_tile_indices() {
-            self.save(index, scan_number)?;
-        }
-        self.adopt()?;
-        self.store.commit(self.metadata(), scan_number)
     }
 
     /// Drops a tile from memory, so that the next question reads it from disk.
@@ -269,6 +270,7 @@ impl Residency {
         if self.is_dirty(index) && !discard_changes {
             return Err(Error::UnsavedChanges { tile: index });
         }
+        self.end_traffic(scan_number)?;
         // All that may fail comes before anything is let go.
         let loaded = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)?;
         if let Some((tile, _)) = &loaded
@@ -277,11 +279,10 @@ impl Residency {
             self.make_room(tile, scan_number)?;
         }
         self.tiles.remove(index);
-        self.pending.applied(index);
+        self.cold.remove(index);
+        self.forget_waiting(index);
         let Some((tile, bytes)) = loaded else { return Ok(false) };
-        self.io.loads += 1;
-        self.io.bytes_read += bytes;
-        self.known_whole.insert(index);
+        self.has_read(index, bytes);
         self.tiles.put(Arc::new(tile));
         Ok(true)
     }
@@ -306,6 +307,9 @@ impl Residency {
             pending_tiles: self.pending.len() as u64,
             pending_updates: self.pending.updates() as u64,
             pending_bytes: self.pending.bytes() as u64,
+            pending_file_bytes: self.pending.file_bytes(),
+            compact_tiles: self.cold.len() as u64,
+            dirty_compact_tiles: self.cold.dirty() as u64,
             disk_bytes: self
                 .store
                 .tiles()
@@ -314,6 +318,8 @@ impl Residency {
                 .sum(),
             octrees: self.octrees.statistics(),
             io: self.io,
+            memory: self.memory(),
+            stalls: self.stalls.counts(),
             ..MapStatistics::default()
         };
         self.tiles.iter().for_each(|tile| statistics.cached += tile.counts());
@@ -321,138 +327,79 @@ impl Residency {
     }
 
     /// Whether anything was observed in a tile.
-    fn exists(&self, index: TileIndex) -> bool {
-        self.store.contains(index) || self.pending.contains(index) || self.tiles.contains(index)
+    pub(super) fn exists(&self, index: TileIndex) -> bool {
+        self.store.contains(index)
+            || self.pending.contains(index)
+            || self.tiles.contains(index)
+            || self.cold.contains(index)
+    }
+
+    /// Whether a tile is on disk and was not looked at yet.
+    pub(super) fn is_unread(&self, index: TileIndex) -> bool {
+        self.store.contains(index) && !self.known_whole.contains(&index)
     }
 
     /// Puts a tile into memory with what waits for it, pushing out others first.
-    fn bring_in(&mut self, index: TileIndex, scan_number: u64) -> Result<Arc<Tile>> {
+    pub(super) fn bring_in(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
         // Read first: a tile that cannot be read pushes nothing out.
-        let tile = Arc::new(self.read(index)?);
-        self.make_room(&tile, scan_number)?;
-        self.pending.applied(index);
-        self.tiles.put(tile.clone());
+        let tile = Arc::new(self.read(index, scan_number)?);
+        if !self.tiles.contains(index) {
+            self.make_room(&tile, scan_number)?;
+            self.has_come_in(tile);
+        }
+        Ok(())
+    }
+
+    /// Puts a tile with all that waited for it into memory, where there is room for it.
+    pub(super) fn has_come_in(&mut self, tile: Arc<Tile>) {
+        let index = tile.index();
+        self.forget_waiting(index);
+        self.io.unpacked += u64::from(self.cold.remove(index).is_some());
+        self.tiles.put(tile);
+    }
+
+    /// A tile that is not resident, with what waits for it applied.
+    pub(super) fn read(&mut self, index: TileIndex, scan_number: u64) -> Result<Tile> {
+        self.end_load_of(index, scan_number)?;
+        if let Some(tile) = self.tiles.peek(index) {
+            return Ok(Tile::clone(tile)); // It has just arrived.
+        }
+        let fetched = self.fetch(index)?;
+        self.made_of(index, fetched)
+    }
+
+    /// A tile made of its table, if it has one, with what waits for it applied.
+    pub(super) fn made_of(&mut self, index: TileIndex, fetched: Option<Fetched>) -> Result<Tile> {
+        let Fetched { table, is_dirty } =
+            fetched.unwrap_or_else(|| Fetched { table: Table::default(), is_dirty: false });
+        let mut tile = Tile::from_table(&self.config.grid, &self.octrees, index, table);
+        if is_dirty {
+            tile.mark_dirty();
+        }
+        self.apply_waiting(&mut tile)?;
         Ok(tile)
     }
 
-    /// The tile as it is on disk, with what waits for it applied.
-    fn read(&mut self, index: TileIndex) -> Result<Tile> {
-        let loaded = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)?;
-        Ok(self.with_waiting(index, loaded))
-    }
-
-    /// A tile as it is on disk, given with its bytes if it is there, and what waits for it applied.
-    fn with_waiting(&mut self, index: TileIndex, loaded: Option<(Tile, u64)>) -> Tile {
-        let mut tile = match loaded {
-            Some((tile, bytes)) => {
-                self.io.loads += 1;
-                self.io.bytes_read += bytes;
-                self.known_whole.insert(index);
-                tile
-            }
-            None => Tile::empty(&self.config.grid, &self.octrees, index),
-        };
-        for updates in self.pending.of(index) {
-            tile.apply(&self.config.sensor_model, &updates);
+    /// The table of a tile that is not resident, without what waits for it; `None` if it has none yet.
+    fn fetch(&mut self, index: TileIndex) -> Result<Option<Fetched>> {
+        if let Some(tile) = self.cold.get(index) {
+            let table = unpack(&self.config.grid, index, tile)?;
+            return Ok(Some(Fetched { table, is_dirty: tile.is_dirty }));
         }
-        tile
-    }
-
-    /// Bytes of memory of all that grows.
-    fn bytes(&self) -> usize {
-        let known_bytes = KNOWN_BYTES_OF_TILE * self.known_whole.len();
-        self.tiles.bytes() + self.pending.bytes() + self.scan_bytes + self.store.index_bytes() + known_bytes
-    }
-
-    /// Whether one more tile fits, and so many bytes with it.
-    fn has_room_for(&self, bytes: usize) -> bool {
-        self.tiles.len() < self.plan.tiles && self.bytes().saturating_add(bytes) <= self.plan.bytes
-    }
-
-    /// Whether a tile may come in before it has to: not when others would soon have to go for it.
-    fn has_room_to_spare(&self) -> bool {
-        self.has_room_for(self.plan.spare_bytes)
-    }
-
-    /// Pushes out the least recently used tiles until this one fits.
-    fn make_room(&mut self, tile: &Tile, scan_number: u64) -> Result<()> {
-        self.make_room_for(tile.bytes(), self.plan.tiles - 1, scan_number)
-    }
-
-    /// Pushes out the least recently used tiles until there are at most so many, and room for so many bytes. Tiles in use
-    /// stay; if all are, what is to come comes on top.
-    fn make_room_for(&mut self, bytes: usize, tiles: usize, scan_number: u64) -> Result<()> {
-        while self.tiles.len() > tiles || self.bytes().saturating_add(bytes) > self.plan.bytes {
-            let Some(index) = self.tiles.least_recently_used() else { return Ok(()) };
-            self.save(index, scan_number)?;
-            self.tiles.remove(index);
+        let (store, grid) = (&self.store, &self.config.grid);
+        if !store.contains(index) {
+            return Ok(None);
         }
-        Ok(())
+        let read = self.stalls.during(|| tile_files::load_table(store, grid, index))?;
+        Ok(read.map(|read| {
+            self.has_read(index, read.file.bytes);
+            Fetched { table: read.table, is_dirty: false }
+        }))
     }
 
-    /// Writes a tile in memory if it is dirty; after an error it is as it was.
-    fn save(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
-        if !self.tiles.peek(index).is_some_and(|tile| tile.is_dirty()) {
-            return Ok(());
-        }
-        self.write(index, scan_number)
-    }
-
-    fn write(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
-        self.adopt()?;
-        // Until it is written: what is on disk of it may be cut short by an attempt that fails.
-        self.tiles.change(index, Tile::mark_dirty);
-        let Some(tile) = self.tiles.peek(index) else { return Ok(()) };
-        let stamp = tile_files::save(&mut self.store, &self.config, tile, scan_number)?;
-        self.tiles.change(index, Tile::mark_clean);
-        self.io.saves += 1;
-        self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
+    pub(super) fn has_read(&mut self, index: TileIndex, bytes: u64) {
+        self.io.loads += 1;
+        self.io.bytes_read += bytes;
         self.known_whole.insert(index);
-        self.saved.insert(index);
-        Ok(())
     }
-
-    /// Gives a map of the seed's format, before its first change, an id, a log and trailers: every tile is written
-    /// anew as it is, and committed. Until that is done it stays a map of the seed's format, with the same content.
-    fn adopt(&mut self) -> Result<()> {
-        if self.store.metadata().ext.is_some() {
-            return Ok(());
-        }
-        log::info!("{}: a map of the seed's format; its tiles get checksums", self.store.folder().display());
-        self.store.adopt(new_map_id())?;
-        for index in self.store.suspects() {
-            // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
-            self.store.drop_next(index);
-        }
-        for index in self.store.tiles().collect::<BTreeSet<_>>() {
-            if self.store.stamp(index).is_some() {
-                continue; // Written by an earlier attempt.
-            }
-            if let Some((tile, _)) = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
-                tile_files::save(&mut self.store, &self.config, &tile, 0)?;
-            }
-        }
-        self.store.commit(self.metadata(), 0)
-    }
-
-    fn metadata(&self) -> Metadata {
-        new_metadata(&self.config, self.store.map_id().unwrap_or_default(), self.input.as_ref())
-    }
-}
-
-/// The metadata of a map; bounds and numbers are the store's to fill in.
-pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
-    let ext = Extension {
-        empty: true,
-        map_id: hex(&map_id),
-        flush_number: 0,
-        scan_number: 0,
-        sensor_model: config.sensor_model,
-        occupancy_threshold: config.occupancy_threshold,
-        rays: config.rays,
-        input_fingerprint: input.map(|input| input.fingerprint.clone()),
-        input_first_scan: input.map_or(0, |input| input.first_scan),
-    };
-    let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
-    Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }
 }

@@ -1,41 +1,35 @@
+use std::collections::VecDeque;
 use std::fmt;
-use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
-/// A thread that does one kind of work beside the one that maps, in the order in which it is given. It sleeps when
-/// there is none, and ends with its owner: what was not begun by then is not done.
+/// A thread that does one kind of work beside the one that maps, in the order in which it is given. It starts with the
+/// first job, sleeps when there is none, and ends with its owner: what was not begun by then is not done. Where the
+/// system gives no thread, the work is done when it is given.
 ///
 /// How much is under way at a time is for the owner to limit.
 pub(super) struct SideWorker<Job, Done> {
+    name: &'static str,
+    work: Arc<dyn Fn(Job) -> Done + Send + Sync>,
+    thread: Option<Thread<Job, Done>>,
+    has_no_thread: bool,
+    done_here: VecDeque<Done>,
+    under_way: usize,
+}
+
+struct Thread<Job, Done> {
     jobs: Option<Sender<Job>>,
     done: Receiver<Done>,
-    under_way: usize,
     is_over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    handle: Option<JoinHandle<()>>,
 }
 
 impl<Job: Send + 'static, Done: Send + 'static> SideWorker<Job, Done> {
-    /// Starts a thread.
-    ///
-    /// # Errors
-    ///
-    /// A system that gives none.
-    pub(super) fn start(name: &str, work: impl Fn(Job) -> Done + Send + 'static) -> io::Result<Self> {
-        let (jobs, jobs_in) = channel::<Job>();
-        let (done_out, done) = channel();
-        let is_over = Arc::new(AtomicBool::new(false));
-        let is_over_there = is_over.clone();
-        let thread = thread::Builder::new().name(name.to_owned()).spawn(move || {
-            for job in jobs_in {
-                if is_over_there.load(Ordering::Relaxed) || done_out.send(work(job)).is_err() {
-                    return;
-                }
-            }
-        })?;
-        Ok(Self { jobs: Some(jobs), done, under_way: 0, is_over, thread: Some(thread) })
+    pub(super) fn new(name: &'static str, work: impl Fn(Job) -> Done + Send + Sync + 'static) -> Self {
+        let (work, done_here) = (Arc::new(work), VecDeque::new());
+        Self { name, work, thread: None, has_no_thread: false, done_here, under_way: 0 }
     }
 
     /// How many jobs were given of which the result was not taken.
@@ -43,58 +37,103 @@ impl<Job: Send + 'static, Done: Send + 'static> SideWorker<Job, Done> {
         self.under_way
     }
 
-    /// Gives a job; back if the thread is gone.
-    pub(super) fn give(&mut self, job: Job) -> Result<(), Job> {
-        let Some(jobs) = &self.jobs else { return Err(job) };
-        jobs.send(job).map_err(|lost| lost.0)?;
+    /// Gives a job.
+    pub(super) fn give(&mut self, job: Job) {
         self.under_way += 1;
-        Ok(())
+        if self.thread.is_none() && !self.has_no_thread {
+            self.start();
+        }
+        let jobs = self.thread.as_ref().and_then(|thread| thread.jobs.as_ref());
+        let left = match jobs {
+            Some(jobs) => jobs.send(job).err().map(|lost| lost.0),
+            None => Some(job),
+        };
+        if let Some(job) = left {
+            self.done_here.push_back((self.work)(job));
+        }
     }
 
     /// A result, if there is one already.
     pub(super) fn take(&mut self) -> Option<Done> {
-        let done = self.done.try_recv().ok()?;
+        let there = self.thread.as_ref().and_then(|thread| thread.done.try_recv().ok());
+        let done = there.or_else(|| self.done_here.pop_front())?;
         self.under_way -= 1;
         Some(done)
     }
 
     /// The next result, waited for; `None` if none will come.
     pub(super) fn wait(&mut self) -> Option<Done> {
-        if self.under_way == 0 {
-            return None;
+        if self.under_way > self.done_here.len()
+            && let Some(thread) = &self.thread
+        {
+            match thread.done.recv() {
+                Ok(done) => {
+                    self.under_way -= 1;
+                    return Some(done);
+                }
+                Err(_) => {
+                    // A thread that panicked took its jobs with it.
+                    self.thread = None;
+                    self.under_way = self.done_here.len();
+                }
+            }
         }
-        let done = self.done.recv().ok();
-        self.under_way = if done.is_some() { self.under_way - 1 } else { 0 };
-        done
+        self.take()
+    }
+
+    fn start(&mut self) {
+        let (jobs, jobs_in) = channel::<Job>();
+        let (done_out, done) = channel();
+        let is_over = Arc::new(AtomicBool::new(false));
+        let (work, is_over_there) = (self.work.clone(), is_over.clone());
+        let handle = thread::Builder::new().name(self.name.to_owned()).spawn(move || {
+            for job in jobs_in {
+                if is_over_there.load(Ordering::Relaxed) || done_out.send(work(job)).is_err() {
+                    return;
+                }
+            }
+        });
+        match handle {
+            Ok(handle) => {
+                self.thread = Some(Thread { jobs: Some(jobs), done, is_over, handle: Some(handle) });
+            }
+            Err(error) => {
+                log::warn!("no thread for {}, which will be waited for: {error}", self.name);
+                self.has_no_thread = true;
+            }
+        }
     }
 }
 
-impl<Job, Done> Drop for SideWorker<Job, Done> {
+impl<Job, Done> Drop for Thread<Job, Done> {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::Relaxed);
         self.jobs = None;
-        if let Some(thread) = self.thread.take() {
-            // A thread that panicked is gone, too.
-            let _ = thread.join();
+        if let Some(handle) = self.handle.take() {
+            // One that panicked is gone, too.
+            let _ = handle.join();
         }
     }
 }
 
 impl<Job, Done> fmt::Debug for SideWorker<Job, Done> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SideWorker").field("under_way", &self.under_way).finish_non_exhaustive()
+        let Self { name, under_way, .. } = self;
+        f.debug_struct("SideWorker").field("name", name).field("under_way", under_way).finish_non_exhaustive()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::AtomicUsize;
+    use std::time::Duration;
 
     #[test]
-    fn what_is_given_is_done_in_order_and_no_more_after_the_end() {
-        let mut worker = SideWorker::start("doubling", |number: u32| 2 * number).unwrap();
+    fn what_is_given_is_done_in_order() {
+        let mut worker = SideWorker::new("doubling", |number: u32| 2 * number);
         assert_eq!(worker.wait(), None);
-        (0..100).for_each(|number| worker.give(number).unwrap());
+        (0..100).for_each(|number| worker.give(number));
         assert_eq!(worker.under_way(), 100);
         let done: Vec<u32> = std::iter::from_fn(|| worker.wait()).collect();
         assert_eq!(done, (0..100).map(|number| 2 * number).collect::<Vec<_>>());
@@ -102,25 +141,34 @@ mod tests {
     }
 
     #[test]
+    fn without_a_thread_the_work_is_done_at_once() {
+        let mut worker = SideWorker::new("doubling", |number: u32| 2 * number);
+        worker.has_no_thread = true;
+        (0..5).for_each(|number| worker.give(number));
+        assert_eq!(worker.done_here, [0, 2, 4, 6, 8]);
+        assert_eq!((worker.take(), worker.wait(), worker.under_way()), (Some(0), Some(2), 3));
+    }
+
+    #[test]
     fn dropping_does_not_wait_for_what_was_not_begun() {
-        let count = Arc::new(std::sync::atomic::AtomicUsize::new(0));
+        let count = Arc::new(AtomicUsize::new(0));
         let counted = count.clone();
-        let mut worker = SideWorker::start("slow", move |()| {
+        let mut worker = SideWorker::new("slow", move |()| {
             counted.fetch_add(1, Ordering::Relaxed);
-            thread::sleep(std::time::Duration::from_millis(20));
-        })
-        .unwrap();
-        (0..1_000).for_each(|_| worker.give(()).unwrap());
+            thread::sleep(Duration::from_millis(20));
+        });
+        (0..1_000).for_each(|_| worker.give(()));
         drop(worker);
         assert!(count.load(Ordering::Relaxed) < 1_000);
     }
 
     #[test]
     fn a_thread_that_is_gone_is_not_waited_for() {
-        let mut worker = SideWorker::start("failing", |fails: bool| assert!(!fails)).unwrap();
-        worker.give(true).unwrap();
-        worker.give(false).ok();
+        let mut worker = SideWorker::new("failing", |fails: bool| assert!(!fails));
+        worker.give(true);
         while worker.wait().is_some() {}
         assert_eq!(worker.under_way(), 0);
+        worker.give(false);
+        assert_eq!(worker.wait(), Some(()));
     }
 }

@@ -38,6 +38,7 @@ pub use batch::PointBatch;
 pub use packed_updates::PackedUpdates;
 pub use ray::{MAX_RAY_STEPS, RayWalk};
 pub use report::{ScanReport, SkippedPoints};
+pub(crate) use trace::PutAside;
 pub use trace::ScanTracer;
 pub use updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, ScanUpdates, TileUpdates};
 pub use world_scan::Scan;

@@ -8,13 +8,23 @@ use rustc_hash::FxHashMap;
 #[derive(Debug, Default)]
 pub(super) struct PackedParts {
     tiles: FxHashMap<TileIndex, PackedUpdates>,
+    bytes: usize,
     report: Option<ScanReport>,
 }
+
+/// What a tile takes beside its updates: its place in the table, which may be half empty.
+const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, PackedUpdates)>();
 
 impl PackedParts {
     pub(super) fn add(&mut self, updates: ScanUpdates) {
         for (tile, updates) in &updates.tiles {
-            self.tiles.entry(*tile).or_default().push(updates);
+            let packed = self.tiles.entry(*tile).or_insert_with(|| {
+                self.bytes += SLOT_BYTES;
+                PackedUpdates::default()
+            });
+            let before = packed.bytes();
+            packed.push(updates);
+            self.bytes += packed.bytes() - before;
         }
         // Every part has seen all points.
         match &mut self.report {
@@ -24,6 +34,19 @@ impl PackedParts {
                 report.misses += updates.report.misses;
             }
         }
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// The updates so far, of which nothing stays here, in the order of tiles.
+    pub(super) fn take(&mut self) -> Vec<(TileIndex, PackedUpdates)> {
+        self.bytes = 0;
+        let mut tiles: Vec<_> = std::mem::take(&mut self.tiles).into_iter().collect();
+        tiles.sort_unstable_by_key(|(tile, _)| *tile);
+        tiles
     }
 
     pub(super) fn into_updates(self, grid: &Grid) -> ScanUpdates {

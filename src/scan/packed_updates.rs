@@ -58,6 +58,16 @@ impl PackedUpdates {
         }
     }
 
+    /// What [`PackedUpdates::as_bytes`] of that many updates gave, and nothing else.
+    pub(crate) fn from_parts(bytes: Vec<u8>, updates: usize) -> Self {
+        Self { bytes, updates }
+    }
+
+    /// The updates as bytes, which stay the same when more are appended.
+    pub(crate) fn as_bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
     /// What each of the scans says, in order.
     pub fn iter(&self) -> impl Iterator<Item = TileUpdates> {
         let mut input = Unpacker { bytes: &self.bytes };

@@ -12,16 +12,19 @@ use super::rounds::rounds;
 use super::slab_ray::SlabRay;
 use super::trace_memory::TraceMemory;
 use super::window::Window;
-use super::{Scan, ScanReport, ScanUpdates};
+use super::{PackedUpdates, Scan, ScanReport, ScanUpdates};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
-use crate::space::{Grid, Point};
+use crate::space::{Grid, Point, TileIndex};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rays that a thread walks at least: fewer are not worth a thread's own marks.
 const LEAST_RAYS_A_THREAD: usize = 4096;
+
+/// Takes a part of the updates of a scan, by tile.
+pub(crate) type PutAside<'a> = dyn FnMut(Vec<(TileIndex, PackedUpdates)>) -> Result<()> + 'a;
 
 /// Finds out what scans say about voxels; from scan to scan it keeps the memory that this takes.
 #[derive(Clone, Debug, Default)]
@@ -48,6 +51,25 @@ impl ScanTracer {
         rays: &RayConfig,
         scan: &Scan,
     ) -> Result<ScanUpdates> {
+        let put_aside = &mut |_| Ok(());
+        self.trace_putting_aside(grid, model, rays, scan, usize::MAX, put_aside)
+    }
+
+    /// The same for a map that is short of memory: whenever there are more than so many bytes of updates, they are put
+    /// aside, and the rest is returned. The report is about all.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanTracer::trace`], and those of putting aside.
+    pub(crate) fn trace_putting_aside(
+        &mut self,
+        grid: &Grid,
+        model: &SensorModel,
+        rays: &RayConfig,
+        scan: &Scan,
+        most_bytes: usize,
+        put_aside: &mut PutAside<'_>,
+    ) -> Result<ScanUpdates> {
         check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
         let fan = Fan::new(grid, model, rays, scan)?;
         let once_a_voxel = rays.insert_mode == InsertMode::PerScan;
@@ -68,6 +90,9 @@ impl ScanTracer {
                 return Ok(updates);
             }
             parts.add(updates);
+            if parts.bytes() > most_bytes {
+                put_aside(parts.take())?;
+            }
         }
         Ok(parts.into_updates(grid))
     }
@@ -309,7 +334,6 @@ mod tests {
     use super::*;
     use crate::scan::{BrickRuns, BrickUpdate, TileUpdates};
     use crate::sensor::Iwlo;
-    use crate::space::TileIndex;
     use proptest::prelude::*;
 
     /// The bricks of every tile in order, however they come.

@@ -1,11 +1,12 @@
 use super::commit_log::{CommitLog, Commits};
-use super::disk::{Disk, DiskRead, EntryKind};
+use super::disk::{Disk, DiskRead};
 use super::layout::{Layout, TileFile, flush_of_kept};
 use super::map_folder::{self, Lock};
 use super::metadata::Metadata;
 use super::readers::Readers;
 use super::recovery::recover;
-use super::tile_stamp::{Stamping, TileStamp};
+use super::tile_location::{StoredTile, TileLocation};
+use super::tile_stamp::TileStamp;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -54,20 +55,6 @@ pub struct TileStore {
 }
 
 struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Box<dyn DiskRead>);
-
-/// A tile's table as it is stored, ready to be read.
-pub struct StoredTile {
-    /// Where it is.
-    pub path: PathBuf,
-    /// The bytes; stamped as they pass.
-    pub input: Stamping<Box<dyn DiskRead>>,
-    /// Length of the file in bytes.
-    pub bytes: u64,
-    /// Id of the map that the file must name; `None` if it is of the seed's format.
-    pub map_id: Option<[u8; 16]>,
-    /// What the log says of the tile, if it does.
-    pub stamp: Option<TileStamp>,
-}
 
 /// How often a reader begins to open a map again because a flush came in between.
 const OPEN_ATTEMPTS: usize = 100;
@@ -299,12 +286,7 @@ impl TileStore {
     ///
     /// A file that the log names and that is missing, and a tile folder that the log does not name.
     pub fn open_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
-        let is_next = self.next.contains_key(&tile) || self.unrenamed.contains(&tile);
-        let path = match is_next {
-            true => self.layout.next(tile, TileFile::Table),
-            false => self.layout.current(tile, TileFile::Table),
-        };
-        self.open_version(tile, path)
+        self.open_version(tile, self.latest_path(tile))
     }
 
     /// Other places where a reader beside a writer may find the version of a tile's table that it sees: committed and
@@ -338,35 +320,34 @@ impl TileStore {
     ///
     /// As for [`TileStore::open_table`].
     pub fn open_version(&self, tile: TileIndex, path: PathBuf) -> Result<Option<StoredTile>> {
-        let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         if self.strays.contains(&tile) {
-            return damaged("commits.log does not name this tile");
+            let reason = "commits.log does not name this tile";
+            return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
         let stamp = self.stamp(tile);
         if stamp.is_none() && !self.foreign.contains(&tile) {
             return Ok(None);
         }
+        self.location_at(tile, path, stamp).open().map(Some)
+    }
+
+    /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before the
+    /// next commit.
+    pub fn location(&self, tile: TileIndex) -> Option<TileLocation> {
+        let stamp = self.stamp(tile)?;
+        Some(self.location_at(tile, self.latest_path(tile), Some(stamp)))
+    }
+
+    fn location_at(&self, tile: TileIndex, path: PathBuf, stamp: Option<TileStamp>) -> TileLocation {
+        let map_id = stamp.and_then(|_| self.map_id());
         let folder = self.layout.tile_folder(tile);
-        match self.disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
-            Some(EntryKind::Folder) => {}
-            Some(_) => {
-                return damaged("what has the name of the tile's folder is none; links are not followed");
-            }
-            None => return damaged("the tile's folder is missing, and the map holds this tile"),
-        }
-        match self.disk.open(&path) {
-            Ok(input) => {
-                let bytes = input.file_bytes();
-                let map_id = stamp.and_then(|_| self.map_id());
-                Ok(Some(StoredTile { path, input: Stamping::new(input), bytes, map_id, stamp }))
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                damaged("the file is missing, and the map holds this tile")
-            }
-            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
-                damaged("no regular file; links inside a map are not followed")
-            }
-            Err(error) => Err(Error::io(&path, "open", error)),
+        TileLocation { disk: self.disk.clone(), tile, folder, path, map_id, stamp }
+    }
+
+    fn latest_path(&self, tile: TileIndex) -> PathBuf {
+        match self.next.contains_key(&tile) || self.unrenamed.contains(&tile) {
+            true => self.layout.next(tile, TileFile::Table),
+            false => self.layout.current(tile, TileFile::Table),
         }
     }
 }

@@ -1,0 +1,151 @@
+//! How a map becomes durable: what waits is applied, what is dirty is written, and all of it committed.
+
+use super::map_id::new_map_id;
+use super::residency::{Input, Residency};
+use super::tile_files;
+use crate::config::MapConfig;
+use crate::error::Result;
+use crate::space::TileIndex;
+use crate::store::{Extension, Metadata, hex};
+use crate::tile::Tile;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+impl Residency {
+    /// Flushes, and with the flush what the map is being built from now.
+    pub(super) fn begin_input(&mut self, input: Input, scan_number: u64) -> Result<()> {
+        let before = self.input.replace(input);
+        let flushed = self.flush(scan_number);
+        if flushed.is_err() {
+            self.input = before;
+        }
+        flushed
+    }
+
+    /// Applies what waits, writes every dirty tile and commits.
+    pub(super) fn flush(&mut self, scan_number: u64) -> Result<()> {
+        self.end_traffic(scan_number)?;
+        // Whatever it was: its tile is written again now.
+        self.save_error = None;
+        for index in self.store.suspects() {
+            // Its file cannot be trusted to be on the medium; what can be read of it is checked as always.
+            if !self.tiles.contains(index) {
+                self.bring_in(index, scan_number)?;
+            }
+            self.write(index, scan_number)?;
+        }
+        let mut waiting: Vec<_> = self.pending.tiles().collect();
+        waiting.sort_unstable();
+        for index in waiting {
+            self.flush_waiting(index, scan_number)?;
+        }
+        // The files are made of the tables alone. But what statistics say of octrees is as of the flush, and tables
+        // whose bricks are in order are written sooner.
+        self.sync_octrees();
+        let mut cold: Vec<_> = self.cold.dirty_tiles();
+        cold.sort_unstable();
+        let mut cold = cold.into_iter();
+        for index in self.cached_tile_indices() {
+            // The other thread writes tiles in the compact form meanwhile.
+            while self.traffic.can_save()
+                && let Some(index) = cold.next()
+            {
+                self.send_to_disk(index, scan_number)?;
+            }
+            self.save(index, scan_number)?;
+            self.take_saved_tiles();
+        }
+        for index in cold {
+            self.send_to_disk(index, scan_number)?;
+        }
+        self.end_saves()?;
+        self.adopt()?;
+        self.store.commit(self.metadata(), scan_number)
+    }
+
+    /// Applies what waits for a tile. Where there is no room for the tile it is written at once and not kept.
+    fn flush_waiting(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+        if self.plan.cold_bytes == 0 {
+            return self.bring_in(index, scan_number);
+        }
+        let tile = Arc::new(self.read(index, scan_number)?);
+        let fits = self.has_room_for(tile.bytes());
+        if !fits {
+            // While it is written it comes on top: only then what waits is forgotten, and an error leaves it here.
+            self.make_room(&tile, scan_number)?;
+        }
+        self.has_come_in(tile);
+        if !fits {
+            self.save(index, scan_number)?;
+            self.tiles.remove(index);
+        }
+        Ok(())
+    }
+
+    /// Writes a tile in memory if it is dirty, and tells whether it was; after an error it is as it was.
+    pub(super) fn save(&mut self, index: TileIndex, scan_number: u64) -> Result<bool> {
+        let is_dirty = self.tiles.peek(index).is_some_and(|tile| tile.is_dirty());
+        if is_dirty {
+            self.write(index, scan_number)?;
+        }
+        Ok(is_dirty)
+    }
+
+    pub(super) fn write(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+        self.adopt()?;
+        // Until it is written: what is on disk of it may be cut short by an attempt that fails.
+        self.tiles.change(index, Tile::mark_dirty);
+        let Some(tile) = self.tiles.peek(index) else { return Ok(()) };
+        let stamp = tile_files::save(&mut self.store, &self.config, tile, scan_number)?;
+        self.tiles.change(index, Tile::mark_clean);
+        self.io.saves += 1;
+        self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
+        self.known_whole.insert(index);
+        self.saved.insert(index);
+        Ok(())
+    }
+
+    /// Gives a map of the seed's format, before its first change, an id, a log and trailers: every tile is written
+    /// anew as it is, and committed. Until that is done it stays a map of the seed's format, with the same content.
+    pub(super) fn adopt(&mut self) -> Result<()> {
+        if self.store.metadata().ext.is_some() {
+            return Ok(());
+        }
+        log::info!("{}: a map of the seed's format; its tiles get checksums", self.store.folder().display());
+        self.store.adopt(new_map_id())?;
+        for index in self.store.suspects() {
+            // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
+            self.store.drop_next(index);
+        }
+        for index in self.store.tiles().collect::<BTreeSet<_>>() {
+            if self.store.stamp(index).is_some() {
+                continue; // Written by an earlier attempt.
+            }
+            if let Some((tile, _)) = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
+                tile_files::save(&mut self.store, &self.config, &tile, 0)?;
+            }
+        }
+        self.store.commit(self.metadata(), 0)
+    }
+
+    fn metadata(&self) -> Metadata {
+        new_metadata(&self.config, self.store.map_id().unwrap_or_default(), self.input.as_ref())
+    }
+}
+
+/// The metadata of a map; bounds and numbers are the store's to fill in.
+pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
+    let ext = Extension {
+        empty: true,
+        map_id: hex(&map_id),
+        flush_number: 0,
+        scan_number: 0,
+        sensor_model: config.sensor_model,
+        occupancy_threshold: config.occupancy_threshold,
+        rays: config.rays,
+        input_fingerprint: input.map(|input| input.fingerprint.clone()),
+        input_first_scan: input.map_or(0, |input| input.first_scan),
+    };
+    let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
+    Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }
+}
