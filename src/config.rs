@@ -41,6 +41,9 @@ pub enum MemoryLimit {
     /// Most bytes of all that grows: tiles, updates that wait for tiles, what a scan takes while it is inserted, what is
     /// known of the tiles on disk. At least [`MemoryLimit::least_bytes`].
     Bytes(usize),
+    /// See [`MapConfig::with_tight_memory_bytes`].
+    #[doc(hidden)]
+    Tight(usize),
 }
 
 /// Which part of a ray counts, and how often.
@@ -164,7 +167,7 @@ impl MapConfig {
     pub fn with_pending_bytes(self, pending_bytes: usize) -> Self {
         let tiles = match self.memory {
             MemoryLimit::Tiles { tiles, .. } => tiles,
-            MemoryLimit::Bytes(_) => usize::MAX,
+            MemoryLimit::Bytes(_) | MemoryLimit::Tight(_) => usize::MAX,
         };
         Self { memory: MemoryLimit::Tiles { tiles, pending_bytes }, ..self }
     }
@@ -174,10 +177,17 @@ impl MapConfig {
         Self { memory: MemoryLimit::Bytes(bytes), ..self }
     }
 
+    /// [`MapConfig::with_memory_bytes`] below what is the least, for tests of maps that are short of memory: the map is
+    /// the same, but the limit does not hold.
+    #[doc(hidden)]
+    pub fn with_tight_memory_bytes(self, bytes: usize) -> Self {
+        Self { memory: MemoryLimit::Tight(bytes), ..self }
+    }
+
     fn pending_bytes(&self) -> usize {
         match self.memory {
             MemoryLimit::Tiles { pending_bytes, .. } => pending_bytes,
-            MemoryLimit::Bytes(_) => DEFAULT_PENDING_BYTES,
+            MemoryLimit::Bytes(_) | MemoryLimit::Tight(_) => DEFAULT_PENDING_BYTES,
         }
     }
 

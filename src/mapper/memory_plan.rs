@@ -15,6 +15,8 @@ pub(super) struct MemoryPlan {
     pub(super) updates_bytes: usize,
     /// Bytes that are kept free for inserting scans from the beginning.
     pub(super) least_scan_bytes: usize,
+    /// Whether what a scan takes counts.
+    pub(super) counts_scan: bool,
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,
     /// Most bytes of tiles in the compact form while others have to go.
@@ -31,20 +33,30 @@ impl MemoryPlan {
                 scan_bytes: usize::MAX,
                 updates_bytes: usize::MAX,
                 least_scan_bytes: 0,
+                counts_scan: true,
                 spare_bytes: 0,
                 cold_bytes: 0,
             },
             // Waiting updates are small beside their tiles, and the more wait the fewer reads and writes there are.
-            MemoryLimit::Bytes(bytes) => Self {
-                tiles: usize::MAX,
-                bytes,
-                pending_bytes: bytes / 4,
-                scan_bytes: bytes / 4,
-                updates_bytes: bytes / 8,
-                least_scan_bytes: bytes / 8,
-                spare_bytes: bytes / 4,
-                cold_bytes: bytes / 8 * 3,
-            },
+            MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
+            // The marks of even a small scan take more than there is.
+            MemoryLimit::Tight(bytes) => {
+                Self { least_scan_bytes: 0, counts_scan: false, ..Self::shares_of(bytes) }
+            }
+        }
+    }
+
+    fn shares_of(bytes: usize) -> Self {
+        Self {
+            tiles: usize::MAX,
+            bytes,
+            pending_bytes: bytes / 4,
+            scan_bytes: bytes / 4,
+            updates_bytes: bytes / 8,
+            least_scan_bytes: bytes / 8,
+            counts_scan: true,
+            spare_bytes: bytes / 4,
+            cold_bytes: bytes / 8 * 3,
         }
     }
 }

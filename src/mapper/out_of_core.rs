@@ -1,6 +1,6 @@
+use super::flush::new_metadata;
 use super::map_id::new_map_id;
 use super::memory_plan::MemoryPlan;
-use super::flush::new_metadata;
 use super::residency::{Input, Residency};
 use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};

@@ -129,7 +129,9 @@ impl Residency {
         scan_bytes: usize,
         scan_number: u64,
     ) -> Result<()> {
-        self.scan_bytes = self.scan_bytes.max(scan_bytes);
+        if self.plan.counts_scan {
+            self.scan_bytes = self.scan_bytes.max(scan_bytes);
+        }
         self.take_arrived(scan_number)?;
         self.work_off(scan_number)?;
         for (tile, _) in &updates.tiles {

@@ -2,13 +2,15 @@ use super::tile_order::in_order_of_tiles;
 use super::updates::{ScanUpdates, TileUpdates};
 use super::{PackedUpdates, ScanReport};
 use crate::space::{Grid, TileIndex};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// The updates of one scan, put together from parts of different voxels, packed.
 #[derive(Debug, Default)]
 pub(super) struct PackedParts {
     tiles: FxHashMap<TileIndex, PackedUpdates>,
     bytes: usize,
+    /// Tiles whose updates were taken already.
+    taken: FxHashSet<TileIndex>,
     report: Option<ScanReport>,
 }
 
@@ -46,12 +48,16 @@ impl PackedParts {
         self.bytes = 0;
         let mut tiles: Vec<_> = std::mem::take(&mut self.tiles).into_iter().collect();
         tiles.sort_unstable_by_key(|(tile, _)| *tile);
+        self.taken.extend(tiles.iter().map(|(tile, _)| *tile));
         tiles
     }
 
     pub(super) fn into_updates(self, grid: &Grid) -> ScanUpdates {
+        let only_taken = self.taken.iter().filter(|tile| !self.tiles.contains_key(tile)).count() as u64;
         let tiles =
             self.tiles.into_iter().map(|(tile, updates)| (tile, TileUpdates::Packed(updates))).collect();
-        in_order_of_tiles(grid, tiles, self.report.unwrap_or_default())
+        let mut updates = in_order_of_tiles(grid, tiles, self.report.unwrap_or_default());
+        updates.report.tiles_touched += only_taken;
+        updates
     }
 }

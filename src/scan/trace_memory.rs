@@ -31,7 +31,7 @@ impl TraceMemory {
     /// How many pages may be marked at a time, by each of so many collectors.
     pub(super) fn pages_at_a_time(&self, collectors: usize) -> usize {
         // Of what is marked, lists of bricks and updates are made, which take as much again.
-        (self.most_bytes / 2 / self.page_bytes / collectors).max(8)
+        (self.most_bytes / 2 / self.page_bytes / collectors).max(1)
     }
 
     /// Learns what so many pages took, over all collectors.

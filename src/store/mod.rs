@@ -29,10 +29,10 @@ pub use layout::{Layout, QUARANTINE, TileFile, flush_of_kept, folder_name, tile_
 pub use map_folder::{Lock, read_log};
 pub use metadata::{Bounds, Extension, MapParameters, Metadata};
 pub use remains::Remains;
+pub use tile_location::{StoredTile, TileLocation};
 pub(crate) use tile_stamp::MAX_NUMBER;
 pub use tile_stamp::{FileStamp, Stamping, TileStamp};
-pub(crate) use tile_store::hex;
-pub use tile_location::{StoredTile, TileLocation};
 pub use tile_store::TileStore;
+pub(crate) use tile_store::hex;
 pub use tile_writer::TileWriter;
 pub use waiting_file::WaitingFile;

@@ -20,6 +20,12 @@ fn config() -> MapConfig {
     MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_pending_bytes(600)
 }
 
+/// Next to no memory: resident tiles become compact, those are saved by a thread of their own, and updates wait in
+/// files. Which operation comes as the n-th is left to chance then.
+fn short_of_memory() -> MapConfig {
+    config().with_tight_memory_bytes(6_000)
+}
+
 /// Scans on a way there and back again, so that tiles come again that were pushed out.
 fn scans() -> Vec<Scan> {
     let mut random = Random(7);
@@ -29,6 +35,7 @@ fn scans() -> Vec<Scan> {
 
 /// What must come out: the digests after each number of scans.
 struct Oracle {
+    config: MapConfig,
     scans: Vec<Scan>,
     digests: Vec<blake3::Hash>,
     answers: Vec<Occupancy>,
@@ -36,8 +43,12 @@ struct Oracle {
 
 impl Oracle {
     fn new() -> Self {
+        Self::of(config())
+    }
+
+    fn of(config: MapConfig) -> Self {
         let scans = scans();
-        let mut mapper = InMemoryMapper::new(config()).unwrap();
+        let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
         let (mut digests, mut answers) = (Vec::new(), Vec::new());
         for number in 0..=scans.len() {
             digests.push(mapper.digest().unwrap());
@@ -46,7 +57,7 @@ impl Oracle {
                 mapper.insert_scan(scan).unwrap();
             }
         }
-        Self { scans, digests, answers }
+        Self { config, scans, digests, answers }
     }
 
     fn check(&self, map: &impl MapView, what: &str) {
@@ -56,21 +67,21 @@ impl Oracle {
     }
 }
 
-fn create(disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
-    match OutOfCoreTileMapper::create_on(disk.shared(), &map(), config()) {
+fn create(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
+    match OutOfCoreTileMapper::create_on(disk.shared(), &map(), oracle.config.clone()) {
         // An attempt that failed at its very end has made the map.
-        Err(Error::AlreadyExists { .. }) => open(disk),
+        Err(Error::AlreadyExists { .. }) => open(disk, oracle),
         created => created,
     }
 }
 
-fn open(disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
-    OutOfCoreTileMapper::open_on(disk.shared(), &map(), config())
+fn open(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
+    OutOfCoreTileMapper::open_on(disk.shared(), &map(), oracle.config.clone())
 }
 
-fn open_or_create(disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
-    match open(disk) {
-        Err(Error::NoMap { .. }) => create(disk),
+fn open_or_create(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
+    match open(disk, oracle) {
+        Err(Error::NoMap { .. }) => create(disk, oracle),
         opened => opened,
     }
 }
@@ -122,7 +133,7 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
         let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("questions go on");
         assert_eq!(answer, oracle.answers[mapper.scan_number() as usize]);
     };
-    let mut mapper = insist(disk, &mut (), nothing, |_| open_or_create(disk))?;
+    let mut mapper = insist(disk, &mut (), nothing, |_| open_or_create(disk, oracle))?;
     let done = insist(disk, &mut mapper, look, |mapper| mapper.resume_input(INPUT))? as usize;
     (reached.safe, reached.tried) = (done, done);
     assert_eq!(mapper.scan_number(), done as u64);
@@ -146,7 +157,7 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
         if number == REOPENED {
             readers.clear();
             drop(mapper);
-            mapper = insist(disk, &mut (), nothing, |_| open(disk))?;
+            mapper = insist(disk, &mut (), nothing, |_| open(disk, oracle))?;
         }
     }
     let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
@@ -217,6 +228,26 @@ fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
 }
 
 #[test]
+fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operation() {
+    let oracle = Oracle::of(short_of_memory());
+    let changes = undisturbed(&oracle).changes();
+    for at in 0..changes {
+        for fault in [Fault::Fails(2 * at), Fault::IsFull(at), Fault::Crashes(at)] {
+            let disk = FaultyDisk::new(fault);
+            let reached = live(&disk, &oracle);
+            let left = disk.after_crash(Unsynced::Shuffled(at));
+            if reached.finished {
+                let reader = MapReader::open_on(left.shared(), &map(), 1);
+                oracle.check(&reader.unwrap_or_else(|error| panic!("{fault:?}: {error}")), "at the end");
+            } else {
+                assert!(disk.has_crashed(), "{fault:?}");
+                check_after_crash(&left, &oracle, reached, &format!("{fault:?}, short of memory"));
+            }
+        }
+    }
+}
+
+#[test]
 fn the_power_goes_some_time_after_the_process_was_killed_at_every_operation() {
     let oracle = Oracle::new();
     let changes = undisturbed(&oracle).changes();
@@ -249,7 +280,7 @@ fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
             for again in 0.. {
                 let recovering = left.copy();
                 recovering.set_fault(Fault::Crashes(again));
-                let opened = open(&recovering);
+                let opened = open(&recovering, &oracle);
                 if !recovering.has_crashed() {
                     break;
                 }
@@ -266,7 +297,7 @@ fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
                     Err(Error::NoMap { .. }) if reached.safe == 0 => {}
                     Err(error) => panic!("{what}: {error}"),
                 }
-                match open(&left) {
+                match open(&left, &oracle) {
                     Ok(mapper) => oracle.check(&mapper, &what),
                     Err(Error::NoMap { .. }) if reached.safe == 0 => {}
                     Err(error) => panic!("{what}: {error}"),
@@ -301,7 +332,7 @@ fn a_flush_that_failed_leaves_nothing_behind_that_a_crash_could_bring_back() {
 /// Inserts all scans and flushes as always, whatever a flush answers; after the first that fails comes another fault.
 /// `None` if none failed, or something else did.
 fn live_carelessly(disk: &FaultyDisk, oracle: &Oracle, then: Fault) -> Option<Reached> {
-    let mut mapper = create(disk).ok()?;
+    let mut mapper = create(disk, oracle).ok()?;
     mapper.begin_input(INPUT).ok()?;
     let (mut reached, mut has_failed) = (Reached::default(), false);
     for (scan, number) in oracle.scans.iter().zip(1..) {
@@ -337,7 +368,7 @@ fn a_flush_that_failed_is_not_believed_by_the_next_process() {
             let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(0)) else { continue };
             points += 1;
             let next = disk.after_kill();
-            drop(open(&next).unwrap());
+            drop(open(&next, &oracle).unwrap());
             let left = next.after_crash(Unsynced::Dropped);
             check_after_crash(&left, &oracle, reached, &format!("{fault:?}"));
         }
@@ -351,7 +382,7 @@ fn the_input_is_that_of_the_last_commit() {
     let oracle = Oracle::new();
     let begin = |fault| {
         let disk = FaultyDisk::new(Fault::None);
-        let mut mapper = create(&disk).unwrap();
+        let mut mapper = create(&disk, &oracle).unwrap();
         mapper.insert_scan(&oracle.scans[0]).unwrap();
         mapper.begin_input("other scans").unwrap();
         disk.set_fault(fault);
@@ -374,7 +405,8 @@ fn the_input_is_that_of_the_last_commit() {
         let is_committed = log_bytes(left) == longest || says_so(left);
         assert!(is_committed || !begun);
         *(if is_committed { &mut committed } else { &mut not_committed }) += 1;
-        let resumed = open(left).unwrap().resume_input(if is_committed { INPUT } else { "other scans" });
+        let resumed =
+            open(left, &oracle).unwrap().resume_input(if is_committed { INPUT } else { "other scans" });
         assert!(resumed.is_ok(), "crash at {at}: {resumed:?}");
     }
     assert!(committed > 1 && not_committed > 0);
@@ -386,7 +418,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
     for at in 0..60 {
         for full in 0..12 {
             let disk = FaultyDisk::new(Fault::None);
-            let mut mapper = create(&disk).unwrap();
+            let mut mapper = create(&disk, &oracle).unwrap();
             for scan in &oracle.scans[..3] {
                 mapper.insert_scan(scan).unwrap();
             }
@@ -437,7 +469,7 @@ fn a_reload_that_fails_changes_nothing() {
 /// A map of the seed's own format, with the content of the first three scans.
 fn foreign(oracle: &Oracle) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
-    let mut mapper = create(&disk).unwrap();
+    let mut mapper = create(&disk, oracle).unwrap();
     for scan in &oracle.scans[..3] {
         mapper.insert_scan(scan).unwrap();
     }
@@ -461,13 +493,13 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
     let oracle = Oracle::new();
     let foreign = foreign(&oracle);
     let (before, after) = {
-        let mut mapper = open(&foreign.copy()).unwrap();
+        let mut mapper = open(&foreign.copy(), &oracle).unwrap();
         let before = mapper.digest().unwrap();
         mapper.insert_scan(&oracle.scans[3]).unwrap();
         (before, mapper.digest().unwrap())
     };
     let adopt = |disk: &FaultyDisk| -> Result<()> {
-        let mut mapper = open(disk)?;
+        let mut mapper = open(disk, &oracle)?;
         mapper.insert_scan(&oracle.scans[3])?;
         mapper.flush()
     };
@@ -484,7 +516,7 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
                 .unwrap_or_else(|error| panic!("{what}: {error}"));
             let digest = reader.digest().unwrap_or_else(|error| panic!("{what}: {error}"));
             assert!(digest == after || (!done && digest == before), "{what}");
-            let mapper = open(&left).unwrap_or_else(|error| panic!("{what}: {error}"));
+            let mapper = open(&left, &oracle).unwrap_or_else(|error| panic!("{what}: {error}"));
             assert_eq!(mapper.digest().unwrap(), digest, "{what}");
         }
         if !disk.has_crashed() {
@@ -495,7 +527,7 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
     for first in (0..90).step_by(3) {
         for second in (0..90).step_by(2) {
             let disk = foreign.copy();
-            let mut mapper = open(&disk).unwrap();
+            let mut mapper = open(&disk, &oracle).unwrap();
             mapper.insert_scan(&oracle.scans[3]).unwrap();
             for full in [first, second] {
                 disk.set_fault(Fault::IsFull(full));

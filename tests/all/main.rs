@@ -41,3 +41,4 @@ mod support;
 mod trajectories;
 /// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
 mod voxel_cache;
+mod wide_scans;

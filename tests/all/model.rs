@@ -12,7 +12,10 @@ fn live(seed: u64, config: &MapConfig) {
     let mut random = Random(seed);
     let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
     let mut reference = ReferenceMap::new(config);
-    let MemoryLimit::Tiles { tiles: most_tiles, .. } = config.memory else { panic!("a limit in tiles") };
+    let most_tiles = match config.memory {
+        MemoryLimit::Tiles { tiles, .. } => tiles,
+        _ => usize::MAX,
+    };
     let (mut scans, mut flushed): (u64, (Voxels, u64)) = (0, (Voxels::new(), 0));
     for _ in 0..60 {
         match random.below(10) {
@@ -62,5 +65,8 @@ fn any_life_of_a_map_equals_the_naive_map_as_of_then() {
             config = config.with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
         }
         live(seed, &config);
+        // From nothing but what a scan needs to a few of the map's tiles.
+        let bytes = [0, 3_000, 30_000, 100_000, 300_000][seed as usize % 5];
+        live(seed, &config.with_tight_memory_bytes(bytes));
     }
 }

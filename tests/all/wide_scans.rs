@@ -1,0 +1,129 @@
+//! Scans whose updates alone are more than the memory that there is.
+
+use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use crate::support::random_scans::{Random, random_scan};
+use std::path::Path;
+use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::{
+    InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan,
+};
+
+/// From masts here and there: every ray goes far, through many tiles.
+fn scans() -> Vec<Scan> {
+    let mut random = Random(11);
+    let masts = [0.0, 0.0, 9.0, 0.0, -7.0, 9.0];
+    let mut scan = |x: f64| {
+        let near = random_scan(&mut random, [x, 0.0, 0.0], 40);
+        let far =
+            |point: &[f64; 3]| std::array::from_fn(|k| near.origin[k] + 9.0 * (point[k] - near.origin[k]));
+        Scan { points: near.points.iter().map(far).collect(), ..near }
+    };
+    masts.iter().map(|&x| scan(x)).collect()
+}
+
+fn configs() -> impl Iterator<Item = MapConfig> {
+    let config = MapConfig::new(0.25, 4.0).unwrap();
+    let iwlo = config.clone().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
+    let every_ray = config.clone().with_insert_mode(InsertMode::PerRay);
+    [config, iwlo, every_ray].into_iter()
+}
+
+#[test]
+fn a_scan_of_more_updates_than_memory_is_taken_whole() {
+    let scans = scans();
+    for config in configs() {
+        let mut expected = InMemoryMapper::new(config.clone()).unwrap();
+        for bytes in [0, 20_000, 200_000] {
+            let disk = FaultyDisk::new(Fault::None);
+            let tight = config.clone().with_tight_memory_bytes(bytes);
+            let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), Path::new("/map"), tight).unwrap();
+            let mut in_files = 0;
+            for (number, scan) in scans.iter().enumerate() {
+                let report = mapper.insert_scan(scan).unwrap();
+                if bytes == 0 {
+                    assert_eq!(expected.insert_scan(scan).unwrap(), report);
+                }
+                in_files = in_files.max(mapper.statistics().pending_file_bytes);
+                if number == 3 {
+                    mapper.flush().unwrap();
+                    assert_eq!(mapper.statistics().pending_file_bytes, 0);
+                }
+                let point = scan.points[7];
+                mapper.occupancy_at(point).unwrap();
+            }
+            assert!(in_files > 0, "{bytes} bytes: nothing was put in files");
+            let digest = mapper.digest().unwrap();
+            if expected.scan_number() as usize == scans.len() {
+                assert_eq!(digest, expected.digest().unwrap(), "{bytes} bytes");
+            }
+            mapper.flush().unwrap();
+            drop(mapper);
+            let reader = MapReader::open_on(disk.shared(), Path::new("/map"), 4).unwrap();
+            assert_eq!(reader.digest().unwrap(), digest);
+            assert!(disk.files().keys().all(|path| path.extension().is_none_or(|last| last != "next")));
+        }
+    }
+}
+
+/// How many operations are tried.
+const POINTS: u64 = 24;
+
+/// A disk that refuses once, at any operation: the scan is undone, and goes the next time; a crash opens as of the last
+/// flush, and what waited in files is gone.
+#[test]
+fn a_wide_scan_that_the_disk_refuses_is_undone() {
+    let scans = &scans()[..4];
+    let config = MapConfig::new(0.4, 6.4).unwrap();
+    let tight = config.clone().with_tight_memory_bytes(5_000);
+    let mut digests = Vec::new();
+    let mut expected = InMemoryMapper::new(config).unwrap();
+    for scan in scans {
+        expected.insert_scan(scan).unwrap();
+        digests.push(expected.digest().unwrap());
+    }
+    let begin = |disk: &FaultyDisk| {
+        let mut mapper =
+            OutOfCoreTileMapper::create_on(disk.shared(), Path::new("/map"), tight.clone()).unwrap();
+        mapper.insert_scan(&scans[0]).unwrap();
+        mapper.flush().unwrap();
+        mapper.insert_scan(&scans[1]).unwrap();
+        mapper
+    };
+    let operations = {
+        let disk = FaultyDisk::new(Fault::None);
+        let mut mapper = begin(&disk);
+        let before = disk.operations();
+        mapper.insert_scan(&scans[2]).unwrap();
+        disk.operations() - before
+    };
+    println!("{operations} operations in a wide scan");
+    let mut refusals = 0;
+    for number in 0..POINTS {
+        let at = operations * number / POINTS;
+        let disk = FaultyDisk::new(Fault::None);
+        let mut mapper = begin(&disk);
+        let crashes = number % 2 == 1;
+        disk.set_fault(if crashes { Fault::Crashes(at / 4) } else { Fault::Fails(at) });
+        let is_refused = mapper.insert_scan(&scans[2]).is_err();
+        if crashes && disk.has_crashed() {
+            drop(mapper);
+            let left = disk.after_crash(Unsynced::Shuffled(at));
+            let mut mapper =
+                OutOfCoreTileMapper::open_on(left.shared(), Path::new("/map"), tight.clone()).unwrap();
+            assert_eq!(mapper.digest().unwrap(), digests[0], "crash at {at}");
+            scans[1..].iter().for_each(|scan| drop(mapper.insert_scan(scan).unwrap()));
+            assert_eq!(mapper.digest().unwrap(), digests[3], "crash at {at}, and on");
+            continue;
+        }
+        refusals += usize::from(is_refused);
+        disk.make_room();
+        if is_refused {
+            assert_eq!(mapper.digest().unwrap(), digests[1], "refused at {at}");
+            mapper.insert_scan(&scans[2]).unwrap();
+        }
+        mapper.insert_scan(&scans[3]).unwrap();
+        assert_eq!(mapper.digest().unwrap(), digests[3], "at {at}");
+        mapper.flush().unwrap();
+    }
+    assert!(refusals > POINTS as usize / 4, "{refusals} scans were refused");
+}
