@@ -18,6 +18,9 @@ pub struct BrickCode(pub u64);
 pub type BrickMask = [u64; 8];
 
 impl BrickCode {
+    /// One more than the largest code.
+    pub const END: u64 = MortonCode::END >> 9;
+
     /// The brick that holds a voxel.
     pub const fn of_voxel(voxel: VoxelIndex) -> Self {
         VoxelKey::from_index(voxel).morton().brick()

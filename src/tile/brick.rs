@@ -29,7 +29,12 @@ impl Brick {
 
     /// A brick in which nothing was observed yet.
     pub(super) const fn new(code: BrickCode) -> Self {
-        Self { code, observed: [0; 8], evidence: Storage::Interned(Cells::empty()), summary: Summary::STALE }
+        Self::with(code, [0; 8], Storage::Interned(Cells::empty()))
+    }
+
+    /// A brick with voxels.
+    pub(super) const fn with(code: BrickCode, observed: BrickMask, evidence: Storage) -> Self {
+        Self { code, observed, evidence, summary: Summary::STALE }
     }
 
     pub(super) fn code(&self) -> BrickCode {

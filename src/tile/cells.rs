@@ -20,6 +20,17 @@ impl<T: Copy> Cells<T> {
         Self { places: [ABSENT; 8], cells: Vec::new() }
     }
 
+    /// The cells of the words of a mask that are not 0, in their order, filled with `value`.
+    pub(super) fn of_words(mask: &BrickMask, value: T) -> Self {
+        let mut places = [ABSENT; 8];
+        let mut count = 0;
+        for (place, _) in places.iter_mut().zip(mask).filter(|(_, word)| **word != 0) {
+            *place = count;
+            count += 1;
+        }
+        Self { places, cells: vec![[value; CELL_VOXELS]; count.into()] }
+    }
+
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.cells.capacity() * size_of::<[T; CELL_VOXELS]>()

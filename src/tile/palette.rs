@@ -67,6 +67,16 @@ impl Palette {
         }
     }
 
+    /// A palette with room for all states that one can take, until [`limit_by_use`](Self::limit_by_use).
+    pub(super) fn with_all_room() -> Self {
+        Self::limited(MOST_STATES, MOST_STATES)
+    }
+
+    /// Sets the limit to what it would be, had the states come one by one.
+    pub(super) fn limit_by_use(&mut self) {
+        self.limit = (2 * self.len()).next_power_of_two().clamp(FIRST_LIMIT, self.most);
+    }
+
     /// The sensor model by which steps are taken.
     pub(super) fn model(&self) -> &SensorModel {
         &self.model
@@ -163,6 +173,21 @@ impl Palette {
             self.next[usize::from(before)].hit = after;
         }
         Ok(after)
+    }
+
+    /// The state of some evidence, if it is known.
+    pub(super) fn find(&self, evidence: Evidence) -> Option<StateId> {
+        if self.slots.is_empty() {
+            return None;
+        }
+        let mut slot = self.slot_of(evidence);
+        loop {
+            match self.slots[slot] {
+                UNKNOWN => return None,
+                state if is_same(self.evidence(state), evidence) => return Some(state),
+                _ => slot = (slot + 1) & (self.slots.len() - 1),
+            }
+        }
     }
 
     /// The state of some evidence, a new one if need be.

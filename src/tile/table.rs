@@ -157,7 +157,7 @@ impl Table {
         brick.iter(&self.palette).map(|(place, evidence)| (brick.code().voxel(place), evidence))
     }
 
-    fn bricks_in_order(&self) -> impl Iterator<Item = &Brick> {
+    pub(super) fn bricks_in_order(&self) -> impl Iterator<Item = &Brick> {
         let in_order = if self.is_in_order() { Vec::new() } else { self.sorted_numbers() };
         let order = if self.is_in_order() { self.order.iter() } else { [].iter() };
         order.copied().chain(in_order).map(|number| &self.bricks[number as usize])
@@ -188,7 +188,7 @@ impl Table {
         self.bricks.get((self.directory.get(at) as usize).wrapping_sub(1))
     }
 
-    #[cfg(test)]
+    /// An empty table with a palette.
     pub(super) fn with_palette(palette: Palette) -> Self {
         Self { palette, ..Self::default() }
     }

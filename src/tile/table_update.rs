@@ -147,6 +147,14 @@ impl Table {
         }
     }
 
+    /// Adds a brick of which nothing is there yet, its states numbered as in the table's palette.
+    pub(super) fn add_brick(&mut self, brick: Brick) {
+        let number = self.number_of(brick.code());
+        self.len += brick.observed.iter().map(|word| word.count_ones() as usize).sum::<usize>();
+        self.cell_bytes += brick.heap_bytes();
+        self.bricks[number] = brick;
+    }
+
     /// The number of a brick, which is made if it is not there.
     fn number_of(&mut self, code: BrickCode) -> usize {
         let number = self.directory.entry(Address::of_brick(code));

@@ -32,13 +32,17 @@ pub(super) fn of_another_tile(key: VoxelKey, offset: u64) -> FormatError {
 /// Whether the values of an entry at `offset` can be evidence.
 #[inline]
 pub(super) fn check_evidence(evidence: Evidence, offset: u64) -> Result<(), FormatError> {
-    let Evidence { log_odds, observation_count } = evidence;
+    match fault_of(evidence) {
+        None => Ok(()),
+        Some((within, reason)) => Err(FormatError::at_offset(offset + within, reason)),
+    }
+}
+
+/// Why values can be no evidence, and where in an entry the one stands that is wrong.
+#[inline]
+pub(super) fn fault_of(Evidence { log_odds, observation_count }: Evidence) -> Option<(u64, String)> {
     if !log_odds.is_finite() {
-        return Err(FormatError::at_offset(offset + 6, format!("log-odds {log_odds} are not finite")));
+        return Some((6, format!("log-odds {log_odds} are not finite")));
     }
-    if observation_count < 0 {
-        let reason = format!("observation count {observation_count} is negative");
-        return Err(FormatError::at_offset(offset + 14, reason));
-    }
-    Ok(())
+    (observation_count < 0).then(|| (14, format!("observation count {observation_count} is negative")))
 }

@@ -12,12 +12,14 @@
 
 mod any_order_entries;
 mod ascending_entries;
+mod compact;
 mod entries;
 mod entry;
 mod reader;
 mod trailer;
 mod writer;
 
+pub use compact::{CompactEffort, read_compact, write_compact};
 pub use entries::encode_entries;
 pub use reader::{DecodedTable, read_table, read_trailer};
 pub use trailer::{TRAILER_BYTES, Trailer};

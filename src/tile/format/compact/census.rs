@@ -1,0 +1,89 @@
+use crate::sensor::Evidence;
+use crate::tile::Table;
+use crate::tile::brick::{Brick, Storage};
+use crate::tile::palette::{Palette, StateId, UNKNOWN};
+use rustc_hash::FxHashMap;
+
+/// How many voxels of a table are in a state.
+pub(super) struct Census {
+    /// By number in the table's palette.
+    pub(super) interned: Vec<u32>,
+    /// Of the states that the palette does not have.
+    pub(super) others: FxHashMap<StateKey, u32>,
+    /// Further states to be counted.
+    room: usize,
+}
+
+/// A state, to the bit.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct StateKey {
+    pub(super) log_odds_bits: u64,
+    pub(super) observation_count: i32,
+}
+
+/// Most states that are counted, the first ones in Morton order: what a palette can hold, so that only a table with
+/// bricks that do without it has more.
+const MOST_COUNTED: usize = (1 << 16) - 1;
+
+impl From<Evidence> for StateKey {
+    fn from(evidence: Evidence) -> Self {
+        Self { log_odds_bits: evidence.log_odds.to_bits(), observation_count: evidence.observation_count }
+    }
+}
+
+impl From<StateKey> for Evidence {
+    fn from(key: StateKey) -> Self {
+        Self { log_odds: f64::from_bits(key.log_odds_bits), observation_count: key.observation_count }
+    }
+}
+
+impl Census {
+    pub(super) fn of(table: &Table) -> Self {
+        let interned = vec![0; table.palette.len()];
+        let mut census = Self { interned, others: FxHashMap::default(), room: MOST_COUNTED };
+        if table.bricks.iter().all(|brick| matches!(brick.evidence, Storage::Interned(_))) {
+            // All are counted, so the order does not matter.
+            table.bricks.iter().for_each(|brick| census.count_all(brick));
+        } else {
+            table.bricks_in_order().for_each(|brick| census.count_first(brick, &table.palette));
+        }
+        census.interned[usize::from(UNKNOWN)] = 0;
+        census
+    }
+
+    fn count_all(&mut self, brick: &Brick) {
+        if let Storage::Interned(cells) = &brick.evidence {
+            cells.all().iter().flatten().for_each(|&state| self.interned[usize::from(state)] += 1);
+        }
+    }
+
+    fn count_first(&mut self, brick: &Brick, palette: &Palette) {
+        match &brick.evidence {
+            Storage::Interned(cells) => cells.for_each(brick.observed, |_, state| self.count_interned(state)),
+            Storage::Plain(cells) => cells.for_each(brick.observed, |_, packed| {
+                let evidence = packed.into();
+                match palette.find(evidence) {
+                    Some(state) => self.count_interned(state),
+                    None => self.count_other(evidence),
+                }
+            }),
+        }
+    }
+
+    fn count_interned(&mut self, state: StateId) {
+        let count = &mut self.interned[usize::from(state)];
+        if *count > 0 || self.room > 0 {
+            self.room -= usize::from(*count == 0);
+            *count += 1;
+        }
+    }
+
+    fn count_other(&mut self, evidence: Evidence) {
+        if let Some(count) = self.others.get_mut(&evidence.into()) {
+            *count += 1;
+        } else if self.room > 0 {
+            self.room -= 1;
+            self.others.insert(evidence.into(), 1);
+        }
+    }
+}

@@ -1,0 +1,74 @@
+use super::census::{Census, StateKey};
+use super::symbol::{MOST_STATES, RARE, Symbols};
+use crate::sensor::Evidence;
+use crate::tile::Table;
+use crate::tile::palette::{Palette, StateId};
+use rustc_hash::FxHashMap;
+use std::cmp::Reverse;
+
+/// The states that more than one voxel of a table is in, numbered, and how each is written.
+pub(super) struct Codebook {
+    pub(super) states: Vec<Evidence>,
+    pub(super) symbols: Symbols,
+    /// By number in the table's palette, see [`Symbols::code`]; [`RARE`] for the others.
+    pub(super) interned: Vec<u16>,
+    /// Of the states that the palette does not have.
+    others: FxHashMap<StateKey, u16>,
+}
+
+/// A state of the codebook.
+struct Common {
+    voxels: u32,
+    state: StateKey,
+    /// Its number in the table's palette.
+    interned: Option<StateId>,
+}
+
+impl Common {
+    /// Such that neighbors have much in common, and that no two are equal.
+    fn rank(&self) -> (i32, u64) {
+        let bits = self.state.log_odds_bits;
+        (self.state.observation_count, if bits >> 63 == 1 { !bits } else { bits | 1 << 63 })
+    }
+}
+
+impl Codebook {
+    pub(super) fn of(table: &Table) -> Self {
+        let census = Census::of(table);
+        let mut commons = commons(&census, &table.palette);
+        commons.sort_unstable_by_key(|common| (Reverse(common.voxels), common.rank()));
+        commons.truncate(MOST_STATES);
+        let symbols = Symbols::of(commons.len());
+        // Within what takes one byte, and within what takes two, any order takes the same space.
+        let (one_byte, two_bytes) = commons.split_at_mut(symbols.direct().into());
+        one_byte.sort_unstable_by_key(|common| common.rank());
+        two_bytes.sort_unstable_by_key(|common| common.rank());
+
+        let mut interned = vec![u16::from(RARE); census.interned.len()];
+        let mut others = FxHashMap::default();
+        for (number, common) in commons.iter().enumerate() {
+            match common.interned {
+                Some(state) => interned[usize::from(state)] = symbols.code(number),
+                None => _ = others.insert(common.state, symbols.code(number)),
+            }
+        }
+        Self { states: commons.iter().map(|common| common.state.into()).collect(), symbols, interned, others }
+    }
+
+    /// How a state is written that is perhaps not in the palette.
+    pub(super) fn code(&self, evidence: Evidence, palette: &Palette) -> u16 {
+        match palette.find(evidence) {
+            Some(state) => self.interned[usize::from(state)],
+            None => self.others.get(&evidence.into()).copied().unwrap_or(RARE.into()),
+        }
+    }
+}
+
+fn commons(census: &Census, palette: &Palette) -> Vec<Common> {
+    let interned = census.interned.iter().enumerate().map(|(state, &voxels)| {
+        let state = state as StateId;
+        Common { voxels, state: palette.evidence(state).into(), interned: Some(state) }
+    });
+    let others = census.others.iter().map(|(&state, &voxels)| Common { voxels, state, interned: None });
+    interned.chain(others).filter(|common| common.voxels > 1).collect()
+}

@@ -1,0 +1,25 @@
+use crate::sensor::Evidence;
+
+/// Bytes of a state.
+pub(super) const STATE_BYTES: usize = 12;
+
+/// Appends states byte by byte: the lowest bytes of all counts, their next ones, ..., the highest ones of all log-odds.
+/// What equal states have in common lies side by side.
+pub(super) fn put_states(states: impl Iterator<Item = Evidence> + Clone, out: &mut Vec<u8>) {
+    for byte in 0..4 {
+        out.extend(states.clone().map(|state| state.observation_count.to_le_bytes()[byte]));
+    }
+    for byte in 0..8 {
+        out.extend(states.clone().map(|state| state.log_odds.to_le_bytes()[byte]));
+    }
+}
+
+/// The state at a place of what [`put_states`] wrote; `states` is of whole states.
+pub(super) fn state_at(states: &[u8], place: usize) -> Evidence {
+    let count = states.len() / STATE_BYTES;
+    let byte = |column: usize| states[column * count + place];
+    Evidence {
+        log_odds: f64::from_le_bytes(std::array::from_fn(|k| byte(4 + k))),
+        observation_count: i32::from_le_bytes(std::array::from_fn(byte)),
+    }
+}

@@ -1,0 +1,150 @@
+use super::codebook::Codebook;
+use super::columns::put_states;
+use super::numbers::put_number;
+use super::packer::Packer;
+use super::symbol::RARE;
+use crate::sensor::Evidence;
+use crate::space::BrickCode;
+use crate::tile::brick::{Brick, Storage};
+use crate::tile::cells::CELL_VOXELS;
+use crate::tile::packed::Packed;
+use crate::tile::palette::{Palette, StateId};
+use std::io;
+
+/// A group ends with the brick that brings it to so many voxels.
+pub(super) const GROUP_VOXELS: usize = 1 << 16;
+
+/// Most bricks of a group.
+pub(super) const GROUP_BRICKS: usize = 1 << 10;
+
+/// Some bricks of a table, one behind the other in Morton order, as columns.
+#[derive(Default)]
+pub(super) struct Group {
+    bricks: usize,
+    /// Of each brick, how far its code is from that of the brick before.
+    steps: Vec<u8>,
+    /// Of each brick, which words of its mask are not 0.
+    words: Vec<u8>,
+    /// These words.
+    masks: Vec<u8>,
+    /// Of each voxel.
+    symbols: Vec<u8>,
+    /// Of each voxel whose symbol is a prefix.
+    seconds: Vec<u8>,
+    /// Of each voxel whose state is not in the codebook.
+    rares: Vec<Evidence>,
+    /// The brick before, in this group or another.
+    before: Option<BrickCode>,
+}
+
+impl Group {
+    pub(super) fn is_full(&self) -> bool {
+        self.bricks == GROUP_BRICKS || self.symbols.len() >= GROUP_VOXELS
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.bricks == 0
+    }
+
+    pub(super) fn push(&mut self, brick: &Brick, codebook: &Codebook, palette: &Palette) {
+        let code = brick.code();
+        put_number(code.0 - self.before.map_or(0, |before| before.0 + 1), &mut self.steps);
+        self.before = Some(code);
+        self.bricks += 1;
+        let mut words = 0;
+        for (word, &mask) in brick.observed.iter().enumerate().filter(|(_, mask)| **mask != 0) {
+            words |= 1 << word;
+            self.masks.extend_from_slice(&mask.to_le_bytes());
+            match &brick.evidence {
+                Storage::Interned(cells) => {
+                    if let Some(cell) = cells.cell(word) {
+                        self.push_states(mask, cell, codebook, palette);
+                    }
+                }
+                Storage::Plain(cells) => {
+                    if let Some(cell) = cells.cell(word) {
+                        self.push_plain(mask, cell, codebook, palette);
+                    }
+                }
+            }
+        }
+        self.words.push(words);
+    }
+
+    fn push_states(
+        &mut self,
+        mask: u64,
+        cell: &[StateId; CELL_VOXELS],
+        codebook: &Codebook,
+        palette: &Palette,
+    ) {
+        let code = |state: StateId| codebook.interned[usize::from(state)];
+        let mut symbols = [0; CELL_VOXELS];
+        let mut count = 0;
+        let mut largest = 0;
+        let mut take = |bit: usize| {
+            let symbol = code(cell[bit]) as u8;
+            symbols[count % CELL_VOXELS] = symbol;
+            largest = largest.max(symbol);
+            count += 1;
+        };
+        if mask == u64::MAX {
+            (0..CELL_VOXELS).for_each(&mut take)
+        } else {
+            bits(mask).for_each(&mut take)
+        }
+        self.symbols.extend_from_slice(&symbols[..count]);
+        if largest >= codebook.symbols.first_prefix() {
+            bits(mask)
+                .for_each(|bit| self.push_rest(code(cell[bit]), codebook, || palette.evidence(cell[bit])));
+        }
+    }
+
+    fn push_plain(
+        &mut self,
+        mask: u64,
+        cell: &[Packed; CELL_VOXELS],
+        codebook: &Codebook,
+        palette: &Palette,
+    ) {
+        for bit in bits(mask) {
+            let evidence = cell[bit].into();
+            let code = codebook.code(evidence, palette);
+            self.symbols.push(code as u8);
+            self.push_rest(code, codebook, || evidence);
+        }
+    }
+
+    /// What stands elsewhere for a voxel than with the symbols.
+    fn push_rest(&mut self, code: u16, codebook: &Codebook, evidence: impl Fn() -> Evidence) {
+        let [symbol, second] = code.to_le_bytes();
+        if symbol == RARE {
+            self.rares.push(evidence());
+        } else if symbol >= codebook.symbols.first_prefix() {
+            self.seconds.push(second);
+        }
+    }
+
+    /// Appends the group's bytes, after which it is empty.
+    pub(super) fn end(&mut self, packer: &mut Packer, out: &mut Vec<u8>) -> io::Result<()> {
+        let mut rares = Vec::new();
+        put_states(self.rares.iter().copied(), &mut rares);
+        let columns = [&self.steps, &self.words, &self.masks, &self.symbols, &self.seconds, &rares];
+        put_number(self.bricks as u64, out);
+        packer.put_columns(columns.map(|column| &column[..]), out)?;
+        let Self { bricks, steps, words, masks, symbols, seconds, rares, before: _ } = self;
+        *bricks = 0;
+        [steps, words, masks, symbols, seconds].into_iter().for_each(Vec::clear);
+        rares.clear();
+        Ok(())
+    }
+}
+
+/// The bits that are set, ascending.
+pub(super) fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = mask.trailing_zeros() as usize;
+        mask &= mask.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
+}

@@ -1,0 +1,39 @@
+//! A tile's exact table in a small part of its memory: for tiles that wait in memory, and for files.
+//!
+//! ```text
+//! header   24 bytes   magic "VXTC", version, voxels, bricks, states of the codebook
+//! codebook            the states that several voxels are in
+//! groups              some bricks each: their codes, their masks, a symbol a voxel, and what symbols stand for
+//! CRC-32    4 bytes
+//! ```
+//!
+//! Everything stands in columns, each packed by zstd where that makes it smaller. The bytes follow from what the table
+//! holds, never from how it came about: bricks in Morton order, states numbered by how many voxels are in them. The
+//! byte tables are in `docs/format.md`.
+
+mod census;
+mod codebook;
+mod columns;
+mod effort;
+mod group;
+mod group_reader;
+mod input;
+mod numbers;
+mod open_brick;
+mod packer;
+mod reader;
+mod symbol;
+#[cfg(test)]
+mod tests;
+mod unpacker;
+mod writer;
+
+pub use effort::CompactEffort;
+pub use reader::read_compact;
+pub use writer::write_compact;
+
+/// "VXTC", little-endian.
+const MAGIC: u32 = 0x4354_5856;
+const VERSION: u32 = 1;
+const HEADER_BYTES: usize = 24;
+const CRC_BYTES: u64 = 4;

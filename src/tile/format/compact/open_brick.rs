@@ -1,0 +1,136 @@
+use super::group::bits;
+use super::group_reader::Rest;
+use super::symbol::{RARE, Symbols};
+use crate::sensor::Evidence;
+use crate::space::{BRICK_EDGE, BrickCode, BrickMask, VoxelBox, mask_of_box, places};
+use crate::tile::brick::{Brick, Storage};
+use crate::tile::cells::{CELL_VOXELS, Cells};
+use crate::tile::packed::Packed;
+use crate::tile::palette::{Full, Palette, StateId, UNKNOWN};
+
+/// A brick whose voxels are being read.
+pub(super) struct OpenBrick {
+    pub(super) code: BrickCode,
+    pub(super) observed: BrickMask,
+    pub(super) symbols: Symbols,
+}
+
+/// Why a brick cannot be read as states of the palette.
+pub(super) enum Refusal {
+    /// The palette takes no more states.
+    Full,
+    Wrong(String),
+}
+
+impl From<String> for Refusal {
+    fn from(reason: String) -> Self {
+        Self::Wrong(reason)
+    }
+}
+
+impl From<Full> for Refusal {
+    fn from(_: Full) -> Self {
+        Self::Full
+    }
+}
+
+impl OpenBrick {
+    /// Whether all voxels belong to a tile.
+    pub(super) fn check_is_inside(&self, tile: &VoxelBox) -> Result<(), String> {
+        let other = || format!("voxels of brick {:#x} belong to another tile", self.code.0);
+        let place = places(self.observed).next().ok_or_else(other)?;
+        let voxel = self.code.voxel(place).to_key().to_index_from(tile.min);
+        if !tile.contains(voxel) {
+            return Err(other());
+        }
+        let first = voxel.map(|k| k & !(BRICK_EDGE - 1));
+        if (0..3).all(|k| first[k] >= tile.min[k] && first[k].saturating_add(BRICK_EDGE) <= tile.end[k]) {
+            return Ok(());
+        }
+        let local = |of: [i32; 3]| std::array::from_fn(|k| of[k].saturating_sub(first[k]));
+        let inside = mask_of_box(local(tile.min), local(tile.end));
+        let is_inside = self.observed.iter().zip(inside).all(|(&observed, inside)| observed & !inside == 0);
+        if is_inside { Ok(()) } else { Err(other()) }
+    }
+
+    /// The brick of what was read.
+    pub(super) fn closed(self, evidence: Storage) -> Brick {
+        Brick::with(self.code, self.observed, evidence)
+    }
+
+    /// The states of the voxels; the palette takes those that it does not have.
+    pub(super) fn interned(
+        &self,
+        rest: &mut Rest<'_>,
+        palette: &mut Palette,
+    ) -> Result<Cells<StateId>, Refusal> {
+        let direct = self.symbols.direct();
+        let mut cells = Cells::of_words(&self.observed, UNKNOWN);
+        let masks = self.observed.iter().filter(|&&mask| mask != 0);
+        for (cell, &mask) in cells.all_mut().iter_mut().zip(masks) {
+            let symbols = rest.take_symbols(mask.count_ones() as usize)?;
+            if symbols.iter().fold(0, |largest, &symbol| largest.max(symbol)) >= direct {
+                for (bit, &symbol) in bits(mask).zip(symbols) {
+                    cell[bit] = self.state(symbol, rest, palette)?;
+                }
+            } else {
+                set(cell, mask, symbols);
+            }
+        }
+        Ok(cells)
+    }
+
+    fn state(&self, symbol: u8, rest: &mut Rest<'_>, palette: &mut Palette) -> Result<StateId, Refusal> {
+        if symbol == RARE {
+            return Ok(palette.intern(rest.take_rare()?)?);
+        }
+        Ok(self.common(symbol, rest)?)
+    }
+
+    /// The evidence of the voxels, where the palette cannot take all of it.
+    pub(super) fn plain(&self, rest: &mut Rest<'_>, palette: &Palette) -> Result<Cells<Packed>, String> {
+        let mut cells = Cells::of_words(&self.observed, Packed::from(Evidence::PRIOR));
+        let masks = self.observed.iter().filter(|&&mask| mask != 0);
+        for (cell, &mask) in cells.all_mut().iter_mut().zip(masks) {
+            let symbols = rest.take_symbols(mask.count_ones() as usize)?;
+            for (bit, &symbol) in bits(mask).zip(symbols) {
+                let evidence = match symbol {
+                    RARE => rest.take_rare()?,
+                    _ => palette.evidence(self.common(symbol, rest)?),
+                };
+                cell[bit] = evidence.into();
+            }
+        }
+        Ok(cells)
+    }
+
+    /// The state of the codebook that a symbol stands for.
+    fn common(&self, symbol: u8, rest: &mut Rest<'_>) -> Result<StateId, String> {
+        let number = if symbol < self.symbols.direct() {
+            Some(usize::from(symbol))
+        } else if symbol < self.symbols.first_prefix() {
+            None
+        } else {
+            self.symbols.number(symbol, rest.take_second()?)
+        };
+        let number = number.ok_or_else(|| format!("symbol {symbol} stands for no state"))?;
+        Ok(state_of(number as u16))
+    }
+}
+
+/// The state in the palette that a state of the codebook is.
+const fn state_of(number: u16) -> StateId {
+    number + 1
+}
+
+/// Sets the states of a mask, whose symbols are their numbers.
+#[inline]
+fn set(cell: &mut [StateId; CELL_VOXELS], mask: u64, symbols: &[u8]) {
+    if let Ok(symbols) = <&[u8; CELL_VOXELS]>::try_from(symbols) {
+        *cell = symbols.map(|symbol| state_of(symbol.into()));
+    } else {
+        for (bit, &symbol) in bits(mask).zip(symbols) {
+            cell[bit] = state_of(symbol.into());
+        }
+    }
+}

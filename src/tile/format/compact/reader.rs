@@ -1,0 +1,113 @@
+use super::columns::{STATE_BYTES, state_at};
+use super::group_reader::GroupReader;
+use super::input::Input;
+use super::symbol::MOST_STATES;
+use super::unpacker::{Column, Unpacker};
+use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
+use crate::error::{DecodeError, FormatError};
+use crate::space::VoxelBox;
+use crate::tile::Table;
+use crate::tile::format::entry::fault_of;
+use crate::tile::palette::Palette;
+use std::io::Read;
+
+/// Reads a table in its compact form, `bytes` bytes that belong to the tile of `voxels`.
+///
+/// Besides the table it takes at most 1.5 MB of memory, whatever the bytes say; the table holds no voxel that is not of
+/// the tile.
+///
+/// # Errors
+///
+/// Anything that is not as the format says, with the offset of the part that it is in: wrong magic or version, lengths
+/// and counts that do not fit, bricks that are out of order or of another tile, states that come twice or are no
+/// evidence, bytes behind the end, a wrong checksum.
+pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Result<Table, DecodeError> {
+    if bytes < HEADER_BYTES as u64 + CRC_BYTES {
+        let reason = format!("{bytes} bytes are too few for a compact table");
+        return Err(FormatError::at_offset(0, reason).into());
+    }
+    let mut input = Input::new(input, bytes);
+    let header = Header::read(&mut input, voxels)?;
+    let mut unpacker = Unpacker::new()?;
+    let palette = read_codebook(header.states, &mut unpacker, &mut input)?;
+    let mut groups = GroupReader::new(voxels, palette);
+    while groups.bricks() < header.bricks {
+        groups.read(&header, &mut unpacker, &mut input)?;
+    }
+    let table = groups.end();
+    if table.len() != header.voxels {
+        let reason = format!("{} voxels where {} are announced", table.len(), header.voxels);
+        return Err(FormatError::at_offset(8, reason).into());
+    }
+    input.end()?;
+    Ok(table)
+}
+
+/// What a compact table begins with.
+pub(super) struct Header {
+    pub(super) voxels: usize,
+    pub(super) bricks: usize,
+    pub(super) states: usize,
+}
+
+impl Header {
+    fn read(input: &mut Input<impl Read>, voxels: &VoxelBox) -> Result<Self, DecodeError> {
+        let mut header = [0; HEADER_BYTES];
+        input.read(&mut header)?;
+        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| header[at + k]));
+        let wrong = |offset, reason: String| Err(FormatError::at_offset(offset, reason).into());
+        if u32_at(0) != MAGIC {
+            return wrong(0, format!("the magic number is {:#010x}, not {MAGIC:#010x}", u32_at(0)));
+        }
+        if u32_at(4) != VERSION {
+            let reason = format!("version {} is not known; this program reads version {VERSION}", u32_at(4));
+            return wrong(4, reason);
+        }
+        let count = u64::from(u32_at(8)) | u64::from(u32_at(12)) << 32;
+        let most = voxels_in(voxels);
+        let Some(count) = usize::try_from(count).ok().filter(|&count| count as u64 <= most) else {
+            return wrong(8, format!("{count} voxels in a tile of {most}"));
+        };
+        let [bricks, states] = [u32_at(16), u32_at(20)].map(|count| count as usize);
+        if bricks > count || (bricks == 0) != (count == 0) {
+            return wrong(16, format!("{count} voxels in {bricks} bricks"));
+        }
+        if states > count.min(MOST_STATES) {
+            return wrong(20, format!("a codebook of {states} states for {count} voxels"));
+        }
+        Ok(Self { voxels: count, bricks, states })
+    }
+}
+
+/// Number of voxels of a tile.
+fn voxels_in(voxels: &VoxelBox) -> u64 {
+    (0..3).map(|k| u64::from(voxels.end[k].abs_diff(voxels.min[k]))).product()
+}
+
+/// The codebook as a palette: its states are numbered from 1.
+fn read_codebook(
+    states: usize,
+    unpacker: &mut Unpacker,
+    input: &mut Input<impl Read>,
+) -> Result<Palette, DecodeError> {
+    let offset = input.offset;
+    let wrong = |reason: String| Err(FormatError::at_offset(offset, reason).into());
+    let mut bytes = Vec::new();
+    let column = Column { name: "codebook", most: states * STATE_BYTES, bytes: &mut bytes };
+    unpacker.take_columns([column], input)?;
+    if bytes.len() != states * STATE_BYTES {
+        return wrong(format!("a codebook of {} bytes for {states} states", bytes.len()));
+    }
+    let mut palette = Palette::with_all_room();
+    for number in 0..states {
+        let state = state_at(&bytes, number);
+        if let Some((_, reason)) = fault_of(state) {
+            return wrong(format!("state {number} of the codebook: {reason}"));
+        }
+        match palette.intern(state) {
+            Ok(id) if usize::from(id) == number + 1 => {}
+            _ => return wrong(format!("state {number} of the codebook comes twice")),
+        }
+    }
+    Ok(palette)
+}

@@ -1,0 +1,72 @@
+/// How the states of a codebook are written: the byte of a voxel and, behind some, a second one.
+///
+/// Symbols below [`first_prefix`](Self::first_prefix) are the codebook's first states. A prefix stands for 256 states,
+/// of which the second byte chooses one. [`RARE`] is a state that is not in the codebook.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Symbols {
+    states: usize,
+    first_prefix: usize,
+}
+
+/// The symbol of a voxel whose state is written out.
+pub(super) const RARE: u8 = u8::MAX;
+
+/// Most states of a codebook: half of the symbols are prefixes then.
+pub(super) const MOST_STATES: usize = 255 + 127 * 255;
+
+impl Symbols {
+    /// Symbols for as many states, at most [`MOST_STATES`].
+    pub(super) fn of(states: usize) -> Self {
+        let prefixes = states.saturating_sub(255).div_ceil(255);
+        Self { states, first_prefix: 255 - prefixes }
+    }
+
+    /// The first symbol that is a prefix.
+    pub(super) fn first_prefix(self) -> u8 {
+        self.first_prefix as u8
+    }
+
+    /// The first symbol that is no state of the codebook by itself.
+    pub(super) fn direct(self) -> u8 {
+        self.states.min(self.first_prefix) as u8
+    }
+
+    /// The symbol of a state of the codebook, and in the upper byte the second one.
+    pub(super) fn code(self, number: usize) -> u16 {
+        match number.checked_sub(self.first_prefix) {
+            None => number as u16,
+            Some(behind) => (self.first_prefix + behind / 256) as u16 | ((behind % 256) as u16) << 8,
+        }
+    }
+
+    /// The number of the state of a prefix and a second byte; `None` if the codebook has no such state.
+    pub(super) fn number(self, prefix: u8, second: u8) -> Option<usize> {
+        let behind = (usize::from(prefix) - self.first_prefix) * 256 + usize::from(second);
+        Some(self.first_prefix + behind).filter(|&number| number < self.states)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_state_has_its_symbol_and_no_symbol_two_states() {
+        for states in [0, 1, 254, 255, 256, 509, 510, 511, 5000, MOST_STATES] {
+            let symbols = Symbols::of(states);
+            assert!(symbols.first_prefix >= 128);
+            for number in 0..states {
+                let [symbol, second] = symbols.code(number).to_le_bytes();
+                assert_ne!(symbol, RARE);
+                match symbol < symbols.first_prefix() {
+                    true => assert_eq!(usize::from(symbol), number),
+                    false => assert_eq!(symbols.number(symbol, second), Some(number)),
+                }
+            }
+            for prefix in symbols.first_prefix()..RARE {
+                let known = (0..=255).filter(|&second| symbols.number(prefix, second).is_some());
+                assert!(known.count() > 0, "{states} {prefix}");
+            }
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Tables of every kind go through the compact form and come back to the bit; what is not a compact table is an error.
+
+use super::{CompactEffort, read_compact, write_compact};
+use crate::error::{DecodeError, FormatError};
+use crate::sensor::Evidence;
+use crate::simulation::Random;
+use crate::space::{BrickCode, MortonCode, VoxelBox, VoxelKey};
+use crate::tile::Table;
+use crate::tile::brick::Storage;
+use crate::tile::palette::Palette;
+use std::collections::BTreeMap;
+
+type Voxels = BTreeMap<MortonCode, Evidence>;
+
+fn state(log_odds: f64, observation_count: i32) -> Evidence {
+    Evidence { log_odds, observation_count }
+}
+
+/// Tiles small and large, on and off the borders of bricks, where keys begin anew, and at the ends of `i32`.
+fn any_tile(random: &mut Random) -> VoxelBox {
+    let n = [2, 3, 7, 8, 16, 21, 40][random.below(7) as usize];
+    let min = std::array::from_fn(|_| match random.below(4) {
+        0 => random.below(200) as i32 * n - 100 * n,
+        1 => 32_768 / n * n,
+        2 => -65_536 / n * n,
+        _ => [i32::MIN, i32::MAX - n][random.below(2) as usize],
+    });
+    VoxelBox { min, end: min.map(|k| k + n) }
+}
+
+/// Few states, many, or one a voxel; now and then one that is hardly ever seen.
+fn any_state(random: &mut Random, kind: u64) -> Evidence {
+    const ODD: [f64; 8] =
+        [0.0, -0.0, f64::MIN_POSITIVE / 3.0, -5e-324, f64::MAX, f64::MIN, 1.0 + f64::EPSILON, -2.0];
+    const COUNTS: [i32; 5] = [0, 1, 255, 65_536, i32::MAX];
+    if random.chance(0.02) {
+        return state(ODD[random.below(8) as usize], COUNTS[random.below(5) as usize]);
+    }
+    let step = random.below([3, 250, 3_000][kind as usize % 3]) as f64;
+    let log_odds = if kind == 3 { random.between(-10.0, 10.0) } else { -0.4 * step };
+    state(log_odds, step as i32)
+}
+
+fn any_voxels(random: &mut Random, tile: &VoxelBox) -> Voxels {
+    let (kind, density) = (random.below(4), [0.002, 0.2, 0.9, 1.0][random.below(4) as usize]);
+    let mut voxels = Voxels::new();
+    let [x, y, z] = std::array::from_fn(|k| tile.min[k]..tile.end[k]);
+    for x in x {
+        for y in y.clone() {
+            for z in z.clone() {
+                if random.chance(density) {
+                    voxels.insert(VoxelKey::from_index([x, y, z]).morton(), any_state(random, kind));
+                }
+            }
+        }
+    }
+    voxels
+}
+
+/// A table of these voxels that came about in some way, with a palette that holds all states or soon too few.
+fn table_of(voxels: &Voxels, random: &mut Random) -> Table {
+    let limit = 1 << random.between(2.0, 12.0) as usize;
+    let palette = [Palette::default(), Palette::limited(limit, limit)][random.below(2) as usize].clone();
+    let mut table = Table::with_palette(palette);
+    let all: Vec<_> = voxels.iter().map(|(&code, &evidence)| (code, evidence)).collect();
+    let mut bricks: Vec<_> = all.chunk_by(|a, b| a.0.brick() == b.0.brick()).collect();
+    for k in (1..bricks.len()).rev() {
+        bricks.swap(k, random.below(k as u64 + 1) as usize);
+    }
+    for brick in bricks {
+        let voxels: Vec<_> =
+            brick.iter().map(|&(code, evidence)| (code.place_in_brick(), evidence)).collect();
+        let (first, second) = voxels.split_at(random.below(voxels.len() as u64 + 1) as usize);
+        table.insert(brick[0].0.brick(), second);
+        table.insert(brick[0].0.brick(), first);
+    }
+    table
+}
+
+fn written(table: &Table, effort: CompactEffort) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let count = write_compact(table, effort, &mut bytes).unwrap();
+    assert_eq!(count, bytes.len() as u64);
+    bytes
+}
+
+fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
+    read_compact(&mut &bytes[..], bytes.len() as u64, tile).map_err(|error| match error {
+        DecodeError::Format(error) => error,
+        DecodeError::Io(error) => panic!("memory can be read: {error}"),
+    })
+}
+
+fn assert_is(table: &Table, voxels: &Voxels) {
+    let bits =
+        |(code, Evidence { log_odds, observation_count })| (code, log_odds.to_bits(), observation_count);
+    assert_eq!(table.len(), voxels.len());
+    assert!(table.iter().map(bits).eq(voxels.iter().map(|(&code, &evidence)| bits((code, evidence)))));
+    assert!(voxels.keys().all(|&code| table.get(code) == voxels.get(&code).copied()));
+    assert_eq!(table.bytes(), table.counted_bytes());
+}
+
+#[test]
+fn tables_come_back_to_the_bit_and_equal_ones_have_equal_bytes() {
+    let mut random = Random::of(7, &[]);
+    let mut plain = 0;
+    for _ in 0..150 {
+        let tile = any_tile(&mut random);
+        let voxels = any_voxels(&mut random, &tile);
+        let (one, other) = (table_of(&voxels, &mut random), table_of(&voxels, &mut random));
+        plain += one.bricks.iter().filter(|brick| matches!(brick.evidence, Storage::Plain(_))).count();
+        for effort in [CompactEffort::Fast, CompactEffort::Small] {
+            let bytes = written(&one, effort);
+            assert!(written(&other, effort) == bytes);
+            let table = read(&bytes, &tile).unwrap();
+            assert_is(&table, &voxels);
+            assert!(written(&table, effort) == bytes);
+        }
+    }
+    assert!(plain > 100, "{plain}");
+}
+
+/// A tile whose voxels have more states than a palette holds, some of them twice.
+#[test]
+fn bricks_that_do_without_the_palette_come_back() {
+    let mut random = Random::of(8, &[]);
+    let tile = VoxelBox { min: [0; 3], end: [50; 3] };
+    let states: Vec<_> = (0..90_000).map(|_| any_state(&mut random, 3)).collect();
+    let mut voxels = Voxels::new();
+    for x in 0..50 {
+        for y in 0..50 {
+            for z in 0..50 {
+                let evidence = states[random.below(90_000) as usize];
+                voxels.insert(VoxelKey::from_index([x, y, z]).morton(), evidence);
+            }
+        }
+    }
+    let (one, other) = (table_of(&voxels, &mut random), table_of(&voxels, &mut random));
+    let bytes = written(&one, CompactEffort::Fast);
+    assert!(written(&other, CompactEffort::Fast) == bytes);
+    let table = read(&bytes, &tile).unwrap();
+    assert_is(&table, &voxels);
+    assert!(table.bricks.iter().any(|brick| matches!(brick.evidence, Storage::Plain(_))));
+    assert!(written(&table, CompactEffort::Fast) == bytes);
+}
+
+#[test]
+fn what_is_read_goes_on_as_any_table() {
+    use crate::sensor::{Observation, SensorModel};
+    let mut random = Random::of(9, &[]);
+    let tile = VoxelBox { min: [0; 3], end: [16; 3] };
+    let voxels = any_voxels(&mut random, &tile);
+    let mut table = table_of(&voxels, &mut random);
+    let mut again = read(&written(&table, CompactEffort::Fast), &tile).unwrap();
+    let model = SensorModel::default();
+    for round in 0..20_000 {
+        let voxel = std::array::from_fn(|_| random.below(16) as i32);
+        let observation = if round % 3 == 0 { Observation::Hit(0.0) } else { Observation::Miss };
+        for table in [&mut table, &mut again] {
+            table.update(&model, VoxelKey::from_index(voxel).morton(), observation);
+        }
+    }
+    assert_is(&again, &table.iter().collect());
+}
+
+/// A small table with every part of the form: states of the codebook, rare ones, two bricks.
+fn small() -> (VoxelBox, Table) {
+    let tile = VoxelBox { min: [-12, 36, 0], end: [0, 48, 12] };
+    let mut voxels = Voxels::new();
+    for x in -9..-1 {
+        for y in 38..47 {
+            let evidence = if x * y % 17 == 0 { state(f64::from(x), y) } else { state(-0.5, y % 5) };
+            voxels.insert(VoxelKey::from_index([x, y, 3]).morton(), evidence);
+        }
+    }
+    (tile, table_of(&voxels, &mut Random::of(1, &[])))
+}
+
+#[test]
+fn every_truncation_and_every_wrong_bit_is_an_error() {
+    let (tile, table) = small();
+    let bytes = written(&table, CompactEffort::Small);
+    assert!(read(&bytes, &tile).is_ok());
+    for length in 0..bytes.len() {
+        read(&bytes[..length], &tile).unwrap_err();
+    }
+    for bit in 0..8 * bytes.len() {
+        let mut wrong = bytes.clone();
+        wrong[bit / 8] ^= 1 << (bit % 8);
+        read(&wrong, &tile).unwrap_err();
+    }
+    read(&[&bytes[..], &[0]].concat(), &tile).unwrap_err();
+    // A stream that ends before the bytes that it should have.
+    let longer = read_compact(&mut &bytes[..bytes.len() - 1], bytes.len() as u64, &tile);
+    assert!(matches!(longer, Err(DecodeError::Io(_))));
+}
+
+/// With a checksum that is right: nothing but an error, or a table of this tile.
+#[test]
+fn hostile_bytes_are_an_error_or_a_table_of_the_tile() {
+    let (tile, table) = small();
+    let bytes = written(&table, CompactEffort::Fast);
+    let mut random = Random::of(3, &[]);
+    let (mut refused, mut read_well) = (0, 0);
+    for _ in 0..20_000 {
+        let mut wrong = bytes[..bytes.len() - 4].to_vec();
+        for _ in 0..=random.below(3) {
+            let at = random.below(wrong.len() as u64) as usize;
+            wrong[at] = [0, 1, 127, 255, random.below(256) as u8][random.below(5) as usize];
+        }
+        wrong.extend(crc32fast::hash(&wrong).to_le_bytes());
+        let Ok(table) = read(&wrong, &tile) else {
+            refused += 1;
+            continue;
+        };
+        read_well += 1;
+        let voxels: Voxels = table.iter().collect();
+        assert_is(&table, &voxels);
+        assert!(voxels.keys().all(|code| tile.contains(code.to_key().to_index_from(tile.min))));
+        let is_evidence = |e: &Evidence| e.log_odds.is_finite() && e.observation_count >= 0;
+        assert!(voxels.values().all(is_evidence));
+        assert_is(&read(&written(&table, CompactEffort::Fast), &tile).unwrap(), &voxels);
+    }
+    assert!(refused > 5_000 && read_well > 200, "{refused} {read_well}");
+}
+
+#[test]
+fn what_is_wrong_is_said_where_it_is() {
+    let (tile, table) = small();
+    let bytes = written(&table, CompactEffort::Fast);
+    let wrong = |at: usize, with: &[u8]| {
+        let mut wrong = bytes[..bytes.len() - 4].to_vec();
+        wrong[at..at + with.len()].copy_from_slice(with);
+        wrong.extend(crc32fast::hash(&wrong).to_le_bytes());
+        read(&wrong, &tile).unwrap_err()
+    };
+    let all = u64::MAX.to_le_bytes();
+    for (at, with, place, reason) in [
+        (0, &b"IWLO"[..], 0, "magic"),
+        (4, &[2], 4, "version 2"),
+        (8, &all, 8, "18446744073709551615 voxels in a tile of 1728"),
+        (8, &[1], 16, "1 voxels in"),
+        (16, &all[..4], 16, "bricks"),
+        (16, &[0], 16, "0 bricks"),
+        (20, &all[..4], 20, "codebook"),
+        (20, &[1], 24, "codebook"),
+    ] {
+        let error = wrong(at, with);
+        assert_eq!(error.at, place, "{error}");
+        assert!(error.reason.contains(reason), "{error}");
+    }
+    let neighbor = VoxelBox { min: [0, 36, 0], end: [12, 48, 12] };
+    assert!(read(&bytes, &neighbor).unwrap_err().reason.contains("another tile"));
+    assert!(read(&[], &tile).unwrap_err().reason.contains("too few"));
+}
+
+#[test]
+fn an_empty_table_and_a_full_brick_have_their_bytes() {
+    let tile = VoxelBox { min: [0; 3], end: [8; 3] };
+    let empty = written(&Table::default(), CompactEffort::Fast);
+    assert_eq!(empty.len(), 30);
+    assert!(read(&empty, &tile).unwrap().is_empty());
+
+    let mut full = Table::default();
+    full.insert(
+        BrickCode::of_voxel([0; 3]),
+        &(0..512).map(|place| (place, state(1.5, 2))).collect::<Vec<_>>(),
+    );
+    let bytes = written(&full, CompactEffort::Fast);
+    assert!(bytes.len() < 120, "{}", bytes.len());
+    assert_eq!(read(&bytes, &tile).unwrap().len(), 512);
+}

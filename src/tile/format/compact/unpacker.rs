@@ -1,0 +1,66 @@
+use super::input::Input;
+use crate::error::{DecodeError, FormatError};
+use std::io::{self, Read};
+use zstd::bulk::Decompressor;
+
+/// Unpacks what a [`Packer`](super::packer::Packer) packed.
+pub(super) struct Unpacker {
+    zstd: Decompressor<'static>,
+    packed: Vec<u8>,
+}
+
+/// A column that is to be read.
+pub(super) struct Column<'a> {
+    pub(super) name: &'static str,
+    /// Most bytes that it may have.
+    pub(super) most: usize,
+    /// Takes its bytes.
+    pub(super) bytes: &'a mut Vec<u8>,
+}
+
+impl Unpacker {
+    pub(super) fn new() -> io::Result<Self> {
+        Ok(Self { zstd: Decompressor::new()?, packed: Vec::new() })
+    }
+
+    /// Reads columns; none takes more memory than it may have bytes.
+    pub(super) fn take_columns<const N: usize>(
+        &mut self,
+        columns: [Column<'_>; N],
+        input: &mut Input<impl Read>,
+    ) -> Result<(), DecodeError> {
+        let mut packed_lengths = [0; N];
+        let mut columns = columns;
+        for (column, packed_length) in columns.iter_mut().zip(&mut packed_lengths) {
+            let length = input.number(column.name, column.most)?;
+            *packed_length = input.number(column.name, length)?;
+            column.bytes.clear();
+            column.bytes.resize(length, 0);
+        }
+        for (column, packed_length) in columns.into_iter().zip(packed_lengths) {
+            self.take(column, packed_length, input)?;
+        }
+        Ok(())
+    }
+
+    fn take(
+        &mut self,
+        column: Column<'_>,
+        packed_length: usize,
+        input: &mut Input<impl Read>,
+    ) -> Result<(), DecodeError> {
+        if packed_length == column.bytes.len() {
+            return input.read(column.bytes);
+        }
+        let offset = input.offset;
+        self.packed.resize(packed_length, 0);
+        input.read(&mut self.packed)?;
+        let unpacked = self.zstd.decompress_to_buffer(&self.packed, &mut column.bytes[..]);
+        let wrong = |reason| Err(FormatError::at_offset(offset, format!("{}: {reason}", column.name)).into());
+        match unpacked {
+            Ok(length) if length == column.bytes.len() => Ok(()),
+            Ok(length) => wrong(format!("{length} bytes where {} are announced", column.bytes.len())),
+            Err(error) => wrong(format!("cannot be unpacked: {error}")),
+        }
+    }
+}
