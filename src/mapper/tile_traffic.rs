@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::space::{Grid, TileIndex};
 use crate::store::{TileLocation, TileStamp, TileWriter};
 use crate::tile::Table;
-use crate::tile::format::decode_compact;
+use crate::tile::format::read_compact;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -152,7 +152,8 @@ impl Load {
 
 /// The table of a tile in the compact form.
 pub(super) fn unpack(grid: &Grid, index: TileIndex, tile: &ColdTile) -> Result<Table> {
-    let unpacked = decode_compact(&tile.compact, &grid.voxels_of_tile(index));
-    // Nothing but broken memory leads here.
-    unpacked.map_err(|error| error.in_map("memory".as_ref(), Some(index)))
+    let mut input = &*tile.compact;
+    // Nothing but broken memory leads to an error.
+    read_compact(&mut input, tile.compact.len() as u64, &grid.voxels_of_tile(index))
+        .map_err(|error| error.in_map("memory".as_ref(), Some(index)))
 }
