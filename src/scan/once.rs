@@ -267,6 +267,23 @@ mod tests {
         marks
     }
 
+    #[test]
+    fn rays_to_the_far_end_of_the_window_leave_the_marks_of_whole_rays() {
+        let origin = [12.3, -45.6, 7.75];
+        let ends = fan(origin, 80, 5_000.0, 0.25, 0.005);
+        let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
+        let mut collector = OnceCollector::default();
+        let far = 8_000.0;
+        let bounds = (origin.point.map(|x| x - far), origin.point.map(|x| x + far));
+        let [(low_x, high_x), (low_y, high_y)] = [0, 1].map(|k| (bounds.0[k], bounds.1[k]));
+        let window = Window::around(origin.voxel, ([low_x, low_y, -50.0], [high_x, high_y, 50.0]));
+        assert!(window.pages()[0] > 240 && window.pages()[1] > 240);
+        collector.clear(window, PageChoice::All);
+        collector.take(origin, &ends, false);
+        assert!(collector.far.is_empty());
+        assert!(collected(&collector) == walked(origin, &ends));
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 

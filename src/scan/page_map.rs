@@ -151,9 +151,9 @@ impl PageMap<MarkedPage> {
     #[inline]
     pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
         let page = |voxel| {
-            let number = self.directory[self.window.page_of(voxel)] as usize;
-            // What the scratch page says is of many pages, and right or wrong: nothing is asked of what rays leave there.
-            self.pages.get(number.wrapping_sub(1))
+            let number = (self.directory[self.window.page_of(voxel)] as usize).wrapping_sub(1);
+            // In pages that are not looked at rays go fast by themselves, and nobody knows what is marked.
+            if self.is_scratch(number) { None } else { self.pages.get(number) }
         };
         let is_one_page = (0..3).all(|k| (low[k] ^ high[k]) < PAGE_EDGE as u32);
         if is_one_page {

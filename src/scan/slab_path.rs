@@ -8,17 +8,17 @@ const EDGE: u32 = PAGE_EDGE as u32;
 
 /// A crossing nearer than this to a border between voxels, in units of 2^-32 voxels, is left to the exact walk.
 ///
-/// That is 2^-20 voxels. A position is off by less than 2^-33 voxels a slab, of which a window has 2048 to either
-/// side, and the closed form's times, rounded to `f64`, by less than 2^-38 voxels.
-const NEAR_BORDER: u32 = 1 << 12;
+/// That is 2^-18 voxels. A position is off by less than 2^-33 voxels a slab, of which a window has 8192 to either
+/// side, and the closed form's times, rounded to `f64`, by less than 2^-36 voxels.
+const NEAR_BORDER: u32 = 1 << 14;
 
 /// Two crossings in one slab that are nearer to each other than this, in units of 2^-32 voxels, are left to the exact
-/// walk: a position is off by less than 2^13 of them.
-const NEAR_EDGE: u64 = 1 << 15;
+/// walk: a position is off by less than 2^14 of them.
+const NEAR_EDGE: u64 = 1 << 16;
 
 /// The same in a page, in units of 2^-32 voxels: positions there have six bits less, and are off by one of these more
 /// for each slab of the page, which has 64.
-const NEAR_BORDER_IN_PAGE: u64 = 1 << 13;
+const NEAR_BORDER_IN_PAGE: u64 = 1 << 14;
 
 /// Where a ray crosses from one slab to the next, in units of 2^-32 voxels relative to the window's lowest voxel.
 #[derive(Clone, Copy)]
@@ -123,6 +123,12 @@ impl SlabPath {
     pub(super) fn is_near_border(&self) -> bool {
         let is_near = |at: i64| (at as u32).wrapping_add(NEAR_BORDER) < 2 * NEAR_BORDER;
         is_near(self.at_b) || is_near(self.at_c)
+    }
+
+    /// Whether the last of so many crossings after `done` others tells where the ray is then.
+    #[inline]
+    pub(super) fn is_certain_after(&self, done: u32, slabs: u32) -> bool {
+        slabs > 0 && !self.after(done + slabs - 1).is_near_border()
     }
 
     /// The voxel between the one by which the ray came into a slab and the one by which it goes out, if these differ along

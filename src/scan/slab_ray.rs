@@ -141,8 +141,12 @@ impl<'a> SlabRay<'a> {
             let mut walked = 0;
             while done < slabs {
                 let stretch = path.stretch([a, b, c], [last[A], last[B], last[C]], done, slabs);
-                let page = pages.at(voxel::<A, B, C>(a, b, c));
-                let certain = stretch.pass::<A, B, C, F>(page, a);
+                let page = pages.number_at(voxel::<A, B, C>(a, b, c));
+                // What is passed in a page that is not looked at does not matter, only where the ray leaves it.
+                let certain = match pages.is_scratch(page) && path.is_certain_after(done, stretch.slabs) {
+                    true => stretch.slabs,
+                    false => stretch.pass::<A, B, C, F>(&mut pages.pages_mut()[page], a),
+                };
                 if certain > 0 {
                     (b, c) = path.after(done + certain - 1).voxel();
                     a = if is_up { a + certain } else { a - certain };

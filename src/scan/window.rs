@@ -3,8 +3,12 @@ use crate::space::{Point, VoxelIndex};
 /// Voxels along the edge of a page of 8 x 8 x 8 bricks.
 pub(super) const PAGE_EDGE: i64 = 64;
 
-/// A window reaches at most so many voxels and a page from the sensor, along each axis and to both sides.
-const MAX_REACH: i64 = 1984;
+/// A window reaches at most so many voxels and a page from the sensor, along each axis and to both sides: the first with
+/// which it has no more than [`MOST_PAGES`], or the last. What a stray ray high up takes away, it takes away far out.
+const REACHES: [i64; 3] = [8128, 4032, 1984];
+
+/// As many as the smallest reach makes, to all sides: 1 MiB of numbers.
+const MOST_PAGES: u64 = 63 * 63 * 63;
 
 /// A voxel relative to the lowest of a window.
 pub(super) type Local = [u32; 3];
@@ -20,10 +24,18 @@ pub(super) struct Window {
 impl Window {
     /// The window around `center` for points with these bounds, both in units of voxels.
     pub(super) fn around(center: VoxelIndex, bounds: (Point, Point)) -> Self {
+        let windows = REACHES.map(|reach| Self::reaching(reach, center, bounds));
+        let is_small = |window: &&Self| {
+            window.pages.iter().map(|&pages| u64::from(pages)).product::<u64>() <= MOST_PAGES
+        };
+        *windows.iter().find(is_small).unwrap_or(&windows[REACHES.len() - 1])
+    }
+
+    fn reaching(reach: i64, center: VoxelIndex, bounds: (Point, Point)) -> Self {
         let page = |axis: usize, coordinate: f64| {
             let center = i64::from(center[axis]);
             // Saturates; NaN, which no bound is, would be 0.
-            let voxel = (coordinate.floor() as i64).clamp(center - MAX_REACH, center + MAX_REACH);
+            let voxel = (coordinate.floor() as i64).clamp(center - reach, center + reach);
             voxel
                 .clamp(i64::from(i32::MIN) + PAGE_EDGE, i64::from(i32::MAX) - PAGE_EDGE)
                 .div_euclid(PAGE_EDGE)
@@ -64,5 +76,20 @@ impl Window {
     pub(super) fn local(&self, voxel: VoxelIndex) -> Option<Local> {
         let local: Local = std::array::from_fn(|k| voxel[k].wrapping_sub(self.base[k]) as u32);
         self.holds(local).then_some(local)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_reaches_as_far_as_it_may_have_pages() {
+        let pages = |low: Point, high: Point| Window::around([0; 3], (low, high)).pages();
+        assert_eq!(pages([-6000.0, -100.0, -10.0], [8000.0, 100.0, 10.0]), [220, 4, 2]);
+        assert_eq!(pages([-9e9; 3], [9e9; 3]), [63; 3]);
+        // A stray ray straight up.
+        assert_eq!(pages([-3000.0, -3000.0, -10.0], [3000.0, 3000.0, 1e6]), [63, 63, 33]);
+        assert_eq!(pages([-1500.0, -1500.0, -10.0], [1500.0, 1500.0, 1e6]), [48, 48, 65]);
     }
 }

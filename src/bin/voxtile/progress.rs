@@ -57,9 +57,17 @@ impl Progress {
         if self.bar.is_hidden() || !self.bar.position().is_multiple_of(8) {
             return;
         }
-        let MapStatistics { tiles, cached_tiles, .. } = mapper.statistics();
+        let MapStatistics { tiles, cached_tiles, pending_tiles, stalls, .. } = mapper.statistics();
         let memory = resident_bytes().map_or(String::new(), |bytes| format!(", {}", HumanBytes(bytes)));
-        self.bar.set_message(format!("{tiles} tiles, {cached_tiles} in memory{memory}"));
+        let waiting = match pending_tiles {
+            0 => String::new(),
+            tiles => format!(", updates wait for {tiles}"),
+        };
+        let stalls = match stalls.count {
+            0 => String::new(),
+            count => format!(", {count} stalls up to {} ms", stalls.worst_us / 1000),
+        };
+        self.bar.set_message(format!("{tiles} tiles, {cached_tiles} in memory{memory}{waiting}{stalls}"));
     }
 
     /// Says what is going on when it is no step.

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use voxtile::OctreeConfig;
-use voxtile::mapper::{MapReader, MapView};
+use voxtile::mapper::{IoCounts, MapReader, MapView, MemoryCounts, StallCounts};
 use voxtile::scan::ScanReport;
 use voxtile::tile::{OctreeStatistics, TileCounts};
 
@@ -32,6 +32,12 @@ pub struct Summary {
     pub disk_bytes: u64,
     pub loads: u64,
     pub saves: u64,
+    /// What went to disk and came back.
+    pub io: IoCounts,
+    /// Waits for the disk.
+    pub stalls: StallCounts,
+    /// Bytes of memory at the end, by what they hold.
+    pub memory: MemoryCounts,
     pub seconds: f64,
     /// Largest resident memory of the process.
     pub peak_rss_bytes: Option<u64>,
@@ -75,6 +81,9 @@ impl Summary {
             disk_bytes: statistics.disk_bytes,
             loads: statistics.io.loads,
             saves: statistics.io.saves,
+            io: statistics.io,
+            stalls: statistics.stalls,
+            memory: statistics.memory,
             seconds: elapsed.as_secs_f64(),
             peak_rss_bytes: memory::peak_bytes(),
         })
@@ -117,9 +126,36 @@ impl Summary {
         if let Some(octrees) = &self.octrees {
             octrees.print(&mut out)?;
         }
-        writeln!(out, "tile I/O  {} read, {} written", HumanCount(self.loads), HumanCount(self.saves))?;
+        self.print_io(&mut out)?;
         if let Some(bytes) = self.peak_rss_bytes {
             writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
+        }
+        Ok(())
+    }
+}
+
+impl Summary {
+    fn print_io(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let IoCounts { bytes_read, bytes_written, packed, unpacked, .. } = self.io;
+        writeln!(
+            out,
+            "tile I/O  {} read ({}), {} written ({})",
+            HumanCount(self.loads),
+            HumanBytes(bytes_read),
+            HumanCount(self.saves),
+            HumanBytes(bytes_written)
+        )?;
+        if packed > 0 {
+            writeln!(out, "packed    {} tiles, {} unpacked", HumanCount(packed), HumanCount(unpacked))?;
+        }
+        let StallCounts { count, p50_us, p99_us, worst_us, .. } = self.stalls;
+        if count > 0 {
+            let [p50, p99, worst] = [p50_us, p99_us, worst_us].map(|us| us as f64 / 1e3);
+            let count = HumanCount(count);
+            writeln!(
+                out,
+                "stalls    {count}: half within {p50:.1} ms, 99 % within {p99:.1}, at most {worst:.1}"
+            )?;
         }
         Ok(())
     }
