@@ -16,7 +16,7 @@ use super::{PackedUpdates, Scan, ScanReport, ScanUpdates};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
-use crate::space::{Grid, Point, TileIndex};
+use crate::space::{Grid, Point, TileIndex, VoxelIndex};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -37,6 +37,16 @@ pub struct ScanTracer {
 }
 
 impl ScanTracer {
+    /// Whether a scan can be traced at all; takes no time.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanTracer::trace`].
+    pub fn check(grid: &Grid, model: &SensorModel, scan: &Scan) -> Result<()> {
+        check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
+        origin_voxel(grid, scan).map(drop)
+    }
+
     /// What a scan says about voxels: its rays walked, and the updates grouped by tile.
     ///
     /// Points that cannot count are skipped and reported.
@@ -158,6 +168,13 @@ pub(super) fn check_intensities(
     }
 }
 
+fn origin_voxel(grid: &Grid, scan: &Scan) -> Result<VoxelIndex> {
+    grid.voxel_of(scan.origin).ok_or_else(|| {
+        let reason = format!("{:?} m is not finite or too far away for a voxel index", scan.origin);
+        Error::argument("scan origin", reason)
+    })
+}
+
 /// The rays of a scan, from one origin.
 struct Fan<'a> {
     grid: &'a Grid,
@@ -171,10 +188,7 @@ struct Fan<'a> {
 
 impl<'a> Fan<'a> {
     fn new(grid: &'a Grid, model: &'a SensorModel, rays: &'a RayConfig, scan: &'a Scan) -> Result<Self> {
-        let voxel = grid.voxel_of(scan.origin).ok_or_else(|| {
-            let reason = format!("{:?} m is not finite or too far away for a voxel index", scan.origin);
-            Error::argument("scan origin", reason)
-        })?;
+        let voxel = origin_voxel(grid, scan)?;
         let origin = RayOrigin::new(grid.to_voxel_units(scan.origin), voxel);
         let range = RangeRule::new(rays, scan.origin);
         let mut fan = Self { grid, model, rays, scan, origin, window: Window::default(), range };

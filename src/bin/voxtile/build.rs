@@ -165,7 +165,7 @@ fn fingerprint(args: &BuildArgs, source: &dyn ScanSource) -> voxtile::Result<Str
 
 fn check(scan: Option<&Scan>, config: &MapConfig) -> voxtile::Result<()> {
     let Some(scan) = scan else { return Ok(()) };
-    ScanTracer::default().trace(&config.grid, &config.sensor_model, &config.rays, scan).map(drop)
+    ScanTracer::check(&config.grid, &config.sensor_model, scan)
 }
 
 /// Passes over scans that are in the map.
