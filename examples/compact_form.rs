@@ -66,7 +66,7 @@ fn octree_seconds(map: &Path, tables: &[(Table, VoxelBox)], repeats: usize) -> R
     let grid = reader.config().grid;
     let mut least = f64::INFINITY;
     for _ in 0..repeats {
-        let copies: Vec<_> = tables.iter().cloned().collect();
+        let copies = tables.to_vec();
         let mut tiles = Vec::with_capacity(copies.len());
         let before = cpu_seconds();
         for (table, voxels) in copies {
