@@ -1,4 +1,4 @@
-//! How long does an update of a voxel take in a tile's table?
+//! How long does a voxel take in a tile's table: to be updated, and to be put into the compact form and back?
 
 use criterion::measurement::WallTime;
 use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
@@ -8,6 +8,7 @@ use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
 use voxtile::space::TileIndex;
 use voxtile::tile::Table;
+use voxtile::tile::format::{CompactEffort, CompactReader, CompactWriter};
 use voxtile::{InsertMode, MapConfig};
 
 type Tables = BTreeMap<TileIndex, Table>;
@@ -55,5 +56,48 @@ fn street(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, street);
+/// The tables of a drive of twenty scans, written and read again.
+fn compact(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("the compact form of a street at 0.2 m");
+    group.sample_size(20);
+    for (name, model) in [("log-odds", SensorModel::default()), ("iwlo", SensorModel::Iwlo(Iwlo::default()))]
+    {
+        let config = MapConfig::new(0.2, 10.0).expect("whole voxels").with_range(0.0, 60.0);
+        let config = config.with_sensor_model(model);
+        let mut tables = Tables::new();
+        let mut tracer = ScanTracer::default();
+        for scan in Survey::street(1).take(20) {
+            let updates = tracer.trace(&config.grid, &model, &config.rays, &scan).expect("a good scan");
+            apply(&mut tables, &config, &updates);
+        }
+        group.throughput(Throughput::Elements(tables.values().map(|table| table.len() as u64).sum()));
+        for (effort_name, effort) in [("fast", CompactEffort::Fast), ("small", CompactEffort::Small)] {
+            let mut writer = CompactWriter::new(effort).expect("a writer");
+            group.bench_function(format!("{name}, {effort_name}"), |bencher| {
+                bencher.iter(|| compact_tables(&mut writer, &tables));
+            });
+        }
+        let bytes = compact_tables(&mut CompactWriter::new(CompactEffort::Fast).expect("a writer"), &tables);
+        let mut reader = CompactReader::new().expect("a reader");
+        group.bench_function(format!("{name}, read"), |bencher| {
+            let mut read = |(tile, bytes): (&TileIndex, &Vec<u8>)| {
+                let voxels = config.grid.voxels_of_tile(*tile);
+                reader.read(&mut &bytes[..], bytes.len() as u64, &voxels).expect("what was written")
+            };
+            bencher.iter_with_large_drop(|| tables.keys().zip(&bytes).map(&mut read).collect::<Vec<_>>());
+        });
+    }
+    group.finish();
+}
+
+fn compact_tables(writer: &mut CompactWriter, tables: &Tables) -> Vec<Vec<u8>> {
+    let compact = |table| {
+        let mut bytes = Vec::new();
+        writer.write(table, &mut bytes).expect("memory takes all");
+        bytes
+    };
+    tables.values().map(compact).collect()
+}
+
+criterion_group!(benches, street, compact);
 criterion_main!(benches);

@@ -19,7 +19,7 @@ mod reader;
 mod trailer;
 mod writer;
 
-pub use compact::{CompactEffort, read_compact, write_compact};
+pub use compact::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
 pub use entries::encode_entries;
 pub use reader::{DecodedTable, read_table, read_trailer};
 pub use trailer::{TRAILER_BYTES, Trailer};

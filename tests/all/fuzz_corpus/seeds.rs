@@ -1,13 +1,15 @@
 //! Small valid files of every format, from which fuzzing begins.
 
-use super::targets::{TILES, entries_end, grid};
+use super::targets::{TILES, compact_bytes, entries_end, grid};
 use crate::readers::{graph, pcd, points};
 use std::fs;
 use tempfile::TempDir;
 use voxtile::io::ScanStreamWriter;
 use voxtile::octree::{Octree, write_bt, write_bt_unpruned, write_ot};
-use voxtile::space::{MortonCode, TileIndex, VoxelKey};
+use voxtile::sensor::Evidence;
+use voxtile::space::{BrickCode, MortonCode, TileIndex, VoxelKey};
 use voxtile::store::{Layout, TileFile};
+use voxtile::tile::Table;
 use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
 
 /// Target, name and content of seeds.
@@ -15,7 +17,7 @@ pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;
 
 /// Every seed.
 pub fn all() -> Seeds {
-    [octrees(), map_files(), clouds(), scans(), texts()].concat()
+    [octrees(), map_files(), compact_tables(), clouds(), scans(), texts()].concat()
 }
 
 fn octrees() -> Seeds {
@@ -94,6 +96,27 @@ fn map_files() -> Seeds {
         ("commit_log", "plain", chosen(0, &log)),
         ("commit_log", "torn", chosen(1, &log[..log.len() - 1])),
         ("commit_log", "zeros", chosen(1, &[&log, &[0; 16][..]].concat())),
+    ]
+}
+
+/// No voxel, some with symbols and rare states of every kind, and a brick of one state.
+fn compact_tables() -> Seeds {
+    let first = grid().voxels_of_tile(TILES[0]).min;
+    let brick = |x: i32| BrickCode::of_voxel([first[0] + 8 * x, first[1], first[2]]);
+    let state = |log_odds, observation_count| Evidence { log_odds, observation_count };
+    let (mut some, mut full) = (Table::default(), Table::default());
+    for x in 0..3 {
+        // The first two bricks have their states in common, so that these take one and two bytes; the third has its own.
+        let voxels = (0..400).map(|place| (place, state(f64::from(x / 2 * 350 + place as i32), x / 2)));
+        some.insert(brick(x), &voxels.collect::<Vec<_>>());
+    }
+    full.insert(brick(3), &(0..512).map(|place| (place, state(-0.5, 7))).collect::<Vec<_>>());
+    let chosen = |choice: u8, table| [&[choice], &compact_bytes(table)[..]].concat();
+    vec![
+        ("compact", "empty", chosen(1, &Table::default())),
+        ("compact", "some", chosen(1, &some)),
+        ("compact", "full", chosen(1, &full)),
+        ("compact", "plain", chosen(0, &full)),
     ]
 }
 

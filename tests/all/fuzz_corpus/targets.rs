@@ -15,15 +15,19 @@ use voxtile::octree::{
 };
 use voxtile::space::{Grid, TileIndex};
 use voxtile::store::{CommitLog, Metadata};
-use voxtile::tile::format::{TRAILER_BYTES, read_table, write_table};
+use voxtile::tile::Table;
+use voxtile::tile::format::{
+    CompactEffort, TRAILER_BYTES, read_compact, read_table, write_compact, write_table,
+};
 
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by the name of its corpus.
-pub const TARGETS: [(&str, Target); 11] = [
+pub const TARGETS: [(&str, Target); 12] = [
     ("bt", octree),
     ("ot", octree),
     ("table", table),
+    ("compact", compact),
     ("metadata", metadata),
     ("commit_log", commit_log),
     ("pcd", pcd),
@@ -130,6 +134,33 @@ fn seal(bytes: &mut [u8]) {
     if let Some((content, crc)) = bytes.split_last_chunk_mut::<4>() {
         *crc = crc32fast::hash(content).to_le_bytes();
     }
+}
+
+/// A table in its compact form: it comes back from the bytes that are made of it, and these are the same again. Others
+/// may stand for the same table.
+pub fn compact(data: &[u8]) -> bool {
+    let Some((&choice, bytes)) = data.split_first() else { return false };
+    let mut bytes = bytes.to_vec();
+    if choice & 1 == 1 {
+        seal(&mut bytes);
+    }
+    let voxels = grid().voxels_of_tile(TILES[usize::from(choice >> 1 & 3)]);
+    let read = |bytes: &[u8]| read_compact(&mut &bytes[..], bytes.len() as u64, &voxels);
+    let Ok(table) = read(&bytes) else { return false };
+    assert_eq!(table.iter().count(), table.len());
+    assert!(table.iter().all(|(code, _)| voxels.contains(code.to_key().to_index_from(voxels.min))));
+    let written = compact_bytes(&table);
+    let again = read(&written).expect("what was written is read");
+    assert!(again.iter().eq(table.iter()));
+    assert!(compact_bytes(&again) == written);
+    true
+}
+
+/// The compact form of a table.
+pub fn compact_bytes(table: &Table) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write_compact(table, CompactEffort::Fast, &mut bytes).expect("memory takes all");
+    bytes
 }
 
 /// `metadata.json`: what was read comes back from its own text.

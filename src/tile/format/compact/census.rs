@@ -1,7 +1,7 @@
 use crate::sensor::Evidence;
 use crate::tile::Table;
 use crate::tile::brick::{Brick, Storage};
-use crate::tile::palette::{Palette, StateId, UNKNOWN};
+use crate::tile::palette::{Palette, StateId};
 use rustc_hash::FxHashMap;
 
 /// How many voxels of a table are in a state.
@@ -43,18 +43,13 @@ impl Census {
         let mut census = Self { interned, others: FxHashMap::default(), room: MOST_COUNTED };
         if table.bricks.iter().all(|brick| matches!(brick.evidence, Storage::Interned(_))) {
             // All are counted, so the order does not matter.
-            table.bricks.iter().for_each(|brick| census.count_all(brick));
+            let mut counts = vec![[0; LANES]; table.palette.len()];
+            table.bricks.iter().for_each(|brick| count_all(brick, &mut counts));
+            census.interned = counts.iter().map(|lanes| lanes.iter().sum()).collect();
         } else {
             table.bricks_in_order().for_each(|brick| census.count_first(brick, &table.palette));
         }
-        census.interned[usize::from(UNKNOWN)] = 0;
         census
-    }
-
-    fn count_all(&mut self, brick: &Brick) {
-        if let Storage::Interned(cells) = &brick.evidence {
-            cells.all().iter().flatten().for_each(|&state| self.interned[usize::from(state)] += 1);
-        }
     }
 
     fn count_first(&mut self, brick: &Brick, palette: &Palette) {
@@ -85,5 +80,18 @@ impl Census {
             self.room -= 1;
             self.others.insert(evidence.into(), 1);
         }
+    }
+}
+
+/// Neighbors are often in one state, and a count that was just written must not be waited for.
+const LANES: usize = 4;
+
+fn count_all(brick: &Brick, counts: &mut [[u32; LANES]]) {
+    if let Storage::Interned(cells) = &brick.evidence {
+        let mut lane = 0;
+        cells.for_each(brick.observed, |_, state| {
+            counts[usize::from(state)][lane % LANES] += 1;
+            lane += 1;
+        });
     }
 }

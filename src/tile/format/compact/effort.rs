@@ -9,11 +9,12 @@ pub enum CompactEffort {
 }
 
 impl CompactEffort {
-    /// The level of zstd.
-    pub(super) const fn level(self) -> i32 {
+    /// The levels of zstd that are tried. A higher one finds more repetitions, which now and then takes more space than
+    /// to find none.
+    pub(super) const fn levels(self) -> &'static [i32] {
         match self {
-            Self::Fast => 1,
-            Self::Small => 5,
+            Self::Fast => &[1],
+            Self::Small => &[5, 1],
         }
     }
 }

@@ -38,6 +38,12 @@ pub(super) struct Group {
 }
 
 impl Group {
+    /// Begins with the first group of a table.
+    pub(super) fn begin(&mut self) {
+        self.clear();
+        self.before = None;
+    }
+
     pub(super) fn is_full(&self) -> bool {
         self.bricks == GROUP_BRICKS || self.symbols.len() >= GROUP_VOXELS
     }
@@ -132,11 +138,16 @@ impl Group {
         let columns = [&self.steps, &self.words, &self.masks, &self.symbols, &self.seconds, &rares];
         put_number(self.bricks as u64, out);
         packer.put_columns(columns.map(|column| &column[..]), out)?;
+        self.clear();
+        Ok(())
+    }
+
+    /// Forgets the bricks, all but which was the last.
+    fn clear(&mut self) {
         let Self { bricks, steps, words, masks, symbols, seconds, rares, before: _ } = self;
         *bricks = 0;
         [steps, words, masks, symbols, seconds].into_iter().for_each(Vec::clear);
         rares.clear();
-        Ok(())
     }
 }
 

@@ -1,19 +1,12 @@
-use super::columns::{STATE_BYTES, state_at};
-use super::group::{GROUP_BRICKS, GROUP_VOXELS};
-use super::input::Input;
-use super::numbers::take_number;
+use super::group_columns::{Columns, Rest, Room};
 use super::open_brick::{OpenBrick, Refusal};
 use super::reader::Header;
 use super::symbol::Symbols;
-use super::unpacker::{Column, Unpacker};
-use crate::error::{DecodeError, FormatError};
-use crate::sensor::Evidence;
-use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, VoxelBox};
+use crate::error::FormatError;
+use crate::space::{BrickCode, VoxelBox};
 use crate::tile::Table;
 use crate::tile::brick::Storage;
-use crate::tile::format::entry::fault_of;
 use crate::tile::palette::Palette;
-use std::io::Read;
 
 /// Puts a table together from groups of bricks.
 pub(super) struct GroupReader<'a> {
@@ -22,48 +15,23 @@ pub(super) struct GroupReader<'a> {
     table: Table,
     /// The brick before.
     before: Option<BrickCode>,
-    columns: Columns,
-}
-
-/// The columns of a group, see [`Group`](super::group::Group).
-#[derive(Default)]
-struct Columns {
-    steps: Vec<u8>,
-    words: Vec<u8>,
-    masks: Vec<u8>,
-    symbols: Vec<u8>,
-    seconds: Vec<u8>,
-    rares: Vec<u8>,
-}
-
-/// What is left of the columns of a group.
-#[derive(Clone, Copy)]
-pub(super) struct Rest<'a> {
-    steps: &'a [u8],
-    words: &'a [u8],
-    masks: &'a [[u8; 8]],
-    pub(super) symbols: &'a [u8],
-    seconds: &'a [u8],
-    rares: &'a [u8],
-    rares_done: usize,
 }
 
 impl<'a> GroupReader<'a> {
     /// The palette holds the codebook.
     pub(super) fn new(voxels: &'a VoxelBox, palette: Palette) -> Self {
         let symbols = Symbols::of(palette.len() - 1);
-        Self {
-            voxels,
-            symbols,
-            table: Table::with_palette(palette),
-            before: None,
-            columns: Columns::default(),
-        }
+        Self { voxels, symbols, table: Table::with_palette(palette), before: None }
     }
 
     /// Number of bricks so far.
     pub(super) fn bricks(&self) -> usize {
         self.table.bricks.len()
+    }
+
+    /// What the next group may have.
+    pub(super) fn room(&self, header: &Header) -> Room {
+        Room { bricks: header.bricks - self.bricks(), voxels: header.voxels - self.table.len() }
     }
 
     /// The table of all groups.
@@ -72,29 +40,17 @@ impl<'a> GroupReader<'a> {
         self.table
     }
 
-    /// Reads the next group.
-    pub(super) fn read(
-        &mut self,
-        header: &Header,
-        unpacker: &mut Unpacker,
-        input: &mut Input<impl Read>,
-    ) -> Result<(), DecodeError> {
-        let offset = input.offset;
-        let bricks = input.number("bricks of a group", GROUP_BRICKS.min(header.bricks - self.bricks()))?;
-        let voxels_left = header.voxels - self.table.len();
-        let voxels = voxels_left.min(GROUP_VOXELS + BRICK_VOXELS - 1).min(bricks * BRICK_VOXELS);
-        let mut columns = std::mem::take(&mut self.columns);
-        columns.read(bricks, voxels, unpacker, input)?;
-        let done = self.add(bricks, Rest::of(&columns));
-        self.columns = columns;
-        Ok(done.map_err(|reason| FormatError::at_offset(offset, reason))?)
+    /// Adds the next group.
+    pub(super) fn add(&mut self, columns: &Columns) -> Result<(), FormatError> {
+        self.add_bricks(columns).map_err(|reason| FormatError::at_offset(columns.offset, reason))
     }
 
-    fn add(&mut self, bricks: usize, mut rest: Rest<'_>) -> Result<(), String> {
-        if bricks == 0 {
+    fn add_bricks(&mut self, columns: &Columns) -> Result<(), String> {
+        if columns.bricks == 0 {
             return Err("a group without bricks".into());
         }
-        (0..bricks).try_for_each(|_| self.add_brick(&mut rest))?;
+        let mut rest = Rest::of(columns);
+        (0..columns.bricks).try_for_each(|_| self.add_brick(&mut rest))?;
         match rest.is_empty() {
             true => Ok(()),
             false => Err("a group has more than its bricks".into()),
@@ -119,100 +75,5 @@ impl<'a> GroupReader<'a> {
         };
         self.table.add_brick(brick.closed(evidence));
         Ok(())
-    }
-}
-
-impl Columns {
-    fn read(
-        &mut self,
-        bricks: usize,
-        voxels: usize,
-        unpacker: &mut Unpacker,
-        input: &mut Input<impl Read>,
-    ) -> Result<(), DecodeError> {
-        /// Bytes of the largest step.
-        const STEP_BYTES: usize = 6;
-        let column = |name, most, bytes| Column { name, most, bytes };
-        unpacker.take_columns(
-            [
-                column("steps", bricks * STEP_BYTES, &mut self.steps),
-                column("words", bricks, &mut self.words),
-                column("masks", bricks * size_of::<BrickMask>(), &mut self.masks),
-                column("symbols", voxels, &mut self.symbols),
-                column("second bytes", voxels, &mut self.seconds),
-                column("rare states", voxels * STATE_BYTES, &mut self.rares),
-            ],
-            input,
-        )
-    }
-}
-
-impl<'a> Rest<'a> {
-    fn of(columns: &'a Columns) -> Self {
-        let Columns { steps, words, masks, symbols, seconds, rares } = columns;
-        Self { steps, words, masks: masks.as_chunks().0, symbols, seconds, rares, rares_done: 0 }
-    }
-
-    /// Whether nothing is left, not even a part of something.
-    fn is_empty(&self) -> bool {
-        let Self { steps, words, masks, symbols, seconds, rares, rares_done } = *self;
-        let is_done = [steps, words, symbols, seconds].iter().all(|column| column.is_empty());
-        is_done && masks.is_empty() && rares_done * STATE_BYTES == rares.len()
-    }
-
-    /// The code of a brick, which is larger than that of the brick before.
-    fn take_code(&mut self, before: Option<BrickCode>) -> Result<BrickCode, String> {
-        let step = take_number(|| {
-            let (&byte, rest) = self.steps.split_first()?;
-            self.steps = rest;
-            Some(byte)
-        });
-        let code = step.and_then(|step| before.map_or(0, |before| before.0 + 1).checked_add(step));
-        let code = code.filter(|&code| code < BrickCode::END);
-        code.map(BrickCode).ok_or_else(|| "a step leads to no brick".into())
-    }
-
-    /// The mask of a brick, in which something is set.
-    fn take_mask(&mut self) -> Result<BrickMask, String> {
-        const SHORT: &str = "a group has less than its bricks";
-        let (&words, rest) = self.words.split_first().ok_or(SHORT)?;
-        self.words = rest;
-        let (masks, rest) = self.masks.split_at_checked(words.count_ones() as usize).ok_or(SHORT)?;
-        self.masks = rest;
-        let mut masks = masks.iter().map(|&mask| u64::from_le_bytes(mask));
-        let observed: BrickMask =
-            std::array::from_fn(|word| if words >> word & 1 == 1 { masks.next().unwrap_or(0) } else { 0 });
-        let is_set = |word: usize| (words >> word & 1 == 1) == (observed[word] != 0);
-        if words == 0 || !(0..8).all(is_set) {
-            return Err("a mask in which nothing is set".into());
-        }
-        Ok(observed)
-    }
-
-    /// The symbols of as many voxels.
-    #[inline]
-    pub(super) fn take_symbols(&mut self, voxels: usize) -> Result<&'a [u8], String> {
-        let (symbols, rest) = self.symbols.split_at_checked(voxels).ok_or("fewer symbols than voxels")?;
-        self.symbols = rest;
-        Ok(symbols)
-    }
-
-    pub(super) fn take_second(&mut self) -> Result<u8, String> {
-        let (&second, rest) = self.seconds.split_first().ok_or("fewer second bytes than prefixes")?;
-        self.seconds = rest;
-        Ok(second)
-    }
-
-    pub(super) fn take_rare(&mut self) -> Result<Evidence, String> {
-        let states = self.rares.len() / STATE_BYTES;
-        if self.rares_done == states || states * STATE_BYTES != self.rares.len() {
-            return Err("fewer rare states than their symbols".into());
-        }
-        let state = state_at(self.rares, self.rares_done);
-        self.rares_done += 1;
-        match fault_of(state) {
-            None => Ok(state),
-            Some((_, reason)) => Err(format!("a rare state: {reason}")),
-        }
     }
 }

@@ -16,6 +16,7 @@ mod codebook;
 mod columns;
 mod effort;
 mod group;
+mod group_columns;
 mod group_reader;
 mod input;
 mod numbers;
@@ -29,8 +30,8 @@ mod unpacker;
 mod writer;
 
 pub use effort::CompactEffort;
-pub use reader::read_compact;
-pub use writer::write_compact;
+pub use reader::{CompactReader, read_compact};
+pub use writer::{CompactWriter, write_compact};
 
 /// "VXTC", little-endian.
 const MAGIC: u32 = 0x4354_5856;

@@ -1,5 +1,5 @@
 use super::group::bits;
-use super::group_reader::Rest;
+use super::group_columns::Rest;
 use super::symbol::{RARE, Symbols};
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, VoxelBox, mask_of_box, places};

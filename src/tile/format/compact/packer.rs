@@ -6,8 +6,10 @@ use zstd::zstd_safe::compress_bound;
 
 /// Packs columns.
 pub(super) struct Packer {
-    zstd: Compressor<'static>,
-    packed: Vec<u8>,
+    /// One a level.
+    zstd: Vec<Compressor<'static>>,
+    /// The smallest form of a column so far, and another.
+    packed: [Vec<u8>; 2],
 }
 
 /// A column of fewer bytes is not packed.
@@ -15,11 +17,8 @@ const LEAST_BYTES: usize = 24;
 
 impl Packer {
     pub(super) fn new(effort: CompactEffort) -> io::Result<Self> {
-        let mut zstd = Compressor::new(effort.level())?;
-        zstd.include_checksum(false)?;
-        zstd.include_contentsize(false)?;
-        zstd.include_dictid(false)?;
-        Ok(Self { zstd, packed: Vec::new() })
+        let zstd: io::Result<_> = effort.levels().iter().map(|&level| compressor(level)).collect();
+        Ok(Self { zstd: zstd?, packed: Default::default() })
     }
 
     /// Appends columns: first of each its length and that of what is written of it, then these. A column that does not
@@ -45,10 +44,27 @@ impl Packer {
             return Ok(column);
         }
         let bound = compress_bound(column.len());
-        if self.packed.len() < bound {
-            self.packed.resize(bound, 0);
+        let mut least = column.len();
+        for zstd in &mut self.zstd {
+            let [best, other] = &mut self.packed;
+            if other.len() < bound {
+                other.resize(bound, 0);
+            }
+            let length = zstd.compress_to_buffer(column, &mut other[..bound])?;
+            if length < least {
+                least = length;
+                std::mem::swap(best, other);
+            }
         }
-        let length = self.zstd.compress_to_buffer(column, &mut self.packed[..bound])?;
-        Ok(if length < column.len() { &self.packed[..length] } else { column })
+        Ok(if least < column.len() { &self.packed[0][..least] } else { column })
     }
+}
+
+/// A compressor that writes nothing that is known anyway.
+fn compressor(level: i32) -> io::Result<Compressor<'static>> {
+    let mut zstd = Compressor::new(level)?;
+    zstd.include_checksum(false)?;
+    zstd.include_contentsize(false)?;
+    zstd.include_dictid(false)?;
+    Ok(zstd)
 }

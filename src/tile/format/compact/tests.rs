@@ -1,6 +1,6 @@
 //! Tables of every kind go through the compact form and come back to the bit; what is not a compact table is an error.
 
-use super::{CompactEffort, read_compact, write_compact};
+use super::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
 use crate::simulation::Random;
@@ -161,6 +161,37 @@ fn what_is_read_goes_on_as_any_table() {
         }
     }
     assert_is(&again, &table.iter().collect());
+}
+
+struct FullDisk;
+
+impl std::io::Write for FullDisk {
+    fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+        Err(std::io::ErrorKind::StorageFull.into())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn writers_and_readers_are_as_new_after_each_table_and_each_failure() {
+    let mut random = Random::of(4, &[]);
+    let (mut writer, mut reader) =
+        (CompactWriter::new(CompactEffort::Fast).unwrap(), CompactReader::new().unwrap());
+    for _ in 0..30 {
+        let tile = any_tile(&mut random);
+        let voxels = any_voxels(&mut random, &tile);
+        let table = table_of(&voxels, &mut random);
+        writer.write(&table, &mut FullDisk).unwrap_err();
+        let mut bytes = Vec::new();
+        writer.write(&table, &mut bytes).unwrap();
+        assert!(bytes == written(&table, CompactEffort::Fast));
+        let half = bytes.len() / 2;
+        reader.read(&mut &bytes[..half], half as u64, &tile).unwrap_err();
+        assert_is(&reader.read(&mut &bytes[..], bytes.len() as u64, &tile).unwrap(), &voxels);
+    }
 }
 
 /// A small table with every part of the form: states of the codebook, rare ones, two bricks.
