@@ -153,6 +153,11 @@ impl Built {
         self.scans.iter().map(|scan| scan.wall_ms).sum::<f64>() / 1e3 + self.flush_wall_s
     }
 
+    /// CPU time of all threads for all scans and for the flush, in seconds.
+    pub fn cpu_s(&self) -> f64 {
+        self.scans.iter().map(|scan| scan.cpu_ms).sum::<f64>() / 1e3 + self.flush_cpu_s
+    }
+
     /// Bytes written to the disk by bytes of the map's files.
     pub fn written_by_map(&self) -> f64 {
         self.bytes_written as f64 / self.map_file_bytes as f64

@@ -10,57 +10,67 @@ use std::process::{Command, Stdio};
 
 /// What a process is begun for: its peak of memory is that of nothing else.
 #[derive(Debug, Serialize, Deserialize)]
-enum Task {
+pub enum Task {
+    /// Build a map.
     Build(Build),
+    /// Find out how large the working set is.
     WorkingSet(WorkingSet),
+    /// Export a map.
     Export(Export),
+    /// Do nothing.
     Idle(Idle),
 }
 
 /// What tells the program to do a task that comes from standard input.
 pub const TASK_ARGUMENT: &str = "--task";
 
-impl Build {
-    /// Builds, in a process of its own.
+/// What a process of its own can be begun for.
+pub trait Apart: Sized {
+    /// What comes of it.
+    type Found: DeserializeOwned;
+
+    /// The task of the process.
+    fn into_task(self) -> Task;
+
+    /// Has a new process do it, and waits.
     ///
     /// # Errors
     ///
     /// A process that cannot be begun or fails.
-    pub fn apart(self) -> Result<Built> {
-        apart(&Task::Build(self))
+    fn apart(self) -> Result<Self::Found> {
+        apart(&self.into_task())
     }
 }
 
-impl WorkingSet {
-    /// Finds it, in a process of its own.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Build::apart`].
-    pub fn apart(self) -> Result<WorkingSetFound> {
-        apart(&Task::WorkingSet(self))
+impl Apart for Build {
+    type Found = Built;
+
+    fn into_task(self) -> Task {
+        Task::Build(self)
     }
 }
 
-impl Export {
-    /// Exports, in a process of its own.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Build::apart`].
-    pub fn apart(self) -> Result<Exported> {
-        apart(&Task::Export(self))
+impl Apart for WorkingSet {
+    type Found = WorkingSetFound;
+
+    fn into_task(self) -> Task {
+        Task::WorkingSet(self)
     }
 }
 
-impl Idle {
-    /// Does nothing, in a process of its own.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Build::apart`].
-    pub fn apart(self) -> Result<Idled> {
-        apart(&Task::Idle(self))
+impl Apart for Export {
+    type Found = Exported;
+
+    fn into_task(self) -> Task {
+        Task::Export(self)
+    }
+}
+
+impl Apart for Idle {
+    type Found = Idled;
+
+    fn into_task(self) -> Task {
+        Task::Idle(self)
     }
 }
 

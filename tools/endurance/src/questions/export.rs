@@ -7,6 +7,7 @@ use crate::export::{Export, ExportFormat};
 use crate::findings::Findings;
 use crate::promise::{Promise, Wanted};
 use crate::setting::{RAYS, Setting, made_up, mib};
+use crate::task::Apart;
 use anyhow::Result;
 use report::{Cell, Table};
 use workload::SurveyName;

@@ -5,6 +5,7 @@ use crate::case::Limit;
 use crate::findings::Findings;
 use crate::promise::{Promise, Wanted};
 use crate::setting::{RAYS, Setting, made_up};
+use crate::task::Apart;
 use anyhow::Result;
 use report::plot::{Content, Line, Panel, Plot, Scale};
 use report::{Cell, Samples, Table};

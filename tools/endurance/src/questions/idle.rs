@@ -4,6 +4,7 @@ use crate::findings::Findings;
 use crate::idle::Idle;
 use crate::promise::{Promise, Wanted};
 use crate::setting::{RAYS, Setting, made_up};
+use crate::task::Apart;
 use anyhow::Result;
 use report::{Cell, Table};
 use workload::SurveyName;

@@ -6,6 +6,7 @@ use crate::findings::Findings;
 use crate::metered_disk::DiskSpeed;
 use crate::promise::{Promise, Wanted};
 use crate::setting::{RAYS, Setting, made_up, mib};
+use crate::task::Apart;
 use crate::working_set::{WorkingSet, WorkingSetFound};
 use anyhow::Result;
 use report::plot::{Bars, Content, Panel, Plot};
@@ -158,6 +159,7 @@ fn table(measured: &[Measured]) -> Table {
         "limit MiB",
         "seconds",
         "of that flush",
+        "CPU seconds",
         "speed",
         "map MB",
         "written by map",
@@ -179,6 +181,7 @@ fn table(measured: &[Measured]) -> Table {
                 Cell::Number(mib(limit_bytes), 1),
                 Cell::Number(wall_s.median(), 1),
                 Cell::Number(built.flush_wall_s, 1),
+                Cell::Number(built.cpu_s(), 1),
                 Cell::Share(of_case.share(of_limit)),
                 Cell::Number(built.map_file_bytes as f64 / 1e6, 0),
                 Cell::Number(built.written_by_map(), 2),
