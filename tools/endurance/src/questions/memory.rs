@@ -1,8 +1,9 @@
 //! Does the memory stay where it is wanted, wherever the sensor goes?
 
-use crate::build::Built;
+use crate::build::{Build, Built};
 use crate::case::{Case, Limit};
 use crate::findings::Findings;
+use crate::metered_disk::DiskSpeed;
 use crate::promise::{Promise, Wanted};
 use crate::setting::{RAYS, Setting, made_up, mib};
 use crate::task::Apart;
@@ -13,12 +14,25 @@ use workload::SurveyName;
 
 /// What a process may take beside its limit, in MiB: its program, the scan, the clocks' samples.
 pub const BESIDE_MIB: f64 = 48.0;
+/// Inputs that are mapped on a slow disk, too.
+const PILES_UP: [&str; 1] = ["teleports"];
+/// How slow it is; the other where the run is to be short.
+const SLOW: DiskSpeed = DiskSpeed::BytesPerSecond(40e6);
+const LESS_SLOW: DiskSpeed = DiskSpeed::BytesPerSecond(100e6);
 
 /// A map built in memory and with some limits.
 struct Measured {
     case: Case,
     in_memory: Built,
-    limited: Vec<(usize, Built)>,
+    limited: Vec<Limited>,
+}
+
+/// A map built with a limit.
+struct Limited {
+    limit_mib: usize,
+    /// Whether its disk was slow, so that what is to be written may pile up.
+    is_slow: bool,
+    built: Built,
 }
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
@@ -26,15 +40,20 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     let mut measured = Vec::new();
     let limits_mib: &[usize] = setting.size(&[64, 128, 256], &[24]);
     for case in cases(setting) {
-        let mut build = |limit| {
-            let build = setting.build(&case, limit);
+        let mut build = |limit, disk| {
+            let build = Build { disk, ..setting.build(&case, limit) };
             let built = build.clone().apart()?;
             findings.keep(&build, &built)?;
             anyhow::Ok(built)
         };
-        let in_memory = build(Limit::InMemory)?;
-        let limited = limits_mib.iter().map(|mib| Ok((*mib, build(Limit::Bytes(mib << 20))?)));
-        let limited = limited.collect::<Result<_>>()?;
+        let in_memory = build(Limit::InMemory, DiskSpeed::Unsynced)?;
+        let slow = PILES_UP.contains(&case.name.as_str()).then_some((limits_mib[0], true));
+        let mut limited = Vec::new();
+        for (limit_mib, is_slow) in limits_mib.iter().map(|&limit_mib| (limit_mib, false)).chain(slow) {
+            let disk = if is_slow { setting.size(SLOW, LESS_SLOW) } else { DiskSpeed::Unsynced };
+            let built = build(Limit::Bytes(limit_mib << 20), disk)?;
+            limited.push(Limited { limit_mib, is_slow, built });
+        }
         measured.push(Measured { case, in_memory, limited });
     }
     findings.promises = measured.iter().flat_map(Measured::promises).collect();
@@ -63,14 +82,14 @@ fn cases(setting: &Setting) -> Vec<Case> {
 impl Measured {
     /// How many digests are not that of the map in memory.
     fn wrong_digests(&self) -> usize {
-        self.limited.iter().filter(|(_, built)| built.digest != self.in_memory.digest).count()
+        self.limited.iter().filter(|limited| limited.built.digest != self.in_memory.digest).count()
     }
 
     fn promises(&self) -> Vec<Promise> {
         let name = &self.case.name;
-        let beside = self.limited.iter().map(|(limit_mib, built)| beside_mib(*limit_mib, built));
+        let beside = self.limited.iter().map(Limited::beside_mib);
         let least_limit_mib =
-            self.limited.iter().map(|(limit_mib, _)| *limit_mib as f64).fold(f64::NAN, f64::min);
+            self.limited.iter().map(|limited| limited.limit_mib as f64).fold(f64::NAN, f64::min);
         vec![
             Promise::new(
                 format!("{name}: peak of memory beyond the limit, largest"),
@@ -96,7 +115,7 @@ impl Measured {
 
     fn panel(&self) -> Panel {
         let is_way = self.case.is_way();
-        let limited = self.limited.iter().map(|(limit_mib, built)| (format!("{limit_mib} MiB"), built));
+        let limited = self.limited.iter().map(|limited| (limited.name(), &limited.built));
         let lines = limited.chain([("in memory".to_owned(), &self.in_memory)]).map(|(name, built)| {
             let every = built.scans.len().div_ceil(400).max(1);
             let points = built.scans.iter().enumerate().step_by(every).map(|(number, scan)| {
@@ -114,13 +133,19 @@ impl Measured {
     }
 }
 
-/// The peak of the process beyond the limit, in MiB.
-fn beside_mib(limit_mib: usize, built: &Built) -> f64 {
-    mib(built.peak_resident_bytes as f64) - limit_mib as f64
+impl Limited {
+    fn name(&self) -> String {
+        format!("{} MiB{}", self.limit_mib, if self.is_slow { ", slow disk" } else { "" })
+    }
+
+    /// The peak of the process beyond the limit, in MiB.
+    fn beside_mib(&self) -> f64 {
+        mib(self.built.peak_resident_bytes as f64) - self.limit_mib as f64
+    }
 }
 
 fn table(measured: &[Measured]) -> Table {
-    let caption = "Peaks of the resident memory of processes that do nothing but build the map, and of what goes to the \
+    let caption = "Peaks of the resident memory of processes that do nothing but build the map, and how many tiles go to the \
                    disk. *beyond*: peak less limit.";
     let columns = [
         "map",
@@ -136,16 +161,17 @@ fn table(measured: &[Measured]) -> Table {
     ];
     let mut table = Table::new("memory", caption, columns);
     for Measured { case, in_memory, limited } in measured {
-        let limits = limited.iter().map(|(limit_mib, built)| (Some(*limit_mib), built));
-        for (limit_mib, built) in [(None, in_memory)].into_iter().chain(limits) {
+        let limits = limited.iter().map(|limited| (limited.name(), limited.beside_mib(), &limited.built));
+        let all = [("in memory".to_owned(), f64::NAN, in_memory)].into_iter().chain(limits);
+        for (limit, beside_mib, built) in all {
             table.push([
                 Cell::Text(case.name.clone()),
                 Cell::Text(case.description()),
-                Cell::Text(limit_mib.map_or("in memory".to_owned(), |limit_mib| format!("{limit_mib} MiB"))),
+                Cell::Text(limit),
                 Cell::Count(built.scans.len() as u64),
                 Cell::Count(built.tiles),
                 Cell::Number(mib(built.peak_resident_bytes as f64), 1),
-                Cell::Number(limit_mib.map_or(f64::NAN, |limit_mib| beside_mib(limit_mib, built)), 1),
+                Cell::Number(beside_mib, 1),
                 Cell::Count(built.saves),
                 Cell::Count(built.loads),
                 Cell::Text(built.digest.chars().take(8).collect()),
