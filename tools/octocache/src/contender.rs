@@ -1,5 +1,5 @@
-use crate::stopwatch::{Stopwatch, Took};
 use anyhow::Result;
+use report::{Stopwatch, Took};
 use voxtile::mapper::MapStatistics;
 use voxtile::{
     InMemoryMapper, MapConfig, MapView, Mapper, OctreeConfig, Scan, VoxelCacheConfig, VoxelCacheMode,

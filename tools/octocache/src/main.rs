@@ -1,24 +1,18 @@
 //! The command `octocache`: puts the questions of the OctoCache paper to voxtile and writes tables and plots.
 
-mod answer;
 mod contender;
 mod dataset;
-mod machine;
-mod page;
-mod plot;
 mod questions;
-mod samples;
-mod stopwatch;
-mod table;
+mod setting;
 mod update_stream;
 
-use answer::Setting;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use clap::Parser;
 use clap::builder::PossibleValuesParser;
 use questions::QUESTIONS;
-use std::fs;
-use std::path::{Path, PathBuf};
+use report::Page;
+use setting::Setting;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -57,12 +51,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let output = arguments.output.as_ref().unwrap_or(&arguments.page);
-    let folder = output.with_extension("");
-    fs::create_dir_all(&folder).with_context(|| format!("{}: cannot make the folder", folder.display()))?;
-    if *output != arguments.page {
-        fs::write(output, read(&arguments.page)?).with_context(|| cannot_write(output))?;
-    }
+    let page = Page::open(&arguments.page, arguments.output.as_deref())?;
     let setting = Setting {
         datasets: dataset::datasets(&arguments.data),
         is_short: arguments.short,
@@ -76,25 +65,11 @@ fn run(arguments: &Arguments) -> Result<()> {
         let begin = Instant::now();
         let answer = pool.install(|| (question.answer)(&setting));
         let answer = answer.with_context(|| question.name.to_owned())?;
-        answer.write(&folder)?;
-        let section =
-            answer.markdown(name_of(&folder)?, &command(arguments, question.name), &machine::description());
-        // After every question, so that a long run that is stopped leaves what it found, and read anew, so that who edits
-        // the page meanwhile loses nothing.
-        let page = page::with_section(&read(output)?, question.name, &section);
-        let page = page.with_context(|| output.display().to_string())?;
-        fs::write(output, page).with_context(|| cannot_write(output))?;
+        // After every question, so that a long run that is stopped leaves what it found.
+        page.put(question.name, &answer, &command(arguments, question.name))?;
         eprintln!("{:.0} s", begin.elapsed().as_secs_f64());
     }
     Ok(())
-}
-
-fn read(page: &Path) -> Result<String> {
-    fs::read_to_string(page).with_context(|| format!("{}: cannot read the page", page.display()))
-}
-
-fn cannot_write(page: &Path) -> String {
-    format!("{}: cannot write the page", page.display())
 }
 
 /// What to type to measure a question again.
@@ -102,9 +77,4 @@ fn command(arguments: &Arguments, question: &str) -> String {
     let short = if arguments.short { " --short" } else { "" };
     let runs = if arguments.short { String::new() } else { format!(" --runs {}", arguments.runs) };
     format!("tools/octocache/run.sh{short}{runs} --only {question}")
-}
-
-fn name_of(folder: &Path) -> Result<&str> {
-    let name = folder.file_name().and_then(|name| name.to_str());
-    name.ok_or_else(|| anyhow!("{}: a folder with a readable name is needed", folder.display()))
 }

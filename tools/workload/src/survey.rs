@@ -1,9 +1,10 @@
 use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
 use voxtile::Scan;
 use voxtile::simulation::Survey;
 
 /// Which of the made-up surveys.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 pub enum SurveyName {
     /// 64 beams of 1024 rays, every metre of a drive through a city; mean range 12 m, at most 60 m
     Street,

@@ -1,12 +1,13 @@
 //! Figure 24: the shape of the cache, few deep buckets or many shallow ones.
 
-use crate::answer::{Answer, Setting};
 use crate::contender::Contender;
 use crate::dataset::{Dataset, in_one_tile};
-use crate::plot::{Content, Line, Panel, Plot, Scale};
-use crate::samples::Samples;
-use crate::table::{Cell, Table};
+use crate::setting::Setting;
 use anyhow::Result;
+use report::Answer;
+use report::Samples;
+use report::plot::{Content, Line, Panel, Plot, Scale};
+use report::{Cell, Table};
 use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, Scan, VoxelCacheConfig};
 
 const TAUS: [usize; 5] = [1, 2, 4, 8, 16];

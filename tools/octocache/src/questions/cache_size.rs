@@ -1,11 +1,12 @@
 //! Figure 23: how many updates find their voxel in the cache, by its size.
 
-use crate::answer::{Answer, Setting};
 use crate::contender::Contender;
 use crate::dataset::in_one_tile;
-use crate::plot::{Content, Line, Panel, Plot, Scale};
-use crate::table::{Cell, Table};
+use crate::setting::Setting;
 use anyhow::Result;
+use report::Answer;
+use report::plot::{Content, Line, Panel, Plot, Scale};
+use report::{Cell, Table};
 use voxtile::{InsertMode, VoxelCacheConfig};
 
 const TAU: usize = 4;

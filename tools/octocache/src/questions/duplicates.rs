@@ -1,11 +1,12 @@
 //! Figure 8 and table 2: how often the same voxels are updated, within a scan and from scan to scan.
 
-use crate::answer::{Answer, Setting};
 use crate::dataset::map_config;
-use crate::plot::{Content, Line, Panel, Plot, Scale};
-use crate::samples::Samples;
-use crate::table::{Cell, Table};
+use crate::setting::Setting;
 use anyhow::Result;
+use report::Answer;
+use report::Samples;
+use report::plot::{Content, Line, Panel, Plot, Scale};
+use report::{Cell, Table};
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 use voxtile::scan::{ScanTracer, ScanUpdates, TileUpdates};

@@ -1,13 +1,14 @@
 //! From a scan to the first answer that knows it.
 
-use crate::answer::{Answer, Setting};
 use crate::contender::Contender;
 use crate::dataset::map_config;
-use crate::plot::{Bars, Content, Panel, Plot};
-use crate::samples::Samples;
-use crate::stopwatch::Stopwatch;
-use crate::table::{Cell, Table};
+use crate::setting::Setting;
 use anyhow::{Result, ensure};
+use report::Answer;
+use report::Samples;
+use report::Stopwatch;
+use report::plot::{Bars, Content, Panel, Plot};
+use report::{Cell, Table};
 use std::hint::black_box;
 use voxtile::space::{Aabb, Grid, Point};
 use voxtile::{

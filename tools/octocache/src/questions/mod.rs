@@ -8,8 +8,9 @@ mod stages;
 mod update_order;
 mod workflows;
 
-use crate::answer::{Answer, Setting};
+use crate::setting::Setting;
 use anyhow::Result;
+use report::Answer;
 
 /// A question of the paper.
 pub struct Question {

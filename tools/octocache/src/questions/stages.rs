@@ -1,12 +1,13 @@
 //! Figure 22 and table 3: where the time goes.
 
-use crate::answer::{Answer, Setting};
 use crate::contender::{Build, Contender};
 use crate::dataset::map_config;
-use crate::plot::{Bars, Content, Panel, Plot};
-use crate::samples::Samples;
-use crate::table::{Cell, Table};
+use crate::setting::Setting;
 use anyhow::Result;
+use report::Answer;
+use report::Samples;
+use report::plot::{Bars, Content, Panel, Plot};
+use report::{Cell, Table};
 use voxtile::{InsertMode, VoxelCacheConfig};
 
 const OCTREE_UPDATE: &str = "octree update";

@@ -1,13 +1,14 @@
 //! Figure 10: the same updates to the octree in other orders.
 
-use crate::answer::{Answer, Setting};
 use crate::dataset::{Dataset, map_config};
-use crate::plot::{Bars, Content, Panel, Plot};
-use crate::samples::Samples;
-use crate::stopwatch::Stopwatch;
-use crate::table::{Cell, Table};
+use crate::setting::Setting;
 use crate::update_stream::{Update, accumulated, updates};
 use anyhow::Result;
+use report::Answer;
+use report::Samples;
+use report::Stopwatch;
+use report::plot::{Bars, Content, Panel, Plot};
+use report::{Cell, Table};
 use rustc_hash::FxHashSet;
 use std::hint::black_box;
 use voxtile::octree::Octree;

@@ -1,12 +1,13 @@
 //! Figures 20 and 21: the time of a map's construction by resolution, with every form of octree.
 
-use crate::answer::{Answer, Setting};
 use crate::contender::Contender;
 use crate::dataset::{Dataset, map_config};
-use crate::plot::{Content, Line, Panel, Plot, Scale};
-use crate::samples::Samples;
-use crate::table::{Cell, Table};
+use crate::setting::Setting;
 use anyhow::Result;
+use report::Answer;
+use report::Samples;
+use report::plot::{Content, Line, Panel, Plot, Scale};
+use report::{Cell, Table};
 use voxtile::{InsertMode, VoxelCacheConfig};
 
 /// One of the paper's two workflows.

@@ -1,20 +1,10 @@
-use crate::dataset::Dataset;
 use crate::plot::Plot;
 use crate::table::Table;
 use anyhow::Result;
 use std::path::Path;
 
-/// What a question is put to, and how long it may take.
-pub struct Setting {
-    /// The scans.
-    pub datasets: Vec<Dataset>,
-    /// Whether to look only whether everything works.
-    pub is_short: bool,
-    /// Runs of which the median is taken.
-    pub runs: usize,
-}
-
 /// What a question yields.
+#[derive(Default)]
 pub struct Answer {
     /// Numbers.
     pub tables: Vec<Table>,
@@ -22,21 +12,18 @@ pub struct Answer {
     pub plots: Vec<Plot>,
 }
 
-impl Setting {
-    /// One of two, the second where the run is to be short.
-    pub fn size<T>(&self, full: T, short: T) -> T {
-        if self.is_short { short } else { full }
-    }
-}
-
 impl Answer {
     /// Writes tables and plots into a folder.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         self.tables.iter().try_for_each(|table| table.write_csv(folder))?;
         self.plots.iter().try_for_each(|plot| plot.write(folder))
     }
 
-    /// Tables and plots for the page beside the folder `folder`.
+    /// Tables and plots for the page beside the folder `folder`, below what was typed and where it ran.
     pub fn markdown(&self, folder: &str, command: &str, machine: &str) -> String {
         let mut text = format!("`{command}`; {machine}.\n");
         for table in &self.tables {

@@ -1,0 +1,250 @@
+use crate::case::{Case, Limit};
+use crate::metered_disk::{DiskSpeed, Meter, MeteredDisk};
+use crate::process_memory;
+use anyhow::{Context, Result};
+use report::Stopwatch;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use voxtile::mapper::IoCounts;
+use voxtile::{InMemoryMapper, MapReader, Mapper, OutOfCoreTileMapper, Questions, Scan};
+
+/// A map to build, scan by scan and with one flush at the end.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Build {
+    /// Of what.
+    pub case: Case,
+    /// In how much memory.
+    pub limit: Limit,
+    /// On how fast a disk.
+    pub disk: DiskSpeed,
+    /// How many scans are made or read before they are inserted one after another: what is done by other threads while
+    /// scans are made is not in the wall time.
+    pub scans_at_a_time: usize,
+    /// Folder of the map, which is replaced.
+    pub folder: PathBuf,
+    /// Whether the map stays there.
+    pub is_kept: bool,
+    /// Whether the digest is wanted.
+    pub has_digest: bool,
+}
+
+/// A map that was built.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Built {
+    /// What each scan took, in their order.
+    pub scans: Vec<ScanCost>,
+    /// Wall time of the flush at the end, in seconds.
+    pub flush_wall_s: f64,
+    /// CPU time of the flush at the end, in seconds.
+    pub flush_cpu_s: f64,
+    /// Resident memory before the first scan, in bytes.
+    pub start_resident_bytes: u64,
+    /// Largest resident memory of the process until the end of the flush, in bytes.
+    pub peak_resident_bytes: u64,
+    /// Tiles of the map.
+    pub tiles: u64,
+    /// Bytes of memory in the tiles that were in memory after the last scan.
+    pub tile_bytes: u64,
+    /// Bytes of the map's files after the flush.
+    pub map_file_bytes: u64,
+    /// Bytes read from the disk, of whatever files.
+    pub bytes_read: u64,
+    /// Bytes written to the disk, of whatever files.
+    pub bytes_written: u64,
+    /// Tiles read.
+    pub loads: u64,
+    /// Tiles written.
+    pub saves: u64,
+    /// The digest of the map, in hexadecimal digits; empty if it was not wanted.
+    pub digest: String,
+}
+
+/// What inserting a scan took.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct ScanCost {
+    /// How far the sensor had come along its way, in metres.
+    pub distance_m: f64,
+    /// Wall time of the call.
+    pub wall_ms: f64,
+    /// CPU time of all threads since the scan before, less that of making the scan.
+    pub cpu_ms: f64,
+    /// Resident memory of the process after the call, in bytes.
+    pub resident_bytes: u64,
+    /// Bytes written to the disk since the map was opened.
+    pub bytes_written: u64,
+}
+
+impl Build {
+    /// Builds it in this process.
+    ///
+    /// # Errors
+    ///
+    /// Scans that cannot be read, a folder that cannot be replaced, a map that cannot be made.
+    pub fn run(self) -> Result<Built> {
+        let config = self.case.config(self.limit)?;
+        let disk = MeteredDisk::new(self.disk);
+        let meter = disk.meter();
+        if self.limit == Limit::InMemory {
+            let mut mapper = InMemoryMapper::new(config)?;
+            let mut built = self.insert_all(&mut mapper, &meter)?;
+            if self.has_digest {
+                built.digest = mapper.digest()?.to_string();
+            }
+            return Ok(built);
+        }
+        replace_folder(&self.folder)?;
+        let mut mapper = OutOfCoreTileMapper::create_on(Arc::new(disk), &self.folder, config)?;
+        let mut built = self.insert_all(&mut mapper, &meter)?;
+        built.map_file_bytes = file_bytes(&self.folder)?;
+        drop(mapper);
+        if self.has_digest {
+            // Not by way of the slow disk: this is no part of what is measured.
+            built.digest = MapReader::open(&self.folder, 1)?.digest()?.to_string();
+        }
+        if !self.is_kept {
+            remove_folder(&self.folder)?;
+        }
+        Ok(built)
+    }
+
+    fn insert_all(&self, mapper: &mut impl Mapper, meter: &Meter) -> Result<Built> {
+        let mut built = Built { start_resident_bytes: process_memory::resident_bytes()?, ..Built::default() };
+        let mut scans = self.case.scans()?;
+        let mut way = Way::default();
+        let mut since_last = Stopwatch::start()?;
+        loop {
+            let some: Vec<Scan> = scans.by_ref().take(self.scans_at_a_time).collect::<Result<_>>()?;
+            if some.is_empty() {
+                break;
+            }
+            for scan in &some {
+                let others_s = since_last.stop()?.others_s;
+                let stopwatch = Stopwatch::start()?;
+                mapper.insert_scan(scan)?;
+                let took = stopwatch.stop()?;
+                since_last = Stopwatch::start()?;
+                built.scans.push(ScanCost {
+                    distance_m: way.to(scan),
+                    wall_ms: 1e3 * took.wall_s,
+                    cpu_ms: 1e3 * (took.cpu_s() + others_s),
+                    resident_bytes: process_memory::resident_bytes()?,
+                    bytes_written: meter.bytes_written(),
+                });
+            }
+        }
+        built.tile_bytes = mapper.statistics().cached.bytes();
+        let stopwatch = Stopwatch::start()?;
+        mapper.flush()?;
+        let took = stopwatch.stop()?;
+        (built.flush_wall_s, built.flush_cpu_s) = (took.wall_s, took.cpu_s());
+        built.peak_resident_bytes = process_memory::peak_bytes()?;
+        let statistics = mapper.statistics();
+        let IoCounts { loads, saves, .. } = statistics.io;
+        let (bytes_read, bytes_written) = (meter.bytes_read(), meter.bytes_written());
+        Ok(Built { tiles: statistics.tiles, bytes_read, bytes_written, loads, saves, ..built })
+    }
+}
+
+impl Built {
+    /// Wall time of all scans and of the flush, in seconds.
+    pub fn wall_s(&self) -> f64 {
+        self.scans.iter().map(|scan| scan.wall_ms).sum::<f64>() / 1e3 + self.flush_wall_s
+    }
+
+    /// CPU time of all threads for all scans and for the flush, in seconds.
+    pub fn cpu_s(&self) -> f64 {
+        self.scans.iter().map(|scan| scan.cpu_ms).sum::<f64>() / 1e3 + self.flush_cpu_s
+    }
+
+    /// Bytes written to the disk by bytes of the map's files.
+    pub fn written_by_map(&self) -> f64 {
+        self.bytes_written as f64 / self.map_file_bytes as f64
+    }
+}
+
+/// How far a sensor has come.
+#[derive(Default)]
+struct Way {
+    last: Option<[f64; 3]>,
+    length_m: f64,
+}
+
+impl Way {
+    fn to(&mut self, scan: &Scan) -> f64 {
+        if let Some(last) = self.last.replace(scan.origin) {
+            self.length_m += (0..3).map(|k| (scan.origin[k] - last[k]).powi(2)).sum::<f64>().sqrt();
+        }
+        self.length_m
+    }
+}
+
+/// Makes room for a map's folder: what is there from before goes.
+fn replace_folder(folder: &Path) -> Result<()> {
+    remove_folder(folder)?;
+    let parent = folder.parent().unwrap_or(folder);
+    fs::create_dir_all(parent).with_context(|| format!("{}: cannot make the folder", parent.display()))
+}
+
+/// Removes a folder and all in it, if it is there.
+///
+/// # Errors
+///
+/// A folder that cannot be removed.
+pub fn remove_folder(folder: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder).with_context(|| format!("{}: cannot remove", folder.display()))?;
+    }
+    Ok(())
+}
+
+/// Bytes of all files in a folder and in the folders in it.
+fn file_bytes(folder: &Path) -> Result<u64> {
+    let mut bytes = 0;
+    for entry in fs::read_dir(folder).with_context(|| format!("{}: cannot read", folder.display()))? {
+        let entry = entry?;
+        let metadata = entry.metadata()?;
+        bytes += if metadata.is_dir() { file_bytes(&entry.path())? } else { metadata.len() };
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Input;
+    use workload::SurveyName;
+
+    fn build(limit: Limit, folder: &Path) -> Built {
+        let input = Input::MadeUp { survey: SurveyName::Drive, rays: 500, scans: 5 };
+        let case =
+            Case { name: "drive".into(), input, resolution_m: 0.4, tile_size_m: 4.0, max_range_m: 30.0 };
+        let folder = folder.join("map");
+        let build = Build {
+            case,
+            limit,
+            disk: DiskSpeed::Unsynced,
+            scans_at_a_time: 2,
+            folder,
+            is_kept: false,
+            has_digest: true,
+        };
+        build.run().unwrap()
+    }
+
+    #[test]
+    fn a_build_on_disk_is_the_build_in_memory_and_its_bytes_are_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let in_memory = build(Limit::InMemory, folder.path());
+        let on_disk = build(Limit::None, folder.path());
+        assert_eq!(in_memory.digest, on_disk.digest);
+        assert_eq!([in_memory.scans.len(), on_disk.scans.len()], [5; 2]);
+        assert_eq!(in_memory.tiles, on_disk.tiles);
+        assert_eq!([in_memory.bytes_written, in_memory.map_file_bytes], [0; 2]);
+        assert!(on_disk.written_by_map() >= 1.0 && on_disk.map_file_bytes > 10_000);
+        assert!((on_disk.scans[4].distance_m - 4.0).abs() < 0.1);
+        assert!(on_disk.peak_resident_bytes >= on_disk.start_resident_bytes);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

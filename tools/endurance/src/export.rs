@@ -1,0 +1,125 @@
+use crate::build::remove_folder;
+use crate::process_memory;
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use voxtile::io::{VoxelFormat, VoxelRecord, VoxelWriter};
+use voxtile::octree::OctreeFormat;
+use voxtile::query::OctreeExport;
+use voxtile::{MapReader, MapView, Questions};
+
+/// A map to export in little memory.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Export {
+    /// Folder of the map.
+    pub map: PathBuf,
+    /// To what kind of file.
+    pub format: ExportFormat,
+    /// Bytes of memory for the part of an octree that is put together at a time.
+    pub memory_bytes: usize,
+    /// Folder for the files, which is made and removed again.
+    pub folder: PathBuf,
+}
+
+/// What a map is exported to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ExportFormat {
+    /// The centers of the occupied voxels.
+    Ply,
+    /// OctoMap's binary octree.
+    Bt,
+    /// OctoMap's full octree.
+    Ot,
+}
+
+/// A map that was exported.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Exported {
+    /// Voxels in the file.
+    pub voxels: u64,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+    /// Wall time, in seconds.
+    pub wall_s: f64,
+    /// Largest resident memory of the process, in bytes.
+    pub peak_resident_bytes: u64,
+    /// Resident memory before the map was opened, in bytes.
+    pub start_resident_bytes: u64,
+}
+
+impl ExportFormat {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Ply, Self::Bt, Self::Ot];
+
+    /// The extension of its files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ply => "ply",
+            Self::Bt => "bt",
+            Self::Ot => "ot",
+        }
+    }
+}
+
+impl Export {
+    /// Exports it in this process.
+    ///
+    /// # Errors
+    ///
+    /// A map that cannot be read, a file that cannot be written.
+    pub fn run(self) -> Result<Exported> {
+        let start_resident_bytes = process_memory::resident_bytes()?;
+        fs::create_dir_all(&self.folder)
+            .with_context(|| format!("{}: cannot make the folder", self.folder.display()))?;
+        let path = self.folder.join("map").with_extension(self.format.name());
+        let begin = Instant::now();
+        let voxels = self.write(&path).with_context(|| format!("{}: cannot export", path.display()))?;
+        let wall_s = begin.elapsed().as_secs_f64();
+        let file_bytes = fs::metadata(&path)?.len();
+        remove_folder(&self.folder)?;
+        let peak_resident_bytes = process_memory::peak_bytes()?;
+        Ok(Exported { voxels, file_bytes, wall_s, peak_resident_bytes, start_resident_bytes })
+    }
+
+    fn write(&self, path: &Path) -> Result<u64> {
+        let map = MapReader::open(&self.map, 1)?;
+        let mut out = BufWriter::with_capacity(1 << 18, File::create(path)?);
+        let voxels = match self.format {
+            ExportFormat::Ply => write_occupied(&map, &mut out)?,
+            ExportFormat::Bt => self.write_octree(&map, OctreeFormat::Bt, &mut out)?,
+            ExportFormat::Ot => self.write_octree(&map, OctreeFormat::Ot, &mut out)?,
+        };
+        out.flush()?;
+        Ok(voxels)
+    }
+
+    fn write_octree(&self, map: &MapReader, format: OctreeFormat, out: &mut impl Write) -> Result<u64> {
+        let spool = self.folder.join("spool");
+        let mut spool = File::options().read(true).write(true).create_new(true).open(spool)?;
+        let export = OctreeExport { format, region: None, memory_bytes: self.memory_bytes };
+        map.write_octree::<anyhow::Error>(&export, &mut spool, out)
+    }
+}
+
+fn write_occupied(map: &MapReader, out: &mut impl Write) -> Result<u64> {
+    let grid = map.config().grid;
+    let (_, count) = map.voxel_counts().context("the map does not know how many voxels it has")?;
+    let mut writer = VoxelWriter::new(VoxelFormat::Ply, count, grid.resolution_m(), out)?;
+    let mut written = Ok(());
+    map.for_each_occupied(None, None, |voxel| {
+        if written.is_ok() {
+            written = writer.write(&VoxelRecord {
+                center_m: grid.center_m(voxel.index),
+                probability: voxel.evidence.probability(),
+                log_odds: voxel.evidence.log_odds,
+                observation_count: voxel.evidence.observation_count,
+            });
+        }
+    })?;
+    written?;
+    writer.finish()?;
+    Ok(count)
+}

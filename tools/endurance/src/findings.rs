@@ -1,0 +1,59 @@
+use crate::promise::{self, Promise};
+use anyhow::Result;
+use report::Answer;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// What a question yields.
+#[derive(Default)]
+pub struct Findings {
+    /// For the page.
+    pub answer: Answer,
+    /// What voxtile is held to.
+    pub promises: Vec<Promise>,
+    /// Everything that was measured, run by run.
+    pub runs: Vec<Value>,
+}
+
+impl Findings {
+    /// Keeps a run and what it was.
+    ///
+    /// # Errors
+    ///
+    /// What cannot be written as JSON.
+    pub fn keep(&mut self, what: &impl Serialize, found: &impl Serialize) -> Result<()> {
+        self.runs.push(json!({ "what": serde_json::to_value(what)?, "found": serde_json::to_value(found)? }));
+        Ok(())
+    }
+
+    /// The promises that do not depend on time and were not kept, in words.
+    pub fn complaints(&self) -> Vec<String> {
+        let broken = self.promises.iter().filter(|promise| !promise.is_about_time && !promise.is_kept());
+        broken.map(Promise::complaint).collect()
+    }
+
+    /// What goes into the page: the promises first. A short run says nothing about time.
+    pub fn into_answer(mut self, file: &'static str, is_short: bool) -> (Answer, Vec<Promise>) {
+        self.promises.retain(|promise| !(is_short && promise.is_about_time));
+        if !self.promises.is_empty() {
+            self.answer.tables.insert(0, promise::table(file, "What was promised.", &self.promises));
+        }
+        (self.answer, self.promises)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::promise::Wanted;
+
+    #[test]
+    fn only_what_does_not_depend_on_time_is_complained_about() {
+        let broken = [1.0, 3.0].map(|found| Promise::new("bytes", found, Wanted::AtMost(2.0), ""));
+        let slow = Promise::about_time("time", 3.0, Wanted::AtMost(2.0), "s");
+        let findings = Findings { promises: [&broken[..], &[slow]].concat(), ..Findings::default() };
+        assert_eq!(findings.complaints(), ["bytes: 3, wanted <= 2"]);
+        let (answer, promises) = findings.into_answer("promises", true);
+        assert_eq!((answer.tables.len(), promises.len()), (1, 2));
+    }
+}

@@ -1,0 +1,225 @@
+use crate::bucket::Bucket;
+use serde::{Deserialize, Serialize};
+use std::any::Any;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
+
+/// How fast a disk is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum DiskSpeed {
+    /// As fast as it is.
+    Own,
+    /// It moves at most so many bytes a second, reads and writes together. A write waits for its bytes and a sync for
+    /// all that was written, whoever wrote it: there is no cache behind which bytes could wait for free.
+    BytesPerSecond(f64),
+    /// The medium is not waited for: for what does not depend on time.
+    Unsynced,
+}
+
+/// The file system at some speed, counting the bytes that go either way.
+#[derive(Debug)]
+pub struct MeteredDisk {
+    meter: Arc<Meter>,
+    is_synced: bool,
+}
+
+/// What went either way.
+#[derive(Debug, Default)]
+pub struct Meter {
+    bytes_read: AtomicU64,
+    bytes_written: AtomicU64,
+    bucket: Option<Bucket>,
+}
+
+struct Metered<T> {
+    file: T,
+    meter: Arc<Meter>,
+    is_synced: bool,
+}
+
+impl MeteredDisk {
+    /// The file system at a speed.
+    pub fn new(speed: DiskSpeed) -> Self {
+        let bucket = match speed {
+            DiskSpeed::BytesPerSecond(bytes_per_s) => Some(Bucket::new(bytes_per_s)),
+            DiskSpeed::Own | DiskSpeed::Unsynced => None,
+        };
+        let meter = Arc::new(Meter { bucket, ..Meter::default() });
+        Self { meter, is_synced: speed != DiskSpeed::Unsynced }
+    }
+
+    /// What counts.
+    pub fn meter(&self) -> Arc<Meter> {
+        self.meter.clone()
+    }
+
+    fn metered<T>(&self, file: T) -> Metered<T> {
+        Metered { file, meter: self.meter.clone(), is_synced: self.is_synced }
+    }
+
+    fn sync(&self, path: &Path, sync: impl Fn(&FsDisk, &Path) -> io::Result<()>) -> io::Result<()> {
+        self.meter.drain();
+        if self.is_synced { sync(&FsDisk, path) } else { Ok(()) }
+    }
+}
+
+impl Meter {
+    /// Bytes read so far.
+    pub fn bytes_read(&self) -> u64 {
+        self.bytes_read.load(Ordering::Relaxed)
+    }
+
+    /// Bytes written so far.
+    pub fn bytes_written(&self) -> u64 {
+        self.bytes_written.load(Ordering::Relaxed)
+    }
+
+    fn count(&self, counter: &AtomicU64, bytes: usize) {
+        counter.fetch_add(bytes as u64, Ordering::Relaxed);
+        if let Some(bucket) = &self.bucket {
+            bucket.take(bytes);
+        }
+    }
+
+    fn drain(&self) {
+        if let Some(bucket) = &self.bucket {
+            bucket.drain();
+        }
+    }
+}
+
+impl Read for Metered<Box<dyn DiskRead>> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let bytes = self.file.read(buffer)?;
+        self.meter.count(&self.meter.bytes_read, bytes);
+        Ok(bytes)
+    }
+}
+
+impl DiskRead for Metered<Box<dyn DiskRead>> {
+    fn file_bytes(&self) -> u64 {
+        self.file.file_bytes()
+    }
+}
+
+impl Write for Metered<Box<dyn DiskWrite>> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let bytes = self.file.write(buffer)?;
+        self.meter.count(&self.meter.bytes_written, bytes);
+        Ok(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl DiskWrite for Metered<Box<dyn DiskWrite>> {
+    fn sync(&mut self) -> io::Result<()> {
+        self.meter.drain();
+        if self.is_synced { self.file.sync() } else { Ok(()) }
+    }
+}
+
+impl Disk for MeteredDisk {
+    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        Ok(Box::new(self.metered(FsDisk.open(path)?)))
+    }
+
+    fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        Ok(Box::new(self.metered(FsDisk.open_shared(path)?)))
+    }
+
+    fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
+        FsDisk.watch(path)
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        Ok(Box::new(self.metered(FsDisk.create(path)?)))
+    }
+
+    fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
+        Ok(Box::new(self.metered(FsDisk.append(path, offset)?)))
+    }
+
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        self.sync(path, FsDisk::sync_file)
+    }
+
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        self.sync(path, FsDisk::sync_folder)
+    }
+
+    fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
+        self.meter.drain();
+        if self.is_synced {
+            return FsDisk.sync_all(files, folders);
+        }
+        [files, folders].map(|paths| paths.iter().map(|_| Ok(())).collect())
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        FsDisk.rename(from, to)
+    }
+
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        FsDisk.remove_file(path)
+    }
+
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        FsDisk.create_folder(path)
+    }
+
+    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+        FsDisk.remove_folder(path)
+    }
+
+    fn list(&self, path: &Path) -> io::Result<Vec<String>> {
+        FsDisk.list(path)
+    }
+
+    fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {
+        FsDisk.kind(path)
+    }
+
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {
+        FsDisk.lock(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::{Duration, Instant};
+
+    #[test]
+    fn bytes_are_counted_and_a_slow_disk_takes_its_time_for_both_ways() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let disk = MeteredDisk::new(DiskSpeed::BytesPerSecond(1e6));
+        let begin = Instant::now();
+        let mut file = disk.create(&path).unwrap();
+        file.write_all(&[7; 30_000]).unwrap();
+        file.sync().unwrap();
+        let mut read = Vec::new();
+        disk.open(&path).unwrap().read_to_end(&mut read).unwrap();
+        assert_eq!(read, [7; 30_000]);
+        let meter = disk.meter();
+        assert_eq!([meter.bytes_written(), meter.bytes_read()], [30_000; 2]);
+        assert!(begin.elapsed() >= Duration::from_millis(58), "{:?}", begin.elapsed());
+    }
+
+    #[test]
+    fn a_sync_waits_for_what_was_written_last() {
+        let folder = tempfile::tempdir().unwrap();
+        let disk = MeteredDisk::new(DiskSpeed::BytesPerSecond(1e5));
+        let begin = Instant::now();
+        // Too little for a write to wait for.
+        disk.create(&folder.path().join("file")).unwrap().write_all(&[7; 150]).unwrap();
+        disk.sync_folder(folder.path()).unwrap();
+        assert!(begin.elapsed() >= Duration::from_micros(1_400), "{:?}", begin.elapsed());
+    }
+}

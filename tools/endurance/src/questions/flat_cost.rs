@@ -1,0 +1,179 @@
+//! Does a scan cost the same however far the map has come?
+
+use crate::build::{Build, Built, ScanCost};
+use crate::case::Limit;
+use crate::findings::Findings;
+use crate::promise::{Promise, Wanted};
+use crate::setting::{RAYS, Setting, made_up};
+use crate::task::Apart;
+use anyhow::Result;
+use report::plot::{Content, Line, Panel, Plot, Scale};
+use report::{Cell, Samples, Table};
+use workload::SurveyName;
+
+/// Scans that are made before they are inserted one after another.
+const SCANS_AT_A_TIME: usize = 50;
+/// Cost of the last stretch by that of the second.
+const MOST_GROWTH: f64 = 1.15;
+/// Slow scans by the median.
+const MOST_SLOW: f64 = 3.0;
+/// Windows of a plot.
+const WINDOWS: usize = 40;
+
+/// One of the clocks.
+type Clock = (&'static str, fn(&ScanCost) -> f64);
+const CLOCKS: [Clock; 2] = [("CPU", |scan| scan.cpu_ms), ("wall", |scan| scan.wall_ms)];
+
+pub fn answer(setting: &Setting) -> Result<Findings> {
+    let metres = setting.size(20_000, 300);
+    let stretch_m = setting.size(1_000.0, 50.0);
+    let limit_mib = setting.size(64, 24);
+    let case = made_up("drive", (SurveyName::Drive, RAYS, metres), [0.2, 10.0, 60.0]);
+    let build = Build {
+        scans_at_a_time: SCANS_AT_A_TIME,
+        has_digest: false,
+        ..setting.build(&case, Limit::Bytes(limit_mib << 20))
+    };
+    let built = build.clone().apart()?;
+    let mut findings = Findings::default();
+    findings.keep(&build, &built)?;
+    findings.promises = promises(&built, stretch_m);
+    let what = format!("{}, limit {limit_mib} MiB", case.description());
+    findings.answer.tables = vec![stretches(&built, stretch_m, &what), latencies(&built)];
+    findings.answer.plots = vec![plot(&built)];
+    Ok(findings)
+}
+
+fn promises(built: &Built, stretch_m: f64) -> Vec<Promise> {
+    let growth = CLOCKS.map(|(clock, time_of)| {
+        let [second, last] = [stretch(built, stretch_m, 1), last_stretch(built, stretch_m)];
+        let growth = mean(last, time_of) / mean(second, time_of);
+        let what = format!("{clock} of a scan, last stretch by second");
+        Promise::about_time(what, growth, Wanted::AtMost(MOST_GROWTH), "")
+    });
+    let wall_ms = samples(evicting(built), |scan| scan.wall_ms);
+    let slow = wall_ms.quantile(0.99) / wall_ms.median();
+    let what = "wall of the 99th percentile of scans by the median, while tiles are pushed out";
+    growth.into_iter().chain([Promise::about_time(what, slow, Wanted::AtMost(MOST_SLOW), "")]).collect()
+}
+
+/// The scans of a stretch of the way, the first being 0.
+fn stretch(built: &Built, stretch_m: f64, number: usize) -> &[ScanCost] {
+    let from = |metres: f64| built.scans.partition_point(|scan| scan.distance_m < metres);
+    let begin_m = number as f64 * stretch_m;
+    &built.scans[from(begin_m)..from(begin_m + stretch_m)]
+}
+
+/// The scans of the last stretch that is whole.
+fn last_stretch(built: &Built, stretch_m: f64) -> &[ScanCost] {
+    let end_m = built.scans.last().map_or(0.0, |scan| scan.distance_m);
+    let first = built.scans.partition_point(|scan| scan.distance_m <= end_m - stretch_m);
+    &built.scans[first..]
+}
+
+/// The scans from the first on for which something had been written: from there on, tiles go for others.
+fn evicting(built: &Built) -> &[ScanCost] {
+    // A new map has its metadata and its log.
+    let begin = built.scans.first().map_or(0, |scan| scan.bytes_written);
+    &built.scans[built.scans.partition_point(|scan| scan.bytes_written <= begin)..]
+}
+
+fn samples(scans: &[ScanCost], time_of: impl Fn(&ScanCost) -> f64) -> Samples {
+    scans.iter().map(time_of).collect()
+}
+
+fn mean(scans: &[ScanCost], time_of: impl Fn(&ScanCost) -> f64) -> f64 {
+    scans.iter().map(time_of).sum::<f64>() / scans.len() as f64
+}
+
+fn stretches(built: &Built, stretch_m: f64, what: &str) -> Table {
+    let caption = format!("Mean milliseconds a scan, by stretches of {} km; {what}.", stretch_m / 1e3);
+    let columns = ["from km", "CPU ms", "wall ms", "scans"];
+    let mut table = Table::new("flat_cost", caption, columns);
+    let end_m = built.scans.last().map_or(0.0, |scan| scan.distance_m);
+    for number in 0..(end_m / stretch_m).ceil() as usize {
+        let scans = stretch(built, stretch_m, number);
+        let [cpu_ms, wall_ms] = CLOCKS.map(|(_, time_of)| Cell::Number(mean(scans, time_of), 2));
+        let from_km = Cell::Number(number as f64 * stretch_m / 1e3, 2);
+        table.push([from_km, cpu_ms, wall_ms, Cell::Count(scans.len() as u64)]);
+    }
+    table
+}
+
+fn latencies(built: &Built) -> Table {
+    let caption =
+        "Wall milliseconds of `insert_scan`: of all scans, and of those while tiles are pushed out.";
+    let columns = ["scans", "how many", "median", "p90", "p99", "worst", "p99 by median"];
+    let mut table = Table::new("latency", caption, columns);
+    for (name, scans) in [("all", &built.scans[..]), ("while tiles are pushed out", evicting(built))] {
+        let wall_ms = samples(scans, |scan| scan.wall_ms);
+        let of = |share| Cell::Number(wall_ms.quantile(share), 2);
+        table.push([
+            name.into(),
+            Cell::Count(scans.len() as u64),
+            of(0.5),
+            of(0.9),
+            of(0.99),
+            of(1.0),
+            Cell::Number(wall_ms.quantile(0.99) / wall_ms.median(), 2),
+        ]);
+    }
+    table
+}
+
+fn plot(built: &Built) -> Plot {
+    let window = built.scans.len().div_ceil(WINDOWS).max(1);
+    let panels = CLOCKS.map(|(clock, time_of)| {
+        let lines = [("median", 0.5), ("p99", 0.99)].map(|(name, share)| {
+            let points = built
+                .scans
+                .chunks(window)
+                .map(|scans| [scans[0].distance_m / 1e3, samples(scans, time_of).quantile(share)]);
+            Line { name: name.to_owned(), points: points.collect() }
+        });
+        Panel {
+            title: clock.to_owned(),
+            x_label: "distance, km".to_owned(),
+            y_label: "ms a scan".to_owned(),
+            content: Content::Lines { x_scale: Scale::Linear, y_scale: Scale::Linear, lines: lines.into() },
+        }
+    });
+    let caption = format!("Milliseconds a scan over distance, in windows of {window} scans");
+    Plot { file: "flat_cost", caption, panels: panels.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A scan every metre; nothing is pushed out before the hundredth.
+    fn built(metres: usize) -> Built {
+        let scans = (0..metres).map(|k| ScanCost {
+            distance_m: k as f64,
+            wall_ms: if k >= 100 && k % 20 == 0 { 50.0 } else { 10.0 },
+            cpu_ms: 5.0 + (k / 100) as f64,
+            resident_bytes: 0,
+            bytes_written: 700 + k.saturating_sub(99) as u64,
+        });
+        Built { scans: scans.collect(), ..Built::default() }
+    }
+
+    #[test]
+    fn stretches_are_by_distance_and_the_last_is_whole() {
+        let built = built(450);
+        let second: Vec<f64> = stretch(&built, 100.0, 1).iter().map(|scan| scan.distance_m).collect();
+        assert_eq!((second.len(), second[0]), (100, 100.0));
+        let last = last_stretch(&built, 100.0);
+        assert_eq!((last.len(), last[0].distance_m), (100, 350.0));
+        assert_eq!(evicting(&built)[0].distance_m, 100.0);
+    }
+
+    #[test]
+    fn growth_and_slow_scans_are_found() {
+        let promises = promises(&built(400), 100.0);
+        let found: Vec<f64> = promises.iter().map(|promise| promise.found).collect();
+        assert!((found[0] - 8.0 / 6.0).abs() < 1e-9 && !promises[0].is_kept(), "{found:?}");
+        assert!((found[1] - 1.0).abs() < 1e-9 && promises[1].is_kept(), "{found:?}");
+        assert!((found[2] - 5.0).abs() < 1e-9 && !promises[2].is_kept(), "{found:?}");
+    }
+}

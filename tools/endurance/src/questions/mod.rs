@@ -1,0 +1,30 @@
+//! The questions, one a file.
+
+mod export;
+mod flat_cost;
+mod idle;
+mod memory;
+mod throughput;
+
+use crate::findings::Findings;
+use crate::setting::Setting;
+use anyhow::Result;
+
+/// A question about the mapper.
+pub struct Question {
+    /// Its section in the page, and what `--only` takes.
+    pub name: &'static str,
+    /// The file of its promises, without its ending.
+    pub promises: &'static str,
+    /// Measures.
+    pub answer: fn(&Setting) -> Result<Findings>,
+}
+
+/// All of them, in the order of the page.
+pub const QUESTIONS: [Question; 5] = [
+    Question { name: "memory", promises: "memory_promises", answer: memory::answer },
+    Question { name: "throughput", promises: "throughput_promises", answer: throughput::answer },
+    Question { name: "flat-cost", promises: "flat_cost_promises", answer: flat_cost::answer },
+    Question { name: "export", promises: "export_promises", answer: export::answer },
+    Question { name: "idle", promises: "idle_promises", answer: idle::answer },
+];
