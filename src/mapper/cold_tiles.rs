@@ -1,4 +1,7 @@
+use crate::error::{Error, Result};
 use crate::space::TileIndex;
+use crate::tile::Tile;
+use crate::tile::format::{CompactEffort, CompactWriter};
 use lru::LruCache;
 use std::sync::Arc;
 
@@ -7,6 +10,8 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct ColdTiles {
     tiles: LruCache<TileIndex, ColdTile>,
+    /// Made with the first tile, and kept: it takes longer to make than a small tile to pack.
+    writer: Option<CompactWriter>,
     bytes: usize,
     dirty: usize,
 }
@@ -28,7 +33,7 @@ const SLOT_BYTES: usize = size_of::<(TileIndex, ColdTile)>() + 80;
 
 impl Default for ColdTiles {
     fn default() -> Self {
-        Self { tiles: LruCache::unbounded(), bytes: 0, dirty: 0 }
+        Self { tiles: LruCache::unbounded(), writer: None, bytes: 0, dirty: 0 }
     }
 }
 
@@ -60,7 +65,26 @@ impl ColdTiles {
         self.tiles.iter().map(|(&index, tile)| (index, tile))
     }
 
-    pub(super) fn put(&mut self, index: TileIndex, tile: ColdTile) {
+    /// Puts a tile here in the compact form.
+    ///
+    /// # Errors
+    ///
+    /// Those of the packer, which has none but a lack of memory.
+    pub(super) fn pack(&mut self, tile: &Tile) -> Result<()> {
+        let failed = |error| Error::io("memory".as_ref(), "pack a tile in", error);
+        let writer = match &mut self.writer {
+            Some(writer) => writer,
+            none => none.insert(CompactWriter::new(CompactEffort::Fast).map_err(failed)?),
+        };
+        let (table, mut compact) = (tile.table(), Vec::new());
+        writer.write(table, &mut compact).map_err(failed)?;
+        let (voxels, table_bytes) = (table.len() as u64, table.bytes());
+        let (compact, is_dirty) = (compact.into(), tile.is_dirty());
+        self.put(tile.index(), ColdTile { compact, voxels, table_bytes, is_dirty, is_leaving: false });
+        Ok(())
+    }
+
+    fn put(&mut self, index: TileIndex, tile: ColdTile) {
         self.bytes += tile.bytes();
         self.dirty += usize::from(tile.is_dirty);
         let replaced = self.tiles.put(index, tile);

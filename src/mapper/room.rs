@@ -1,13 +1,11 @@
 //! How room is made: resident tiles are brought into the compact form, and these go to disk, beside the mapping.
 
-use super::cold_tiles::ColdTile;
 use super::residency::Residency;
 use super::statistics::MemoryCounts;
 use super::tile_traffic::Saved;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::space::TileIndex;
 use crate::tile::Tile;
-use crate::tile::format::{CompactEffort, write_compact};
 use std::time::Instant;
 
 /// What a tile takes in the set of those that are known to be whole, and in that of those saved.
@@ -76,17 +74,7 @@ impl Residency {
                 self.stalls.note(since.elapsed());
             }
         } else if let Some(tile) = self.tiles.peek(index) {
-            let mut compact = Vec::new();
-            write_compact(tile.table(), CompactEffort::Fast, &mut compact)
-                .map_err(|error| Error::io("memory".as_ref(), "pack a tile in", error))?;
-            let cold = ColdTile {
-                compact: compact.into(),
-                voxels: tile.table().len() as u64,
-                table_bytes: tile.table().bytes(),
-                is_dirty: tile.is_dirty(),
-                is_leaving: false,
-            };
-            self.cold.put(index, cold);
+            self.cold.pack(tile)?;
             self.io.packed += 1;
         }
         self.tiles.remove(index);

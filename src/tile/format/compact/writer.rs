@@ -5,6 +5,7 @@ use super::group::Group;
 use super::packer::Packer;
 use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::tile::Table;
+use std::fmt;
 use std::io::{self, Write};
 
 /// Writes tables in their compact form. What it works with is kept from one table to the next: 0.7 MB, or 1.7 MB for
@@ -66,6 +67,12 @@ impl CompactWriter {
         }
         out.write_all(&crc.finalize().to_le_bytes())?;
         Ok(bytes + CRC_BYTES)
+    }
+}
+
+impl fmt::Debug for CompactWriter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("CompactWriter").finish_non_exhaustive()
     }
 }
 
