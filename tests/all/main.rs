@@ -14,6 +14,7 @@ mod fuzz_corpus;
 mod interrupted;
 /// What each folder may know.
 mod layering;
+mod low_memory;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
 mod local_map;
 /// The same sentences about every mapper: equal to the naive one, to the bit.

@@ -1,0 +1,80 @@
+//! A limit in bytes: the layers between the tiles in use and the disk.
+
+use crate::support::unsynced_disk::UnsyncedDisk;
+use std::time::Duration;
+use tempfile::TempDir;
+use voxtile::simulation::Survey;
+use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan};
+
+fn config() -> MapConfig {
+    MapConfig::new(0.2, 6.4).unwrap().with_range(0.0, 20.0)
+}
+
+fn scans(count: usize) -> Vec<Scan> {
+    Survey::tour(3, 1_000).step_by(4).take(count).collect()
+}
+
+#[test]
+fn tiles_ahead_are_fetched_before_they_are_needed() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("map");
+    let config = config().with_memory_bytes(64 << 20);
+    let scans = scans(30);
+    let mut expected = InMemoryMapper::new(config.clone()).unwrap();
+    for _ in 0..2 {
+        let mut mapper = match path.exists() {
+            false => OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()),
+            true => OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config.clone()),
+        }
+        .unwrap();
+        for scan in &scans {
+            mapper.insert_scan(scan).unwrap();
+            expected.insert_scan(scan).unwrap();
+        }
+        mapper.flush().unwrap();
+        let io = mapper.statistics().io;
+        // There is nothing to be fetched for a new map, and on the way back over the same ground there is.
+        assert_eq!(io.prefetches > 0, io.loads > 0, "{io:?}");
+        assert_eq!(io.prefetches > 10, mapper.scan_number() > scans.len() as u64, "{io:?}");
+    }
+    let mapper = OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config).unwrap();
+    assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
+}
+
+/// What an operator sees: everything is counted, and adds up.
+#[test]
+fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(60);
+    let mut expected = InMemoryMapper::new(config()).unwrap();
+    const BYTES: usize = 700_000;
+    let tight = config().with_tight_memory_bytes(BYTES);
+    let disk = UnsyncedDisk::taking(Duration::ZERO);
+    let mut mapper = OutOfCoreTileMapper::create_on(disk, &folder.path().join("map"), tight).unwrap();
+    let mut most = 0;
+    for scan in &scans {
+        mapper.insert_scan(scan).unwrap();
+        expected.insert_scan(scan).unwrap();
+        let statistics = mapper.statistics();
+        most = most.max(statistics.memory.bytes());
+        assert_eq!(statistics.memory.pending, statistics.pending_bytes);
+        assert!(statistics.dirty_compact_tiles <= statistics.compact_tiles);
+        assert!(statistics.cached_tiles + statistics.compact_tiles <= statistics.tiles);
+    }
+    assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
+    let statistics = mapper.statistics();
+    let in_memory = expected.statistics().cached.bytes();
+    assert!(in_memory > 4 * BYTES as u64, "{in_memory} bytes do not need more than the limit");
+    // A scan's updates are counted before they are known to the byte.
+    assert!(most < 2 * BYTES as u64, "{most} bytes");
+    assert!(statistics.io.packed > 20 && statistics.io.unpacked > 0, "{:?}", statistics.io);
+    assert!(statistics.compact_tiles > 0 && statistics.memory.compact_tiles > 0);
+    mapper.flush().unwrap();
+    let flushed = mapper.statistics();
+    assert_eq!((flushed.dirty_tiles, flushed.dirty_compact_tiles, flushed.pending_tiles), (0, 0, 0));
+    assert_eq!(flushed.memory.on_the_way, 0);
+    let written = flushed.io.bytes_written as f64 / flushed.disk_bytes as f64;
+    assert!(written < 4.0, "{written} bytes written for each of the map's");
+    assert_eq!(flushed.stalls.count == 0, flushed.stalls.worst_us == 0);
+    assert!(flushed.stalls.p50_us <= flushed.stalls.p99_us);
+}
