@@ -1,4 +1,6 @@
+use crate::build::{Build, Built};
 use crate::promise::{self, Promise};
+use crate::setting::mib;
 use anyhow::Result;
 use report::Answer;
 use serde::Serialize;
@@ -24,6 +26,18 @@ impl Findings {
     pub fn keep(&mut self, what: &impl Serialize, found: &impl Serialize) -> Result<()> {
         self.runs.push(json!({ "what": serde_json::to_value(what)?, "found": serde_json::to_value(found)? }));
         Ok(())
+    }
+
+    /// Keeps a build, and says that it is done: a question has many, and each takes its time.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Findings::keep`].
+    pub fn keep_build(&mut self, build: &Build, built: &Built) -> Result<()> {
+        let Build { case, limit, disk, .. } = build;
+        let (wall_s, peak_mib) = (built.wall_s(), mib(built.peak_resident_bytes as f64));
+        eprintln!("  {}, {limit:?}, {disk:?}: {wall_s:.1} s, peak {peak_mib:.0} MiB", case.name);
+        self.keep(build, built)
     }
 
     /// The promises that do not depend on time and were not kept, in words.

@@ -85,13 +85,13 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let mut measured: Vec<Value> = Vec::new();
     let is_wanted = |name| arguments.only.as_ref().is_none_or(|only| only == name);
     for question in QUESTIONS.iter().filter(|question| is_wanted(question.name)) {
-        eprint!("{}: ", question.name);
+        eprintln!("{}", question.name);
         let begin = Instant::now();
         let mut findings = (question.answer)(&setting).with_context(|| question.name.to_owned())?;
         complaints.extend(findings.complaints());
         let runs = std::mem::take(&mut findings.runs);
         let promises = put(&page, arguments, question, findings)?;
-        eprintln!("{:.0} s", begin.elapsed().as_secs_f64());
+        eprintln!("{}: {:.0} s", question.name, begin.elapsed().as_secs_f64());
         measured.push(json!({ "question": question.name, "promises": promises, "runs": runs }));
         if let Some(path) = &arguments.json {
             write_json(path, &json!({ "machine": report::machine(), "questions": measured }))?;

@@ -21,7 +21,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     let built = build.clone().apart()?;
     let memory_bytes = (built.tile_bytes / TIMES) as usize;
     let mut findings = Findings::default();
-    findings.keep(&build, &built)?;
+    findings.keep_build(&build, &built)?;
     let caption = format!(
         "Exports of a map whose tiles take {:.0} MiB in memory, {TIMES} times what the export may use; {}.",
         mib(built.tile_bytes as f64),

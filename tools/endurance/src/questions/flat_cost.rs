@@ -36,7 +36,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     };
     let built = build.clone().apart()?;
     let mut findings = Findings::default();
-    findings.keep(&build, &built)?;
+    findings.keep_build(&build, &built)?;
     findings.promises = promises(&built, stretch_m);
     let what = format!("{}, limit {limit_mib} MiB", case.description());
     findings.answer.tables = vec![stretches(&built, stretch_m, &what), latencies(&built)];

@@ -43,7 +43,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         let mut build = |limit, disk| {
             let build = Build { disk, ..setting.build(&case, limit) };
             let built = build.clone().apart()?;
-            findings.keep(&build, &built)?;
+            findings.keep_build(&build, &built)?;
             anyhow::Ok(built)
         };
         let in_memory = build(Limit::InMemory, DiskSpeed::Unsynced)?;

@@ -62,7 +62,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
                     };
                     of_limit.built = build.clone().apart()?;
                     of_limit.wall_s.push(of_limit.built.wall_s());
-                    findings.keep(&build, &of_limit.built)?;
+                    findings.keep_build(&build, &of_limit.built)?;
                 }
             }
             measured.push(Measured { case: case.clone(), working_set: found.clone(), disk, builds });
