@@ -38,8 +38,9 @@ pub enum MemoryLimit {
         /// Larger: fewer reads and writes.
         pending_bytes: usize,
     },
-    /// Most bytes of all that grows: tiles, updates that wait for tiles, what a scan takes while it is inserted, what is
-    /// known of the tiles on disk. At least [`MemoryLimit::least_bytes`].
+    /// Most bytes of all that grows: tiles in use, others in the compact form, updates that wait for tiles, what a scan takes
+    /// while it is inserted, tiles on their way to and from disk, what is known of the tiles there (some 250 bytes a tile).
+    /// Tiles are written and fetched by threads of their own. At least [`MemoryLimit::least_bytes`].
     Bytes(usize),
     /// See [`MapConfig::with_tight_memory_bytes`].
     #[doc(hidden)]

@@ -25,8 +25,6 @@ impl Residency {
     /// Applies what waits, writes every dirty tile and commits.
     pub(super) fn flush(&mut self, scan_number: u64) -> Result<()> {
         self.end_traffic(scan_number)?;
-        // Whatever it was: its tile is written again now.
-        self.save_error = None;
         for index in self.store.suspects() {
             // Its file cannot be trusted to be on the medium; what can be read of it is checked as always.
             if !self.tiles.contains(index) {

@@ -117,6 +117,9 @@ impl Residency {
         while let Some(saved) = self.traffic.wait_saved() {
             self.note_saved(saved);
         }
+        self.cold.none_leaves();
+        // Whatever it was: its tile is dirty, and will be sent again.
+        self.save_error = None;
         Ok(())
     }
 

@@ -8,7 +8,9 @@
 //!
 //! ```text
 //! insert_scan -> scan::trace -> updates by tile -> resident tiles, at once
-//!                                               -> pending lists, for tiles on disk
+//!                                               -> pending lists, for tiles that are not
+//! make room   -> resident tiles -> cold tiles (in the compact form) -> store, on a thread of its own
+//! look ahead  -> store, on a thread of its own -> resident tiles
 //! flush       -> pending lists -> tiles -> store -> one commit
 //! ```
 

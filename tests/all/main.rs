@@ -14,9 +14,9 @@ mod fuzz_corpus;
 mod interrupted;
 /// What each folder may know.
 mod layering;
-mod low_memory;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
 mod local_map;
+mod low_memory;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
 /// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
