@@ -120,15 +120,16 @@ impl ColdTiles {
         }
     }
 
-    /// Notes that the way of a tile to disk has ended, if it still is the one that was sent.
-    pub(super) fn has_left(&mut self, index: TileIndex, compact: &Arc<[u8]>, is_on_disk: bool) {
-        if let Some(tile) = self.tiles.peek_mut(&index).filter(|tile| Arc::ptr_eq(&tile.compact, compact)) {
-            tile.is_leaving = false;
-            if is_on_disk && tile.is_dirty {
-                tile.is_dirty = false;
-                self.dirty -= 1;
-            }
+    /// Notes that the way of a tile to disk has ended. Returns whether what is here still is what was sent.
+    pub(super) fn has_left(&mut self, index: TileIndex, compact: &Arc<[u8]>, is_on_disk: bool) -> bool {
+        let sent = self.tiles.peek_mut(&index).filter(|tile| Arc::ptr_eq(&tile.compact, compact));
+        let Some(tile) = sent else { return false };
+        tile.is_leaving = false;
+        if is_on_disk && tile.is_dirty {
+            tile.is_dirty = false;
+            self.dirty -= 1;
         }
+        true
     }
 
     /// Notes that no tile is on its way to disk.

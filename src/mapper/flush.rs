@@ -91,6 +91,7 @@ impl Residency {
 
     pub(super) fn write(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
         self.adopt()?;
+        self.end_saves_of(index);
         // Until it is written: what is on disk of it may be cut short by an attempt that fails.
         self.tiles.change(index, Tile::mark_dirty);
         let Some(tile) = self.tiles.peek(index) else { return Ok(()) };

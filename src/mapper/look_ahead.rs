@@ -123,6 +123,16 @@ impl Residency {
         Ok(())
     }
 
+    /// Waits until no version of a tile is on its way to disk: an older one must not come after a newer.
+    pub(super) fn end_saves_of(&mut self, index: TileIndex) {
+        while self.traffic.is_saving(index) {
+            let traffic = &mut self.traffic;
+            if let Some(saved) = self.stalls.during(|| traffic.wait_saved()) {
+                self.note_saved(saved);
+            }
+        }
+    }
+
     /// Waits until every tile that was sent to disk is there.
     ///
     /// # Errors

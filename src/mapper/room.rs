@@ -134,7 +134,7 @@ impl Residency {
     /// Takes note of a tile that has arrived on disk, or could not.
     pub(super) fn note_saved(&mut self, saved: Saved) {
         let Saved { index, tile, result } = saved;
-        self.cold.has_left(index, &tile.compact, result.is_ok());
+        let is_here = self.cold.has_left(index, &tile.compact, result.is_ok());
         match result {
             Ok(stamp) => {
                 self.store.note_next(index, stamp);
@@ -143,7 +143,9 @@ impl Residency {
                 self.known_whole.insert(index);
                 self.saved.insert(index);
             }
-            Err(error) => self.save_error = Some(error),
+            Err(error) if is_here => self.save_error = Some(error),
+            // It has changed since, and is written again.
+            Err(error) => log::debug!("an older version of tile {index} was not saved: {error}"),
         }
     }
 }

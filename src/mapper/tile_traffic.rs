@@ -8,6 +8,7 @@ use crate::store::{TileLocation, TileStamp, TileWriter};
 use crate::tile::Table;
 use crate::tile::format::read_compact;
 use rustc_hash::FxHashMap;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Tiles on their way to disk and from there, on a thread for each direction.
@@ -18,6 +19,8 @@ pub(super) struct TileTraffic {
     /// Bytes of memory that each tile on its way from disk is about to take.
     loading: FxHashMap<TileIndex, usize>,
     loading_bytes: usize,
+    /// The tiles on their way to disk, in order. One may be there twice, an older and a newer version.
+    saving: VecDeque<TileIndex>,
     saving_bytes: usize,
 }
 
@@ -57,6 +60,7 @@ impl TileTraffic {
             loader: SideWorker::new("voxtile-load", move |load: Load| load.run(&loading)),
             loading: FxHashMap::default(),
             loading_bytes: 0,
+            saving: VecDeque::new(),
             saving_bytes: 0,
         }
     }
@@ -73,21 +77,40 @@ impl TileTraffic {
 
     pub(super) fn save(&mut self, writer: TileWriter, index: TileIndex, tile: ColdTile, scan_number: u64) {
         self.saving_bytes += tile.table_bytes;
+        self.saving.push_back(index);
         self.saver.give(Save { writer, index, tile, scan_number });
+    }
+
+    /// Whether some version of a tile is on its way to disk.
+    pub(super) fn is_saving(&self, index: TileIndex) -> bool {
+        self.saving.contains(&index)
     }
 
     /// A tile that has arrived on disk, or could not.
     pub(super) fn take_saved(&mut self) -> Option<Saved> {
         let saved = self.saver.take()?;
-        self.saving_bytes -= saved.tile.table_bytes;
+        self.has_left(&saved);
         Some(saved)
     }
 
     /// The same, waited for; `None` if there is none on its way.
     pub(super) fn wait_saved(&mut self) -> Option<Saved> {
-        let saved = self.saver.wait();
-        self.saving_bytes = saved.as_ref().map_or(0, |saved| self.saving_bytes - saved.tile.table_bytes);
-        saved
+        match self.saver.wait() {
+            Some(saved) => {
+                self.has_left(&saved);
+                Some(saved)
+            }
+            None => {
+                self.saving.clear();
+                self.saving_bytes = 0;
+                None
+            }
+        }
+    }
+
+    fn has_left(&mut self, saved: &Saved) {
+        self.saving_bytes -= saved.tile.table_bytes;
+        self.saving.pop_front();
     }
 
     /// Whether another tile may be sent for.

@@ -4,7 +4,7 @@ use crate::support::unsynced_disk::UnsyncedDisk;
 use std::time::Duration;
 use tempfile::TempDir;
 use voxtile::simulation::Survey;
-use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan};
 
 fn config() -> MapConfig {
     MapConfig::new(0.2, 6.4).unwrap().with_range(0.0, 20.0)
@@ -77,4 +77,27 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     assert!(written < 4.0, "{written} bytes written for each of the map's");
     assert_eq!(flushed.stalls.count == 0, flushed.stalls.worst_us == 0);
     assert!(flushed.stalls.p50_us <= flushed.stalls.p99_us);
+}
+
+/// A tile may be wanted, changed and flushed while an older version of it is still on its way to disk.
+#[test]
+fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
+    let scans = scans(24);
+    for bytes in [100_000, 300_000] {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("map");
+        let tight = config().with_tight_memory_bytes(bytes);
+        let disk = UnsyncedDisk::slow_beside(Duration::from_millis(3));
+        let mut mapper = OutOfCoreTileMapper::create_on(disk.clone(), &path, tight).unwrap();
+        let mut expected = InMemoryMapper::new(config()).unwrap();
+        for (number, scan) in scans.iter().chain(&scans).enumerate() {
+            mapper.insert_scan(scan).unwrap();
+            expected.insert_scan(scan).unwrap();
+            if number % 6 == 5 {
+                mapper.flush().unwrap();
+                let reader = MapReader::open_on(disk.clone(), &path, 2).unwrap();
+                assert_eq!(reader.digest().unwrap(), expected.digest().unwrap(), "after scan {number}");
+            }
+        }
+    }
 }

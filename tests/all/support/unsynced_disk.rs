@@ -11,6 +11,8 @@ use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
 pub struct UnsyncedDisk {
     /// What a sync takes in place of what the medium takes.
     sync_time: Duration,
+    /// How long it takes to begin a file on the thread that writes beside the mapping.
+    beside_time: Duration,
 }
 
 impl UnsyncedDisk {
@@ -20,7 +22,12 @@ impl UnsyncedDisk {
 
     /// A medium that takes so long for a sync, 16 of them at once, whatever has been written.
     pub fn taking(sync_time: Duration) -> Arc<dyn Disk> {
-        Arc::new(Self { sync_time })
+        Arc::new(Self { sync_time, beside_time: Duration::ZERO })
+    }
+
+    /// A disk that is slow for the thread that writes beside the mapping, so that the other thread gets ahead.
+    pub fn slow_beside(beside_time: Duration) -> Arc<dyn Disk> {
+        Arc::new(Self { sync_time: Duration::ZERO, beside_time })
     }
 }
 
@@ -63,6 +70,9 @@ impl Disk for UnsyncedDisk {
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        if thread::current().name() == Some("voxtile-save") {
+            wait(self.beside_time);
+        }
         Ok(Box::new(Unsynced(FsDisk.create(path)?, self.sync_time)))
     }
 
