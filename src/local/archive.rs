@@ -105,7 +105,7 @@ impl LocalMap {
         if is_known_free(&self.applied, log_odds) {
             return false;
         }
-        let block = self.tree.make_block(voxel.map(|k| k >> 2), self.inflation.rule());
+        let block = self.tree.make_block(voxel.map(|k| k >> 2), self.inflation.rules.current());
         let place = place_of(voxel);
         if self.tree.blocks.get(block).voxels.mask >> place & 1 != 0 {
             return false;

@@ -68,7 +68,7 @@ impl LocalMap {
             let index = voxel.map(|k| k >> 2);
             let block = match last_block {
                 Some((last_index, block)) if last_index == index => block,
-                _ => self.tree.make_block(index, self.inflation.rule()),
+                _ => self.tree.make_block(index, self.inflation.rules.current()),
             };
             last_block = Some((index, block));
             self.hit(block, place_of(voxel));

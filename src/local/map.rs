@@ -132,7 +132,7 @@ impl LocalMap {
     pub(super) fn inflate(&mut self, position: Point, report: &mut LocalReport) {
         self.inflation.update(&mut self.tree, self.grid, position, !self.sweep.is_done());
         report.inflation_changes = std::mem::take(&mut self.inflation.changes) as u64;
-        report.is_settled = self.sweep.is_done() && !self.is_over_limit();
+        report.is_settled = self.parameters == self.applied && self.sweep.is_done() && !self.is_over_limit();
     }
 
     /// Whether there are more voxels than the limit: it was lowered, and they go a part an update.
@@ -158,7 +158,13 @@ impl LocalMap {
     pub(super) fn take_over_parameters(&mut self, report: &mut LocalReport) {
         if self.parameters != self.applied {
             let before = std::mem::replace(&mut self.applied, self.parameters);
-            self.begin_sweep(&before, report);
+            if !self.inflation.rules.has_room() {
+                // So many other ranges and radii have not come to all of the map yet that there is no number for one more:
+                // this one waits until they have.
+                self.applied.inflation_range_m = before.inflation_range_m;
+                self.applied.inflation_radius_m = before.inflation_radius_m;
+            }
+            self.begin_sweep(&before);
         }
         self.sweep_some(self.applied.work_per_update, report);
     }
@@ -173,8 +179,8 @@ impl LocalMap {
         view.position = self.position;
         view.stored = self.voxels.len();
         view.inflated = self.inflation.inflated;
-        view.replace_nodes(&self.tree, &dirty);
-        self.tree.reuse(dirty);
+        view.replace_pages(&self.tree, &dirty);
+        self.tree.shown(dirty);
         self.view = Arc::new(view);
         self.shared.set(self.view.clone());
     }
