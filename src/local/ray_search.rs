@@ -19,6 +19,9 @@ pub(super) struct RaySearch {
     step: [i32; 3],
     start: VoxelIndex,
     last: VoxelIndex,
+    /// A box in which the ray is: the voxels of its two ends, without a quarter of a voxel at their outer borders.
+    low: Point,
+    high: Point,
     /// The highest place of a cell along the axes on which the ray goes down, else 0: with it places count in the order in
     /// which the ray comes to them.
     flip: usize,
@@ -49,6 +52,8 @@ impl RaySearch {
             step: std::array::from_fn(|k| (last[k] - start[k]).signum()),
             start,
             last,
+            low: std::array::from_fn(|k| f64::from(start[k].min(last[k])) + 0.25),
+            high: std::array::from_fn(|k| f64::from(start[k].max(last[k])) + 0.75),
             flip: (0..3).map(|k| if last[k] < start[k] { 3 << (2 * k) } else { 0 }).sum(),
         }
     }
@@ -120,10 +125,11 @@ impl RaySearch {
         stay: Stay,
         visit: &mut impl FnMut(u32),
     ) {
-        self.search::<0>(at, stored.mask, stay, |cell, place, _| {
-            if cell != self.last
-                && let Some(voxel) = stored.get(&tree.lists, place)
-            {
+        // Mostly the end is all that there is.
+        let is_end = at == self.last.map(|k| k >> 2);
+        let before_end = stored.mask & !(u64::from(is_end) << place_of(self.last));
+        self.search::<0>(at, before_end, stay, |_, place, _| {
+            if let Some(voxel) = stored.get(&tree.lists, place) {
                 visit(voxel);
             }
         });
@@ -139,21 +145,25 @@ impl RaySearch {
         stay: Stay,
         mut visit: impl FnMut(VoxelIndex, usize, Stay),
     ) {
-        let mut near = mask & self.near::<SHIFT>(parent, stay);
-        if near & near.wrapping_sub(1) != 0 {
-            near = mirrored(near, self.flip);
-        } else if near == 0 {
+        if mask == 0 {
             return;
-        } else {
-            near = 1 << (near.trailing_zeros() as usize ^ self.flip);
         }
+        // Without a branch a cell: nobody could guess it.
+        let (mut near, mut visited) = (mask & self.near::<SHIFT>(parent, stay), 0_u64);
         while near != 0 {
-            let place = near.trailing_zeros() as usize ^ self.flip;
+            let place = near.trailing_zeros() as usize;
             near &= near - 1;
+            visited |= u64::from(self.visits::<SHIFT>(cell_at(parent, place))) << place;
+        }
+        if visited == 0 {
+            return;
+        }
+        let mut in_order = mirrored(visited, self.flip);
+        while in_order != 0 {
+            let place = in_order.trailing_zeros() as usize ^ self.flip;
+            in_order &= in_order - 1;
             let cell = cell_at(parent, place);
-            if let Some(stay) = self.stay_in::<SHIFT>(cell) {
-                visit(cell, place, stay);
-            }
+            visit(cell, place, self.stay_in::<SHIFT>(cell));
         }
     }
 
@@ -161,32 +171,36 @@ impl RaySearch {
     /// box of its two ends.
     #[inline]
     fn near<const SHIFT: u32>(&self, parent: VoxelIndex, stay: Stay) -> u64 {
-        // In cells; the times' and sums' rounding is a thousandth of this or less.
+        // In voxels; rounding of times and positions is a thousandth of this or less.
         const MARGIN: f64 = 1e-3;
         let cells_per_voxel = 1.0 / f64::from(1 << SHIFT);
+        let leave = if stay.leave < 1.0 { stay.leave } else { 1.0 };
         let range = |k: usize| {
-            let from_parent = self.origin[k] - f64::from(parent[k] << (SHIFT + 2));
-            let a = (from_parent + self.direction[k] * stay.enter) * cells_per_voxel;
-            let b = (from_parent + self.direction[k] * stay.leave.min(1.0)) * cells_per_voxel;
-            let (low, high) = if a < b { (a, b) } else { (b, a) };
-            let (first, last) = (self.start[k].min(self.last[k]), self.start[k].max(self.last[k]));
-            let in_parent = |voxel: i32| ((voxel >> SHIFT) - (parent[k] << 2)).clamp(0, 3);
-            // Conversions to integers round towards 0 and saturate.
-            let low = ((low - MARGIN) as i32).max(in_parent(first));
-            let high = ((high + MARGIN) as i32).min(in_parent(last));
-            (low as usize & 3, high as usize & 3)
+            let (a, b) =
+                (self.origin[k] + self.direction[k] * stay.enter, self.origin[k] + self.direction[k] * leave);
+            let (low, high) = (smaller(a, b) - MARGIN, larger(a, b) + MARGIN);
+            let corner = f64::from(parent[k] << (SHIFT + 2));
+            let (low, high) = (larger(low, self.low[k]) - corner, smaller(high, self.high[k]) - corner);
+            (cell_of(low * cells_per_voxel), cell_of(high * cells_per_voxel))
         };
         in_box(range(0), range(1), range(2))
     }
 
-    /// From when to when the ray is in a cell of `2^SHIFT` voxels, if it visits it; the cell is in the box of the ray's ends.
+    /// Whether the ray visits a cell of `2^SHIFT` voxels that is in the box of the ray's ends.
     #[inline]
-    fn stay_in<const SHIFT: u32>(&self, cell: VoxelIndex) -> Option<Stay> {
+    fn visits<const SHIFT: u32>(&self, cell: VoxelIndex) -> bool {
         let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
         let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
         // Of equal times the lowest axis goes first.
-        let is_visited = (ex <= ly) & (ex <= lz) & (ey < lx) & (ey <= lz) & (ez < lx) & (ez < ly);
-        is_visited.then(|| Stay { enter: ex.max(ey).max(ez).max(0.0), leave: lx.min(ly).min(lz) })
+        (ex <= ly) & (ex <= lz) & (ey < lx) & (ey <= lz) & (ez < lx) & (ez < ly)
+    }
+
+    /// From when to when the ray is in a cell of `2^SHIFT` voxels that it visits.
+    #[inline]
+    fn stay_in<const SHIFT: u32>(&self, cell: VoxelIndex) -> Stay {
+        let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
+        let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
+        Stay { enter: larger(larger(ex, ey), larger(ez, 0.0)), leave: smaller(smaller(lx, ly), lz) }
     }
 
     /// Time at which the ray enters a cell of `2^SHIFT` voxels along `axis`; minus infinity for the first.
@@ -224,4 +238,24 @@ fn earliest([x, y, z]: Point) -> (usize, f64) {
     } else {
         (2, z)
     }
+}
+
+// One instruction each, where the library's must care for what is no number.
+#[inline]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Which of the cells 0 to 3 a coordinate is in, or the nearest of them; on a border either of the two.
+#[inline]
+fn cell_of(x: f64) -> usize {
+    // Where the lowest bits of the sum are the nearest integer.
+    const INTEGERS: f64 = 6_755_399_441_055_744.0;
+    let x = smaller(larger(x, 0.25), 3.75);
+    (x - 0.5 + INTEGERS).to_bits() as usize & 3
 }
