@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn counts_reach_what_the_largest_ball_has() {
         let (mut counts, mut tally) = (Counts::default(), Tally::default());
-        (0..57_777).for_each(|_| drop(counts.add(&mut tally, 1 << 63 | 1)));
+        (0..57_777).for_each(|_| _ = counts.add(&mut tally, 1 << 63 | 1));
         counts.set_inflating(tally, 5);
         assert_eq!((counts_of(&counts, tally)[63], counts_of(&counts, tally)[1]), (57_777, 0));
         (1..57_777).for_each(|_| assert_eq!(counts.subtract(&mut tally, 1 << 63 | 1), 0));

@@ -2,7 +2,7 @@ use super::place::{cell_at, ones, place_of};
 use super::range::{Ball, Relation};
 use super::rules::Rules;
 use super::stencil::Stencil;
-use super::tree::{NONE, Tree};
+use super::tree::{NONE, Node, Tree};
 use crate::space::{Grid, Point, VoxelIndex};
 use std::sync::Arc;
 
@@ -111,10 +111,28 @@ impl Inflation {
                 _ => {}
             }
         }
-        for node in tree.nodes_of(page).to_vec() {
-            let ball = self.rules.ball(tree.nodes.get(node).rule, grid, position);
-            let relation = ball.relation(tree.node_index(node).map(|k| k << 4), 16);
-            for block in tree.blocks_of(node).to_vec() {
+        for place in ones(tree.pages.get(page).nodes.mask) {
+            if let Some(node) = tree.pages.get(page).nodes.get(&tree.lists, place) {
+                self.update_node(tree, grid, position, node);
+            }
+        }
+    }
+
+    fn update_node(&mut self, tree: &mut Tree, grid: Grid, position: Point, node: u32) {
+        let Node { rule, occupied, inflating, .. } = *tree.nodes.get(node);
+        if occupied == 0 && inflating == 0 {
+            return;
+        }
+        let ball = self.rules.ball(rule, grid, position);
+        let relation = ball.relation(tree.node_index(node).map(|k| k << 4), 16);
+        match relation {
+            Relation::Inside if inflating == occupied => return,
+            Relation::Outside if inflating == 0 => return,
+            _ => {}
+        }
+        // Blocks that the inflation adds meanwhile have nothing that inflates.
+        for place in ones(tree.nodes.get(node).blocks.mask) {
+            if let Some(block) = tree.nodes.get(node).blocks.get(&tree.lists, place) {
                 self.reconcile(tree, block, &ball, relation);
             }
         }
@@ -164,12 +182,7 @@ impl Inflation {
                 self.count_down(tree, at, mask);
             }
         }
-        let block = tree.blocks.get(block);
-        let inflating = tree.counts.inflating(block.tally);
-        tree.counts.set_inflating(block.tally, (inflating | begin) & !end);
-        let page = tree.nodes.get(block.node).page;
-        let inflating = &mut tree.pages.get_mut(page).inflating;
-        *inflating = *inflating + begin.count_ones() - end.count_ones();
+        tree.set_inflating(block, begin, end);
         self.changes += (begin.count_ones() + end.count_ones()) as usize;
     }
 

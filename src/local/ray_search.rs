@@ -109,11 +109,22 @@ impl RaySearch {
 
     #[inline]
     fn search_node(&self, tree: &Tree, node: &Node, at: VoxelIndex, stay: Stay, visit: &mut impl FnMut(u32)) {
-        self.search::<2>(at, node.stored, stay, |cell, place, stay| {
+        let end = if at == self.last.map(|k| k >> 4) { self.block_of_end_alone(tree, node) } else { 0 };
+        self.search::<2>(at, node.stored & !end, stay, |cell, place, stay| {
             if let Some(block) = node.blocks.get(&tree.lists, place) {
                 self.search_block(tree, &tree.blocks.get(block).voxels, cell, stay, visit);
             }
         });
+    }
+
+    /// The block in which the ray ends, if it is in the node and holds nothing but the end: this spares most rays the way
+    /// down to it.
+    #[inline]
+    fn block_of_end_alone(&self, tree: &Tree, node: &Node) -> u64 {
+        let place = place_of(self.last.map(|k| k >> 2));
+        let block = node.blocks.get(&tree.lists, place).map(|block| tree.blocks.get(block));
+        let is_alone = block.is_some_and(|block| block.voxels.mask == 1 << place_of(self.last));
+        u64::from(is_alone) << place
     }
 
     #[inline]
@@ -125,7 +136,6 @@ impl RaySearch {
         stay: Stay,
         visit: &mut impl FnMut(u32),
     ) {
-        // Mostly the end is all that there is.
         let is_end = at == self.last.map(|k| k >> 2);
         let before_end = stored.mask & !(u64::from(is_end) << place_of(self.last));
         self.search::<0>(at, before_end, stay, |_, place, _| {

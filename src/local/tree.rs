@@ -18,6 +18,8 @@ pub(super) struct Tree {
     pub(super) blocks: Slab<Block>,
     pub(super) lists: IdLists,
     pub(super) counts: Counts,
+    /// Index and number of the page in which a block was asked for last.
+    last_page: Option<(VoxelIndex, u32)>,
     /// Pages, by index, with nodes that have changed since they were last shown to readers.
     dirty: Vec<VoxelIndex>,
 }
@@ -45,6 +47,10 @@ pub(super) struct Node {
     pub(super) place: u8,
     /// Number of the inflation rule that holds here.
     pub(super) rule: u8,
+    /// Occupied voxels.
+    pub(super) occupied: u16,
+    /// Voxels that inflate others.
+    pub(super) inflating: u16,
     pub(super) blocks: Sparse64,
     /// Blocks that hold voxels with occupancy.
     pub(super) stored: u64,
@@ -103,14 +109,7 @@ impl Tree {
     pub(super) fn make_block(&mut self, index: VoxelIndex, rule: u8) -> u32 {
         let node_index = index.map(|k| k >> 2);
         let page_index = node_index.map(|k| k >> 2);
-        let page = match self.page_at(page_index) {
-            Some(page) => page,
-            None => {
-                let page = self.pages.insert(Page { index: page_index, ..Page::default() });
-                self.by_index.insert(page_index, page);
-                page
-            }
-        };
+        let page = self.make_page(page_index);
         let in_page = place_of(node_index);
         let node = match self.pages.get(page).nodes.get(&self.lists, in_page) {
             Some(node) => node,
@@ -130,6 +129,23 @@ impl Tree {
                 block
             }
         }
+    }
+
+    #[inline]
+    fn make_page(&mut self, index: VoxelIndex) -> u32 {
+        // Mostly it is that of the block before.
+        if let Some((last, page)) = self.last_page
+            && last == index
+        {
+            return page;
+        }
+        let page = self.page_at(index).unwrap_or_else(|| {
+            let page = self.pages.insert(Page { index, ..Page::default() });
+            self.by_index.insert(index, page);
+            page
+        });
+        self.last_page = Some((index, page));
+        page
     }
 
     /// Puts a voxel with occupancy into a block.
@@ -162,12 +178,29 @@ impl Tree {
             return false;
         }
         *occupied ^= 1 << place;
-        let node = *node;
-        let page = self.nodes.get(node).page;
-        let count = &mut self.pages.get_mut(page).occupied;
-        *count = if is_occupied { *count + 1 } else { *count - 1 };
-        self.mark_dirty(node);
+        let number = *node;
+        let node = self.nodes.get_mut(number);
+        let page = self.pages.get_mut(node.page);
+        if is_occupied {
+            (node.occupied, page.occupied) = (node.occupied + 1, page.occupied + 1);
+        } else {
+            (node.occupied, page.occupied) = (node.occupied - 1, page.occupied - 1);
+        }
+        self.mark_dirty(number);
         true
+    }
+
+    /// Says which voxels of a block inflate others: `begin` do so from now on, `end` no more.
+    pub(super) fn set_inflating(&mut self, block: u32, begin: u64, end: u64) {
+        let Block { node, tally, .. } = *self.blocks.get(block);
+        let inflating = (self.counts.inflating(tally) | begin) & !end;
+        self.counts.set_inflating(tally, inflating);
+        let (begin, end) = (begin.count_ones(), end.count_ones());
+        let node = self.nodes.get_mut(node);
+        // A node has 4096 voxels.
+        node.inflating = (u32::from(node.inflating) + begin - end) as u16;
+        let page = self.pages.get_mut(node.page);
+        page.inflating = page.inflating + begin - end;
     }
 
     /// Notes that what readers see of a node has changed.
@@ -215,6 +248,7 @@ impl Tree {
         nodes.remove(&mut self.lists, in_page);
         if nodes.mask == 0 {
             self.by_index.remove(index);
+            self.last_page = None;
             self.pages.remove(page);
         }
     }
