@@ -13,7 +13,7 @@ pub(super) struct Counts {
 /// Where the counts of a block are; no planes where nothing is inflated.
 // Next to each other in a block of 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(packed)]
+#[repr(Rust, packed)]
 pub(super) struct Tally {
     run: u32,
     planes: u8,

@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn masks_are_mirrored_and_boxed_place_by_place() {
         let mask = 0x0123_4567_89ab_cdef_u64 ^ 1 << 40;
-        for flip in (0..8).map(|octant| (0..3).map(|k| (octant >> k & 1) * 3 << (2 * k)).sum::<usize>()) {
+        for flip in (0..8).map(|octant| (0..3).map(|k| ((octant >> k & 1) * 3) << (2 * k)).sum::<usize>()) {
             let naive = ones(mask).fold(0_u64, |moved, place| moved | 1 << (place ^ flip));
             assert_eq!(mirrored(mask, flip), naive, "{flip}");
         }

@@ -3,7 +3,7 @@ use super::runs::Runs;
 /// Which of 64 places are taken, and the number that each holds: 4 bytes a number, in a list as long as needed.
 // Next to each other in a block of 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(packed(4))]
+#[repr(Rust, packed(4))]
 pub(super) struct Sparse64 {
     pub(super) mask: u64,
     list: u32,

@@ -231,6 +231,8 @@ impl Tree {
     }
 
     /// Drops a block in which nothing is left, and its node and page if nothing is left in these.
+    ///
+    /// Readers must see the tree before anything is made again: what is new does not know what they saw in its place.
     pub(super) fn drop_if_empty(&mut self, block: u32) {
         let Block { node, place, voxels, tally, .. } = self.blocks.get(block).clone();
         if voxels.mask != 0 || !tally.is_empty() {
