@@ -2,7 +2,7 @@ use super::map::{LocalMap, is_known_free};
 use super::place::place_of;
 use super::report::LocalReport;
 use super::view::{LocalState, LocalView};
-use super::voxels::Voxel;
+use super::voxels::{MOST_VOXELS, Voxel};
 use crate::error::{Error, Result};
 use crate::mapper::{MapView, Mapper};
 use crate::query::{Occupancy, Questions};
@@ -68,7 +68,7 @@ impl LocalMap {
         self.take_over_parameters(&mut LocalReport::default());
         let mut new = 0;
         for (_, voxel, log_odds) in found {
-            if self.applied.max_voxels.is_some_and(|limit| self.voxels.len() >= limit) {
+            if self.voxels.len() >= self.applied.max_voxels.unwrap_or(MOST_VOXELS).min(MOST_VOXELS) {
                 break;
             }
             new += usize::from(self.add_oldest(voxel, log_odds));
@@ -105,7 +105,7 @@ impl LocalMap {
         if is_known_free(&self.applied, log_odds) {
             return false;
         }
-        let block = self.tree.make_block(voxel.map(|k| k >> 2), self.inflation.rule());
+        let block = self.tree.make_block(voxel.map(|k| k >> 2), self.inflation.rules.current());
         let place = place_of(voxel);
         if self.tree.blocks.get(block).voxels.mask >> place & 1 != 0 {
             return false;
@@ -145,7 +145,7 @@ impl<M: Mapper> WithLocalMap<M> {
     /// As for [`Mapper::insert_scan`] and [`LocalMap::insert_scan`]; then both are as before the call.
     pub fn insert_scan(&mut self, scan: &Scan) -> Result<(ScanReport, LocalReport)> {
         // All that the local map can refuse; then nothing but the archive can fail.
-        self.local.check_position(scan.origin)?;
+        self.local.check_scan(scan.origin, &scan.points)?;
         let report = self.archive.insert_scan(scan)?;
         Ok((report, self.local.insert_scan(scan)?))
     }

@@ -29,42 +29,34 @@ impl LocalView {
     }
 }
 
-/// Whether two parts of views are one.
-fn is_shared<T>(before: Option<&Arc<T>>, after: Option<&Arc<T>>) -> bool {
-    before.zip(after).is_some_and(|(before, after)| Arc::ptr_eq(before, after))
-}
-
 fn compare_pages(
     index: VoxelIndex,
     before: Option<&Arc<PageView>>,
     after: Option<&Arc<PageView>>,
     changes: &mut Vec<VoxelChange>,
 ) {
-    if is_shared(before, after) {
+    if before.zip(after).is_some_and(|(before, after)| Arc::ptr_eq(before, after)) {
         return;
     }
     let mask = |page: Option<&Arc<PageView>>| page.map_or(0, |page| page.mask);
     for place in ones(mask(before) | mask(after)) {
-        let node = |page: Option<&Arc<PageView>>| page.and_then(|page| page.node(place).cloned());
-        compare_nodes(cell_at(index, place), node(before), node(after), changes);
+        compare_nodes(cell_at(index, place), node_of(before, place), node_of(after, place), changes);
     }
+}
+
+fn node_of(page: Option<&Arc<PageView>>, place: usize) -> NodeView<'_> {
+    page.and_then(|page| page.node(place)).unwrap_or_default()
 }
 
 fn compare_nodes(
     index: VoxelIndex,
-    before: Option<Arc<NodeView>>,
-    after: Option<Arc<NodeView>>,
+    before: NodeView<'_>,
+    after: NodeView<'_>,
     changes: &mut Vec<VoxelChange>,
 ) {
-    if is_shared(before.as_ref(), after.as_ref()) {
-        return;
-    }
-    let mask = |node: &Option<Arc<NodeView>>| node.as_ref().map_or(0, |node| node.mask);
-    for place in ones(mask(&before) | mask(&after)) {
-        let block = |node: &Option<Arc<NodeView>>| {
-            node.as_ref().and_then(|node| node.block(place).copied()).unwrap_or_default()
-        };
-        compare_blocks(cell_at(index, place), block(&before), block(&after), changes);
+    for place in ones(before.mask | after.mask) {
+        let block = |node: NodeView<'_>| node.block(place).copied().unwrap_or_default();
+        compare_blocks(cell_at(index, place), block(before), block(after), changes);
     }
 }
 

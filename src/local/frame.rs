@@ -4,7 +4,6 @@ use super::parameters::LocalParameters;
 use super::place::place_of;
 use super::ray_search::RaySearch;
 use super::report::LocalReport;
-use super::tree::NONE;
 use super::voxels::Voxel;
 use crate::maths::logit;
 use crate::scan::MAX_RAY_STEPS;
@@ -41,11 +40,13 @@ impl Frame {
     /// What the scan says of a voxel so far.
     #[inline]
     fn touch(&mut self, id: u32, voxel: &mut Voxel) -> &mut Touch {
-        if voxel.touch == NONE {
-            voxel.touch = self.touches.len() as u32;
+        let number = voxel.touch().unwrap_or_else(|| {
+            let number = self.touches.len() as u32;
+            voxel.set_touch(Some(number));
             self.touches.push(Touch { voxel: id, hits: 0, misses: 0, is_new: false, is_free: false });
-        }
-        &mut self.touches[voxel.touch as usize]
+            number
+        });
+        &mut self.touches[number as usize]
     }
 }
 
@@ -68,7 +69,7 @@ impl LocalMap {
             let index = voxel.map(|k| k >> 2);
             let block = match last_block {
                 Some((last_index, block)) if last_index == index => block,
-                _ => self.tree.make_block(index, self.inflation.rule()),
+                _ => self.tree.make_block(index, self.inflation.rules.current()),
             };
             last_block = Some((index, block));
             self.hit(block, place_of(voxel));
@@ -140,7 +141,7 @@ impl LocalMap {
             let voxel = self.voxels.slab.get_mut(touch.voxel);
             let sum = f64::from(touch.hits) * log_odds.hit + f64::from(touch.misses) * log_odds.miss;
             voxel.log_odds = (voxel.log_odds + sum).clamp(log_odds.min, log_odds.max);
-            voxel.touch = NONE;
+            voxel.set_touch(None);
             touch.is_free = is_known_free(&self.applied, voxel.log_odds);
             let (block, place) = voxel.home();
             let is_occupied = voxel.log_odds >= occupied_log_odds;

@@ -1,23 +1,18 @@
 use super::place::{cell_at, ones, place_of};
 use super::range::{Ball, Relation};
-use super::slab::Slab;
+use super::rules::Rules;
 use super::stencil::Stencil;
-use super::tree::{NONE, Tree};
+use super::tree::{NONE, Node, Tree};
 use crate::space::{Grid, Point, VoxelIndex};
 use std::sync::Arc;
 
-/// The inflation map: how many voxels inflate each voxel, and who inflates whom by which rule.
+/// Keeps the inflated set: the dilation of the occupied voxels in range.
 ///
-/// The inflated set is the dilation of the occupied voxels in range. It is kept incrementally: a voxel that begins to
-/// inflate adds one to the counts of its stencil, one that ends takes it away again, whatever the reason.
+/// It is kept incrementally: a voxel that begins to inflate adds one to the counts of its stencil, one that ends takes it
+/// away again, whatever the reason.
 #[derive(Clone, Debug)]
 pub(super) struct Inflation {
-    narrow: Slab<Counts<u8>>,
-    /// For voxels that more than 255 inflate.
-    wide: Slab<Counts<u16>>,
-    /// The rule of each number; more than one only while parameters change.
-    rules: Vec<Option<Rule>>,
-    current: u8,
+    pub(super) rules: Rules,
     /// Blocks whose occupied voxels have changed.
     waiting: Vec<u32>,
     /// Blocks in which nothing may be left.
@@ -33,30 +28,10 @@ pub(super) struct Inflation {
     pub(super) changes: usize,
 }
 
-/// Which occupied voxels inflate which.
-#[derive(Clone, Debug)]
-struct Rule {
-    range_m: f64,
-    stencil: Arc<Stencil>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Counts<T>([T; 64]);
-
-impl<T: Copy + Default> Default for Counts<T> {
-    fn default() -> Self {
-        Self([T::default(); 64])
-    }
-}
-
 impl Inflation {
     pub(super) fn new(range_m: f64, radius_m: f64, resolution_m: f64) -> Self {
-        let stencil = Arc::new(Stencil::new(radius_m, resolution_m));
         Self {
-            narrow: Slab::default(),
-            wide: Slab::default(),
-            rules: vec![Some(Rule { range_m, stencil })],
-            current: 0,
+            rules: Rules::new(range_m, radius_m, resolution_m),
             waiting: Vec::new(),
             emptied: Vec::new(),
             beside: Vec::new(),
@@ -67,53 +42,21 @@ impl Inflation {
         }
     }
 
-    /// Number of the rule for what is new.
-    pub(super) fn rule(&self) -> u8 {
-        self.current
-    }
-
-    /// Whether there is a number for one more rule.
-    pub(super) fn has_room(&self) -> bool {
-        self.rules.len() < 256 || self.rules.iter().any(Option::is_none)
-    }
-
-    /// Makes another rule the current one; the nodes keep theirs until [`Inflation::adopt`].
-    pub(super) fn set_rule(&mut self, range_m: f64, radius_m: f64, resolution_m: f64) {
-        let known = self.rules.iter().flatten().find(|rule| rule.stencil.radius_m() == radius_m);
-        let stencil = known.map(|rule| rule.stencil.clone());
-        let stencil = stencil.unwrap_or_else(|| Arc::new(Stencil::new(radius_m, resolution_m)));
-        let number = self.rules.iter().position(Option::is_none).unwrap_or_else(|| {
-            self.rules.push(None);
-            self.rules.len() - 1
-        });
-        self.rules[number] = Some(Rule { range_m, stencil });
-        self.current = number as u8;
-    }
-
-    /// Forgets all rules but the current one, which every node has by now.
-    pub(super) fn forget_old_rules(&mut self) {
-        for (number, rule) in self.rules.iter_mut().enumerate() {
-            if number != usize::from(self.current) {
-                *rule = None;
-            }
-        }
-    }
-
     /// Gives a node the current rule; its voxels begin to inflate by it when [`Inflation::update`] comes.
     pub(super) fn adopt(&mut self, tree: &mut Tree, node: u32) {
-        let old = tree.nodes.get(node).rule;
-        if old == self.current {
+        let (old, new) = (tree.nodes.get(node).rule, self.rules.current());
+        if old == new {
             return;
         }
-        let (before, after) = (self.stencil(old), self.stencil(self.current));
+        let (before, after) = (self.rules.stencil(old), self.rules.stencil(new));
         for block in tree.blocks_of(node).to_vec() {
             if !Arc::ptr_eq(&before, &after) {
-                let inflating = tree.blocks.get(block).inflating;
+                let inflating = tree.counts.inflating(tree.blocks.get(block).tally);
                 self.change(tree, block, 0, inflating, &before);
             }
             self.wait(tree, block);
         }
-        tree.nodes.get_mut(node).rule = self.current;
+        tree.nodes.get_mut(node).rule = new;
     }
 
     /// Notes that the occupied voxels of a block have changed.
@@ -136,7 +79,7 @@ impl Inflation {
         let mut waiting = std::mem::take(&mut self.waiting);
         for block in waiting.drain(..) {
             tree.blocks.get_mut(block).is_waiting = false;
-            let ball = self.ball(grid, position, tree.nodes.get(tree.blocks.get(block).node).rule);
+            let ball = self.rules.ball(tree.nodes.get(tree.blocks.get(block).node).rule, grid, position);
             self.reconcile(tree, block, &ball, Relation::Border);
         }
         self.waiting = waiting;
@@ -162,16 +105,34 @@ impl Inflation {
             return;
         }
         if !has_old_rules {
-            match self.ball(grid, position, self.current).relation(index.map(|k| k << 6), 64) {
+            match self.rules.ball(self.rules.current(), grid, position).relation(index.map(|k| k << 6), 64) {
                 Relation::Inside if inflating == occupied => return,
                 Relation::Outside if inflating == 0 => return,
                 _ => {}
             }
         }
-        for node in tree.nodes_of(page).to_vec() {
-            let ball = self.ball(grid, position, tree.nodes.get(node).rule);
-            let relation = ball.relation(tree.node_index(node).map(|k| k << 4), 16);
-            for block in tree.blocks_of(node).to_vec() {
+        for place in ones(tree.pages.get(page).nodes.mask) {
+            if let Some(node) = tree.pages.get(page).nodes.get(&tree.lists, place) {
+                self.update_node(tree, grid, position, node);
+            }
+        }
+    }
+
+    fn update_node(&mut self, tree: &mut Tree, grid: Grid, position: Point, node: u32) {
+        let Node { rule, occupied, inflating, .. } = *tree.nodes.get(node);
+        if occupied == 0 && inflating == 0 {
+            return;
+        }
+        let ball = self.rules.ball(rule, grid, position);
+        let relation = ball.relation(tree.node_index(node).map(|k| k << 4), 16);
+        match relation {
+            Relation::Inside if inflating == occupied => return,
+            Relation::Outside if inflating == 0 => return,
+            _ => {}
+        }
+        // Blocks that the inflation adds meanwhile have nothing that inflates.
+        for place in ones(tree.nodes.get(node).blocks.mask) {
+            if let Some(block) = tree.nodes.get(node).blocks.get(&tree.lists, place) {
                 self.reconcile(tree, block, &ball, relation);
             }
         }
@@ -182,7 +143,7 @@ impl Inflation {
     fn reconcile(&mut self, tree: &mut Tree, block: u32, ball: &Ball, relation: Relation) {
         let (occupied, inflating) = {
             let block = tree.blocks.get(block);
-            (block.occupied, block.inflating)
+            (block.occupied, tree.counts.inflating(block.tally))
         };
         if occupied | inflating == 0 || (relation == Relation::Inside && occupied == inflating) {
             return;
@@ -198,7 +159,7 @@ impl Inflation {
             Relation::Border => in_ball(occupied, index, ball),
         };
         if wanted != inflating {
-            let stencil = self.stencil(tree.nodes.get(tree.blocks.get(block).node).rule);
+            let stencil = self.rules.stencil(tree.nodes.get(tree.blocks.get(block).node).rule);
             self.change(tree, block, wanted & !inflating, inflating & !wanted, &stencil);
         }
     }
@@ -221,11 +182,7 @@ impl Inflation {
                 self.count_down(tree, at, mask);
             }
         }
-        let block = tree.blocks.get_mut(block);
-        block.inflating = (block.inflating | begin) & !end;
-        let page = tree.nodes.get(block.node).page;
-        let inflating = &mut tree.pages.get_mut(page).inflating;
-        *inflating = *inflating + begin.count_ones() - end.count_ones();
+        tree.set_inflating(block, begin, end);
         self.changes += (begin.count_ones() + end.count_ones()) as usize;
     }
 
@@ -244,7 +201,7 @@ impl Inflation {
             true => tree.nodes.get(node).blocks.get(&tree.lists, place_of(at)),
             false => None,
         };
-        let block = known.unwrap_or_else(|| tree.make_block(at, self.current));
+        let block = known.unwrap_or_else(|| tree.make_block(at, self.rules.current()));
         self.last_node = (at.map(|k| k >> 2), tree.blocks.get(block).node);
         self.beside[number as usize] = block;
         block
@@ -252,85 +209,31 @@ impl Inflation {
 
     fn count_up(&mut self, tree: &mut Tree, id: u32, mask: u64) {
         let block = tree.blocks.get_mut(id);
-        let new = mask & !block.inflated;
+        let new = tree.counts.add(&mut block.tally, mask);
         if new != 0 {
-            block.inflated |= mask;
             self.inflated += new.count_ones() as usize;
             let node = block.node;
             tree.mark_dirty(node);
         }
-        let block = tree.blocks.get_mut(id);
-        if block.counts == NONE {
-            block.counts = self.narrow.insert(Counts::default());
-        }
-        if !block.is_wide {
-            let Counts(counts) = self.narrow.get_mut(block.counts);
-            if !ones(mask).any(|place| counts[place] == u8::MAX) {
-                ones(mask).for_each(|place| counts[place] += 1);
-                return;
-            }
-            let wide = Counts(counts.map(u16::from));
-            self.narrow.remove(block.counts);
-            (block.counts, block.is_wide) = (self.wide.insert(wide), true);
-        }
-        let Counts(counts) = self.wide.get_mut(block.counts);
-        ones(mask).for_each(|place| counts[place] += 1);
     }
 
     fn count_down(&mut self, tree: &mut Tree, id: u32, mask: u64) {
         let block = tree.blocks.get_mut(id);
-        let mut ended = 0_u64;
-        // A count is at least that of those that inflate: it never goes below 0.
-        if block.is_wide {
-            let Counts(counts) = self.wide.get_mut(block.counts);
-            for place in ones(mask) {
-                counts[place] -= 1;
-                ended |= u64::from(counts[place] == 0) << place;
+        let ended = tree.counts.subtract(&mut block.tally, mask);
+        if ended != 0 {
+            self.inflated -= ended.count_ones() as usize;
+            if block.tally.is_empty() {
+                self.emptied.push(id);
             }
-        } else {
-            let Counts(counts) = self.narrow.get_mut(block.counts);
-            for place in ones(mask) {
-                counts[place] -= 1;
-                ended |= u64::from(counts[place] == 0) << place;
-            }
+            let node = block.node;
+            tree.mark_dirty(node);
         }
-        if ended == 0 {
-            return;
-        }
-        block.inflated &= !ended;
-        self.inflated -= ended.count_ones() as usize;
-        if block.inflated == 0 {
-            match block.is_wide {
-                true => self.wide.remove(block.counts),
-                false => self.narrow.remove(block.counts),
-            }
-            (block.counts, block.is_wide) = (NONE, false);
-            self.emptied.push(id);
-        }
-        let node = block.node;
-        tree.mark_dirty(node);
-    }
-
-    fn stencil(&self, rule: u8) -> Arc<Stencil> {
-        self.in_force(rule).stencil.clone()
-    }
-
-    fn ball(&self, grid: Grid, center: Point, rule: u8) -> Ball {
-        Ball { grid, center, radius_m: self.in_force(rule).range_m }
-    }
-
-    fn in_force(&self, rule: u8) -> &Rule {
-        let current = usize::from(self.current);
-        let rule = self.rules[usize::from(rule)].as_ref().or(self.rules[current].as_ref());
-        rule.expect("the current rule is never forgotten")
     }
 
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         let lists = [&self.waiting, &self.emptied, &self.beside, &self.pages];
-        self.narrow.bytes()
-            + self.wide.bytes()
-            + lists.iter().map(|list| list.capacity() * size_of::<u32>()).sum::<usize>()
+        lists.iter().map(|list| list.capacity() * size_of::<u32>()).sum::<usize>()
     }
 }
 

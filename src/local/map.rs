@@ -6,7 +6,7 @@ use super::report::LocalReport;
 use super::sweep::Sweep;
 use super::tree::Tree;
 use super::view::LocalView;
-use super::voxels::Voxels;
+use super::voxels::{MOST_VOXELS, Voxels};
 use crate::error::{Error, Result};
 use crate::scan::Scan;
 use crate::space::{Grid, Point, VoxelIndex};
@@ -91,7 +91,7 @@ impl LocalMap {
     ///
     /// # Errors
     ///
-    /// An origin without a voxel: the map stays as it was.
+    /// An origin without a voxel, more voxels and points than 67 million: the map stays as it was.
     pub fn insert_scan(&mut self, scan: &Scan) -> Result<LocalReport> {
         self.update(scan.origin, &scan.points, true)
     }
@@ -100,13 +100,13 @@ impl LocalMap {
     ///
     /// # Errors
     ///
-    /// A position without a voxel: the map stays as it was.
+    /// A position without a voxel, more voxels and points than 67 million: the map stays as it was.
     pub fn insert_relayed(&mut self, position: Point, points: &[Point]) -> Result<LocalReport> {
         self.update(position, points, false)
     }
 
     fn update(&mut self, origin: Point, points: &[Point], has_rays: bool) -> Result<LocalReport> {
-        let start = self.check_position(origin)?;
+        let start = self.check_scan(origin, points)?;
         let mut report = LocalReport { points: points.len() as u64, ..LocalReport::default() };
         let mut clock = Clock::start();
         self.take_over_parameters(&mut report);
@@ -132,7 +132,7 @@ impl LocalMap {
     pub(super) fn inflate(&mut self, position: Point, report: &mut LocalReport) {
         self.inflation.update(&mut self.tree, self.grid, position, !self.sweep.is_done());
         report.inflation_changes = std::mem::take(&mut self.inflation.changes) as u64;
-        report.is_settled = self.sweep.is_done() && !self.is_over_limit();
+        report.is_settled = self.parameters == self.applied && self.sweep.is_done() && !self.is_over_limit();
     }
 
     /// Whether there are more voxels than the limit: it was lowered, and they go a part an update.
@@ -148,6 +148,12 @@ impl LocalMap {
         })
     }
 
+    /// The voxel of a scan's origin, if the map can take the scan; then nothing can fail any more.
+    pub(super) fn check_scan(&self, origin: Point, points: &[Point]) -> Result<VoxelIndex> {
+        check_room(self.voxels.len(), points.len())?;
+        self.check_position(origin)
+    }
+
     /// The voxel of a point, if it can be in the map.
     pub(super) fn voxel_of(&self, point: Point) -> Option<VoxelIndex> {
         let voxel = self.grid.voxel_of(point)?;
@@ -158,7 +164,13 @@ impl LocalMap {
     pub(super) fn take_over_parameters(&mut self, report: &mut LocalReport) {
         if self.parameters != self.applied {
             let before = std::mem::replace(&mut self.applied, self.parameters);
-            self.begin_sweep(&before, report);
+            if !self.inflation.rules.has_room() {
+                // So many other ranges and radii have not come to all of the map yet that there is no number for one more:
+                // this one waits until they have.
+                self.applied.inflation_range_m = before.inflation_range_m;
+                self.applied.inflation_radius_m = before.inflation_radius_m;
+            }
+            self.begin_sweep(&before);
         }
         self.sweep_some(self.applied.work_per_update, report);
     }
@@ -173,8 +185,8 @@ impl LocalMap {
         view.position = self.position;
         view.stored = self.voxels.len();
         view.inflated = self.inflation.inflated;
-        view.replace_nodes(&self.tree, &dirty);
-        self.tree.reuse(dirty);
+        view.replace_pages(&self.tree, &dirty);
+        self.tree.shown(dirty);
         self.view = Arc::new(view);
         self.shared.set(self.view.clone());
     }
@@ -242,7 +254,32 @@ impl Clock {
     }
 }
 
+/// Whether as many points as these can be new voxels beside those that are there.
+fn check_room(stored: usize, points: usize) -> Result<()> {
+    if stored.saturating_add(points) <= MOST_VOXELS {
+        return Ok(());
+    }
+    let reason = format!(
+        "{points} points beside {stored} voxels may be more than the {MOST_VOXELS} that a local map numbers; \
+         limit the map (`LocalParameters::max_voxels`) or split the scan"
+    );
+    Err(Error::argument("points of the scan", reason))
+}
+
 /// Whether a voxel of these log-odds leaves the map. What is occupied is not free, where the thresholds meet.
 pub(super) fn is_known_free(parameters: &LocalParameters, log_odds: f64) -> bool {
     log_odds <= parameters.free_log_odds && log_odds < parameters.occupied_log_odds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scans_that_may_be_too_much_are_refused() {
+        assert!(check_room(0, MOST_VOXELS).is_ok() && check_room(MOST_VOXELS - 4000, 4000).is_ok());
+        let error = check_room(MOST_VOXELS - 4000, 4001).unwrap_err().to_string();
+        assert!(error.contains("max_voxels") && error.contains("4001 points"), "{error}");
+        assert!(check_room(1, usize::MAX).is_err());
+    }
 }

@@ -27,6 +27,7 @@
 
 mod archive;
 mod changes;
+mod counts;
 mod frame;
 mod inflation;
 mod map;
@@ -38,6 +39,8 @@ mod range;
 mod ray_search;
 mod reader;
 mod report;
+mod rules;
+mod runs;
 mod slab;
 mod sparse;
 mod stencil;

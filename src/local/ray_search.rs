@@ -1,5 +1,5 @@
 use super::page_table::PageTable;
-use super::place::place_of;
+use super::place::{cell_at, in_box, mirrored, place_of};
 use super::sparse::Sparse64;
 use super::tree::{Node, Page, Tree};
 use crate::scan::RayWalk;
@@ -7,60 +7,54 @@ use crate::space::{Point, VoxelIndex};
 
 /// Finds the voxels with occupancy that a ray visits, exactly those that [`RayWalk`] visits before its last voxel.
 ///
-/// The borders of larger cells are borders between voxels too, and their crossings have the same times to the bit. So the
-/// walk over pages, nodes or blocks is the walk over voxels with the crossings in between left out, and where it comes
-/// into a cell that holds something, the crossings in between that were before are counted.
+/// A ray crosses borders in the order of their times, of equal times the lowest axis first. So it visits a voxel if and only
+/// if it crosses all borders into it before any border out of it, and so it is with larger cells, whose borders are borders
+/// between voxels with the same times to the bit. Nobody has to walk there: of the cells that hold something and that are
+/// near to the ray, each is asked for itself.
 #[derive(Clone, Debug)]
 pub(super) struct RaySearch {
     origin: Point,
+    direction: Point,
     inv_direction: Point,
     step: [i32; 3],
     start: VoxelIndex,
     last: VoxelIndex,
-    /// Which way it goes: bit `k` is set where it goes down along axis `k`.
-    octant: usize,
+    /// A box in which the ray is: the voxels of its two ends, without a quarter of a voxel at their outer borders.
+    low: Point,
+    high: Point,
+    /// The highest place of a cell along the axes on which the ray goes down, else 0: with it places count in the order in
+    /// which the ray comes to them.
+    flip: usize,
 }
 
-/// For each octant, as [`RaySearch`] counts them, and each place: the places that a ray can come to from there.
-static AHEAD: [[u64; 64]; 8] = places_ahead();
-
-const fn places_ahead() -> [[u64; 64]; 8] {
-    let mut ahead = [[0; 64]; 8];
-    let mut case = 0;
-    while case < 8 * 64 * 64 {
-        let (octant, from, to) = (case >> 12, case >> 6 & 63, case & 63);
-        let (mut axis, mut is_ahead) = (0, true);
-        while axis < 3 {
-            let (a, b) = (from >> (2 * axis) & 3, to >> (2 * axis) & 3);
-            is_ahead &= if octant >> axis & 1 != 0 { b <= a } else { b >= a };
-            axis += 1;
-        }
-        ahead[octant][from] |= (is_ahead as u64) << to;
-        case += 1;
-    }
-    ahead
+/// From when to when a ray is in a cell.
+#[derive(Clone, Copy, Debug)]
+struct Stay {
+    enter: f64,
+    leave: f64,
 }
 
-/// The crossing by which a cell is entered: its time and its axis.
-type Entry = Option<(f64, usize)>;
-
-/// Where a walk among cells of `4^LEVEL` voxels is.
-struct Cursor<const SHIFT: u32> {
-    cell: VoxelIndex,
+/// Where the walk from page to page is.
+struct Cursor {
+    page: VoxelIndex,
     next: Point,
-    entry: Entry,
+    enter: f64,
 }
 
 impl RaySearch {
     /// The ray from `origin` to `end`, both in units of voxels and inside `start` and `last`, their voxels.
     pub(super) fn new(origin: Point, start: VoxelIndex, end: Point, last: VoxelIndex) -> Self {
+        let direction: Point = std::array::from_fn(|k| end[k] - origin[k]);
         Self {
             origin,
-            inv_direction: std::array::from_fn(|k| 1.0 / (end[k] - origin[k])),
+            direction,
+            inv_direction: direction.map(|d| 1.0 / d),
             step: std::array::from_fn(|k| (last[k] - start[k]).signum()),
             start,
             last,
-            octant: (0..3).map(|k| usize::from(last[k] < start[k]) << k).sum(),
+            low: std::array::from_fn(|k| f64::from(start[k].min(last[k])) + 0.25),
+            high: std::array::from_fn(|k| f64::from(start[k].max(last[k])) + 0.75),
+            flip: (0..3).map(|k| if last[k] < start[k] { 3 << (2 * k) } else { 0 }).sum(),
         }
     }
 
@@ -78,14 +72,20 @@ impl RaySearch {
         if !(is_sound(0) && is_sound(1) && is_sound(2)) {
             return self.for_each_stored_by_steps(tree, end, visit);
         }
-        let mut at = self.cursor::<6>(self.start.map(|k| k >> 6), None);
+        let page = self.start.map(|k| k >> 6);
+        let mut at =
+            Cursor { page, next: std::array::from_fn(|k| self.leave_time::<6>(k, page[k])), enter: 0.0 };
         loop {
-            if let Some(page) = pages.get(tree, at.cell) {
-                self.search_page(tree, tree.pages.get(page), &at, &mut visit);
+            let (axis, leave) = earliest(at.next);
+            if let Some(page) = pages.get(tree, at.page) {
+                self.search_page(tree, tree.pages.get(page), Stay { enter: at.enter, leave }, &mut visit);
             }
-            if self.advance(&mut at).is_none() {
+            if leave == f64::INFINITY {
                 return;
             }
+            at.page[axis] += self.step[axis];
+            at.next[axis] = self.leave_time::<6>(axis, at.page[axis]);
+            at.enter = leave;
         }
     }
 
@@ -99,119 +99,173 @@ impl RaySearch {
         });
     }
 
-    fn search_page(&self, tree: &Tree, page: &Page, at: &Cursor<6>, visit: &mut impl FnMut(u32)) {
-        self.search::<6, 4>(at, page.stored, |nodes, place| {
+    fn search_page(&self, tree: &Tree, page: &Page, stay: Stay, visit: &mut impl FnMut(u32)) {
+        self.search::<4>(page.index, page.stored, stay, |cell, place, stay| {
             if let Some(node) = page.nodes.get(&tree.lists, place) {
-                self.search_node(tree, tree.nodes.get(node), nodes, visit);
+                self.search_node(tree, tree.nodes.get(node), cell, stay, visit);
             }
         });
     }
 
     #[inline]
-    fn search_node(&self, tree: &Tree, node: &Node, at: &Cursor<4>, visit: &mut impl FnMut(u32)) {
-        self.search::<4, 2>(at, node.stored, |blocks, place| {
+    fn search_node(&self, tree: &Tree, node: &Node, at: VoxelIndex, stay: Stay, visit: &mut impl FnMut(u32)) {
+        let end = if at == self.last.map(|k| k >> 4) { self.block_of_end_alone(tree, node) } else { 0 };
+        self.search::<2>(at, node.stored & !end, stay, |cell, place, stay| {
             if let Some(block) = node.blocks.get(&tree.lists, place) {
-                self.search_block(tree, &tree.blocks.get(block).voxels, blocks, visit);
+                self.search_block(tree, &tree.blocks.get(block).voxels, cell, stay, visit);
             }
         });
     }
 
+    /// The block in which the ray ends, if it is in the node and holds nothing but the end: this spares most rays the way
+    /// down to it.
     #[inline]
-    fn search_block(&self, tree: &Tree, stored: &Sparse64, at: &Cursor<2>, visit: &mut impl FnMut(u32)) {
-        self.search::<2, 0>(at, stored.mask, |voxels, place| {
-            if voxels.cell != self.last
-                && let Some(voxel) = stored.get(&tree.lists, place)
-            {
+    fn block_of_end_alone(&self, tree: &Tree, node: &Node) -> u64 {
+        let place = place_of(self.last.map(|k| k >> 2));
+        let block = node.blocks.get(&tree.lists, place).map(|block| tree.blocks.get(block));
+        let is_alone = block.is_some_and(|block| block.voxels.mask == 1 << place_of(self.last));
+        u64::from(is_alone) << place
+    }
+
+    #[inline]
+    fn search_block(
+        &self,
+        tree: &Tree,
+        stored: &Sparse64,
+        at: VoxelIndex,
+        stay: Stay,
+        visit: &mut impl FnMut(u32),
+    ) {
+        let is_end = at == self.last.map(|k| k >> 2);
+        let before_end = stored.mask & !(u64::from(is_end) << place_of(self.last));
+        self.search::<0>(at, before_end, stay, |_, place, _| {
+            if let Some(voxel) = stored.get(&tree.lists, place) {
                 visit(voxel);
             }
         });
     }
 
-    /// Visits those cells in a cell that the ray meets and that are in the mask.
+    /// Visits those cells of `2^SHIFT` voxels in a cell of four times that along an edge that are in the mask and that the ray
+    /// visits, in the order in which it comes to them. `stay` is that of the larger cell.
     #[inline]
-    fn search<const SHIFT: u32, const CHILD: u32>(
+    fn search<const SHIFT: u32>(
         &self,
-        parent: &Cursor<SHIFT>,
-        mut mask: u64,
-        mut visit: impl FnMut(&Cursor<CHILD>, usize),
+        parent: VoxelIndex,
+        mask: u64,
+        stay: Stay,
+        mut visit: impl FnMut(VoxelIndex, usize, Stay),
     ) {
-        let mut at = self.descend::<SHIFT, CHILD>(parent);
-        mask &= AHEAD[self.octant][place_of(at.cell)];
-        while mask != 0 {
-            let place = place_of(at.cell);
-            if mask >> place & 1 != 0 {
-                visit(&at, place);
-                // Often nothing is left ahead of the ray.
-                mask &= AHEAD[self.octant][place] & !(1 << place);
-            }
-            match self.advance(&mut at) {
-                Some(axis) if at.cell[axis] >> 2 == parent.cell[axis] => {}
-                _ => return,
-            }
+        if mask == 0 {
+            return;
+        }
+        // Without a branch a cell: nobody could guess it.
+        let (mut near, mut visited) = (mask & self.near::<SHIFT>(parent, stay), 0_u64);
+        while near != 0 {
+            let place = near.trailing_zeros() as usize;
+            near &= near - 1;
+            visited |= u64::from(self.visits::<SHIFT>(cell_at(parent, place))) << place;
+        }
+        if visited == 0 {
+            return;
+        }
+        let mut in_order = mirrored(visited, self.flip);
+        while in_order != 0 {
+            let place = in_order.trailing_zeros() as usize ^ self.flip;
+            in_order &= in_order - 1;
+            let cell = cell_at(parent, place);
+            visit(cell, place, self.stay_in::<SHIFT>(cell));
         }
     }
 
+    /// The places in a cell, of cells of `2^SHIFT` voxels, that lie in a box around the ray's way through it, none outside the
+    /// box of its two ends.
     #[inline]
-    fn cursor<const SHIFT: u32>(&self, cell: VoxelIndex, entry: Entry) -> Cursor<SHIFT> {
-        Cursor { cell, next: std::array::from_fn(|axis| self.crossing::<SHIFT>(axis, cell[axis])), entry }
-    }
-
-    /// Goes to the next cell, along the axis that is returned; `None` at the last.
-    #[inline]
-    fn advance<const SHIFT: u32>(&self, at: &mut Cursor<SHIFT>) -> Option<usize> {
-        let [x, y, z] = at.next;
-        // Spelled out by axis: an index would go through memory.
-        let (axis, time) = if x <= y && x <= z {
-            at.cell[0] += self.step[0];
-            at.next[0] = self.crossing::<SHIFT>(0, at.cell[0]);
-            (0, x)
-        } else if y <= z {
-            at.cell[1] += self.step[1];
-            at.next[1] = self.crossing::<SHIFT>(1, at.cell[1]);
-            (1, y)
-        } else {
-            at.cell[2] += self.step[2];
-            at.next[2] = self.crossing::<SHIFT>(2, at.cell[2]);
-            (2, z)
+    fn near<const SHIFT: u32>(&self, parent: VoxelIndex, stay: Stay) -> u64 {
+        // In voxels; rounding of times and positions is a thousandth of this or less.
+        const MARGIN: f64 = 1e-3;
+        let cells_per_voxel = 1.0 / f64::from(1 << SHIFT);
+        let leave = if stay.leave < 1.0 { stay.leave } else { 1.0 };
+        let range = |k: usize| {
+            let (a, b) =
+                (self.origin[k] + self.direction[k] * stay.enter, self.origin[k] + self.direction[k] * leave);
+            let (low, high) = (smaller(a, b) - MARGIN, larger(a, b) + MARGIN);
+            let corner = f64::from(parent[k] << (SHIFT + 2));
+            let (low, high) = (larger(low, self.low[k]) - corner, smaller(high, self.high[k]) - corner);
+            (cell_of(low * cells_per_voxel), cell_of(high * cells_per_voxel))
         };
-        at.entry = Some((time, axis));
-        (time < f64::INFINITY).then_some(axis)
+        in_box(range(0), range(1), range(2))
     }
 
-    /// Where the ray comes into a cell, as a walk among the cells in it.
+    /// Whether the ray visits a cell of `2^SHIFT` voxels that is in the box of the ray's ends.
     #[inline]
-    fn descend<const SHIFT: u32, const CHILD: u32>(&self, at: &Cursor<SHIFT>) -> Cursor<CHILD> {
-        let (mut cell, mut next) = ([0; 3], [0.0; 3]);
-        for axis in 0..3 {
-            let (start, is_up) = (self.start[axis] >> CHILD, self.step[axis] > 0);
-            let low = at.cell[axis] << 2;
-            // The first cell inside that the ray can be in.
-            let first = match self.step[axis] {
-                0 => start,
-                _ if is_up => low.max(start),
-                _ => (low + 3).min(start),
-            };
-            (cell[axis], next[axis]) = (first, self.crossing::<CHILD>(axis, first));
-            let Some((entry, entry_axis)) = at.entry else { continue };
-            if axis == entry_axis {
-                continue;
-            }
-            while next[axis] < entry || (next[axis] == entry && axis < entry_axis) {
-                cell[axis] += self.step[axis];
-                next[axis] = self.crossing::<CHILD>(axis, cell[axis]);
-            }
-        }
-        Cursor { cell, next, entry: at.entry }
+    fn visits<const SHIFT: u32>(&self, cell: VoxelIndex) -> bool {
+        let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
+        let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
+        // Of equal times the lowest axis goes first.
+        (ex <= ly) & (ex <= lz) & (ey < lx) & (ey <= lz) & (ez < lx) & (ez < ly)
     }
 
-    /// Time at which the ray leaves a cell of `2^SHIFT` voxels along `axis`, as [`RayWalk`] has it; infinite from the last
-    /// cell on.
+    /// From when to when the ray is in a cell of `2^SHIFT` voxels that it visits.
     #[inline]
-    fn crossing<const SHIFT: u32>(&self, axis: usize, cell: i32) -> f64 {
-        if cell == self.last[axis] >> SHIFT {
-            return f64::INFINITY;
-        }
-        let boundary = (cell + i32::from(self.step[axis] > 0)) << SHIFT;
-        (f64::from(boundary) - self.origin[axis]) * self.inv_direction[axis]
+    fn stay_in<const SHIFT: u32>(&self, cell: VoxelIndex) -> Stay {
+        let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
+        let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
+        Stay { enter: larger(larger(ex, ey), larger(ez, 0.0)), leave: smaller(smaller(lx, ly), lz) }
     }
+
+    /// Time at which the ray enters a cell of `2^SHIFT` voxels along `axis`; minus infinity for the first.
+    #[inline]
+    fn enter_time<const SHIFT: u32>(&self, axis: usize, cell: i32) -> f64 {
+        match cell == self.start[axis] >> SHIFT {
+            true => f64::NEG_INFINITY,
+            false => self.time(axis, (cell + i32::from(self.step[axis] < 0)) << SHIFT),
+        }
+    }
+
+    /// Time at which the ray leaves a cell of `2^SHIFT` voxels along `axis`; infinite for the last.
+    #[inline]
+    fn leave_time<const SHIFT: u32>(&self, axis: usize, cell: i32) -> f64 {
+        match cell == self.last[axis] >> SHIFT {
+            true => f64::INFINITY,
+            false => self.time(axis, (cell + i32::from(self.step[axis] > 0)) << SHIFT),
+        }
+    }
+
+    /// Time at which the ray crosses a border between voxels, as [`RayWalk`] has it.
+    #[inline]
+    fn time(&self, axis: usize, border: i32) -> f64 {
+        (f64::from(border) - self.origin[axis]) * self.inv_direction[axis]
+    }
+}
+
+/// The axis with the least time, the lowest of equals, and that time.
+#[inline]
+fn earliest([x, y, z]: Point) -> (usize, f64) {
+    if x <= y && x <= z {
+        (0, x)
+    } else if y <= z {
+        (1, y)
+    } else {
+        (2, z)
+    }
+}
+
+// One instruction each, where the library's must care for what is no number.
+#[inline]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Which of the cells 0 to 3 a coordinate is in, or the nearest of them; on a border either of the two.
+#[inline]
+fn cell_of(x: f64) -> usize {
+    // Where the lowest bits of the sum are the nearest integer.
+    const INTEGERS: f64 = 6_755_399_441_055_744.0;
+    let x = smaller(larger(x, 0.25), 3.75);
+    (x - 0.5 + INTEGERS).to_bits() as usize & 3
 }

@@ -1,58 +1,60 @@
+use super::runs::Runs;
+
 /// Which of 64 places are taken, and the number that each holds: 4 bytes a number, in a list as long as needed.
+// Next to each other in a block of 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(Rust, packed(4))]
 pub(super) struct Sparse64 {
     pub(super) mask: u64,
-    start: u32,
-    class: u8,
+    list: u32,
 }
 
-/// The lists of many [`Sparse64`], by capacity: 1, 2, 4 ... 64.
+/// The lists of many [`Sparse64`], by capacity: 1, 2, 4 ... 64, the least that is enough.
 #[derive(Clone, Debug, Default)]
 pub(super) struct IdLists {
-    classes: [Class; 7],
+    classes: [Runs<u32>; 7],
 }
 
-#[derive(Clone, Debug, Default)]
-struct Class {
-    ids: Vec<u32>,
-    free: Vec<u32>,
+/// The class of lists of so many numbers.
+#[inline]
+fn class_of(len: usize) -> usize {
+    len.next_power_of_two().trailing_zeros() as usize
 }
 
 impl IdLists {
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
-        self.classes
-            .iter()
-            .map(|class| (class.ids.capacity() + class.free.capacity()) * size_of::<u32>())
-            .sum()
+        self.classes.iter().map(Runs::bytes).sum()
     }
 
-    fn take(&mut self, class: u8) -> u32 {
-        let Class { ids, free } = &mut self.classes[usize::from(class)];
-        free.pop().unwrap_or_else(|| {
-            let start = ids.len();
-            // Doubling would leave a third of it empty on average.
-            if ids.capacity() < start + (1 << class) {
-                ids.reserve_exact(start / 8 + 1024);
-            }
-            ids.resize(start + (1 << class), 0);
-            start as u32
-        })
+    #[inline]
+    fn list(&self, class: usize, list: u32) -> &[u32] {
+        self.classes[class].get(list, 1 << class)
     }
 
-    /// Moves a list of `len` numbers to another class.
-    fn resize(&mut self, list: &mut Sparse64, len: usize, class: u8) {
-        let start = self.take(class);
-        for k in 0..len {
-            let id = self.classes[usize::from(list.class)].ids[list.start as usize + k];
-            self.classes[usize::from(class)].ids[start as usize + k] = id;
-        }
-        self.classes[usize::from(list.class)].free.push(list.start);
-        (list.start, list.class) = (start, class);
+    #[inline]
+    fn list_mut(&mut self, class: usize, list: u32) -> &mut [u32] {
+        self.classes[class].get_mut(list, 1 << class)
+    }
+
+    /// Moves a list to another class, as much as there is room for; returns its number there.
+    fn moved(&mut self, list: u32, from: usize, to: usize) -> u32 {
+        let new = self.classes[to].take(1 << to);
+        let len = 1 << from.min(to);
+        let mut ids = [0; 64];
+        ids[..len].copy_from_slice(&self.list(from, list)[..len]);
+        self.list_mut(to, new)[..len].copy_from_slice(&ids[..len]);
+        self.classes[from].give(list);
+        new
     }
 }
 
 impl Sparse64 {
+    #[inline]
+    fn len(&self) -> usize {
+        self.mask.count_ones() as usize
+    }
+
     #[inline]
     fn rank(&self, place: usize) -> usize {
         (self.mask & ((1 << place) - 1)).count_ones() as usize
@@ -62,46 +64,45 @@ impl Sparse64 {
     #[inline]
     pub(super) fn get(&self, lists: &IdLists, place: usize) -> Option<u32> {
         let is_taken = self.mask >> place & 1 != 0;
-        is_taken.then(|| lists.classes[usize::from(self.class)].ids[self.start as usize + self.rank(place)])
+        is_taken.then(|| lists.list(class_of(self.len()), self.list)[self.rank(place)])
     }
 
     /// The numbers, by place.
     pub(super) fn ids<'a>(&self, lists: &'a IdLists) -> &'a [u32] {
-        if self.mask == 0 {
-            return &[];
-        }
-        &lists.classes[usize::from(self.class)].ids[self.start as usize..][..self.mask.count_ones() as usize]
+        let len = self.len();
+        if len == 0 { &[] } else { &lists.list(class_of(len), self.list)[..len] }
     }
 
     /// Puts a number at a place that is not taken.
     pub(super) fn insert(&mut self, lists: &mut IdLists, place: usize, id: u32) {
         debug_assert!(self.mask >> place & 1 == 0);
-        let len = self.mask.count_ones() as usize;
+        let len = self.len();
+        let class = class_of(len + 1);
         if len == 0 {
-            (self.start, self.class) = (lists.take(0), 0);
-        } else if len == 1 << self.class {
-            lists.resize(self, len, self.class + 1);
+            self.list = lists.classes[0].take(1);
+        } else if class != class_of(len) {
+            self.list = lists.moved(self.list, class - 1, class);
         }
-        let (start, rank) = (self.start as usize, self.rank(place));
-        let ids = &mut lists.classes[usize::from(self.class)].ids;
-        ids.copy_within(start + rank..start + len, start + rank + 1);
-        ids[start + rank] = id;
+        let rank = self.rank(place);
+        let ids = lists.list_mut(class, self.list);
+        ids.copy_within(rank..len, rank + 1);
+        ids[rank] = id;
         self.mask |= 1 << place;
     }
 
     /// Takes the number at a place that is taken away.
     pub(super) fn remove(&mut self, lists: &mut IdLists, place: usize) -> u32 {
         debug_assert!(self.mask >> place & 1 != 0);
-        let len = self.mask.count_ones() as usize;
-        let (start, rank) = (self.start as usize, self.rank(place));
-        let ids = &mut lists.classes[usize::from(self.class)].ids;
-        let id = ids[start + rank];
-        ids.copy_within(start + rank + 1..start + len, start + rank);
+        let (len, rank) = (self.len(), self.rank(place));
+        let class = class_of(len);
+        let ids = lists.list_mut(class, self.list);
+        let id = ids[rank];
+        ids.copy_within(rank + 1..len, rank);
         self.mask &= !(1 << place);
         if len == 1 {
-            lists.classes[usize::from(self.class)].free.push(self.start);
-        } else if self.class > 0 && len - 1 == 1 << (self.class - 1) {
-            lists.resize(self, len - 1, self.class - 1);
+            lists.classes[0].give(self.list);
+        } else if class_of(len - 1) != class {
+            self.list = lists.moved(self.list, class, class - 1);
         }
         id
     }

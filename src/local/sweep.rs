@@ -35,7 +35,7 @@ impl Sweep {
 
 impl LocalMap {
     /// Begins to judge and inflate all voxels anew, where the parameters that changed ask for it.
-    pub(super) fn begin_sweep(&mut self, before: &LocalParameters, report: &mut LocalReport) {
+    pub(super) fn begin_sweep(&mut self, before: &LocalParameters) {
         let LocalParameters { inflation_range_m, inflation_radius_m, .. } = self.applied;
         let states = |p: &LocalParameters| {
             [p.log_odds.min, p.log_odds.max, p.occupied_log_odds, p.free_log_odds].map(f64::to_bits)
@@ -46,16 +46,13 @@ impl LocalMap {
             return;
         }
         if inflates_anew {
-            if !self.inflation.has_room() {
-                // So many changes at a time that there is no number for one more.
-                self.sweep_some(usize::MAX, report);
-            }
-            self.inflation.set_rule(inflation_range_m, inflation_radius_m, self.resolution_m());
+            let resolution_m = self.resolution_m();
+            self.inflation.rules.set(inflation_range_m, inflation_radius_m, resolution_m);
         }
         let from = self.position.and_then(|position: Point| self.grid.voxel_of(position)).unwrap_or_default();
         self.sweep = Sweep::of(&self.tree, from);
         if self.sweep.is_done() {
-            self.inflation.forget_old_rules();
+            self.inflation.rules.forget_old();
         }
     }
 
@@ -74,7 +71,7 @@ impl LocalMap {
             }
         }
         if self.sweep.is_done() {
-            self.inflation.forget_old_rules();
+            self.inflation.rules.forget_old();
             self.sweep = Sweep::default();
         }
     }

@@ -1,3 +1,4 @@
+use super::counts::{Counts, Tally};
 use super::place::{cell_at, place_of};
 use super::slab::Slab;
 use super::sparse::{IdLists, Sparse64};
@@ -16,7 +17,10 @@ pub(super) struct Tree {
     pub(super) nodes: Slab<Node>,
     pub(super) blocks: Slab<Block>,
     pub(super) lists: IdLists,
-    /// Nodes, by index, whose masks have changed since they were last shown to readers.
+    pub(super) counts: Counts,
+    /// Index and number of the page in which a block was asked for last.
+    last_page: Option<(VoxelIndex, u32)>,
+    /// Pages, by index, with nodes that have changed since they were last shown to readers.
     dirty: Vec<VoxelIndex>,
 }
 
@@ -28,6 +32,8 @@ pub(super) struct Page {
     pub(super) nodes: Sparse64,
     /// Nodes that hold voxels with occupancy.
     pub(super) stored: u64,
+    /// Nodes in which voxels have changed since they were last shown to readers.
+    pub(super) dirty: u64,
     /// Occupied voxels.
     pub(super) occupied: u32,
     /// Voxels that inflate others.
@@ -41,30 +47,27 @@ pub(super) struct Node {
     pub(super) place: u8,
     /// Number of the inflation rule that holds here.
     pub(super) rule: u8,
-    is_dirty: bool,
+    /// Occupied voxels.
+    pub(super) occupied: u16,
+    /// Voxels that inflate others.
+    pub(super) inflating: u16,
     pub(super) blocks: Sparse64,
     /// Blocks that hold voxels with occupancy.
     pub(super) stored: u64,
 }
 
-/// 4 x 4 x 4 voxels, each with what it is in the occupancy map and in the inflation map.
+/// 4 x 4 x 4 voxels, each with what it is in the occupancy map and in the inflation map: half a cache line.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block {
     pub(super) node: u32,
     pub(super) place: u8,
-    /// Whether the counts are wide.
-    pub(super) is_wide: bool,
     /// Whether it waits to be inflated anew.
     pub(super) is_waiting: bool,
     /// The voxels with occupancy, and their numbers.
     pub(super) voxels: Sparse64,
     pub(super) occupied: u64,
-    /// Occupied voxels that inflate others now.
-    pub(super) inflating: u64,
-    /// Voxels that at least one inflates.
-    pub(super) inflated: u64,
-    /// Number of the inflation counts, if any voxel is inflated.
-    pub(super) counts: u32,
+    /// The occupied voxels that inflate others now, and by how many each voxel is inflated.
+    pub(super) tally: Tally,
 }
 
 impl Tree {
@@ -106,14 +109,7 @@ impl Tree {
     pub(super) fn make_block(&mut self, index: VoxelIndex, rule: u8) -> u32 {
         let node_index = index.map(|k| k >> 2);
         let page_index = node_index.map(|k| k >> 2);
-        let page = match self.page_at(page_index) {
-            Some(page) => page,
-            None => {
-                let page = self.pages.insert(Page { index: page_index, ..Page::default() });
-                self.by_index.insert(page_index, page);
-                page
-            }
-        };
+        let page = self.make_page(page_index);
         let in_page = place_of(node_index);
         let node = match self.pages.get(page).nodes.get(&self.lists, in_page) {
             Some(node) => node,
@@ -127,12 +123,29 @@ impl Tree {
         match self.nodes.get(node).blocks.get(&self.lists, in_node) {
             Some(block) => block,
             None => {
-                let block = Block { node, place: in_node as u8, counts: NONE, ..Block::default() };
+                let block = Block { node, place: in_node as u8, ..Block::default() };
                 let block = self.blocks.insert(block);
                 self.nodes.get_mut(node).blocks.insert(&mut self.lists, in_node, block);
                 block
             }
         }
+    }
+
+    #[inline]
+    fn make_page(&mut self, index: VoxelIndex) -> u32 {
+        // Mostly it is that of the block before.
+        if let Some((last, page)) = self.last_page
+            && last == index
+        {
+            return page;
+        }
+        let page = self.page_at(index).unwrap_or_else(|| {
+            let page = self.pages.insert(Page { index, ..Page::default() });
+            self.by_index.insert(index, page);
+            page
+        });
+        self.last_page = Some((index, page));
+        page
     }
 
     /// Puts a voxel with occupancy into a block.
@@ -165,47 +178,66 @@ impl Tree {
             return false;
         }
         *occupied ^= 1 << place;
-        let node = *node;
-        let page = self.nodes.get(node).page;
-        let count = &mut self.pages.get_mut(page).occupied;
-        *count = if is_occupied { *count + 1 } else { *count - 1 };
-        self.mark_dirty(node);
+        let number = *node;
+        let node = self.nodes.get_mut(number);
+        let page = self.pages.get_mut(node.page);
+        if is_occupied {
+            (node.occupied, page.occupied) = (node.occupied + 1, page.occupied + 1);
+        } else {
+            (node.occupied, page.occupied) = (node.occupied - 1, page.occupied - 1);
+        }
+        self.mark_dirty(number);
         true
+    }
+
+    /// Says which voxels of a block inflate others: `begin` do so from now on, `end` no more.
+    pub(super) fn set_inflating(&mut self, block: u32, begin: u64, end: u64) {
+        let Block { node, tally, .. } = *self.blocks.get(block);
+        let inflating = (self.counts.inflating(tally) | begin) & !end;
+        self.counts.set_inflating(tally, inflating);
+        let (begin, end) = (begin.count_ones(), end.count_ones());
+        let node = self.nodes.get_mut(node);
+        // A node has 4096 voxels.
+        node.inflating = (u32::from(node.inflating) + begin - end) as u16;
+        let page = self.pages.get_mut(node.page);
+        page.inflating = page.inflating + begin - end;
     }
 
     /// Notes that what readers see of a node has changed.
     #[inline]
     pub(super) fn mark_dirty(&mut self, node: u32) {
-        if !std::mem::replace(&mut self.nodes.get_mut(node).is_dirty, true) {
-            let index = self.node_index(node);
-            self.dirty.push(index);
+        let Node { page, place, .. } = *self.nodes.get(node);
+        let Page { index, dirty, .. } = self.pages.get_mut(page);
+        if *dirty == 0 {
+            self.dirty.push(*index);
         }
+        *dirty |= 1 << place;
     }
 
-    /// The nodes, by index, whose masks have changed since the last call; some may not be there any more.
+    /// The pages, by index, that may have changed for readers since the last call; some may not be there any more, some
+    /// come twice.
     pub(super) fn take_dirty(&mut self) -> Vec<VoxelIndex> {
-        let dirty = std::mem::take(&mut self.dirty);
-        for &index in &dirty {
-            if let Some(node) = self.node_at(index) {
-                self.nodes.get_mut(node).is_dirty = false;
+        std::mem::take(&mut self.dirty)
+    }
+
+    /// Notes that readers see these pages as they are; keeps the memory for the next call of [`Tree::take_dirty`].
+    pub(super) fn shown(&mut self, mut dirty: Vec<VoxelIndex>) {
+        for index in dirty.drain(..) {
+            if let Some(page) = self.page_at(index) {
+                self.pages.get_mut(page).dirty = 0;
             }
         }
-        dirty
-    }
-
-    /// Gives the memory back for the next call of [`Tree::take_dirty`].
-    pub(super) fn reuse(&mut self, mut dirty: Vec<VoxelIndex>) {
-        dirty.clear();
         self.dirty = dirty;
     }
 
     /// Drops a block in which nothing is left, and its node and page if nothing is left in these.
+    ///
+    /// Readers must see the tree before anything is made again: what is new does not know what they saw in its place.
     pub(super) fn drop_if_empty(&mut self, block: u32) {
-        let Block { node, place, voxels, inflating, inflated, counts, .. } = self.blocks.get(block).clone();
-        if voxels.mask | inflating | inflated != 0 {
+        let Block { node, place, voxels, tally, .. } = self.blocks.get(block).clone();
+        if voxels.mask != 0 || !tally.is_empty() {
             return;
         }
-        debug_assert_eq!(counts, NONE);
         self.blocks.remove(block);
         let Node { page, place: in_page, blocks, .. } = self.nodes.get_mut(node);
         blocks.remove(&mut self.lists, place.into());
@@ -218,6 +250,7 @@ impl Tree {
         nodes.remove(&mut self.lists, in_page);
         if nodes.mask == 0 {
             self.by_index.remove(index);
+            self.last_page = None;
             self.pages.remove(page);
         }
     }
@@ -236,7 +269,9 @@ impl Tree {
     pub(super) fn stored_but_not_inflated(&self) -> usize {
         let nodes = self.page_ids().flat_map(|page| self.nodes_of(page));
         let blocks = nodes.flat_map(|&node| self.blocks_of(node)).map(|&block| self.blocks.get(block));
-        blocks.map(|block| (block.voxels.mask & !block.inflated).count_ones() as usize).sum()
+        blocks
+            .map(|block| (block.voxels.mask & !self.counts.inflated(block.tally)).count_ones() as usize)
+            .sum()
     }
 
     /// Bytes of memory on the heap.
@@ -246,6 +281,17 @@ impl Tree {
             + self.nodes.bytes()
             + self.blocks.bytes()
             + self.lists.bytes()
+            + self.counts.bytes()
             + self.dirty.capacity() * size_of::<VoxelIndex>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_is_half_a_cache_line() {
+        assert_eq!((size_of::<Block>(), size_of::<Node>()), (32, 32));
     }
 }

@@ -1,5 +1,5 @@
 use super::place::{cell_at, ones, place_of};
-use super::tree::{Node, Tree};
+use super::tree::{Page, Tree};
 use crate::space::{Grid, Point, VoxelIndex};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -23,16 +23,18 @@ pub struct LocalView {
 #[derive(Clone, Debug, Default)]
 pub(super) struct PageView {
     pub(super) mask: u64,
-    /// The nodes of the mask.
-    nodes: Box<[Arc<NodeView>]>,
+    /// Of each node of the mask: which blocks there are, and the number of blocks before.
+    nodes: Box<[(u64, u32)]>,
+    /// The blocks of all nodes.
+    blocks: Box<[BlockView]>,
 }
 
 /// 4 x 4 x 4 blocks.
-#[derive(Clone, Debug, Default)]
-pub(super) struct NodeView {
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct NodeView<'a> {
     pub(super) mask: u64,
     /// The blocks of the mask.
-    blocks: Box<[BlockView]>,
+    blocks: &'a [BlockView],
 }
 
 /// 4 x 4 x 4 voxels.
@@ -101,30 +103,80 @@ fn at<T>(values: &[T], mask: u64, place: usize) -> Option<&T> {
 
 impl PageView {
     #[inline]
-    pub(super) fn node(&self, place: usize) -> Option<&Arc<NodeView>> {
-        at(&self.nodes, self.mask, place)
+    pub(super) fn node(&self, place: usize) -> Option<NodeView<'_>> {
+        at(&self.nodes, self.mask, place).map(|node| self.view_of(node))
+    }
+
+    #[inline]
+    fn view_of(&self, &(mask, before): &(u64, u32)) -> NodeView<'_> {
+        NodeView { mask, blocks: &self.blocks[before as usize..][..mask.count_ones() as usize] }
+    }
+
+    /// The nodes of the mask.
+    fn nodes(&self) -> impl Iterator<Item = NodeView<'_>> {
+        self.nodes.iter().map(|node| self.view_of(node))
+    }
+
+    /// Bytes of memory on the heap, with those of the counts beside it.
+    fn bytes(&self) -> usize {
+        2 * size_of::<usize>()
+            + size_of::<Self>()
+            + size_of_val::<[(u64, u32)]>(&self.nodes)
+            + size_of_val::<[BlockView]>(&self.blocks)
     }
 }
 
-impl NodeView {
+impl<'a> NodeView<'a> {
     #[inline]
-    pub(super) fn block(&self, place: usize) -> Option<&BlockView> {
-        at(&self.blocks, self.mask, place)
+    pub(super) fn block(&self, place: usize) -> Option<&'a BlockView> {
+        at(self.blocks, self.mask, place)
     }
+}
 
-    fn of(tree: &Tree, node: &Node) -> Self {
-        let mut view = Self::default();
-        let mut blocks = Vec::with_capacity(node.blocks.mask.count_ones() as usize);
-        for (place, &id) in ones(node.blocks.mask).zip(node.blocks.ids(&tree.lists)) {
-            let block = tree.blocks.get(id);
-            let (occupied, inflated) = (block.occupied, block.inflated);
-            if occupied | inflated != 0 {
-                view.mask |= 1 << place;
-                blocks.push(BlockView { occupied, inflated });
+/// Puts together views of pages; kept from page to page for its memory.
+#[derive(Default)]
+struct PageBuilder {
+    nodes: Vec<(u64, u32)>,
+    blocks: Vec<BlockView>,
+}
+
+impl PageBuilder {
+    /// The view of a page whose view was `before`; `None` if nothing in it is occupied or inflated.
+    fn build(&mut self, tree: &Tree, page: &Page, before: Option<&PageView>) -> Option<PageView> {
+        self.nodes.clear();
+        self.blocks.clear();
+        let mut mask = 0;
+        for (place, &node) in ones(page.nodes.mask).zip(page.nodes.ids(&tree.lists)) {
+            let first = self.blocks.len();
+            let of_node = if page.dirty >> place & 1 != 0 {
+                self.add_blocks_of(tree, node)
+            } else {
+                let node = before.and_then(|page| page.node(place)).unwrap_or_default();
+                self.blocks.extend_from_slice(node.blocks);
+                node.mask
+            };
+            if of_node != 0 {
+                mask |= 1 << place;
+                self.nodes.push((of_node, first as u32));
             }
         }
-        view.blocks = blocks.into_boxed_slice();
-        view
+        let (nodes, blocks) = (self.nodes.as_slice().into(), self.blocks.as_slice().into());
+        (mask != 0).then_some(PageView { mask, nodes, blocks })
+    }
+
+    /// Adds the blocks of a node that hold something to see; returns which these are.
+    fn add_blocks_of(&mut self, tree: &Tree, node: u32) -> u64 {
+        let mut mask = 0;
+        let blocks = tree.nodes.get(node).blocks;
+        for (place, &id) in ones(blocks.mask).zip(blocks.ids(&tree.lists)) {
+            let block = tree.blocks.get(id);
+            let (occupied, inflated) = (block.occupied, tree.counts.inflated(block.tally));
+            if occupied | inflated != 0 {
+                mask |= 1 << place;
+                self.blocks.push(BlockView { occupied, inflated });
+            }
+        }
+        mask
     }
 }
 
@@ -134,29 +186,15 @@ impl LocalView {
         Self { grid, update_number: 0, position: None, stored: 0, occupied: 0, inflated: 0, pages }
     }
 
-    /// Takes over the nodes with these indices.
-    pub(super) fn replace_nodes(&mut self, tree: &Tree, dirty: &[VoxelIndex]) {
-        let mut by_page: FxHashMap<VoxelIndex, Vec<VoxelIndex>> = FxHashMap::default();
+    /// Takes over the pages with these indices.
+    pub(super) fn replace_pages(&mut self, tree: &Tree, dirty: &[VoxelIndex]) {
+        let mut builder = PageBuilder::default();
         for &index in dirty {
-            by_page.entry(index.map(|k| k >> 2)).or_default().push(index);
-        }
-        for (index, dirty) in by_page {
-            let mut nodes: [Option<Arc<NodeView>>; 64] = [const { None }; 64];
-            if let Some(page) = self.pages.get(&index) {
-                ones(page.mask).zip(&page.nodes).for_each(|(place, node)| nodes[place] = Some(node.clone()));
-            }
-            for node in dirty {
-                let view = tree.node_at(node).map(|id| NodeView::of(tree, tree.nodes.get(id)));
-                nodes[place_of(node)] = view.filter(|view| view.mask != 0).map(Arc::new);
-            }
-            let mask =
-                (0..64).filter(|&place| nodes[place].is_some()).fold(0, |mask, place| mask | 1 << place);
-            match mask {
-                0 => drop(self.pages.remove(&index)),
-                _ => {
-                    let nodes = nodes.into_iter().flatten().collect();
-                    self.pages.insert(index, Arc::new(PageView { mask, nodes }));
-                }
+            let before = self.pages.get(&index).map(|page| &**page);
+            let page = tree.page_at(index).map(|page| tree.pages.get(page));
+            match page.and_then(|page| builder.build(tree, page, before)) {
+                Some(page) => drop(self.pages.insert(index, Arc::new(page))),
+                None => drop(self.pages.remove(&index)),
             }
         }
     }
@@ -207,9 +245,9 @@ impl LocalView {
     /// Visits all voxels that are occupied or inflated, in no stated order.
     pub fn for_each(&self, mut visit: impl FnMut(VoxelIndex, LocalState)) {
         for (index, page) in &self.pages {
-            for (place, node) in ones(page.mask).zip(&page.nodes) {
+            for (place, node) in ones(page.mask).zip(page.nodes()) {
                 let node_index = cell_at(*index, place);
-                for (place, block) in ones(node.mask).zip(&node.blocks) {
+                for (place, block) in ones(node.mask).zip(node.blocks) {
                     let block_index = cell_at(node_index, place);
                     ones(block.occupied | block.inflated)
                         .for_each(|place| visit(cell_at(block_index, place), block.state(place)));
@@ -220,17 +258,7 @@ impl LocalView {
 
     /// Bytes of memory on the heap, were none of it shared with other views.
     pub(super) fn bytes(&self) -> usize {
-        let counts = 2 * size_of::<usize>();
-        let of_node = |node: &Arc<NodeView>| {
-            counts
-                + size_of::<NodeView>()
-                + size_of_val::<[BlockView]>(&node.blocks)
-                + size_of::<Arc<NodeView>>()
-        };
-        let of_page = |page: &Arc<PageView>| {
-            counts + size_of::<PageView>() + page.nodes.iter().map(of_node).sum::<usize>()
-        };
         self.pages.capacity() * 8 / 7 * (size_of::<(VoxelIndex, Arc<PageView>)>() + 1)
-            + self.pages.values().map(of_page).sum::<usize>()
+            + self.pages.values().map(|page| page.bytes()).sum::<usize>()
     }
 }

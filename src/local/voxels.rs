@@ -6,31 +6,50 @@ use super::tree::NONE;
 pub(super) struct Voxel {
     /// Sum of the evidence so far, clamped.
     pub(super) log_odds: f64,
-    /// Number of its block times 64, plus its place in that.
-    pub(super) home: u32,
+    block: u32,
     /// The voxel updated before it, in the history.
     older: u32,
     /// The voxel updated after it.
     newer: u32,
-    /// Number of what the present scan says of it.
-    pub(super) touch: u32,
+    /// Its place in the block, and 64 times the number of what the present scan says of it.
+    place_and_touch: u32,
 }
+
+/// Most voxels with occupancy that a map numbers, before a scan and with all of its points; each may be touched by a scan.
+pub(super) const MOST_VOXELS: usize = NO_TOUCH as usize;
+
+/// The number of nothing, in 26 bits.
+const NO_TOUCH: u32 = u32::MAX >> 6;
 
 impl Default for Voxel {
     fn default() -> Self {
-        Self { log_odds: 0.0, home: 0, older: NONE, newer: NONE, touch: NONE }
+        Self::new(0, 0, 0.0)
     }
 }
 
 impl Voxel {
     pub(super) fn new(block: u32, place: usize, log_odds: f64) -> Self {
-        Self { log_odds, home: block << 6 | place as u32, ..Self::default() }
+        let place_and_touch = place as u32 | NO_TOUCH << 6;
+        Self { log_odds, block, older: NONE, newer: NONE, place_and_touch }
     }
 
     /// Number of its block, and its place in that.
     #[inline]
     pub(super) fn home(&self) -> (u32, usize) {
-        (self.home >> 6, (self.home & 63) as usize)
+        (self.block, (self.place_and_touch & 63) as usize)
+    }
+
+    /// Number of what the present scan says of it.
+    #[inline]
+    pub(super) fn touch(&self) -> Option<u32> {
+        let touch = self.place_and_touch >> 6;
+        (touch != NO_TOUCH).then_some(touch)
+    }
+
+    /// Sets what [`Voxel::touch`] returns; there are fewer than [`MOST_VOXELS`].
+    #[inline]
+    pub(super) fn set_touch(&mut self, touch: Option<u32>) {
+        self.place_and_touch = self.place_and_touch & 63 | touch.unwrap_or(NO_TOUCH) << 6;
     }
 }
 

@@ -323,6 +323,10 @@ pub struct LocalArgs {
     /// Take about so many points of each scan, evenly [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub points: Option<u32>,
+    /// Run the scans so many times, and count for each update the least of its times: what others do on the machine adds to
+    /// some, never to all
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeat: u32,
     /// File of poses, as for build
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,

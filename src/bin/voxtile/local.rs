@@ -29,7 +29,12 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     let mut rows = Vec::new();
     for (number, setup) in setups.iter().enumerate() {
         let mut panels = (number == 0).then(Vec::new);
-        rows.push(run_setup(args, setup, panels.as_mut())?);
+        let mut row = run_setup(args, setup, panels.as_mut())?;
+        for _ in 1..args.repeat {
+            row.take_least(&run_setup(args, setup, None)?);
+        }
+        row.finish();
+        rows.push(row);
         if let Some(panels) = panels {
             let title = format!("voxtile local: {} m voxels, setup {}", args.resolution, setup.name);
             OverTime { resolution_m: args.resolution, title, panels }.write_png(&args.output)?;
@@ -112,7 +117,7 @@ fn run_setup(args: &LocalArgs, setup: &Setup, mut panels: Option<&mut Vec<Panel>
     if let Some(panels) = panels.filter(|panels| panels.is_empty()) {
         panels.push(Panel::of(map.view(), number, path));
     }
-    row.finish(&map);
+    row.count_memory(&map);
     Ok(row)
 }
 

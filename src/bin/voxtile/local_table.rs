@@ -26,9 +26,15 @@ pub struct Row {
     /// Bytes for each voxel in the occupancy or inflation map, at the end.
     pub bytes_per_voxel: f64,
     #[serde(skip)]
-    cpu: Vec<f64>,
-    #[serde(skip)]
-    clock: Vec<f64>,
+    updates: Vec<Times>,
+}
+
+/// How long one update took, in milliseconds.
+#[derive(Clone, Copy, Debug)]
+struct Times {
+    cpu: f64,
+    clock: f64,
+    stages: Stages,
 }
 
 /// What is known of many times.
@@ -56,7 +62,7 @@ const COUNT_EVERY: u64 = 16;
 impl Row {
     pub fn new(setup: &'static str, parameters: &LocalParameters) -> Self {
         let (scans, points, skipped, n_occ, bytes) = Default::default();
-        let (n_inf, cpu_ms, t_tot_ms, stages_ms, bytes_per_voxel, cpu, clock) = Default::default();
+        let (n_inf, cpu_ms, t_tot_ms, stages_ms, bytes_per_voxel, updates) = Default::default();
         let parameters = *parameters;
         Self {
             setup,
@@ -71,8 +77,7 @@ impl Row {
             stages_ms,
             bytes,
             bytes_per_voxel,
-            cpu,
-            clock,
+            updates,
         }
     }
 
@@ -82,35 +87,65 @@ impl Row {
         self.points += report.points;
         self.skipped += report.skipped.total() + report.beyond_input_range;
         self.n_inf += map.inflated_voxels() as f64;
-        self.cpu.push(cpu_seconds * 1e3);
-        self.clock.push(ms(report.times.total()));
-        let StageTimes { input, rays, occupancy, removal, inflation, publishing, .. } = report.times;
-        let stages = &mut self.stages_ms;
-        stages.input += ms(input);
-        stages.rays += ms(rays);
-        stages.occupancy += ms(occupancy);
-        stages.removal += ms(removal);
-        stages.inflation += ms(inflation);
-        stages.publishing += ms(publishing);
+        let (cpu, clock) = (cpu_seconds * 1e3, ms(report.times.total()));
+        self.updates.push(Times { cpu, clock, stages: Stages::of(&report.times) });
         if self.scans.is_multiple_of(COUNT_EVERY) {
             self.bytes = self.bytes.max(map.bytes());
         }
     }
 
-    /// Turns sums into means.
-    pub fn finish(&mut self, map: &LocalMap) {
-        let scans = self.scans.max(1) as f64;
+    /// Counts the memory of the map after the last update.
+    pub fn count_memory(&mut self, map: &LocalMap) {
         self.n_occ = map.stored_voxels();
-        self.n_inf /= scans;
-        self.cpu_ms = Distribution::of(&mut self.cpu);
-        self.t_tot_ms = Distribution::of(&mut self.clock);
-        let Stages { input, rays, occupancy, removal, inflation, publishing } = &mut self.stages_ms;
-        for stage in [input, rays, occupancy, removal, inflation, publishing] {
-            *stage /= scans;
-        }
         let bytes = map.bytes();
         self.bytes = self.bytes.max(bytes);
         self.bytes_per_voxel = bytes as f64 / map.voxels().max(1) as f64;
+    }
+
+    /// Takes over the times of another run of the same scans, where they are less.
+    pub fn take_least(&mut self, other: &Self) {
+        for (times, other) in self.updates.iter_mut().zip(&other.updates) {
+            times.cpu = times.cpu.min(other.cpu);
+            times.clock = times.clock.min(other.clock);
+            times.stages = times.stages.with(&other.stages, f64::min);
+        }
+    }
+
+    /// Turns sums and times into means.
+    pub fn finish(&mut self) {
+        let scans = self.scans.max(1) as f64;
+        self.n_inf /= scans;
+        self.cpu_ms = Distribution::of(&mut self.updates.iter().map(|times| times.cpu).collect::<Vec<_>>());
+        self.t_tot_ms =
+            Distribution::of(&mut self.updates.iter().map(|times| times.clock).collect::<Vec<_>>());
+        let share = |sum: f64, time: f64| sum + time / scans;
+        self.stages_ms =
+            self.updates.iter().fold(Stages::default(), |sum, times| sum.with(&times.stages, share));
+    }
+}
+
+impl Stages {
+    fn of(times: &StageTimes) -> Self {
+        Self {
+            input: ms(times.input),
+            rays: ms(times.rays),
+            occupancy: ms(times.occupancy),
+            removal: ms(times.removal),
+            inflation: ms(times.inflation),
+            publishing: ms(times.publishing),
+        }
+    }
+
+    /// Stage by stage, what `join` makes of both.
+    fn with(&self, other: &Self, join: impl Fn(f64, f64) -> f64) -> Self {
+        Self {
+            input: join(self.input, other.input),
+            rays: join(self.rays, other.rays),
+            occupancy: join(self.occupancy, other.occupancy),
+            removal: join(self.removal, other.removal),
+            inflation: join(self.inflation, other.inflation),
+            publishing: join(self.publishing, other.publishing),
+        }
     }
 }
 
@@ -189,6 +224,22 @@ pub fn print_table(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_two_runs_each_update_has_the_least_times() {
+        let row = |times: [f64; 2]| {
+            let mut row = Row::new("a", &LocalParameters::local_mapping());
+            let of =
+                |cpu: f64| Times { cpu, clock: 2.0 * cpu, stages: Stages { rays: cpu, ..Stages::default() } };
+            (row.scans, row.updates) = (2, times.map(of).to_vec());
+            row
+        };
+        let mut least = row([1.0, 5.0]);
+        least.take_least(&row([4.0, 2.0]));
+        least.finish();
+        assert_eq!((least.cpu_ms.mean, least.cpu_ms.max, least.t_tot_ms.mean), (1.5, 2.0, 3.0));
+        assert_eq!((least.stages_ms.rays, least.stages_ms.input), (1.5, 0.0));
+    }
 
     #[test]
     fn of_a_hundred_values_the_99th_is_p99() {

@@ -21,6 +21,9 @@ fn scans_run_through_a_local_map_give_a_table_and_a_picture() {
         json(&["local", text(&scans), "-o", text(&picture), "--json", "--points", "10", "--d-in", "inf"]);
     assert_eq!(few["points"].as_u64(), Some(30));
 
+    let twice = json(&["local", text(&scans), "-o", text(&picture), "--json", "--repeat", "2"]);
+    assert_eq!((twice["scans"].as_u64(), twice["n_occ"].as_u64()), (Some(3), Some(40)));
+
     let table = output(&["local", text(&scans), "-o", text(&picture), "--preset", "table"]);
     let setups: Vec<&str> = table.lines().filter_map(|line| line.split_whitespace().next()).collect();
     assert_eq!(setups[..6], ["setup", "a", "b", "c", "d", "e"]);
