@@ -26,6 +26,7 @@ impl UnsyncedDisk {
     }
 
     /// A disk that is slow for the thread that writes beside the mapping, so that the other thread gets ahead.
+    #[allow(dead_code, reason = "benches share this file")]
     pub fn slow_beside(beside_time: Duration) -> Arc<dyn Disk> {
         Arc::new(Self { sync_time: Duration::ZERO, beside_time })
     }
