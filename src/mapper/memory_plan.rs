@@ -49,9 +49,7 @@ impl MemoryPlan {
     fn shares_of(bytes: usize) -> Self {
         Self {
             tiles: usize::MAX,
-            // What is counted is what was asked for. Blocks of many sizes leave gaps between them, which the allocator
-            // cannot give back.
-            bytes: bytes / 8 * 7,
+            bytes,
             pending_bytes: bytes / 4,
             scan_bytes: bytes / 4,
             updates_bytes: bytes / 8,

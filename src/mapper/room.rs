@@ -25,8 +25,13 @@ impl Residency {
         }
     }
 
+    /// Bytes that count towards the limit. The share of packed tiles counts as if it were full: the many small blocks that
+    /// tiles in use leave to the allocator do not take the large ones of packed tiles, so that these come on top of all that
+    /// tiles in use have ever taken.
     fn bytes(&self) -> usize {
-        self.memory().bytes() as usize
+        let memory = self.memory();
+        let packed = memory.compact_tiles.max(self.plan.cold_bytes as u64);
+        (memory.bytes() - memory.compact_tiles + packed) as usize
     }
 
     /// Whether one more tile fits, and so many bytes with it.
