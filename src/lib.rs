@@ -67,6 +67,7 @@ pub mod octree;
 pub mod query;
 pub mod scan;
 pub mod sensor;
+pub mod share;
 pub mod simulation;
 pub mod space;
 pub mod store;

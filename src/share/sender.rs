@@ -1,0 +1,331 @@
+use super::ExportPolicy;
+use super::codec::{Header, MAX_VOXELS_PER_PACKET, Packet, Status, Update};
+use super::pending::Pending;
+use super::ring::Ring;
+use super::set::VoxelSet;
+use crate::error::{Error, Result};
+use crate::space::{BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, places};
+use std::time::Duration;
+
+/// How a sender sends.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SenderConfig {
+    /// Which voxels a frame holds. Default: those that changed since the last one.
+    pub policy: ExportPolicy,
+    /// How long a change may wait for others before its frame is sent. Longer: fewer bytes, since voxels that lie together
+    /// are sent together, and what changes back is not sent. Default: 1 s.
+    pub latency: Duration,
+    /// Most bytes of a packet, 256 to 60000. Default: 1200, which fits into a datagram nearly anywhere.
+    pub max_packet_bytes: usize,
+    /// Time between two statuses, with which receivers find out what they lack; four times as long while nothing
+    /// changes. Default: 2 s.
+    pub status_interval: Duration,
+    /// Packets whose voxels are kept to be sent again, at least 1; a million voxels at most. Default: 1024.
+    pub ring_packets: usize,
+    /// Most packets that answer one ask. Default: 16.
+    pub packets_per_answer: usize,
+    /// Most bytes a second that all answers take together; asks beyond it are not answered. Default: 256 KiB.
+    pub answer_bytes_per_s: u64,
+}
+
+impl Default for SenderConfig {
+    fn default() -> Self {
+        Self {
+            policy: ExportPolicy::default(),
+            latency: Duration::from_secs(1),
+            max_packet_bytes: 1200,
+            status_interval: Duration::from_secs(2),
+            ring_packets: 1024,
+            packets_per_answer: 16,
+            answer_bytes_per_s: 256 << 10,
+        }
+    }
+}
+
+/// Which receiver asks; any number that is its own.
+pub type ReceiverId = u64;
+
+/// Bytes to be sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outgoing {
+    /// To one receiver, or to all.
+    pub to: Option<ReceiverId>,
+    /// A packet.
+    pub bytes: Vec<u8>,
+}
+
+/// What a sender has done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[non_exhaustive]
+pub struct SenderCounts {
+    /// Frames.
+    pub frames: u64,
+    /// Packets of changes.
+    pub packets: u64,
+    /// Bytes of these.
+    pub packet_bytes: u64,
+    /// Voxels in these.
+    pub updates: u64,
+    /// Voxels of these that were sent again.
+    pub updates_again: u64,
+    /// Bytes of statuses to all.
+    pub status_bytes: u64,
+    /// Asks that came in.
+    pub asks: u64,
+    /// Bytes of answers.
+    pub answer_bytes: u64,
+    /// Asks not answered, since there were too many.
+    pub refused_asks: u64,
+}
+
+/// Shares a set of voxels. Bytes in, bytes out; whoever has it calls [`Sender::poll`] a few times a second.
+#[derive(Clone, Debug)]
+pub struct Sender {
+    pub(super) config: SenderConfig,
+    epoch: u32,
+    /// As receivers know it once they have everything.
+    pub(super) sent: VoxelSet,
+    pub(super) pending: Pending,
+    pub(super) ring: Ring,
+    pub(super) counts: SenderCounts,
+    next_status: Duration,
+    /// As of the last status.
+    status_sequence: Option<u64>,
+    /// Voxels that the last packet had room for.
+    voxels_a_packet: usize,
+    pub(super) allowance: Allowance,
+}
+
+/// Bytes that answers may take.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Allowance {
+    bytes: u64,
+    at: Duration,
+}
+
+impl Allowance {
+    /// Takes bytes, if there are any left at this time.
+    pub(super) fn take(&mut self, bytes_per_s: u64, now: Duration) -> bool {
+        let passed = now.saturating_sub(self.at).as_millis().min(1000) as u64;
+        self.bytes = (self.bytes + bytes_per_s.saturating_mul(passed) / 1000).min(bytes_per_s);
+        self.at = self.at.max(now);
+        self.bytes > 0
+    }
+
+    pub(super) fn spend(&mut self, bytes: u64) {
+        self.bytes = self.bytes.saturating_sub(bytes);
+    }
+}
+
+/// Beyond so many waiting voxels a frame is sent before its time.
+const MAX_PENDING: usize = 1 << 18;
+
+impl Sender {
+    /// A sender with an empty set. The epoch must be another one each time that a robot begins anew.
+    ///
+    /// # Errors
+    ///
+    /// A configuration that is wrong.
+    pub fn new(grid: Grid, epoch: u32, config: SenderConfig) -> Result<Self> {
+        Self::with_set(VoxelSet::new(grid), epoch, config)
+    }
+
+    /// A sender of a set, which receivers ask for.
+    ///
+    /// # Errors
+    ///
+    /// A configuration that is wrong.
+    pub fn with_set(set: VoxelSet, epoch: u32, config: SenderConfig) -> Result<Self> {
+        if !(256..=60_000).contains(&config.max_packet_bytes) {
+            let reason = format!("{} bytes; 256 to 60000 are possible", config.max_packet_bytes);
+            return Err(Error::argument("packet size", reason));
+        }
+        if config.ring_packets == 0
+            || config.packets_per_answer == 0
+            || config.policy == ExportPolicy::Ring(0)
+        {
+            return Err(Error::argument("ring, packets an answer", "0 is too few; give at least 1"));
+        }
+        Ok(Self {
+            ring: Ring::new(config.ring_packets),
+            config,
+            epoch,
+            sent: set,
+            pending: Pending::default(),
+            counts: SenderCounts::default(),
+            next_status: Duration::ZERO,
+            status_sequence: None,
+            voxels_a_packet: 1000,
+            allowance: Allowance::default(),
+        })
+    }
+
+    /// The grid of the set.
+    pub fn grid(&self) -> &Grid {
+        self.sent.grid()
+    }
+
+    /// What was done so far.
+    pub fn counts(&self) -> SenderCounts {
+        self.counts
+    }
+
+    /// The set as sent: what receivers have once they have everything.
+    pub fn sent(&mut self) -> &mut VoxelSet {
+        &mut self.sent
+    }
+
+    /// Whether nothing waits for a frame.
+    pub fn is_idle(&self) -> bool {
+        self.pending.is_empty()
+    }
+
+    /// Whether a voxel is in the set.
+    pub fn contains(&self, voxel: VoxelIndex) -> bool {
+        self.pending.get(voxel).unwrap_or_else(|| self.sent.contains(voxel))
+    }
+
+    /// Puts a voxel into the set or takes it out.
+    pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) {
+        let was_sent = self.sent.contains(voxel);
+        self.pending.put(voxel, is_in, was_sent);
+    }
+
+    /// Says which voxels of a brick of a tile are in the set.
+    pub fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
+        let sent = self.sent.brick(tile, brick);
+        let min = self.grid().voxels_of_tile(tile).min;
+        let mut put = |places_of: BrickMask, is_in_of: fn(&BrickMask, usize) -> bool| {
+            for place in places(places_of) {
+                let voxel = brick.voxel(place).to_key().to_index_from(min);
+                self.pending.put(voxel, is_in_of(&mask, place), is_in_of(&sent, place));
+            }
+        };
+        put(std::array::from_fn(|k| mask[k] | sent[k]), |mask, place| {
+            mask[place / 64] >> (place % 64) & 1 == 1
+        });
+    }
+
+    /// What is to be sent now: a frame when it is time, a status when it is time.
+    pub fn poll(&mut self, now: Duration) -> Vec<Outgoing> {
+        let waited = self.pending.waited(now);
+        let is_due =
+            !self.pending.is_empty() && (waited >= self.config.latency || self.pending.len() >= MAX_PENDING);
+        let mut out = if is_due { self.frame() } else { Vec::new() };
+        let is_quiet = self.status_sequence == Some(self.last_sequence());
+        if now >= self.next_status || (is_quiet && !out.is_empty()) {
+            let status = self.status(0);
+            self.counts.status_bytes += status.len() as u64;
+            out.push(Outgoing { to: None, bytes: status });
+            let factor = if is_quiet && out.len() == 1 { 4 } else { 1 };
+            self.next_status = now + self.config.status_interval * factor;
+            self.status_sequence = Some(self.last_sequence());
+        }
+        out
+    }
+
+    /// What waits, at once: before a sender ends.
+    pub fn flush(&mut self, now: Duration) -> Vec<Outgoing> {
+        let mut out = if self.pending.is_empty() { Vec::new() } else { self.frame() };
+        self.next_status = now;
+        out.extend(self.poll(now));
+        out
+    }
+
+    /// Number of the last packet of changes, 0 for none.
+    fn last_sequence(&self) -> u64 {
+        self.ring.next() - 1
+    }
+
+    pub(super) fn header(&self) -> Header {
+        Header { epoch: self.epoch, sequence: self.last_sequence() }
+    }
+
+    pub(super) fn status(&mut self, nonce: u64) -> Vec<u8> {
+        let grid = *self.grid();
+        let status = Status {
+            header: self.header(),
+            nonce,
+            oldest: self.ring.oldest(),
+            resolution_m: grid.resolution_m(),
+            tile_size_m: grid.tile_size_m(),
+            voxels: self.sent.len(),
+            digest: *self.sent.digest().as_bytes(),
+        };
+        // A status has no voxels that could be too many.
+        Packet::Status(status).encode().unwrap_or_default()
+    }
+
+    fn frame(&mut self) -> Vec<Outgoing> {
+        let (changed, again, repaired) = self.pending.take();
+        for (&voxel, &is_in) in &changed {
+            self.sent.put(voxel, is_in);
+        }
+        let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(again.iter().copied()).collect();
+        self.counts.updates_again += again.len() as u64;
+        match self.config.policy {
+            ExportPolicy::LastFrame => {}
+            ExportPolicy::Ring(frames) => voxels.extend(self.ring.last_frames(frames - 1)),
+            ExportPolicy::Everything => voxels.extend(self.sent.iter()),
+        }
+        self.counts.frames += 1;
+        self.ring.begin_frame();
+        self.packets_of(voxels, &repaired)
+    }
+
+    /// Packs voxels as they are now into as many packets as it takes, those that lie together into one.
+    fn packets_of(&mut self, mut voxels: Vec<VoxelIndex>, repaired: &[u64]) -> Vec<Outgoing> {
+        voxels.sort_by_cached_key(|&voxel| along_curve(voxel));
+        voxels.dedup();
+        let updates: Vec<Update> =
+            voxels.iter().map(|&voxel| Update { voxel, is_in: self.sent.contains(voxel) }).collect();
+        let mut rest = updates.as_slice();
+        let mut out = Vec::new();
+        while !rest.is_empty() {
+            let header = Header { epoch: self.epoch, sequence: self.ring.next() };
+            let repaired = repaired.to_vec();
+            let packet = |updates: &[Update]| Packet::Changes {
+                header,
+                repaired: repaired.clone(),
+                updates: updates.to_vec(),
+            };
+            let (bytes, taken) = self.fit(rest, packet);
+            self.ring.push(rest[..taken].iter().map(|update| update.voxel).collect());
+            rest = &rest[taken..];
+            self.counts.packets += 1;
+            self.counts.packet_bytes += bytes.len() as u64;
+            self.counts.updates += taken as u64;
+            out.push(Outgoing { to: None, bytes });
+        }
+        out
+    }
+
+    /// A packet of as many of some items, at least one, as fit into it.
+    pub(super) fn fit<T>(&mut self, items: &[T], packet: impl Fn(&[T]) -> Packet) -> (Vec<u8>, usize) {
+        let limit = self.config.max_packet_bytes;
+        let mut count = self.voxels_a_packet.clamp(1, MAX_VOXELS_PER_PACKET).min(items.len());
+        loop {
+            match packet(&items[..count]).encode() {
+                Ok(bytes) if bytes.len() <= limit || count <= 1 => {
+                    // For the next one: about as many as would have filled this one.
+                    self.voxels_a_packet = (count * (limit - limit / 64) / bytes.len().max(limit / 8)).max(1);
+                    return (bytes, count);
+                }
+                Ok(bytes) => count = (count * (limit - limit / 64) / bytes.len()).clamp(1, count - 1),
+                // Too far apart for one packet, which one voxel never is but at the very end of all indices.
+                Err(_) if count > 1 => count /= 2,
+                Err(_) => return (Vec::new(), 1),
+            }
+        }
+    }
+}
+
+/// A place on the Morton curve through all voxel indices.
+fn along_curve(voxel: VoxelIndex) -> (u64, u64) {
+    let part = |shift: u32| {
+        let [x, y, z] = voxel.map(|k| ((k as u32 ^ 1 << 31) >> shift) as u16);
+        VoxelKey([x, y, z]).morton().0
+    };
+    (part(16), part(0))
+}
