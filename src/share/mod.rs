@@ -43,6 +43,7 @@ mod answers;
 mod catch_up;
 pub mod codec;
 mod fold;
+mod layer_file;
 mod pending;
 mod policy;
 mod receiver;
@@ -56,6 +57,7 @@ mod union;
 mod watch;
 
 pub use fold::{FoldReport, fold_layer};
+pub use layer_file::{read_layer, write_layer};
 pub use policy::ExportPolicy;
 pub use receiver::{Receiver, ReceiverConfig, ReceiverCounts};
 pub use sender::{Outgoing, ReceiverId, Sender, SenderConfig, SenderCounts};

@@ -36,11 +36,6 @@ impl Pending {
         }
     }
 
-    /// What a voxel is, if that was not sent yet.
-    pub(super) fn get(&self, voxel: VoxelIndex) -> Option<bool> {
-        self.changed.get(&voxel).copied()
-    }
-
     /// Has the voxels of a lost packet sent again.
     pub(super) fn repair(&mut self, sequence: u64, voxels: &[VoxelIndex]) {
         if self.repaired.len() < MAX_REPAIRED && !self.repaired.contains(&sequence) {

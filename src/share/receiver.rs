@@ -153,6 +153,11 @@ impl Receiver {
         stream.is_complete() && self.equal_as_of == Some(stream.highest) && self.puzzled_since.is_none()
     }
 
+    /// Epoch and number of the packet as of which the layer was last found equal to the sender's set.
+    pub fn equal_as_of(&self) -> Option<(u32, u64)> {
+        Some((self.stream.as_ref()?.epoch, self.equal_as_of?))
+    }
+
     /// Whether voxels were refused: the layer cannot become equal then, and is not compared any more.
     pub fn is_over_limit(&self) -> bool {
         self.is_over_limit
@@ -289,6 +294,7 @@ impl Receiver {
         if self.layer.as_ref().is_none_or(|layer| *layer.grid() != grid) {
             self.layer = Some(VoxelSet::new(grid));
         }
+        self.equal_as_of = None;
         self.stream = Some(Stream::new(status.header.epoch, status.header.sequence, now));
         self.catch_up = CatchUp::default();
         self.puzzled_since = None;

@@ -84,6 +84,8 @@ pub struct SenderCounts {
 pub struct Sender {
     pub(super) config: SenderConfig,
     epoch: u32,
+    /// As it is now.
+    wanted: VoxelSet,
     /// As receivers know it once they have everything.
     pub(super) sent: VoxelSet,
     pub(super) pending: Pending,
@@ -151,6 +153,7 @@ impl Sender {
             ring: Ring::new(config.ring_packets),
             config,
             epoch,
+            wanted: set.clone(),
             sent: set,
             pending: Pending::default(),
             counts: SenderCounts::default(),
@@ -183,28 +186,30 @@ impl Sender {
 
     /// Whether a voxel is in the set.
     pub fn contains(&self, voxel: VoxelIndex) -> bool {
-        self.pending.get(voxel).unwrap_or_else(|| self.sent.contains(voxel))
+        self.wanted.contains(voxel)
     }
 
     /// Puts a voxel into the set or takes it out.
     pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) {
-        let was_sent = self.sent.contains(voxel);
-        self.pending.put(voxel, is_in, was_sent);
+        if self.wanted.put(voxel, is_in) {
+            self.pending.put(voxel, is_in, self.sent.contains(voxel));
+        }
     }
 
     /// Says which voxels of a brick of a tile are in the set.
     pub fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
+        let before = self.wanted.brick(tile, brick);
+        if before == mask {
+            return;
+        }
         let sent = self.sent.brick(tile, brick);
         let min = self.grid().voxels_of_tile(tile).min;
-        let mut put = |places_of: BrickMask, is_in_of: fn(&BrickMask, usize) -> bool| {
-            for place in places(places_of) {
-                let voxel = brick.voxel(place).to_key().to_index_from(min);
-                self.pending.put(voxel, is_in_of(&mask, place), is_in_of(&sent, place));
-            }
-        };
-        put(std::array::from_fn(|k| mask[k] | sent[k]), |mask, place| {
-            mask[place / 64] >> (place % 64) & 1 == 1
-        });
+        let has = |mask: &BrickMask, place: usize| mask[place / 64] >> (place % 64) & 1 == 1;
+        for place in places(std::array::from_fn(|k| before[k] ^ mask[k])) {
+            let voxel = brick.voxel(place).to_key().to_index_from(min);
+            self.pending.put(voxel, has(&mask, place), has(&sent, place));
+        }
+        self.wanted.put_brick(tile, brick, mask);
     }
 
     /// What is to be sent now: a frame when it is time, a status when it is time.
@@ -233,6 +238,12 @@ impl Sender {
         out
     }
 
+    /// Epoch and number of the last packet of changes, 0 for none: what [`Receiver::equal_as_of`](super::Receiver::equal_as_of)
+    /// says once a receiver has everything.
+    pub fn last_packet(&self) -> (u32, u64) {
+        (self.epoch, self.last_sequence())
+    }
+
     /// Number of the last packet of changes, 0 for none.
     fn last_sequence(&self) -> u64 {
         self.ring.next() - 1
@@ -259,12 +270,15 @@ impl Sender {
 
     fn frame(&mut self) -> Vec<Outgoing> {
         let (changed, again, repaired) = self.pending.take();
+        let has_changes = !changed.is_empty();
         for (&voxel, &is_in) in &changed {
             self.sent.put(voxel, is_in);
         }
         let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(again.iter().copied()).collect();
         self.counts.updates_again += again.len() as u64;
         match self.config.policy {
+            // What only repairs must not grow into what is to be repaired again.
+            _ if !has_changes => {}
             ExportPolicy::LastFrame => {}
             ExportPolicy::Ring(frames) => voxels.extend(self.ring.last_frames(frames - 1)),
             ExportPolicy::Everything => voxels.extend(self.sent.iter()),
