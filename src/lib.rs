@@ -33,6 +33,7 @@
 //! questions <- tile by tile <- memory or disk              query
 //!
 //! Scan -> LocalMap -> views for planners                   local, beside an archive or alone
+//! occupied voxels -> Sender -> packets -> Receiver         share
 //! ```
 //!
 //! # Words

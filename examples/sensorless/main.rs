@@ -73,9 +73,9 @@ fn by_shared_map(forest: &Forest, sharing: &mut Sharing) -> voxtile::Result<Outc
         let middle =
             travellers.iter().map(|traveller| traveller.at[0]).sum::<f64>() / travellers.len() as f64;
         sharing.step(forest, middle, step)?;
-        if step >= HEAD_START_STEPS {
-            for traveller in &mut travellers {
-                traveller.hear(sharing)?;
+        for traveller in travellers.iter_mut().filter(|traveller| !traveller.is_over()) {
+            traveller.hear(sharing)?;
+            if step >= HEAD_START_STEPS {
                 traveller.fly(forest);
             }
         }

@@ -5,8 +5,8 @@ use crate::{RESOLUTION_M, STEP};
 use std::time::{Duration, Instant};
 use voxtile::local::{LocalMap, LocalParameters};
 use voxtile::share::{MapWatch, Receiver, ReceiverConfig, Sender, SenderConfig, VoxelSet};
-use voxtile::space::Point;
-use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Result};
+use voxtile::space::{Grid, Point, places};
+use voxtile::{InMemoryMapper, MapConfig, Mapper, Result};
 
 /// A sensor.
 #[derive(Clone, Copy)]
@@ -31,6 +31,10 @@ impl Sensing {
 pub struct Sharing {
     spotters: [Spotter; 2],
     now: Duration,
+    /// All that came so far, of either.
+    heard: VoxelSet,
+    /// What came with the last step: the centers of voxels.
+    pub new_points: Vec<Point>,
 }
 
 struct Spotter {
@@ -65,7 +69,8 @@ impl Sharing {
                 number,
             })
         };
-        Ok(Self { spotters: [spotter(0)?, spotter(1)?], now: Duration::ZERO })
+        let heard = VoxelSet::new(Grid::new(RESOLUTION_M, 100.0 * RESOLUTION_M)?);
+        Ok(Self { spotters: [spotter(0)?, spotter(1)?], now: Duration::ZERO, heard, new_points: Vec::new() })
     }
 
     /// The spotters scan, share, and are heard. `middle_m` is where the travellers are.
@@ -81,7 +86,25 @@ impl Sharing {
             MapWatch::new(0.5)?.take_scan(&spotter.map, &scan, &mut spotter.sender)?;
             spotter.talk(self.now);
         }
+        self.find_new();
         Ok(())
+    }
+
+    fn find_new(&mut self) {
+        self.new_points.clear();
+        for layer in self.spotters.iter().filter_map(|spotter| spotter.receiver.layer()) {
+            for tile in layer.tiles() {
+                let min = layer.grid().voxels_of_tile(tile).min;
+                for (brick, mask) in layer.bricks_of(tile) {
+                    let known = self.heard.brick(tile, brick);
+                    for place in places(std::array::from_fn(|k| mask[k] & !known[k])) {
+                        let voxel = brick.voxel(place).to_key().to_index_from(min);
+                        self.heard.put(voxel, true);
+                        self.new_points.push(layer.grid().center_m(voxel));
+                    }
+                }
+            }
+        }
     }
 
     /// Bytes a second of both spotters, both ways.
@@ -119,8 +142,6 @@ impl Spotter {
 /// A robot that flies to the other end.
 pub struct Traveller {
     map: LocalMap,
-    /// Voxels that the map has taken over from others.
-    heard: VoxelSet,
     pub at: Point,
     goal: Point,
     pub path: Vec<Point>,
@@ -137,6 +158,8 @@ const HORIZON_M: f64 = 9.5;
 const RADIUS_M: f64 = 0.2;
 const INFLATION_M: f64 = 0.4;
 const HEIGHT_M: f64 = 2.0;
+/// The paper's local maps have 50 000; these see the ground, too.
+const MOST_VOXELS: usize = 150_000;
 
 impl Traveller {
     /// Side by side.
@@ -146,11 +169,9 @@ impl Traveller {
 
     fn new(y: f64) -> Result<Self> {
         let parameters = LocalParameters::passive_perception().with_inflation_radius(INFLATION_M);
-        let grid = *InMemoryMapper::new(MapConfig::new(RESOLUTION_M, 100.0 * RESOLUTION_M)?)?.config();
         let at = [0.0, y, HEIGHT_M];
         Ok(Self {
-            map: LocalMap::new(RESOLUTION_M, parameters.with_max_voxels(None))?,
-            heard: VoxelSet::new(grid.grid),
+            map: LocalMap::new(RESOLUTION_M, parameters.with_max_voxels(Some(MOST_VOXELS)))?,
             at,
             goal: [LENGTH_M, y, HEIGHT_M],
             path: vec![at],
@@ -172,15 +193,7 @@ impl Traveller {
 
     /// Takes over what newly came of the shared maps: hits, and no rays.
     pub fn hear(&mut self, sharing: &Sharing) -> Result<()> {
-        let mut points = Vec::new();
-        for layer in sharing.layers() {
-            for voxel in layer.iter() {
-                if self.heard.put(voxel, true) {
-                    points.push(layer.grid().center_m(voxel));
-                }
-            }
-        }
-        self.map.insert_relayed(self.at, &points).map(drop)
+        self.map.insert_relayed(self.at, &sharing.new_points).map(drop)
     }
 
     /// Takes a scan of its own; returns the number of points.
