@@ -174,7 +174,9 @@ fn shared() -> Seeds {
     let packet = |packet: Packet| [vec![0], packet.encode().unwrap()].concat();
     let ask = |ask: Ask| [vec![0], ask.encode()].concat();
     let mut layer = VoxelSet::new(Grid::new(0.1, 0.8).unwrap());
-    (0..20).for_each(|x| drop(layer.put([x, 2 * x, -x], true)));
+    for x in 0..20 {
+        layer.put([x, 2 * x, -x], true);
+    }
     let mut file = vec![0];
     write_layer(&mut layer, &mut file).unwrap();
     // Put, wait, send; then loss, a new sender, an invented packet.
