@@ -39,16 +39,21 @@
 //! # }
 //! ```
 
+mod allowance;
 mod answers;
 mod catch_up;
 pub mod codec;
+mod differences;
 mod fold;
 mod layer_file;
+mod nonce;
 mod pending;
 mod policy;
 mod receiver;
+mod receiver_config;
 mod ring;
 mod sender;
+mod sender_config;
 mod set;
 mod set_range;
 mod stamps;
@@ -59,8 +64,10 @@ mod watch;
 pub use fold::{FoldReport, fold_layer};
 pub use layer_file::{read_layer, write_layer};
 pub use policy::ExportPolicy;
-pub use receiver::{Receiver, ReceiverConfig, ReceiverCounts};
-pub use sender::{Outgoing, ReceiverId, Sender, SenderConfig, SenderCounts};
+pub use receiver::Receiver;
+pub use receiver_config::{ReceiverConfig, ReceiverCounts};
+pub use sender::{Outgoing, ReceiverId, Sender};
+pub use sender_config::{SenderConfig, SenderCounts};
 pub use set::VoxelSet;
 pub use set_range::{SetPosition, SetRange};
 pub use union::WithLayers;

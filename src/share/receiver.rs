@@ -1,74 +1,14 @@
 use super::catch_up::CatchUp;
 use super::codec::{Ask, Header, MAX_LISTED, Packet, Status, Update};
+use super::differences::differences;
+use super::nonce::Nonce;
+use super::receiver_config::{ReceiverConfig, ReceiverCounts};
 use super::set::{VoxelSet, position_of};
 use super::set_range::SetRange;
 use super::stream::Stream;
 use crate::error::FormatError;
-use crate::space::{Grid, TileIndex, VoxelBox, VoxelIndex, places};
+use crate::space::{Grid, VoxelIndex};
 use std::time::Duration;
-
-/// What a receiver accepts, and how it asks.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct ReceiverConfig {
-    /// The only grid that is accepted; `None` for any. Default: any.
-    pub grid: Option<Grid>,
-    /// Most voxels of a robot. Default: 2^26, some 400 MB.
-    pub max_voxels: u64,
-    /// Most tiles of a robot. Default: 2^17.
-    pub max_tiles: usize,
-    /// Voxels outside of it are refused; `None` for no limit. Default: none.
-    pub region: Option<VoxelBox>,
-    /// Whether to ask for what is lacking. Without it a receiver only listens. Default: yes.
-    pub asks: bool,
-    /// How long to wait for packets that may only be late. Default: 0.3 s.
-    pub patience: Duration,
-    /// Time between two asks of a kind: with 1200 bytes at most an ask, the most that asks take. Default: 0.2 s.
-    pub ask_interval: Duration,
-    /// Where the numbers begin that tell answers from old or invented ones; others should not be able to guess it.
-    pub nonce_seed: u64,
-}
-
-impl Default for ReceiverConfig {
-    fn default() -> Self {
-        Self {
-            grid: None,
-            max_voxels: 1 << 26,
-            max_tiles: 1 << 17,
-            region: None,
-            asks: true,
-            patience: Duration::from_millis(300),
-            ask_interval: Duration::from_millis(200),
-            nonce_seed: 1,
-        }
-    }
-}
-
-/// What a receiver has seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[non_exhaustive]
-pub struct ReceiverCounts {
-    /// Packets taken in.
-    pub packets: u64,
-    /// Bytes of all that came.
-    pub bytes: u64,
-    /// Packets of changes that came twice, or too late.
-    pub repeated: u64,
-    /// Packets that are not what packets should be.
-    pub malformed: u64,
-    /// Packets of a life of the sender, or with a number, that the sender has not confirmed.
-    pub unconfirmed: u64,
-    /// Voxels beyond the limits on region, tiles and voxels.
-    pub refused_voxels: u64,
-    /// Statuses with another grid than the one that is accepted.
-    pub refused_grids: u64,
-    /// Asks.
-    pub asks: u64,
-    /// Bytes of these.
-    pub ask_bytes: u64,
-    /// Times that the set was compared by digests, or fetched.
-    pub catch_ups: u64,
-}
 
 /// Listens to one robot and keeps a layer: its set of voxels. Whoever has it calls [`Receiver::poll`] a few times a
 /// second.
@@ -88,17 +28,6 @@ pub struct Receiver {
     is_over_limit: bool,
 }
 
-/// Numbers that only an answer has.
-#[derive(Clone, Debug)]
-struct Nonce {
-    state: u64,
-    /// The last one, while it was not answered, and when it was sent.
-    waiting: Option<(u64, Duration)>,
-    next_at: Duration,
-}
-
-/// Time between two questions for a status.
-const STATUS_INTERVAL: Duration = Duration::from_secs(1);
 /// After so long without an answer a sender is believed, since there may be no way back to it.
 const ONE_WAY: Duration = Duration::from_secs(5);
 /// First time between two asks for the same packet: its voxels come with a frame.
@@ -107,7 +36,7 @@ const RETRY: Duration = Duration::from_millis(1500);
 impl Receiver {
     /// A receiver that has heard nothing.
     pub fn new(config: ReceiverConfig) -> Self {
-        let nonce = Nonce { state: config.nonce_seed, waiting: None, next_at: Duration::ZERO };
+        let nonce = Nonce::new(config.nonce_seed);
         Self {
             config,
             layer: None,
@@ -350,30 +279,6 @@ impl Receiver {
     }
 }
 
-impl Nonce {
-    fn ask(&mut self, now: Duration) -> Option<Ask> {
-        if now < self.next_at {
-            return None;
-        }
-        self.next_at = now + STATUS_INTERVAL;
-        // splitmix64: never twice the same in a receiver's life.
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.state;
-        bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        let nonce = (bits ^ bits >> 31).max(1);
-        self.waiting = Some((nonce, now));
-        Some(Ask::Status { nonce })
-    }
-
-    /// When the ask was sent that a number answers.
-    fn take(&mut self, nonce: u64) -> Option<Duration> {
-        let (_, at) = self.waiting.filter(|(waiting, _)| *waiting == nonce)?;
-        self.waiting = None;
-        Some(at)
-    }
-}
-
 /// Puts a voxel into a layer, or takes it out; `false` if that is beyond the limits.
 fn put_within(config: &ReceiverConfig, layer: &mut VoxelSet, voxel: VoxelIndex, is_in: bool) -> bool {
     let is_inside = config.region.as_ref().is_none_or(|region| region.contains(voxel));
@@ -385,33 +290,4 @@ fn put_within(config: &ReceiverConfig, layer: &mut VoxelSet, voxel: VoxelIndex, 
         layer.put(voxel, is_in);
     }
     is_allowed
-}
-
-/// Voxels of a part of a set that are not as in another set, and what they are there.
-fn differences(from: &VoxelSet, to: &VoxelSet, range: SetRange) -> Vec<(VoxelIndex, bool)> {
-    let (first, last) = (range.first.tile, range.last.tile);
-    let mut tiles: Vec<TileIndex> = from.tiles_between(first, last);
-    tiles.extend(to.tiles_between(first, last));
-    tiles.sort_unstable();
-    tiles.dedup();
-    let mut found = Vec::new();
-    for tile in tiles {
-        let min = from.grid().voxels_of_tile(tile).min;
-        let mut bricks: Vec<_> =
-            from.bricks_of(tile).chain(to.bricks_of(tile)).map(|(brick, _)| brick).collect();
-        bricks.sort_unstable();
-        bricks.dedup();
-        for brick in bricks {
-            let (before, after) = (from.brick(tile, brick), to.brick(tile, brick));
-            for place in places(std::array::from_fn(|k| before[k] ^ after[k])) {
-                let code = brick.voxel(place);
-                let position = super::SetPosition { tile, code: code.0 };
-                if range.contains(position) {
-                    let is_in = after[place / 64] >> (place % 64) & 1 == 1;
-                    found.push((code.to_key().to_index_from(min), is_in));
-                }
-            }
-        }
-    }
-    found
 }
