@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 use voxtile::local::{LocalMap, LocalParameters, LocalState};
 use voxtile::query::UnknownAs;
-use voxtile::share::{LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, WithLayers, fold_layer};
+use voxtile::share::{
+    LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, WithLayers, fold_layer, read_layer, write_layer,
+};
 use voxtile::space::VoxelIndex;
 use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Questions, Scan};
 
@@ -171,4 +173,28 @@ fn questions_are_answered_from_all_maps_together() {
     assert!(hits > 20 && collisions > 20, "{hits} {collisions}");
     let coarse = [&VoxelSet::new(MapConfig::new(0.2, 1.0).unwrap().grid)];
     assert!(WithLayers::new(&map, &coarse).is_err());
+}
+
+#[test]
+fn a_layer_comes_back_from_its_file_and_damage_is_told() {
+    let mut random = Random(21);
+    let many = (0..9000).map(|_| std::array::from_fn(|_| random.below(90) as i32 - 45));
+    // Far apart: more than one packet of them.
+    let far = [[-2_000_000_000, 5, 7], [2_000_000_000, 0, -9]];
+    for voxels in [Vec::new(), vec![[1, 2, 3]], many.chain(far).collect()] {
+        let mut layer = layer(voxels);
+        let mut file = Vec::new();
+        write_layer(&mut layer, &mut file).unwrap();
+        assert!(read_layer(&mut &file[..], 1 << 20).unwrap() == layer);
+        for at in (0..file.len()).step_by(1 + file.len() / 50) {
+            let mut damaged = file.clone();
+            damaged[at] ^= 4;
+            assert!(read_layer(&mut &damaged[..], 1 << 20).is_err(), "byte {at}");
+            assert!(read_layer(&mut &file[..at], 1 << 20).is_err(), "cut at {at}");
+        }
+        if layer.len() > 100 {
+            let error = read_layer(&mut &file[..], 100).unwrap_err().to_string();
+            assert!(error.contains("more than 100 voxels"), "{error}");
+        }
+    }
 }
