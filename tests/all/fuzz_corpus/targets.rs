@@ -387,7 +387,7 @@ pub fn share_life(data: &[u8]) -> bool {
     }
     let layer = receiver.layer().expect("a sender was heard");
     assert!(receiver.is_over_limit() || layer == &*sender.sent(), "{:?}", receiver.counts());
-    sender.sent().len() > 0
+    !sender.sent().is_empty()
 }
 
 fn assert_is_pose(pose: &Isometry3<f64>) {
