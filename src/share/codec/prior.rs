@@ -9,7 +9,7 @@ use crate::error::{FormatError, Result};
 /// for scans that were not counted. Part of the format: another table is another version.
 pub(super) static PRIOR: &[u8; CONTEXTS] = include_bytes!("prior.bin");
 
-/// Counts zeros and ones in each context of a packet of these updates: what [`PRIOR`] is made of.
+/// Counts zeros and ones in each context of a packet of these updates: what the codec begins with is made of it.
 ///
 /// # Errors
 ///
