@@ -17,7 +17,7 @@
 //! use std::time::Duration;
 //! use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig};
 //!
-//! # fn main() -> voxtile::Result<()> {
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let grid = voxtile::space::Grid::new(0.1, 10.0)?;
 //! let mut sender = Sender::new(grid, 1, SenderConfig::default())?;
 //! let mut receiver = Receiver::new(ReceiverConfig::default());
