@@ -33,6 +33,7 @@
 //! questions <- tile by tile <- memory or disk              query
 //!
 //! Scan -> LocalMap -> views for planners                   local, beside an archive or alone
+//! occupied voxels -> Sender -> packets -> Receiver         share
 //! ```
 //!
 //! # Words
@@ -67,6 +68,7 @@ pub mod octree;
 pub mod query;
 pub mod scan;
 pub mod sensor;
+pub mod share;
 pub mod simulation;
 pub mod space;
 pub mod store;

@@ -464,3 +464,31 @@ fn ctrl_c_flushes_and_says_how_far_it_got() {
     assert!(scans < 4000);
     assert_eq!(json(&["info", text(&map), "--json"])["scan_number"].as_u64(), Some(scans));
 }
+
+#[cfg(unix)]
+#[test]
+fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let voxtile = folder.path().join("voxtile");
+    std::fs::copy(env!("CARGO_BIN_EXE_voxtile"), &voxtile).unwrap();
+    let run = || {
+        let mut command = std::process::Command::new(&voxtile);
+        command
+            .args(["share", "--subscribe", "-o", "map", "--help"])
+            .env("PATH", folder.path())
+            .output()
+            .unwrap()
+    };
+    let missing = run();
+    let said = String::from_utf8_lossy(&missing.stderr).into_owned();
+    assert!(!missing.status.success());
+    assert!(said.contains("cannot run voxtile-share") && said.lines().count() == 1, "{said}");
+
+    let program = folder.path().join("voxtile-share");
+    std::fs::write(&program, "#!/bin/sh\necho \"$@\"\nexit 7\n").unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let ran = run();
+    assert_eq!(String::from_utf8_lossy(&ran.stdout), "--subscribe -o map --help\n");
+    assert_eq!(ran.status.code(), Some(7));
+}

@@ -33,6 +33,8 @@ mod questions;
 mod readers;
 /// The stream of scans, in files and from standard input.
 mod scan_stream;
+/// Map sharing: codec, convergence over bad links, layers.
+mod sharing;
 /// Numbers that are large, negative or on a border.
 mod space;
 /// Files of a map: what a flush leaves, what damage is told, what is never overwritten.

@@ -1,6 +1,7 @@
 use crate::byte_size::ByteSize;
 use crate::flush_schedule::FlushEvery;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
@@ -36,6 +37,9 @@ pub enum Command {
     Repair(RepairArgs),
     /// Run scans through a local map, as a planner needs it: sizes and times in a table, and a picture
     Local(LocalArgs),
+    /// Share what is occupied with other robots over a network; runs voxtile-share, which comes separately
+    #[command(disable_help_flag = true)]
+    Share(ShareArgs),
     /// Map a small made-up city and draw it: a first look, no data needed
     Demo(DemoArgs),
 }
@@ -161,6 +165,13 @@ pub enum InsertName {
     PerScan,
     /// Once for every ray
     PerRay,
+}
+
+#[derive(Debug, Args)]
+pub struct ShareArgs {
+    /// Handed to voxtile-share as they are; --help lists them
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    pub arguments: Vec<OsString>,
 }
 
 #[derive(Debug, Args)]

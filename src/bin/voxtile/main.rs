@@ -20,6 +20,7 @@ mod progress;
 mod query;
 mod raycast;
 mod repair;
+mod share;
 mod summary;
 mod verify;
 
@@ -55,6 +56,7 @@ fn main() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
         Command::Local(args) => local::run(&args),
+        Command::Share(args) => share::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     outcome.unwrap_or_else(|error| {

@@ -7,7 +7,9 @@ use tempfile::TempDir;
 use voxtile::io::ScanStreamWriter;
 use voxtile::octree::{Octree, write_bt, write_bt_unpruned, write_ot};
 use voxtile::sensor::Evidence;
-use voxtile::space::{BrickCode, MortonCode, TileIndex, VoxelKey};
+use voxtile::share::codec::{Ask, DigestEntry, Header, Packet, Status, Update};
+use voxtile::share::{SetRange, VoxelSet, write_layer};
+use voxtile::space::{BrickCode, Grid, MortonCode, TileIndex, VoxelKey};
 use voxtile::store::{Layout, TileFile};
 use voxtile::tile::Table;
 use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
@@ -17,7 +19,7 @@ pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;
 
 /// Every seed.
 pub fn all() -> Seeds {
-    [octrees(), map_files(), compact_tables(), clouds(), scans(), texts()].concat()
+    [octrees(), map_files(), compact_tables(), clouds(), scans(), texts(), shared()].concat()
 }
 
 fn octrees() -> Seeds {
@@ -158,6 +160,42 @@ fn scan_stream(label: &str, has_intensities: bool) -> Vec<u8> {
         writer.write_world(&scan).unwrap();
     }
     bytes
+}
+
+fn shared() -> Seeds {
+    let header = Header { epoch: 1, sequence: 3 };
+    let update = |voxel, is_in| Update { voxel, is_in };
+    let updates = vec![update([1, 2, 3], true), update([1, 2, 4], false), update([-9, 0, 30], true)];
+    let range = SetRange::of_tiles(TileIndex::new(0, 0, 0), TileIndex::new(0, 3, -1));
+    let entry = DigestEntry { last: TileIndex::new(5, 0, 0), voxels: 3, digest: [1; 8] };
+    let (resolution_m, tile_size_m) = (0.1, 0.8);
+    let status =
+        Status { header, nonce: 7, oldest: 1, resolution_m, tile_size_m, voxels: 2, digest: [2; 32] };
+    let packet = |packet: Packet| [vec![0], packet.encode().unwrap()].concat();
+    let ask = |ask: Ask| [vec![0], ask.encode()].concat();
+    let mut layer = VoxelSet::new(Grid::new(0.1, 0.8).unwrap());
+    for x in 0..20 {
+        layer.put([x, 2 * x, -x], true);
+    }
+    let mut file = vec![0];
+    write_layer(&mut layer, &mut file).unwrap();
+    // Put, wait, send; then loss, a new sender, an invented packet.
+    let life =
+        [0, 1, 2, 3, 3, 20, 4, 5, 7, 0, 6, 0, 1, 9, 9, 9, 3, 50, 4, 8, 136, 0, 4, 4, 4, 3, 50, 4, 9, 2, 1, 1];
+    vec![
+        ("share_packet", "changes", packet(Packet::Changes { header, repaired: vec![1], updates })),
+        ("share_packet", "content", packet(Packet::Content { header, range, voxels: vec![[1, 2, 3]] })),
+        (
+            "share_packet",
+            "digests",
+            packet(Packet::Digests { header, first: TileIndex::default(), entries: vec![entry] }),
+        ),
+        ("share_packet", "status", packet(Packet::Status(status))),
+        ("share_packet", "ask-missing", ask(Ask::Missing { epoch: 1, sequences: vec![2, 3] })),
+        ("share_packet", "ask-content", ask(Ask::Content { epoch: 1, ranges: vec![range, SetRange::ALL] })),
+        ("share_packet", "layer", file),
+        ("share_life", "short", life.to_vec()),
+    ]
 }
 
 fn texts() -> Seeds {

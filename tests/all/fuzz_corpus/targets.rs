@@ -6,6 +6,7 @@
 
 use nalgebra::Isometry3;
 use std::path::Path;
+use std::time::Duration;
 use voxtile::io::{
     PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log,
     read_scan_stream,
@@ -13,6 +14,8 @@ use voxtile::io::{
 use voxtile::octree::{
     OctreeFile, OctreeFormat, read, read_with_limit, write_bt, write_bt_unpruned, write_ot,
 };
+use voxtile::share::codec::{Ask, Packet};
+use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
 use voxtile::space::{Grid, TileIndex};
 use voxtile::store::{CommitLog, Metadata};
 use voxtile::tile::Table;
@@ -23,7 +26,7 @@ use voxtile::tile::format::{
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by the name of its corpus.
-pub const TARGETS: [(&str, Target); 12] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("bt", octree),
     ("ot", octree),
     ("table", table),
@@ -36,6 +39,8 @@ pub const TARGETS: [(&str, Target); 12] = [
     ("scan_stream", scan_stream),
     ("poses", poses),
     ("points", points),
+    ("share_packet", share_packet),
+    ("share_life", share_life),
 ];
 
 const MAX_TREE_BYTES: usize = 64 << 20;
@@ -282,6 +287,107 @@ pub fn points(data: &[u8]) -> bool {
     let Ok(Ok(points)) = read_points(data) else { return false };
     assert!(points.len() <= data.len());
     true
+}
+
+/// Packets, asks and layers of map sharing: what was read comes back from what is written of it.
+pub fn share_packet(data: &[u8]) -> bool {
+    let Some((&choice, packet)) = data.split_first() else { return false };
+    let mut packet = packet.to_vec();
+    if choice & 1 == 1 {
+        packet.extend(crc32fast::hash(&packet).to_le_bytes());
+    }
+    let is_packet = Packet::decode(&packet).is_ok_and(|read| {
+        let written = read.encode().expect("what was read can be written");
+        let again = Packet::decode(&written).expect("what was written is read");
+        // Lengths of a status may be NaN, which is not equal to itself.
+        assert_eq!(format!("{:?}", in_order(again)), format!("{:?}", in_order(read)));
+        true
+    });
+    let is_ask = Ask::decode(&packet).is_ok_and(|read| {
+        assert_eq!(Ask::decode(&read.encode()).expect("what was written is read"), read);
+        true
+    });
+    is_packet || is_ask || read_layer(&mut &packet[..], 1 << 20).is_ok()
+}
+
+/// Voxels lie in a packet in the order of its cube, which need not be the smallest one.
+fn in_order(mut packet: Packet) -> Packet {
+    match &mut packet {
+        Packet::Changes { updates, .. } => updates.sort_unstable(),
+        Packet::Content { voxels, .. } => voxels.sort_unstable(),
+        Packet::Digests { .. } | Packet::Status(_) => {}
+    }
+    packet
+}
+
+/// A life of a sender and a receiver, whose voxels, losses, delays, repetitions, restarts and invented packets the bytes
+/// tell. Whatever it was, once the link is good the sets become equal.
+pub fn share_life(data: &[u8]) -> bool {
+    let grid = Grid::new(0.1, 0.8).expect("8 voxels along a tile");
+    let mut config = SenderConfig::default();
+    (config.ring_packets, config.max_packet_bytes, config.latency) = (4, 256, Duration::from_millis(100));
+    let new_sender = |epoch| Sender::new(grid, epoch, config.clone()).expect("a valid configuration");
+    let (mut epoch, mut now) = (1, Duration::ZERO);
+    let mut sender = new_sender(epoch);
+    let mut receiver = Receiver::new(ReceiverConfig::default());
+    let (mut down, mut up) = (Vec::<Vec<u8>>::new(), Vec::<Vec<u8>>::new());
+    let mut script = data.iter().copied();
+    while let Some(verb) = script.next() {
+        let mut byte = || script.next().unwrap_or(0);
+        match verb % 10 {
+            0..3 => {
+                let voxel = [byte(), byte(), byte()].map(|k| i32::from(k as i8));
+                sender.put(voxel, verb & 128 == 0);
+            }
+            3 => now += Duration::from_millis(u64::from(byte()) * 20),
+            4 => down.extend(sender.poll(now).into_iter().map(|packet| packet.bytes)),
+            5 => up.extend(receiver.poll(now)),
+            6 if !down.is_empty() => {
+                let packet = down.swap_remove(usize::from(byte()) % down.len());
+                if verb & 128 == 0 {
+                    down.push(packet.clone());
+                }
+                receiver.take(&packet, now).expect("a packet of the sender's");
+            }
+            7 if !up.is_empty() => {
+                let ask = up.swap_remove(usize::from(byte()) % up.len());
+                let answers = sender.answer(1, &ask, now).expect("an ask of the receiver's");
+                down.extend(answers.into_iter().map(|packet| packet.bytes));
+            }
+            8 if verb & 128 == 0 => drop((down.pop(), up.pop())),
+            8 => {
+                epoch += 1;
+                sender = new_sender(epoch);
+            }
+            9 => {
+                let length = usize::from(byte());
+                let mut packet = vec![1, 1 + verb / 10 % 4];
+                packet.extend((0..length).map(|_| byte()));
+                packet.extend(crc32fast::hash(&packet).to_le_bytes());
+                let _ = receiver.take(&packet, now);
+                let _ = sender.answer(2, &packet, now);
+            }
+            _ => {}
+        }
+    }
+    for _ in 0..1200 {
+        now += Duration::from_millis(100);
+        for packet in sender.poll(now) {
+            receiver.take(&packet.bytes, now).expect("a packet of the sender's");
+        }
+        for ask in receiver.poll(now) {
+            for packet in sender.answer(1, &ask, now).expect("an ask of the receiver's") {
+                receiver.take(&packet.bytes, now).expect("a packet of the sender's");
+            }
+        }
+        let is_equal = receiver.is_converged() && receiver.equal_as_of() == Some(sender.last_packet());
+        if sender.is_idle() && is_equal {
+            break;
+        }
+    }
+    let layer = receiver.layer().expect("a sender was heard");
+    assert!(receiver.is_over_limit() || layer == &*sender.sent(), "{:?}", receiver.counts());
+    !sender.sent().is_empty()
 }
 
 fn assert_is_pose(pose: &Isometry3<f64>) {

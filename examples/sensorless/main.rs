@@ -1,0 +1,129 @@
+//! The sensorless scenario of the voxel mapping paper (its section VII-B and table II): travellers without sensors follow
+//! the maps that two spotters share, around the trees of made-up forests; and, to compare, travellers with their own
+//! sensor and no sharing.
+//!
+//! ```text
+//! sensorless [FORESTS] [PICTURE.svg]
+//! ```
+//!
+//! Prints the paper's table, and draws the first forest from above. It is a simulation of points that fly at the paper's
+//! 3 m/s, not of drones, and they do not avoid each other: what it shows is that a shared map is enough to plan by.
+
+mod forest;
+#[path = "../../tests/all/sharing/lossy_link.rs"]
+#[allow(dead_code)]
+mod lossy_link;
+mod picture;
+#[path = "../high_speed/planner.rs"]
+mod planner;
+mod robots;
+
+use forest::Forest;
+use robots::{Sensing, Sharing, Traveller};
+use std::error::Error;
+use std::fs;
+use std::time::Duration;
+
+/// Edge of a voxel.
+const RESOLUTION_M: f64 = 0.1;
+/// Between two looks of the planner, and two scans of a spotter (5 Hz).
+const STEP: Duration = Duration::from_millis(200);
+/// A flight that is not over by then does not arrive.
+const MOST_STEPS: u32 = 600;
+/// How long spotters look before travellers begin.
+const HEAD_START_STEPS: u32 = 25;
+
+/// What one forest gave.
+struct Outcome {
+    travellers: Vec<Traveller>,
+    /// Bytes a second that went from robot to robot, or from the sensors, at 16 bytes a point.
+    bytes_per_s: f64,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let forests: u64 = arguments.first().map_or(Ok(10), |forests| forests.parse())?;
+    let picture = arguments.get(1).map_or("sensorless.svg", String::as_str);
+    let mut outcomes: [Vec<Outcome>; 2] = Default::default();
+    for seed in 0..forests {
+        let forest = Forest::new(seed);
+        let mut sharing = Sharing::new(seed)?;
+        outcomes[0].push(by_shared_map(&forest, &mut sharing)?);
+        outcomes[1].push(by_own_sensor(&forest)?);
+        if seed == 0 {
+            let page =
+                picture::page(&forest, &sharing, [&outcomes[0][0].travellers, &outcomes[1][0].travellers]);
+            fs::write(picture, page)?;
+        }
+        eprintln!("forest {seed} is flown through");
+    }
+    println!("| setup | d_fly (m) | t_fly (s) | t_cal (ms) | collisions a flight | arrived | kB/s |");
+    println!("|---|---|---|---|---|---|---|");
+    for (name, outcomes) in ["sensorless, two spotters", "own sensor"].into_iter().zip(&outcomes) {
+        println!("| {name} | {} |", summary(outcomes));
+    }
+    println!("picture: {picture}");
+    Ok(())
+}
+
+/// Travellers that know what two spotters share.
+fn by_shared_map(forest: &Forest, sharing: &mut Sharing) -> voxtile::Result<Outcome> {
+    let mut travellers = Traveller::four()?;
+    for step in 0..MOST_STEPS {
+        let middle =
+            travellers.iter().map(|traveller| traveller.at[0]).sum::<f64>() / travellers.len() as f64;
+        sharing.step(forest, middle, step)?;
+        for traveller in travellers.iter_mut().filter(|traveller| !traveller.is_over()) {
+            traveller.hear(sharing)?;
+            if step >= HEAD_START_STEPS {
+                traveller.fly(forest);
+            }
+        }
+        if travellers.iter().all(Traveller::is_over) {
+            break;
+        }
+    }
+    let bytes_per_s = sharing.bytes_per_s();
+    Ok(Outcome { travellers, bytes_per_s })
+}
+
+/// Travellers that see for themselves, 10 m far.
+fn by_own_sensor(forest: &Forest) -> voxtile::Result<Outcome> {
+    let mut travellers = Traveller::four()?;
+    let (mut points, mut steps) = (0, 0);
+    for step in 0..MOST_STEPS {
+        for (number, traveller) in
+            travellers.iter_mut().enumerate().filter(|(_, traveller)| !traveller.is_over())
+        {
+            // 10 Hz: twice a step.
+            for half in 0..2 {
+                let sensing = Sensing::ONBOARD;
+                points += traveller.look(forest, sensing, u64::from(step) * 16 + number as u64 * 2 + half)?;
+            }
+            traveller.fly(forest);
+        }
+        steps += 1;
+        if travellers.iter().all(Traveller::is_over) {
+            break;
+        }
+    }
+    let bytes_per_s = 16.0 * points as f64 / (f64::from(steps) * STEP.as_secs_f64());
+    Ok(Outcome { travellers, bytes_per_s })
+}
+
+/// Means of lengths and times over the flights that arrived, of the rest over all.
+fn summary(outcomes: &[Outcome]) -> String {
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let all = || outcomes.iter().flat_map(|outcome| &outcome.travellers);
+    let arrived = || all().filter(|traveller| traveller.has_arrived);
+    format!(
+        "{:.1} | {:.1} | {:.2} | {:.2} | {} of {} | {:.1}",
+        mean(arrived().map(|traveller| traveller.length_m).collect()),
+        mean(arrived().map(|traveller| f64::from(traveller.steps) * STEP.as_secs_f64()).collect()),
+        mean(all().map(Traveller::planning_ms).collect()),
+        mean(all().map(|traveller| f64::from(u8::from(traveller.has_collided))).collect()),
+        arrived().count(),
+        all().count(),
+        mean(outcomes.iter().map(|outcome| outcome.bytes_per_s / 1e3).collect()),
+    )
+}

@@ -1,0 +1,130 @@
+use super::codec::{Ask, DigestEntry, Packet};
+use super::sender::{Outgoing, ReceiverId, Sender};
+use super::set_range::SetRange;
+use crate::error::FormatError;
+use crate::space::{TileIndex, VoxelIndex};
+use std::time::Duration;
+
+/// Tiles of a range up to which each gets a digest of its own.
+const MAX_SINGLE_TILES: usize = 1024;
+/// Digests for a range of more tiles.
+const GROUPS: usize = 64;
+
+impl Sender {
+    /// Answers what a receiver asks.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no ask; nothing happens then.
+    pub fn answer(
+        &mut self,
+        from: ReceiverId,
+        ask: &[u8],
+        now: Duration,
+    ) -> Result<Vec<Outgoing>, FormatError> {
+        let ask = Ask::decode(ask)?;
+        self.counts.asks += 1;
+        if !self.allowance.take(self.config.answer_bytes_per_s, now) {
+            self.counts.refused_asks += 1;
+            return Ok(Vec::new());
+        }
+        let epoch = self.header().epoch;
+        let packets = match ask {
+            Ask::Status { nonce } => vec![self.status(nonce)],
+            Ask::Missing { epoch: asked, sequences } if asked == epoch => self.repair(&sequences),
+            Ask::Digests { epoch: asked, range } if asked == epoch => self.digests(range),
+            Ask::Content { epoch: asked, ranges } if asked == epoch => self.content(&ranges),
+            // Of a life before this one.
+            _ => vec![self.status(0)],
+        };
+        let bytes = packets.iter().map(|packet| packet.len() as u64).sum();
+        self.allowance.spend(bytes);
+        self.counts.answer_bytes += bytes;
+        Ok(packets.into_iter().map(|bytes| Outgoing { to: Some(from), bytes }).collect())
+    }
+
+    /// Has the voxels of lost packets in the next frame. A status tells of packets that cannot be repaired.
+    fn repair(&mut self, sequences: &[u64]) -> Vec<Vec<u8>> {
+        let mut is_known = true;
+        for &sequence in sequences {
+            match self.ring.get(sequence) {
+                Some(voxels) => self.pending.repair(sequence, voxels),
+                None => is_known = false,
+            }
+        }
+        if is_known { Vec::new() } else { vec![self.status(0)] }
+    }
+
+    fn digests(&mut self, range: SetRange) -> Vec<Vec<u8>> {
+        let (mut first, last) = (range.first.tile, range.last.tile);
+        let tiles = self.sent.tiles_between(first, last);
+        let group = if tiles.len() <= MAX_SINGLE_TILES { 1 } else { tiles.len().div_ceil(GROUPS) };
+        let mut entries = Vec::new();
+        let mut begin = first;
+        let groups: Vec<&[TileIndex]> = tiles.chunks(group).collect();
+        for (number, group) in groups.iter().enumerate() {
+            // The last entry reaches to the end, the others up to their last tile.
+            let end = group.last().filter(|_| number + 1 < groups.len()).copied().unwrap_or(last);
+            entries.push(self.entry(begin, end));
+            begin = after(end);
+        }
+        if entries.is_empty() {
+            entries.push(self.entry(first, last));
+        }
+        // 13 to 32 bytes each.
+        let per_packet = (self.config.max_packet_bytes - 64) / 32;
+        let header = self.header();
+        let mut packets = Vec::new();
+        for entries in entries.chunks(per_packet.max(1)).take(4 * self.config.packets_per_answer) {
+            let packet = Packet::Digests { header, first, entries: entries.to_vec() };
+            packets.extend(packet.encode());
+            first = entries.last().map_or(first, |entry| after(entry.last));
+        }
+        packets
+    }
+
+    fn entry(&mut self, first: TileIndex, last: TileIndex) -> DigestEntry {
+        let (voxels, digest) = self.sent.short_digest(first, last);
+        DigestEntry { last, voxels, digest }
+    }
+
+    fn content(&mut self, ranges: &[SetRange]) -> Vec<Vec<u8>> {
+        let header = self.header();
+        let mut packets = Vec::new();
+        for &range in ranges {
+            let mut range = range;
+            loop {
+                if packets.len() >= self.config.packets_per_answer {
+                    return packets;
+                }
+                // As many as may be in a packet, and one more to know whether there are more.
+                let most = super::codec::MAX_VOXELS_PER_PACKET + 1;
+                let voxels: Vec<VoxelIndex> = self.sent.in_range(range).take(most).collect();
+                let grid = *self.grid();
+                let end_of = |taken: &[VoxelIndex]| match taken.last() {
+                    Some(&last) if taken.len() < voxels.len() => super::set::position_of(&grid, last),
+                    _ => range.last,
+                };
+                let packet = |taken: &[VoxelIndex]| {
+                    let range = SetRange { first: range.first, last: end_of(taken) };
+                    Packet::Content { header, range, voxels: taken.to_vec() }
+                };
+                let (bytes, taken) = match voxels.is_empty() {
+                    true => (packet(&[]).encode().unwrap_or_default(), 0),
+                    false => self.fit(&voxels, packet),
+                };
+                packets.push(bytes);
+                if taken == voxels.len() {
+                    break;
+                }
+                range.first = super::set::position_of(&grid, voxels[taken - 1]).next();
+            }
+        }
+        packets
+    }
+}
+
+/// The tile behind one in the order of a set.
+pub(super) fn after(tile: TileIndex) -> TileIndex {
+    super::set_range::SetPosition { tile, code: super::set_range::LAST_CODE }.next().tile
+}

@@ -1,0 +1,266 @@
+use super::ExportPolicy;
+use super::allowance::Allowance;
+use super::codec::{Header, MAX_VOXELS_PER_PACKET, Packet, Status, Update};
+use super::pending::Pending;
+use super::ring::Ring;
+use super::sender_config::{SenderConfig, SenderCounts};
+use super::set::VoxelSet;
+use crate::error::{Error, Result};
+use crate::space::{BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, places};
+use std::time::Duration;
+
+/// Which receiver asks; any number that is its own.
+pub type ReceiverId = u64;
+
+/// Bytes to be sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outgoing {
+    /// To one receiver, or to all.
+    pub to: Option<ReceiverId>,
+    /// A packet.
+    pub bytes: Vec<u8>,
+}
+
+/// Shares a set of voxels. Bytes in, bytes out; whoever has it calls [`Sender::poll`] a few times a second.
+#[derive(Clone, Debug)]
+pub struct Sender {
+    pub(super) config: SenderConfig,
+    epoch: u32,
+    /// As it is now.
+    wanted: VoxelSet,
+    /// As receivers know it once they have everything.
+    pub(super) sent: VoxelSet,
+    pub(super) pending: Pending,
+    pub(super) ring: Ring,
+    pub(super) counts: SenderCounts,
+    next_status: Duration,
+    /// As of the last status.
+    status_sequence: Option<u64>,
+    /// Voxels that the last packet had room for.
+    voxels_a_packet: usize,
+    pub(super) allowance: Allowance,
+}
+
+/// Beyond so many waiting voxels a frame is sent before its time.
+const MAX_PENDING: usize = 1 << 18;
+
+impl Sender {
+    /// A sender with an empty set. The epoch must be another one each time that a robot begins anew.
+    ///
+    /// # Errors
+    ///
+    /// A configuration that is wrong.
+    pub fn new(grid: Grid, epoch: u32, config: SenderConfig) -> Result<Self> {
+        Self::with_set(VoxelSet::new(grid), epoch, config)
+    }
+
+    /// A sender of a set, which receivers ask for.
+    ///
+    /// # Errors
+    ///
+    /// A configuration that is wrong.
+    pub fn with_set(set: VoxelSet, epoch: u32, config: SenderConfig) -> Result<Self> {
+        if !(256..=60_000).contains(&config.max_packet_bytes) {
+            let reason = format!("{} bytes; 256 to 60000 are possible", config.max_packet_bytes);
+            return Err(Error::argument("packet size", reason));
+        }
+        if config.ring_packets == 0
+            || config.packets_per_answer == 0
+            || config.policy == ExportPolicy::Ring(0)
+        {
+            return Err(Error::argument("ring, packets an answer", "0 is too few; give at least 1"));
+        }
+        Ok(Self {
+            ring: Ring::new(config.ring_packets),
+            config,
+            epoch,
+            wanted: set.clone(),
+            sent: set,
+            pending: Pending::default(),
+            counts: SenderCounts::default(),
+            next_status: Duration::ZERO,
+            status_sequence: None,
+            voxels_a_packet: 1000,
+            allowance: Allowance::default(),
+        })
+    }
+
+    /// The grid of the set.
+    pub fn grid(&self) -> &Grid {
+        self.sent.grid()
+    }
+
+    /// What was done so far.
+    pub fn counts(&self) -> SenderCounts {
+        self.counts
+    }
+
+    /// The set as sent: what receivers have once they have everything.
+    pub fn sent(&mut self) -> &mut VoxelSet {
+        &mut self.sent
+    }
+
+    /// Whether nothing waits for a frame.
+    pub fn is_idle(&self) -> bool {
+        self.pending.is_empty()
+    }
+
+    /// Whether a voxel is in the set.
+    pub fn contains(&self, voxel: VoxelIndex) -> bool {
+        self.wanted.contains(voxel)
+    }
+
+    /// Puts a voxel into the set or takes it out.
+    pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) {
+        if self.wanted.put(voxel, is_in) {
+            self.pending.put(voxel, is_in, self.sent.contains(voxel));
+        }
+    }
+
+    /// Says which voxels of a brick of a tile are in the set.
+    pub fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
+        let before = self.wanted.brick(tile, brick);
+        if before == mask {
+            return;
+        }
+        let sent = self.sent.brick(tile, brick);
+        let min = self.grid().voxels_of_tile(tile).min;
+        let has = |mask: &BrickMask, place: usize| mask[place / 64] >> (place % 64) & 1 == 1;
+        for place in places(std::array::from_fn(|k| before[k] ^ mask[k])) {
+            let voxel = brick.voxel(place).to_key().to_index_from(min);
+            self.pending.put(voxel, has(&mask, place), has(&sent, place));
+        }
+        self.wanted.put_brick(tile, brick, mask);
+    }
+
+    /// What is to be sent now: a frame when it is time, a status when it is time.
+    pub fn poll(&mut self, now: Duration) -> Vec<Outgoing> {
+        let waited = self.pending.waited(now);
+        let is_due =
+            !self.pending.is_empty() && (waited >= self.config.latency || self.pending.len() >= MAX_PENDING);
+        let mut out = if is_due { self.frame() } else { Vec::new() };
+        let is_quiet = self.status_sequence == Some(self.last_sequence());
+        if now >= self.next_status || (is_quiet && !out.is_empty()) {
+            let status = self.status(0);
+            self.counts.status_bytes += status.len() as u64;
+            out.push(Outgoing { to: None, bytes: status });
+            let factor = if is_quiet && out.len() == 1 { 4 } else { 1 };
+            self.next_status = now + self.config.status_interval * factor;
+            self.status_sequence = Some(self.last_sequence());
+        }
+        out
+    }
+
+    /// What waits, at once: before a sender ends.
+    pub fn flush(&mut self, now: Duration) -> Vec<Outgoing> {
+        let mut out = if self.pending.is_empty() { Vec::new() } else { self.frame() };
+        self.next_status = now;
+        out.extend(self.poll(now));
+        out
+    }
+
+    /// Epoch and number of the last packet of changes, 0 for none: what [`Receiver::equal_as_of`](super::Receiver::equal_as_of)
+    /// says once a receiver has everything.
+    pub fn last_packet(&self) -> (u32, u64) {
+        (self.epoch, self.last_sequence())
+    }
+
+    /// Number of the last packet of changes, 0 for none.
+    fn last_sequence(&self) -> u64 {
+        self.ring.next() - 1
+    }
+
+    pub(super) fn header(&self) -> Header {
+        Header { epoch: self.epoch, sequence: self.last_sequence() }
+    }
+
+    pub(super) fn status(&mut self, nonce: u64) -> Vec<u8> {
+        let grid = *self.grid();
+        let status = Status {
+            header: self.header(),
+            nonce,
+            oldest: self.ring.oldest(),
+            resolution_m: grid.resolution_m(),
+            tile_size_m: grid.tile_size_m(),
+            voxels: self.sent.len(),
+            digest: *self.sent.digest().as_bytes(),
+        };
+        // A status has no voxels that could be too many.
+        Packet::Status(status).encode().unwrap_or_default()
+    }
+
+    fn frame(&mut self) -> Vec<Outgoing> {
+        let (changed, again, repaired) = self.pending.take();
+        let has_changes = !changed.is_empty();
+        for (&voxel, &is_in) in &changed {
+            self.sent.put(voxel, is_in);
+        }
+        let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(again.iter().copied()).collect();
+        self.counts.updates_again += again.len() as u64;
+        match self.config.policy {
+            // What only repairs must not grow into what is to be repaired again.
+            _ if !has_changes => {}
+            ExportPolicy::LastFrame => {}
+            ExportPolicy::Ring(frames) => voxels.extend(self.ring.last_frames(frames - 1)),
+            ExportPolicy::Everything => voxels.extend(self.sent.iter()),
+        }
+        self.counts.frames += 1;
+        self.ring.begin_frame();
+        self.packets_of(voxels, &repaired)
+    }
+
+    /// Packs voxels as they are now into as many packets as it takes, those that lie together into one.
+    fn packets_of(&mut self, mut voxels: Vec<VoxelIndex>, repaired: &[u64]) -> Vec<Outgoing> {
+        voxels.sort_by_cached_key(|&voxel| along_curve(voxel));
+        voxels.dedup();
+        let updates: Vec<Update> =
+            voxels.iter().map(|&voxel| Update { voxel, is_in: self.sent.contains(voxel) }).collect();
+        let mut rest = updates.as_slice();
+        let mut out = Vec::new();
+        while !rest.is_empty() {
+            let header = Header { epoch: self.epoch, sequence: self.ring.next() };
+            let repaired = repaired.to_vec();
+            let packet = |updates: &[Update]| Packet::Changes {
+                header,
+                repaired: repaired.clone(),
+                updates: updates.to_vec(),
+            };
+            let (bytes, taken) = self.fit(rest, packet);
+            self.ring.push(rest[..taken].iter().map(|update| update.voxel).collect());
+            rest = &rest[taken..];
+            self.counts.packets += 1;
+            self.counts.packet_bytes += bytes.len() as u64;
+            self.counts.updates += taken as u64;
+            out.push(Outgoing { to: None, bytes });
+        }
+        out
+    }
+
+    /// A packet of as many of some items, at least one, as fit into it.
+    pub(super) fn fit<T>(&mut self, items: &[T], packet: impl Fn(&[T]) -> Packet) -> (Vec<u8>, usize) {
+        let limit = self.config.max_packet_bytes;
+        let mut count = self.voxels_a_packet.clamp(1, MAX_VOXELS_PER_PACKET).min(items.len());
+        loop {
+            match packet(&items[..count]).encode() {
+                Ok(bytes) if bytes.len() <= limit || count <= 1 => {
+                    // For the next one: about as many as would have filled this one.
+                    self.voxels_a_packet = (count * (limit - limit / 64) / bytes.len().max(limit / 8)).max(1);
+                    return (bytes, count);
+                }
+                Ok(bytes) => count = (count * (limit - limit / 64) / bytes.len()).clamp(1, count - 1),
+                // Too far apart for one packet, which one voxel never is but at the very end of all indices.
+                Err(_) if count > 1 => count /= 2,
+                Err(_) => return (Vec::new(), 1),
+            }
+        }
+    }
+}
+
+/// A place on the Morton curve through all voxel indices.
+fn along_curve(voxel: VoxelIndex) -> (u64, u64) {
+    let part = |shift: u32| {
+        let [x, y, z] = voxel.map(|k| ((k as u32 ^ 1 << 31) >> shift) as u16);
+        VoxelKey([x, y, z]).morton().0
+    };
+    (part(16), part(0))
+}

@@ -1,0 +1,225 @@
+use super::set_range::{LAST_CODE, SetPosition, SetRange};
+use crate::space::{BrickCode, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, VoxelKey, places};
+use std::collections::BTreeMap;
+
+/// A set of voxels, tile by tile, with digests: what a sender shares, and what a receiver has of it.
+#[derive(Clone, Debug)]
+pub struct VoxelSet {
+    grid: Grid,
+    tiles: BTreeMap<TileIndex, TileVoxels>,
+    len: u64,
+}
+
+/// The voxels of a tile, by brick. Never empty.
+#[derive(Clone, Debug, Default)]
+struct TileVoxels {
+    bricks: BTreeMap<BrickCode, BrickMask>,
+    len: u64,
+    /// Unless a voxel changed since it was computed.
+    digest: Option<[u8; 32]>,
+}
+
+const LABEL: &[u8] = b"voxtile-set-1";
+
+impl VoxelSet {
+    /// An empty set of voxels of a grid.
+    pub fn new(grid: Grid) -> Self {
+        Self { grid, tiles: BTreeMap::new(), len: 0 }
+    }
+
+    /// The grid of the voxels and tiles.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Number of voxels.
+    pub fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Number of tiles that hold voxels.
+    pub fn tile_count(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// The tiles that hold voxels, in order.
+    pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
+        self.tiles.keys().copied()
+    }
+
+    /// Whether a voxel is in the set.
+    pub fn contains(&self, voxel: VoxelIndex) -> bool {
+        let code = VoxelKey::from_index(voxel).morton();
+        let tile = self.tiles.get(&self.grid.tile_of_voxel(voxel));
+        tile.and_then(|tile| tile.bricks.get(&code.brick()))
+            .is_some_and(|mask| has(mask, code.place_in_brick()))
+    }
+
+    /// Puts a voxel in, or takes it out; whether that changed anything.
+    pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) -> bool {
+        let code = VoxelKey::from_index(voxel).morton();
+        let (brick, place) = (code.brick(), code.place_in_brick());
+        let tile = self.grid.tile_of_voxel(voxel);
+        let mut mask = self.brick(tile, brick);
+        if has(&mask, place) == is_in {
+            return false;
+        }
+        mask[place / 64] ^= 1 << (place % 64);
+        self.put_brick(tile, brick, mask);
+        true
+    }
+
+    /// The voxels of a brick of a tile.
+    pub fn brick(&self, tile: TileIndex, brick: BrickCode) -> BrickMask {
+        self.tiles.get(&tile).and_then(|tile| tile.bricks.get(&brick)).copied().unwrap_or([0; 8])
+    }
+
+    /// The bricks of a tile that hold voxels, in Morton order.
+    pub fn bricks_of(&self, tile: TileIndex) -> impl Iterator<Item = (BrickCode, BrickMask)> {
+        self.tiles
+            .get(&tile)
+            .into_iter()
+            .flat_map(|tile| tile.bricks.iter().map(|(code, mask)| (*code, *mask)))
+    }
+
+    /// Replaces the voxels of a brick of a tile.
+    pub(super) fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
+        let of_tile = self.tiles.entry(tile).or_default();
+        let count = |mask: &BrickMask| mask.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
+        let before = match mask {
+            [0, 0, 0, 0, 0, 0, 0, 0] => of_tile.bricks.remove(&brick),
+            _ => of_tile.bricks.insert(brick, mask),
+        };
+        let (before, after) = (before.as_ref().map_or(0, count), count(&mask));
+        of_tile.len = of_tile.len + after - before;
+        of_tile.digest = None;
+        self.len = self.len + after - before;
+        if of_tile.bricks.is_empty() {
+            self.tiles.remove(&tile);
+        }
+    }
+
+    /// The voxels in order.
+    pub fn iter(&self) -> impl Iterator<Item = VoxelIndex> {
+        self.in_range(SetRange::ALL)
+    }
+
+    /// The voxels of a range, in order.
+    pub fn in_range(&self, range: SetRange) -> impl Iterator<Item = VoxelIndex> {
+        let tiles = range.is_valid().then(|| self.tiles.range(range.first.tile..=range.last.tile));
+        tiles.into_iter().flatten().flat_map(move |(&index, tile)| {
+            let first = if index == range.first.tile { range.first.code } else { 0 };
+            let last = if index == range.last.tile { range.last.code } else { LAST_CODE };
+            let min = self.grid.voxels_of_tile(index).min;
+            let bricks = (first <= last)
+                .then(|| tile.bricks.range(MortonCode(first).brick()..=MortonCode(last).brick()));
+            let codes = bricks
+                .into_iter()
+                .flatten()
+                .flat_map(|(brick, mask)| places(*mask).map(|place| brick.voxel(place)));
+            codes
+                .filter(move |code| (first..=last).contains(&code.0))
+                .map(move |code| code.to_key().to_index_from(min))
+        })
+    }
+
+    /// Where a voxel is in the order of the set.
+    pub fn position_of(&self, voxel: VoxelIndex) -> SetPosition {
+        position_of(&self.grid, voxel)
+    }
+
+    /// BLAKE3 over the sorted Morton codes of a tile's voxels, six bytes each, little-endian; `None` for a tile without.
+    pub fn digest_of_tile(&mut self, tile: TileIndex) -> Option<[u8; 32]> {
+        self.tiles.get_mut(&tile).map(TileVoxels::digest)
+    }
+
+    /// BLAKE3 over "voxtile-set-1", the bits of resolution and tile size, and each tile's index and digest, in order:
+    /// equal for equal sets.
+    pub fn digest(&mut self) -> blake3::Hash {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(LABEL);
+        hasher.update(&self.grid.resolution_m().to_bits().to_le_bytes());
+        hasher.update(&self.grid.tile_size_m().to_bits().to_le_bytes());
+        self.add_tiles(&mut hasher, SetRange::ALL.first.tile, SetRange::ALL.last.tile);
+        hasher.finalize()
+    }
+
+    /// The number of voxels of some tiles, and the first eight bytes of BLAKE3 over these tiles' indices and digests.
+    pub(super) fn short_digest(&mut self, first: TileIndex, last: TileIndex) -> (u64, [u8; 8]) {
+        let mut hasher = blake3::Hasher::new();
+        let voxels = self.add_tiles(&mut hasher, first, last);
+        let digest = hasher.finalize();
+        (voxels, std::array::from_fn(|k| digest.as_bytes()[k]))
+    }
+
+    fn add_tiles(&mut self, hasher: &mut blake3::Hasher, first: TileIndex, last: TileIndex) -> u64 {
+        let mut voxels = 0;
+        if first > last {
+            return 0;
+        }
+        for (index, tile) in self.tiles.range_mut(first..=last) {
+            index.to_array().iter().for_each(|k| {
+                hasher.update(&k.to_le_bytes());
+            });
+            hasher.update(&tile.digest());
+            voxels += tile.len;
+        }
+        voxels
+    }
+
+    /// The tiles from one to another, both included, that hold voxels.
+    pub(super) fn tiles_between(&self, first: TileIndex, last: TileIndex) -> Vec<TileIndex> {
+        if first > last {
+            Vec::new()
+        } else {
+            self.tiles.range(first..=last).map(|(index, _)| *index).collect()
+        }
+    }
+
+    /// Number of voxels of a tile.
+    pub fn voxels_of_tile(&self, tile: TileIndex) -> u64 {
+        self.tiles.get(&tile).map_or(0, |tile| tile.len)
+    }
+
+    /// Whether a tile holds voxels.
+    pub fn has_tile(&self, tile: TileIndex) -> bool {
+        self.tiles.contains_key(&tile)
+    }
+}
+
+/// Equal sets of equal grids.
+impl PartialEq for VoxelSet {
+    fn eq(&self, other: &Self) -> bool {
+        let bricks = |set: &Self| {
+            set.tiles.iter().map(|(index, tile)| (*index, tile.bricks.clone())).collect::<Vec<_>>()
+        };
+        self.grid == other.grid && self.len == other.len && bricks(self) == bricks(other)
+    }
+}
+
+impl TileVoxels {
+    fn digest(&mut self) -> [u8; 32] {
+        *self.digest.get_or_insert_with(|| {
+            let mut hasher = blake3::Hasher::new();
+            for (brick, mask) in &self.bricks {
+                for place in places(*mask) {
+                    hasher.update(&brick.voxel(place).0.to_le_bytes()[..6]);
+                }
+            }
+            *hasher.finalize().as_bytes()
+        })
+    }
+}
+
+pub(super) fn position_of(grid: &Grid, voxel: VoxelIndex) -> SetPosition {
+    SetPosition { tile: grid.tile_of_voxel(voxel), code: VoxelKey::from_index(voxel).morton().0 }
+}
+
+fn has(mask: &BrickMask, place: usize) -> bool {
+    mask[place / 64] >> (place % 64) & 1 == 1
+}

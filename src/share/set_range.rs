@@ -1,0 +1,64 @@
+use crate::space::TileIndex;
+
+/// A place in the order of a set: by tile (x, then y, then z), then by the Morton code of the voxel's key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SetPosition {
+    /// Which tile.
+    pub tile: TileIndex,
+    /// Morton code of 48 bits.
+    pub code: u64,
+}
+
+/// Places from one to another, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SetRange {
+    /// The first place.
+    pub first: SetPosition,
+    /// The last one, not before the first.
+    pub last: SetPosition,
+}
+
+/// The largest Morton code of a key.
+pub(super) const LAST_CODE: u64 = (1 << 48) - 1;
+
+impl SetPosition {
+    /// The place behind this one.
+    pub(super) fn next(self) -> Self {
+        if self.code < LAST_CODE {
+            return Self { code: self.code + 1, ..self };
+        }
+        let TileIndex { x, y, z } = self.tile;
+        let tile = match (y, z) {
+            (i32::MAX, i32::MAX) => TileIndex::new(x.saturating_add(1), i32::MIN, i32::MIN),
+            (_, i32::MAX) => TileIndex::new(x, y + 1, i32::MIN),
+            _ => TileIndex::new(x, y, z + 1),
+        };
+        Self { tile, code: 0 }
+    }
+}
+
+impl SetRange {
+    /// Everything.
+    pub const ALL: Self = Self {
+        first: SetPosition { tile: TileIndex::new(i32::MIN, i32::MIN, i32::MIN), code: 0 },
+        last: SetPosition { tile: TileIndex::new(i32::MAX, i32::MAX, i32::MAX), code: LAST_CODE },
+    };
+
+    /// The places of tiles from one to another, both included.
+    pub fn of_tiles(first: TileIndex, last: TileIndex) -> Self {
+        Self {
+            first: SetPosition { tile: first, code: 0 },
+            last: SetPosition { tile: last, code: LAST_CODE },
+        }
+    }
+
+    /// Whether a place lies in the range.
+    pub fn contains(&self, position: SetPosition) -> bool {
+        self.first <= position && position <= self.last
+    }
+
+    /// Whether the range ends where it begins or later.
+    pub fn is_valid(&self) -> bool {
+        self.first <= self.last && self.first.code <= LAST_CODE && self.last.code <= LAST_CODE
+    }
+}

@@ -1,0 +1,133 @@
+use super::set::VoxelSet;
+use crate::error::{Error, Result};
+use crate::mapper::MapView;
+use crate::query::{Occupancy, Questions, Shape, UnknownAs};
+use crate::scan::{MAX_RAY_STEPS, RayWalk};
+use crate::space::{Grid, Point, VoxelIndex};
+
+/// A robot's own map together with the layers of others: occupied is what is occupied in any of them.
+#[derive(Clone, Copy, Debug)]
+pub struct WithLayers<'a, V> {
+    map: &'a V,
+    layers: &'a [&'a VoxelSet],
+}
+
+impl<'a, V: MapView> WithLayers<'a, V> {
+    /// A map and layers over it.
+    ///
+    /// # Errors
+    ///
+    /// A layer with other voxels than the map's.
+    pub fn new(map: &'a V, layers: &'a [&'a VoxelSet]) -> Result<Self> {
+        let own = map.config().grid.resolution_m();
+        for layer in layers {
+            let theirs = layer.grid().resolution_m();
+            if theirs.to_bits() != own.to_bits() {
+                let reason =
+                    format!("{theirs} m in a layer, {own} m in the map; share maps of one resolution");
+                return Err(Error::argument("resolution", reason));
+            }
+        }
+        Ok(Self { map, layers })
+    }
+
+    /// What is known of the voxel that holds a point. Of a voxel that only layers have, the probability is not known: it
+    /// counts as 1.
+    ///
+    /// # Errors
+    ///
+    /// A tile of the map that cannot be read.
+    pub fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
+        let own = self.map.occupancy_at(point)?;
+        let voxel = self.grid().voxel_of(point);
+        let is_in_layer = voxel.is_some_and(|voxel| self.is_in_layer(voxel));
+        Ok(if is_in_layer && !own.is_occupied() { Occupancy::Occupied(1.0) } else { own })
+    }
+
+    /// The first voxel on a segment that is occupied (or unknown, if that is an obstacle).
+    ///
+    /// # Errors
+    ///
+    /// Ends without a voxel, a segment of more than a million voxels, a tile of the map that cannot be read.
+    pub fn first_on_segment(&self, from: Point, to: Point, unknown: UnknownAs) -> Result<Option<VoxelIndex>> {
+        let grid = self.grid();
+        let (Some(start), Some(last)) = (grid.voxel_of(from), grid.voxel_of(to)) else {
+            return Err(Error::argument("segment", format!("{from:?} to {to:?} m: an end has no voxel")));
+        };
+        let mut walk = RayWalk::between(grid.to_voxel_units(from), start, grid.to_voxel_units(to), last);
+        if walk.steps() > MAX_RAY_STEPS {
+            return Err(Error::argument("segment", "it is more than a million voxels long"));
+        }
+        loop {
+            let voxel = walk.voxel();
+            if self.is_obstacle(voxel, unknown)? {
+                return Ok(Some(voxel));
+            }
+            if walk.is_at_end() {
+                return Ok(None);
+            }
+            walk.advance();
+        }
+    }
+
+    /// A voxel that a sphere touches and that is occupied (or unknown, if that is an obstacle).
+    ///
+    /// # Errors
+    ///
+    /// A sphere that is not finite or too large, a tile of the map that cannot be read.
+    pub fn sphere_collision(
+        &self,
+        center: Point,
+        radius_m: f64,
+        unknown: UnknownAs,
+    ) -> Result<Option<VoxelIndex>> {
+        let own = self.map.collision(&Shape::Sphere { center, radius_m }, unknown)?;
+        // The map may call unknown what a layer has; either is an obstacle.
+        if own.is_some() {
+            return Ok(own);
+        }
+        let grid = self.grid();
+        let corner = |sign: f64| grid.voxel_of(center.map(|k| k + sign * radius_m));
+        let (Some(low), Some(high)) = (corner(-1.0), corner(1.0)) else { return Ok(None) };
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let voxel = [x, y, z];
+                    if self.is_in_layer(voxel) && touches(grid, voxel, center, radius_m) {
+                        return Ok(Some(voxel));
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn grid(&self) -> &Grid {
+        &self.map.config().grid
+    }
+
+    fn is_in_layer(&self, voxel: VoxelIndex) -> bool {
+        self.layers.iter().any(|layer| layer.contains(voxel))
+    }
+
+    fn is_obstacle(&self, voxel: VoxelIndex, unknown: UnknownAs) -> Result<bool> {
+        if self.is_in_layer(voxel) {
+            return Ok(true);
+        }
+        let own = Occupancy::of(self.map.config(), self.map.evidence(voxel)?);
+        Ok(own.is_occupied() || (own == Occupancy::Unknown && unknown == UnknownAs::Obstacle))
+    }
+}
+
+/// Whether a sphere touches a voxel.
+fn touches(grid: &Grid, voxel: VoxelIndex, center: Point, radius_m: f64) -> bool {
+    let r = grid.resolution_m();
+    let squared: f64 = (0..3)
+        .map(|k| {
+            let low = f64::from(voxel[k]) * r;
+            let nearest = center[k].clamp(low, low + r);
+            (center[k] - nearest) * (center[k] - nearest)
+        })
+        .sum();
+    squared <= radius_m * radius_m
+}

@@ -1,0 +1,181 @@
+use super::sender::Sender;
+use crate::error::{Error, Result};
+use crate::local::{LocalMap, LocalReport, LocalState, LocalView};
+use crate::mapper::MapView;
+use crate::maths::logit;
+use crate::scan::{RayWalk, Scan};
+use crate::space::{BrickMask, Grid, TileIndex, VoxelIndex};
+use rustc_hash::FxHashSet;
+use std::sync::Arc;
+
+/// Tells a sender what of an archive is occupied: voxels whose probability is at least a threshold.
+#[derive(Clone, Copy, Debug)]
+pub struct MapWatch {
+    threshold_log_odds: f64,
+}
+
+impl MapWatch {
+    /// Voxels of at least this probability.
+    ///
+    /// # Errors
+    ///
+    /// A threshold that is not between 0 and 1.
+    pub fn new(threshold: f64) -> Result<Self> {
+        if !(threshold > 0.0 && threshold < 1.0) {
+            return Err(Error::argument("threshold", format!("{threshold} is not between 0 and 1")));
+        }
+        Ok(Self { threshold_log_odds: logit(threshold) })
+    }
+
+    /// Looks at the whole map: once, before the first scan.
+    ///
+    /// # Errors
+    ///
+    /// A map of another grid, a tile that cannot be read.
+    pub fn take_all(&self, view: &impl MapView, sender: &mut Sender) -> Result<()> {
+        check_grid(&view.config().grid, sender)?;
+        view.tile_indices().into_iter().try_for_each(|tile| self.take_tile(view, tile, sender))
+    }
+
+    /// Looks at the tiles that a scan, which the map has just taken, may have changed.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapWatch::take_all`].
+    pub fn take_scan(&self, view: &impl MapView, scan: &Scan, sender: &mut Sender) -> Result<()> {
+        check_grid(&view.config().grid, sender)?;
+        let Some([first, last]) = tiles_around(view.config().grid, view.config().rays.max_range_m, scan)
+        else {
+            return Ok(());
+        };
+        let is_near = |tile: &TileIndex| {
+            (0..3).all(|k| (first.to_array()[k]..=last.to_array()[k]).contains(&tile.to_array()[k]))
+        };
+        view.tile_indices()
+            .into_iter()
+            .filter(is_near)
+            .try_for_each(|tile| self.take_tile(view, tile, sender))
+    }
+
+    fn take_tile(&self, view: &impl MapView, index: TileIndex, sender: &mut Sender) -> Result<()> {
+        let Some(tile) = view.tile(index)? else { return Ok(()) };
+        for brick in tile.table().bricks() {
+            let mut mask: BrickMask = [0; 8];
+            tile.table().for_each_in(brick, |place, evidence| {
+                mask[place / 64] |= u64::from(evidence.log_odds >= self.threshold_log_odds) << (place % 64);
+            });
+            sender.put_brick(index, brick, mask);
+        }
+        Ok(())
+    }
+}
+
+fn check_grid(grid: &Grid, sender: &Sender) -> Result<()> {
+    if grid == sender.grid() {
+        return Ok(());
+    }
+    let reason =
+        format!("voxels and tiles of the map and of the sender differ: {grid:?}, {:?}", sender.grid());
+    Err(Error::argument("grid", reason))
+}
+
+/// The lowest and the highest tile that a scan may reach.
+fn tiles_around(grid: Grid, max_range_m: Option<f64>, scan: &Scan) -> Option<[TileIndex; 2]> {
+    let range = max_range_m.unwrap_or(f64::INFINITY);
+    let origin = scan.origin;
+    grid.voxel_of(origin)?;
+    let (mut low, mut high) = (origin, origin);
+    for point in scan.points.iter().filter(|point| grid.voxel_of(**point).is_some()) {
+        for k in 0..3 {
+            // One voxel more: what is cut at the range is rounded.
+            let reach = range + grid.resolution_m();
+            low[k] = low[k].min(point[k].max(origin[k] - reach));
+            high[k] = high[k].max(point[k].min(origin[k] + reach));
+        }
+    }
+    Some([grid.tile_of(low)?, grid.tile_of(high)?])
+}
+
+/// Tells a sender what of a local map is occupied. A voxel that the map forgets for its age stays in the set; one that rays
+/// have found free leaves it.
+#[derive(Clone, Debug)]
+pub struct LocalWatch {
+    seen: Option<Arc<LocalView>>,
+}
+
+impl LocalWatch {
+    /// A watch that has seen nothing.
+    pub fn new() -> Self {
+        Self { seen: None }
+    }
+
+    /// Looks at what a scan has changed, which the map has just taken.
+    ///
+    /// # Errors
+    ///
+    /// A sender whose voxels have another size.
+    pub fn take_scan(
+        &mut self,
+        map: &LocalMap,
+        report: &LocalReport,
+        scan: &Scan,
+        sender: &mut Sender,
+    ) -> Result<()> {
+        if map.resolution_m().to_bits() != sender.grid().resolution_m().to_bits() {
+            let reason = format!(
+                "{} m in the map, {} m in the sender",
+                map.resolution_m(),
+                sender.grid().resolution_m()
+            );
+            return Err(Error::argument("resolution", reason));
+        }
+        let now = map.view().clone();
+        let changes = match &self.seen {
+            Some(seen) => now.changes_since(seen),
+            None => now.changes_since(&LocalMap::new(map.resolution_m(), *map.parameters())?.view().clone()),
+        };
+        self.seen = Some(now);
+        let mut left: FxHashSet<VoxelIndex> = FxHashSet::default();
+        for change in changes {
+            if change.after == LocalState::Occupied {
+                sender.put(change.voxel, true);
+            } else if change.before == LocalState::Occupied {
+                left.insert(change.voxel);
+            }
+        }
+        if report.forgotten > 0 && !left.is_empty() {
+            left = passed_by_rays(sender.grid(), scan, left);
+        }
+        left.into_iter().for_each(|voxel| sender.put(voxel, false));
+        Ok(())
+    }
+}
+
+impl Default for LocalWatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The voxels of a set on the rays of a scan; no ray passes what was forgotten for its age.
+fn passed_by_rays(grid: &Grid, scan: &Scan, mut wanted: FxHashSet<VoxelIndex>) -> FxHashSet<VoxelIndex> {
+    let mut found = FxHashSet::default();
+    let Some(start) = grid.voxel_of(scan.origin) else { return found };
+    let origin = grid.to_voxel_units(scan.origin);
+    for &point in &scan.points {
+        let Some(last) = grid.voxel_of(point) else { continue };
+        let walk = RayWalk::between(origin, start, grid.to_voxel_units(point), last);
+        if walk.steps() > crate::scan::MAX_RAY_STEPS {
+            continue;
+        }
+        walk.for_each_before_end(|voxel| {
+            if wanted.remove(&voxel) {
+                found.insert(voxel);
+            }
+        });
+        if wanted.is_empty() {
+            break;
+        }
+    }
+    found
+}

@@ -1,0 +1,200 @@
+use crate::support::random_scans::{Random, random_scan};
+use crate::support::reference_local::states_of;
+use std::collections::BTreeSet;
+use std::time::Duration;
+use voxtile::local::{LocalMap, LocalParameters, LocalState};
+use voxtile::query::UnknownAs;
+use voxtile::share::{
+    LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, WithLayers, fold_layer, read_layer, write_layer,
+};
+use voxtile::space::VoxelIndex;
+use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Questions, Scan};
+
+fn config() -> MapConfig {
+    MapConfig::new(0.1, 1.0).unwrap().with_range(0.0, 3.0)
+}
+
+fn sender() -> Sender {
+    Sender::new(config().grid, 1, SenderConfig::default()).unwrap()
+}
+
+fn sent(sender: &mut Sender) -> BTreeSet<VoxelIndex> {
+    sender.flush(Duration::ZERO);
+    sender.sent().iter().collect()
+}
+
+fn occupied(map: &InMemoryMapper, threshold: f64) -> BTreeSet<VoxelIndex> {
+    map.all_occupied_voxels(Some(threshold)).unwrap().iter().map(|voxel| voxel.index).collect()
+}
+
+#[test]
+fn what_a_watch_tells_is_what_is_occupied_after_every_scan() {
+    for (seed, threshold) in [(1, 0.5), (2, 0.6), (3, 0.9)] {
+        let mut random = Random(seed);
+        let mut map = InMemoryMapper::new(config()).unwrap();
+        let (mut by_scans, mut at_once, mut seldom_sent) = (sender(), sender(), sender());
+        let watch = MapWatch::new(threshold).unwrap();
+        for number in 0..12 {
+            let scan = random_scan(&mut random, [f64::from(number), 0.0, 0.0], 300);
+            map.insert_scan(&scan).unwrap();
+            watch.take_scan(&map, &scan, &mut by_scans).unwrap();
+            watch.take_scan(&map, &scan, &mut seldom_sent).unwrap();
+            assert!(sent(&mut by_scans) == occupied(&map, threshold));
+        }
+        assert!(sent(&mut seldom_sent) == occupied(&map, threshold));
+        watch.take_all(&map, &mut at_once).unwrap();
+        assert!(sent(&mut at_once) == occupied(&map, threshold));
+    }
+    assert!(MapWatch::new(1.0).is_err());
+    let mut other = Sender::new(MapConfig::new(0.2, 1.0).unwrap().grid, 1, SenderConfig::default()).unwrap();
+    let map = InMemoryMapper::new(config()).unwrap();
+    assert!(MapWatch::new(0.5).unwrap().take_all(&map, &mut other).is_err());
+}
+
+#[test]
+fn a_local_map_shares_what_it_finds_occupied_and_forgets_nothing_for_its_age() {
+    for limit in [None, Some(150)] {
+        let mut random = Random(5);
+        let mut map = LocalMap::new(0.1, LocalParameters::local_mapping().with_max_voxels(limit)).unwrap();
+        let mut watch = LocalWatch::new();
+        let mut sender = sender();
+        let (mut forgotten, mut left) = (0, 0);
+        let mut before = BTreeSet::new();
+        for number in 0..20 {
+            // Five points that are seen once, and then three times rays that pass through them.
+            let cycle = f64::from(number / 4);
+            let farther = if number % 4 == 0 { 1.0 } else { 2.0 };
+            let seen = (0..5).map(|k| [2.05 + 0.1 * cycle, 0.3 * f64::from(k), 0.35].map(|x| farther * x));
+            let points = (0..30).map(|_| random.point([0.0; 3], 4.0)).chain(seen).collect();
+            let scan = Scan { origin: [0.0; 3], points, intensities: None };
+            let report = map.insert_scan(&scan).unwrap();
+            watch.take_scan(&map, &report, &scan, &mut sender).unwrap();
+            let states = states_of(map.view());
+            let is_occupied =
+                |(voxel, state): (VoxelIndex, LocalState)| (state == LocalState::Occupied).then_some(voxel);
+            let occupied: BTreeSet<VoxelIndex> = states.into_iter().filter_map(is_occupied).collect();
+            let shared = sent(&mut sender);
+            assert!(shared.is_superset(&occupied));
+            if limit.is_none() {
+                assert!(shared == occupied);
+            }
+            left += before.difference(&shared).count();
+            forgotten += report.forgotten;
+            before = shared;
+        }
+        assert_eq!(forgotten > 0, limit.is_some());
+        assert!(left > 0, "rays have freed nothing");
+        if limit.is_some() {
+            assert!(before.len() > map.stored_voxels() + 100, "{} shared", before.len());
+        }
+    }
+}
+
+fn layer(voxels: impl IntoIterator<Item = VoxelIndex>) -> VoxelSet {
+    let mut layer = VoxelSet::new(config().grid);
+    voxels.into_iter().for_each(|voxel| {
+        layer.put(voxel, true);
+    });
+    layer
+}
+
+#[test]
+fn a_folded_layer_is_occupied_and_folding_it_again_changes_nothing() {
+    let mut random = Random(9);
+    let mut map = InMemoryMapper::new(config()).unwrap();
+    let scan = Scan { origin: [0.0; 3], points: vec![[2.05, 0.05, 0.05]; 5], intensities: None };
+    (0..4).for_each(|_| {
+        map.insert_scan(&scan).unwrap();
+    });
+    // One voxel that the map has seen free four times, one that it has seen occupied, others.
+    let new = (0..200).map(|_| std::array::from_fn(|_| 30 + random.below(40) as i32));
+    let layer = layer(new.chain([[10, 0, 0], [20, 0, 0]]));
+    let report = fold_layer(&layer, &mut map).unwrap();
+    assert_eq!((report.voxels, report.known, report.hits), (layer.len(), 1, layer.len() - 1));
+    let now = occupied(&map, 0.5);
+    assert_eq!(now.len() as u64, layer.len() - 1, "what was seen free four times is free");
+    let digest = map.digest().unwrap();
+    let again = fold_layer(&layer, &mut map).unwrap();
+    assert_eq!(again.hits, 1);
+    assert_ne!(map.digest().unwrap(), digest, "its hit counts");
+    let mut other = InMemoryMapper::new(MapConfig::new(0.2, 1.0).unwrap()).unwrap();
+    assert!(fold_layer(&layer, &mut other).is_err());
+}
+
+#[test]
+fn questions_are_answered_from_all_maps_together() {
+    let mut random = Random(11);
+    let mut map = InMemoryMapper::new(config()).unwrap();
+    for _ in 0..3 {
+        map.insert_scan(&random_scan(&mut random, [0.0; 3], 200)).unwrap();
+    }
+    let mut voxels =
+        || (0..300).map(|_| std::array::from_fn(|_| random.below(60) as i32 - 30)).collect::<Vec<_>>();
+    let layers = [layer(voxels()), layer(voxels())];
+    let layers = [&layers[0], &layers[1]];
+    let all = WithLayers::new(&map, &layers).unwrap();
+    let own = occupied(&map, 0.5);
+    let is_occupied =
+        |voxel: VoxelIndex| own.contains(&voxel) || layers.iter().any(|layer| layer.contains(voxel));
+    let grid = map.config().grid;
+    let mut random = Random(12);
+    let (mut hits, mut collisions) = (0, 0);
+    for _ in 0..300 {
+        let (from, to) = (random.point([0.0; 3], 3.5), random.point([0.0; 3], 3.5));
+        assert_eq!(all.occupancy_at(from).unwrap().is_occupied(), is_occupied(grid.voxel_of(from).unwrap()));
+        let hit = all.first_on_segment(from, to, UnknownAs::Free).unwrap();
+        hits += usize::from(hit.is_some());
+        assert!(hit.is_none_or(is_occupied));
+        // No smaller step along the segment finds anything before the hit.
+        for step in 0..1000 {
+            let at = std::array::from_fn(|k| from[k] + (to[k] - from[k]) * f64::from(step) / 1000.0);
+            let voxel = grid.voxel_of(at).unwrap();
+            if is_occupied(voxel) {
+                assert!(hit.is_some());
+                break;
+            }
+            if hit == Some(voxel) {
+                break;
+            }
+        }
+        let collision = all.sphere_collision(from, 0.25, UnknownAs::Free).unwrap();
+        collisions += usize::from(collision.is_some());
+        let near = |voxel: &VoxelIndex| {
+            let low = voxel.map(|k| f64::from(k) * 0.1);
+            let gap = |k: usize| from[k] - from[k].clamp(low[k], low[k] + 0.1);
+            (0..3).map(|k| gap(k) * gap(k)).sum::<f64>()
+        };
+        let everything = own.iter().copied().chain(layers.iter().flat_map(|layer| layer.iter()));
+        let nearest = everything.map(|voxel| near(&voxel)).fold(f64::INFINITY, f64::min);
+        if (nearest - 0.0625).abs() > 1e-9 {
+            assert_eq!(collision.is_some(), nearest < 0.0625);
+        }
+    }
+    assert!(hits > 20 && collisions > 20, "{hits} {collisions}");
+    let coarse = [&VoxelSet::new(MapConfig::new(0.2, 1.0).unwrap().grid)];
+    assert!(WithLayers::new(&map, &coarse).is_err());
+}
+
+#[test]
+fn a_layer_comes_back_from_its_file_and_damage_is_told() {
+    let mut random = Random(21);
+    let many = (0..9000).map(|_| std::array::from_fn(|_| random.below(90) as i32 - 45));
+    // Far apart: more than one packet of them.
+    let far = [[-2_000_000_000, 5, 7], [2_000_000_000, 0, -9]];
+    for voxels in [Vec::new(), vec![[1, 2, 3]], many.chain(far).collect()] {
+        let mut layer = layer(voxels);
+        let mut file = Vec::new();
+        write_layer(&mut layer, &mut file).unwrap();
+        assert!(read_layer(&mut &file[..], 1 << 20).unwrap() == layer);
+        for at in (0..file.len()).step_by(1 + file.len() / 50) {
+            let mut damaged = file.clone();
+            damaged[at] ^= 4;
+            assert!(read_layer(&mut &damaged[..], 1 << 20).is_err(), "byte {at}");
+            assert!(read_layer(&mut &file[..at], 1 << 20).is_err(), "cut at {at}");
+        }
+        if layer.len() > 100 {
+            let error = read_layer(&mut &file[..], 100).unwrap_err().to_string();
+            assert!(error.contains("more than 100 voxels"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+use std::time::Duration;
+use voxtile::simulation::Random;
+
+/// A link that loses, repeats, delays and reorders packets, or is cut.
+pub struct LossyLink {
+    random: Random,
+    pub loss: f64,
+    pub repetition: f64,
+    /// Every packet takes between nothing and so long.
+    pub max_delay: Duration,
+    pub is_cut: bool,
+    on_the_way: Vec<(Duration, Vec<u8>)>,
+    /// Bytes that were sent, whether or not they arrive.
+    pub bytes: u64,
+    pub packets: u64,
+    pub max_packet: usize,
+}
+
+impl LossyLink {
+    pub fn new(seed: u64, loss: f64, repetition: f64, max_delay: Duration) -> Self {
+        let random = Random::of(seed, &[]);
+        let on_the_way = Vec::new();
+        Self {
+            random,
+            loss,
+            repetition,
+            max_delay,
+            is_cut: false,
+            on_the_way,
+            bytes: 0,
+            packets: 0,
+            max_packet: 0,
+        }
+    }
+
+    pub fn send(&mut self, packet: &[u8], now: Duration) {
+        self.bytes += packet.len() as u64;
+        self.packets += 1;
+        self.max_packet = self.max_packet.max(packet.len());
+        let copies = if self.random.chance(self.repetition) { 2 } else { 1 };
+        for _ in 0..copies {
+            let delay = self.max_delay.mul_f64(self.random.between(0.0, 1.0));
+            if !self.is_cut && !self.random.chance(self.loss) {
+                self.on_the_way.push((now + delay, packet.to_vec()));
+            }
+        }
+    }
+
+    /// What has arrived by now, in the order of arrival.
+    pub fn arrived(&mut self, now: Duration) -> Vec<Vec<u8>> {
+        let all = std::mem::take(&mut self.on_the_way);
+        let (mut arrived, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|(at, _)| *at <= now);
+        self.on_the_way = rest;
+        arrived.sort_by_key(|(at, _)| *at);
+        arrived.into_iter().map(|(_, packet)| packet).collect()
+    }
+}

@@ -1,0 +1,11 @@
+//! The set of a sender arrives at receivers, whatever the link does.
+
+/// Bytes of packets against plain ones, and hostile ones.
+mod codec;
+/// Folding, unions, watches.
+mod layers;
+pub mod lossy_link;
+/// Random lives of a sender and receivers over a bad link: equal sets at the end.
+mod random_lives;
+/// What hostile packets may not do.
+mod trust;

@@ -1,0 +1,21 @@
+use crate::args::Args;
+use crate::files::{load_layer, open_map};
+use std::path::Path;
+use voxtile::Mapper;
+use voxtile::share::fold_layer;
+
+pub fn run(args: &Args, layer: &Path, map: &Path) -> anyhow::Result<()> {
+    let layer = load_layer(layer, args.max_voxels)?;
+    let mut mapper = open_map(map, &layer)?;
+    let report = fold_layer(&layer, &mut mapper)?;
+    mapper.flush()?;
+    if args.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        println!(
+            "folded    {} voxels: {} got a hit, {} were known",
+            report.voxels, report.hits, report.known
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,128 @@
+use crate::args::Args;
+use anyhow::{Context, anyhow};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::time::Duration;
+use zenoh::qos::CongestionControl;
+use zenoh::{Config, Session, Wait};
+
+/// A connection to other robots: bytes under keys.
+pub struct Link {
+    session: Session,
+    sender: SyncSender<Message>,
+    messages: Receiver<Message>,
+    /// Kept alive, or nothing comes any more.
+    subscribers: Vec<zenoh::pubsub::Subscriber<()>>,
+}
+
+/// Bytes that came under a key.
+pub struct Message {
+    pub key: String,
+    pub bytes: Vec<u8>,
+}
+
+/// Messages that wait to be taken. What does not fit is lost, and catch-up mends it.
+const WAITING: usize = 4096;
+/// Larger messages are none of ours.
+const MAX_BYTES: usize = 64 << 10;
+
+impl Link {
+    pub fn open(args: &Args) -> anyhow::Result<Self> {
+        let (listen, connect) = match args.publish.is_some() {
+            true => (or_default(&args.listen, &args.connect), args.connect.clone()),
+            false => (args.listen.clone(), or_default(&args.connect, &args.listen)),
+        };
+        let mut config = match &args.zenoh_config {
+            Some(file) => Config::from_file(file).map_err(|error| anyhow!("{}: {error}", file.display()))?,
+            None => Config::default(),
+        };
+        let has_file = args.zenoh_config.is_some();
+        let mut set = |key: &str, value: String| {
+            config.insert_json5(key, &value).map_err(|error| anyhow!("{key}: {error}"))
+        };
+        if !has_file {
+            set("mode", "\"peer\"".into())?;
+        }
+        if !has_file || args.scout {
+            set("scouting/multicast/enabled", args.scout.to_string())?;
+        }
+        if !has_file || !args.listen.is_empty() {
+            set("listen/endpoints", serde_json::to_string(&listen)?)?;
+        }
+        if !has_file || !args.connect.is_empty() {
+            set("connect/endpoints", serde_json::to_string(&connect)?)?;
+            // Whoever is not there yet is tried again and again.
+            set("connect/timeout_ms", "-1".into())?;
+            set("connect/exit_on_failure", "false".into())?;
+        }
+        let session =
+            zenoh::open(config).wait().map_err(|error| anyhow!("cannot open the network: {error}"))?;
+        let (sender, messages) = sync_channel(WAITING);
+        Ok(Self { session, sender, messages, subscribers: Vec::new() })
+    }
+
+    /// Listens to all keys of a form.
+    pub fn subscribe(&mut self, keys: &str) -> anyhow::Result<()> {
+        let sender = self.sender.clone();
+        let take = move |sample: zenoh::sample::Sample| {
+            let payload = sample.payload();
+            if payload.len() > MAX_BYTES {
+                return;
+            }
+            let message =
+                Message { key: sample.key_expr().to_string(), bytes: payload.to_bytes().into_owned() };
+            match sender.try_send(message) {
+                Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
+            }
+        };
+        let subscriber = self.session.declare_subscriber(keys).callback(take).wait();
+        self.subscribers.push(subscriber.map_err(|error| anyhow!("{keys}: {error}"))?);
+        Ok(())
+    }
+
+    /// Sends, or drops where the network does not take it: catch-up mends that, and nobody waits.
+    pub fn send(&self, key: &str, bytes: Vec<u8>) -> anyhow::Result<()> {
+        let put = self.session.put(key, bytes).congestion_control(CongestionControl::Drop).wait();
+        put.map_err(|error| anyhow!("{error}")).with_context(|| format!("cannot send to {key}"))
+    }
+
+    /// The next message, if one comes within a time.
+    pub fn next(&self, wait: Duration) -> Option<Message> {
+        self.messages.recv_timeout(wait).ok()
+    }
+
+    pub fn close(self) {
+        drop(self.subscribers);
+        // There is nothing to be done about a network that does not close.
+        let _ = self.session.close().wait();
+    }
+}
+
+fn or_default(endpoints: &[String], others: &[String]) -> Vec<String> {
+    match endpoints.is_empty() && others.is_empty() {
+        true => vec!["tcp/127.0.0.1:7447".to_string()],
+        false => endpoints.to_vec(),
+    }
+}
+
+/// Packets to all.
+pub fn packets_key(robot: &str) -> String {
+    format!("voxtile/{robot}/packets")
+}
+
+/// Answers to one receiver, by its number.
+pub fn answers_key(robot: &str, receiver: u64) -> String {
+    format!("voxtile/{robot}/answers/{receiver:016x}")
+}
+
+/// What a receiver asks.
+pub fn asks_key(robot: &str, receiver: u64) -> String {
+    format!("voxtile/{robot}/asks/{receiver:016x}")
+}
+
+/// The robot, the kind and the receiver of a key.
+pub fn parse_key(key: &str) -> Option<(&str, &str, Option<u64>)> {
+    let mut parts = key.split('/');
+    let (_, robot, kind) = (parts.next()?, parts.next()?, parts.next()?);
+    let receiver = parts.next().map(|number| u64::from_str_radix(number, 16));
+    Some((robot, kind, receiver.transpose().ok()?))
+}

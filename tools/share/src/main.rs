@@ -1,0 +1,52 @@
+//! The command `voxtile-share`, which `voxtile share` runs: sets of occupied voxels over Zenoh.
+//!
+//! All that is clever is in [`voxtile::share`]; here are the transport, the clock and the files.
+
+mod args;
+mod files;
+mod fold;
+mod link;
+/// That of the library's tests.
+#[path = "../../../tests/all/sharing/lossy_link.rs"]
+#[allow(dead_code, missing_docs)]
+mod lossy_link;
+mod measure;
+mod publish;
+mod robot_name;
+mod subscribe;
+
+use args::{Args, Mode};
+use clap::Parser;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("voxtile share: {error:#}");
+            ExitCode::from(if error.is::<voxtile::Error>() { 2 } else { 1 })
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    match args.mode()? {
+        Mode::Publish(source) => publish::run(args, &source, &*stop_signal()?),
+        Mode::Subscribe(output) => subscribe::run(args, &output, &*stop_signal()?),
+        Mode::Fold(layer, output) => fold::run(args, &layer, &output),
+        Mode::Measure(scans) => measure::run(args, &scans),
+    }
+}
+
+/// Set by the first Ctrl-C or SIGTERM; a second one ends the process at once.
+fn stop_signal() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.clone())?;
+        signal_hook::flag::register(signal, stop.clone())?;
+    }
+    Ok(stop)
+}
