@@ -68,6 +68,7 @@ pub mod octree;
 pub mod query;
 pub mod scan;
 pub mod sensor;
+pub mod session;
 pub mod share;
 pub mod simulation;
 pub mod space;

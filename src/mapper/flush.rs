@@ -133,7 +133,7 @@ impl Residency {
 }
 
 /// The metadata of a map; bounds and numbers are the store's to fill in.
-pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
+pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
     let ext = Extension {
         empty: true,
         map_id: hex(&map_id),

@@ -82,7 +82,7 @@ pub(super) struct Fetched {
 
 /// An input that a map is built from, and how many scans the map had taken before.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Input {
+pub(crate) struct Input {
     pub(super) fingerprint: String,
     pub(super) first_scan: u64,
 }

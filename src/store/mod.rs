@@ -21,6 +21,7 @@ mod tile_location;
 mod tile_stamp;
 mod tile_store;
 mod tile_writer;
+mod unfinished;
 mod waiting_file;
 
 pub use commit_log::{CommitLog, Commits, Flush};
@@ -33,6 +34,7 @@ pub use tile_location::{StoredTile, TileLocation};
 pub(crate) use tile_stamp::MAX_NUMBER;
 pub use tile_stamp::{FileStamp, Stamping, TileStamp};
 pub use tile_store::TileStore;
-pub(crate) use tile_store::hex;
+pub(crate) use tile_store::{hex, id_from_hex};
 pub use tile_writer::TileWriter;
+pub use unfinished::{UnfinishedMap, unfinished_folder};
 pub use waiting_file::WaitingFile;

@@ -362,3 +362,10 @@ impl std::fmt::Debug for SharedMetadata {
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
+
+/// An id from its hexadecimal digits.
+pub(crate) fn id_from_hex(digits: &str) -> Option<[u8; 16]> {
+    let byte = |at: usize| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok();
+    let bytes: Option<Vec<u8>> = (0..16).map(byte).collect();
+    bytes?.try_into().ok().filter(|_| digits.len() == 32)
+}

@@ -6,7 +6,7 @@ use crate::mapper::tile_files::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
     Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Stamping,
-    StoredTile, TileFile, TileStamp, hex, tile_of_folder,
+    StoredTile, TileFile, TileStamp, hex, id_from_hex, tile_of_folder,
 };
 use crate::tile::format::{Trailer, read_trailer};
 use rustc_hash::FxHashMap;
@@ -221,7 +221,7 @@ impl Trailers {
 fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<([u8; 16], Metadata)> {
     let written = remains.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
     let logged = remains.commits.metadata.as_ref().filter(|metadata| metadata.ext.is_some());
-    let id_of = |metadata: &Metadata| metadata.ext.as_ref().and_then(|ext| id_from(&ext.map_id));
+    let id_of = |metadata: &Metadata| metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id));
     let of_tiles = trailers.most();
     // Where the two files contradict each other, the tiles decide.
     let candidates =
@@ -252,10 +252,4 @@ fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<(
     };
     let (resolution_m, tile_size_m) = (parameters.resolution, parameters.tile_size);
     Ok((trailer.map_id, Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }))
-}
-
-fn id_from(digits: &str) -> Option<[u8; 16]> {
-    let byte = |at: usize| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok();
-    let bytes: Option<Vec<u8>> = (0..16).map(byte).collect();
-    bytes?.try_into().ok().filter(|_| digits.len() == 32)
 }

@@ -17,6 +17,8 @@ mod layering;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
 mod local_map;
 mod low_memory;
+/// New maps from tables: there is none, or the whole one.
+mod map_writer;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
 /// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
