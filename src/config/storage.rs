@@ -1,4 +1,5 @@
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// How the tiles of a map are stored. It belongs to the map from its beginning; content, answers and digest do not depend
 /// on it.
@@ -11,6 +12,15 @@ pub enum Storage {
     Seed,
     /// One file a tile, `tile.vxt`: the table in the compact form, in a tenth to a fiftieth of the bytes.
     Compact,
+}
+
+impl fmt::Display for Storage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Seed => "seed",
+            Self::Compact => "compact",
+        })
+    }
 }
 
 impl Storage {
