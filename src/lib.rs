@@ -77,7 +77,7 @@ pub mod tile;
 pub mod upkeep;
 
 pub use config::{
-    InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, VoxelCacheConfig, VoxelCacheMode,
+    InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
 };
 pub use error::{DecodeError, Error, FormatError, Place, Result};
 pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};

@@ -197,7 +197,7 @@ pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig>
     let wrong = |error: String| FormatError::at_offset(0, error).in_map(path, None);
     let grid =
         Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
-    let mut config = MapConfig { grid, ..MapConfig::default() };
+    let mut config = MapConfig { grid, storage: metadata.storage(), ..MapConfig::default() };
     if let Some(ext) = &metadata.ext {
         config.sensor_model = ext.sensor_model;
         config.occupancy_threshold = ext.occupancy_threshold;

@@ -32,6 +32,7 @@ mod statistics;
 pub(crate) mod tile_files;
 mod tile_map;
 mod tile_ref;
+pub(crate) mod tile_saver;
 mod tile_traffic;
 mod trace;
 mod traits;

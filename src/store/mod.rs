@@ -26,7 +26,7 @@ mod waiting_file;
 
 pub use commit_log::{CommitLog, Commits, Flush};
 pub use disk::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
-pub use layout::{Layout, QUARANTINE, TileFile, flush_of_kept, folder_name, tile_of_folder};
+pub use layout::{Layout, QUARANTINE, TileFile, folder_name, tile_of_folder};
 pub use map_folder::{Lock, read_log};
 pub use metadata::{Bounds, Extension, MapParameters, Metadata};
 pub use remains::Remains;

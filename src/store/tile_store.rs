@@ -1,6 +1,6 @@
 use super::commit_log::{CommitLog, Commits};
 use super::disk::{Disk, DiskRead};
-use super::layout::{Layout, TileFile, flush_of_kept};
+use super::layout::{Layout, TileFile};
 use super::map_folder::{self, Lock};
 use super::metadata::Metadata;
 use super::readers::Readers;
@@ -179,6 +179,7 @@ impl TileStore {
         log: Option<CommitLog>,
         commits: Commits,
     ) -> Self {
+        let layout = layout.with_storage(metadata.storage());
         let (next, suspect, unrenamed, renamed, strays, foreign, readers) = Default::default();
         Self {
             disk,
@@ -304,7 +305,7 @@ impl TileStore {
         };
         let mut kept: Vec<u64> = names
             .iter()
-            .filter_map(|name| flush_of_kept(name))
+            .filter_map(|name| self.layout.flush_of_kept(name))
             .filter(|&flush_number| flush_number >= self.commits.flush_number)
             .collect();
         kept.sort_unstable();
@@ -341,7 +342,15 @@ impl TileStore {
     fn location_at(&self, tile: TileIndex, path: PathBuf, stamp: Option<TileStamp>) -> TileLocation {
         let map_id = stamp.and_then(|_| self.map_id());
         let folder = self.layout.tile_folder(tile);
-        TileLocation { disk: self.disk.clone(), tile, folder, path, map_id, stamp }
+        TileLocation {
+            disk: self.disk.clone(),
+            tile,
+            folder,
+            path,
+            map_id,
+            stamp,
+            storage: self.layout.storage(),
+        }
     }
 
     fn latest_path(&self, tile: TileIndex) -> PathBuf {

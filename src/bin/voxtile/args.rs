@@ -3,6 +3,7 @@ use crate::flush_schedule::FlushEvery;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::ffi::OsString;
 use std::path::PathBuf;
+use voxtile::Storage;
 
 /// Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
 ///
@@ -60,6 +61,9 @@ pub struct BuildArgs {
     /// Edge of a tile in metres, 2 to 1024 whole voxels [default: 10, or the map's own]
     #[arg(long, value_name = "M")]
     pub tile_size: Option<f64>,
+    /// How the tiles of a new map are stored [default: seed, or the map's own]
+    #[arg(long, value_name = "FORM")]
+    pub storage: Option<StorageName>,
     /// Most memory for all that grows with the map or with a scan (256MiB, 1GB); some 40 MB for the rest come on top
     /// [default: 512MiB, or what tiles of this size need at least]
     #[arg(long, value_name = "SIZE", conflicts_with = "cache_tiles")]
@@ -141,6 +145,23 @@ pub enum VoxelCacheName {
     Serial,
     /// The same, with the pointer octrees written by a thread of their own
     Parallel,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StorageName {
+    /// Two files a tile that other programs read: iwlo_meta.bin, 18 bytes a voxel, and octree.bt
+    Seed,
+    /// One file a tile, a tenth to a fiftieth of the bytes; convert makes the other form of it
+    Compact,
+}
+
+impl From<StorageName> for Storage {
+    fn from(name: StorageName) -> Self {
+        match name {
+            StorageName::Seed => Self::Seed,
+            StorageName::Compact => Self::Compact,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -287,6 +308,9 @@ pub struct DemoArgs {
     /// Edge of a voxel in metres
     #[arg(long, value_name = "M", default_value_t = 0.2)]
     pub resolution: f64,
+    /// How the tiles of the map are stored
+    #[arg(long, value_name = "FORM", default_value = "seed")]
+    pub storage: StorageName,
     /// What the colors of the picture show
     #[arg(long, value_name = "WHAT", default_value = "height")]
     pub color: ColorName,
