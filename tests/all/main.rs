@@ -17,8 +17,6 @@ mod layering;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
 mod local_map;
 mod low_memory;
-/// New maps from tables: there is none, or the whole one.
-mod map_writer;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
 /// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
@@ -35,6 +33,8 @@ mod questions;
 mod readers;
 /// The stream of scans, in files and from standard input.
 mod scan_stream;
+/// What is done with whole maps: made, merged, cropped, cleared, faded.
+mod session;
 /// Map sharing: codec, convergence over bad links, layers.
 mod sharing;
 /// Numbers that are large, negative or on a border.
