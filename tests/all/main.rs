@@ -17,6 +17,8 @@ mod layering;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
 mod local_map;
 mod low_memory;
+/// Lives of maps in commands of their own, against a naive life: removed tiles, and every operation as a fault.
+mod map_life;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
 /// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
