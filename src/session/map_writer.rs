@@ -1,6 +1,7 @@
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::mapper::{config_from, new_map_id, new_metadata, tile_files};
+use crate::mapper::tile_saver::TileSaver;
+use crate::mapper::{config_from, new_map_id, new_metadata};
 use crate::space::TileIndex;
 use crate::store::{Disk, FsDisk, Metadata, UnfinishedMap, id_from_hex};
 use crate::tile::Table;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct MapWriter {
     map: UnfinishedMap,
+    saver: TileSaver,
     config: MapConfig,
     metadata: Metadata,
     scan_number: u64,
@@ -81,7 +83,8 @@ impl MapWriter {
         let scan_number = ext.scan_number;
         let map = UnfinishedMap::begin(disk, folder, metadata.clone(), map_id)?;
         let (last, uncommitted, written) = Default::default();
-        Ok(Self { map, config, metadata, scan_number, last, uncommitted, written })
+        let saver = TileSaver::new(&config);
+        Ok(Self { map, saver, config, metadata, scan_number, last, uncommitted, written })
     }
 
     /// How the map is made.
@@ -112,7 +115,7 @@ impl MapWriter {
             return Ok(());
         }
         let store = self.map.store();
-        let stamp = tile_files::write(&store.writer()?, &self.config, tile, table, scan_number)?;
+        let stamp = self.saver.write(&store.writer()?, tile, table, scan_number)?;
         store.note_next(tile, stamp);
         self.last = Some(tile);
         self.written.tiles += 1;

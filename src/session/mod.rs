@@ -4,6 +4,8 @@
 //! tables, in tile order -> MapWriter -> MAP.unfinished -> MAP
 //! ```
 
+mod convert;
 mod map_writer;
 
+pub use convert::convert;
 pub use map_writer::{MapWriter, WrittenMap};

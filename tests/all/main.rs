@@ -3,6 +3,8 @@
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;
+/// Maps with another storage: the same content, and there and back the same files.
+mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
 mod corruption;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
