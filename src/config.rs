@@ -1,13 +1,17 @@
+mod storage;
+
 use crate::error::{Error, Result};
 use crate::maths::logit;
 use crate::sensor::SensorModel;
 use crate::space::Grid;
 use serde::{Deserialize, Serialize};
+pub use storage::Storage;
 
 /// How a map is made and how much memory it may use.
 ///
 /// Resolution, tile size, sensor model and occupancy threshold belong to the map: they are stored with it, and
-/// opening it with others is an error. The rest may change from run to run.
+/// opening it with others is an error. So does its storage, which an opened map keeps, whatever is asked for. The rest may
+/// change from run to run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MapConfig {
@@ -23,6 +27,8 @@ pub struct MapConfig {
     pub octree: OctreeConfig,
     /// How much an out-of-core mapper keeps in memory. Default: 16 tiles, and 32 MiB of updates for others.
     pub memory: MemoryLimit,
+    /// How the tiles of a new map are stored. Default: the seed's files.
+    pub storage: Storage,
 }
 
 /// How much an out-of-core mapper keeps in memory. The map does not depend on it, only the work to make it.
@@ -113,6 +119,7 @@ impl Default for MapConfig {
             rays: RayConfig::default(),
             octree: OctreeConfig::default(),
             memory: MemoryLimit::default(),
+            storage: Storage::default(),
         }
     }
 }
@@ -183,6 +190,11 @@ impl MapConfig {
     #[doc(hidden)]
     pub fn with_tight_memory_bytes(self, bytes: usize) -> Self {
         Self { memory: MemoryLimit::Tight(bytes), ..self }
+    }
+
+    /// The same with another storage for a new map.
+    pub fn with_storage(self, storage: Storage) -> Self {
+        Self { storage, ..self }
     }
 
     fn pending_bytes(&self) -> usize {

@@ -186,6 +186,16 @@ pub enum DecodeError {
 }
 
 impl DecodeError {
+    /// The same of a part that begins so many bytes into the file.
+    pub(crate) fn further_by(self, bytes: u64) -> Self {
+        match self {
+            Self::Format(FormatError { place: Place::Offset, at, reason }) => {
+                FormatError::at_offset(at.saturating_add(bytes), reason).into()
+            }
+            error => error,
+        }
+    }
+
     /// The error of a file that was given to be read.
     pub fn in_input(self, path: &Path) -> Error {
         match self {

@@ -68,6 +68,7 @@ pub mod octree;
 pub mod query;
 pub mod scan;
 pub mod sensor;
+pub mod session;
 pub mod share;
 pub mod simulation;
 pub mod space;
@@ -76,7 +77,7 @@ pub mod tile;
 pub mod upkeep;
 
 pub use config::{
-    InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, VoxelCacheConfig, VoxelCacheMode,
+    InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
 };
 pub use error::{DecodeError, Error, FormatError, Place, Result};
 pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};

@@ -21,6 +21,8 @@ pub(super) struct ColdTiles {
 pub(super) struct ColdTile {
     pub(super) compact: Arc<[u8]>,
     pub(super) voxels: u64,
+    /// Occupied voxels, where the tile will go to disk as it is.
+    pub(super) occupied: Option<u64>,
     /// What the tile's table takes in memory, as it last was there.
     pub(super) table_bytes: usize,
     pub(super) is_dirty: bool,
@@ -65,12 +67,13 @@ impl ColdTiles {
         self.tiles.iter().map(|(&index, tile)| (index, tile))
     }
 
-    /// Puts a tile here in the compact form.
+    /// Puts a tile here in the compact form. If it is to go to disk as it is, the voxels are counted that are occupied, from
+    /// these log-odds.
     ///
     /// # Errors
     ///
     /// Those of the packer, which has none but a lack of memory.
-    pub(super) fn pack(&mut self, tile: &Tile) -> Result<()> {
+    pub(super) fn pack(&mut self, tile: &Tile, occupied_from: Option<f64>) -> Result<()> {
         let failed = |error| Error::io("memory".as_ref(), "pack a tile in", error);
         let writer = match &mut self.writer {
             Some(writer) => writer,
@@ -79,8 +82,10 @@ impl ColdTiles {
         let (table, mut compact) = (tile.table(), Vec::new());
         writer.write(table, &mut compact).map_err(failed)?;
         let (voxels, table_bytes) = (table.len() as u64, table.bytes());
+        let occupied = occupied_from.map(|log_odds| table.count_from(log_odds) as u64);
         let (compact, is_dirty) = (compact.into(), tile.is_dirty());
-        self.put(tile.index(), ColdTile { compact, voxels, table_bytes, is_dirty, is_leaving: false });
+        let cold = ColdTile { compact, voxels, occupied, table_bytes, is_dirty, is_leaving: false };
+        self.put(tile.index(), cold);
         Ok(())
     }
 

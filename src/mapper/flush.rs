@@ -95,7 +95,7 @@ impl Residency {
         // Until it is written: what is on disk of it may be cut short by an attempt that fails.
         self.tiles.change(index, Tile::mark_dirty);
         let Some(tile) = self.tiles.peek(index) else { return Ok(()) };
-        let stamp = tile_files::save(&mut self.store, &self.config, tile, scan_number)?;
+        let stamp = self.saver.save(&mut self.store, tile, scan_number)?;
         self.tiles.change(index, Tile::mark_clean);
         self.io.saves += 1;
         self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
@@ -121,7 +121,7 @@ impl Residency {
                 continue; // Written by an earlier attempt.
             }
             if let Some((tile, _)) = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
-                tile_files::save(&mut self.store, &self.config, &tile, 0)?;
+                self.saver.save(&mut self.store, &tile, 0)?;
             }
         }
         self.store.commit(self.metadata(), 0)
@@ -133,7 +133,7 @@ impl Residency {
 }
 
 /// The metadata of a map; bounds and numbers are the store's to fill in.
-pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
+pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
     let ext = Extension {
         empty: true,
         map_id: hex(&map_id),
@@ -144,6 +144,7 @@ pub(super) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&
         rays: config.rays,
         input_fingerprint: input.map(|input| input.fingerprint.clone()),
         input_first_scan: input.map_or(0, |input| input.first_scan),
+        storage: config.storage,
     };
     let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
     Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }

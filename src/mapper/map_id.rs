@@ -1,7 +1,7 @@
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 /// A new map's id: 16 bytes that no other map has. Identity only, it has no part in any answer.
-pub(super) fn new_map_id() -> [u8; 16] {
+pub(crate) fn new_map_id() -> [u8; 16] {
     let mut hasher = blake3::Hasher::new();
     for _ in 0..2 {
         // The standard library keys its hash maps from the system's source of randomness.

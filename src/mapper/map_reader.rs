@@ -1,5 +1,5 @@
 use super::statistics::IoCounts;
-use super::tile_files;
+use super::tile_files::{self, ReadTable};
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
@@ -103,6 +103,16 @@ impl MapReader {
         })
     }
 
+    /// Where the map is.
+    pub(crate) fn disk(&self) -> Arc<dyn Disk> {
+        self.disk.clone()
+    }
+
+    /// The table of a tile as it stands in its file, which is not kept in memory; `None` if the map has no such tile.
+    pub(crate) fn read_table(&self, index: TileIndex) -> Result<Option<ReadTable>> {
+        tile_files::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
+    }
+
     fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {
         tile_files::load(&self.store, &self.config.grid, &self.octrees, index)
             .map_err(|error| self.explain(error))
@@ -197,7 +207,7 @@ pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig>
     let wrong = |error: String| FormatError::at_offset(0, error).in_map(path, None);
     let grid =
         Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
-    let mut config = MapConfig { grid, ..MapConfig::default() };
+    let mut config = MapConfig { grid, storage: metadata.storage(), ..MapConfig::default() };
     if let Some(ext) = &metadata.ext {
         config.sensor_model = ext.sensor_model;
         config.occupancy_threshold = ext.occupancy_threshold;

@@ -32,12 +32,15 @@ mod statistics;
 pub(crate) mod tile_files;
 mod tile_map;
 mod tile_ref;
+pub(crate) mod tile_saver;
 mod tile_traffic;
 mod trace;
 mod traits;
 mod waiting;
 
+pub(crate) use flush::new_metadata;
 pub use in_memory::InMemoryMapper;
+pub(crate) use map_id::new_map_id;
 pub use map_reader::MapReader;
 pub(crate) use map_reader::config_from;
 pub use out_of_core::OutOfCoreTileMapper;

@@ -58,6 +58,7 @@ impl OutOfCoreTileMapper {
         let config = config.validated()?;
         let store = TileStore::open(disk, folder)?;
         check_parameters(folder, store.metadata(), &config)?;
+        let config = config.with_storage(store.layout().storage());
         Ok(Self::new(config, store))
     }
 

@@ -6,6 +6,7 @@ use super::resident_tiles::ResidentTiles;
 use super::stalls::Stalls;
 use super::statistics::{IoCounts, MapStatistics};
 use super::tile_files;
+use super::tile_saver::TileSaver;
 use super::tile_traffic::{TileTraffic, unpack};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
@@ -40,6 +41,7 @@ pub(super) struct Residency {
     pub(super) octrees: OctreeFactory,
     pub(super) cold: ColdTiles,
     pub(super) traffic: TileTraffic,
+    pub(super) saver: TileSaver,
     pub(super) pending: Pending,
     /// What the scan that is being inserted has in files already; it counts when the scan is accepted.
     pub(super) coming: FxHashMap<TileIndex, InFile>,
@@ -82,7 +84,7 @@ pub(super) struct Fetched {
 
 /// An input that a map is built from, and how many scans the map had taken before.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Input {
+pub(crate) struct Input {
     pub(super) fingerprint: String,
     pub(super) first_scan: u64,
 }
@@ -102,6 +104,7 @@ impl Residency {
             tiles: ResidentTiles::default(),
             cold: ColdTiles::default(),
             traffic: TileTraffic::new(&config),
+            saver: TileSaver::new(&config),
             pending: Pending::default(),
             coming: FxHashMap::default(),
             ahead: LookAhead::default(),

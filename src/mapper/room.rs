@@ -3,6 +3,7 @@
 use super::residency::Residency;
 use super::statistics::MemoryCounts;
 use super::tile_traffic::Saved;
+use crate::config::Storage;
 use crate::error::Result;
 use crate::space::TileIndex;
 use crate::tile::Tile;
@@ -79,7 +80,8 @@ impl Residency {
                 self.stalls.note(since.elapsed());
             }
         } else if let Some(tile) = self.tiles.peek(index) {
-            self.cold.pack(tile)?;
+            let is_compact = self.config.storage == Storage::Compact;
+            self.cold.pack(tile, is_compact.then(|| self.config.occupied_log_odds()))?;
             self.io.packed += 1;
         }
         self.tiles.remove(index);

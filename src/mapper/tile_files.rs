@@ -1,45 +1,11 @@
-//! A tile to its two files and back: the one place that knows both tiles and store.
+//! Tiles from their files. How they get there is `tile_saver.rs`.
 
-use crate::config::MapConfig;
+use crate::config::{MapConfig, Storage};
 use crate::error::{Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
-use crate::store::{FileStamp, MapParameters, StoredTile, TileFile, TileStamp, TileStore, TileWriter, hex};
-use crate::tile::format::{DecodedTable, Trailer, read_table, write_table};
+use crate::store::{FileStamp, MapParameters, StoredTile, TileStamp, TileStore, hex};
+use crate::tile::format::{DecodedTable, Trailer, read_compact_file, read_table};
 use crate::tile::{OctreeFactory, Table, Tile};
-
-/// Writes the next version of a tile's files.
-pub(crate) fn save(
-    store: &mut TileStore,
-    config: &MapConfig,
-    tile: &Tile,
-    scan_number: u64,
-) -> Result<TileStamp> {
-    let stamp = write(&store.writer()?, config, tile.index(), tile.table(), scan_number)?;
-    store.note_next(tile.index(), stamp);
-    Ok(stamp)
-}
-
-/// Writes the next version of a tile's files, of which the store is still to be told.
-pub(crate) fn write(
-    writer: &TileWriter,
-    config: &MapConfig,
-    index: TileIndex,
-    table: &Table,
-    scan_number: u64,
-) -> Result<TileStamp> {
-    let threshold = config.occupied_log_odds();
-    let octree = writer.write_next(index, TileFile::Octree, |mut out| {
-        table.write_bt(config.grid.resolution_m(), threshold as f32, &mut out)
-    })?;
-    let (map_id, parameters) = (writer.map_id(), map_parameters(config).to_text());
-    let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
-    let trailer =
-        Trailer { map_id, tile: index, scan_number, table_crc: 0, octree_crc, octree_bytes, parameters };
-    let (voxels, occupied) = (table.len() as u64, table.count_from(threshold) as u64);
-    let table = writer
-        .write_next(index, TileFile::Table, |mut out| write_table(table, trailer, &mut out).map(drop))?;
-    Ok(TileStamp { scan_number, table, octree, voxels, occupied })
-}
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
 pub(crate) fn load(
@@ -96,13 +62,17 @@ pub(crate) struct ReadTable {
 
 /// Reads a tile's table. In a map with an id it must be that map's, and the version that the log names, if it does.
 pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: StoredTile) -> Result<ReadTable> {
-    let decoded = read_table(&mut stored.input, stored.bytes, &grid.voxels_of_tile(index))
-        .map_err(|error| error.in_map(&stored.path, Some(index)))?;
-    let StoredTile { path, input, map_id, stamp, .. } = stored;
+    let voxels = grid.voxels_of_tile(index);
+    let decoded = match stored.storage {
+        Storage::Seed => read_table(&mut stored.input, stored.bytes, &voxels),
+        Storage::Compact => read_compact_file(&mut stored.input, stored.bytes, &voxels),
+    };
+    let decoded = decoded.map_err(|error| error.in_map(&stored.path, Some(index)))?;
+    let StoredTile { path, input, map_id, stamp, storage, .. } = stored;
     let (file, _) = input.finish();
     let DecodedTable { table, trailer } = decoded;
     if let Some(map_id) = map_id {
-        check(map_id, index, trailer.as_ref(), file, stamp)
+        check(map_id, index, storage, trailer.as_ref(), file, stamp)
             .map_err(|error| error.in_map(&path, Some(index)))?;
     }
     Ok(ReadTable { table, file, trailer })
@@ -112,6 +82,7 @@ pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: Store
 fn check(
     map_id: [u8; 16],
     index: TileIndex,
+    storage: Storage,
     trailer: Option<&Trailer>,
     file: FileStamp,
     stamp: Option<TileStamp>,
@@ -119,7 +90,10 @@ fn check(
     let Some(trailer) = trailer else {
         return Err(FormatError::at_offset(file.bytes, "the trailer after the last entry is missing"));
     };
-    let at = file.bytes - trailer.bytes();
+    let at = match storage {
+        Storage::Seed => file.bytes - trailer.bytes(),
+        Storage::Compact => 0,
+    };
     let damaged = |offset, reason: String| Err(FormatError::at_offset(at + offset, reason));
     if trailer.map_id != map_id {
         return damaged(

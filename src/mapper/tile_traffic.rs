@@ -1,6 +1,7 @@
 use super::cold_tiles::ColdTile;
 use super::side_worker::SideWorker;
 use super::tile_files::{self, ReadTable};
+use super::tile_saver::{PackedTable, TileSaver};
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::space::{Grid, TileIndex};
@@ -9,7 +10,6 @@ use crate::tile::Table;
 use crate::tile::format::read_compact;
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 /// Tiles on their way to disk and from there, on a thread for each direction.
 #[derive(Debug)]
@@ -54,10 +54,10 @@ pub(super) struct Loaded {
 
 impl TileTraffic {
     pub(super) fn new(config: &MapConfig) -> Self {
-        let (saving, loading) = (Arc::new(config.clone()), config.grid);
+        let (saver, grid) = (TileSaver::new(config), config.grid);
         Self {
-            saver: SideWorker::new("voxtile-save", move |save: Save| save.run(&saving)),
-            loader: SideWorker::new("voxtile-load", move |load: Load| load.run(&loading)),
+            saver: SideWorker::new("voxtile-save", move |save: Save| save.run(&grid, &saver)),
+            loader: SideWorker::new("voxtile-load", move |load: Load| load.run(&grid)),
             loading: FxHashMap::default(),
             loading_bytes: 0,
             saving: VecDeque::new(),
@@ -157,10 +157,16 @@ impl TileTraffic {
 }
 
 impl Save {
-    fn run(self, config: &MapConfig) -> Saved {
+    fn run(self, grid: &Grid, saver: &TileSaver) -> Saved {
         let Self { writer, index, tile, scan_number } = self;
-        let result = unpack(&config.grid, index, &tile)
-            .and_then(|table| tile_files::write(&writer, config, index, &table, scan_number));
+        let result = match tile.occupied {
+            Some(occupied) => {
+                let packed = PackedTable { compact: &tile.compact, voxels: tile.voxels, occupied };
+                saver.write_packed(&writer, index, packed, scan_number)
+            }
+            None => unpack(grid, index, &tile)
+                .and_then(|table| saver.write_seed(&writer, index, &table, scan_number)),
+        };
         Saved { index, tile, result }
     }
 }

@@ -156,15 +156,16 @@ impl TileStore {
     }
 
     fn sync_next(&mut self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
+        let layout = &self.layout;
         let files: Vec<_> = changed
             .iter()
-            .flat_map(|&(tile, _)| TileFile::IN_ORDER.map(|file| self.layout.next(tile, file)))
+            .flat_map(|&(tile, _)| layout.files().iter().map(move |&file| layout.next(tile, file)))
             .collect();
-        let folders = changed.iter().map(|&(tile, _)| self.layout.tile_folder(tile));
+        let folders = changed.iter().map(|&(tile, _)| layout.tile_folder(tile));
         // The map's own folder names the new tile folders.
-        let folders: Vec<_> = folders.chain([self.layout.folder().to_owned()]).collect();
+        let folders: Vec<_> = folders.chain([layout.folder().to_owned()]).collect();
         let [synced_files, synced_folders] = self.disk.sync_all(&files, &folders);
-        let per_tile = TileFile::IN_ORDER.len();
+        let per_tile = layout.files().len();
         for (number, result) in synced_files.iter().enumerate() {
             if result.is_err() {
                 self.suspect.insert(changed[number / per_tile].0);
@@ -216,6 +217,8 @@ impl TileStore {
     fn fill_in(&self, mut metadata: Metadata, flush_number: u64, scan_number: u64) -> Metadata {
         metadata.bounds = Bounds::of(self.tiles());
         if let Some(ext) = &mut metadata.ext {
+            // A map keeps its storage, whatever the caller says.
+            ext.storage = self.layout.storage();
             ext.empty = metadata.bounds.is_none();
             (ext.flush_number, ext.scan_number) = (flush_number, scan_number);
         }

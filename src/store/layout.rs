@@ -1,3 +1,4 @@
+use crate::config::Storage;
 use crate::space::TileIndex;
 use std::path::{Path, PathBuf};
 
@@ -5,43 +6,66 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub struct Layout {
     folder: PathBuf,
+    storage: Storage,
 }
 
-/// One of the two files of a tile.
+/// One of the files of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TileFile {
-    /// `iwlo_meta.bin`: the exact table.
+    /// `iwlo_meta.bin`, or with compact storage `tile.vxt`: the exact table.
     Table,
-    /// `octree.bt`: the octree as OctoMap writes it.
+    /// `octree.bt`: the octree as OctoMap writes it; not with compact storage.
     Octree,
 }
 
 impl TileFile {
-    /// Both files, in the order in which they are written and renamed: the table, which names the octree's
+    /// The files that a tile has, in the order in which they are written and renamed: the table, which names the octree's
     /// checksum, comes last.
-    pub const IN_ORDER: [Self; 2] = [Self::Octree, Self::Table];
+    pub const fn all(storage: Storage) -> &'static [Self] {
+        match storage {
+            Storage::Seed => &[Self::Octree, Self::Table],
+            Storage::Compact => &[Self::Table],
+        }
+    }
 
     /// The file's name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Table => "iwlo_meta.bin",
-            Self::Octree => "octree.bt",
+    pub const fn name(self, storage: Storage) -> &'static str {
+        match (self, storage) {
+            (Self::Table, Storage::Seed) => "iwlo_meta.bin",
+            (Self::Table, Storage::Compact) => "tile.vxt",
+            (Self::Octree, _) => "octree.bt",
         }
     }
 
     /// The name of the version that waits for the next commit.
-    pub const fn next_name(self) -> &'static str {
-        match self {
-            Self::Table => "iwlo_meta.bin.next",
-            Self::Octree => "octree.bt.next",
+    pub const fn next_name(self, storage: Storage) -> &'static str {
+        match (self, storage) {
+            (Self::Table, Storage::Seed) => "iwlo_meta.bin.next",
+            (Self::Table, Storage::Compact) => "tile.vxt.next",
+            (Self::Octree, _) => "octree.bt.next",
         }
     }
 }
 
 impl Layout {
-    /// The layout of the map in `folder`.
+    /// The layout of the map in `folder`, if its tiles are the seed's files.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
-        Self { folder: folder.into() }
+        Self { folder: folder.into(), storage: Storage::Seed }
+    }
+
+    /// The same with tiles stored in this way.
+    pub fn with_storage(self, storage: Storage) -> Self {
+        Self { storage, ..self }
+    }
+
+    /// How the tiles are stored.
+    pub fn storage(&self) -> Storage {
+        self.storage
+    }
+
+    /// The files that each tile has, in the order in which they are written and renamed.
+    pub fn files(&self) -> &'static [TileFile] {
+        TileFile::all(self.storage)
     }
 
     /// The map's own folder.
@@ -71,12 +95,18 @@ impl Layout {
 
     /// The committed version of a tile's file.
     pub fn current(&self, tile: TileIndex, file: TileFile) -> PathBuf {
-        self.tile_folder(tile).join(file.name())
+        self.tile_folder(tile).join(file.name(self.storage))
     }
 
     /// The table of a tile as of a flush, kept beside newer ones for readers that opened the map then.
     pub fn kept(&self, tile: TileIndex, flush_number: u64) -> PathBuf {
-        self.tile_folder(tile).join(format!("{KEPT_PREFIX}{flush_number}"))
+        let table = TileFile::Table.name(self.storage);
+        self.tile_folder(tile).join(format!("{table}{KEPT_SUFFIX}{flush_number}"))
+    }
+
+    /// The flush number of a kept table's name; `None` for another name.
+    pub fn flush_of_kept(&self, name: &str) -> Option<u64> {
+        name.strip_prefix(TileFile::Table.name(self.storage))?.strip_prefix(KEPT_SUFFIX)?.parse().ok()
     }
 
     /// Updates that wait for a tile while the map is written to.
@@ -91,7 +121,7 @@ impl Layout {
 
     /// The version of a tile's file that waits for the next commit.
     pub fn next(&self, tile: TileIndex, file: TileFile) -> PathBuf {
-        self.tile_folder(tile).join(file.next_name())
+        self.tile_folder(tile).join(file.next_name(self.storage))
     }
 }
 
@@ -101,12 +131,7 @@ pub(super) const WAITING: &str = "updates.next";
 /// The name of the folder for what repair takes out of the map.
 pub const QUARANTINE: &str = "quarantine";
 
-const KEPT_PREFIX: &str = "iwlo_meta.bin.flush";
-
-/// The flush number of a kept table's name; `None` for another name.
-pub fn flush_of_kept(name: &str) -> Option<u64> {
-    name.strip_prefix(KEPT_PREFIX)?.parse().ok()
-}
+const KEPT_SUFFIX: &str = ".flush";
 
 /// The name of a tile's folder, such as `tile_0_1_-1`.
 pub fn folder_name(tile: TileIndex) -> String {
@@ -123,6 +148,19 @@ pub fn tile_of_folder(name: &str) -> Option<TileIndex> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_kept_table_is_known_by_its_name() {
+        let tile = TileIndex::new(0, 1, -1);
+        for storage in [Storage::Seed, Storage::Compact] {
+            let layout = Layout::new("map").with_storage(storage);
+            let kept = layout.kept(tile, 12);
+            let name = kept.file_name().unwrap().to_str().unwrap();
+            assert_eq!(layout.flush_of_kept(name), Some(12));
+            assert_eq!(layout.flush_of_kept(TileFile::Table.name(storage)), None);
+        }
+        assert_eq!(Layout::new("map").flush_of_kept("tile.vxt.flush12"), None);
+    }
 
     #[test]
     fn only_the_one_spelling_of_a_folder_is_a_tile() {

@@ -50,7 +50,7 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
 pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
     let Some(parent) = folder.parent() else { return Ok(()) };
     let is_relative_end = parent.as_os_str().is_empty();
-    let parent = if is_relative_end { Path::new(".") } else { parent };
+    let parent = parent_of(folder);
     let is_there = disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?.is_some();
     if !is_relative_end {
         create_folders(disk, parent)?;
@@ -66,6 +66,14 @@ pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
         let _ = disk.remove_folder(folder);
         Error::io(parent, "sync", error)
     })
+}
+
+/// The folder that names a folder.
+pub(super) fn parent_of(folder: &Path) -> &Path {
+    match folder.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
 }
 
 /// Replaces a file as a whole: `write` makes its successor beside it, synced, and that takes its name. The name is

@@ -1,5 +1,5 @@
 use super::tile_stamp::MAX_NUMBER;
-use crate::config::RayConfig;
+use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;
 use crate::sensor::SensorModel;
 use crate::space::TileIndex;
@@ -49,6 +49,9 @@ pub struct Extension {
     /// Number of scans that the map had taken before the first of that input.
     #[serde(default)]
     pub input_first_scan: u64,
+    /// How the tiles are stored; maps of the seed's files do not say.
+    #[serde(default, skip_serializing_if = "Storage::is_seed")]
+    pub storage: Storage,
 }
 
 /// What makes a map the map it is. It stands in every tile, so that a map can be put together again from its tiles.
@@ -117,6 +120,11 @@ impl Metadata {
             sensor_model: ext.sensor_model,
             occupancy_threshold: ext.occupancy_threshold,
         })
+    }
+
+    /// How the tiles are stored.
+    pub fn storage(&self) -> Storage {
+        self.ext.as_ref().map_or(Storage::Seed, |ext| ext.storage)
     }
 
     /// Whether the two say the same but for what every flush brings: bounds and numbers.
@@ -213,6 +221,7 @@ mod tests {
             rays: RayConfig::default(),
             input_fingerprint: Some("abc".into()),
             input_first_scan: 45,
+            storage: Storage::Seed,
         };
         let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());
         Metadata { resolution_m: 0.05, tile_size_m: 10.0, bounds, ext: Some(ext) }
@@ -226,6 +235,17 @@ mod tests {
                     \"min\": [-7, -1, 0],\n    \"max\": [0, 2, 4]\n  },\n  \"ext\": {\n    \"empty\": false";
         assert!(text.starts_with(seed), "{text}");
         assert_eq!(Metadata::from_text(&text), Ok(written));
+    }
+
+    #[test]
+    fn a_storage_is_named_where_it_is_not_the_seeds() {
+        let mut written = metadata();
+        assert!(!written.to_text().contains("storage"));
+        if let Some(ext) = &mut written.ext {
+            ext.storage = Storage::Compact;
+        }
+        assert!(written.to_text().contains("\n    \"storage\": \"compact\",\n"));
+        assert_eq!(Metadata::from_text(&written.to_text()), Ok(written));
     }
 
     #[test]

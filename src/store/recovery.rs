@@ -1,6 +1,6 @@
 use super::commit_log::Commits;
 use super::disk::{Disk, EntryKind};
-use super::layout::{Layout, TileFile, WAITING, flush_of_kept, tile_of_folder};
+use super::layout::{Layout, WAITING, tile_of_folder};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
@@ -87,8 +87,9 @@ fn look_at_tile(
     }
     let mut names = list(disk, &folder)?;
     let mut unrenamed = false;
-    for file in TileFile::IN_ORDER {
-        let Some(at) = names.iter().position(|name| name == file.next_name()) else { continue };
+    for &file in layout.files() {
+        let next_name = file.next_name(layout.storage());
+        let Some(at) = names.iter().position(|name| name == next_name) else { continue };
         let next = layout.next(tile, file);
         match stamp.map(|stamp| stamp.of(file)) {
             Some(committed) if has_stamp(disk, &next, committed)? => {
@@ -106,7 +107,7 @@ fn look_at_tile(
         remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
-    for name in names.extract_if(.., |name| name == WAITING || flush_of_kept(name).is_some()) {
+    for name in names.extract_if(.., |name| name == WAITING || layout.flush_of_kept(name).is_some()) {
         remove(disk, &folder.join(name), removed)?;
     }
     Ok(match stamp {

@@ -1,10 +1,12 @@
 use super::commit_log::{CommitLog, Commits};
 use super::disk::Disk;
-use super::layout::Layout;
+use super::layout::{Layout, TileFile, tile_of_folder};
 use super::map_folder;
 use super::metadata::{Bounds, Metadata};
+use crate::config::Storage;
 use crate::error::{DecodeError, Error, FormatError, Result};
 use std::io;
+use std::path::Path;
 
 /// What can still be read of the two files that say what a map is, when they cannot be read together.
 #[derive(Debug)]
@@ -53,6 +55,23 @@ impl Remains {
         Ok(Self { metadata, log_error, log_map_id, commits })
     }
 
+    /// Where the files of the map in `folder` are: its tiles are stored as these two files say, or where they say nothing
+    /// or contradict each other, as most tiles are.
+    pub fn layout_of_tiles(&self, disk: &dyn Disk, folder: &Path) -> Layout {
+        let written = self.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
+        let logged = self.commits.metadata.as_ref();
+        let layout = Layout::new(folder);
+        match (written.map(Metadata::storage), logged.map(Metadata::storage)) {
+            (Some(written), Some(logged)) if written == logged => layout.with_storage(written),
+            (Some(storage), None) | (None, Some(storage)) => layout.with_storage(storage),
+            _ => {
+                let [seed, compact] = [Storage::Seed, Storage::Compact]
+                    .map(|storage| count_tables(disk, &layout.clone().with_storage(storage)));
+                layout.with_storage(if compact > seed { Storage::Compact } else { Storage::Seed })
+            }
+        }
+    }
+
     /// Writes `commits.log` and then `metadata.json` anew, each in place of what there is.
     ///
     /// # Errors
@@ -88,4 +107,15 @@ impl Remains {
 /// Whether an error is about a link, or anything else that is no file.
 fn is_no_file(error: &Error) -> bool {
     matches!(error, Error::Io { cause, .. } if cause.kind() == io::ErrorKind::InvalidInput)
+}
+
+/// Number of tiles that have a table, or one that waits for its name.
+fn count_tables(disk: &dyn Disk, layout: &Layout) -> usize {
+    // What cannot be listed is told by whoever reads it next.
+    let names = disk.list(layout.folder()).unwrap_or_default();
+    let is_there = |path: &Path| matches!(disk.kind(path), Ok(Some(_)));
+    let has_table = |&tile: &_| {
+        is_there(&layout.current(tile, TileFile::Table)) || is_there(&layout.next(tile, TileFile::Table))
+    };
+    names.iter().filter_map(|name| tile_of_folder(name)).filter(has_table).count()
 }

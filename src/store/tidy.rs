@@ -34,7 +34,7 @@ impl TileStore {
             if keep && self.kind(&self.layout.next(tile, TileFile::Table))?.is_some() {
                 self.keep_table(tile)?;
             }
-            for file in TileFile::IN_ORDER {
+            for &file in self.layout.files() {
                 self.rename(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
             }
             self.unrenamed.remove(&tile);
@@ -77,7 +77,7 @@ impl TileStore {
         if keep && self.kind(&self.layout.current(tile, TileFile::Table))?.is_some() {
             self.keep_table(tile)?;
         }
-        for file in TileFile::IN_ORDER {
+        for &file in self.layout.files() {
             for path in [self.layout.current(tile, file), self.layout.next(tile, file)] {
                 self.remove_file(&path)?;
             }

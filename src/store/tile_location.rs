@@ -1,5 +1,6 @@
 use super::disk::{Disk, DiskRead, EntryKind};
 use super::tile_stamp::{Stamping, TileStamp};
+use crate::config::Storage;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
 use std::io;
@@ -15,6 +16,7 @@ pub struct TileLocation {
     pub(super) path: PathBuf,
     pub(super) map_id: Option<[u8; 16]>,
     pub(super) stamp: Option<TileStamp>,
+    pub(super) storage: Storage,
 }
 
 /// A tile's table as it is stored, ready to be read.
@@ -29,6 +31,8 @@ pub struct StoredTile {
     pub map_id: Option<[u8; 16]>,
     /// What the log says of the tile, if it does.
     pub stamp: Option<TileStamp>,
+    /// Of which form it is.
+    pub storage: Storage,
 }
 
 impl TileLocation {
@@ -43,7 +47,7 @@ impl TileLocation {
     ///
     /// A file or folder that is missing or none, and a disk that refuses.
     pub fn open(self) -> Result<StoredTile> {
-        let Self { disk, tile, folder, path, map_id, stamp } = self;
+        let Self { disk, tile, folder, path, map_id, stamp, storage } = self;
         let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
             Some(EntryKind::Folder) => {}
@@ -55,7 +59,7 @@ impl TileLocation {
         match disk.open(&path) {
             Ok(input) => {
                 let bytes = input.file_bytes();
-                Ok(StoredTile { path, input: Stamping::new(input), bytes, map_id, stamp })
+                Ok(StoredTile { path, input: Stamping::new(input), bytes, map_id, stamp, storage })
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 damaged("the file is missing, and the map holds this tile")

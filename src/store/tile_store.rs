@@ -1,6 +1,6 @@
 use super::commit_log::{CommitLog, Commits};
 use super::disk::{Disk, DiskRead};
-use super::layout::{Layout, TileFile, flush_of_kept};
+use super::layout::{Layout, TileFile};
 use super::map_folder::{self, Lock};
 use super::metadata::Metadata;
 use super::readers::Readers;
@@ -188,6 +188,7 @@ impl TileStore {
         log: Option<CommitLog>,
         commits: Commits,
     ) -> Self {
+        let layout = layout.with_storage(metadata.storage());
         let (next, suspect, removed, unrenamed, renamed) = Default::default();
         let (unremoved, strays, foreign, readers) = Default::default();
         Self {
@@ -315,7 +316,7 @@ impl TileStore {
         };
         let mut kept: Vec<u64> = names
             .iter()
-            .filter_map(|name| flush_of_kept(name))
+            .filter_map(|name| self.layout.flush_of_kept(name))
             .filter(|&flush_number| flush_number >= self.commits.flush_number)
             .collect();
         kept.sort_unstable();
@@ -352,7 +353,15 @@ impl TileStore {
     fn location_at(&self, tile: TileIndex, path: PathBuf, stamp: Option<TileStamp>) -> TileLocation {
         let map_id = stamp.and_then(|_| self.map_id());
         let folder = self.layout.tile_folder(tile);
-        TileLocation { disk: self.disk.clone(), tile, folder, path, map_id, stamp }
+        TileLocation {
+            disk: self.disk.clone(),
+            tile,
+            folder,
+            path,
+            map_id,
+            stamp,
+            storage: self.layout.storage(),
+        }
     }
 
     fn latest_path(&self, tile: TileIndex) -> PathBuf {
@@ -372,4 +381,11 @@ impl std::fmt::Debug for SharedMetadata {
 /// An id's bytes as hexadecimal digits.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// An id from its hexadecimal digits.
+pub(crate) fn id_from_hex(digits: &str) -> Option<[u8; 16]> {
+    let byte = |at: usize| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok();
+    let bytes: Option<Vec<u8>> = (0..16).map(byte).collect();
+    bytes?.try_into().ok().filter(|_| digits.len() == 32)
 }

@@ -1,6 +1,7 @@
 use super::disk::{Disk, EntryKind};
 use super::layout::{Layout, TileFile};
 use super::tile_stamp::{FileStamp, Stamping};
+use crate::config::Storage;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use std::io::{self, BufWriter, Write};
@@ -22,6 +23,11 @@ impl TileWriter {
     /// The map's id; zeros for a map of the seed's format.
     pub fn map_id(&self) -> [u8; 16] {
         self.map_id
+    }
+
+    /// How the map's tiles are stored.
+    pub fn storage(&self) -> Storage {
+        self.layout.storage()
     }
 
     /// Writes the next version of one of a tile's files; the committed version stays as it is.

@@ -1,14 +1,14 @@
 //! What a map is, told from whatever is left of it: `metadata.json`, `commits.log`, and the tiles themselves.
 
-use crate::config::MapConfig;
+use crate::config::{MapConfig, Storage};
 use crate::error::{Error, FormatError, Result};
 use crate::mapper::tile_files::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
     Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Stamping,
-    StoredTile, TileFile, TileStamp, hex, tile_of_folder,
+    StoredTile, TileFile, TileStamp, hex, id_from_hex, tile_of_folder,
 };
-use crate::tile::format::{Trailer, read_trailer};
+use crate::tile::format::{Trailer, read_compact_front, read_trailer};
 use rustc_hash::FxHashMap;
 use std::path::Path;
 
@@ -106,7 +106,7 @@ impl Index {
         tile: TileIndex,
         known_scan: Option<u64>,
     ) -> Result<()> {
-        let read = |file: &Path| read_alone(disk, file, &config.grid, self.map_id, tile);
+        let read = |file: &Path| read_alone(disk, file, layout.storage(), &config.grid, self.map_id, tile);
         let (current, next) = (layout.current(tile, TileFile::Table), layout.next(tile, TileFile::Table));
         let table = match (read(&current)?, read(&next)?) {
             (Some(Ok(table)), _) => table,
@@ -151,6 +151,7 @@ fn scan_number_of(table: &ReadTable) -> Option<u64> {
 fn read_alone(
     disk: &dyn Disk,
     path: &Path,
+    storage: Storage,
     grid: &Grid,
     map_id: [u8; 16],
     tile: TileIndex,
@@ -166,7 +167,7 @@ fn read_alone(
     };
     let bytes = input.file_bytes();
     let (path, input, map_id) = (path.to_owned(), Stamping::new(input), Some(map_id));
-    match read_stored_table(grid, tile, StoredTile { path, input, bytes, map_id, stamp: None }) {
+    match read_stored_table(grid, tile, StoredTile { path, input, bytes, map_id, stamp: None, storage }) {
         Err(error @ Error::Damaged { .. }) => Ok(Some(Err(error))),
         Err(error) => Err(error),
         Ok(table) => Ok(Some(Ok(table))),
@@ -203,7 +204,11 @@ impl Trailers {
             let path = layout.current(tile, TileFile::Table);
             let Ok(mut input) = disk.open(&path) else { continue };
             let bytes = input.file_bytes();
-            if let Ok(Some(trailer)) = read_trailer(&mut input, bytes) {
+            let trailer = match layout.storage() {
+                Storage::Seed => read_trailer(&mut input, bytes),
+                Storage::Compact => read_compact_front(&mut input, bytes).map(Some),
+            };
+            if let Ok(Some(trailer)) = trailer {
                 by_map.entry(trailer.map_id).or_insert((trailer, 0)).1 += 1;
             }
         }
@@ -221,7 +226,7 @@ impl Trailers {
 fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<([u8; 16], Metadata)> {
     let written = remains.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
     let logged = remains.commits.metadata.as_ref().filter(|metadata| metadata.ext.is_some());
-    let id_of = |metadata: &Metadata| metadata.ext.as_ref().and_then(|ext| id_from(&ext.map_id));
+    let id_of = |metadata: &Metadata| metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id));
     let of_tiles = trailers.most();
     // Where the two files contradict each other, the tiles decide.
     let candidates =
@@ -249,13 +254,8 @@ fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<(
         rays: crate::config::RayConfig::default(),
         input_fingerprint: None,
         input_first_scan: 0,
+        storage: layout.storage(),
     };
     let (resolution_m, tile_size_m) = (parameters.resolution, parameters.tile_size);
     Ok((trailer.map_id, Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }))
-}
-
-fn id_from(digits: &str) -> Option<[u8; 16]> {
-    let byte = |at: usize| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok();
-    let bytes: Option<Vec<u8>> = (0..16).map(byte).collect();
-    bytes?.try_into().ok().filter(|_| digits.len() == 32)
 }

@@ -4,7 +4,8 @@ use super::rebuild::{self, Index};
 use super::tile_check::{check_tile, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::mapper::{config_from, tile_files};
+use crate::mapper::config_from;
+use crate::mapper::tile_saver::TileSaver;
 use crate::space::TileIndex;
 use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Remains, TileFile, TileStore, hex};
 use crate::tile::{OctreeFactory, Tile};
@@ -96,6 +97,7 @@ pub fn repair_on(
         Err(error) => return Err(error),
     };
     let config = config_from(store.metadata(), &store.layout().metadata())?;
+    repairer.layout = store.layout().clone();
     repairer.repair_tiles(&mut store, &config)?;
     Ok(repairer.counts)
 }
@@ -135,6 +137,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     fn repair_index(&mut self) -> Result<()> {
         let _lock = Lock::take(self.disk, &self.layout)?;
         let remains = Remains::read(self.disk, &self.layout)?;
+        self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
         let Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles }) = index else {
             // Of the seed's format, but with a log that cannot be read: the log is no part of it.
@@ -182,7 +185,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         tiles.sort_unstable();
         for tile in tiles {
             let is_waiting = waiting.contains(&tile);
-            for file in TileFile::IN_ORDER {
+            for &file in self.layout.files() {
                 let (next, current) = (self.layout.next(tile, file), self.layout.current(tile, file));
                 if self.kind(&next)?.is_none() {
                     continue;
@@ -271,7 +274,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             // Another writer's octree cannot be had again: the tile is written anew with the present one.
             let scan_number = table.trailer.map_or(0, |trailer| trailer.scan_number);
             let tile = Tile::from_table(&config.grid, &OctreeFactory::default(), tile, table.table);
-            tile_files::save(store, config, &tile, scan_number)?;
+            TileSaver::new(config).save(store, &tile, scan_number)?;
             let (metadata, scan_number) = (store.metadata().clone(), store.commits().scan_number);
             store.commit(metadata, scan_number)?;
         }

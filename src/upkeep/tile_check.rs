@@ -9,7 +9,7 @@ use std::path::Path;
 /// What a look at both files of a tile gave.
 pub(super) struct TileCheck {
     pub table: Result<ReadTable>,
-    /// `None` where nothing tells what the octree must be.
+    /// `None` where there is none, or nothing tells what it must be.
     pub octree: Option<std::result::Result<(), FormatError>>,
 }
 
@@ -33,7 +33,8 @@ pub(super) fn check_tile(
         Err(error @ Error::Damaged { .. }) => Err(error),
         Err(error) => return Err(error),
     };
-    let octree = match store.stamp(tile) {
+    let has_octree = store.layout().files().contains(&TileFile::Octree);
+    let octree = match store.stamp(tile).filter(|_| has_octree) {
         Some(stamp) => Some(check_octree(disk, store, tile, stamp)?),
         None => None,
     };

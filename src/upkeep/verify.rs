@@ -6,8 +6,8 @@ use crate::error::{Error, FormatError, Result};
 use crate::mapper::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, TileFile, TileStamp, TileStore, flush_of_kept,
-    read_log, tile_of_folder,
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, TileFile, TileStamp, TileStore, read_log,
+    tile_of_folder,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -87,6 +87,7 @@ pub fn verify_on(
         }
     };
     if let Some(store) = store {
+        verifier.layout = store.layout().clone();
         let path = store.layout().metadata();
         match config_from(store.metadata(), &path) {
             Ok(config) => verifier.verify_map(&store, &config)?,
@@ -187,6 +188,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     /// Where metadata or log cannot be read, the tiles are checked against what else tells of them.
     fn index_from_remains(&mut self, disk: &Arc<dyn Disk>) -> Result<Option<TileStore>> {
         let remains = Remains::read(self.disk, &self.layout)?;
+        self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         match rebuild::index_of(self.disk, &self.layout, &remains, &mut |_, _| ()) {
             Ok(Some(Index { map_id, metadata, commits, damaged, .. })) => {
                 for (tile, error) in damaged {
@@ -240,13 +242,13 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let mut is_stray = false;
         for name in self.list(folder)? {
             let path = folder.join(&name);
-            if name.ends_with(".next") || flush_of_kept(&name).is_some() {
+            if name.ends_with(".next") || self.layout.flush_of_kept(&name).is_some() {
                 self.report(Finding::note(
                     &path,
                     Some(tile),
                     "left behind, being written, or kept for a reader",
                 ));
-            } else if TileFile::IN_ORDER.iter().all(|file| file.name() != name) {
+            } else if self.layout.files().iter().all(|file| file.name(self.layout.storage()) != name) {
                 self.report(Finding::note(&path, Some(tile), "no part of a map"));
             } else {
                 is_stray |= !is_known;
@@ -261,7 +263,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             let reason = "taken out of the map; its files go when the map is next opened for writing";
             self.report(Finding::note(folder, Some(tile), reason));
         } else if now.is_none_or(|now| !now.tiles.contains_key(&tile)) {
-            let path = folder.join(TileFile::Table.name());
+            let path = self.layout.current(tile, TileFile::Table);
             self.damage(&path, Some(tile), "commits.log does not name this tile");
         }
         Ok(())

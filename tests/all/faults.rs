@@ -3,7 +3,7 @@ use crate::support::random_scans::{Random, random_scan};
 use std::path::PathBuf;
 use voxtile::{
     Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions,
-    Result, Scan,
+    Result, Scan, Storage,
 };
 
 const INPUT: &str = "random scans";
@@ -18,6 +18,11 @@ fn map() -> PathBuf {
 /// Room for two tiles and next to nothing that waits: every scan evicts.
 fn config() -> MapConfig {
     MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_pending_bytes(600)
+}
+
+/// The same map with compact storage.
+fn compact() -> MapConfig {
+    config().with_storage(Storage::Compact)
 }
 
 /// Next to no memory: resident tiles become compact, those are saved by a thread of their own, and updates wait in
@@ -191,16 +196,21 @@ fn check_after_crash(disk: &FaultyDisk, oracle: &Oracle, reached: Reached, what:
 
 #[test]
 fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
-    let oracle = Oracle::new();
-    let disk = undisturbed(&oracle);
+    for config in [config(), compact()] {
+        fail_once_at_every_operation(&Oracle::of(config));
+    }
+}
+
+fn fail_once_at_every_operation(oracle: &Oracle) {
+    let disk = undisturbed(oracle);
     let (operations, changes) = (disk.operations(), disk.changes());
-    println!("{operations} operations, {changes} of them changes");
+    println!("{operations} operations, {changes} of them changes, {} storage", oracle.config.storage);
     let faults = (0..operations).map(Fault::Fails);
     let faults = faults.chain((0..changes).map(Fault::LosesSync));
     let faults = faults.chain((0..changes).map(Fault::IsFull));
     for fault in faults.chain((0..changes).map(Fault::IsReadOnly)) {
         let disk = FaultyDisk::new(fault);
-        let reached = live(&disk, &oracle);
+        let reached = live(&disk, oracle);
         assert!(reached.finished, "{fault:?}");
         // What was said to be safe is on the medium.
         let left = disk.after_crash(Unsynced::Dropped);
@@ -213,35 +223,45 @@ fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
 
 #[test]
 fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
-    let oracle = Oracle::new();
-    for at in 0..undisturbed(&oracle).changes() {
+    for config in [config(), compact()] {
+        crash_at_every_operation(&Oracle::of(config));
+    }
+}
+
+fn crash_at_every_operation(oracle: &Oracle) {
+    for at in 0..undisturbed(oracle).changes() {
         let disk = FaultyDisk::new(Fault::Crashes(at));
-        let reached = live(&disk, &oracle);
+        let reached = live(&disk, oracle);
         assert!(disk.has_crashed());
         let shuffled = (0..3).map(|seed| Unsynced::Shuffled(31 * at + seed));
         for unsynced in shuffled.chain([Unsynced::Dropped, Unsynced::Kept]) {
             let what = format!("crash at {at}, {unsynced:?}");
             let left = disk.after_crash(unsynced);
-            check_after_crash(&left.copy(), &oracle, reached, &what);
+            check_after_crash(&left.copy(), oracle, reached, &what);
         }
     }
 }
 
 #[test]
 fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operation() {
-    let oracle = Oracle::of(short_of_memory());
-    let changes = undisturbed(&oracle).changes();
+    for storage in [Storage::Seed, Storage::Compact] {
+        fail_and_crash_short_of_memory(&Oracle::of(short_of_memory().with_storage(storage)));
+    }
+}
+
+fn fail_and_crash_short_of_memory(oracle: &Oracle) {
+    let changes = undisturbed(oracle).changes();
     for at in 0..changes {
         for fault in [Fault::Fails(2 * at), Fault::IsFull(at), Fault::Crashes(at)] {
             let disk = FaultyDisk::new(fault);
-            let reached = live(&disk, &oracle);
+            let reached = live(&disk, oracle);
             let left = disk.after_crash(Unsynced::Shuffled(at));
             if reached.finished {
                 let reader = MapReader::open_on(left.shared(), &map(), 1);
                 oracle.check(&reader.unwrap_or_else(|error| panic!("{fault:?}: {error}")), "at the end");
             } else {
                 assert!(disk.has_crashed(), "{fault:?}");
-                check_after_crash(&left, &oracle, reached, &format!("{fault:?}, short of memory"));
+                check_after_crash(&left, oracle, reached, &format!("{fault:?}, short of memory"));
             }
         }
     }
@@ -270,17 +290,22 @@ fn the_power_goes_some_time_after_the_process_was_killed_at_every_operation() {
 
 #[test]
 fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
-    let oracle = Oracle::new();
+    for config in [config(), compact()] {
+        crash_again_while_opening(&Oracle::of(config));
+    }
+}
+
+fn crash_again_while_opening(oracle: &Oracle) {
     let mut points = 0;
-    for at in 0..undisturbed(&oracle).changes() {
+    for at in 0..undisturbed(oracle).changes() {
         let disk = FaultyDisk::new(Fault::Crashes(at));
-        let reached = live(&disk, &oracle);
+        let reached = live(&disk, oracle);
         for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
             let left = disk.after_crash(unsynced);
             for again in 0.. {
                 let recovering = left.copy();
                 recovering.set_fault(Fault::Crashes(again));
-                let opened = open(&recovering, &oracle);
+                let opened = open(&recovering, oracle);
                 if !recovering.has_crashed() {
                     break;
                 }
@@ -297,7 +322,7 @@ fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
                     Err(Error::NoMap { .. }) if reached.safe == 0 => {}
                     Err(error) => panic!("{what}: {error}"),
                 }
-                match open(&left, &oracle) {
+                match open(&left, oracle) {
                     Ok(mapper) => oracle.check(&mapper, &what),
                     Err(Error::NoMap { .. }) if reached.safe == 0 => {}
                     Err(error) => panic!("{what}: {error}"),

@@ -9,7 +9,7 @@ use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
 use voxtile::space::{TileIndex, VoxelKey};
-use voxtile::{InsertMode, MapConfig, VoxelCacheConfig, VoxelCacheMode};
+use voxtile::{InsertMode, MapConfig, Storage, VoxelCacheConfig, VoxelCacheMode};
 
 /// Small tiles, so that a scan of a few metres touches many.
 fn config() -> MapConfig {
@@ -63,9 +63,19 @@ fn in_memory_equals_the_naive_map() {
 fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
     for (seed, config) in configs().into_iter().enumerate() {
         let mut digests = Vec::new();
-        for (cache_tiles, pending_bytes) in [(1, 0), (1, 1 << 20), (3, 20_000), (10_000, 0)] {
+        use Storage::{Compact, Seed};
+        let kinds = [
+            (1, 0, Seed),
+            (1, 1 << 20, Compact),
+            (3, 20_000, Seed),
+            (3, 20_000, Compact),
+            (10_000, 0, Seed),
+            (10_000, 0, Compact),
+        ];
+        for (cache_tiles, pending_bytes, storage) in kinds {
             let folder = TempDir::new().unwrap();
             let config = config.clone().with_cache_tiles(cache_tiles).with_pending_bytes(pending_bytes);
+            let config = config.with_storage(storage);
             let mut reference = ReferenceMap::new(&config);
             let mut mapper = OutOfCoreTileMapper::create_on(
                 UnsyncedDisk::shared(),
@@ -88,9 +98,11 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             let mut mapper = OutOfCoreTileMapper::open_on(
                 UnsyncedDisk::shared(),
                 &folder.path().join("map"),
-                config.clone(),
+                // A map keeps its storage, whatever is asked for.
+                config.clone().with_storage(Seed),
             )
             .unwrap();
+            assert_eq!(mapper.config().storage, storage);
             assert_eq!(mapper.digest().unwrap(), unsaved);
             assert_eq!(mapper.scan_number(), 12);
             let mut random = Random(99);

@@ -3,7 +3,7 @@ use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
 use crate::support::unsynced_disk::UnsyncedDisk;
 use tempfile::TempDir;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::{InsertMode, MapConfig, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Questions};
+use voxtile::{InsertMode, MapConfig, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Questions, Storage};
 
 /// One random life of a map beside the naive one, which is set back to the last flush where the map crashes.
 fn live(seed: u64, config: &MapConfig) {
@@ -63,6 +63,9 @@ fn any_life_of_a_map_equals_the_naive_map_as_of_then() {
             .with_pending_bytes((seed as usize % 4) * 3000);
         if seed % 2 == 1 {
             config = config.with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
+        }
+        if seed % 4 >= 2 {
+            config = config.with_storage(Storage::Compact);
         }
         live(seed, &config);
         // From nothing but what a scan needs to a few of the map's tiles.

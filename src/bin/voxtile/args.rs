@@ -3,6 +3,7 @@ use crate::flush_schedule::FlushEvery;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::ffi::OsString;
 use std::path::PathBuf;
+use voxtile::Storage;
 
 /// Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
 ///
@@ -31,6 +32,8 @@ pub enum Command {
     Export(ExportArgs),
     /// Print the digest of a map's content: equal for equal maps
     Digest(DigestArgs),
+    /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit
+    Convert(ConvertArgs),
     /// Check every file of a map for damage; exit code 1 if there is any
     Verify(VerifyArgs),
     /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted
@@ -60,6 +63,9 @@ pub struct BuildArgs {
     /// Edge of a tile in metres, 2 to 1024 whole voxels [default: 10, or the map's own]
     #[arg(long, value_name = "M")]
     pub tile_size: Option<f64>,
+    /// How the tiles of a new map are stored [default: seed, or the map's own]
+    #[arg(long, value_name = "FORM")]
+    pub storage: Option<StorageName>,
     /// Most memory for all that grows with the map or with a scan (256MiB, 1GB); some 40 MB for the rest come on top
     /// [default: 512MiB, or what tiles of this size need at least]
     #[arg(long, value_name = "SIZE", conflicts_with = "cache_tiles")]
@@ -141,6 +147,23 @@ pub enum VoxelCacheName {
     Serial,
     /// The same, with the pointer octrees written by a thread of their own
     Parallel,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StorageName {
+    /// Two files a tile that other programs read: iwlo_meta.bin, 18 bytes a voxel, and octree.bt
+    Seed,
+    /// One file a tile, a tenth to a fiftieth of the bytes; convert makes the other form of it
+    Compact,
+}
+
+impl From<StorageName> for Storage {
+    fn from(name: StorageName) -> Self {
+        match name {
+            StorageName::Seed => Self::Seed,
+            StorageName::Compact => Self::Compact,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -264,6 +287,21 @@ pub struct VerifyArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct ConvertArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// Folder of the new map, which does not exist yet
+    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    pub output: PathBuf,
+    /// How the tiles of the new map are stored
+    #[arg(long, value_name = "FORM")]
+    pub storage: StorageName,
+    /// Print JSON; sizes in bytes
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
 pub struct RepairArgs {
     /// Folder of the map
     pub map: PathBuf,
@@ -287,6 +325,9 @@ pub struct DemoArgs {
     /// Edge of a voxel in metres
     #[arg(long, value_name = "M", default_value_t = 0.2)]
     pub resolution: f64,
+    /// How the tiles of the map are stored
+    #[arg(long, value_name = "FORM", default_value = "seed")]
+    pub storage: StorageName,
     /// What the colors of the picture show
     #[arg(long, value_name = "WHAT", default_value = "height")]
     pub color: ColorName,

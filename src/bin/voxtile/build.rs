@@ -15,7 +15,7 @@ use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::{ScanReport, ScanTracer};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
-use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, Scan};
+use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, Scan, Storage};
 
 /// Where rays are cut unless something else is asked for.
 const MAX_RANGE_M: f64 = 100.0;
@@ -184,7 +184,8 @@ fn next_scan(source: &mut dyn ScanSource) -> voxtile::Result<Option<Scan>> {
 }
 
 fn config_to_create(args: &BuildArgs) -> anyhow::Result<MapConfig> {
-    let config = MapConfig::new(args.resolution.unwrap_or(0.1), args.tile_size.unwrap_or(10.0))?;
+    let config = MapConfig::new(args.resolution.unwrap_or(0.1), args.tile_size.unwrap_or(10.0))?
+        .with_storage(args.storage.map(Storage::from).unwrap_or_default());
     Ok(for_this_run(args, config)?.validated()?)
 }
 
@@ -196,7 +197,18 @@ fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
         let tile_size_m = args.tile_size.unwrap_or(config.grid.tile_size_m());
         config.grid = Grid::new(resolution_m, tile_size_m)?;
     }
+    check_storage(args, config.storage)?;
     Ok(for_this_run(args, config)?.validated()?)
+}
+
+fn check_storage(args: &BuildArgs, own: Storage) -> voxtile::Result<()> {
+    match args.storage.map(Storage::from) {
+        Some(wanted) if wanted != own => {
+            let reason = format!("the map's tiles are stored as {own}; leave it out, or convert the map");
+            Err(Error::argument("--storage", reason))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig> {

@@ -29,7 +29,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         .with_range(0.0, 40.0)
         .with_octree(octree_config(&args.octree)?)
         .with_cache_tiles(args.cache_tiles)
-        .with_pending_bytes(4 << 20);
+        .with_pending_bytes(4 << 20)
+        .with_storage(args.storage.into());
     let mut mapper = OutOfCoreTileMapper::create(&map, config)?;
     mapper.begin_input(format!("demo city {} over {} m", args.seed, args.length))?;
     let scans = args.length.div_ceil(SPACING_M) as usize;

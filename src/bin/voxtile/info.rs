@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::sensor::SensorModel;
 use voxtile::store::Bounds;
-use voxtile::{Questions, Result};
+use voxtile::{Questions, Result, Storage};
 
 #[derive(Debug, Serialize)]
 struct Info {
@@ -18,6 +18,7 @@ struct Info {
     tile_size_m: f64,
     sensor_model: SensorModel,
     occupancy_threshold: f64,
+    storage: Storage,
     scan_number: u64,
     flush_number: u64,
     input_fingerprint: Option<String>,
@@ -64,6 +65,7 @@ impl Info {
             tile_size_m,
             sensor_model: config.sensor_model,
             occupancy_threshold: config.occupancy_threshold,
+            storage: config.storage,
             scan_number: reader.scan_number(),
             flush_number: reader.flush_number(),
             input_fingerprint: ext.and_then(|ext| ext.input_fingerprint.clone()),
@@ -102,7 +104,10 @@ impl Info {
         }
         writeln!(out, "voxels       {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;
         let (table, octree) = (HumanBytes(self.table_bytes), HumanBytes(self.octree_bytes));
-        writeln!(out, "on disk      {table} in tables, {octree} in octrees")
+        match self.storage {
+            Storage::Seed => writeln!(out, "on disk      {table} in tables, {octree} in octrees"),
+            Storage::Compact => writeln!(out, "on disk      {table} in compact tables"),
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 mod args;
 mod build;
 mod byte_size;
+mod convert;
 mod demo;
 mod digest;
 mod export;
@@ -53,6 +54,7 @@ fn main() -> ExitCode {
         Command::Raycast(args) => raycast::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Digest(args) => digest::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
         Command::Local(args) => local::run(&args),

@@ -8,11 +8,12 @@
 //! ```
 //!
 //! All little-endian. A reader of version 1 stops after `count` entries and never sees the trailer. The byte
-//! tables are in `docs/format.md`.
+//! tables are in `docs/format.md`. With compact storage the same table is the `tile.vxt` of `compact_file.rs`.
 
 mod any_order_entries;
 mod ascending_entries;
 mod compact;
+mod compact_file;
 mod entries;
 mod entry;
 mod reader;
@@ -20,6 +21,7 @@ mod trailer;
 mod writer;
 
 pub use compact::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
+pub use compact_file::{read_compact_file, read_compact_front, write_compact_file};
 pub use entries::encode_entries;
 pub use reader::{DecodedTable, read_table, read_trailer};
 pub use trailer::{TRAILER_BYTES, Trailer};

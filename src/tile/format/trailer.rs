@@ -12,8 +12,8 @@ const MAX_PARAMETERS_BYTES: u64 = 1 << 16;
 const MAGIC: u32 = 0x5254_5856;
 const VERSION: u32 = 1;
 
-/// What stands after the last entry of `iwlo_meta.bin`: which map, tile and moment the file belongs to, and
-/// checksums of both files of the tile.
+/// What stands after the last entry of `iwlo_meta.bin`, and in front in `tile.vxt`: which map, tile and moment the file
+/// belongs to, and checksums of the tile's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trailer {
     /// Id of the map.
@@ -22,11 +22,11 @@ pub struct Trailer {
     pub tile: TileIndex,
     /// Number of the last scan that the map had taken when the file was written.
     pub scan_number: u64,
-    /// CRC-32 of header and entries.
+    /// CRC-32 of header and entries, or of the compact form.
     pub table_crc: u32,
-    /// CRC-32 of the tile's `octree.bt`.
+    /// CRC-32 of the tile's `octree.bt`; 0 with compact storage.
     pub octree_crc: u32,
-    /// Length of the tile's `octree.bt` in bytes.
+    /// Length of the tile's `octree.bt` in bytes; 0 with compact storage.
     pub octree_bytes: u64,
     /// The map's parameters as text, behind the trailer: with them a map can be put together from its tiles.
     pub parameters: String,
@@ -65,40 +65,96 @@ impl Trailer {
     ///
     /// A wrong length, magic number, version or checksum.
     pub fn read(input: &mut impl Read, offset: u64, bytes: u64) -> Result<Self, DecodeError> {
-        let wrong = |at, reason: String| Err(FormatError::at_offset(offset + at, reason).into());
         let is_long_enough = bytes >= TRAILER_BYTES as u64;
         if !is_long_enough || bytes - TRAILER_BYTES as u64 > MAX_PARAMETERS_BYTES {
             let reason = "there must be none or a trailer of voxtile's";
-            return wrong(0, format!("{bytes} bytes follow the last entry; {reason}"));
+            let reason = format!("{bytes} bytes follow the last entry; {reason}");
+            return Err(FormatError::at_offset(offset, reason).into());
         }
-        let mut fixed = [0; TRAILER_BYTES];
-        input.read_exact(&mut fixed)?;
-        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| fixed[at + k]));
-        let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| fixed[at + k]));
-        if u32_at(68) != crc32fast::hash(&fixed[..68]) {
-            return wrong(0, "the trailer does not match its checksum".into());
+        let fixed = Fixed::read(input, offset)?;
+        if bytes != fixed.all_bytes() {
+            let (found, wanted) = (bytes - TRAILER_BYTES as u64, fixed.parameters_bytes());
+            let reason = format!("{found} bytes of parameters where the trailer names {wanted}");
+            return Err(FormatError::at_offset(offset + 60, reason).into());
         }
-        if (u32_at(0), u32_at(4)) != (MAGIC, VERSION) {
-            return wrong(0, "no trailer of version 1 after the last entry".into());
-        }
-        if bytes != TRAILER_BYTES as u64 + u64::from(u32_at(60)) {
-            let (found, wanted) = (bytes - TRAILER_BYTES as u64, u32_at(60));
-            return wrong(60, format!("{found} bytes of parameters where the trailer names {wanted}"));
-        }
-        let mut parameters = vec![0; u32_at(60) as usize];
-        input.read_exact(&mut parameters)?;
-        let is_whole = u32_at(64) == crc32fast::hash(&parameters);
-        let Some(parameters) = String::from_utf8(parameters).ok().filter(|_| is_whole) else {
-            return wrong(TRAILER_BYTES as u64, "the parameters do not match their checksum".into());
+        fixed.with_parameters(input, offset)
+    }
+
+    /// Reads the trailer and its parameters from the beginning of a file of so many bytes.
+    ///
+    /// # Errors
+    ///
+    /// A wrong length, magic number, version or checksum.
+    pub fn read_in_front(input: &mut impl Read, file_bytes: u64) -> Result<Self, DecodeError> {
+        let too_short = |wanted: u64| {
+            let reason = format!("{file_bytes} bytes are too few for the {wanted} that stand in front");
+            Err(FormatError::at_offset(0, reason).into())
         };
-        Ok(Self {
-            map_id: std::array::from_fn(|k| fixed[8 + k]),
-            tile: TileIndex::new(u32_at(24) as i32, u32_at(28) as i32, u32_at(32) as i32),
-            scan_number: u64_at(36),
-            table_crc: u32_at(44),
-            octree_crc: u32_at(48),
-            octree_bytes: u64_at(52),
+        if file_bytes < TRAILER_BYTES as u64 {
+            return too_short(TRAILER_BYTES as u64);
+        }
+        let fixed = Fixed::read(input, 0)?;
+        if file_bytes < fixed.all_bytes() {
+            return too_short(fixed.all_bytes());
+        }
+        fixed.with_parameters(input, 0)
+    }
+}
+
+/// The part of a trailer whose length is fixed, with the right checksum, magic number and version.
+struct Fixed([u8; TRAILER_BYTES]);
+
+impl Fixed {
+    fn read(input: &mut impl Read, offset: u64) -> Result<Self, DecodeError> {
+        let wrong = |at, reason: &str| Err(FormatError::at_offset(offset + at, reason).into());
+        let mut bytes = [0; TRAILER_BYTES];
+        input.read_exact(&mut bytes)?;
+        let fixed = Self(bytes);
+        if fixed.u32_at(68) != crc32fast::hash(&bytes[..68]) {
+            return wrong(0, "the trailer does not match its checksum");
+        }
+        if (fixed.u32_at(0), fixed.u32_at(4)) != (MAGIC, VERSION) {
+            return wrong(0, "no trailer of version 1 is here");
+        }
+        if u64::from(fixed.parameters_bytes()) > MAX_PARAMETERS_BYTES {
+            return wrong(60, "the parameters are longer than any");
+        }
+        Ok(fixed)
+    }
+
+    fn parameters_bytes(&self) -> u32 {
+        self.u32_at(60)
+    }
+
+    fn all_bytes(&self) -> u64 {
+        TRAILER_BYTES as u64 + u64::from(self.parameters_bytes())
+    }
+
+    fn with_parameters(self, input: &mut impl Read, offset: u64) -> Result<Trailer, DecodeError> {
+        let mut parameters = vec![0; self.parameters_bytes() as usize];
+        input.read_exact(&mut parameters)?;
+        let is_whole = self.u32_at(64) == crc32fast::hash(&parameters);
+        let Some(parameters) = String::from_utf8(parameters).ok().filter(|_| is_whole) else {
+            let reason = "the parameters do not match their checksum";
+            return Err(FormatError::at_offset(offset + TRAILER_BYTES as u64, reason).into());
+        };
+        let [x, y, z] = [24, 28, 32].map(|at| self.u32_at(at) as i32);
+        Ok(Trailer {
+            map_id: std::array::from_fn(|k| self.0[8 + k]),
+            tile: TileIndex::new(x, y, z),
+            scan_number: self.u64_at(36),
+            table_crc: self.u32_at(44),
+            octree_crc: self.u32_at(48),
+            octree_bytes: self.u64_at(52),
             parameters,
         })
+    }
+
+    fn u32_at(&self, at: usize) -> u32 {
+        u32::from_le_bytes(std::array::from_fn(|k| self.0[at + k]))
+    }
+
+    fn u64_at(&self, at: usize) -> u64 {
+        u64::from_le_bytes(std::array::from_fn(|k| self.0[at + k]))
     }
 }

@@ -37,4 +37,5 @@ pub use writer::{CompactWriter, write_compact};
 const MAGIC: u32 = 0x4354_5856;
 const VERSION: u32 = 1;
 const HEADER_BYTES: usize = 24;
-const CRC_BYTES: u64 = 4;
+/// What a compact table ends with.
+pub(super) const CRC_BYTES: u64 = 4;

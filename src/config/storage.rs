@@ -1,0 +1,31 @@
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// How the tiles of a map are stored. It belongs to the map from its beginning; content, answers and digest do not depend
+/// on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Storage {
+    /// The seed's two files a tile: `iwlo_meta.bin`, 18 bytes a voxel, which any program that knows the seed's format can
+    /// read, and beside it `octree.bt` for those that read OctoMap's.
+    #[default]
+    Seed,
+    /// One file a tile, `tile.vxt`: the table in the compact form, in a tenth to a fiftieth of the bytes.
+    Compact,
+}
+
+impl fmt::Display for Storage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Seed => "seed",
+            Self::Compact => "compact",
+        })
+    }
+}
+
+impl Storage {
+    /// Whether this is the storage of a map that does not say.
+    pub(crate) fn is_seed(&self) -> bool {
+        *self == Self::Seed
+    }
+}
