@@ -37,7 +37,11 @@ impl Residency {
         // Soon they will have to come in.
         let soon = self.pending.bytes().saturating_sub(self.plan.pending_bytes / 4 * 3);
         if soon > 0 {
-            self.pending.heaviest(soon).into_iter().for_each(|tile| self.send_for(tile));
+            for tile in self.pending.heaviest(soon) {
+                if !self.is_cheaper_in_file(tile) {
+                    self.send_for(tile);
+                }
+            }
         }
         let span = TileSpan::of(updates.iter().map(|(tile, _)| *tile));
         let before = std::mem::replace(&mut self.ahead.last, span);

@@ -1,5 +1,5 @@
 use super::statistics::IoCounts;
-use super::tile_files;
+use super::tile_files::{self, ReadTable};
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
@@ -101,6 +101,16 @@ impl MapReader {
                 (table + stamp.table.bytes, octree + stamp.octree.bytes)
             })
         })
+    }
+
+    /// Where the map is.
+    pub(crate) fn disk(&self) -> Arc<dyn Disk> {
+        self.disk.clone()
+    }
+
+    /// The table of a tile as it stands in its file, which is not kept in memory; `None` if the map has no such tile.
+    pub(crate) fn read_table(&self, index: TileIndex) -> Result<Option<ReadTable>> {
+        tile_files::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
     }
 
     fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {

@@ -25,10 +25,10 @@ pub(super) struct InFile {
     pub(super) updates: usize,
 }
 
-/// What a tile takes beside its updates: its place in the table, which may be half empty.
-const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, Waiting)>();
-
 impl Pending {
+    /// What a tile takes beside its updates: its place in the table, which may be half empty.
+    pub(super) const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, Waiting)>();
+
     pub(super) fn push(&mut self, tile: TileIndex, updates: &TileUpdates) {
         self.change(tile, |waiting| waiting.packed.push(updates));
     }
@@ -41,7 +41,7 @@ impl Pending {
     fn change(&mut self, tile: TileIndex, change: impl FnOnce(&mut Waiting)) {
         let mut added = 0;
         let waiting = self.tiles.entry(tile).or_insert_with(|| {
-            added += SLOT_BYTES;
+            added += Self::SLOT_BYTES;
             Waiting::default()
         });
         let before = waiting.packed.bytes();
@@ -67,7 +67,7 @@ impl Pending {
     /// Forgets what waited for a tile: it has been applied. Returns what was in its file.
     pub(super) fn applied(&mut self, tile: TileIndex) -> InFile {
         let Some(waiting) = self.tiles.remove(&tile) else { return InFile::default() };
-        self.bytes -= SLOT_BYTES + waiting.packed.bytes();
+        self.bytes -= Self::SLOT_BYTES + waiting.packed.bytes();
         waiting.in_file
     }
 
@@ -94,10 +94,18 @@ impl Pending {
         self.tiles.values().map(|waiting| waiting.in_file.updates + waiting.packed.len()).sum()
     }
 
-    /// The tiles of which the file has more than so many bytes, in no particular order.
-    pub(super) fn longest_files(&self, bytes: u64) -> Vec<TileIndex> {
-        let is_long = |(_, waiting): &(&TileIndex, &Waiting)| waiting.in_file.file.bytes > bytes;
-        self.tiles.iter().filter(is_long).map(|(tile, _)| *tile).collect()
+    /// The tiles of which the file has more than so many bytes, and of the others so many that have the longest; the
+    /// longest first and the lowest tile of equals.
+    pub(super) fn longest_files(&self, bytes: u64, count: usize) -> Vec<TileIndex> {
+        let file_bytes = |waiting: &Waiting| waiting.in_file.file.bytes;
+        let is_wanted = |waiting: &Waiting| file_bytes(waiting) > if count > 0 { 0 } else { bytes };
+        let wanted = self.tiles.iter().filter(|(_, waiting)| is_wanted(waiting));
+        let mut longest: Vec<_> =
+            wanted.map(|(tile, waiting)| (Reverse(file_bytes(waiting)), *tile)).collect();
+        longest.sort_unstable();
+        let long = longest.partition_point(|(Reverse(file), _)| *file > bytes);
+        longest.truncate(long + count);
+        longest.into_iter().map(|(_, tile)| tile).collect()
     }
 
     /// The tiles by how many bytes of memory wait for them, the most first and the lowest tile of equals, as far as
@@ -109,7 +117,7 @@ impl Pending {
         let mut sum = 0;
         let is_wanted = |&(Reverse(waiting), _): &(Reverse<usize>, TileIndex)| {
             let is_wanted = sum < bytes && waiting > 0;
-            sum += waiting + SLOT_BYTES;
+            sum += waiting + Self::SLOT_BYTES;
             is_wanted
         };
         heaviest.into_iter().take_while(is_wanted).map(|(_, tile)| tile).collect()

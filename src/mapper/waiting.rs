@@ -1,6 +1,6 @@
 //! Updates that wait: when they are applied, and how they go to files where memory is short.
 
-use super::pending::InFile;
+use super::pending::{InFile, Pending};
 use super::residency::Residency;
 use crate::error::Result;
 use crate::scan::PackedUpdates;
@@ -10,17 +10,63 @@ use crate::tile::Tile;
 /// A tile for which more than this waits in its file is brought in: so much is cheaper applied than kept.
 const MOST_IN_FILE: u64 = 1 << 20;
 
+/// Less than this is not worth reading and writing a tile for, however small that is.
+const LEAST_BROUGHT_IN_FOR: u64 = 1 << 14;
+
 impl Residency {
-    /// Applies what waits, as far as it is too much.
+    /// Makes what waits in memory less, as far as it is too much: it is applied, or goes to files where that is cheaper.
     pub(super) fn work_off(&mut self, scan_number: u64) -> Result<()> {
         let too_much = self.pending.bytes().saturating_sub(self.plan.pending_bytes);
         let heaviest = if too_much > 0 { self.pending.heaviest(too_much) } else { Vec::new() };
-        let in_files = self.pending.longest_files(MOST_IN_FILE);
-        for tile in heaviest.into_iter().chain(in_files) {
-            if self.pending.contains(tile) && !self.coming.contains_key(&tile) {
-                self.bring_in(tile, scan_number)?;
+        for tile in heaviest {
+            if self.coming.contains_key(&tile) {
+                continue;
+            }
+            if self.is_cheaper_in_file(tile) {
+                self.adopt()?;
+                self.move_to_file(tile)?;
+            } else {
+                self.bring_in_waiting(tile, scan_number)?;
             }
         }
+        // However little waits for each: what is known of it takes memory.
+        let too_many = self.pending.len().saturating_sub(self.plan.pending_bytes / 2 / Pending::SLOT_BYTES);
+        for tile in self.pending.longest_files(MOST_IN_FILE, too_many) {
+            self.bring_in_waiting(tile, scan_number)?;
+        }
+        Ok(())
+    }
+
+    fn bring_in_waiting(&mut self, tile: TileIndex, scan_number: u64) -> Result<()> {
+        // It may have come in with another.
+        if self.pending.contains(tile) && !self.coming.contains_key(&tile) {
+            self.bring_in(tile, scan_number)?;
+        }
+        Ok(())
+    }
+
+    /// Whether what waits for a tile is better put into its file than applied. A tile on disk is read and written for its
+    /// updates; that these are at least as many bytes as it has keeps the bytes that go either way in proportion to
+    /// the updates, as in a log-structured merge tree (O'Neil et al., 1996).
+    pub(super) fn is_cheaper_in_file(&self, tile: TileIndex) -> bool {
+        let is_in_memory = self.tiles.contains(tile) || self.cold.contains(tile);
+        if self.plan.cold_bytes == 0 || is_in_memory || self.traffic.is_loading(tile) {
+            return false;
+        }
+        let tile_bytes = self.store.stamp(tile).map_or(0, |stamp| stamp.table.bytes);
+        let in_memory = self.pending.in_memory(tile).map_or(0, |waiting| waiting.as_bytes().len());
+        let waiting = self.pending.in_file(tile).file.bytes + in_memory as u64;
+        waiting < tile_bytes.max(LEAST_BROUGHT_IN_FOR)
+    }
+
+    /// Puts what waits for a tile in memory into its file, behind what is there.
+    fn move_to_file(&mut self, index: TileIndex) -> Result<()> {
+        let Some(waiting) = self.pending.in_memory(index).filter(|waiting| !waiting.is_empty()) else {
+            return Ok(());
+        };
+        let in_file = self.append(index, self.pending.in_file(index), waiting)?;
+        self.io.bytes_written += waiting.as_bytes().len() as u64;
+        self.pending.moved_to_file(index, in_file);
         Ok(())
     }
 
@@ -66,12 +112,7 @@ impl Residency {
             if self.tiles.contains(index) {
                 self.push_out(index, scan_number)?;
             }
-            let in_memory = self.pending.in_memory(index).filter(|waiting| !waiting.is_empty());
-            if let Some(waiting) = in_memory {
-                let in_file = self.append(index, self.pending.in_file(index), waiting)?;
-                self.io.bytes_written += waiting.as_bytes().len() as u64;
-                self.pending.moved_to_file(index, in_file);
-            }
+            self.move_to_file(index)?;
             let before = self.coming.get(&index).copied();
             let before = before.unwrap_or_else(|| self.pending.in_file(index));
             let in_file = self.append(index, before, &updates)?;

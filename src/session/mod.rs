@@ -10,6 +10,7 @@
 //! What each is for, and its rules: `docs/life_of_a_map.md`.
 
 mod clear;
+mod convert;
 mod crop;
 mod decay;
 mod map_editor;
@@ -21,6 +22,7 @@ mod table_change;
 mod table_merge;
 
 pub use clear::{Cleared, clear, clear_on};
+pub use convert::convert;
 pub use crop::{crop, crop_on};
 pub use decay::{Decay, Decayed, decay, decay_on};
 pub use map_writer::{MapWriter, WrittenMap};

@@ -12,8 +12,10 @@ use std::path::Path;
 /// ```text
 /// header  32 bytes  magic "VXTCOMIT", version u32 1, map id 16 bytes, CRC-32 of these
 /// record            payload length u32, its complement u32, payload, CRC-32 of the payload
-/// payload           kind u32 (0 change, 1 whole map), tile count u32, flush number u64, scan number u64,
-///                   a tile: index 3 x i32, stamp 48 bytes; then, where it changed, the text of metadata.json
+/// payload           kind u32 (bit 0: whole map, else a change; bit 1: tiles were removed), tile count u32,
+///                   flush number u64, scan number u64, a tile: index 3 x i32, stamp 48 bytes;
+///                   where tiles were removed, their count u32 and the index of each, 3 x i32;
+///                   then, where it changed, the text of metadata.json
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommitLog {
@@ -33,6 +35,8 @@ pub struct Commits {
     pub tiles: FxHashMap<TileIndex, TileStamp>,
     /// The tiles that the last record names.
     pub last_changed: Vec<TileIndex>,
+    /// The tiles that the last record takes out of the map: their files may still be there.
+    pub last_removed: Vec<TileIndex>,
     /// The last metadata in the log: its parameters are the map's, its bounds and numbers may be older ones.
     pub metadata: Option<Metadata>,
     /// What is wrong with the end of the log, where a flush may have been cut short: it never happened, unless
@@ -49,6 +53,8 @@ pub struct Flush<'a> {
     pub scan_number: u64,
     /// The tiles that changed.
     pub changed: &'a [(TileIndex, TileStamp)],
+    /// The tiles that are no part of the map any more.
+    pub removed: &'a [TileIndex],
     /// The text of `metadata.json`, if more of it changed than every flush changes.
     pub metadata_text: Option<&'a str>,
 }
@@ -57,9 +63,11 @@ const MAGIC: &[u8; 8] = b"VXTCOMIT";
 const VERSION: u32 = 1;
 const HEADER_BYTES: usize = 32;
 const PAYLOAD_HEADER_BYTES: usize = 24;
-const TILE_BYTES: usize = 12 + TileStamp::BYTES;
-const KIND_CHANGE: u32 = 0;
-const KIND_WHOLE_MAP: u32 = 1;
+const INDEX_BYTES: usize = 12;
+const TILE_BYTES: usize = INDEX_BYTES + TileStamp::BYTES;
+/// Bits of a record's kind.
+const WHOLE_MAP: u32 = 1;
+const NAMES_REMOVED: u32 = 2;
 
 impl CommitLog {
     /// The log of a map of which nothing is written yet.
@@ -88,19 +96,20 @@ impl CommitLog {
         let mut tiles: Vec<_> = commits.tiles.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
         tiles.sort_unstable_by_key(|&(tile, _)| tile);
         let (number, scan_number) = (commits.flush_number, commits.scan_number);
-        let whole = Flush { number, scan_number, changed: &tiles, metadata_text: Some(metadata_text) };
+        let (removed, metadata_text) = (&*commits.last_removed, Some(metadata_text));
+        let whole = Flush { number, scan_number, changed: &tiles, removed, metadata_text };
         let mut bytes = header(map_id).to_vec();
-        bytes.extend(record(KIND_WHOLE_MAP, &whole)?);
+        bytes.extend(record(WHOLE_MAP, &whole)?);
         let mut out = disk.create(path)?;
         out.write_all(&bytes)?;
         out.sync()?;
         Ok(Self { map_id, bytes: bytes.len() as u64 })
     }
 
-    /// Appends a record of changed tiles and syncs it: when this returns, the flush is committed. After an error
+    /// Appends a record of changed and removed tiles and syncs it: when this returns, the flush is committed. After an error
     /// the record may be in the file or not, until [`CommitLog::cut`] has taken it out.
     pub fn append(&mut self, disk: &dyn Disk, path: &Path, flush: &Flush<'_>) -> io::Result<()> {
-        let record = record(KIND_CHANGE, flush)?;
+        let record = record(0, flush)?;
         let mut out = disk.append(path, self.bytes)?;
         out.write_all(&record)?;
         out.sync()?;
@@ -162,11 +171,17 @@ impl Commits {
         if tiles_bytes > (payload.len() - PAYLOAD_HEADER_BYTES) as u64 {
             return wrong(4, "the number of tiles does not fit the record");
         }
-        let (tiles, text) = payload[PAYLOAD_HEADER_BYTES..].split_at(tiles_bytes as usize);
-        match u32_at(0) {
-            KIND_CHANGE => {}
-            KIND_WHOLE_MAP => self.tiles.clear(),
-            _ => return wrong(0, "a record of unknown kind"),
+        let (tiles, rest) = payload[PAYLOAD_HEADER_BYTES..].split_at(tiles_bytes as usize);
+        let kind = u32_at(0);
+        if kind & !(WHOLE_MAP | NAMES_REMOVED) != 0 {
+            return wrong(0, "a record of unknown kind");
+        }
+        let at = PAYLOAD_HEADER_BYTES as u64 + tiles_bytes;
+        let Some((removed, text)) = split_removed(kind, rest) else {
+            return wrong(at, "the number of removed tiles does not fit the record");
+        };
+        if kind & WHOLE_MAP != 0 {
+            self.tiles.clear();
         }
         if u64_at(8) > MAX_NUMBER || u64_at(16) > MAX_NUMBER {
             return wrong(8, "flush or scan number is too high to be true");
@@ -178,7 +193,7 @@ impl Commits {
         self.scan_number = u64_at(16);
         self.last_changed.clear();
         if !text.is_empty() {
-            let at = PAYLOAD_HEADER_BYTES as u64 + tiles_bytes;
+            let at = (payload.len() - text.len()) as u64;
             let text = std::str::from_utf8(text);
             match text.ok().and_then(|text| Metadata::from_text(text).ok()) {
                 Some(metadata) => self.metadata = Some(metadata),
@@ -186,17 +201,35 @@ impl Commits {
             }
         }
         for (number, tile) in (0..).zip(tiles.chunks_exact(TILE_BYTES)) {
-            let index = |axis: usize| i32::from_le_bytes(std::array::from_fn(|k| tile[4 * axis + k]));
-            let index = TileIndex::new(index(0), index(1), index(2));
-            let Some(stamp) = TileStamp::from_bytes(&std::array::from_fn(|k| tile[12 + k])) else {
+            let index = index_from(tile);
+            let Some(stamp) = TileStamp::from_bytes(&std::array::from_fn(|k| tile[INDEX_BYTES + k])) else {
                 let at = (PAYLOAD_HEADER_BYTES + TILE_BYTES * number) as u64;
                 return wrong(at, "numbers that no tile has");
             };
             self.tiles.insert(index, stamp);
             self.last_changed.push(index);
         }
+        self.last_removed = removed.chunks_exact(INDEX_BYTES).map(index_from).collect();
+        for tile in &self.last_removed {
+            self.tiles.remove(tile);
+        }
         Ok(())
     }
+}
+
+/// The indices of removed tiles, and what stands behind them; `None` if there are fewer than announced.
+fn split_removed(kind: u32, bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    if kind & NAMES_REMOVED == 0 {
+        return Some((&[], bytes));
+    }
+    let (count, bytes) = bytes.split_first_chunk()?;
+    let removed_bytes = u64::from(u32::from_le_bytes(*count)) * INDEX_BYTES as u64;
+    bytes.split_at_checked(usize::try_from(removed_bytes).ok()?)
+}
+
+fn index_from(bytes: &[u8]) -> TileIndex {
+    let index = |axis: usize| i32::from_le_bytes(std::array::from_fn(|k| bytes[4 * axis + k]));
+    TileIndex::new(index(0), index(1), index(2))
 }
 
 fn header(map_id: [u8; 16]) -> [u8; HEADER_BYTES] {
@@ -211,7 +244,9 @@ fn header(map_id: [u8; 16]) -> [u8; HEADER_BYTES] {
 
 fn record(kind: u32, flush: &Flush<'_>) -> io::Result<Vec<u8>> {
     let text = flush.metadata_text.unwrap_or_default();
-    let payload_bytes = PAYLOAD_HEADER_BYTES + flush.changed.len() * TILE_BYTES + text.len();
+    let kind = if flush.removed.is_empty() { kind } else { kind | NAMES_REMOVED };
+    let removed_bytes = if flush.removed.is_empty() { 0 } else { 4 + flush.removed.len() * INDEX_BYTES };
+    let payload_bytes = PAYLOAD_HEADER_BYTES + flush.changed.len() * TILE_BYTES + removed_bytes + text.len();
     let Ok(payload_bytes) = u32::try_from(payload_bytes) else {
         return Err(io::Error::other("more tiles than one record of the log can name"));
     };
@@ -222,9 +257,16 @@ fn record(kind: u32, flush: &Flush<'_>) -> io::Result<Vec<u8>> {
     bytes.extend_from_slice(&(flush.changed.len() as u32).to_le_bytes());
     bytes.extend_from_slice(&flush.number.to_le_bytes());
     bytes.extend_from_slice(&flush.scan_number.to_le_bytes());
-    for (tile, stamp) in flush.changed {
+    let put_index = |bytes: &mut Vec<u8>, tile: TileIndex| {
         tile.to_array().iter().for_each(|index| bytes.extend_from_slice(&index.to_le_bytes()));
+    };
+    for (tile, stamp) in flush.changed {
+        put_index(&mut bytes, *tile);
         bytes.extend_from_slice(&stamp.to_bytes());
+    }
+    if !flush.removed.is_empty() {
+        bytes.extend_from_slice(&(flush.removed.len() as u32).to_le_bytes());
+        flush.removed.iter().for_each(|tile| put_index(&mut bytes, *tile));
     }
     bytes.extend_from_slice(text.as_bytes());
     let crc = crc32fast::hash(&bytes[8..]);

@@ -41,7 +41,27 @@ impl TileStore {
     /// Notes that the next version of a tile is written, both files.
     pub fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
         self.suspect.remove(&tile);
+        self.removed.remove(&tile);
         self.next.insert(tile, stamp);
+    }
+
+    /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not hold
+    /// the tile, unless a next version of it is written later. What is not committed leaves the tile where it was.
+    ///
+    /// Memory that holds the tile is the caller's to clear.
+    ///
+    /// # Errors
+    ///
+    /// A map of the seed's format, which has no log that could name removed tiles.
+    pub fn remove(&mut self, tile: TileIndex) -> Result<()> {
+        if self.log.is_none() {
+            return Err(Error::argument("map", "a map of the seed's format must be adopted first"));
+        }
+        self.drop_next(tile);
+        if self.commits.tiles.contains_key(&tile) {
+            self.removed.insert(tile);
+        }
+        Ok(())
     }
 
     /// Forgets the next version of a tile, as if it had not been written.
@@ -58,7 +78,8 @@ impl TileStore {
         suspects
     }
 
-    /// Commits every version written since the last commit. When this returns they are durable, and only they.
+    /// Commits every version written and every tile removed since the last commit. When this returns they are durable, and
+    /// only they.
     ///
     /// `metadata` gives the map's parameters; bounds and numbers are filled in here. After an error nothing is
     /// committed, and calling again tries again. What comes after the commit only tidies up: if the disk refuses that,
@@ -78,14 +99,16 @@ impl TileStore {
         }
         let mut changed: Vec<_> = self.next.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
         changed.sort_unstable_by_key(|&(tile, _)| tile);
+        let mut removed: Vec<_> = self.removed.iter().copied().collect();
+        removed.sort_unstable();
         let is_new = self.metadata.ext.is_none() || !self.metadata.is_same_but_for_progress(&metadata);
-        if !changed.is_empty() || is_new || scan_number != self.commits.scan_number {
+        if !changed.is_empty() || !removed.is_empty() || is_new || scan_number != self.commits.scan_number {
             self.sync_next(&changed)?;
             let number = self.commits.flush_number + 1;
             let metadata = self.fill_in(metadata, number, scan_number);
             let text = metadata.to_text();
             let metadata_text = is_new.then_some(&*text);
-            let flush = Flush { number, scan_number, changed: &changed, metadata_text };
+            let flush = Flush { number, scan_number, changed: &changed, removed: &removed, metadata_text };
             if let Err(error) = log.append(&*self.disk, &log_path, &flush) {
                 self.is_log_settled = false;
                 // At once if it goes: another process may come next, and would see a record that is not on the medium.
@@ -95,8 +118,14 @@ impl TileStore {
             // Committed.
             self.log = Some(log);
             self.next.clear();
+            self.removed.clear();
             self.foreign.clear();
             self.unrenamed.extend(changed.iter().map(|&(tile, _)| tile));
+            self.unremoved.extend(&removed);
+            for tile in &removed {
+                self.commits.tiles.remove(tile);
+            }
+            self.commits.last_removed = removed;
             self.commits.flush_number = number;
             self.commits.scan_number = scan_number;
             self.commits.tiles.extend(changed);
@@ -123,7 +152,7 @@ impl TileStore {
             self.sync_folder(self.layout.folder())?;
             self.is_log_settled = true;
         }
-        self.finish_renames()
+        self.put_in_place()
     }
 
     fn sync_next(&mut self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
@@ -147,65 +176,6 @@ impl TileStore {
             result.map_err(|error| Error::io(path, "sync", error))?;
         }
         Ok(())
-    }
-
-    fn tidy_up(&mut self) -> Result<()> {
-        self.finish_renames()?;
-        if self.written_flush != Some(self.commits.flush_number) {
-            self.write_metadata()?;
-        }
-        self.readers.release(&*self.disk, &self.layout);
-        self.compact_log()
-    }
-
-    /// Gives committed versions their names. Tables that they replace are kept while there are readers.
-    pub(super) fn finish_renames(&mut self) -> Result<()> {
-        // Asked after the commit: who begins to read later sees it.
-        let keep = !self.unrenamed.is_empty() && self.readers.are_there();
-        while let Some(&tile) = self.unrenamed.first() {
-            if keep {
-                self.keep_table(tile)?;
-            }
-            for &file in self.layout.files() {
-                self.rename(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
-            }
-            self.unrenamed.remove(&tile);
-            self.renamed.insert(tile);
-        }
-        self.sync_renamed()
-    }
-
-    /// Makes the new names durable. Before that nothing may be written under the old ones, which a crash could bring
-    /// back.
-    fn sync_renamed(&mut self) -> Result<()> {
-        let tiles: Vec<_> = self.renamed.iter().copied().collect();
-        let folders: Vec<_> = tiles.iter().map(|&tile| self.layout.tile_folder(tile)).collect();
-        let [_, synced] = self.disk.sync_all(&[], &folders);
-        for ((tile, folder), result) in tiles.iter().zip(&folders).zip(synced) {
-            result.map_err(|error| Error::io(folder, "sync", error))?;
-            self.renamed.remove(tile);
-        }
-        Ok(())
-    }
-
-    fn keep_table(&mut self, tile: TileIndex) -> Result<()> {
-        let next = self.layout.next(tile, TileFile::Table);
-        if self.disk.kind(&next).map_err(|error| Error::io(&next, "look at", error))?.is_none() {
-            // Renamed by an earlier attempt: the table in place is the new one.
-            return Ok(());
-        }
-        let flush_number = self.commits.flush_number.saturating_sub(1);
-        self.rename(&self.layout.current(tile, TileFile::Table), &self.layout.kept(tile, flush_number))?;
-        self.readers.keep(tile, flush_number);
-        Ok(())
-    }
-
-    /// Renames a file; one that is not there was renamed by an earlier attempt, or never was.
-    fn rename(&self, from: &Path, to: &Path) -> Result<()> {
-        match self.disk.rename(from, to) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            result => result.map_err(|error| Error::io(from, "rename", error)),
-        }
     }
 
     /// Puts the next version of a tile's octree in place by itself: it must be the one that the log names.
@@ -271,7 +241,7 @@ impl TileStore {
         self.sync_folder(self.layout.folder())
     }
 
-    fn compact_log(&mut self) -> Result<()> {
+    pub(super) fn compact_log(&mut self) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
         let whole_bytes = (self.commits.tiles.len() * (12 + TileStamp::BYTES)) as u64;
         if log.bytes() < COMPACT_LOG_BYTES.max(2 * whole_bytes) { Ok(()) } else { self.replace_log() }
@@ -289,7 +259,7 @@ impl TileStore {
         self.sync_folder(self.layout.folder())
     }
 
-    fn sync_folder(&self, folder: &Path) -> Result<()> {
+    pub(super) fn sync_folder(&self, folder: &Path) -> Result<()> {
         self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
     }
 }

@@ -1,7 +1,7 @@
 //! Named bytes on disk; knows no voxel.
 //!
 //! ```text
-//! TileStore -> flush, recovery, readers -> layout (names), CommitLog, Metadata -> Disk -> the file system
+//! TileStore -> flush, tidy, recovery, readers -> layout (names), CommitLog, Metadata -> Disk -> the file system
 //! ```
 //!
 //! Every file operation of a map, syncs included, goes through [`Disk`], so that a failing disk and a crash are
@@ -17,6 +17,7 @@ mod metadata;
 mod readers;
 mod recovery;
 mod remains;
+mod tidy;
 mod tile_location;
 mod tile_stamp;
 mod tile_store;

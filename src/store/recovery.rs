@@ -31,6 +31,7 @@ pub(super) struct Leftovers {
 /// Safe to repeat and to break off anywhere.
 pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Result<Leftovers> {
     let changed: FxHashSet<TileIndex> = commits.last_changed.iter().copied().collect();
+    let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
     let mut leftovers = Leftovers::default();
     for name in list(disk, layout.folder())? {
         let path = layout.folder().join(&name);
@@ -54,6 +55,8 @@ pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Re
                 disk.remove_folder(&path).map_err(|error| Error::io(&path, "remove", error))?;
             }
             State::Empty => {}
+            // The store goes on with its removal.
+            State::Stray if removed.contains(&tile) => {}
             State::Stray => {
                 leftovers.strays.insert(tile);
             }

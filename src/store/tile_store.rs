@@ -35,10 +35,14 @@ pub struct TileStore {
     pub(super) next: FxHashMap<TileIndex, TileStamp>,
     /// Versions of which a sync failed: the medium may hold anything, whatever later syncs say.
     pub(super) suspect: FxHashSet<TileIndex>,
+    /// Tiles that the next commit takes out of the map.
+    pub(super) removed: FxHashSet<TileIndex>,
     /// Committed versions that still have their `*.next` names.
     pub(super) unrenamed: BTreeSet<TileIndex>,
     /// Tiles whose versions have their names, but perhaps not on the medium.
     pub(super) renamed: BTreeSet<TileIndex>,
+    /// Tiles that a commit took out of the map, with files that are still there or whose absence may not be durable.
+    pub(super) unremoved: BTreeSet<TileIndex>,
     /// Tile folders that the log does not know: never read, never overwritten.
     pub(super) strays: FxHashSet<TileIndex>,
     /// How many files of an earlier writer opening has removed.
@@ -90,6 +94,10 @@ impl TileStore {
         let path = store.layout.metadata();
         let watch = store.disk.watch(&path).map_err(|error| Error::io(&path, "open", error))?;
         store.readers.watch(store.written_flush.unwrap_or_default(), watch);
+        if store.commits.flush_number == 0 {
+            // Of a creation that was killed no name may be durable yet.
+            store.sync_folder(folder)?;
+        }
         if store.log.is_some() {
             store.is_log_settled = store.commits.torn.is_none();
             if store.is_metadata_behind() {
@@ -102,7 +110,8 @@ impl TileStore {
             store.leftovers_removed = leftovers.removed;
             store.unrenamed = leftovers.unrenamed;
             store.renamed = leftovers.renamed;
-            store.finish_renames()?;
+            store.unremoved = store.commits.last_removed.iter().copied().collect();
+            store.put_in_place()?;
         }
         Ok(store)
     }
@@ -180,7 +189,8 @@ impl TileStore {
         commits: Commits,
     ) -> Self {
         let layout = layout.with_storage(metadata.storage());
-        let (next, suspect, unrenamed, renamed, strays, foreign, readers) = Default::default();
+        let (next, suspect, removed, unrenamed, renamed) = Default::default();
+        let (unremoved, strays, foreign, readers) = Default::default();
         Self {
             disk,
             layout,
@@ -191,8 +201,10 @@ impl TileStore {
             written_flush: None,
             next,
             suspect,
+            removed,
             unrenamed,
             renamed,
+            unremoved,
             strays,
             leftovers_removed: 0,
             foreign,
@@ -256,16 +268,14 @@ impl TileStore {
 
     /// Whether the tile has a version on disk, committed or not.
     pub fn contains(&self, tile: TileIndex) -> bool {
-        self.next.contains_key(&tile)
-            || self.commits.tiles.contains_key(&tile)
-            || self.foreign.contains(&tile)
-            || self.strays.contains(&tile)
+        self.stamp(tile).is_some() || self.foreign.contains(&tile) || self.strays.contains(&tile)
     }
 
     /// The tiles that have a version on disk, in no particular order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
         let uncommitted = self.next.keys().filter(|tile| !self.commits.tiles.contains_key(tile));
-        self.commits.tiles.keys().chain(&self.foreign).chain(uncommitted).copied()
+        let committed = self.commits.tiles.keys().filter(|tile| !self.removed.contains(tile));
+        committed.chain(&self.foreign).chain(uncommitted).copied()
     }
 
     /// Bytes of memory of what is known of the tiles without reading them: some 200 a tile.
@@ -278,7 +288,8 @@ impl TileStore {
 
     /// What is known of the latest version of a tile on disk without reading it.
     pub fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
-        self.next.get(&tile).or_else(|| self.commits.tiles.get(&tile)).copied()
+        let committed = || self.commits.tiles.get(&tile).filter(|_| !self.removed.contains(&tile));
+        self.next.get(&tile).or_else(committed).copied()
     }
 
     /// Opens the latest version of a tile's table; `None` if the tile has none.

@@ -254,8 +254,15 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 is_stray |= !is_known;
             }
         }
-        // A writer may have added it since the log was read.
-        if is_stray && self.stamp_now(tile).is_none() {
+        if !is_stray {
+            return Ok(());
+        }
+        // A writer may have added it, or begun to remove it, since the log was read.
+        let now = read_log(self.disk, &self.layout).ok().flatten().map(|(_, commits)| commits);
+        if now.as_ref().is_some_and(|now| now.last_removed.contains(&tile)) {
+            let reason = "taken out of the map; its files go when the map is next opened for writing";
+            self.report(Finding::note(folder, Some(tile), reason));
+        } else if now.is_none_or(|now| !now.tiles.contains_key(&tile)) {
             let path = self.layout.current(tile, TileFile::Table);
             self.damage(&path, Some(tile), "commits.log does not name this tile");
         }

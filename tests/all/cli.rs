@@ -492,3 +492,38 @@ fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
     assert_eq!(String::from_utf8_lossy(&ran.stdout), "--subscribe -o map --help\n");
     assert_eq!(ran.status.code(), Some(7));
 }
+
+#[test]
+fn a_map_is_built_small_converted_and_gone_on_with() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = built(&folder);
+    let small = folder.path().join("small");
+    output(&["build", text(&scans), "-o", text(&small), "--storage", "compact"]);
+    let digest = output(&["digest", text(&map)]);
+    assert_eq!(output(&["digest", text(&small)]), digest);
+    assert!(output(&["verify", text(&small)]).contains("whole"));
+    let info = json(&["info", text(&small), "--json"]);
+    assert_eq!((info["storage"].as_str(), info["octree_bytes"].as_u64()), (Some("compact"), Some(0)));
+    assert!(output(&["info", text(&small)]).contains("in compact tables"));
+    assert_eq!(json(&["info", text(&map), "--json"])["storage"], "seed");
+
+    let (to_small, to_seed) = (folder.path().join("to_small"), folder.path().join("to_seed"));
+    let said = json(&["convert", text(&map), "-o", text(&to_small), "--storage", "compact", "--json"]);
+    assert_eq!(said["from"]["octree_bytes"], json(&["info", text(&map), "--json"])["octree_bytes"]);
+    assert!(said["to"]["table_bytes"].as_u64() < said["from"]["table_bytes"].as_u64());
+    let said = output(&["convert", text(&small), "-o", text(&to_seed), "--storage", "seed"]);
+    assert!(said.contains("with compact storage"), "{said}");
+    for map in [&to_small, &to_seed] {
+        assert_eq!(output(&["digest", text(map)]), digest);
+        // All scans of this input are in it.
+        assert_eq!(json(&["build", text(&scans), "-o", text(map), "--resume", "--json"])["resumed_after"], 3);
+    }
+    let (code, message) = failure(&["convert", text(&map), "-o", text(&small), "--storage", "compact"]);
+    assert_eq!(code, 2);
+    assert!(message.contains("small") && message.contains("does not exist yet"), "{message}");
+    let again = ["build", text(&scans), "-o", text(&small), "--resume", "--storage"];
+    let (code, message) = failure(&[&again[..], &["seed"]].concat());
+    assert_eq!(code, 2);
+    assert!(message.contains("stored as compact"), "{message}");
+    output(&[&again[..], &["compact"]].concat());
+}

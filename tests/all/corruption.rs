@@ -197,12 +197,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
             "is missing",
             false,
         ),
-        (
-            "swapped tables",
-            Box::new(|disk| disk.put(table, &files[tables[1]])),
-            "belongs to another tile",
-            true,
-        ),
+        ("swapped tables", Box::new(|disk| disk.put(table, &files[tables[1]])), "to another tile", true),
         (
             "a table of another map",
             Box::new(|disk| disk.put(table, &other_map.files()[table])),
@@ -394,21 +389,21 @@ fn a_damaged_index_does_not_keep_the_tiles_from_being_checked() {
         ("commits.log", Storage::Seed, "octree.bt"),
         ("commits.log", Storage::Compact, "tile.vxt"),
     ] {
-            let whole = small_map(storage);
-            let disk = whole.copy();
-            let mut damaged = vec![map().join(index)];
-            damaged.extend(whole.files().into_keys().filter(|path| path.ends_with(name)));
-            for path in &damaged {
-                let mut bytes = whole.files()[path].clone();
-                let middle = bytes.len() / 2;
-                bytes[middle] ^= 1;
-                disk.put(path, &bytes);
-            }
-            let (_, found) = findings(&disk);
-            for path in &damaged {
-                assert!(found.iter().any(|finding| finding.path == *path), "{index}, {name}: {found:?}");
-            }
-            assert_eq!(found.len(), damaged.len(), "{index}, {name}: {found:?}");
+        let whole = small_map(storage);
+        let disk = whole.copy();
+        let mut damaged = vec![map().join(index)];
+        damaged.extend(whole.files().into_keys().filter(|path| path.ends_with(name)));
+        for path in &damaged {
+            let mut bytes = whole.files()[path].clone();
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 1;
+            disk.put(path, &bytes);
+        }
+        let (_, found) = findings(&disk);
+        for path in &damaged {
+            assert!(found.iter().any(|finding| finding.path == *path), "{index}, {name}: {found:?}");
+        }
+        assert_eq!(found.len(), damaged.len(), "{index}, {name}: {found:?}");
     }
 }
 

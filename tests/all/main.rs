@@ -3,6 +3,8 @@
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;
+/// Maps with another storage: the same content, and there and back the same files.
+mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
 mod corruption;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
@@ -17,6 +19,8 @@ mod layering;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
 mod local_map;
 mod low_memory;
+/// Lives of maps in commands of their own, against a naive life: removed tiles, and every operation as a fault.
+mod map_life;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
 /// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.

@@ -1,4 +1,6 @@
-use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting};
+use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting, voxtile};
+use std::fs;
+use std::process::Stdio;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -18,11 +20,11 @@ impl Random {
 #[test]
 fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
     let scans = Scans::new(24, 1);
-    let how = ["--resume", "--flush-every", "2"];
+    let hows = ["seed", "compact"].map(|storage| ["--resume", "--flush-every", "2", "--storage", storage]);
     let whole_us = {
         let (_folder, map) = folder_for_maps();
         let started = Instant::now();
-        assert!(scans.build(&map, &how).status().unwrap().success());
+        assert!(scans.build(&map, &hows[0]).status().unwrap().success());
         started.elapsed().as_micros() as u64
     };
     let kills = setting("VOXTILE_KILLS", 50);
@@ -32,7 +34,7 @@ fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
         let (_folder, map) = folder_for_maps();
         lives += 1;
         loop {
-            let mut child = scans.build(&map, &how).spawn().unwrap();
+            let mut child = scans.build(&map, &hows[lives % 2]).spawn().unwrap();
             // Most of them while the process begins, makes or opens the map and recovers it.
             let within_us = whole_us / [2, 8, 64][random.below(3) as usize];
             sleep(Duration::from_micros(random.below(within_us.max(1))));
@@ -54,4 +56,45 @@ fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
         assert!(is_whole(&map));
     }
     println!("{killed} kills in {lives} builds, {in_vain} of them before there was a map");
+}
+
+#[test]
+fn a_conversion_that_is_killed_leaves_no_new_map_or_the_whole_one() {
+    let scans = Scans::new(12, 1);
+    let (_folder, map) = folder_for_maps();
+    assert!(scans.build(&map, &[]).status().unwrap().success());
+    let expected = digest(&map).unwrap();
+    let new = map.with_file_name("new");
+    let convert = |storage| {
+        let mut command = voxtile();
+        command.arg("convert").arg(&map).arg("-o").arg(&new).args(["--storage", storage]);
+        command.stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    };
+    let started = Instant::now();
+    assert!(convert("compact").status().unwrap().success());
+    let whole_us = started.elapsed().as_micros() as u64;
+    fs::remove_dir_all(&new).unwrap();
+    let mut random = Random(setting("VOXTILE_SEED", 1));
+    let (mut in_vain, mut whole) = (0, 0);
+    for number in 0..setting("VOXTILE_KILLS", 50) {
+        let storage = ["seed", "compact"][number as usize % 2];
+        let mut child = convert(storage).spawn().unwrap();
+        sleep(Duration::from_micros(random.below(whole_us * 5 / 4)));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        match digest(&new) {
+            Ok(found) => {
+                assert_eq!(found, expected, "kill {number}");
+                fs::remove_dir_all(&new).unwrap();
+                whole += 1;
+            }
+            Err(message) if message.contains("no map here") => in_vain += 1,
+            Err(message) => panic!("kill {number}: {message}"),
+        }
+        assert_eq!(digest(&map), Ok(expected.clone()), "kill {number}");
+    }
+    assert!(convert("compact").status().unwrap().success());
+    assert!(is_whole(&new) && digest(&new) == Ok(expected));
+    println!("{in_vain} kills before there was a new map, {whole} after");
 }

@@ -43,6 +43,8 @@ pub enum Command {
     Clear(ClearArgs),
     /// Let the evidence of a map fade by the scans that have come since, in place
     Decay(DecayArgs),
+    /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit
+    Convert(ConvertArgs),
     /// Check every file of a map for damage; exit code 1 if there is any
     Verify(VerifyArgs),
     /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted
@@ -291,6 +293,21 @@ pub struct VerifyArgs {
     /// Folder of the map; a writer may be at work on it
     pub map: PathBuf,
     /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ConvertArgs {
+    /// Folder of the map
+    pub map: PathBuf,
+    /// Folder of the new map, which does not exist yet
+    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    pub output: PathBuf,
+    /// How the tiles of the new map are stored
+    #[arg(long, value_name = "FORM")]
+    pub storage: StorageName,
+    /// Print JSON; sizes in bytes
     #[arg(long)]
     pub json: bool,
 }

@@ -4,6 +4,7 @@ mod args;
 mod build;
 mod byte_size;
 mod clear;
+mod convert;
 mod crop;
 mod decay;
 mod demo;
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         Command::Crop(args) => crop::run(&args),
         Command::Clear(args) => clear::run(&args),
         Command::Decay(args) => decay::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
         Command::Local(args) => local::run(&args),

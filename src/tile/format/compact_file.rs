@@ -56,3 +56,87 @@ pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trai
     }
     Ok(front)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::Evidence;
+    use crate::space::{BrickCode, TileIndex};
+    use crate::tile::Table;
+    use crate::tile::format::{CompactEffort, write_compact};
+
+    const VOXELS: VoxelBox = VoxelBox { min: [0; 3], end: [16; 3] };
+
+    fn table(log_odds: f64) -> Table {
+        let mut table = Table::default();
+        let state = |place| Evidence { log_odds: log_odds + f64::from(place % 3), observation_count: 2 };
+        table.insert(
+            BrickCode::of_voxel([8, 0, 0]),
+            &(0..200).map(|place| (place as usize, state(place))).collect::<Vec<_>>(),
+        );
+        table
+    }
+
+    fn file(table: &Table, scan_number: u64) -> Vec<u8> {
+        let (mut compact, mut file) = (Vec::new(), Vec::new());
+        write_compact(table, CompactEffort::Fast, &mut compact).unwrap();
+        let (map_id, tile, parameters) = ([3; 16], TileIndex::new(0, 0, 0), "{}".to_owned());
+        let front =
+            Trailer { map_id, tile, scan_number, table_crc: 9, octree_crc: 9, octree_bytes: 9, parameters };
+        write_compact_file(&compact, front, &mut file).unwrap();
+        file
+    }
+
+    fn read(file: &[u8]) -> Result<DecodedTable, DecodeError> {
+        read_compact_file(&mut &file[..], file.len() as u64, &VOXELS)
+    }
+
+    #[test]
+    fn a_table_comes_back_with_what_stands_in_front() {
+        let (table, file) = (table(0.5), file(&table(0.5), 77));
+        let decoded = read(&file).unwrap();
+        assert!(decoded.table.iter().eq(table.iter()));
+        let front = decoded.trailer.unwrap();
+        assert_eq!((front.scan_number, front.octree_crc, front.octree_bytes), (77, 0, 0));
+        assert_eq!(read_compact_front(&mut &file[..], file.len() as u64).unwrap(), front);
+    }
+
+    #[test]
+    fn every_flipped_bit_and_every_other_length_is_an_error() {
+        let file = file(&table(0.5), 77);
+        for at in 0..file.len() {
+            for bit in 0..8 {
+                let mut flipped = file.clone();
+                flipped[at] ^= 1 << bit;
+                assert!(read(&flipped).is_err(), "bit {bit} of byte {at}");
+            }
+            assert!(read(&file[..at]).is_err(), "{at} bytes");
+        }
+        assert!(read(&[&file[..], &[0]].concat()).is_err());
+    }
+
+    #[test]
+    fn an_error_behind_the_front_says_where_in_the_file() {
+        let mut file = file(&table(0.5), 77);
+        let front_bytes = 74;
+        file[front_bytes] ^= 1;
+        match read(&file) {
+            Err(DecodeError::Format(error)) => assert_eq!(error.at, front_bytes as u64),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// A checksum behind what it is of would make that of the whole file the same for all of one length.
+    #[test]
+    fn files_of_other_content_have_other_checksums() {
+        let files = [0.5, 0.75].map(|log_odds| file(&table(log_odds), 77));
+        assert_eq!(files[0].len(), files[1].len());
+        assert_ne!(crc32fast::hash(&files[0]), crc32fast::hash(&files[1]));
+    }
+
+    #[test]
+    fn what_is_no_compact_form_is_not_written() {
+        let front = read(&file(&table(0.5), 1)).unwrap().trailer.unwrap();
+        assert!(write_compact_file(&[1, 2, 3], front, &mut Vec::new()).is_err());
+    }
+}

@@ -12,6 +12,7 @@ use voxtile::share::{SetRange, VoxelSet, write_layer};
 use voxtile::space::{BrickCode, Grid, MortonCode, TileIndex, VoxelKey};
 use voxtile::store::{Layout, TileFile};
 use voxtile::tile::Table;
+use voxtile::tile::format::{Trailer, write_compact_file};
 use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
 
 /// Target, name and content of seeds.
@@ -114,7 +115,19 @@ fn compact_tables() -> Seeds {
     }
     full.insert(brick(3), &(0..512).map(|place| (place, state(-0.5, 7))).collect::<Vec<_>>());
     let chosen = |choice: u8, table| [&[choice], &compact_bytes(table)[..]].concat();
+    let file = |choice: u8, table| {
+        let (tile, scan_number, parameters) = (TILES[0], 12, "{\"resolution\":0.1}".to_owned());
+        let (table_crc, octree_crc, octree_bytes) = (0, 0, 0);
+        let front =
+            Trailer { map_id: [7; 16], tile, scan_number, table_crc, octree_crc, octree_bytes, parameters };
+        let mut file = vec![choice];
+        write_compact_file(&compact_bytes(table), front, &mut file).unwrap();
+        file
+    };
     vec![
+        ("compact_file", "empty", file(1, &Table::default())),
+        ("compact_file", "some", file(1, &some)),
+        ("compact_file", "plain", file(0, &full)),
         ("compact", "empty", chosen(1, &Table::default())),
         ("compact", "some", chosen(1, &some)),
         ("compact", "full", chosen(1, &full)),

@@ -20,17 +20,19 @@ use voxtile::space::{Grid, TileIndex};
 use voxtile::store::{CommitLog, Metadata};
 use voxtile::tile::Table;
 use voxtile::tile::format::{
-    CompactEffort, TRAILER_BYTES, read_compact, read_table, write_compact, write_table,
+    CompactEffort, TRAILER_BYTES, Trailer, read_compact, read_compact_file, read_compact_front, read_table,
+    write_compact, write_compact_file, write_table,
 };
 
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by the name of its corpus.
-pub const TARGETS: [(&str, Target); 14] = [
+pub const TARGETS: [(&str, Target); 15] = [
     ("bt", octree),
     ("ot", octree),
     ("table", table),
     ("compact", compact),
+    ("compact_file", compact_file),
     ("metadata", metadata),
     ("commit_log", commit_log),
     ("pcd", pcd),
@@ -139,6 +141,38 @@ fn seal(bytes: &mut [u8]) {
     if let Some((content, crc)) = bytes.split_last_chunk_mut::<4>() {
         *crc = crc32fast::hash(content).to_le_bytes();
     }
+}
+
+/// `tile.vxt`: what stands in front is written the same again, and so is the table.
+pub fn compact_file(data: &[u8]) -> bool {
+    let Some((&choice, file)) = data.split_first() else { return false };
+    let mut file = file.to_vec();
+    if choice & 1 == 1 {
+        seal_compact_file(&mut file);
+    }
+    let voxels = grid().voxels_of_tile(TILES[usize::from(choice >> 1 & 3)]);
+    let read = |bytes: &[u8]| read_compact_file(&mut &bytes[..], bytes.len() as u64, &voxels);
+    let Ok(decoded) = read(&file) else { return false };
+    let front = decoded.trailer.expect("what stands in front was read");
+    assert_eq!(read_compact_front(&mut &file[..], file.len() as u64).expect("it was read before"), front);
+    let mut written = Vec::new();
+    let compact = compact_bytes(&decoded.table);
+    write_compact_file(&compact, front.clone(), &mut written).expect("memory takes all");
+    let again = read(&written).expect("what was written is read");
+    assert!(again.table.iter().eq(decoded.table.iter()));
+    let of_content = |front: Trailer| Trailer { table_crc: 0, ..front };
+    assert_eq!(again.trailer.map(of_content), Some(of_content(front)));
+    true
+}
+
+/// Makes the checksums of a `tile.vxt` right.
+fn seal_compact_file(file: &mut [u8]) {
+    let Some((front, behind)) = file.split_at_mut_checked(TRAILER_BYTES) else { return };
+    let length = u32::from_le_bytes(std::array::from_fn(|k| front[60 + k]));
+    let Some((parameters, body)) = behind.split_at_mut_checked(length as usize) else { return };
+    front[44..48].copy_from_slice(&crc32fast::hash(body).to_le_bytes());
+    front[64..68].copy_from_slice(&crc32fast::hash(parameters).to_le_bytes());
+    seal(front);
 }
 
 /// A table in its compact form: it comes back from the bytes that are made of it, and these are the same again. Others

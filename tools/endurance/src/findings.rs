@@ -34,9 +34,9 @@ impl Findings {
     ///
     /// As for [`Findings::keep`].
     pub fn keep_build(&mut self, build: &Build, built: &Built) -> Result<()> {
-        let Build { case, limit, disk, .. } = build;
+        let Build { case, limit, disk, storage, .. } = build;
         let (wall_s, peak_mib) = (built.wall_s(), mib(built.peak_resident_bytes as f64));
-        eprintln!("  {}, {limit:?}, {disk:?}: {wall_s:.1} s, peak {peak_mib:.0} MiB", case.name);
+        eprintln!("  {}, {limit:?}, {disk:?}, {storage}: {wall_s:.1} s, peak {peak_mib:.0} MiB", case.name);
         self.keep(build, built)
     }
 

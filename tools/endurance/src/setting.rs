@@ -2,6 +2,7 @@ use crate::build::Build;
 use crate::case::{Case, Input, Limit};
 use crate::metered_disk::DiskSpeed;
 use std::path::PathBuf;
+use voxtile::Storage;
 use workload::SurveyName;
 
 /// What questions are put to, and how long they may take.
@@ -42,6 +43,7 @@ impl Setting {
             case: case.clone(),
             limit,
             disk: self.size(DiskSpeed::Own, DiskSpeed::Unsynced),
+            storage: Storage::Seed,
             scans_at_a_time: 1,
             folder: self.work.join("map"),
             is_kept: false,

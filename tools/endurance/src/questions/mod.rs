@@ -4,6 +4,7 @@ mod export;
 mod flat_cost;
 mod idle;
 mod memory;
+mod storage;
 mod throughput;
 
 use crate::findings::Findings;
@@ -21,9 +22,10 @@ pub struct Question {
 }
 
 /// All of them, in the order of the page.
-pub const QUESTIONS: [Question; 5] = [
+pub const QUESTIONS: [Question; 6] = [
     Question { name: "memory", promises: "memory_promises", answer: memory::answer },
     Question { name: "throughput", promises: "throughput_promises", answer: throughput::answer },
+    Question { name: "storage", promises: "storage_promises", answer: storage::answer },
     Question { name: "flat-cost", promises: "flat_cost_promises", answer: flat_cost::answer },
     Question { name: "export", promises: "export_promises", answer: export::answer },
     Question { name: "idle", promises: "idle_promises", answer: idle::answer },

@@ -1,0 +1,198 @@
+use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use crate::support::random_scans::{Random, random_scan};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::session::convert;
+use voxtile::upkeep::verify_on;
+use voxtile::{
+    Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Result, Scan, Storage,
+};
+
+const INPUT: &str = "random scans";
+
+fn place(name: &str) -> PathBuf {
+    Path::new("/city").join(name)
+}
+
+fn config() -> MapConfig {
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0)
+}
+
+fn scan(number: u64) -> Scan {
+    random_scan(&mut Random(number), [3.0 * number as f64, 0.0, 0.0], 4)
+}
+
+/// A map of two scans, flushed after each, so that tiles are of different scans.
+fn map(disk: &FaultyDisk, config: MapConfig) -> blake3::Hash {
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &place("map"), config).unwrap();
+    mapper.begin_input(INPUT).unwrap();
+    for number in 0..2 {
+        mapper.insert_scan(&scan(number)).unwrap();
+        mapper.flush().unwrap();
+    }
+    mapper.digest().unwrap()
+}
+
+fn reader(disk: &FaultyDisk, name: &str) -> Result<MapReader> {
+    MapReader::open_on(disk.shared(), &place(name), 1)
+}
+
+fn converted(disk: &FaultyDisk, from: &str, to: &str, storage: Storage) -> Result<()> {
+    let mut told = 0;
+    let reader = reader(disk, from)?;
+    let written = convert(&reader, place(to), storage, |done, _| told = done)?;
+    assert_eq!((written.tiles, told), (reader.tile_indices().len() as u64, written.tiles));
+    Ok(())
+}
+
+/// The files of a map's tiles, by their path in the map.
+fn tile_files(disk: &FaultyDisk, name: &str) -> BTreeMap<PathBuf, Vec<u8>> {
+    let files = disk.files().into_iter();
+    let inside =
+        files.filter_map(|(path, bytes)| Some((path.strip_prefix(place(name)).ok()?.to_owned(), bytes)));
+    inside.filter(|(path, _)| path.components().count() == 2).collect()
+}
+
+#[test]
+fn there_and_back_the_content_stays_and_the_files_are_the_same() {
+    let iwlo = SensorModel::Iwlo(Iwlo::default());
+    for config in [config(), config().with_sensor_model(iwlo).with_storage(Storage::Compact)] {
+        let (own, other) = match config.storage {
+            Storage::Seed => (Storage::Seed, Storage::Compact),
+            Storage::Compact => (Storage::Compact, Storage::Seed),
+        };
+        let disk = FaultyDisk::new(Fault::None);
+        let digest = map(&disk, config);
+        converted(&disk, "map", "other", other).unwrap();
+        converted(&disk, "other", "back", own).unwrap();
+        let first = reader(&disk, "map").unwrap();
+        for (name, storage) in [("other", other), ("back", own)] {
+            let reader = reader(&disk, name).unwrap();
+            assert_eq!((reader.config().storage, reader.digest().unwrap()), (storage, digest));
+            assert_eq!(reader.voxel_counts(), first.voxel_counts());
+            assert_eq!(reader.scan_number(), 2);
+            let ids = [&first, &reader].map(|map| map.metadata().ext.clone().unwrap().map_id);
+            assert_eq!(ids[0], ids[1]);
+            let mut found = Vec::new();
+            let verified =
+                verify_on(disk.shared(), &place(name), |finding| found.push(finding.clone()), |_, _| ());
+            assert!(verified.unwrap().is_whole() && found.is_empty(), "{found:?}");
+        }
+        let [seed, compact] = match own {
+            Storage::Seed => ["map", "other"],
+            Storage::Compact => ["other", "map"],
+        };
+        let [(seed_table, seed_octree), (table, octree)] =
+            [seed, compact].map(|name| reader(&disk, name).unwrap().disk_bytes().unwrap());
+        assert!(table < seed_table && octree == 0 && seed_octree > 0);
+        assert!(tile_files(&disk, "map") == tile_files(&disk, "back"));
+        assert!(tile_files(&disk, compact).keys().all(|path| path.ends_with("tile.vxt")));
+    }
+}
+
+#[test]
+fn a_build_goes_on_with_the_other_form_as_with_the_first() {
+    let disk = FaultyDisk::new(Fault::None);
+    map(&disk, config());
+    converted(&disk, "map", "small", Storage::Compact).unwrap();
+    let digests = ["map", "small"].map(|name| {
+        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &place(name), config()).unwrap();
+        assert_eq!(mapper.resume_input(INPUT).unwrap(), 2);
+        for number in [1, 2] {
+            mapper.insert_scan(&scan(number)).unwrap();
+        }
+        mapper.flush().unwrap();
+        reader(&disk, name).unwrap().digest().unwrap()
+    });
+    assert_eq!(digests[0], digests[1]);
+}
+
+#[test]
+fn whatever_fails_and_wherever_the_power_goes_there_is_no_new_map_or_the_whole_one() {
+    let before = FaultyDisk::new(Fault::None);
+    let digest = map(&before, config());
+    let first = tile_files(&before, "map");
+    let undisturbed = before.copy();
+    let (operations, changes) = (undisturbed.operations(), undisturbed.changes());
+    converted(&undisturbed, "map", "small", Storage::Compact).unwrap();
+    let (operations, changes) = (undisturbed.operations() - operations, undisturbed.changes() - changes);
+    println!("{operations} operations, {changes} of them changes");
+    let is_there = |disk: &FaultyDisk, what: &str| match reader(disk, "small") {
+        Ok(reader) => {
+            assert_eq!(reader.digest().unwrap_or_else(|error| panic!("{what}: {error}")), digest, "{what}");
+            true
+        }
+        Err(Error::NoMap { .. }) => false,
+        Err(error) => panic!("{what}: {error}"),
+    };
+    let again = |disk: &FaultyDisk, what: &str| {
+        let was_there = is_there(disk, what);
+        match converted(disk, "map", "small", Storage::Compact) {
+            Ok(()) => assert!(!was_there, "{what}"),
+            Err(Error::AlreadyExists { .. }) => assert!(was_there, "{what}"),
+            Err(error) => panic!("{what}: {error}"),
+        }
+        assert!(is_there(disk, what), "{what}");
+        assert!(tile_files(disk, "map") == first, "{what}");
+    };
+    let failures = (0..operations).map(Fault::Fails);
+    let failures = failures.chain((0..changes).map(Fault::LosesSync));
+    for fault in failures.chain((0..changes).map(Fault::IsFull)) {
+        let disk = before.copy();
+        disk.set_fault(fault);
+        let done = converted(&disk, "map", "small", Storage::Compact);
+        disk.make_room();
+        assert!(done.is_err() || is_there(&disk.after_crash(Unsynced::Dropped), "done"), "{fault:?}");
+        again(&disk, &format!("{fault:?}"));
+    }
+    for at in 0..changes {
+        let disk = before.copy();
+        disk.set_fault(Fault::Crashes(at));
+        let done = converted(&disk, "map", "small", Storage::Compact);
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
+            let (left, what) = (disk.after_crash(unsynced), format!("crash at {at}, {unsynced:?}"));
+            assert!(done.is_err() || is_there(&left, &what), "{what}");
+            again(&left, &what);
+        }
+    }
+}
+
+#[test]
+fn a_damaged_tile_is_named_and_leaves_nothing_behind() {
+    for storage in [Storage::Seed, Storage::Compact] {
+        let disk = FaultyDisk::new(Fault::None);
+        map(&disk, config().with_storage(storage));
+        let (path, mut bytes) = tile_files(&disk, "map").pop_last().unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 4;
+        let path = place("map").join(path);
+        let path = if path.ends_with("octree.bt") { path.with_file_name("iwlo_meta.bin") } else { path };
+        disk.put(&path, &bytes);
+        match converted(&disk, "map", "new", Storage::Compact) {
+            Err(Error::Damaged { path: named, tile: Some(_), .. }) => assert_eq!(named, path),
+            other => panic!("{other:?}"),
+        }
+        assert!(disk.files().keys().all(|path| path.starts_with(place("map"))));
+    }
+}
+
+/// A map of the seed's own format has no checksums; what is made of it has.
+#[test]
+fn a_map_of_the_seeds_own_format_gets_what_it_lacks() {
+    let disk = FaultyDisk::new(Fault::None);
+    let digest = map(&disk, config());
+    disk.take(&place("map").join("commits.log"));
+    let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
+    disk.put(&place("map").join("metadata.json"), metadata);
+    for (path, bytes) in disk.files() {
+        if path.ends_with("iwlo_meta.bin") {
+            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
+            disk.put(&path, &bytes[..16 + 18 * count]);
+        }
+    }
+    converted(&disk, "map", "small", Storage::Compact).unwrap();
+    let reader = reader(&disk, "small").unwrap();
+    assert!(reader.is_verified());
+    assert_eq!((reader.digest().unwrap(), reader.scan_number()), (digest, 0));
+}

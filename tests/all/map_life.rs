@@ -1,0 +1,258 @@
+use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use crate::support::random_scans::{Random, random_scan};
+use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
+use std::path::Path;
+use voxtile::space::TileIndex;
+use voxtile::store::{TileStore, tile_of_folder};
+use voxtile::upkeep::{Finding, Severity, Verification, verify_on};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Result, Scan};
+
+fn map() -> &'static Path {
+    Path::new("/city/map")
+}
+
+fn config() -> MapConfig {
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_pending_bytes(600)
+}
+
+/// What people do with a map, each in a process of its own.
+#[derive(Clone, Debug)]
+enum Act {
+    /// Insert these scans and flush.
+    Scans(std::ops::Range<u64>),
+    /// Take every so many-th tile out of the map.
+    Remove(usize),
+}
+
+fn scan(number: u64) -> Scan {
+    let x = [0.0, 3.0, 6.0, 3.0][number as usize % 4];
+    random_scan(&mut Random(number), [x, 0.0, 0.0], 4)
+}
+
+/// What a map is after an act.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct State {
+    voxels: Voxels,
+    scan_number: u64,
+}
+
+/// A life, and the naive map after each of its acts.
+struct Life {
+    acts: Vec<Act>,
+    states: Vec<State>,
+}
+
+impl Life {
+    fn new(acts: Vec<Act>) -> Self {
+        let mut states = vec![State::default()];
+        for act in &acts {
+            states.push(naive(states.last().unwrap().clone(), act));
+        }
+        Self { acts, states }
+    }
+
+    /// The number of the state that a map is in, among these.
+    fn state_of(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
+        let reader = match MapReader::open_on(disk.shared(), map(), 1) {
+            Err(Error::NoMap { .. }) if among.contains(&0) => return 0,
+            opened => opened.unwrap_or_else(|error| panic!("{what}: {error}")),
+        };
+        let found = State { voxels: voxels_of(&reader), scan_number: reader.scan_number() };
+        let number = among.iter().copied().find(|&number| self.states[number] == found);
+        number.unwrap_or_else(|| panic!("{what}: none of the states {among:?}"))
+    }
+
+    /// Acts from a state to the end; how far it came, if something failed.
+    fn live(&self, disk: &FaultyDisk, from: usize) -> std::result::Result<(), (usize, Error)> {
+        for (number, action) in self.acts.iter().enumerate().skip(from) {
+            act(disk, action).map_err(|error| (number, error))?;
+        }
+        Ok(())
+    }
+
+    /// The act in which the power went; what comes after the commit of the last one fails without an error.
+    fn live_until_crash(&self, disk: &FaultyDisk, from: usize) -> usize {
+        let lived = self.live(disk, from);
+        assert!(disk.has_crashed());
+        lived.map_or_else(|(number, _)| number, |()| self.acts.len() - 1)
+    }
+
+    fn undisturbed(&self) -> FaultyDisk {
+        let disk = FaultyDisk::new(Fault::None);
+        self.live(&disk, 0).unwrap();
+        disk
+    }
+
+    /// What a crash in an act left is the map before or after it, whole, and life goes on to the same end.
+    fn check_after_crash(&self, disk: &FaultyDisk, number: usize, what: &str) {
+        let from = self.state_of(disk, &[number, number + 1], what);
+        if from > 0 {
+            check_whole(disk, what);
+        }
+        self.live(disk, from).unwrap_or_else(|(number, error)| panic!("{what}: then act {number}: {error}"));
+        self.check_end(disk, what);
+    }
+
+    fn check_end(&self, disk: &FaultyDisk, what: &str) {
+        // What a crash in the last act left goes when the map is opened.
+        drop(OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap());
+        self.state_of(disk, &[self.acts.len()], what);
+        check_files(disk, what);
+    }
+}
+
+fn check_whole(disk: &FaultyDisk, what: &str) -> Verification {
+    let is_damage = |finding: &Finding| finding.severity == Severity::Damage;
+    let found = |finding: &Finding| assert!(!is_damage(finding), "{what}: {finding}");
+    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap()
+}
+
+/// Nothing is damaged, and nothing lies around.
+fn check_files(disk: &FaultyDisk, what: &str) {
+    assert_eq!(check_whole(disk, what).notes, 0, "{what}");
+    let reader = MapReader::open_on(disk.shared(), map(), 1).unwrap();
+    let tiles = reader.tile_indices();
+    for path in disk.files().into_keys() {
+        let folder = path.parent().and_then(|folder| folder.file_name()?.to_str()).unwrap();
+        let is_of_tile = tile_of_folder(folder).is_none_or(|tile| tiles.binary_search(&tile).is_ok());
+        assert!(is_of_tile, "{what}: {}", path.display());
+    }
+}
+
+fn is_removed(every: usize, tile: TileIndex) -> bool {
+    (tile.x + tile.y + tile.z).rem_euclid(every as i32) == 0
+}
+
+fn naive(before: State, act: &Act) -> State {
+    let grid = config().grid;
+    let mut map = ReferenceMap::new(&config());
+    (map.voxels, map.updated) = (before.voxels, Vec::new());
+    match act {
+        Act::Scans(numbers) => {
+            numbers.clone().for_each(|number| map.insert_scan(&scan(number)));
+            let scan_number = before.scan_number + numbers.end - numbers.start;
+            State { voxels: map.voxels, scan_number }
+        }
+        Act::Remove(every) => {
+            map.voxels.retain(|&voxel, _| !is_removed(*every, grid.tile_of_voxel(voxel)));
+            State { voxels: map.voxels, scan_number: before.scan_number }
+        }
+    }
+}
+
+fn act(disk: &FaultyDisk, act: &Act) -> Result<()> {
+    match act {
+        Act::Scans(numbers) => {
+            let mut mapper = match OutOfCoreTileMapper::open_on(disk.shared(), map(), config()) {
+                Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create_on(disk.shared(), map(), config()),
+                opened => opened,
+            }?;
+            for number in numbers.clone() {
+                mapper.insert_scan(&scan(number))?;
+            }
+            mapper.flush()
+        }
+        Act::Remove(every) => {
+            let mut store = TileStore::open(disk.shared(), map())?;
+            for tile in store.tiles().filter(|tile| is_removed(*every, *tile)).collect::<Vec<_>>() {
+                store.remove(tile)?;
+            }
+            store.commit(store.metadata().clone(), store.commits().scan_number)
+        }
+    }
+}
+
+/// Tiles go and come again, and at the end all of them go.
+fn removals() -> Life {
+    Life::new(vec![
+        Act::Scans(0..3),
+        Act::Remove(2),
+        Act::Scans(3..5),
+        Act::Remove(3),
+        Act::Scans(0..1),
+        Act::Remove(1),
+    ])
+}
+
+#[test]
+fn an_operation_fails_and_the_next_attempt_goes() {
+    let life = removals();
+    let disk = life.undisturbed();
+    life.check_end(&disk, "undisturbed");
+    for at in 0..disk.operations() {
+        let disk = FaultyDisk::new(Fault::Fails(at));
+        if let Err((number, _)) = life.live(&disk, 0) {
+            let left = disk.after_kill();
+            life.check_after_crash(&left, number, &format!("operation {at} fails"));
+        }
+    }
+}
+
+#[test]
+fn the_power_goes_at_every_change() {
+    let life = removals();
+    let changes = life.undisturbed().changes();
+    println!("{changes} changes");
+    for at in 0..changes {
+        let disk = FaultyDisk::new(Fault::Crashes(at));
+        let number = life.live_until_crash(&disk, 0);
+        let shuffled = (0..3).map(|seed| Unsynced::Shuffled(31 * at + seed));
+        for unsynced in shuffled.chain([Unsynced::Dropped, Unsynced::Kept]) {
+            let left = disk.after_crash(unsynced);
+            life.check_after_crash(&left, number, &format!("crash at {at}, {unsynced:?}"));
+        }
+    }
+}
+
+#[test]
+fn the_power_goes_some_time_after_a_kill() {
+    let life = removals();
+    for at in 0..life.undisturbed().changes() {
+        let disk = FaultyDisk::new(Fault::Crashes(at));
+        let number = life.live_until_crash(&disk, 0);
+        for again in [0, 1, 2, 3, 5, at % 17, 7 + at % 29] {
+            let killed = disk.after_kill();
+            let from = life.state_of(&killed, &[number, number + 1], "killed");
+            killed.set_fault(Fault::Crashes(again));
+            if from == life.acts.len() {
+                continue;
+            }
+            let number = life.live_until_crash(&killed, from);
+            let left = killed.after_crash(Unsynced::Shuffled(again));
+            life.check_after_crash(&left, number, &format!("killed at {at}, crash {again} later"));
+        }
+    }
+}
+
+/// A reader from before goes on seeing what was removed.
+#[test]
+fn a_reader_goes_on_seeing_removed_tiles() {
+    let life = removals();
+    let disk = FaultyDisk::new(Fault::None);
+    for (number, action) in life.acts.iter().enumerate() {
+        let reader = MapReader::open_on(disk.shared(), map(), 1);
+        let digest = reader.as_ref().ok().map(|reader| reader.digest().unwrap());
+        act(&disk, action).unwrap();
+        if let Ok(reader) = reader {
+            assert_eq!(voxels_of(&reader), life.states[number].voxels, "a reader across act {number}");
+            assert_eq!(reader.digest().ok(), digest);
+        }
+    }
+}
+
+/// What is staged and not committed leaves the map as it was.
+#[test]
+fn a_removal_counts_from_the_commit_on() {
+    let life = removals();
+    let disk = FaultyDisk::new(Fault::None);
+    act(&disk, &life.acts[0]).unwrap();
+    let mut store = TileStore::open(disk.shared(), map()).unwrap();
+    let tiles: Vec<_> = store.tiles().collect();
+    for &tile in &tiles {
+        store.remove(tile).unwrap();
+        assert!(!store.contains(tile) && store.open_table(tile).unwrap().is_none());
+    }
+    assert_eq!(store.tiles().count(), 0);
+    drop(store);
+    assert_eq!(life.state_of(&disk, &[1], "not committed"), 1);
+}
