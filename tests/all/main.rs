@@ -3,6 +3,9 @@
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;
+/// The commands that merge, crop, clear and fade.
+#[cfg(feature = "cli")]
+mod cli_edit;
 /// Maps with another storage: the same content, and there and back the same files.
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.

@@ -77,6 +77,7 @@ pub struct PartArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct DecayArgs {
     /// Folder of the map
     pub map: PathBuf,
