@@ -64,7 +64,7 @@ fn what_is_free_stays_free_however_much_has_faded() {
     let reader = MapReader::open_on(disk.shared(), &path("map"), 1).unwrap();
     assert!(matches!(reader.occupancy_at([0.25; 3]).unwrap(), Occupancy::Free(_)));
     assert!(matches!(reader.occupancy_at([4.75, 0.25, 0.25]).unwrap(), Occupancy::Occupied(_)));
-    let tree = reader.merged_octree(None).unwrap();
+    let tree = reader.merged_octree(None, 1 << 20).unwrap();
     let occupied = tree.leaves().filter(|leaf| leaf.value >= 0.0).count();
     assert_eq!(occupied, 1, "as octree, too");
 }
