@@ -67,8 +67,7 @@ pub fn revert_on(
         check_is_free(&store, keep_as)?;
         store.create_snapshot(keep_as)?;
     }
-    let mut reverted =
-        Reverted { scan_number_before: store.commits().scan_number, ..Reverted::default() };
+    let mut reverted = Reverted { scan_number_before: store.commits().scan_number, ..Reverted::default() };
     let mut reverter = Reverter::new(&mut store, &past)?;
     let mut tiles: Vec<_> = past.tiles().collect();
     tiles.sort_unstable();
@@ -105,7 +104,8 @@ impl<'a> Reverter<'a> {
 
     /// Makes the snapshot's version of a tile the next one; false if it is the present one.
     fn restore(&mut self, tile: TileIndex) -> Result<bool> {
-        let Some(stamp) = self.past.stamp(tile).filter(|_| self.past.stamp(tile) != self.store.stamp(tile)) else {
+        let Some(stamp) = self.past.stamp(tile).filter(|_| self.past.stamp(tile) != self.store.stamp(tile))
+        else {
             return Ok(false);
         };
         let stored = self.past.open_table(tile)?.ok_or_else(|| self.missing(tile))?;
@@ -125,7 +125,12 @@ impl<'a> Reverter<'a> {
     }
 
     /// Derives the octree, and tells whether it is the one that the snapshot's table names.
-    fn has_octree_of(&mut self, tile: TileIndex, table: &crate::tile::Table, stamp: TileStamp) -> Result<bool> {
+    fn has_octree_of(
+        &mut self,
+        tile: TileIndex,
+        table: &crate::tile::Table,
+        stamp: TileStamp,
+    ) -> Result<bool> {
         if !self.store.layout().files().contains(&TileFile::Octree) {
             return Ok(true);
         }

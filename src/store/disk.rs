@@ -160,7 +160,11 @@ impl Disk for FsDisk {
 
     fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
         // Elsewhere it cannot be told that a file has other names.
-        if cfg!(unix) { fs::hard_link(only_a_file(from)?, to) } else { Err(io::ErrorKind::Unsupported.into()) }
+        if cfg!(unix) {
+            fs::hard_link(only_a_file(from)?, to)
+        } else {
+            Err(io::ErrorKind::Unsupported.into())
+        }
     }
 
     fn remove_file(&self, path: &Path) -> io::Result<()> {

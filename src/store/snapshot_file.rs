@@ -58,10 +58,13 @@ impl Snapshot {
             Ok(input) => input,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 let map = layout.folder().display();
-                let reason = format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them");
+                let reason =
+                    format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them");
                 return Err(Error::argument("snapshot", reason));
             }
-            Err(error) if error.kind() == io::ErrorKind::InvalidInput => return damaged(0, error.to_string()),
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
+                return damaged(0, error.to_string());
+            }
             Err(error) => return Err(Error::io(&path, "open", error)),
         };
         let bytes = input.file_bytes();

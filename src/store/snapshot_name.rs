@@ -63,7 +63,8 @@ mod tests {
         for good in ["a", "before-lunch", "2026.11.21_a", "-", "a.next", &"x".repeat(64)] {
             assert_eq!(SnapshotName::new(good).unwrap().as_str(), good);
         }
-        for bad in ["", ".", "..", ".next", "a/b", "a\\b", "a b", "a@b", "ä", "now", "a\0", &"x".repeat(65)] {
+        for bad in ["", ".", "..", ".next", "a/b", "a\\b", "a b", "a@b", "ä", "now", "a\0", &"x".repeat(65)]
+        {
             assert!(SnapshotName::new(bad).unwrap_err().to_string().contains("cannot be"), "{bad:?}");
         }
     }

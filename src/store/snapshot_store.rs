@@ -1,17 +1,17 @@
 //! Snapshots of a [`TileStore`]: made, deleted, and opened like the map itself.
 
-use super::commit_log::CommitLog;
+use super::commit_log::{CommitLog, Commits};
 use super::disk::{Disk, EntryKind};
 use super::layout::Layout;
+use super::layout::TileFile;
 use super::map_folder;
-use super::metadata::Bounds;
+use super::metadata::{Bounds, Metadata};
 use super::snapshot_file::Snapshot;
 use super::snapshot_name::SnapshotName;
 use super::snapshots::Snapshots;
-use super::layout::TileFile;
 use super::tile_store::{TileStore, id_from_hex};
-use crate::space::TileIndex;
 use crate::error::{Error, FormatError, Result};
+use crate::space::TileIndex;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -27,13 +27,23 @@ impl TileStore {
         let metadata = map_folder::read_metadata(&*disk, &layout)?;
         let Some(map_id) = metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id)) else {
             let map = folder.display();
-            let reason = format!("{map} has none with the name {name}: a map of the seed's format has no snapshots");
+            let reason =
+                format!("{map} has none with the name {name}: a map of the seed's format has no snapshots");
             return Err(Error::argument("snapshot", reason));
         };
-        let Snapshot { metadata, commits, .. } = Snapshot::read(&*disk, &layout, name, map_id)?;
-        let mut store = Self::new(disk, layout, metadata, Some(CommitLog::of_map(map_id)), commits);
-        store.snapshot = Some(name.clone());
-        Ok(store)
+        let snapshot = Snapshot::read(&*disk, &layout, name, map_id)?;
+        Ok(Self::of_snapshot(disk, layout, snapshot))
+    }
+
+    fn of_snapshot(disk: Arc<dyn Disk>, layout: Layout, snapshot: Snapshot) -> Self {
+        let Snapshot { name, map_id, metadata, commits, .. } = snapshot;
+        let store = Self::new(disk, layout, metadata, Some(CommitLog::of_map(map_id)), commits);
+        Self { snapshot: Some(name), ..store }
+    }
+
+    /// The map as a snapshot of it says, for reading.
+    pub fn at(&self, snapshot: &Snapshot) -> Self {
+        Self::of_snapshot(self.disk.clone(), self.layout.clone(), snapshot.clone())
     }
 
     /// The snapshot that this store was opened as.
@@ -82,7 +92,7 @@ impl TileStore {
         }
         // Perhaps made by an attempt that could not.
         self.sync_folder(self.layout.folder())?;
-        self.write_snapshot(&path, map_id)?;
+        self.write_snapshot(&path, map_id, &self.metadata, &self.commits)?;
         let named = self.sync_folder(&folder);
         match named {
             Ok(()) => self.snapshots.share(self.commits.tiles.keys().copied()),
@@ -92,16 +102,39 @@ impl TileStore {
         named
     }
 
-    fn write_snapshot(&self, path: &Path, map_id: [u8; 16]) -> Result<()> {
-        let mut metadata = self.metadata.clone();
-        metadata.bounds = Bounds::of(self.commits.tiles.keys().copied());
+    /// Writes what a snapshot says in place of what it said before.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn replace_snapshot(&self, snapshot: &Snapshot) -> Result<()> {
+        let Snapshot { name, map_id, metadata, commits, .. } = snapshot;
+        self.write_snapshot(&self.layout.snapshot(name), *map_id, metadata, commits)?;
+        self.sync_folder(&self.layout.snapshots())
+    }
+
+    /// Every kept table that a snapshot sees; where one cannot be read, every kept table.
+    pub fn seen_by_snapshots(&self) -> impl Iterator<Item = (TileIndex, u64)> {
+        let pinned = self.snapshots.pinned().iter();
+        pinned.flat_map(|(&tile, flushes)| flushes.iter().map(move |&flush_number| (tile, flush_number)))
+    }
+
+    fn write_snapshot(
+        &self,
+        path: &Path,
+        map_id: [u8; 16],
+        metadata: &Metadata,
+        commits: &Commits,
+    ) -> Result<()> {
+        let mut metadata = metadata.clone();
+        metadata.bounds = Bounds::of(commits.tiles.keys().copied());
         if let Some(ext) = &mut metadata.ext {
             ext.empty = metadata.bounds.is_none();
-            (ext.flush_number, ext.scan_number) = (self.commits.flush_number, self.commits.scan_number);
+            (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
         }
         let next = self.layout.snapshot_next();
         let write = || {
-            CommitLog::write_whole(&*self.disk, &next, map_id, &self.commits, &metadata.to_text())?;
+            CommitLog::write_whole(&*self.disk, &next, map_id, commits, &metadata.to_text())?;
             self.disk.rename(&next, path)
         };
         write().map_err(|error| Error::io(path, "write", error))

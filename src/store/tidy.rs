@@ -38,7 +38,8 @@ impl TileStore {
             let is_seen = self.snapshots.sees_present(tile);
             let is_wanted = (is_seen || has_readers) && !self.snapshots.sees_kept(tile, flush_number);
             if is_wanted && self.is_replaced_in_place(tile)? {
-                let (from, to) = (self.layout.current(tile, TileFile::Table), self.layout.kept(tile, flush_number));
+                let (from, to) =
+                    (self.layout.current(tile, TileFile::Table), self.layout.kept(tile, flush_number));
                 self.rename(&from, &to)?;
                 match is_seen {
                     true => self.snapshots.pin(tile, flush_number),
