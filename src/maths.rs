@@ -13,6 +13,11 @@ pub fn sigmoid(log_odds: f64) -> f64 {
     1.0 / (1.0 + libm::exp(-log_odds))
 }
 
+/// Two to the power of a number.
+pub fn exp2(power: f64) -> f64 {
+    libm::exp2(power)
+}
+
 /// Sine and cosine of an angle in radians.
 pub fn sin_cos(angle_rad: f64) -> (f64, f64) {
     libm::sincos(angle_rad)

@@ -1,14 +1,12 @@
 //! How a map becomes durable: what waits is applied, what is dirty is written, and all of it committed.
 
-use super::map_id::new_map_id;
+use super::adoption::adopt;
 use super::residency::{Input, Residency};
-use super::tile_files;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::space::TileIndex;
 use crate::store::{Extension, Metadata, hex};
 use crate::tile::Tile;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Residency {
@@ -104,31 +102,19 @@ impl Residency {
         Ok(())
     }
 
-    /// Gives a map of the seed's format, before its first change, an id, a log and trailers: every tile is written
-    /// anew as it is, and committed. Until that is done it stays a map of the seed's format, with the same content.
+    /// Makes a map of the seed's format, before its first change, one of voxtile's own.
     pub(super) fn adopt(&mut self) -> Result<()> {
-        if self.store.metadata().ext.is_some() {
-            return Ok(());
-        }
-        log::info!("{}: a map of the seed's format; its tiles get checksums", self.store.folder().display());
-        self.store.adopt(new_map_id())?;
-        for index in self.store.suspects() {
-            // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
-            self.store.drop_next(index);
-        }
-        for index in self.store.tiles().collect::<BTreeSet<_>>() {
-            if self.store.stamp(index).is_some() {
-                continue; // Written by an earlier attempt.
-            }
-            if let Some((tile, _)) = tile_files::load(&self.store, &self.config.grid, &self.octrees, index)? {
-                self.saver.save(&mut self.store, &tile, 0)?;
-            }
-        }
-        self.store.commit(self.metadata(), 0)
+        let Self { store, saver, config, input, .. } = self;
+        adopt(store, saver, config, |map_id| new_metadata(config, map_id, input.as_ref()))
     }
 
     fn metadata(&self) -> Metadata {
-        new_metadata(&self.config, self.store.map_id().unwrap_or_default(), self.input.as_ref())
+        let map_id = self.store.map_id().unwrap_or_default();
+        let mut metadata = new_metadata(&self.config, map_id, self.input.as_ref());
+        if let (Some(ext), Some(before)) = (&mut metadata.ext, &self.store.metadata().ext) {
+            ext.decayed_scan = before.decayed_scan;
+        }
+        metadata
     }
 }
 
@@ -144,6 +130,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&
         rays: config.rays,
         input_fingerprint: input.map(|input| input.fingerprint.clone()),
         input_first_scan: input.map_or(0, |input| input.first_scan),
+        decayed_scan: 0,
         storage: config.storage,
     };
     let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());

@@ -14,6 +14,7 @@
 //! flush       -> pending lists -> tiles -> store -> one commit
 //! ```
 
+pub(crate) mod adoption;
 mod cold_tiles;
 mod flush;
 mod in_memory;

@@ -37,6 +37,14 @@ impl SensorModel {
         })
     }
 
+    /// The model's name, as commands and metadata spell it.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::LogOdds(_) => "log-odds",
+            Self::Iwlo(_) => "iwlo",
+        }
+    }
+
     /// Whether hits need an intensity.
     pub const fn needs_intensity(&self) -> bool {
         matches!(self, Self::Iwlo(_))

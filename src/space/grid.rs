@@ -1,4 +1,4 @@
-use super::{Point, TileIndex, VoxelBox, VoxelIndex};
+use super::{Aabb, Point, TileIndex, VoxelBox, VoxelIndex};
 use thiserror::Error;
 
 /// Most voxels along the edge of a tile.
@@ -136,6 +136,21 @@ impl Grid {
         voxel.map(|index| (f64::from(index) + 0.5) * self.resolution_m)
     }
 
+    /// The voxels whose center is in a box.
+    pub fn voxels_in(&self, region: &Aabb) -> VoxelBox {
+        // Centers ascend with their index, so the first one from a bound on is found by halving.
+        let first_from = |bound_m: f64| {
+            let (mut low, mut high) = (i64::from(i32::MIN), i64::from(i32::MAX));
+            while low < high {
+                let middle = (low + high).div_euclid(2);
+                let [center_m, ..] = self.center_m([middle as i32; 3]);
+                if center_m >= bound_m { high = middle } else { low = middle + 1 }
+            }
+            low as i32
+        };
+        VoxelBox { min: region.min.map(first_from), end: region.max.map(first_from) }
+    }
+
     /// The voxels of a tile. The far edge saturates for the last tile of the `i32` range.
     pub fn voxels_of_tile(&self, tile: TileIndex) -> VoxelBox {
         let n = i64::from(self.voxels_per_tile_edge);
@@ -226,6 +241,29 @@ mod tests {
                 assert_eq!(grid.tile_of_voxel([x; 3]), TileIndex::new(tile, tile, tile), "{x} of {n}");
             }
         }
+    }
+
+    #[test]
+    fn the_voxels_in_a_box_are_those_whose_center_is() {
+        let grid = Grid::new(0.1, 0.7).unwrap();
+        let bounds =
+            [f64::NEG_INFINITY, -3e8, -2.95, -1.0, -0.05, 0.0, 0.049, 0.05, 0.75, 2.0, 3e8, f64::INFINITY];
+        for min in bounds {
+            for max in bounds {
+                let region = Aabb { min: [min, -1.0, min], max: [max, 1.0, max] };
+                let voxels = grid.voxels_in(&region);
+                for x in (-40..40).chain([i32::MIN, i32::MAX - 1]) {
+                    let voxel = [x, 3, x];
+                    assert_eq!(
+                        voxels.contains(voxel),
+                        region.contains(grid.center_m(voxel)),
+                        "{x} in {min} to {max}"
+                    );
+                }
+            }
+        }
+        let nothing = grid.voxels_in(&Aabb { min: [f64::NAN; 3], max: [1.0; 3] });
+        assert!(nothing.is_empty());
     }
 
     #[test]

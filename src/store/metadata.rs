@@ -49,6 +49,9 @@ pub struct Extension {
     /// Number of scans that the map had taken before the first of that input.
     #[serde(default)]
     pub input_first_scan: u64,
+    /// Number of the last scan in the map when its evidence last faded; 0 if it never has.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub decayed_scan: u64,
     /// How the tiles are stored; maps of the seed's files do not say.
     #[serde(default, skip_serializing_if = "Storage::is_seed")]
     pub storage: Storage,
@@ -176,7 +179,7 @@ impl Metadata {
             check_crc(text)?;
         }
         if let Some(ext) = &document.ext
-            && [ext.flush_number, ext.scan_number, ext.input_first_scan]
+            && [ext.flush_number, ext.scan_number, ext.input_first_scan, ext.decayed_scan]
                 .iter()
                 .any(|&number| number > MAX_NUMBER)
         {
@@ -200,6 +203,10 @@ fn check_crc(text: &str) -> Result<(), FormatError> {
     if text[end..] == crc { Ok(()) } else { wrong(end) }
 }
 
+fn is_zero(number: &u64) -> bool {
+    *number == 0
+}
+
 /// A length as a plain decimal that is a JSON float.
 fn decimal(length_m: f64) -> String {
     let text = length_m.to_string();
@@ -221,6 +228,7 @@ mod tests {
             rays: RayConfig::default(),
             input_fingerprint: Some("abc".into()),
             input_first_scan: 45,
+            decayed_scan: 0,
             storage: Storage::Seed,
         };
         let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());
@@ -235,6 +243,17 @@ mod tests {
                     \"min\": [-7, -1, 0],\n    \"max\": [0, 2, 4]\n  },\n  \"ext\": {\n    \"empty\": false";
         assert!(text.starts_with(seed), "{text}");
         assert_eq!(Metadata::from_text(&text), Ok(written));
+    }
+
+    #[test]
+    fn a_decay_is_named_where_there_was_one() {
+        let mut written = metadata();
+        assert!(!written.to_text().contains("decayed"));
+        if let Some(ext) = &mut written.ext {
+            ext.decayed_scan = 70;
+        }
+        assert!(written.to_text().contains("\n    \"decayed_scan\": 70"));
+        assert_eq!(Metadata::from_text(&written.to_text()), Ok(written));
     }
 
     #[test]

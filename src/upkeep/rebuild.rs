@@ -1,5 +1,6 @@
 //! What a map is, told from whatever is left of it: `metadata.json`, `commits.log`, and the tiles themselves.
 
+use super::snapshots::last_known_flush;
 use crate::config::{MapConfig, Storage};
 use crate::error::{Error, FormatError, Result};
 use crate::mapper::tile_files::{ReadTable, read_stored_table};
@@ -94,6 +95,13 @@ fn index_from_tiles(
     for (done, &tile) in (1..).zip(&tiles) {
         index.add(disk, layout, &config, tile, known_scan)?;
         progress(done, tiles.len() as u64);
+    }
+    let files = [written, remains.commits.metadata.as_ref()];
+    if files.into_iter().flatten().all(|metadata| metadata.ext.is_none())
+        && let Some(ext) = &mut index.metadata.ext
+    {
+        // Tiles do not say how much of their evidence has faded: rather too little of it fades than some of it twice.
+        ext.decayed_scan = index.commits.scan_number;
     }
     Ok(index)
 }
@@ -257,6 +265,7 @@ fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<(
         rays: crate::config::RayConfig::default(),
         input_fingerprint: None,
         input_first_scan: 0,
+        decayed_scan: 0,
         storage: layout.storage(),
     };
     let (resolution_m, tile_size_m) = (parameters.resolution, parameters.tile_size);

@@ -40,7 +40,7 @@ fn the_folders_know_only_what_lies_before_them_in_the_flow() {
         ("share/codec", &["error", "share", "space"]),
         ("share", &["error", "local", "mapper", "maths", "query", "scan", "space"]),
         // Whole maps on disk, tile by tile.
-        ("session", &["config", "error", "mapper", "query", "sensor", "space", "store", "tile"]),
+        ("session", &["config", "error", "mapper", "maths", "sensor", "space", "store", "tile"]),
         ("simulation", &["maths", "scan", "space"]),
     ];
     for (folder, allowed) in allowed {

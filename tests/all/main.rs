@@ -3,6 +3,9 @@
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;
+/// The commands that merge, crop, clear and fade.
+#[cfg(feature = "cli")]
+mod cli_edit;
 /// Maps with another storage: the same content, and there and back the same files.
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
@@ -21,8 +24,6 @@ mod local_map;
 mod low_memory;
 /// Lives of maps in commands of their own, against a naive life: removed tiles, and every operation as a fault.
 mod map_life;
-/// New maps from tables: there is none, or the whole one.
-mod map_writer;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
 /// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
@@ -39,6 +40,8 @@ mod questions;
 mod readers;
 /// The stream of scans, in files and from standard input.
 mod scan_stream;
+/// What is done with whole maps: made, merged, cropped, cleared, faded.
+mod session;
 /// Map sharing: codec, convergence over bad links, layers.
 mod sharing;
 /// Numbers that are large, negative or on a border.

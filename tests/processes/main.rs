@@ -11,6 +11,8 @@
 mod killed;
 /// What a command takes of memory, told by itself.
 mod memory;
+/// Merges that are killed: no map, or the whole one.
+mod merged;
 /// The thread that writes octrees: one, asleep when idle, gone with its mapper.
 #[cfg(target_os = "linux")]
 mod octree_worker;

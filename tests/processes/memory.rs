@@ -92,3 +92,38 @@ fn whole_maps_are_looked_at_in_constant_memory() {
         assert!(many < few + memory + (2 << 20), "{command} {how:?}: {few} bytes, then {many}");
     }
 }
+
+/// What makes or changes whole maps takes no more memory for a long drive than for a short one.
+#[cfg(target_os = "linux")]
+#[test]
+fn whole_maps_are_merged_cropped_cleared_and_fade_in_constant_memory() {
+    const MORE: u64 = 3 << 20;
+    let (folder, _) = folder_for_maps();
+    let path = |name: &str| folder.path().join(name);
+    for (name, length_m) in
+        [("short", 20), ("long", crate::survey::setting("VOXTILE_DRIVE_METRES", 600) as usize)]
+    {
+        build(&path(name), length_m);
+    }
+    let map_bytes = answer("info", &path("long"), &[])["table_bytes"].as_u64().unwrap();
+    assert!(map_bytes > 12 * MORE, "{map_bytes} bytes");
+    let text = |name: &str| path(name).to_str().unwrap().to_owned();
+    let region = ["--region", "-1e6", "-1e6", "-1e6", "1e6", "0.3", "1e6"];
+    let mut cases: Vec<(&str, Vec<String>)> = Vec::new();
+    cases.push(("merge", vec!["MAP".into()]));
+    cases.push(("crop", region.map(str::to_owned).to_vec()));
+    cases.push(("decay", ["--halflife", "50", "--scans", "20"].map(str::to_owned).to_vec()));
+    cases.push(("clear", region.map(str::to_owned).to_vec()));
+    for (command, how) in cases {
+        let [few, many] = ["short", "long"].map(|name| {
+            let out = text(&format!("{name}_{command}"));
+            let mut how: Vec<String> = how.iter().map(|part| part.replace("MAP", &text(name))).collect();
+            if ["merge", "crop"].contains(&command) {
+                how.extend(["-o".to_owned(), out]);
+            }
+            let how: Vec<&str> = how.iter().map(String::as_str).collect();
+            peak(&answer(command, &path(name), &how))
+        });
+        assert!(many < few + MORE, "{command}: {few} bytes, then {many}");
+    }
+}

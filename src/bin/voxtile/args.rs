@@ -1,6 +1,9 @@
+mod edit;
+
 use crate::byte_size::ByteSize;
 use crate::flush_schedule::FlushEvery;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
 use voxtile::Storage;
@@ -32,6 +35,14 @@ pub enum Command {
     Export(ExportArgs),
     /// Print the digest of a map's content: equal for equal maps
     Digest(DigestArgs),
+    /// Make one map of several
+    Merge(MergeArgs),
+    /// Make a map of a part of another
+    Crop(CropArgs),
+    /// Make a part of a map unknown, in place
+    Clear(ClearArgs),
+    /// Let the evidence of a map fade by the scans that have come since, in place
+    Decay(DecayArgs),
     /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit
     Convert(ConvertArgs),
     /// Check every file of a map for damage; exit code 1 if there is any

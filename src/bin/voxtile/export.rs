@@ -1,7 +1,8 @@
 use crate::args::ExportArgs;
-use crate::map_at::{point_of, read_map};
+use crate::map_at::read_map;
 use crate::memory;
 use crate::octree_file;
+use crate::part::region_of;
 use crate::progress::Progress;
 use indicatif::HumanCount;
 use std::fs::{self, File};
@@ -23,13 +24,7 @@ enum ExportFormat {
 }
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
-    let region = args
-        .region
-        .as_ref()
-        .map(|corners| Aabb { min: point_of(&corners[..3]), max: point_of(&corners[3..]) });
-    if region.is_some_and(|region| !(0..3).all(|k| region.min[k] < region.max[k])) {
-        return Err(Error::argument("--region", "needs X0 < X1, Y0 < Y1 and Z0 < Z1").into());
-    }
+    let region = args.region.as_deref().map(region_of).transpose()?;
     if args.min_probability.is_some_and(|probability| !(0.0..=1.0).contains(&probability)) {
         return Err(Error::argument("--min-probability", "must be from 0 to 1").into());
     }

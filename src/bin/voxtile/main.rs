@@ -3,7 +3,10 @@
 mod args;
 mod build;
 mod byte_size;
+mod clear;
 mod convert;
+mod crop;
+mod decay;
 mod demo;
 mod digest;
 mod export;
@@ -13,9 +16,11 @@ mod local;
 mod local_table;
 mod map_at;
 mod memory;
+mod merge;
 mod octree_choice;
 mod octree_file;
 mod one_heap;
+mod part;
 mod picture;
 mod progress;
 mod query;
@@ -24,6 +29,7 @@ mod repair;
 mod share;
 mod summary;
 mod verify;
+mod written;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -54,6 +60,10 @@ fn main() -> ExitCode {
         Command::Raycast(args) => raycast::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Digest(args) => digest::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Crop(args) => crop::run(&args),
+        Command::Clear(args) => clear::run(&args),
+        Command::Decay(args) => decay::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),

@@ -1,0 +1,32 @@
+use crate::args::CropArgs;
+use crate::memory;
+use crate::part::part_of;
+use crate::progress::Progress;
+use crate::written::print_written;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use voxtile::session::{WrittenMap, crop};
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    map: &'a Path,
+    #[serde(flatten)]
+    written: WrittenMap,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let written = crop(&args.map, &part_of(&args.part)?, &args.output, |done, all| progress.set(done, all))?;
+    drop(progress);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let summary = Summary { map: &args.output, written, peak_rss_bytes: memory::peak_bytes() };
+        writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+    } else {
+        print_written(&args.output, &written, &mut out)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

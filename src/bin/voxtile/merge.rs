@@ -1,0 +1,57 @@
+use crate::args::MergeArgs;
+use crate::memory;
+use crate::progress::Progress;
+use crate::written::print_written;
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use voxtile::session::{Merged, merge};
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    map: &'a Path,
+    #[serde(flatten)]
+    merged: Merged,
+    warnings: Vec<String>,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let prefer = args.prefer.map(Into::into);
+    let merged = merge(&args.maps, &args.output, prefer, |done, all| progress.set(done, all))?;
+    drop(progress);
+    let warnings = warnings_of(&merged);
+    for warning in &warnings {
+        eprintln!("voxtile: warning: {warning}");
+    }
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let peak_rss_bytes = memory::peak_bytes();
+        let summary = Summary { map: &args.output, merged, warnings, peak_rss_bytes };
+        writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+    } else {
+        print_written(&args.output, &merged.written, &mut out)?;
+        writeln!(
+            out,
+            "merged    {} maps, {} voxels in two or more",
+            args.maps.len(),
+            HumanCount(merged.common_voxels)
+        )?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn warnings_of(merged: &Merged) -> Vec<String> {
+    let related = merged.related.iter().filter(|_| merged.is_added);
+    let warning = |(earlier, later): &(std::path::PathBuf, std::path::PathBuf)| {
+        format!(
+            "{} and {} go back to the same map: evidence that both have counts twice; --prefer takes it once",
+            earlier.display(),
+            later.display()
+        )
+    };
+    related.map(warning).collect()
+}

@@ -1,0 +1,165 @@
+use super::map_writer::{MapWriter, WrittenMap};
+use super::merge_rule::{MergeRule, Prefer};
+use super::table_merge::TableMerge;
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::mapper::{MapReader, MapView, TileRef};
+use crate::space::TileIndex;
+use crate::store::{Disk, FsDisk};
+use crate::tile::Table;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What a merge did.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Merged {
+    /// The map that it made.
+    #[serde(flatten)]
+    pub written: WrittenMap,
+    /// Voxels that two maps or more know.
+    pub common_voxels: u64,
+    /// Maps that are the same or go back to the same map, an earlier and a later one of the list: what they have in
+    /// common is in both.
+    pub related: Vec<(PathBuf, PathBuf)>,
+    /// Whether evidence was added, so that what related maps have in common counts twice.
+    pub is_added: bool,
+}
+
+/// Makes one map of several: of a voxel that one map knows its evidence, of one that several know what `prefer` says.
+///
+/// Without a preference log-odds are added, in the order of the maps, and clamped once; counts are added, too. That is
+/// what one map of all scans would have, but for the clamps on the way and the order of additions. It takes maps of the
+/// model [`LogOdds`](crate::sensor::LogOdds) with equal parameters, because evidence of the other model depends on what was
+/// there before. With a preference any models go together; sensor model, occupancy threshold and storage are those of the
+/// first map.
+///
+/// The maps are read as of their last flush, without their locks; the new one has an id of its own and no scans, and is
+/// there as a whole or not at all, see [`MapWriter`]. `progress` is told the tiles done and all.
+///
+/// # Errors
+///
+/// Fewer than two maps, maps of different grids, maps that do not go together without a preference, a damaged tile, an
+/// output with other content, a disk that refuses.
+pub fn merge(
+    maps: &[PathBuf],
+    output: impl AsRef<Path>,
+    prefer: Option<Prefer>,
+    progress: impl FnMut(u64, u64),
+) -> Result<Merged> {
+    merge_on(Arc::new(FsDisk), maps, output.as_ref(), prefer, progress)
+}
+
+/// [`merge`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`merge`].
+pub fn merge_on(
+    disk: Arc<dyn Disk>,
+    maps: &[PathBuf],
+    output: &Path,
+    prefer: Option<Prefer>,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Merged> {
+    let [first, .., _] = maps else {
+        return Err(Error::argument("maps", "name two maps or more to be merged"));
+    };
+    let readers =
+        maps.iter().map(|map| MapReader::open_on(disk.clone(), map, 1)).collect::<Result<Vec<_>>>()?;
+    let config = readers[0].config().clone();
+    for (map, reader) in maps.iter().zip(&readers) {
+        check_grid(map, reader.config(), first, &config)?;
+        if prefer.is_none() {
+            check_model(map, reader, first, &config)?;
+        }
+    }
+    let Some(rule) = MergeRule::of(&config, prefer) else {
+        let reason = format!(
+            "the maps' sensor model is {}, whose evidence does not add up: say which map's voxels to take with --prefer \
+             first, last or more-observed",
+            config.sensor_model.name()
+        );
+        return Err(Error::argument("maps", reason));
+    };
+    let mut writer = MapWriter::create_on(disk, output, &config)?;
+    let tiles: BTreeSet<TileIndex> = readers.iter().flat_map(MapView::tile_indices).collect();
+    let mut merge = TableMerge::new(rule);
+    for (done, &tile) in (0..).zip(&tiles) {
+        progress(done, tiles.len() as u64);
+        put_merged(&mut writer, &mut merge, rule, &readers, tile)?;
+    }
+    progress(tiles.len() as u64, tiles.len() as u64);
+    let written = writer.finish()?;
+    let is_added = matches!(rule, MergeRule::Add { .. });
+    Ok(Merged { written, common_voxels: merge.common, related: related(maps, &readers), is_added })
+}
+
+fn put_merged(
+    writer: &mut MapWriter,
+    merge: &mut TableMerge,
+    rule: MergeRule,
+    readers: &[MapReader],
+    tile: TileIndex,
+) -> Result<()> {
+    let found = readers.iter().map(|reader| reader.tile_in_passing(tile));
+    let found: Vec<TileRef<'_>> = found.filter_map(Result::transpose).collect::<Result<_>>()?;
+    let tables: Vec<&Table> = found.iter().map(|tile| tile.table()).collect();
+    match tables[..] {
+        [only] if is_left_alone(only, rule) => writer.put(tile, only),
+        _ => writer.put(tile, &merge.merge(&tables)),
+    }
+}
+
+/// Whether the rule leaves the voxels as they are that only this table has. Log-odds beyond the clamps come from other
+/// programs only.
+fn is_left_alone(table: &Table, rule: MergeRule) -> bool {
+    match rule {
+        MergeRule::Take(_) => true,
+        MergeRule::Add { min, max } => {
+            table.iter().all(|(_, evidence)| min <= evidence.log_odds && evidence.log_odds <= max)
+        }
+    }
+}
+
+fn check_grid(map: &Path, config: &MapConfig, first: &Path, wanted: &MapConfig) -> Result<()> {
+    let (grid, first_grid) = (&config.grid, &wanted.grid);
+    for (what, found, wanted) in [
+        ("resolution", grid.resolution_m(), first_grid.resolution_m()),
+        ("tile size", grid.tile_size_m(), first_grid.tile_size_m()),
+    ] {
+        if found.to_bits() != wanted.to_bits() {
+            let wanted = format!("{wanted} m as {}", first.display());
+            return Err(Error::Mismatch { path: map.to_owned(), what, found: format!("{found} m"), wanted });
+        }
+    }
+    Ok(())
+}
+
+/// Whether evidence of a map can be added to that of the first.
+fn check_model(map: &Path, reader: &MapReader, first: &Path, wanted: &MapConfig) -> Result<()> {
+    let config = reader.config();
+    let first = first.display();
+    let what = if !reader.is_verified() {
+        "it is of the seed's format, which does not tell the sensor model".to_owned()
+    } else if config.sensor_model != wanted.sensor_model {
+        format!("its sensor model is {:?}, that of {first} is {:?}", config.sensor_model, wanted.sensor_model)
+    } else if config.occupancy_threshold != wanted.occupancy_threshold {
+        let (found, wanted) = (config.occupancy_threshold, wanted.occupancy_threshold);
+        format!("its voxels are occupied from probability {found}, those of {first} from {wanted}")
+    } else {
+        return Ok(());
+    };
+    let hint = "so that evidence does not add up: say which map's voxels to take with --prefer first, last or more-observed";
+    Err(Error::argument(map.display().to_string(), format!("{what}, {hint}")))
+}
+
+fn related(maps: &[PathBuf], readers: &[MapReader]) -> Vec<(PathBuf, PathBuf)> {
+    let id_of = |reader: &MapReader| reader.metadata().ext.as_ref().map(|ext| ext.map_id.clone());
+    let ids: Vec<Option<String>> = readers.iter().map(id_of).collect();
+    let pairs = (0..maps.len()).flat_map(|later| (0..later).map(move |earlier| (earlier, later)));
+    let pairs = pairs.filter(|&(earlier, later)| ids[later].is_some() && ids[earlier] == ids[later]);
+    pairs.map(|(earlier, later)| (maps[earlier].clone(), maps[later].clone())).collect()
+}

@@ -1,0 +1,66 @@
+use super::merge_rule::MergeRule;
+use crate::sensor::Evidence;
+use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, places};
+use crate::tile::Table;
+use std::collections::BTreeSet;
+
+/// Merges the tables that several maps have of a tile. The room for it is kept from one tile to the next: 8 KiB a map.
+#[derive(Debug)]
+pub(super) struct TableMerge {
+    rule: MergeRule,
+    /// What each map has of the brick at hand.
+    bricks: Vec<MapBrick>,
+    /// What the maps have of the voxel at hand.
+    known: Vec<Evidence>,
+    run: Vec<(usize, Evidence)>,
+    /// Voxels so far that two maps or more know.
+    pub(super) common: u64,
+}
+
+#[derive(Clone, Debug)]
+struct MapBrick {
+    observed: BrickMask,
+    evidence: Vec<Evidence>,
+}
+
+impl TableMerge {
+    pub(super) fn new(rule: MergeRule) -> Self {
+        Self { rule, bricks: Vec::new(), known: Vec::new(), run: Vec::new(), common: 0 }
+    }
+
+    /// The table of all voxels that the tables have, which come in the order of their maps.
+    pub(super) fn merge(&mut self, tables: &[&Table]) -> Table {
+        let unused = MapBrick { observed: [0; 8], evidence: vec![Evidence::PRIOR; BRICK_VOXELS] };
+        self.bricks.resize(tables.len().max(self.bricks.len()), unused);
+        let codes: BTreeSet<BrickCode> = tables.iter().flat_map(|table| table.bricks()).collect();
+        let mut merged = Table::default();
+        for code in codes {
+            self.merge_brick(code, tables);
+            merged.insert(code, &self.run);
+        }
+        merged
+    }
+
+    fn merge_brick(&mut self, code: BrickCode, tables: &[&Table]) {
+        let Self { rule, bricks, known, run, common } = self;
+        let bricks = &mut bricks[..tables.len()];
+        let mut observed = [0; 8];
+        for (brick, table) in bricks.iter_mut().zip(tables) {
+            let MapBrick { observed: own, evidence } = brick;
+            *own = [0; 8];
+            table.for_each_in(code, |place, now| {
+                own[place / 64] |= 1 << (place % 64);
+                evidence[place] = now;
+            });
+            (0..8).for_each(|word| observed[word] |= own[word]);
+        }
+        run.clear();
+        for place in places(observed) {
+            known.clear();
+            let knows = |brick: &&MapBrick| brick.observed[place / 64] >> (place % 64) & 1 == 1;
+            known.extend(bricks.iter().filter(knows).map(|brick| brick.evidence[place]));
+            *common += u64::from(known.len() > 1);
+            run.extend(rule.evidence(known).map(|evidence| (place, evidence)));
+        }
+    }
+}

@@ -1,0 +1,60 @@
+use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting, voxtile};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+fn merge(maps: [&Path; 2], output: &Path) -> Command {
+    let mut command = voxtile();
+    command.arg("merge").args(maps).arg("-o").arg(output);
+    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+#[test]
+fn a_merge_that_is_killed_leaves_no_map_and_goes_the_next_time() {
+    let (folder, a) = folder_for_maps();
+    let b = folder.path().join("b");
+    for (map, scans) in [(&a, 20), (&b, 30)] {
+        assert!(Scans::new(scans, 1).build(map, &[]).status().unwrap().success());
+    }
+    let whole = folder.path().join("whole");
+    let started = Instant::now();
+    assert!(merge([&a, &b], &whole).status().unwrap().success());
+    let whole_us = started.elapsed().as_micros() as u64;
+    let expected = digest(&whole).unwrap();
+    let output = folder.path().join("merged");
+    let kills = setting("VOXTILE_KILLS", 50) / 2;
+    let (mut killed, mut ended) = (0, 0);
+    while killed < kills {
+        let mut child = merge([&a, &b], &output).spawn().unwrap();
+        // Evenly over the time that it takes, and a little beyond.
+        sleep(Duration::from_micros(whole_us * ((killed + ended) * 7 % 24) / 20));
+        child.kill().unwrap();
+        let run = child.wait_with_output().unwrap();
+        if run.status.code().is_none() {
+            killed += 1;
+        } else {
+            ended += 1;
+            assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        }
+        match digest(&output) {
+            // Killed after it was done, perhaps.
+            Ok(found) => {
+                assert_eq!(found, expected);
+                assert!(is_whole(&output));
+                std::fs::remove_dir_all(&output).unwrap();
+            }
+            Err(message) => assert!(message.contains("no map here"), "{message}"),
+        }
+        assert!(ended < 20 * kills, "it is never caught at work");
+    }
+    let last = merge([&a, &b], &output).output().unwrap();
+    assert!(last.status.success(), "{}", String::from_utf8_lossy(&last.stderr));
+    assert_eq!(digest(&output).unwrap(), expected);
+    let left = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert!(left.into_iter().all(|name| !name.contains("unfinished")));
+    println!("{killed} kills, {ended} came too late");
+}
