@@ -4,7 +4,7 @@ use super::{MapStatistics, MapView, TileRef};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
-use crate::store::{Disk, FsDisk, Metadata, TileStore};
+use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStamp, TileStore};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
@@ -43,7 +43,33 @@ impl MapReader {
 
     /// [`MapReader::open`] on another disk than the file system.
     pub fn open_on(disk: Arc<dyn Disk>, folder: &Path, cache_tiles: usize) -> Result<Self> {
-        let store = TileStore::open_read_only(disk.clone(), folder)?;
+        Self::of_store(TileStore::open_read_only(disk.clone(), folder)?, disk, cache_tiles)
+    }
+
+    /// Opens a snapshot of the map in a folder: it is read like the map, as of then.
+    ///
+    /// # Errors
+    ///
+    /// No map or no snapshot of this name there; a damaged snapshot.
+    pub fn open_snapshot(folder: impl AsRef<Path>, name: &SnapshotName, cache_tiles: usize) -> Result<Self> {
+        Self::open_snapshot_on(Arc::new(FsDisk), folder.as_ref(), name, cache_tiles)
+    }
+
+    /// [`MapReader::open_snapshot`] on another disk than the file system.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapReader::open_snapshot`].
+    pub fn open_snapshot_on(
+        disk: Arc<dyn Disk>,
+        folder: &Path,
+        name: &SnapshotName,
+        cache_tiles: usize,
+    ) -> Result<Self> {
+        Self::of_store(TileStore::open_snapshot(disk.clone(), folder, name)?, disk, cache_tiles)
+    }
+
+    fn of_store(store: TileStore, disk: Arc<dyn Disk>, cache_tiles: usize) -> Result<Self> {
         let config = config_from(store.metadata(), &store.layout().metadata())?;
         let config = config.with_cache_tiles(cache_tiles).validated()?;
         let cache = ReaderCache { tiles: LruCache::unbounded(), io: IoCounts::default() };
@@ -79,6 +105,26 @@ impl MapReader {
         self.store.map_id().is_some()
     }
 
+    /// The snapshot that this reader sees; `None` if it sees the map as it was when it was opened.
+    pub fn snapshot(&self) -> Option<&SnapshotName> {
+        self.store.opened_snapshot()
+    }
+
+    /// The folder of the map.
+    pub fn folder(&self) -> &Path {
+        self.store.folder()
+    }
+
+    /// The map's id; `None` for a map of the seed's format.
+    pub(crate) fn map_id(&self) -> Option<[u8; 16]> {
+        self.store.map_id()
+    }
+
+    /// What is known of a tile without reading it.
+    pub(crate) fn stamp(&self, index: TileIndex) -> Option<TileStamp> {
+        self.store.stamp(index)
+    }
+
     /// Number of the flush that this reader sees.
     pub fn flush_number(&self) -> u64 {
         self.store.commits().flush_number
@@ -93,12 +139,13 @@ impl MapReader {
         })
     }
 
-    /// Bytes on disk in tables and in octrees; `None` for a map of the seed's format.
+    /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the seed's format.
     pub fn disk_bytes(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
             let stamps = self.store.commits().tiles.values();
             stamps.fold((0, 0), |(table, octree), stamp| {
-                (table + stamp.table.bytes, octree + stamp.octree.bytes)
+                let octree_bytes = if self.snapshot().is_some() { 0 } else { stamp.octree.bytes };
+                (table + stamp.table.bytes, octree + octree_bytes)
             })
         })
     }
@@ -124,6 +171,10 @@ impl MapReader {
             return error;
         }
         let folder = self.store.folder();
+        if let Some(name) = self.snapshot() {
+            // Deleted meanwhile?
+            return self.store.snapshot(name).err().unwrap_or(error);
+        }
         let now =
             TileStore::open_read_only(self.disk.clone(), folder).map(|store| store.commits().flush_number);
         if now.is_ok_and(|flush_number| flush_number != self.flush_number()) {

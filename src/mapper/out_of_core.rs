@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, VoxelIndex};
-use crate::store::{Disk, FsDisk, Metadata, TileStore};
+use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStore};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -107,6 +107,17 @@ impl OutOfCoreTileMapper {
         };
         let path = residency.store().folder().to_owned();
         Err(Error::Mismatch { path, what: "been built from input", found, wanted: fingerprint.to_owned() })
+    }
+
+    /// Flushes, and keeps the map as it is then under a name: a snapshot, which stays until it is deleted
+    /// ([`session::delete_snapshot`](crate::session::delete_snapshot)).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::AlreadyExists`] if there is one of this name; as for [`Mapper::flush`].
+    pub fn snapshot(&mut self, name: &SnapshotName) -> Result<()> {
+        self.flush()?;
+        self.residency_mut().store.create_snapshot(name)
     }
 
     /// The folder of the map.

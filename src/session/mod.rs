@@ -5,6 +5,9 @@
 //! merge   k readers, the tiles of one place at a time -> MapWriter
 //! crop    one reader -> MapWriter
 //! clear, decay   MapEditor: tiles read, changed, written beside -> one commit
+//! a flush  -> snapshot -> snapshots/NAME, and the tables that it sees stay
+//! snapshot -> revert   -> one commit
+//! two maps, or snapshots of one, tile by tile -> diff
 //! ```
 //!
 //! What each is for, and its rules: `docs/life_of_a_map.md`.
@@ -13,11 +16,14 @@ mod clear;
 mod convert;
 mod crop;
 mod decay;
+mod diff;
 mod map_editor;
 mod map_writer;
 mod merge;
 mod merge_rule;
 mod part;
+mod revert;
+mod snapshot;
 mod table_change;
 mod table_merge;
 
@@ -25,7 +31,12 @@ pub use clear::{Cleared, clear, clear_on};
 pub use convert::convert;
 pub use crop::{crop, crop_on};
 pub use decay::{Decay, Decayed, decay, decay_on};
+pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
 pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge, merge_on};
 pub use merge_rule::Prefer;
 pub use part::Part;
+pub use revert::{Reverted, revert, revert_on};
+pub use snapshot::{
+    SnapshotInfo, delete_snapshot, delete_snapshot_on, snapshot, snapshot_on, snapshots, snapshots_on,
+};

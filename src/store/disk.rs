@@ -19,7 +19,8 @@ pub trait Disk: Debug + Send + Sync {
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
     /// Watches for readers of the file that has the name now, even after another file took its name.
     fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>>;
-    /// Creates a file, or empties it, for writing from the beginning.
+    /// Creates a file, or empties it, for writing from the beginning. A file with other names too ([`Disk::link`]) keeps its
+    /// content under those.
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>>;
     /// Opens a file, which must be there and be that long, for writing from `offset` on; what stood there is cut off.
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>>;
@@ -37,6 +38,10 @@ pub trait Disk: Debug + Send + Sync {
     }
     /// Renames a file, replacing what had the new name, or a folder to a name that nothing has.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Gives a file another name, which nothing has; the two are one file. An error where files have one name only.
+    fn link(&self, _: &Path, _: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
     /// Removes a file.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
     /// Makes a folder; its parents must exist.
@@ -117,6 +122,9 @@ impl Disk for FsDisk {
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        if has_other_names(path) {
+            fs::remove_file(path)?;
+        }
         Ok(Box::new(File::create(only_a_file(path)?)?))
     }
 
@@ -148,6 +156,15 @@ impl Disk for FsDisk {
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         fs::rename(from, to)
+    }
+
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        // Elsewhere it cannot be told that a file has other names.
+        if cfg!(unix) {
+            fs::hard_link(only_a_file(from)?, to)
+        } else {
+            Err(io::ErrorKind::Unsupported.into())
+        }
     }
 
     fn remove_file(&self, path: &Path) -> io::Result<()> {
@@ -248,6 +265,15 @@ fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> 
     });
     let never_tried = || Err(io::Error::other("the sync was not tried"));
     results.into_iter().map(|result| result.into_inner().unwrap_or_else(never_tried)).collect()
+}
+
+/// Whether a file has names beside this one.
+fn has_other_names(path: &Path) -> bool {
+    #[cfg(unix)]
+    let names = |metadata: fs::Metadata| std::os::unix::fs::MetadataExt::nlink(&metadata);
+    #[cfg(not(unix))]
+    let names = |_: fs::Metadata| 1;
+    fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_file() && names(metadata) > 1)
 }
 
 /// A link inside a map could lead anywhere, and a pipe would be waited for: only files are opened, and names that

@@ -144,7 +144,7 @@ impl TileStore {
     }
 
     /// Brings about what earlier calls left open, before anything that builds upon it is written.
-    fn settle(&mut self) -> Result<()> {
+    pub(super) fn settle(&mut self) -> Result<()> {
         if let (false, Some(log)) = (self.is_log_settled, self.log) {
             // A record that came to disk after all names files that must stay as they are until it is cut off.
             let path = self.layout.commit_log();

@@ -1,3 +1,4 @@
+use super::snapshot_name::SnapshotName;
 use crate::config::Storage;
 use crate::space::TileIndex;
 use std::path::{Path, PathBuf};
@@ -98,7 +99,7 @@ impl Layout {
         self.tile_folder(tile).join(file.name(self.storage))
     }
 
-    /// The table of a tile as of a flush, kept beside newer ones for readers that opened the map then.
+    /// The table of a tile as of a flush, kept beside newer ones for readers that opened the map then and for snapshots.
     pub fn kept(&self, tile: TileIndex, flush_number: u64) -> PathBuf {
         let table = TileFile::Table.name(self.storage);
         self.tile_folder(tile).join(format!("{table}{KEPT_SUFFIX}{flush_number}"))
@@ -112,6 +113,21 @@ impl Layout {
     /// Updates that wait for a tile while the map is written to.
     pub fn waiting(&self, tile: TileIndex) -> PathBuf {
         self.tile_folder(tile).join(WAITING)
+    }
+
+    /// The folder of snapshots.
+    pub fn snapshots(&self) -> PathBuf {
+        self.folder.join(SNAPSHOTS)
+    }
+
+    /// A snapshot.
+    pub fn snapshot(&self, name: &SnapshotName) -> PathBuf {
+        self.snapshots().join(name.as_str())
+    }
+
+    /// A snapshot that is being written; no snapshot has such a name.
+    pub(super) fn snapshot_next(&self) -> PathBuf {
+        self.snapshots().join(SNAPSHOT_NEXT)
     }
 
     /// Where repair puts what it takes out of the map.
@@ -130,6 +146,12 @@ pub(super) const WAITING: &str = "updates.next";
 
 /// The name of the folder for what repair takes out of the map.
 pub const QUARANTINE: &str = "quarantine";
+
+/// The name of the folder of snapshots.
+pub const SNAPSHOTS: &str = "snapshots";
+
+/// The name of the file in it that is being written.
+pub const SNAPSHOT_NEXT: &str = ".next";
 
 const KEPT_SUFFIX: &str = ".flush";
 

@@ -1,7 +1,7 @@
 //! Named bytes on disk; knows no voxel.
 //!
 //! ```text
-//! TileStore -> flush, tidy, recovery, readers -> layout (names), CommitLog, Metadata -> Disk -> the file system
+//! TileStore -> flush, tidy, recovery, readers, snapshots -> layout (names), CommitLog, Metadata -> Disk -> the file system
 //! ```
 //!
 //! Every file operation of a map, syncs included, goes through [`Disk`], so that a failing disk and a crash are
@@ -17,6 +17,10 @@ mod metadata;
 mod readers;
 mod recovery;
 mod remains;
+mod snapshot_file;
+mod snapshot_name;
+mod snapshot_store;
+mod snapshots;
 mod tidy;
 mod tile_location;
 mod tile_stamp;
@@ -27,10 +31,12 @@ mod waiting_file;
 
 pub use commit_log::{CommitLog, Commits, Flush};
 pub use disk::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
-pub use layout::{Layout, QUARANTINE, TileFile, folder_name, tile_of_folder};
+pub use layout::{Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, TileFile, folder_name, tile_of_folder};
 pub use map_folder::{Lock, read_log};
 pub use metadata::{Bounds, Extension, MapParameters, Metadata};
 pub use remains::Remains;
+pub use snapshot_file::Snapshot;
+pub use snapshot_name::SnapshotName;
 pub use tile_location::{StoredTile, TileLocation};
 pub(crate) use tile_stamp::MAX_NUMBER;
 pub use tile_stamp::{FileStamp, Stamping, TileStamp};

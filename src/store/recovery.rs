@@ -1,6 +1,7 @@
 use super::commit_log::Commits;
 use super::disk::{Disk, EntryKind};
 use super::layout::{Layout, WAITING, tile_of_folder};
+use super::snapshots::{KeptTables, Snapshots};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
@@ -21,18 +22,26 @@ pub(super) struct Leftovers {
     pub renamed: BTreeSet<TileIndex>,
     /// Tile folders that hold files and are not in the log.
     pub strays: FxHashSet<TileIndex>,
+    /// What the map's snapshots see.
+    pub snapshots: Snapshots,
     /// How many files were removed.
     pub removed: u64,
 }
 
 /// Looks through the folders of a map for what a writer left when it ended: removes versions that were never
-/// committed and those kept for readers, and finds the committed ones that wait for their names.
+/// committed and tables kept for readers, and finds the committed ones that wait for their names.
 ///
 /// Safe to repeat and to break off anywhere.
-pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Result<Leftovers> {
+pub(super) fn recover(
+    disk: &dyn Disk,
+    layout: &Layout,
+    commits: &Commits,
+    map_id: [u8; 16],
+) -> Result<Leftovers> {
     let changed: FxHashSet<TileIndex> = commits.last_changed.iter().copied().collect();
     let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
     let mut leftovers = Leftovers::default();
+    let (mut kept, mut hollow) = (KeptTables::default(), Vec::new());
     for name in list(disk, layout.folder())? {
         let path = layout.folder().join(&name);
         if OWN_NEXT.contains(&&*name) {
@@ -41,7 +50,12 @@ pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Re
         let Some(tile) = tile_of_folder(&name) else { continue };
         let stamp = commits.tiles.get(&tile);
         let is_of_last_commit = changed.contains(&tile);
-        match look_at_tile(disk, layout, tile, stamp, is_of_last_commit, &mut leftovers.removed)? {
+        let (state, flushes) =
+            look_at_tile(disk, layout, tile, stamp, is_of_last_commit, &mut leftovers.removed)?;
+        if !flushes.is_empty() {
+            kept.insert(tile, flushes);
+        }
+        match state {
             // Its names may not be on the medium yet, if the writer was killed before it could see to that.
             State::Whole if is_of_last_commit => {
                 leftovers.renamed.insert(tile);
@@ -50,10 +64,8 @@ pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Re
             State::Unrenamed => {
                 leftovers.unrenamed.insert(tile);
             }
-            // Made for a tile that was never committed.
-            State::Empty if stamp.is_none() => {
-                disk.remove_folder(&path).map_err(|error| Error::io(&path, "remove", error))?;
-            }
+            // Made for a tile that was never committed, or of one that is no part of the map any more.
+            State::Empty if stamp.is_none() => hollow.push(tile),
             State::Empty => {}
             // The store goes on with its removal.
             State::Stray if removed.contains(&tile) => {}
@@ -62,7 +74,36 @@ pub(super) fn recover(disk: &dyn Disk, layout: &Layout, commits: &Commits) -> Re
             }
         }
     }
+    leftovers.snapshots = Snapshots::look(disk, layout, map_id, &kept)?;
+    remove_unseen(disk, layout, &kept, &mut leftovers)?;
+    for tile in hollow.into_iter().filter(|tile| !leftovers.snapshots.pinned().contains_key(tile)) {
+        let path = layout.tile_folder(tile);
+        disk.remove_folder(&path).map_err(|error| Error::io(&path, "remove", error))?;
+    }
     Ok(leftovers)
+}
+
+/// Removes kept tables that no snapshot sees: they were kept for readers, or for a snapshot that is deleted.
+fn remove_unseen(
+    disk: &dyn Disk,
+    layout: &Layout,
+    kept: &KeptTables,
+    leftovers: &mut Leftovers,
+) -> Result<()> {
+    let folder = layout.snapshots();
+    if kind(disk, &folder)? == Some(EntryKind::Folder) {
+        remove(disk, &layout.snapshot_next(), &mut leftovers.removed)?;
+        if !kept.is_empty() {
+            // A deletion that a killed writer could not make durable would come back and miss its tables.
+            disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
+        }
+    }
+    for (&tile, flushes) in kept {
+        for &flush_number in flushes.iter().filter(|&&n| !leftovers.snapshots.sees_kept(tile, n)) {
+            remove(disk, &layout.kept(tile, flush_number), &mut leftovers.removed)?;
+        }
+    }
+    Ok(())
 }
 
 enum State {
@@ -79,11 +120,11 @@ fn look_at_tile(
     stamp: Option<&TileStamp>,
     is_of_last_commit: bool,
     removed: &mut u64,
-) -> Result<State> {
+) -> Result<(State, BTreeSet<u64>)> {
     let folder = layout.tile_folder(tile);
-    if disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? != Some(EntryKind::Folder) {
+    if kind(disk, &folder)? != Some(EntryKind::Folder) {
         // A file or a link with a tile's name: reading the tile, if there is one, tells.
-        return Ok(State::Stray);
+        return Ok((State::Stray, BTreeSet::new()));
     }
     let mut names = list(disk, &folder)?;
     let mut unrenamed = false;
@@ -107,15 +148,22 @@ fn look_at_tile(
         remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
-    for name in names.extract_if(.., |name| name == WAITING || layout.flush_of_kept(name).is_some()) {
+    for name in names.extract_if(.., |name| name == WAITING) {
         remove(disk, &folder.join(name), removed)?;
     }
-    Ok(match stamp {
+    let is_kept = |name: &mut String| layout.flush_of_kept(name).is_some();
+    let kept = names.extract_if(.., is_kept).filter_map(|name| layout.flush_of_kept(&name)).collect();
+    let state = match stamp {
         _ if names.is_empty() => State::Empty,
         None => State::Stray,
         Some(_) if unrenamed => State::Unrenamed,
         Some(_) => State::Whole,
-    })
+    };
+    Ok((state, kept))
+}
+
+fn kind(disk: &dyn Disk, path: &Path) -> Result<Option<EntryKind>> {
+    disk.kind(path).map_err(|error| Error::io(path, "look at", error))
 }
 
 fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
@@ -124,8 +172,7 @@ fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
 
 /// Removes a file; what has its name and is none is not voxtile's, and stays.
 fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
-    let kind = disk.kind(path).map_err(|error| Error::io(path, "look at", error))?;
-    if !matches!(kind, Some(EntryKind::File(_))) {
+    if !matches!(kind(disk, path)?, Some(EntryKind::File(_))) {
         return Ok(());
     }
     *removed += 1;

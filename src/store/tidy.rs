@@ -19,21 +19,60 @@ impl TileStore {
     }
 
     /// Brings the files of tiles to what the last commit says, durably. Before that nothing may be written under the
-    /// names in question, which a crash could bring back. Tables that go are kept while there are readers.
+    /// names in question, which a crash could bring back.
     pub(super) fn put_in_place(&mut self) -> Result<()> {
-        // Asked after the commit: who begins to read later sees it.
-        let is_idle = self.unrenamed.is_empty() && self.unremoved.is_empty();
-        let keep = !is_idle && self.readers.are_there();
-        self.finish_renames(keep)?;
-        self.finish_removals(keep)
+        self.keep_replaced()?;
+        self.finish_renames()?;
+        self.finish_removals()
     }
 
-    fn finish_renames(&mut self, keep: bool) -> Result<()> {
-        while let Some(&tile) = self.unrenamed.first() {
-            // Renamed by an earlier attempt, the table in place is the new one.
-            if keep && self.kind(&self.layout.next(tile, TileFile::Table))?.is_some() {
-                self.keep_table(tile)?;
+    /// Keeps the tables in place that the last commit replaces or removes, where a reader or a snapshot sees them. Those of
+    /// snapshots have their new names durably before other tables can take the old ones.
+    fn keep_replaced(&mut self) -> Result<()> {
+        let tiles: Vec<_> = self.unrenamed.iter().chain(&self.unremoved).copied().collect();
+        // Asked after the commit: who begins to read later sees it.
+        let has_readers = !tiles.is_empty() && self.readers.are_there();
+        let flush_number = self.commits.flush_number.saturating_sub(1);
+        let mut seen = Vec::new();
+        for tile in tiles {
+            let is_seen = self.snapshots.sees_present(tile);
+            let is_wanted = (is_seen || has_readers) && !self.snapshots.sees_kept(tile, flush_number);
+            if is_wanted && self.is_replaced_in_place(tile)? {
+                let (from, to) =
+                    (self.layout.current(tile, TileFile::Table), self.layout.kept(tile, flush_number));
+                self.rename(&from, &to)?;
+                match is_seen {
+                    true => self.snapshots.pin(tile, flush_number),
+                    false => self.readers.keep(tile, flush_number),
+                }
             }
+            // Also what an earlier attempt, or a writer that was killed, renamed and could not sync.
+            if self.snapshots.sees_kept(tile, flush_number) {
+                seen.push(tile);
+            }
+        }
+        let folders: Vec<_> = seen.iter().map(|&tile| self.layout.tile_folder(tile)).collect();
+        let [_, synced] = self.disk.sync_all(&[], &folders);
+        for ((tile, folder), result) in seen.iter().zip(&folders).zip(synced) {
+            result.map_err(|error| Error::io(folder, "sync", error))?;
+            self.snapshots.has_replaced(*tile);
+        }
+        Ok(())
+    }
+
+    /// Whether the table in place is the version before the last commit. An earlier attempt may have kept it already; what
+    /// is renamed then is not there, and nothing happens.
+    fn is_replaced_in_place(&self, tile: TileIndex) -> Result<bool> {
+        let is_there = |path: &Path| Ok(self.kind(path)?.is_some());
+        match self.unrenamed.contains(&tile) {
+            // Otherwise it has been put in place.
+            true => is_there(&self.layout.next(tile, TileFile::Table)),
+            false => is_there(&self.layout.tile_folder(tile)),
+        }
+    }
+
+    fn finish_renames(&mut self) -> Result<()> {
+        while let Some(&tile) = self.unrenamed.first() {
             for &file in self.layout.files() {
                 self.rename(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
             }
@@ -56,12 +95,12 @@ impl TileStore {
 
     /// Removes the files of removed tiles, and their folders where nothing else is in them. The log names these tiles
     /// until that is durable.
-    fn finish_removals(&mut self, keep: bool) -> Result<()> {
+    fn finish_removals(&mut self) -> Result<()> {
         if self.unremoved.is_empty() {
             return Ok(());
         }
         for tile in self.unremoved.clone() {
-            self.remove_files(tile, keep)?;
+            self.remove_files(tile)?;
         }
         self.sync_folder(self.layout.folder())?;
         self.unremoved.clear();
@@ -69,13 +108,10 @@ impl TileStore {
         Ok(())
     }
 
-    fn remove_files(&mut self, tile: TileIndex, keep: bool) -> Result<()> {
+    fn remove_files(&mut self, tile: TileIndex) -> Result<()> {
         let folder = self.layout.tile_folder(tile);
         if self.kind(&folder)? != Some(EntryKind::Folder) {
             return Ok(());
-        }
-        if keep && self.kind(&self.layout.current(tile, TileFile::Table))?.is_some() {
-            self.keep_table(tile)?;
         }
         for &file in self.layout.files() {
             for path in [self.layout.current(tile, file), self.layout.next(tile, file)] {
@@ -87,14 +123,6 @@ impl TileStore {
             true => self.disk.remove_folder(&folder).map_err(|error| Error::io(&folder, "remove", error)),
             false => self.sync_folder(&folder),
         }
-    }
-
-    /// Keeps the table in place, which the last commit replaces or removes, for those that see the flush before.
-    fn keep_table(&mut self, tile: TileIndex) -> Result<()> {
-        let flush_number = self.commits.flush_number.saturating_sub(1);
-        self.rename(&self.layout.current(tile, TileFile::Table), &self.layout.kept(tile, flush_number))?;
-        self.readers.keep(tile, flush_number);
-        Ok(())
     }
 
     /// Renames a file; one that is not there was renamed by an earlier attempt, or never was.
@@ -112,7 +140,7 @@ impl TileStore {
         }
     }
 
-    fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
+    pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
         self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
     }
 }

@@ -5,6 +5,8 @@ use super::map_folder::{self, Lock};
 use super::metadata::Metadata;
 use super::readers::Readers;
 use super::recovery::recover;
+use super::snapshot_name::SnapshotName;
+use super::snapshots::{Snapshots, seen_by};
 use super::tile_location::{StoredTile, TileLocation};
 use super::tile_stamp::TileStamp;
 use crate::error::{Error, FormatError, Result};
@@ -51,6 +53,10 @@ pub struct TileStore {
     pub(super) foreign: FxHashSet<TileIndex>,
     /// A writer's.
     pub(super) readers: Readers,
+    /// A writer's.
+    pub(super) snapshots: Snapshots,
+    /// The snapshot that was opened in place of the map as it is.
+    pub(super) snapshot: Option<SnapshotName>,
     /// Held while the store may write.
     pub(super) lock: Option<Lock>,
     /// Held by a reader, so that a writer keeps what it sees.
@@ -105,7 +111,9 @@ impl TileStore {
                 // again proves nothing: written anew, it is durable before it is acted upon.
                 store.replace_log()?;
             }
-            let leftovers = recover(&*store.disk, &store.layout, &store.commits)?;
+            let map_id = store.map_id().unwrap_or_default();
+            let leftovers = recover(&*store.disk, &store.layout, &store.commits, map_id)?;
+            store.snapshots = leftovers.snapshots;
             store.strays = leftovers.strays;
             store.leftovers_removed = leftovers.removed;
             store.unrenamed = leftovers.unrenamed;
@@ -181,7 +189,7 @@ impl TileStore {
         Ok(Self { written_flush, ..Self::new(disk, layout, metadata, Some(log), commits) })
     }
 
-    fn new(
+    pub(super) fn new(
         disk: Arc<dyn Disk>,
         layout: Layout,
         metadata: Metadata,
@@ -190,7 +198,7 @@ impl TileStore {
     ) -> Self {
         let layout = layout.with_storage(metadata.storage());
         let (next, suspect, removed, unrenamed, renamed) = Default::default();
-        let (unremoved, strays, foreign, readers) = Default::default();
+        let (unremoved, strays, foreign, readers, snapshots) = Default::default();
         Self {
             disk,
             layout,
@@ -209,6 +217,8 @@ impl TileStore {
             leftovers_removed: 0,
             foreign,
             readers,
+            snapshots,
+            snapshot: None,
             lock: None,
             shared_metadata: None,
         }
@@ -284,6 +294,7 @@ impl TileStore {
         let slot = size_of::<(TileIndex, TileStamp)>() + 1;
         (self.commits.tiles.capacity() + self.next.capacity()) * 8 / 7 * slot
             + (self.foreign.capacity() + self.strays.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
+            + self.snapshots.bytes()
     }
 
     /// What is known of the latest version of a tile on disk without reading it.
@@ -298,7 +309,37 @@ impl TileStore {
     ///
     /// A file that the log names and that is missing, and a tile folder that the log does not name.
     pub fn open_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
-        self.open_version(tile, self.latest_path(tile))
+        let path = match &self.snapshot {
+            Some(_) => self.path_in_snapshot(tile)?,
+            None => self.latest_path(tile),
+        };
+        self.open_version(tile, path)
+    }
+
+    /// Where a snapshot's version of a table is while no writer is at work.
+    fn path_in_snapshot(&self, tile: TileIndex) -> Result<PathBuf> {
+        let kept = self.kept_tables(tile)?;
+        Ok(match seen_by(Some(&kept), self.commits.flush_number) {
+            Some(flush_number) => self.layout.kept(tile, flush_number),
+            None => self.layout.current(tile, TileFile::Table),
+        })
+    }
+
+    /// The flushes as of which tables of a tile are kept beside the one in place.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub fn kept_tables(&self, tile: TileIndex) -> Result<BTreeSet<u64>> {
+        let folder = self.layout.tile_folder(tile);
+        match self.disk.list(&folder) {
+            // It tells when the table is opened.
+            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                Ok(BTreeSet::new())
+            }
+            Err(error) => Err(Error::io(&folder, "list", error)),
+            Ok(names) => Ok(names.iter().filter_map(|name| self.layout.flush_of_kept(name)).collect()),
+        }
     }
 
     /// Other places where a reader beside a writer may find the version of a tile's table that it sees: committed and
@@ -308,18 +349,10 @@ impl TileStore {
     ///
     /// A folder that cannot be listed.
     pub fn other_places(&self, tile: TileIndex) -> Result<Vec<PathBuf>> {
-        let folder = self.layout.tile_folder(tile);
-        let names = match self.disk.list(&folder) {
-            _ if self.lock.is_some() => return Ok(Vec::new()),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            names => names.map_err(|error| Error::io(&folder, "list", error))?,
-        };
-        let mut kept: Vec<u64> = names
-            .iter()
-            .filter_map(|name| self.layout.flush_of_kept(name))
-            .filter(|&flush_number| flush_number >= self.commits.flush_number)
-            .collect();
-        kept.sort_unstable();
+        if self.lock.is_some() {
+            return Ok(Vec::new());
+        }
+        let kept = self.kept_tables(tile)?.split_off(&self.commits.flush_number);
         let kept = kept.into_iter().map(|flush_number| self.layout.kept(tile, flush_number));
         let places =
             kept.chain([self.layout.next(tile, TileFile::Table), self.layout.current(tile, TileFile::Table)]);

@@ -1,7 +1,7 @@
 //! Looking after a map on disk: is everything whole, and what can be put right?
 //!
 //! ```text
-//! verify  metadata.json, commits.log, then tile by tile: table, octree  -> findings
+//! verify  metadata.json, commits.log, then tile by tile: table, octree; then snapshots  -> findings
 //! repair  index (metadata.json, commits.log) from whatever is left      -> actions
 //!         tile by tile: octree from its table, damaged tiles to quarantine/
 //! ```
@@ -12,6 +12,8 @@ mod finding;
 mod quarantine;
 mod rebuild;
 mod repair;
+mod repair_snapshots;
+mod snapshots;
 mod tile_check;
 mod verify;
 

@@ -1,5 +1,6 @@
 //! What a map is, told from whatever is left of it: `metadata.json`, `commits.log`, and the tiles themselves.
 
+use super::snapshots::last_known_flush;
 use crate::config::{MapConfig, Storage};
 use crate::error::{Error, FormatError, Result};
 use crate::mapper::tile_files::{ReadTable, read_stored_table};
@@ -77,12 +78,13 @@ fn index_from_tiles(
     let (map_id, metadata) = identity(layout, remains, &trailers)?;
     let config = crate::mapper::config_from(&metadata, &layout.metadata())?;
     let known_scan = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.scan_number);
-    let known_flush = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.flush_number);
+    let written_flush = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.flush_number);
+    let known_flush = last_known_flush(disk, layout, map_id, &tiles);
     let mut index = Index {
         map_id,
         metadata,
         commits: Commits {
-            flush_number: known_flush.unwrap_or(0).max(remains.commits.flush_number) + 1,
+            flush_number: known_flush.max(written_flush.unwrap_or(0)).max(remains.commits.flush_number) + 1,
             scan_number: known_scan.unwrap_or(0).max(remains.commits.scan_number),
             ..Commits::default()
         },
@@ -128,9 +130,11 @@ impl Index {
             }
             (None, next_table) => {
                 let folder = layout.tile_folder(tile);
+                let is_kept = |name: &String| layout.flush_of_kept(name).is_some();
                 let (path, reason) = match next_table {
                     Some(_) => (&next, "nothing tells whether this version was committed"),
-                    None if disk.list(&folder).is_ok_and(|names| names.is_empty()) => return Ok(()),
+                    // Of a removed tile that a snapshot sees, perhaps.
+                    None if disk.list(&folder).is_ok_and(|names| names.iter().all(is_kept)) => return Ok(()),
                     None => (&current, "the file is missing"),
                 };
                 self.damaged.push((tile, FormatError::at_offset(0, reason).in_map(path, Some(tile))));

@@ -39,7 +39,7 @@ pub enum ActionKind {
     Renamed,
     /// Removed, because the log proves that it was never committed or has been replaced.
     Removed,
-    /// No longer named by the log, because its files are missing.
+    /// No longer named by the log, because its files are missing; or by a snapshot, because they are missing or damaged.
     Forgotten,
 }
 
@@ -49,6 +49,8 @@ pub enum ActionKind {
 pub struct Repair {
     /// Tiles of the map now.
     pub tiles: u64,
+    /// Tiles that are no longer part of some snapshot.
+    pub snapshot_tiles_lost: u64,
     /// Tiles that are no longer part of the map: their space is unknown again.
     pub tiles_lost: u64,
     /// Number of things done; 0 if the map was whole.
@@ -102,24 +104,41 @@ pub fn repair_on(
     Ok(repairer.counts)
 }
 
-struct Repairer<'a, F, P> {
-    disk: &'a dyn Disk,
-    layout: Layout,
+pub(super) struct Repairer<'a, F, P> {
+    pub(super) disk: &'a dyn Disk,
+    pub(super) layout: Layout,
     done: F,
     progress: P,
-    counts: Repair,
+    pub(super) counts: Repair,
 }
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
-    fn note(&mut self, kind: ActionKind, path: &Path, reason: impl Into<String>) {
+    pub(super) fn note(&mut self, kind: ActionKind, path: &Path, reason: impl Into<String>) {
         self.counts.actions += 1;
         (self.done)(&Action { kind, path: path.to_owned(), reason: reason.into() });
     }
 
-    fn quarantine(&mut self, path: &Path, why: &str) -> Result<()> {
+    pub(super) fn quarantine(&mut self, path: &Path, why: &str) -> Result<()> {
         let to = Quarantine::new(self.disk, &self.layout).take(path)?;
         self.note(ActionKind::Quarantined, path, format!("{why}; now {}", to.display()));
         Ok(())
+    }
+
+    /// Takes a tile out of the map; tables that snapshots see stay.
+    fn quarantine_tile(&mut self, tile: TileIndex, why: &str) -> Result<()> {
+        let folder = self.layout.tile_folder(tile);
+        let names = match self.kind(&folder)? {
+            Some(EntryKind::Folder) if self.kind(&self.layout.snapshots())?.is_some() => {
+                self.disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?
+            }
+            _ => Vec::new(),
+        };
+        let is_kept = |name: &String| self.layout.flush_of_kept(name).is_some();
+        let (kept, others): (Vec<_>, Vec<_>) = names.into_iter().partition(is_kept);
+        if kept.is_empty() {
+            return self.quarantine(&folder, why);
+        }
+        others.iter().try_for_each(|name| self.quarantine(&folder.join(name), why))
     }
 
     fn quarantine_copy(&mut self, path: &Path, why: &str) -> Result<()> {
@@ -129,7 +148,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
+    pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
         self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
     }
 
@@ -144,7 +163,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             return self.quarantine(&self.layout.commit_log(), "metadata.json is of the seed's format");
         };
         for (tile, error) in damaged {
-            self.quarantine(&self.layout.tile_folder(tile), &error.to_string())?;
+            self.quarantine_tile(tile, &error.to_string())?;
             self.counts.tiles_lost += 1;
         }
         if is_from_tiles {
@@ -214,7 +233,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             self.note(ActionKind::Removed, &folder, reason);
         }
         for tile in store.strays() {
-            self.quarantine(&self.layout.tile_folder(tile), "commits.log does not name this tile")?;
+            self.quarantine_tile(tile, "commits.log does not name this tile")?;
         }
         let mut tiles: Vec<_> = store.tiles().collect();
         tiles.sort_unstable();
@@ -239,6 +258,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 "brought up to the last flush in commits.log",
             );
         }
+        self.repair_snapshots(store, config)?;
         self.counts.tiles = (tiles.len() - lost.len()) as u64;
         self.counts.tiles_lost += lost.len() as u64;
         Ok(())
@@ -255,7 +275,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 if self.kind(&folder)?.is_none() {
                     self.note(ActionKind::Forgotten, &folder, "the tile's folder is missing");
                 } else {
-                    self.quarantine(&folder, &finding.reason)?;
+                    self.quarantine_tile(tile, &finding.reason)?;
                 }
                 return Ok(false);
             }

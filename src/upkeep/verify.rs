@@ -1,13 +1,14 @@
 use super::finding::{Finding, Severity};
 use super::rebuild::{self, Index};
+use super::snapshots::{WholeTables, lost_tiles};
 use super::tile_check::{check_tile, first_difference, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::mapper::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, TileFile, TileStamp, TileStore, read_log,
-    tile_of_folder,
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotName, TileFile,
+    TileStamp, TileStore, read_log, tile_of_folder,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -26,6 +27,8 @@ pub struct Verification {
     pub scan_number: u64,
     /// Tiles of the map.
     pub tiles: u64,
+    /// Snapshots of the map.
+    pub snapshots: u64,
     /// Observed voxels in the tiles that are whole.
     pub voxels: u64,
     /// Bytes of the tables that are whole.
@@ -145,7 +148,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             self.verify_tile(store, config, *tile)?;
             (self.progress)(done, tiles.len() as u64);
         }
-        self.look_around(|tile| tiles.binary_search(&tile).is_ok())
+        let seen = self.verify_snapshots(store, config)?;
+        self.look_around(&seen, |tile| tiles.binary_search(&tile).is_ok())
     }
 
     fn verify_tile(&mut self, store: &TileStore, config: &MapConfig, tile: TileIndex) -> Result<()> {
@@ -208,19 +212,70 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
     }
 
+    /// Looks at the snapshots, and at the tables that only they see. Returns those that are whole.
+    fn verify_snapshots(&mut self, store: &TileStore, config: &MapConfig) -> Result<WholeTables> {
+        let mut whole = WholeTables::new();
+        let names = match store.snapshot_names() {
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                return Ok(whole);
+            }
+            Ok(names) => names,
+        };
+        for name in names {
+            self.counts.snapshots += 1;
+            let lost =
+                store.snapshot(&name).and_then(|snapshot| lost_tiles(store, config, &snapshot, &mut whole));
+            let errors = match lost {
+                // Deleted meanwhile.
+                Err(Error::InvalidArgument { .. }) => continue,
+                Err(error) => vec![error],
+                Ok(lost) => lost.into_iter().map(|(_, error)| error).collect(),
+            };
+            if !store.snapshot_names()?.contains(&name) {
+                continue;
+            }
+            for error in errors {
+                let mut finding = Finding::of(error)?;
+                finding.reason += &format!("; the snapshot {name} needs it");
+                self.report(finding);
+            }
+        }
+        Ok(whole)
+    }
+
+    fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
+        if self.disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?
+            != Some(EntryKind::Folder)
+        {
+            return Ok(()); // Told already.
+        }
+        for name in self.list(folder)? {
+            let reason = match SnapshotName::new(&*name) {
+                Ok(_) => continue,
+                Err(_) if name == SNAPSHOT_NEXT => "left behind, or being written",
+                Err(_) => "no snapshot: it has no name of one",
+            };
+            self.report(Finding::note(&folder.join(&name), None, reason));
+        }
+        Ok(())
+    }
+
     /// Looks for what is no part of the map.
-    fn look_around(&mut self, is_known: impl Fn(TileIndex) -> bool) -> Result<()> {
+    fn look_around(&mut self, seen: &WholeTables, is_known: impl Fn(TileIndex) -> bool) -> Result<()> {
         let folder = self.layout.folder().to_owned();
         for name in self.list(&folder)? {
             let path = folder.join(&name);
             match (&*name, tile_of_folder(&name)) {
                 ("metadata.json" | "commits.log" | "writer.lock", _) => {}
+                (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
                 (QUARANTINE, _) => {
                     self.report(Finding::note(&path, None, "taken out of the map by a repair"))
                 }
                 (_, Some(tile)) => {
                     let is_known = is_known(tile) || self.told.contains(&tile);
-                    self.look_into(&path, tile, is_known)?;
+                    self.look_into(&path, tile, seen, is_known)?;
                 }
                 (name, None) if name.ends_with(".next") => {
                     self.report(Finding::note(&path, None, "left behind, or being written"));
@@ -231,7 +286,13 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    fn look_into(&mut self, folder: &Path, tile: TileIndex, is_known: bool) -> Result<()> {
+    fn look_into(
+        &mut self,
+        folder: &Path,
+        tile: TileIndex,
+        seen: &WholeTables,
+        is_known: bool,
+    ) -> Result<()> {
         let kind = self.disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?;
         if kind != Some(EntryKind::Folder) {
             if !is_known {
@@ -242,7 +303,11 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let mut is_stray = false;
         for name in self.list(folder)? {
             let path = folder.join(&name);
-            if name.ends_with(".next") || self.layout.flush_of_kept(&name).is_some() {
+            let kept = self.layout.flush_of_kept(&name);
+            if kept.is_some_and(|flush_number| seen.contains(&(tile, flush_number))) {
+                continue;
+            }
+            if name.ends_with(".next") || kept.is_some() {
                 self.report(Finding::note(
                     &path,
                     Some(tile),

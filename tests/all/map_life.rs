@@ -1,9 +1,11 @@
 use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use crate::support::random_scans::{Random, random_scan};
 use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
+use std::collections::BTreeMap;
 use std::path::Path;
+use voxtile::session::{delete_snapshot_on, revert_on, snapshot_on, snapshots_on};
 use voxtile::space::TileIndex;
-use voxtile::store::{TileStore, tile_of_folder};
+use voxtile::store::{SnapshotName, TileStore, tile_of_folder};
 use voxtile::upkeep::{Finding, Severity, Verification, verify_on};
 use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Result, Scan};
 
@@ -22,6 +24,9 @@ enum Act {
     Scans(std::ops::Range<u64>),
     /// Take every so many-th tile out of the map.
     Remove(usize),
+    Snapshot(&'static str),
+    Delete(&'static str),
+    Revert(&'static str),
 }
 
 fn scan(number: u64) -> Scan {
@@ -34,6 +39,8 @@ fn scan(number: u64) -> Scan {
 struct State {
     voxels: Voxels,
     scan_number: u64,
+    /// Voxels and scan number of each snapshot.
+    snapshots: BTreeMap<String, (Voxels, u64)>,
 }
 
 /// A life, and the naive map after each of its acts.
@@ -57,7 +64,7 @@ impl Life {
             Err(Error::NoMap { .. }) if among.contains(&0) => return 0,
             opened => opened.unwrap_or_else(|error| panic!("{what}: {error}")),
         };
-        let found = State { voxels: voxels_of(&reader), scan_number: reader.scan_number() };
+        let found = state_seen(disk, &reader);
         let number = among.iter().copied().find(|&number| self.states[number] == found);
         number.unwrap_or_else(|| panic!("{what}: none of the states {among:?}"))
     }
@@ -101,6 +108,22 @@ impl Life {
     }
 }
 
+fn name(name: &str) -> SnapshotName {
+    SnapshotName::new(name).unwrap()
+}
+
+fn state_seen(disk: &FaultyDisk, reader: &MapReader) -> State {
+    let (voxels, scan_number) = (voxels_of(reader), reader.scan_number());
+    let open = |name| MapReader::open_snapshot_on(disk.shared(), map(), &name, 1).unwrap();
+    let infos = snapshots_on(disk.shared(), map()).unwrap().into_iter();
+    let readers = infos.map(|info| open(name(&info.name)));
+    let snapshots = readers.map(|reader| {
+        let name = reader.snapshot().unwrap().to_string();
+        (name, (voxels_of(&reader), reader.scan_number()))
+    });
+    State { voxels, scan_number, snapshots: snapshots.collect() }
+}
+
 fn check_whole(disk: &FaultyDisk, what: &str) -> Verification {
     let is_damage = |finding: &Finding| finding.severity == Severity::Damage;
     let found = |finding: &Finding| assert!(!is_damage(finding), "{what}: {finding}");
@@ -114,7 +137,8 @@ fn check_files(disk: &FaultyDisk, what: &str) {
     let tiles = reader.tile_indices();
     for path in disk.files().into_keys() {
         let folder = path.parent().and_then(|folder| folder.file_name()?.to_str()).unwrap();
-        let is_of_tile = tile_of_folder(folder).is_none_or(|tile| tiles.binary_search(&tile).is_ok());
+        let is_of_tile = tile_of_folder(folder).is_none_or(|tile| tiles.binary_search(&tile).is_ok())
+            || path.to_string_lossy().contains(".flush");
         assert!(is_of_tile, "{what}: {}", path.display());
     }
 }
@@ -126,16 +150,30 @@ fn is_removed(every: usize, tile: TileIndex) -> bool {
 fn naive(before: State, act: &Act) -> State {
     let grid = config().grid;
     let mut map = ReferenceMap::new(&config());
-    (map.voxels, map.updated) = (before.voxels, Vec::new());
+    map.voxels = before.voxels.clone();
     match act {
         Act::Scans(numbers) => {
             numbers.clone().for_each(|number| map.insert_scan(&scan(number)));
             let scan_number = before.scan_number + numbers.end - numbers.start;
-            State { voxels: map.voxels, scan_number }
+            State { voxels: map.voxels, scan_number, ..before }
         }
         Act::Remove(every) => {
             map.voxels.retain(|&voxel, _| !is_removed(*every, grid.tile_of_voxel(voxel)));
-            State { voxels: map.voxels, scan_number: before.scan_number }
+            State { voxels: map.voxels, ..before }
+        }
+        Act::Snapshot(name) => {
+            let mut after = before;
+            after.snapshots.insert((*name).to_owned(), (map.voxels.clone(), after.scan_number));
+            State { voxels: map.voxels, ..after }
+        }
+        Act::Delete(name) => {
+            let mut after = State { voxels: map.voxels, ..before };
+            assert!(after.snapshots.remove(*name).is_some());
+            after
+        }
+        Act::Revert(name) => {
+            let (voxels, scan_number) = before.snapshots[*name].clone();
+            State { voxels, scan_number, ..before }
         }
     }
 }
@@ -159,6 +197,9 @@ fn act(disk: &FaultyDisk, act: &Act) -> Result<()> {
             }
             store.commit(store.metadata().clone(), store.commits().scan_number)
         }
+        Act::Snapshot(of) => snapshot_on(disk.shared(), map(), &name(of)),
+        Act::Delete(of) => delete_snapshot_on(disk.shared(), map(), &name(of)),
+        Act::Revert(to) => revert_on(disk.shared(), map(), &name(to), None, |_, _| ()).map(drop),
     }
 }
 
@@ -174,13 +215,33 @@ fn removals() -> Life {
     ])
 }
 
-#[test]
-fn an_operation_fails_and_the_next_attempt_goes() {
-    let life = removals();
-    let disk = life.undisturbed();
-    life.check_end(&disk, "undisturbed");
-    for at in 0..disk.operations() {
-        let disk = FaultyDisk::new(Fault::Fails(at));
+/// Snapshots that share tiles, of tiles that go, and again; reverts to each; and none at the end.
+fn snapshots() -> Life {
+    Life::new(vec![
+        Act::Scans(0..2),
+        Act::Snapshot("a"),
+        Act::Scans(2..3),
+        Act::Snapshot("b"),
+        Act::Remove(2),
+        Act::Scans(3..4),
+        Act::Revert("a"),
+        Act::Scans(4..5),
+        Act::Delete("a"),
+        Act::Snapshot("c"),
+        Act::Revert("b"),
+        Act::Delete("b"),
+        Act::Scans(5..6),
+        Act::Delete("c"),
+    ])
+}
+
+fn every_operation_fails(life: &Life, disk: impl Fn(Fault) -> FaultyDisk) {
+    let undisturbed = disk(Fault::None);
+    life.live(&undisturbed, 0).unwrap();
+    life.check_end(&undisturbed, "undisturbed");
+    println!("{} operations", undisturbed.operations());
+    for at in 0..undisturbed.operations() {
+        let disk = disk(Fault::Fails(at));
         if let Err((number, _)) = life.live(&disk, 0) {
             let left = disk.after_kill();
             life.check_after_crash(&left, number, &format!("operation {at} fails"));
@@ -188,13 +249,12 @@ fn an_operation_fails_and_the_next_attempt_goes() {
     }
 }
 
-#[test]
-fn the_power_goes_at_every_change() {
-    let life = removals();
-    let changes = life.undisturbed().changes();
-    println!("{changes} changes");
-    for at in 0..changes {
-        let disk = FaultyDisk::new(Fault::Crashes(at));
+fn the_power_goes(life: &Life, disk: impl Fn(Fault) -> FaultyDisk) {
+    let undisturbed = disk(Fault::None);
+    life.live(&undisturbed, 0).unwrap();
+    println!("{} changes", undisturbed.changes());
+    for at in 0..undisturbed.changes() {
+        let disk = disk(Fault::Crashes(at));
         let number = life.live_until_crash(&disk, 0);
         let shuffled = (0..3).map(|seed| Unsynced::Shuffled(31 * at + seed));
         for unsynced in shuffled.chain([Unsynced::Dropped, Unsynced::Kept]) {
@@ -204,9 +264,7 @@ fn the_power_goes_at_every_change() {
     }
 }
 
-#[test]
-fn the_power_goes_some_time_after_a_kill() {
-    let life = removals();
+fn the_power_goes_after_a_kill(life: &Life) {
     for at in 0..life.undisturbed().changes() {
         let disk = FaultyDisk::new(Fault::Crashes(at));
         let number = life.live_until_crash(&disk, 0);
@@ -214,14 +272,51 @@ fn the_power_goes_some_time_after_a_kill() {
             let killed = disk.after_kill();
             let from = life.state_of(&killed, &[number, number + 1], "killed");
             killed.set_fault(Fault::Crashes(again));
-            if from == life.acts.len() {
+            let lived = life.live(&killed, from);
+            if !killed.has_crashed() {
                 continue;
             }
-            let number = life.live_until_crash(&killed, from);
+            let number = lived.map_or_else(|(number, _)| number, |()| life.acts.len() - 1);
             let left = killed.after_crash(Unsynced::Shuffled(again));
             life.check_after_crash(&left, number, &format!("killed at {at}, crash {again} later"));
         }
     }
+}
+
+#[test]
+fn an_operation_of_a_removal_fails_and_the_next_attempt_goes() {
+    every_operation_fails(&removals(), FaultyDisk::new);
+}
+
+#[test]
+fn the_power_goes_at_every_change_of_removals() {
+    the_power_goes(&removals(), FaultyDisk::new);
+}
+
+#[test]
+fn the_power_goes_some_time_after_a_kill_among_removals() {
+    the_power_goes_after_a_kill(&removals());
+}
+
+#[test]
+fn an_operation_of_a_snapshot_fails_and_the_next_attempt_goes() {
+    every_operation_fails(&snapshots(), FaultyDisk::new);
+    every_operation_fails(&snapshots(), |fault| FaultyDisk::new(fault).without_links());
+}
+
+#[test]
+fn the_power_goes_at_every_change_of_snapshots() {
+    the_power_goes(&snapshots(), FaultyDisk::new);
+}
+
+#[test]
+fn the_power_goes_at_every_change_of_snapshots_where_files_have_one_name() {
+    the_power_goes(&snapshots(), |fault| FaultyDisk::new(fault).without_links());
+}
+
+#[test]
+fn the_power_goes_some_time_after_a_kill_among_snapshots() {
+    the_power_goes_after_a_kill(&snapshots());
 }
 
 /// A reader from before goes on seeing what was removed.

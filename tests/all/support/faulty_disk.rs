@@ -84,6 +84,7 @@ struct State {
     operations: u64,
     changes: u64,
     has_room: bool,
+    has_links: bool,
     crashed: bool,
 }
 
@@ -106,6 +107,7 @@ impl FaultyDisk {
             operations: 0,
             changes: 0,
             has_room: true,
+            has_links: true,
             crashed: false,
         };
         Self { state: Arc::new(Mutex::new(state)) }
@@ -129,6 +131,12 @@ impl FaultyDisk {
     /// Whether the power has gone.
     pub fn has_crashed(&self) -> bool {
         self.state().crashed
+    }
+
+    /// The same disk with a file system on which a file has one name only.
+    pub fn without_links(self) -> Self {
+        self.state().has_links = false;
+        self
     }
 
     /// Ends a lack of room.
@@ -175,7 +183,9 @@ impl FaultyDisk {
             (inode, Content { seen: bytes.clone(), on_medium: bytes, ..Content::default() })
         });
         let contents = contents.collect();
-        Self::of(names, contents, Fault::None)
+        let left = Self::of(names, contents, Fault::None);
+        left.state().has_links = state.has_links;
+        left
     }
 
     /// The same disk for another process, after the one before was killed: nothing is lost, and nothing more is on the
@@ -188,6 +198,7 @@ impl FaultyDisk {
         next.names_on_medium = state.names_on_medium.clone();
         next.unsynced_names = state.unsynced_names.clone();
         next.next_inode = state.next_inode;
+        next.has_links = state.has_links;
         for content in next.contents.values_mut() {
             (content.readers, content.locked) = (0, false);
         }
@@ -498,6 +509,11 @@ impl Disk for FaultyDisk {
         let mut state = self.state();
         state.attempt(Kind::NeedsRoom)?;
         let inode = state.file_or_new(path)?;
+        let is_linked = state.names.values().filter(|entry| **entry == Entry::File(inode)).count() > 1;
+        if is_linked {
+            state.change_name(NameChange::Remove(path.to_owned()));
+        }
+        let inode = state.file_or_new(path)?;
         let content = state.content(inode);
         content.seen.clear();
         content.lost = false;
@@ -551,6 +567,18 @@ impl Disk for FaultyDisk {
             _ => return Err(io::ErrorKind::AlreadyExists.into()),
         }
         state.change_name(NameChange::Rename(from.to_owned(), to.to_owned()));
+        Ok(())
+    }
+
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        let mut state = self.state();
+        state.attempt(Kind::NeedsRoom)?;
+        let inode = state.file(from)?;
+        match state.names.contains_key(to) {
+            _ if !state.has_links => return Err(io::ErrorKind::Unsupported.into()),
+            true => return Err(io::ErrorKind::AlreadyExists.into()),
+            false => state.change_name(NameChange::Put(to.to_owned(), Entry::File(inode))),
+        }
         Ok(())
     }
 

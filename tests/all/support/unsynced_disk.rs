@@ -102,6 +102,10 @@ impl Disk for UnsyncedDisk {
         FsDisk.rename(from, to)
     }
 
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        FsDisk.link(from, to)
+    }
+
     fn remove_file(&self, path: &Path) -> io::Result<()> {
         FsDisk.remove_file(path)
     }

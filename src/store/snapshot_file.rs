@@ -1,0 +1,85 @@
+//! The files in `snapshots/`: each a commit log of one record, the whole map as of a flush.
+
+use super::commit_log::{CommitLog, Commits};
+use super::disk::{Disk, EntryKind};
+use super::layout::Layout;
+use super::metadata::Metadata;
+use super::snapshot_name::SnapshotName;
+use super::tile_store::hex;
+use crate::error::{Error, FormatError, Result};
+use std::io;
+
+/// What a snapshot says: every tile and the metadata as of a flush.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Its name.
+    pub name: SnapshotName,
+    /// The map that it is of.
+    pub map_id: [u8; 16],
+    /// The metadata as of then.
+    pub metadata: Metadata,
+    /// Flush, scan and tiles.
+    pub commits: Commits,
+    /// Length of its file in bytes.
+    pub bytes: u64,
+}
+
+impl Snapshot {
+    /// The names of a map's snapshots, in order. Files with names that no snapshot may have are left out.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn list(disk: &dyn Disk, layout: &Layout) -> Result<Vec<SnapshotName>> {
+        let folder = layout.snapshots();
+        match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
+            Some(EntryKind::Folder) => {}
+            None => return Ok(Vec::new()),
+            Some(_) => {
+                let reason = "something else has the name of the folder of snapshots";
+                return Err(FormatError::at_offset(0, reason).in_map(&folder, None));
+            }
+        }
+        let names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;
+        let mut names: Vec<_> = names.into_iter().filter_map(|name| SnapshotName::new(name).ok()).collect();
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    /// Reads a snapshot of the map with this id.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] if there is none of this name; damage; a disk that refuses.
+    pub fn read(disk: &dyn Disk, layout: &Layout, name: &SnapshotName, map_id: [u8; 16]) -> Result<Self> {
+        let path = layout.snapshot(name);
+        let damaged = |at, reason: String| Err(FormatError::at_offset(at, reason).in_map(&path, None));
+        let input = match disk.open(&path) {
+            Ok(input) => input,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let map = layout.folder().display();
+                let reason =
+                    format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them");
+                return Err(Error::argument("snapshot", reason));
+            }
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
+                return damaged(0, error.to_string());
+            }
+            Err(error) => return Err(Error::io(&path, "open", error)),
+        };
+        let bytes = input.file_bytes();
+        let (log, mut commits) = CommitLog::read(&mut io::BufReader::new(input), bytes)
+            .map_err(|error| error.in_map(&path, None))?;
+        if let Some(torn) = commits.torn.take() {
+            return Err(torn.in_map(&path, None));
+        }
+        if log.map_id() != map_id {
+            let (found, wanted) = (hex(&log.map_id()), hex(&map_id));
+            return damaged(12, format!("the snapshot is of map {found}, not of {wanted}"));
+        }
+        match commits.metadata.clone().filter(|metadata| metadata.ext.is_some()) {
+            Some(metadata) => Ok(Self { name: name.clone(), map_id, metadata, commits, bytes }),
+            None => damaged(bytes, "the snapshot does not say what the map was".into()),
+        }
+    }
+}

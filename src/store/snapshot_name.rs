@@ -1,0 +1,71 @@
+use crate::error::{Error, Result};
+use std::fmt;
+use std::str::FromStr;
+
+/// The name of a snapshot, which is a file's name too: 1 to 64 letters of `A-Z a-z 0-9 . _ -`, the first of them no dot, and not
+/// `now`, which means the map as it is.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SnapshotName(String);
+
+/// What the map as it is is called among snapshots.
+const NOW: &str = "now";
+
+impl SnapshotName {
+    /// Takes a name.
+    ///
+    /// # Errors
+    ///
+    /// A name that no snapshot may have.
+    pub fn new(name: impl Into<String>) -> Result<Self> {
+        const MOST_LETTERS: usize = 64;
+        let name = name.into();
+        let is_letter = |letter: u8| letter.is_ascii_alphanumeric() || b"._-".contains(&letter);
+        let is_good = (1..=MOST_LETTERS).contains(&name.len())
+            && name.bytes().all(is_letter)
+            && !name.starts_with('.')
+            && name != NOW;
+        if is_good {
+            return Ok(Self(name));
+        }
+        let reason = format!(
+            "{name:?} cannot be a snapshot's name; 1 to {MOST_LETTERS} of A-Z a-z 0-9 . _ - can, beginning with no dot, \
+             but for {NOW:?}, which is the map as it is"
+        );
+        Err(Error::argument("snapshot", reason))
+    }
+
+    /// The name as text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl FromStr for SnapshotName {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::new(name)
+    }
+}
+
+impl fmt::Display for SnapshotName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_names_that_are_safe_as_files_are_taken() {
+        for good in ["a", "before-lunch", "2026.11.21_a", "-", "a.next", &"x".repeat(64)] {
+            assert_eq!(SnapshotName::new(good).unwrap().as_str(), good);
+        }
+        for bad in ["", ".", "..", ".next", "a/b", "a\\b", "a b", "a@b", "ä", "now", "a\0", &"x".repeat(65)]
+        {
+            assert!(SnapshotName::new(bad).unwrap_err().to_string().contains("cannot be"), "{bad:?}");
+        }
+    }
+}
