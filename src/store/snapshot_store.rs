@@ -37,8 +37,9 @@ impl TileStore {
 
     fn of_snapshot(disk: Arc<dyn Disk>, layout: Layout, snapshot: Snapshot) -> Self {
         let Snapshot { name, map_id, metadata, commits, .. } = snapshot;
-        let store = Self::new(disk, layout, metadata, Some(CommitLog::of_map(map_id)), commits);
-        Self { snapshot: Some(name), ..store }
+        let mut store = Self::new(disk, layout, metadata, Some(CommitLog::of_map(map_id)), commits);
+        store.snapshot = Some(name);
+        store
     }
 
     /// The map as a snapshot of it says, for reading.

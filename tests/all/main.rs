@@ -44,6 +44,8 @@ mod scan_stream;
 mod session;
 /// Map sharing: codec, convergence over bad links, layers.
 mod sharing;
+/// Snapshots, reverts and diffs against naive ones; their damage and repair.
+mod snapshots;
 /// Numbers that are large, negative or on a border.
 mod space;
 /// Files of a map: what a flush leaves, what damage is told, what is never overwritten.
