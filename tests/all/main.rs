@@ -6,6 +6,9 @@ mod cli;
 /// The commands that merge, crop, clear and fade.
 #[cfg(feature = "cli")]
 mod cli_edit;
+/// Snapshots from the command line.
+#[cfg(feature = "cli")]
+mod cli_snapshots;
 /// Maps with another storage: the same content, and there and back the same files.
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.

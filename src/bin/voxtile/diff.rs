@@ -55,7 +55,7 @@ pub fn run(args: &DiffArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn sides(sides: &[PathBuf]) -> voxtile::Result<[MapAt; 2]> {
-    let side = |map: &Path, name: &Path| {
+    let side = |map: &Path, name: &Path| -> voxtile::Result<MapAt> {
         let name = name.to_string_lossy();
         let snapshot = if name == "now" { None } else { Some(SnapshotName::new(name)?) };
         Ok(MapAt { map: map.to_owned(), snapshot })
