@@ -6,6 +6,9 @@ mod cli;
 /// The commands that merge, crop, clear and fade.
 #[cfg(feature = "cli")]
 mod cli_edit;
+/// Snapshots from the command line.
+#[cfg(feature = "cli")]
+mod cli_snapshots;
 /// Maps with another storage: the same content, and there and back the same files.
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
@@ -44,6 +47,8 @@ mod scan_stream;
 mod session;
 /// Map sharing: codec, convergence over bad links, layers.
 mod sharing;
+/// Snapshots, reverts and diffs against naive ones; their damage and repair.
+mod snapshots;
 /// Numbers that are large, negative or on a border.
 mod space;
 /// Files of a map: what a flush leaves, what damage is told, what is never overwritten.

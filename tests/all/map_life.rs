@@ -92,7 +92,11 @@ impl Life {
 
     /// What a crash in an act left is the map before or after it, whole, and life goes on to the same end.
     fn check_after_crash(&self, disk: &FaultyDisk, number: usize, what: &str) {
-        let from = self.state_of(disk, &[number, number + 1], what);
+        self.check_among(disk, &[number, number + 1], what);
+    }
+
+    fn check_among(&self, disk: &FaultyDisk, among: &[usize], what: &str) {
+        let from = self.state_of(disk, among, what);
         if from > 0 {
             check_whole(disk, what);
         }
@@ -276,9 +280,14 @@ fn the_power_goes_after_a_kill(life: &Life) {
             if !killed.has_crashed() {
                 continue;
             }
-            let number = lived.map_or_else(|(number, _)| number, |()| life.acts.len() - 1);
+            let reached = lived.map_or_else(|(number, _)| number, |()| life.acts.len() - 1);
+            let mut among = vec![reached, reached + 1];
+            if reached == from {
+                // What the killed process could not make durable, nobody else may have had the time to.
+                among.extend([number, number + 1]);
+            }
             let left = killed.after_crash(Unsynced::Shuffled(again));
-            life.check_after_crash(&left, number, &format!("killed at {at}, crash {again} later"));
+            life.check_among(&left, &among, &format!("killed at {at}, crash {again} later"));
         }
     }
 }

@@ -20,6 +20,8 @@ mod octree_worker;
 mod readers;
 /// A disk that is full or only for reading, and too many open files.
 mod refused;
+/// Snapshots and reverts that are killed.
+mod snapshots;
 /// SIGTERM and Ctrl-C: flushed and ended.
 mod stopped;
 mod survey;

@@ -1,9 +1,11 @@
 mod edit;
+mod snapshot;
 
 use crate::byte_size::ByteSize;
 use crate::flush_schedule::FlushEvery;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
+pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
 use voxtile::Storage;
@@ -35,6 +37,14 @@ pub enum Command {
     Export(ExportArgs),
     /// Print the digest of a map's content: equal for equal maps
     Digest(DigestArgs),
+    /// Keep a map as it is under a name, at next to no cost; or delete such a snapshot
+    Snapshot(SnapshotArgs),
+    /// List a map's snapshots
+    Snapshots(SnapshotsArgs),
+    /// Say in what two maps differ, or two snapshots of a map
+    Diff(DiffArgs),
+    /// Make a map again what it was when a snapshot was made, in place
+    Revert(RevertArgs),
     /// Make one map of several
     Merge(MergeArgs),
     /// Make a map of a part of another
@@ -211,7 +221,7 @@ pub struct ShareArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct InfoArgs {
-    /// Folder of the map, or an OctoMap file (.bt .ot)
+    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// Print JSON
     #[arg(long)]
@@ -221,7 +231,7 @@ pub struct InfoArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct QueryArgs {
-    /// Folder of the map
+    /// Folder of the map, or FOLDER@SNAPSHOT
     pub map: PathBuf,
     /// A point: X Y Z in metres
     #[arg(value_names = ["X", "Y", "Z"], num_args = 3, required_unless_present = "points")]
@@ -237,7 +247,7 @@ pub struct QueryArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct RaycastArgs {
-    /// Folder of the map
+    /// Folder of the map, or FOLDER@SNAPSHOT
     pub map: PathBuf,
     /// Where the ray begins, in metres
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, required = true)]
@@ -259,7 +269,7 @@ pub struct RaycastArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct ExportArgs {
-    /// Folder of the map, or an OctoMap file (.bt .ot)
+    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// File to write; its extension says what: .ply .pcd .csv hold occupied voxels, .bt .ot the whole octree
     #[arg(short = 'o', long = "output", value_name = "FILE")]
@@ -281,7 +291,7 @@ pub struct ExportArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct DigestArgs {
-    /// Folder of the map
+    /// Folder of the map, or FOLDER@SNAPSHOT
     pub map: PathBuf,
     /// Print JSON
     #[arg(long)]
@@ -290,7 +300,7 @@ pub struct DigestArgs {
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// Folder of the map; a writer may be at work on it
+    /// Folder of the map, whose snapshots are checked too; a writer may be at work on it
     pub map: PathBuf,
     /// Print JSON
     #[arg(long)]
@@ -299,7 +309,7 @@ pub struct VerifyArgs {
 
 #[derive(Debug, Args)]
 pub struct ConvertArgs {
-    /// Folder of the map
+    /// Folder of the map, or FOLDER@SNAPSHOT
     pub map: PathBuf,
     /// Folder of the new map, which does not exist yet
     #[arg(short = 'o', long = "output", value_name = "MAP")]

@@ -8,6 +8,7 @@ mod convert;
 mod crop;
 mod decay;
 mod demo;
+mod diff;
 mod digest;
 mod export;
 mod flush_schedule;
@@ -26,7 +27,10 @@ mod progress;
 mod query;
 mod raycast;
 mod repair;
+mod revert;
 mod share;
+mod snapshot;
+mod snapshots;
 mod summary;
 mod verify;
 mod written;
@@ -60,6 +64,10 @@ fn main() -> ExitCode {
         Command::Raycast(args) => raycast::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Digest(args) => digest::run(&args),
+        Command::Snapshot(args) => snapshot::run(&args),
+        Command::Snapshots(args) => snapshots::run(&args),
+        Command::Diff(args) => diff::run(&args),
+        Command::Revert(args) => revert::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Crop(args) => crop::run(&args),
         Command::Clear(args) => clear::run(&args),

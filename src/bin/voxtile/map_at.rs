@@ -1,5 +1,6 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use voxtile::mapper::MapReader;
+use voxtile::store::SnapshotName;
 use voxtile::{Error, Result};
 
 /// Tiles that a reading command keeps in memory.
@@ -7,19 +8,56 @@ const CACHE_TILES: usize = 32;
 /// How often a map is opened again because a writer flushed it.
 const ATTEMPTS: usize = 8;
 
-/// Answers from one state of the map; if a writer flushes it meanwhile, begins again with the new state.
+/// A map as it is, or as a snapshot of it.
+pub struct MapAt {
+    pub map: PathBuf,
+    pub snapshot: Option<SnapshotName>,
+}
+
+impl MapAt {
+    /// `MAP`, or `MAP@SNAPSHOT` where nothing has that as its own name.
+    pub fn of(path: &Path) -> Result<Self> {
+        let text = path.to_str().filter(|_| std::fs::symlink_metadata(path).is_err());
+        match text.and_then(|text| text.rsplit_once('@')) {
+            Some((map, name)) if !name.contains(std::path::is_separator) => {
+                Ok(Self { map: map.into(), snapshot: Some(SnapshotName::new(name)?) })
+            }
+            _ => Ok(Self { map: path.to_owned(), snapshot: None }),
+        }
+    }
+
+    fn open(&self) -> Result<MapReader> {
+        match &self.snapshot {
+            Some(name) => MapReader::open_snapshot(&self.map, name, CACHE_TILES),
+            None => MapReader::open(&self.map, CACHE_TILES),
+        }
+    }
+}
+
+/// Answers from one state of a map, or from a snapshot of it (`MAP@SNAPSHOT`); if a writer flushes the map meanwhile, begins
+/// again with the new state.
 pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Result<T>) -> anyhow::Result<T> {
+    let map = MapAt::of(map)?;
+    again_if_changed(|| read(&map.open()?))
+}
+
+/// The same from two maps.
+pub fn read_maps<T>(
+    first: &MapAt,
+    second: &MapAt,
+    mut read: impl FnMut(&MapReader, &MapReader) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    again_if_changed(|| read(&first.open()?, &second.open()?))
+}
+
+fn again_if_changed<T>(mut attempt: impl FnMut() -> anyhow::Result<T>) -> anyhow::Result<T> {
     for _ in 1..ATTEMPTS {
-        match read(&open(map)?) {
+        match attempt() {
             Err(error) if matches!(error.downcast_ref(), Some(Error::Changed { .. })) => {}
             outcome => return outcome,
         }
     }
-    read(&open(map)?)
-}
-
-fn open(map: &Path) -> Result<MapReader> {
-    MapReader::open(map, CACHE_TILES)
+    attempt()
 }
 
 /// Three coordinates that the argument parser has counted.

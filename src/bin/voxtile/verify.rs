@@ -48,8 +48,17 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -> std::io::Result<()> {
-    let Verification { verified, flush_number, scan_number, tiles, voxels, table_bytes, damage, .. } =
-        verification;
+    let Verification {
+        verified,
+        flush_number,
+        scan_number,
+        tiles,
+        voxels,
+        table_bytes,
+        damage,
+        snapshots,
+        ..
+    } = verification;
     writeln!(
         out,
         "{} tiles, {} voxels, {} of tables; flush {flush_number}, scan {scan_number}",
@@ -57,6 +66,9 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
         HumanCount(*voxels),
         HumanBytes(*table_bytes)
     )?;
+    if *snapshots > 0 {
+        writeln!(out, "{} snapshots", HumanCount(*snapshots))?;
+    }
     match (damage, verified) {
         (0, true) => writeln!(out, "whole: every checksum matches"),
         (0, false) => writeln!(out, "unverified: the map has no checksums; the form of its tables is right"),

@@ -263,14 +263,19 @@ fn mix(content: &Content, random: &mut Random) -> Vec<u8> {
     bytes
 }
 
+fn is_below(change: &NameChange, folder: &Path) -> bool {
+    match change {
+        NameChange::Put(name, _) | NameChange::Remove(name) => name.starts_with(folder),
+        NameChange::Rename(from, to) => from.starts_with(folder) && to.starts_with(folder),
+    }
+}
+
 fn apply(names: &mut Names, change: &NameChange) {
     match change {
         NameChange::Put(path, entry) => {
             names.insert(path.clone(), *entry);
         }
-        NameChange::Remove(path) => {
-            names.remove(path);
-        }
+        NameChange::Remove(path) => names.retain(|name, _| !name.starts_with(path)),
         NameChange::Rename(from, to) => {
             let moved: Vec<_> = names.keys().filter(|path| path.starts_with(from)).cloned().collect();
             for path in moved {
@@ -546,12 +551,23 @@ impl Disk for FaultyDisk {
         state.attempt(Kind::Changes)?;
         let is_in = |name: &Path| name.parent() == Some(path);
         let changes = std::mem::take(&mut state.unsynced_names);
-        let (synced, unsynced) = changes.into_iter().partition(|change| match change {
+        let is_synced = |change: &NameChange| match change {
             NameChange::Put(name, _) | NameChange::Remove(name) => is_in(name),
             NameChange::Rename(from, to) => is_in(from) || is_in(to),
-        });
+        };
+        let (mut synced, mut unsynced) = (Vec::new(), Vec::new());
+        for change in changes {
+            if !is_synced(&change) {
+                unsynced.push(change);
+                continue;
+            }
+            if let NameChange::Remove(gone) = &change {
+                // What was in a folder that is gone is gone, whatever folder has its name then.
+                unsynced.retain(|change| !is_below(change, gone));
+            }
+            synced.push(change);
+        }
         state.unsynced_names = unsynced;
-        let synced: Vec<NameChange> = synced;
         for change in &synced {
             apply(&mut state.names_on_medium, change);
         }

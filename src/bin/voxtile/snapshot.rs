@@ -1,0 +1,29 @@
+use crate::args::SnapshotArgs;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::session::{SnapshotInfo, delete_snapshot, snapshot, snapshots};
+
+pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
+    let find = || -> voxtile::Result<Option<SnapshotInfo>> {
+        Ok(snapshots(&args.map)?.into_iter().find(|info| info.name == args.name.as_str()))
+    };
+    let info = if args.delete {
+        // What it was, before it is gone.
+        let info = find()?;
+        delete_snapshot(&args.map, &args.name)?;
+        info
+    } else {
+        snapshot(&args.map, &args.name)?;
+        find()?
+    };
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let answer = serde_json::json!({ "map": args.map, "deleted": args.delete, "snapshot": info });
+        writeln!(out, "{answer}")?;
+    } else if args.delete {
+        writeln!(out, "deleted   {}", args.name)?;
+    } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {
+        writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,93 @@
+use crate::cli::{failure, json, output, scans, text};
+use std::fs;
+use tempfile::TempDir;
+
+#[test]
+fn a_bad_session_is_undone_and_the_past_can_be_looked_at() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = (scans(&folder), folder.path().join("map"));
+    let map = text(&map);
+    for storage in ["seed", "compact"] {
+        output(&["build", text(&scans), "-o", map, "--storage", storage]);
+        let before = output(&["digest", map]);
+        let said = output(&["snapshot", map, "good"]);
+        assert!(said.contains("kept      good: flush") && said.contains("scan 3"), "{said}");
+        output(&["build", text(&scans), "-o", map, "--append"]);
+        let after = output(&["digest", map]);
+        assert_ne!(before, after);
+
+        let past = format!("{map}@good");
+        assert_eq!(output(&["digest", &past]), before);
+        assert_eq!(json(&["info", &past, "--json"])["scan_number"], 3);
+        assert_eq!(json(&["query", &past, "4.05", "0", "0.55", "--json"])["observation_count"], 3);
+        assert_eq!(json(&["query", map, "4.05", "0", "0.55", "--json"])["observation_count"], 6);
+        let copy = folder.path().join(format!("copy_{storage}"));
+        output(&["convert", &past, "-o", text(&copy), "--storage", "compact"]);
+        assert_eq!(output(&["digest", text(&copy)]), before);
+
+        let listed = json(&["snapshots", map, "--json"]);
+        assert_eq!(listed["snapshots"][0]["name"], "good");
+        assert!(listed["snapshots"][0]["own_bytes"].as_u64().unwrap() > 200);
+        assert!(output(&["snapshots", map]).contains("for it alone"));
+
+        let changed = json(&["diff", &past, map, "--json"]);
+        let again = json(&["diff", map, "good", "now", "--json"]);
+        for key in ["from", "to", "tiles", "tiles_changed", "tiles_equal", "changed", "to_free"] {
+            assert_eq!(changed[key], again[key], "{key}");
+        }
+        assert_eq!((changed["appeared"].as_u64(), changed["gone"].as_u64()), (Some(0), Some(0)));
+        assert!(changed["changed"].as_u64().unwrap() > 0);
+        assert_eq!(
+            changed["tiles"].as_array().unwrap().len() as u64,
+            changed["tiles_changed"].as_u64().unwrap()
+        );
+        let same = output(&["diff", map, map]);
+        assert!(same.contains("0 appeared, 0 gone, 0 changed") && same.contains("0 in value only"), "{same}");
+
+        let said = output(&["revert", map, "good", "--keep-as", "bad"]);
+        assert!(said.contains("reverted  to good: scan 3") && said.contains("kept as bad"), "{said}");
+        assert_eq!(output(&["digest", map]), before);
+        assert_eq!(output(&["digest", &format!("{map}@bad")]), after);
+        let report = json(&["verify", map, "--json"]);
+        assert_eq!((report["whole"].as_bool(), report["snapshots"].as_u64()), (Some(true), Some(2)));
+        assert_eq!(json(&["revert", map, "bad", "--json"])["scan_number_before"], 3);
+        assert_eq!(output(&["digest", map]), after);
+        assert!(output(&["snapshot", map, "bad", "--delete"]).contains("deleted   bad"));
+        output(&["snapshot", map, "good", "--delete"]);
+        assert_eq!(output(&["snapshots", map]), "no snapshots\n");
+        fs::remove_dir_all(map).unwrap();
+    }
+}
+
+#[test]
+fn wrong_snapshots_are_told_what_is_wrong() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = (scans(&folder), folder.path().join("map"));
+    output(&["build", text(&scans), "-o", text(&map)]);
+    let map = text(&map);
+    output(&["snapshot", map, "a"]);
+    let past = format!("{map}@none");
+    for (arguments, message) in [
+        (&["snapshot", map, "a"][..], "delete that snapshot first"),
+        (&["snapshot", map, "now"], "cannot be a snapshot's name"),
+        (&["snapshot", map, "../a"], "cannot be a snapshot's name"),
+        (&["snapshot", map, "b", "--delete"], "lists them"),
+        (&["revert", map, "b"], "lists them"),
+        (&["revert", map, "a", "--keep-as", "a"], "delete that snapshot first"),
+        (&["digest", &past], "has none with the name none"),
+        (&["diff", map, "a", "b"], "has none with the name b"),
+    ] {
+        let (code, said) = failure(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {said}");
+        assert!(said.contains(message), "{arguments:?}: {said}");
+    }
+    let other = folder.path().join("other");
+    output(&["build", text(&scans), "-o", text(&other), "--resolution", "0.2"]);
+    let (code, said) = failure(&["diff", map, text(&other)]);
+    assert_eq!(code, 2);
+    assert!(said.contains("resolution 0.2 m, not 0.1 m"), "{said}");
+    // A folder that is named like that is that folder.
+    let odd = folder.path().join("odd@a");
+    fs::rename(text(&other), &odd).unwrap();
+    assert_eq!(json(&["info", text(&odd), "--json"])["resolution_m"], 0.2);
+}

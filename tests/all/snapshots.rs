@@ -1,0 +1,440 @@
+use crate::support::faulty_disk::{Fault, FaultyDisk};
+use crate::support::random_scans::{Random, random_scan};
+use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
+use crate::support::unsynced_disk::UnsyncedDisk;
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tempfile::TempDir;
+use voxtile::session::{
+    Diff, TileChange, TileDiff, delete_snapshot_on, diff, revert_on, snapshot_on, snapshots_on,
+};
+use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileStore};
+use voxtile::upkeep::{Severity, repair_on, verify_on};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan, Storage};
+
+fn name(name: &str) -> SnapshotName {
+    SnapshotName::new(name).unwrap()
+}
+
+fn config(storage: Storage) -> MapConfig {
+    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage);
+    config.with_cache_tiles(2).with_pending_bytes(600)
+}
+
+fn scan(seed: u64) -> Scan {
+    random_scan(&mut Random(seed), [[0.0, 3.0, 6.0, 3.0][seed as usize % 4], 0.0, 0.0], 5)
+}
+
+/// A naive map with its snapshots: copies.
+struct Naive {
+    now: ReferenceMap,
+    scans: u64,
+    flushed: (Voxels, u64),
+    snapshots: BTreeMap<String, (Voxels, u64)>,
+}
+
+fn check_snapshots(disk: &Arc<dyn Disk>, map: &Path, naive: &Naive, what: &str) {
+    let infos = snapshots_on(disk.clone(), map).unwrap();
+    assert_eq!(infos.len(), naive.snapshots.len(), "{what}");
+    for (of, (voxels, scans)) in &naive.snapshots {
+        let reader = MapReader::open_snapshot_on(disk.clone(), map, &name(of), 2).unwrap();
+        assert_eq!((voxels_of(&reader), reader.scan_number()), (voxels.clone(), *scans), "{what}: {of}");
+        let info = infos.iter().find(|info| info.name == *of).unwrap();
+        assert_eq!((info.voxels, info.scan_number), (voxels.len() as u64, *scans), "{what}: {of}");
+    }
+}
+
+fn live(seed: u64, storage: Storage) {
+    let (folder, disk) = (TempDir::new().unwrap(), UnsyncedDisk::shared());
+    let map = folder.path().join("map");
+    let config = config(storage);
+    let mut random = Random(seed);
+    let open = || OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &map, config.clone()).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.clone(), &map, config.clone()).unwrap();
+    let now = ReferenceMap::new(&config);
+    let mut naive = Naive { now, scans: 0, flushed: Default::default(), snapshots: BTreeMap::new() };
+    for step in 0..80 {
+        let what = format!("seed {seed}, step {step}");
+        let snapshot = ["a", "b", "c"][random.below(3) as usize];
+        let exists = naive.snapshots.contains_key(snapshot);
+        match random.below(12) {
+            0..5 => {
+                let scan = scan(random.below(40));
+                mapper.insert_scan(&scan).unwrap();
+                naive.now.insert_scan(&scan);
+                naive.scans += 1;
+            }
+            5 => {
+                mapper.flush().unwrap();
+                naive.flushed = (naive.now.voxels.clone(), naive.scans);
+            }
+            6 | 7 if !exists => {
+                mapper.snapshot(&name(snapshot)).unwrap();
+                naive.flushed = (naive.now.voxels.clone(), naive.scans);
+                naive.snapshots.insert(snapshot.to_owned(), naive.flushed.clone());
+            }
+            // What is not flushed goes with the process.
+            choice => {
+                drop(mapper);
+                match choice {
+                    8 if exists => {
+                        delete_snapshot_on(disk.clone(), &map, &name(snapshot)).unwrap();
+                        naive.snapshots.remove(snapshot);
+                    }
+                    9 | 10 if exists => {
+                        revert_on(disk.clone(), &map, &name(snapshot), None, |_, _| ()).unwrap();
+                        naive.flushed = naive.snapshots[snapshot].clone();
+                    }
+                    11 => {
+                        let mut store = TileStore::open(disk.clone(), &map).unwrap();
+                        let gone = store.tiles().filter(|tile| tile.x % 2 == 0).collect::<Vec<_>>();
+                        gone.iter().for_each(|tile| store.remove(*tile).unwrap());
+                        store.commit(store.metadata().clone(), store.commits().scan_number).unwrap();
+                        let tile_of = |voxel| config.grid.tile_of_voxel(voxel);
+                        naive.flushed.0.retain(|&voxel, _| tile_of(voxel).x % 2 != 0);
+                    }
+                    _ => {}
+                }
+                (naive.now.voxels, naive.scans) = naive.flushed.clone();
+                mapper = open();
+            }
+        }
+        assert_eq!(mapper.scan_number(), naive.scans, "{what}");
+        if step % 8 == 0 {
+            check_snapshots(&disk, &map, &naive, &what);
+            assert_eq!(voxels_of(&mapper), naive.now.voxels, "{what}");
+        }
+    }
+    mapper.flush().unwrap();
+    assert_eq!(voxels_of(&mapper), naive.now.voxels, "seed {seed}");
+    drop(mapper);
+    check_snapshots(&disk, &map, &naive, "at the end");
+    drop(open());
+    let verification = verify_on(disk, &map, |finding| panic!("{finding}"), |_, _| ()).unwrap();
+    assert_eq!(verification.snapshots, naive.snapshots.len() as u64);
+}
+
+#[test]
+fn any_life_with_snapshots_equals_the_naive_one() {
+    for seed in 0..10 {
+        live(seed, if seed % 2 == 0 { Storage::Seed } else { Storage::Compact });
+    }
+}
+
+/// A map in memory with three scans flushed one by one, a snapshot after the first and the second, and the digests.
+fn small(storage: Storage) -> (FaultyDisk, PathBuf, Vec<String>) {
+    let (disk, map) = (FaultyDisk::new(Fault::None), PathBuf::from("/map"));
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &map, config(storage)).unwrap();
+    mapper.begin_input("scans").unwrap();
+    let mut digests = Vec::new();
+    for (seed, of) in (1..).zip([Some("first"), Some("second"), None]) {
+        mapper.insert_scan(&scan(4 * seed)).unwrap();
+        mapper.insert_scan(&scan(4 * seed + 1)).unwrap();
+        mapper.flush().unwrap();
+        digests.push(mapper.digest().unwrap().to_string());
+        of.map(|of| mapper.snapshot(&name(of)).unwrap());
+    }
+    drop(mapper);
+    (disk.copy(), map, digests)
+}
+
+fn digest_of(disk: &FaultyDisk, map: &Path, snapshot: Option<&str>) -> voxtile::Result<String> {
+    let reader = match snapshot {
+        Some(of) => MapReader::open_snapshot_on(disk.shared(), map, &name(of), 2)?,
+        None => MapReader::open_on(disk.shared(), map, 2)?,
+    };
+    Ok(reader.digest()?.to_string())
+}
+
+#[test]
+fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
+    for storage in [Storage::Seed, Storage::Compact] {
+        for disk in [small(storage).0, small(storage).0.without_links()] {
+            let (_, map, digests) = small(storage);
+            let reader = MapReader::open_on(disk.shared(), &map, 1).unwrap();
+            let reverted =
+                revert_on(disk.shared(), &map, &name("first"), Some(&name("third")), |_, _| ()).unwrap();
+            assert_eq!((reverted.scan_number_before, reverted.scan_number), (6, 2));
+            assert!(reverted.flush_number > reader.flush_number());
+            assert_eq!(reader.digest().unwrap().to_string(), digests[2], "a reader across the revert");
+            for (of, digest) in [(None, 0), (Some("first"), 0), (Some("second"), 1), (Some("third"), 2)] {
+                assert_eq!(digest_of(&disk, &map, of).unwrap(), digests[digest], "{of:?}");
+            }
+            drop(reader);
+            // The input is that of the snapshot, and the same scans lead to the same maps again.
+            let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &map, config(storage)).unwrap();
+            assert_eq!(mapper.resume_input("scans").unwrap(), 2);
+            for seed in 2..4 {
+                mapper.insert_scan(&scan(4 * seed)).unwrap();
+                mapper.insert_scan(&scan(4 * seed + 1)).unwrap();
+            }
+            mapper.flush().unwrap();
+            assert_eq!(mapper.digest().unwrap().to_string(), digests[2]);
+            drop(mapper);
+            for of in ["first", "second", "third"] {
+                delete_snapshot_on(disk.shared(), &map, &name(of)).unwrap();
+            }
+            let kept = disk.files().into_keys().filter(|path| path.to_string_lossy().contains(".flush"));
+            assert_eq!(kept.count(), 0, "nobody sees any kept table");
+        }
+    }
+}
+
+#[test]
+fn own_bytes_are_what_deleting_frees() {
+    let (disk, map, _) = small(Storage::Seed);
+    let bytes = || disk.files().values().map(|bytes| bytes.len() as u64).sum::<u64>();
+    for of in ["second", "first"] {
+        let infos = snapshots_on(disk.shared(), &map).unwrap();
+        let info = infos.iter().find(|info| info.name == of).unwrap();
+        let before = bytes();
+        delete_snapshot_on(disk.shared(), &map, &name(of)).unwrap();
+        assert_eq!(before - bytes(), info.own_bytes, "{of}");
+        assert!(info.own_bytes > 500, "{of}");
+    }
+}
+
+#[test]
+fn wrong_names_and_other_refusals_say_what_to_do() {
+    let (disk, map, _) = small(Storage::Seed);
+    let error = snapshot_on(disk.shared(), &map, &name("first")).unwrap_err();
+    assert!(matches!(error, Error::AlreadyExists { .. }), "{error}");
+    let revert = |to, keep: Option<&str>| {
+        revert_on(disk.shared(), &map, &name(to), keep.map(name).as_ref(), |_, _| ()).unwrap_err()
+    };
+    assert!(matches!(revert("first", Some("second")), Error::AlreadyExists { .. }));
+    for error in [
+        revert("none", Some("kept")),
+        delete_snapshot_on(disk.shared(), &map, &name("none")).unwrap_err(),
+        MapReader::open_snapshot_on(disk.shared(), &map, &name("none"), 1).unwrap_err(),
+    ] {
+        assert!(error.to_string().contains("`voxtile snapshots /map` lists them"), "{error}");
+    }
+    assert_eq!(snapshots_on(disk.shared(), &map).unwrap().len(), 2, "nothing was kept in vain");
+    let writer = TileStore::open(disk.shared(), &map).unwrap();
+    assert!(matches!(snapshot_on(disk.shared(), &map, &name("x")), Err(Error::Locked { .. })));
+    drop(writer);
+}
+
+/// A map of the seed's own format gets its checksums first.
+#[test]
+fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
+    let (disk, map, digests) = small(Storage::Seed);
+    disk.take(&map.join("commits.log"));
+    disk.take(&map.join("snapshots"));
+    let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
+    disk.put(&map.join("metadata.json"), metadata);
+    for (path, bytes) in disk.files() {
+        if path.ends_with("iwlo_meta.bin") {
+            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
+            disk.put(&path, &bytes[..16 + 18 * count]);
+        } else if path.to_string_lossy().contains(".flush") {
+            disk.take(&path);
+        }
+    }
+    snapshot_on(disk.shared(), &map, &name("adopted")).unwrap();
+    assert!(MapReader::open_on(disk.shared(), &map, 1).unwrap().is_verified());
+    assert_eq!(digest_of(&disk, &map, Some("adopted")).unwrap(), digests[2]);
+}
+
+/// Every few bytes of a snapshot and of a table that only snapshots see, and these files gone: found, named, repaired; the map
+/// and what is whole of the snapshots stay as they were.
+#[test]
+fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
+    for storage in [Storage::Seed, Storage::Compact] {
+        let (whole, map, digests) = small(storage);
+        let is_of_snapshots = |path: &Path| {
+            path.parent().is_some_and(|folder| folder.ends_with("snapshots"))
+                || path.to_string_lossy().contains(".flush")
+        };
+        let mut damages = 0;
+        for (path, bytes) in whole.files().into_iter().filter(|(path, _)| is_of_snapshots(path)) {
+            for at in (0..=bytes.len()).step_by(23) {
+                let disk = whole.copy();
+                match bytes.get(at) {
+                    Some(_) if at % 2 == 0 => {
+                        let mut flipped = bytes.clone();
+                        flipped[at] ^= 1 << (at % 8);
+                        disk.put(&path, &flipped);
+                    }
+                    Some(_) => disk.put(&path, &bytes[..at]),
+                    // A snapshot that is missing is one that was deleted.
+                    None if path.to_string_lossy().contains(".flush") => disk.take(&path),
+                    None => continue,
+                }
+                damages += 1;
+                check_repair(&disk, &map, &digests, &path, &format!("{}, byte {at}", path.display()));
+            }
+        }
+        println!("{damages} damages");
+        assert!(damages > 100);
+    }
+}
+
+fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, what: &str) {
+    let mut named = false;
+    let found = |finding: &voxtile::upkeep::Finding| {
+        named |= finding.severity == Severity::Damage && finding.path == path;
+    };
+    assert!(!verify_on(disk.shared(), map, found, |_, _| ()).unwrap().is_whole(), "{what}");
+    let is_missing = !disk.files().contains_key(path);
+    assert!(named || is_missing, "{what}: the file is not named");
+    assert_eq!(digest_of(disk, map, None).unwrap(), digests[2], "{what}");
+    // Opening for writing removes nothing that a snapshot may see.
+    let files = disk.files();
+    drop(TileStore::open(disk.shared(), map).unwrap());
+    assert_eq!(disk.files(), files, "{what}");
+    let repair = repair_on(disk.shared(), map, |_| (), |_, _| ()).unwrap();
+    assert!(repair.actions > 0 && repair.tiles_lost == 0, "{what}");
+    let lost: u64 = disk.files().keys().filter(|path| path.starts_with("/map/quarantine")).count() as u64;
+    assert!(lost > 0 || is_missing, "{what}: nothing is deleted");
+    let verification = verify_on(disk.shared(), map, |_| (), |_, _| ()).unwrap();
+    assert!(verification.is_whole(), "{what}");
+    assert_eq!(digest_of(disk, map, None).unwrap(), digests[2], "{what}");
+    for info in snapshots_on(disk.shared(), map).unwrap() {
+        assert!(info.damage.is_none(), "{what}");
+        let digest = digest_of(disk, map, Some(&info.name)).unwrap();
+        let was = &digests[usize::from(info.name == "second")];
+        assert!(digest == *was || repair.snapshot_tiles_lost > 0, "{what}: {}", info.name);
+    }
+}
+
+/// Whatever is put together again from the tiles: snapshots see what they saw, also after what comes then.
+#[test]
+fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
+    let (whole, map, digests) = small(Storage::Seed);
+    for lost in [&["commits.log"][..], &["commits.log", "metadata.json"]] {
+        let disk = whole.copy();
+        lost.iter().for_each(|file| disk.take(&map.join(file)));
+        repair_on(disk.shared(), &map, |_| (), |_, _| ()).unwrap();
+        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &map, config(Storage::Seed));
+        for seed in 30..34 {
+            // Without metadata.json the ranges of the rays are not known any more, which matters to no snapshot.
+            let mapper = mapper.as_mut().unwrap();
+            mapper.insert_scan(&scan(seed)).unwrap();
+            mapper.flush().unwrap();
+        }
+        drop(mapper);
+        assert_eq!(digest_of(&disk, &map, Some("first")).unwrap(), digests[0], "{lost:?}");
+        assert_eq!(digest_of(&disk, &map, Some("second")).unwrap(), digests[1], "{lost:?}");
+    }
+    // A table in place is damaged: the tile goes, but not what snapshots see of it.
+    let disk = whole.copy();
+    let files = disk.files();
+    let kept = files.keys().find(|path| path.to_string_lossy().contains(".flush")).unwrap();
+    disk.put(&kept.with_file_name("iwlo_meta.bin"), b"damaged");
+    let repair = repair_on(disk.shared(), &map, |_| (), |_, _| ()).unwrap();
+    assert_eq!(repair.tiles_lost, 1);
+    assert!(verify_on(disk.shared(), &map, |_| (), |_, _| ()).unwrap().is_whole());
+    assert_eq!(digest_of(&disk, &map, Some("first")).unwrap(), digests[0]);
+    revert_on(disk.shared(), &map, &name("first"), None, |_, _| ()).unwrap();
+    assert_eq!(digest_of(&disk, &map, None).unwrap(), digests[0], "the tile is back");
+}
+
+/// The naive difference of two maps, voxel by voxel.
+fn naive_diff(config: &MapConfig, a: &Voxels, b: &Voxels) -> BTreeMap<[i32; 3], [u64; 5]> {
+    let mut tiles: BTreeMap<[i32; 3], [u64; 5]> = BTreeMap::new();
+    let is_occupied = |bits: u64| f64::from_bits(bits) >= 0.0;
+    for voxel in a.keys().chain(b.keys()).collect::<std::collections::BTreeSet<_>>() {
+        let kind = match (a.get(voxel), b.get(voxel)) {
+            (None, _) => 0,
+            (_, None) => 1,
+            (Some(a), Some(b)) if !is_occupied(a.0) && is_occupied(b.0) => 2,
+            (Some(a), Some(b)) if is_occupied(a.0) && !is_occupied(b.0) => 3,
+            (Some(a), Some(b)) if a != b => 4,
+            _ => continue,
+        };
+        tiles.entry(config.grid.tile_of_voxel(*voxel).to_array()).or_default()[kind] += 1;
+    }
+    tiles
+}
+
+#[test]
+fn a_diff_counts_what_a_naive_one_counts() {
+    let folder = TempDir::new().unwrap();
+    let build = |map: &str, storage, seeds: std::ops::Range<u64>| {
+        let path = folder.path().join(map);
+        let mut mapper =
+            OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config(storage)).unwrap();
+        for seed in seeds {
+            mapper.insert_scan(&scan(seed)).unwrap();
+            mapper.snapshot(&name(&format!("s{seed}"))).unwrap();
+        }
+        path
+    };
+    let (a, b) = (build("a", Storage::Seed, 0..6), build("b", Storage::Compact, 3..8));
+    let empty = build("empty", Storage::Seed, 0..0);
+    let open = |map: &Path| MapReader::open(map, 2).unwrap();
+    let at = |seed: u64| MapReader::open_snapshot(&a, &name(&format!("s{seed}")), 2).unwrap();
+    let pairs = [
+        (at(0), at(5)),
+        (at(4), at(2)),
+        (at(3), at(4)),
+        (at(5), open(&a)),
+        (open(&a), open(&b)),
+        (open(&b), open(&a)),
+        (open(&a), open(&empty)),
+        (open(&empty), open(&b)),
+    ];
+    for (number, (from, to)) in pairs.iter().enumerate() {
+        let mut found: Vec<TileDiff> = Vec::new();
+        let Diff { tiles_appeared, tiles_gone, tiles_changed, tiles_equal, tiles_read, .. } =
+            diff(from, to, |tile| found.push(tile), |_, _| ()).unwrap();
+        let naive = naive_diff(from.config(), &voxels_of(from), &voxels_of(to));
+        let told: BTreeMap<_, _> = found
+            .iter()
+            .map(|tile| {
+                let v = tile.voxels;
+                (tile.tile, [v.appeared, v.gone, v.to_occupied, v.to_free, v.changed])
+            })
+            .collect();
+        assert_eq!(told, naive, "pair {number}");
+        let [before, after] = [from, to].map(|map| map.tile_indices());
+        for tile in &found {
+            let holds =
+                |tiles: &[voxtile::space::TileIndex]| tiles.iter().any(|index| index.to_array() == tile.tile);
+            let change = match (holds(&before), holds(&after)) {
+                (false, _) => TileChange::Appeared,
+                (_, false) => TileChange::Gone,
+                _ => TileChange::Changed,
+            };
+            assert_eq!(tile.change, change, "pair {number}");
+        }
+        assert_eq!(tiles_appeared + tiles_gone + tiles_changed, naive.len() as u64, "pair {number}");
+        assert!(tiles_read >= naive.len() as u64, "pair {number}");
+        if number < 4 {
+            assert!(
+                tiles_read < naive.len() as u64 + tiles_equal || tiles_equal == 0,
+                "tiles are not read in vain"
+            );
+        }
+    }
+    let other = MapConfig::new(0.2, 3.2).unwrap();
+    let path = folder.path().join("other");
+    drop(OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, other).unwrap());
+    let error = diff(&open(&a), &open(&path), |_| (), |_, _| ()).unwrap_err();
+    assert!(matches!(error, Error::Mismatch { what: "resolution", .. }), "{error}");
+}
+
+/// A file of two names is not written to through one of them.
+#[test]
+#[cfg(unix)]
+fn a_linked_file_that_is_created_anew_leaves_the_other_name_its_content() {
+    let folder = TempDir::new().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    let write = |path: &Path, text: &[u8]| FsDisk.create(path).unwrap().write_all(text).unwrap();
+    let read = |path: &Path| {
+        let mut bytes = Vec::new();
+        FsDisk.open(path).unwrap().read_to_end(&mut bytes).unwrap();
+        bytes
+    };
+    write(&a, b"kept");
+    FsDisk.link(&a, &b).unwrap();
+    assert_eq!(read(&b), b"kept");
+    write(&b, b"new");
+    assert_eq!((read(&a), read(&b)), (b"kept".to_vec(), b"new".to_vec()));
+    assert!(FsDisk.link(&a, &b).is_err(), "a name that something has is not taken");
+    assert_eq!(FsDisk.kind(&a).unwrap(), Some(EntryKind::File(4)));
+}
