@@ -151,6 +151,11 @@ impl ColdTiles {
 }
 
 impl ColdTile {
+    /// Bytes of memory that it takes to go to disk, beside its own.
+    pub(super) fn bytes_to_save(&self) -> usize {
+        if self.occupied.is_some() { 0 } else { self.table_bytes }
+    }
+
     fn bytes(&self) -> usize {
         SLOT_BYTES + self.compact.len()
     }
