@@ -10,7 +10,7 @@ pub enum Storage {
     /// read, and beside it `octree.bt` for those that read OctoMap's.
     #[default]
     Seed,
-    /// One file a tile, `tile.vxt`: the table in the compact form, in a tenth to a fiftieth of the bytes.
+    /// One file a tile, `tile.vxt`: the table in the compact form, in a twentieth to a fortieth of the bytes.
     Compact,
 }
 

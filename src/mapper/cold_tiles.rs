@@ -3,6 +3,7 @@ use crate::space::TileIndex;
 use crate::tile::Tile;
 use crate::tile::format::{CompactEffort, CompactWriter};
 use lru::LruCache;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Tiles that nobody uses at the moment, in the compact form, in the order in which they were put here: between the tiles
@@ -13,7 +14,12 @@ pub(super) struct ColdTiles {
     /// Made with the first tile, and kept: it takes longer to make than a small tile to pack.
     writer: Option<CompactWriter>,
     bytes: usize,
+    /// The tiles that are not on disk as they are, nor on their way there, by when they were put here: looking for one from
+    /// the oldest tile on would pass all that are on disk already, again and again.
+    to_leave: BTreeMap<u64, TileIndex>,
     dirty: usize,
+    /// How many tiles were ever put here.
+    puts: u64,
 }
 
 /// A tile in the compact form.
@@ -28,14 +34,17 @@ pub(super) struct ColdTile {
     pub(super) is_dirty: bool,
     /// Whether it is on its way to disk.
     pub(super) is_leaving: bool,
+    /// How many were put here before it.
+    number: u64,
 }
 
 /// What a tile takes beside its bytes.
-const SLOT_BYTES: usize = size_of::<(TileIndex, ColdTile)>() + 80;
+const SLOT_BYTES: usize = size_of::<(TileIndex, ColdTile)>() + 128;
 
 impl Default for ColdTiles {
     fn default() -> Self {
-        Self { tiles: LruCache::unbounded(), writer: None, bytes: 0, dirty: 0 }
+        let (tiles, to_leave) = (LruCache::unbounded(), BTreeMap::new());
+        Self { tiles, writer: None, bytes: 0, to_leave, dirty: 0, puts: 0 }
     }
 }
 
@@ -84,22 +93,29 @@ impl ColdTiles {
         let (voxels, table_bytes) = (table.len() as u64, table.bytes());
         let occupied = occupied_from.map(|log_odds| table.count_from(log_odds) as u64);
         let (compact, is_dirty) = (compact.into(), tile.is_dirty());
-        let cold = ColdTile { compact, voxels, occupied, table_bytes, is_dirty, is_leaving: false };
+        let (is_leaving, number) = (false, self.puts);
+        let cold = ColdTile { compact, voxels, occupied, table_bytes, is_dirty, is_leaving, number };
         self.put(tile.index(), cold);
         Ok(())
     }
 
     fn put(&mut self, index: TileIndex, tile: ColdTile) {
+        self.remove(index);
+        self.puts += 1;
         self.bytes += tile.bytes();
-        self.dirty += usize::from(tile.is_dirty);
-        let replaced = self.tiles.put(index, tile);
-        self.take_off(replaced);
+        if tile.is_dirty {
+            self.dirty += 1;
+            self.to_leave.insert(tile.number, index);
+        }
+        self.tiles.put(index, tile);
     }
 
     pub(super) fn remove(&mut self, index: TileIndex) -> Option<ColdTile> {
-        let removed = self.tiles.pop(&index);
-        self.take_off(removed.clone());
-        removed
+        let removed = self.tiles.pop(&index)?;
+        self.bytes -= removed.bytes();
+        self.dirty -= usize::from(removed.is_dirty);
+        self.to_leave.remove(&removed.number);
+        Some(removed)
     }
 
     /// The tiles that are not on disk as they are, in no particular order.
@@ -114,14 +130,14 @@ impl ColdTiles {
 
     /// The oldest tile that is not on disk as it is, nor on its way there.
     pub(super) fn next_to_leave(&self) -> Option<TileIndex> {
-        let mut oldest_first = self.iter().rev();
-        oldest_first.find(|(_, tile)| tile.is_dirty && !tile.is_leaving).map(|(index, _)| index)
+        self.to_leave.first_key_value().map(|(_, index)| *index)
     }
 
     /// Notes that a tile is on its way to disk.
     pub(super) fn leaves(&mut self, index: TileIndex) {
         if let Some(tile) = self.tiles.peek_mut(&index) {
             tile.is_leaving = true;
+            self.to_leave.remove(&tile.number);
         }
     }
 
@@ -130,27 +146,32 @@ impl ColdTiles {
         let sent = self.tiles.peek_mut(&index).filter(|tile| Arc::ptr_eq(&tile.compact, compact));
         let Some(tile) = sent else { return false };
         tile.is_leaving = false;
-        if is_on_disk && tile.is_dirty {
+        if tile.is_dirty && is_on_disk {
             tile.is_dirty = false;
             self.dirty -= 1;
+        } else if tile.is_dirty {
+            self.to_leave.insert(tile.number, index);
         }
         true
     }
 
     /// Notes that no tile is on its way to disk.
     pub(super) fn none_leaves(&mut self) {
-        self.tiles.iter_mut().for_each(|(_, tile)| tile.is_leaving = false);
-    }
-
-    fn take_off(&mut self, tile: Option<ColdTile>) {
-        if let Some(tile) = tile {
-            self.bytes -= tile.bytes();
-            self.dirty -= usize::from(tile.is_dirty);
+        for (index, tile) in self.tiles.iter_mut().filter(|(_, tile)| tile.is_leaving) {
+            tile.is_leaving = false;
+            if tile.is_dirty {
+                self.to_leave.insert(tile.number, *index);
+            }
         }
     }
 }
 
 impl ColdTile {
+    /// Bytes of memory that it takes to go to disk, beside its own.
+    pub(super) fn bytes_to_save(&self) -> usize {
+        if self.occupied.is_some() { 0 } else { self.table_bytes }
+    }
+
     fn bytes(&self) -> usize {
         SLOT_BYTES + self.compact.len()
     }

@@ -76,7 +76,7 @@ impl TileTraffic {
     }
 
     pub(super) fn save(&mut self, writer: TileWriter, index: TileIndex, tile: ColdTile, scan_number: u64) {
-        self.saving_bytes += tile.table_bytes;
+        self.saving_bytes += tile.bytes_to_save();
         self.saving.push_back(index);
         self.saver.give(Save { writer, index, tile, scan_number });
     }
@@ -109,7 +109,7 @@ impl TileTraffic {
     }
 
     fn has_left(&mut self, saved: &Saved) {
-        self.saving_bytes -= saved.tile.table_bytes;
+        self.saving_bytes -= saved.tile.bytes_to_save();
         self.saving.pop_front();
     }
 

@@ -174,6 +174,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
     let table = tables[0];
     let tile = tile_of(table).unwrap();
     let other_map = small_map(storage);
+    let other_storage = small_map(STORAGES[usize::from(storage == STORAGES[0])]);
     let older = {
         let disk = FaultyDisk::new(Fault::None);
         let config = config().with_storage(storage);
@@ -254,6 +255,15 @@ fn check_files_that_do_not_belong(storage: Storage) {
             Box::new(|disk| {
                 let metadata = Path::new("/map/metadata.json");
                 disk.put(metadata, &other_map.files()[metadata]);
+            }),
+            "the log belongs to map",
+            false,
+        ),
+        (
+            "the metadata of a map with the other storage",
+            Box::new(|disk| {
+                let metadata = Path::new("/map/metadata.json");
+                disk.put(metadata, &other_storage.files()[metadata]);
             }),
             "the log belongs to map",
             false,

@@ -174,7 +174,7 @@ pub enum VoxelCacheName {
 pub enum StorageName {
     /// Two files a tile that other programs read: iwlo_meta.bin, 18 bytes a voxel, and octree.bt
     Seed,
-    /// One file a tile, a tenth to a fiftieth of the bytes; convert makes the other form of it
+    /// One file a tile, a twentieth to a fortieth of the bytes; convert makes the other form of it
     Compact,
 }
 

@@ -668,7 +668,8 @@ impl Disk for FaultyDisk {
 
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {
         let mut state = self.state();
-        state.attempt(Kind::NeedsRoom)?;
+        let is_there = state.names.contains_key(path);
+        state.attempt(if is_there { Kind::Changes } else { Kind::NeedsRoom })?;
         let inode = state.file_or_new(path)?;
         let content = state.content(inode);
         if std::mem::replace(&mut content.locked, true) {

@@ -41,7 +41,7 @@ pub struct Args {
     /// Find others by multicast
     #[arg(long, help_heading = "Network")]
     pub scout: bool,
-    /// A Zenoh configuration file: TLS certificates, user and password, a router; endpoints given here go before it
+    /// A Zenoh configuration as JSON5: TLS certificates, user and password, a router; what is said here goes before it
     #[arg(long, value_name = "FILE", help_heading = "Network")]
     pub zenoh_config: Option<PathBuf>,
 

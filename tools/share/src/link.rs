@@ -1,4 +1,5 @@
 use crate::args::Args;
+use crate::network_file::NetworkFile;
 use anyhow::{Context, anyhow};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
@@ -31,24 +32,31 @@ impl Link {
             true => (or_default(&args.listen, &args.connect), args.connect.clone()),
             false => (args.listen.clone(), or_default(&args.connect, &args.listen)),
         };
-        let mut config = match &args.zenoh_config {
-            Some(file) => Config::from_file(file).map_err(|error| anyhow!("{}: {error}", file.display()))?,
-            None => Config::default(),
+        let (mut config, file) = match &args.zenoh_config {
+            Some(path) => {
+                let config =
+                    Config::from_file(path).map_err(|error| anyhow!("{}: {error}", path.display()))?;
+                (config, NetworkFile::read(path)?)
+            }
+            None => (Config::default(), NetworkFile::default()),
         };
-        let has_file = args.zenoh_config.is_some();
         let mut set = |key: &str, value: String| {
             config.insert_json5(key, &value).map_err(|error| anyhow!("{key}: {error}"))
         };
-        if !has_file {
+        // Zenoh's own defaults would listen on every interface and scout by multicast; a file has to ask for that.
+        if !file.says("mode") {
             set("mode", "\"peer\"".into())?;
         }
-        if !has_file || args.scout {
+        if args.scout || !file.says("scouting/multicast/enabled") {
             set("scouting/multicast/enabled", args.scout.to_string())?;
         }
-        if !has_file || !args.listen.is_empty() {
+        let is_silent = !file.says("listen/endpoints") && !file.says("connect/endpoints");
+        if !args.listen.is_empty() || is_silent {
             set("listen/endpoints", serde_json::to_string(&listen)?)?;
+        } else if !file.says("listen/endpoints") {
+            set("listen/endpoints", "[]".into())?;
         }
-        if !has_file || !args.connect.is_empty() {
+        if !args.connect.is_empty() || is_silent {
             set("connect/endpoints", serde_json::to_string(&connect)?)?;
             // Whoever is not there yet is tried again and again.
             set("connect/timeout_ms", "-1".into())?;

@@ -11,6 +11,7 @@ mod link;
 #[allow(dead_code, missing_docs)]
 mod lossy_link;
 mod measure;
+mod network_file;
 mod publish;
 mod robot_name;
 mod subscribe;

@@ -153,6 +153,70 @@ fn killed_and_started_again_on_either_side() {
     assert_eq!(report["hits"].as_u64(), Some(voxels));
 }
 
+/// Who has no certificate of the fleet hears nothing.
+#[test]
+fn over_tls_only_robots_with_a_certificate_of_the_fleet_hear_each_other() {
+    let folder = TempDir::new().unwrap();
+    let (fleet, strangers) = (Fleet::new(), Fleet::new());
+    let config = |name: &str, own: &Fleet| {
+        let (certificate, key) = own.robot(name);
+        let file = |kind: &str, text: String| {
+            let path = folder.path().join(format!("{name}.{kind}"));
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let (certificate, key) = (file("cert.pem", certificate), file("key.pem", key));
+        let ca = file("ca.pem", fleet.certificate.clone());
+        let tls = serde_json::json!({
+            "root_ca_certificate": ca, "enable_mtls": true,
+            "listen_certificate": certificate, "listen_private_key": key,
+            "connect_certificate": certificate, "connect_private_key": key,
+        });
+        let config = serde_json::json!({ "transport": { "link": { "tls": tls } } });
+        file("json5", config.to_string()).to_str().unwrap().to_string()
+    };
+    let endpoint = endpoint().replace("tcp/127.0.0.1", "tls/localhost");
+    let scans = scans(folder.path(), 31, 10);
+    let args = ["--publish", scans.to_str().unwrap(), "--robot", "spotter", "--listen", &endpoint, "--json"];
+    let spotter = config("spotter", &fleet);
+    let mut publisher = start(
+        SHARE,
+        &[&args[..], &["--rate", "20", "--latency", "0.2", "--zenoh-config", &spotter]].concat(),
+    );
+    let set = set_of(&mut publisher);
+    let heard = |config: &str, seconds: &str| {
+        let map = folder.path().join("map");
+        let more = ["--zenoh-config", config, "--until-equal", "--for", seconds, "--keep-apart"];
+        layers_of(subscriber(&map, &[&endpoint], &more))
+    };
+    assert_eq!(heard(&config("stranger", &strangers), "4"), []);
+    assert_eq!(heard(&config("friend", &fleet), "120"), [("spotter".to_string(), set.0, set.1, true)]);
+}
+
+/// A certificate authority, and those that it signs.
+struct Fleet {
+    issuer: rcgen::Issuer<'static, rcgen::KeyPair>,
+    certificate: String,
+}
+
+impl Fleet {
+    fn new() -> Self {
+        let mut params = rcgen::CertificateParams::new(Vec::<String>::new()).unwrap();
+        params.is_ca = rcgen::IsCa::Ca(rcgen::BasicConstraints::Unconstrained);
+        let key = rcgen::KeyPair::generate().unwrap();
+        let certificate = params.self_signed(&key).unwrap().pem();
+        Self { issuer: rcgen::Issuer::new(params, key), certificate }
+    }
+
+    /// Certificate and key of a robot, as PEM.
+    fn robot(&self, name: &str) -> (String, String) {
+        let names = vec![name.to_string(), "localhost".to_string()];
+        let params = rcgen::CertificateParams::new(names).unwrap();
+        let key = rcgen::KeyPair::generate().unwrap();
+        (params.signed_by(&key, &self.issuer).unwrap().pem(), key.serialize_pem())
+    }
+}
+
 #[test]
 fn what_is_wrong_on_the_command_line_is_said() {
     for (args, word) in [
