@@ -59,16 +59,32 @@ pub fn revert_on(
     folder: &Path,
     name: &SnapshotName,
     keep_as: Option<&SnapshotName>,
-    mut progress: impl FnMut(u64, u64),
+    progress: impl FnMut(u64, u64),
 ) -> Result<Reverted> {
     let mut store = TileStore::open(disk.clone(), folder)?;
-    let past = TileStore::open_snapshot(disk, folder, name)?;
+    let past = TileStore::open_snapshot(disk.clone(), folder, name)?;
     if let Some(keep_as) = keep_as {
         check_is_free(&store, keep_as)?;
         store.create_snapshot(keep_as)?;
     }
+    let outcome = revert_to(&mut store, &past, progress);
+    drop(store);
+    // What was written in vain gives its room back.
+    if outcome.is_err()
+        && let Err(error) = TileStore::open(disk, folder)
+    {
+        log::warn!("{}: not tidied up after an error: {error}", folder.display());
+    }
+    outcome
+}
+
+fn revert_to(
+    store: &mut TileStore,
+    past: &TileStore,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Reverted> {
     let mut reverted = Reverted { scan_number_before: store.commits().scan_number, ..Reverted::default() };
-    let mut reverter = Reverter::new(&mut store, &past)?;
+    let mut reverter = Reverter::new(store, past)?;
     let mut tiles: Vec<_> = past.tiles().collect();
     tiles.sort_unstable();
     for (done, &tile) in (1..).zip(&tiles) {

@@ -28,6 +28,7 @@ mod query;
 mod raycast;
 mod repair;
 mod revert;
+mod scan_input;
 mod share;
 mod snapshot;
 mod snapshots;

@@ -68,6 +68,8 @@ struct Content {
 enum NameChange {
     Put(PathBuf, Entry),
     Remove(PathBuf),
+    /// And with it the files that were in it on the medium or on the way there: another folder may get its name.
+    RemoveFolder(PathBuf, Vec<Inode>),
     Rename(PathBuf, PathBuf),
 }
 
@@ -263,11 +265,12 @@ fn mix(content: &Content, random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-fn is_below(change: &NameChange, folder: &Path) -> bool {
-    match change {
-        NameChange::Put(name, _) | NameChange::Remove(name) => name.starts_with(folder),
-        NameChange::Rename(from, to) => from.starts_with(folder) && to.starts_with(folder),
-    }
+fn is_one_of(name: &Path, entry: &Entry, folder: &Path, files: &[Inode]) -> bool {
+    name.starts_with(folder) && matches!(entry, Entry::File(inode) if files.contains(inode))
+}
+
+fn puts_one_of(change: &NameChange, folder: &Path, files: &[Inode]) -> bool {
+    matches!(change, NameChange::Put(name, entry) if is_one_of(name, entry, folder, files))
 }
 
 fn apply(names: &mut Names, change: &NameChange) {
@@ -275,7 +278,13 @@ fn apply(names: &mut Names, change: &NameChange) {
         NameChange::Put(path, entry) => {
             names.insert(path.clone(), *entry);
         }
-        NameChange::Remove(path) => names.retain(|name, _| !name.starts_with(path)),
+        NameChange::Remove(path) => {
+            names.remove(path);
+        }
+        NameChange::RemoveFolder(path, gone) => {
+            names.remove(path);
+            names.retain(|name, entry| !is_one_of(name, entry, path, gone));
+        }
         NameChange::Rename(from, to) => {
             let moved: Vec<_> = names.keys().filter(|path| path.starts_with(from)).cloned().collect();
             for path in moved {
@@ -552,7 +561,9 @@ impl Disk for FaultyDisk {
         let is_in = |name: &Path| name.parent() == Some(path);
         let changes = std::mem::take(&mut state.unsynced_names);
         let is_synced = |change: &NameChange| match change {
-            NameChange::Put(name, _) | NameChange::Remove(name) => is_in(name),
+            NameChange::Put(name, _) | NameChange::Remove(name) | NameChange::RemoveFolder(name, _) => {
+                is_in(name)
+            }
             NameChange::Rename(from, to) => is_in(from) || is_in(to),
         };
         let (mut synced, mut unsynced) = (Vec::new(), Vec::new());
@@ -561,9 +572,8 @@ impl Disk for FaultyDisk {
                 unsynced.push(change);
                 continue;
             }
-            if let NameChange::Remove(gone) = &change {
-                // What was in a folder that is gone is gone, whatever folder has its name then.
-                unsynced.retain(|change| !is_below(change, gone));
+            if let NameChange::RemoveFolder(folder, gone) = &change {
+                unsynced.retain(|change| !puts_one_of(change, folder, gone));
             }
             synced.push(change);
         }
@@ -622,7 +632,18 @@ impl Disk for FaultyDisk {
         if state.names.keys().any(|name| name.parent() == Some(path)) {
             return Err(io::ErrorKind::DirectoryNotEmpty.into());
         }
-        state.change_name(NameChange::Remove(path.to_owned()));
+        let on_medium = state.names_on_medium.iter();
+        let on_the_way = state.unsynced_names.iter().filter_map(|change| match change {
+            NameChange::Put(name, entry) => Some((name, entry)),
+            _ => None,
+        });
+        let in_it = on_medium.chain(on_the_way).filter(|(name, _)| name.starts_with(path));
+        let files = in_it.filter_map(|(_, entry)| match entry {
+            Entry::File(inode) => Some(*inode),
+            Entry::Folder => None,
+        });
+        let change = NameChange::RemoveFolder(path.to_owned(), files.collect());
+        state.change_name(change);
         Ok(())
     }
 
