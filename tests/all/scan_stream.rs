@@ -118,7 +118,7 @@ fn a_stream_is_known_by_its_label_and_a_file_by_its_bytes() {
     assert!(open_scans(&path, Some(Path::new("poses.txt"))).is_err());
 }
 
-/// `voxtile build -`.
+/// `voxtile build -` and `voxtile local -`.
 #[cfg(feature = "cli")]
 mod command {
     use super::*;
@@ -165,5 +165,29 @@ mod command {
         let nothing = folder.path().join("nothing");
         build(&nothing, &[]).write_stdin(b"no scans".to_vec()).assert().code(1);
         assert!(!nothing.exists());
+    }
+
+    #[test]
+    fn a_local_map_takes_scans_from_standard_input_once() {
+        let folder = TempDir::new().unwrap();
+        let (file, picture) = (folder.path().join("drive.scans"), folder.path().join("local.png"));
+        let local = |scans: &str, how: &[&str]| {
+            let arguments = ["local", scans, "-o", text(&picture), "--resolution", "0.5", "--json"];
+            voxtile(&[&arguments[..], how].concat())
+        };
+        let row = |output: assert_cmd::assert::Assert| {
+            let row: serde_json::Value =
+                serde_json::from_slice(&output.success().get_output().stdout).unwrap();
+            ["scans", "points", "n_occ", "n_inf"].map(|key| row[key].clone())
+        };
+        let piped = row(local("-", &[]).write_stdin(drive("", 6)).assert());
+        std::fs::write(&file, drive("", 6)).unwrap();
+        assert_eq!(piped, row(local(text(&file), &[]).assert()));
+        assert_eq!(piped[0], 6);
+        assert!(picture.exists());
+        for several in [["--preset", "table"], ["--repeat", "2"]] {
+            let refused = local("-", &several).write_stdin(drive("", 6)).assert().code(2);
+            assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("come once"));
+        }
     }
 }

@@ -345,7 +345,7 @@ pub struct DemoArgs {
 #[command(allow_negative_numbers = true)]
 pub struct LocalArgs {
     /// A folder of PCD files in the sensor frame (or one that holds it as scans/), an OctoMap scan graph (.graph) or
-    /// scan log (.log)
+    /// scan log (.log), a scan stream (.scans), or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
     /// What the map is for; table runs the setups a to e of the voxel mapping paper one after the other

@@ -3,14 +3,14 @@ use crate::args::{BuildArgs, InsertName, ModelName};
 use crate::flush_schedule::FlushSchedule;
 use crate::octree_choice::octree_config;
 use crate::progress::Progress;
+use crate::scan_input::{self, is_standard_input};
 use crate::summary::Summary;
-use std::io::BufReader;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use voxtile::io::{ScanSource, open_scans, read_scan_stream};
+use voxtile::io::ScanSource;
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::{ScanReport, ScanTracer};
 use voxtile::sensor::{Iwlo, SensorModel};
@@ -26,7 +26,7 @@ const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let stop = stop_signal()?;
-    let mut source = open_source(args)?;
+    let mut source = scan_input::open(&args.scans, args.poses.as_deref())?;
     let fingerprint = fingerprint(args, &*source)?;
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
@@ -138,25 +138,10 @@ fn exists(args: &BuildArgs) -> anyhow::Result<bool> {
     Ok(exists)
 }
 
-fn open_source(args: &BuildArgs) -> voxtile::Result<Box<dyn ScanSource>> {
-    if !is_standard_input(args) {
-        return open_scans(&args.scans, args.poses.as_deref());
-    }
-    if args.poses.is_some() {
-        return Err(Error::argument("--poses", "a scan stream has its own poses; leave the option out"));
-    }
-    let input = BufReader::with_capacity(1 << 18, std::io::stdin().lock());
-    Ok(Box::new(read_scan_stream(input, Path::new("standard input"), false)?))
-}
-
-fn is_standard_input(args: &BuildArgs) -> bool {
-    args.scans == Path::new("-")
-}
-
 /// What the map remembers of its input. Only who wants to resume needs to tell one stream from another.
 fn fingerprint(args: &BuildArgs, source: &dyn ScanSource) -> voxtile::Result<String> {
     match source.fingerprint() {
-        Err(Error::InvalidArgument { .. }) if is_standard_input(args) && !args.resume => {
+        Err(Error::InvalidArgument { .. }) if is_standard_input(&args.scans) && !args.resume => {
             Ok("a stream without a label".to_owned())
         }
         fingerprint => fingerprint,

@@ -2,12 +2,13 @@ use crate::args::{LocalArgs, PresetName};
 use crate::local_table::{Row, print_table};
 use crate::picture::{OverTime, Panel};
 use crate::progress::Progress;
+use crate::scan_input::{self, is_standard_input};
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::Scan;
-use voxtile::io::{ScanSource, open_scans};
+use voxtile::io::ScanSource;
 use voxtile::local::{LocalMap, LocalParameters, LocalReader, LocalState};
 use voxtile::space::{Grid, Point};
+use voxtile::{Error, Scan};
 
 /// Times at which the picture shows the map.
 const PANELS: usize = 6;
@@ -22,6 +23,10 @@ struct Setup {
 
 pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     let setups = setups(args);
+    if is_standard_input(&args.scans) && (setups.len() > 1 || args.repeat > 1) {
+        let reason = "scans from standard input come once: choose one preset and no --repeat, or give a file";
+        return Err(Error::argument("SCANS", reason).into());
+    }
     // All arguments before the first scan.
     for setup in &setups {
         LocalMap::new(args.resolution, setup.parameters)?;
@@ -86,7 +91,7 @@ fn setups(args: &LocalArgs) -> Vec<Setup> {
 }
 
 fn run_setup(args: &LocalArgs, setup: &Setup, mut panels: Option<&mut Vec<Panel>>) -> anyhow::Result<Row> {
-    let mut source = open_scans(&args.scans, args.poses.as_deref())?;
+    let mut source = scan_input::open(&args.scans, args.poses.as_deref())?;
     let scans = source.len_hint();
     let progress = Progress::over_scans(scans);
     let mut map = LocalMap::new(args.resolution, setup.parameters)?;

@@ -21,6 +21,7 @@ mod progress;
 mod query;
 mod raycast;
 mod repair;
+mod scan_input;
 mod share;
 mod summary;
 mod verify;
