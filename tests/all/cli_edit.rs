@@ -75,6 +75,7 @@ fn evidence_fades_once_by_the_scans_that_came() {
     let decayed = json(&["decay", map, "--halflife", "3", "--json"]);
     assert_eq!((decayed["scans"].as_u64(), decayed["factor"].as_f64()), (Some(3), Some(0.5)));
     assert_eq!(log_odds(), before / 2.0);
+    assert_eq!(json(&["info", map, "--json"])["decayed_scan"].as_u64(), Some(3));
     let told = output(&["decay", map, "--halflife", "3"]);
     assert!(told.contains("by 0 scans"), "{told}");
     assert_eq!(log_odds(), before / 2.0);

@@ -22,6 +22,8 @@ struct Info {
     scan_number: u64,
     flush_number: u64,
     input_fingerprint: Option<String>,
+    /// Number of the last scan when evidence last faded; 0 if it never has.
+    decayed_scan: u64,
     tiles: u64,
     tile_bounds: Option<Bounds>,
     bounds_m: Option<[[f64; 3]; 2]>,
@@ -69,6 +71,7 @@ impl Info {
             scan_number: reader.scan_number(),
             flush_number: reader.flush_number(),
             input_fingerprint: ext.and_then(|ext| ext.input_fingerprint.clone()),
+            decayed_scan: ext.map_or(0, |ext| ext.decayed_scan),
             tiles: reader.tile_indices().len() as u64,
             tile_bounds,
             bounds_m: tile_bounds.map(|bounds| [corner(bounds.min, 0), corner(bounds.max, 1)]),
@@ -98,6 +101,9 @@ impl Info {
             HumanCount(self.scan_number),
             HumanCount(self.flush_number)
         )?;
+        if self.decayed_scan > 0 {
+            writeln!(out, "faded        last after scan {}", HumanCount(self.decayed_scan))?;
+        }
         writeln!(out, "tiles        {}", HumanCount(self.tiles))?;
         if let Some([min, max]) = self.bounds_m {
             writeln!(out, "bounds       {min:?} to {max:?} m")?;

@@ -1,9 +1,11 @@
 use super::random_maps::{config, disk, path, random_voxels, read_map, write_map};
 use crate::support::faulty_disk::FaultyDisk;
 use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::Voxels;
+use crate::support::reference_map::{Voxels, voxels_of};
 use voxtile::sensor::Evidence;
-use voxtile::session::{Decay, Decayed, decay_on};
+use voxtile::session::{Decay, Decayed, decay_on, revert_on, snapshot_on};
+use voxtile::store::SnapshotName;
+use voxtile::upkeep::repair_on;
 use voxtile::{
     Error, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions, Result,
 };
@@ -109,6 +111,37 @@ fn the_scans_since_the_last_time_count_once() {
     assert_eq!(read_map(&disk, &path("map")), naive(&before, 4.0, 3, 0.0));
     assert_eq!(decay(&disk, &Decay::new(4.0).with_scans(5)).unwrap().scans, 5);
     assert_eq!(decay(&disk, &Decay::new(4.0)).unwrap().scans, 0);
+}
+
+#[test]
+fn a_snapshot_does_not_fade_and_a_revert_brings_back_what_has() {
+    let (disk, mapper) = mapped(6);
+    drop(mapper);
+    let name = SnapshotName::new("before").unwrap();
+    snapshot_on(disk.shared(), &path("map"), &name).unwrap();
+    let before = read_map(&disk, &path("map"));
+    decay(&disk, &Decay::new(4.0).with_forget_below(0.3)).unwrap();
+    let once = read_map(&disk, &path("map"));
+    assert!(once.len() < before.len());
+    let kept = MapReader::open_snapshot_on(disk.shared(), &path("map"), &name, 1).unwrap();
+    assert_eq!(voxels_of(&kept), before);
+    revert_on(disk.shared(), &path("map"), &name, None, |_, _| {}).unwrap();
+    assert_eq!(read_map(&disk, &path("map")), before);
+    assert_eq!(decay(&disk, &Decay::new(4.0).with_forget_below(0.3)).unwrap().scans, 6);
+    assert_eq!(read_map(&disk, &path("map")), once);
+}
+
+#[test]
+fn a_map_that_was_put_together_from_its_tiles_does_not_fade_twice() {
+    let (disk, mapper) = mapped(6);
+    drop(mapper);
+    decay(&disk, &Decay::new(4.0)).unwrap();
+    let once = read_map(&disk, &path("map"));
+    disk.take(&path("map").join("commits.log"));
+    disk.take(&path("map").join("metadata.json"));
+    repair_on(disk.shared(), &path("map"), |_| {}, |_, _| {}).unwrap();
+    assert_eq!(decay(&disk, &Decay::new(4.0)).unwrap().scans, 0);
+    assert_eq!(read_map(&disk, &path("map")), once);
 }
 
 #[test]
