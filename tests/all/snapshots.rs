@@ -134,7 +134,9 @@ fn small(storage: Storage) -> (FaultyDisk, PathBuf, Vec<String>) {
         mapper.insert_scan(&scan(4 * seed + 1)).unwrap();
         mapper.flush().unwrap();
         digests.push(mapper.digest().unwrap().to_string());
-        of.map(|of| mapper.snapshot(&name(of)).unwrap());
+        if let Some(of) = of {
+            mapper.snapshot(&name(of)).unwrap();
+        }
     }
     drop(mapper);
     (disk.copy(), map, digests)
