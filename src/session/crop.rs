@@ -3,49 +3,32 @@ use super::part::{Part, Share};
 use super::table_change::voxels_of_part;
 use crate::error::Result;
 use crate::mapper::{MapReader, MapView, new_map_id, new_metadata};
-use crate::store::{Disk, FsDisk, Metadata};
+use crate::store::Metadata;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Makes a map of the voxels of another that are in a part of space.
 ///
-/// The map is read as of its last flush, without its lock. The new one has its parameters, storage and number of scans,
-/// but an id of its own and no input to go on with: it is a part of what the scans have said. It is there as a whole or not
-/// at all, see [`MapWriter`]. `progress` is told the tiles done and all.
+/// The new one has the parameters, storage and number of scans of the other, but an id of its own and no input to go on
+/// with: it is a part of what the scans have said. It is there as a whole or not at all, see [`MapWriter`]. `progress` is
+/// told the tiles done and all.
 ///
 /// # Errors
 ///
 /// A box that is none, a damaged tile, an output with other content, a disk that refuses.
 pub fn crop(
-    map: impl AsRef<Path>,
+    map: &MapReader,
     part: &Part,
     output: impl AsRef<Path>,
-    progress: impl FnMut(u64, u64),
-) -> Result<WrittenMap> {
-    crop_on(Arc::new(FsDisk), map.as_ref(), part, output.as_ref(), progress)
-}
-
-/// [`crop`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`crop`].
-pub fn crop_on(
-    disk: Arc<dyn Disk>,
-    map: &Path,
-    part: &Part,
-    output: &Path,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
-    let reader = MapReader::open_on(disk.clone(), map, 1)?;
-    let grid = reader.config().grid;
+    let grid = map.config().grid;
     let part = part.voxels(&grid)?;
-    let mut writer = MapWriter::create_as(disk, output, metadata_of_part(&reader))?;
-    let mut tiles = reader.tile_indices();
+    let mut writer = MapWriter::create_as(map.disk(), output.as_ref(), metadata_of_part(map))?;
+    let mut tiles = map.tile_indices();
     tiles.retain(|&tile| part.share_of(&grid.voxels_of_tile(tile)) != Share::Nothing);
     for (done, &tile) in (0..).zip(&tiles) {
         progress(done, tiles.len() as u64);
-        let Some(found) = reader.tile_in_passing(tile)? else { continue };
+        let Some(found) = map.tile_in_passing(tile)? else { continue };
         match part.share_of(&found.voxel_box()) {
             Share::Nothing => {}
             Share::Everything => writer.put(tile, found.table())?,
@@ -57,9 +40,9 @@ pub fn crop_on(
 }
 
 /// What a part says of itself: what the whole says, but for its identity.
-fn metadata_of_part(reader: &MapReader) -> Metadata {
-    let mut metadata = new_metadata(reader.config(), new_map_id(), None);
-    if let (Some(ext), Some(whole)) = (&mut metadata.ext, &reader.metadata().ext) {
+fn metadata_of_part(map: &MapReader) -> Metadata {
+    let mut metadata = new_metadata(map.config(), new_map_id(), None);
+    if let (Some(ext), Some(whole)) = (&mut metadata.ext, &map.metadata().ext) {
         (ext.scan_number, ext.decayed_scan) = (whole.scan_number, whole.decayed_scan);
     }
     metadata

@@ -1,16 +1,13 @@
 use super::map_writer::{MapWriter, WrittenMap};
 use super::merge_rule::{MergeRule, Prefer};
 use super::table_merge::TableMerge;
-use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView, TileRef};
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk};
 use crate::tile::Table;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
 /// What a merge did.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -21,9 +18,9 @@ pub struct Merged {
     pub written: WrittenMap,
     /// Voxels that two maps or more know.
     pub common_voxels: u64,
-    /// Maps that are the same or go back to the same map, an earlier and a later one of the list: what they have in
-    /// common is in both.
-    pub related: Vec<(PathBuf, PathBuf)>,
+    /// Maps that are the same or go back to the same map, by their places in the list, the earlier one first: what they
+    /// have in common is in both.
+    pub related: Vec<(usize, usize)>,
     /// Whether evidence was added, so that what related maps have in common counts twice.
     pub is_added: bool,
 }
@@ -36,44 +33,27 @@ pub struct Merged {
 /// there before. With a preference any models go together; sensor model, occupancy threshold and storage are those of the
 /// first map.
 ///
-/// The maps are read as of their last flush, without their locks; the new one has an id of its own and no scans, and is
-/// there as a whole or not at all, see [`MapWriter`]. `progress` is told the tiles done and all.
+/// The new map has an id of its own and no scans, and is there as a whole or not at all, see [`MapWriter`]; it is made on
+/// the disk of the first. `progress` is told the tiles done and all.
 ///
 /// # Errors
 ///
 /// Fewer than two maps, maps of different grids, maps that do not go together without a preference, a damaged tile, an
 /// output with other content, a disk that refuses.
 pub fn merge(
-    maps: &[PathBuf],
+    maps: &[MapReader],
     output: impl AsRef<Path>,
-    prefer: Option<Prefer>,
-    progress: impl FnMut(u64, u64),
-) -> Result<Merged> {
-    merge_on(Arc::new(FsDisk), maps, output.as_ref(), prefer, progress)
-}
-
-/// [`merge`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`merge`].
-pub fn merge_on(
-    disk: Arc<dyn Disk>,
-    maps: &[PathBuf],
-    output: &Path,
     prefer: Option<Prefer>,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Merged> {
     let [first, .., _] = maps else {
         return Err(Error::argument("maps", "name two maps or more to be merged"));
     };
-    let readers =
-        maps.iter().map(|map| MapReader::open_on(disk.clone(), map, 1)).collect::<Result<Vec<_>>>()?;
-    let config = readers[0].config().clone();
-    for (map, reader) in maps.iter().zip(&readers) {
-        check_grid(map, reader.config(), first, &config)?;
+    let config = first.config().clone();
+    for map in maps {
+        check_grid(map, first)?;
         if prefer.is_none() {
-            check_model(map, reader, first, &config)?;
+            check_model(map, first)?;
         }
     }
     let Some(rule) = MergeRule::of(&config, prefer) else {
@@ -84,27 +64,27 @@ pub fn merge_on(
         );
         return Err(Error::argument("maps", reason));
     };
-    let mut writer = MapWriter::create_on(disk, output, &config)?;
-    let tiles: BTreeSet<TileIndex> = readers.iter().flat_map(MapView::tile_indices).collect();
+    let mut writer = MapWriter::create_on(first.disk(), output.as_ref(), &config)?;
+    let tiles: BTreeSet<TileIndex> = maps.iter().flat_map(MapView::tile_indices).collect();
     let mut merge = TableMerge::new(rule);
     for (done, &tile) in (0..).zip(&tiles) {
         progress(done, tiles.len() as u64);
-        put_merged(&mut writer, &mut merge, rule, &readers, tile)?;
+        put_merged(&mut writer, &mut merge, rule, maps, tile)?;
     }
     progress(tiles.len() as u64, tiles.len() as u64);
     let written = writer.finish()?;
     let is_added = matches!(rule, MergeRule::Add { .. });
-    Ok(Merged { written, common_voxels: merge.common, related: related(maps, &readers), is_added })
+    Ok(Merged { written, common_voxels: merge.common, related: related(maps), is_added })
 }
 
 fn put_merged(
     writer: &mut MapWriter,
     merge: &mut TableMerge,
     rule: MergeRule,
-    readers: &[MapReader],
+    maps: &[MapReader],
     tile: TileIndex,
 ) -> Result<()> {
-    let found = readers.iter().map(|reader| reader.tile_in_passing(tile));
+    let found = maps.iter().map(|map| map.tile_in_passing(tile));
     let found: Vec<TileRef<'_>> = found.filter_map(Result::transpose).collect::<Result<_>>()?;
     let tables: Vec<&Table> = found.iter().map(|tile| tile.table()).collect();
     match tables[..] {
@@ -124,25 +104,26 @@ fn is_left_alone(table: &Table, rule: MergeRule) -> bool {
     }
 }
 
-fn check_grid(map: &Path, config: &MapConfig, first: &Path, wanted: &MapConfig) -> Result<()> {
-    let (grid, first_grid) = (&config.grid, &wanted.grid);
+fn check_grid(map: &MapReader, first: &MapReader) -> Result<()> {
+    let (grid, first_grid) = (&map.config().grid, &first.config().grid);
     for (what, found, wanted) in [
         ("resolution", grid.resolution_m(), first_grid.resolution_m()),
         ("tile size", grid.tile_size_m(), first_grid.tile_size_m()),
     ] {
         if found.to_bits() != wanted.to_bits() {
-            let wanted = format!("{wanted} m as {}", first.display());
-            return Err(Error::Mismatch { path: map.to_owned(), what, found: format!("{found} m"), wanted });
+            let (found, wanted) =
+                (format!("{found} m"), format!("{wanted} m as {}", first.folder().display()));
+            return Err(Error::Mismatch { path: map.folder().to_owned(), what, found, wanted });
         }
     }
     Ok(())
 }
 
 /// Whether evidence of a map can be added to that of the first.
-fn check_model(map: &Path, reader: &MapReader, first: &Path, wanted: &MapConfig) -> Result<()> {
-    let config = reader.config();
-    let first = first.display();
-    let what = if !reader.is_verified() {
+fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
+    let (config, wanted) = (map.config(), first.config());
+    let first = first.folder().display();
+    let what = if !map.is_verified() {
         "it is of the seed's format, which does not tell the sensor model".to_owned()
     } else if config.sensor_model != wanted.sensor_model {
         format!("its sensor model is {:?}, that of {first} is {:?}", config.sensor_model, wanted.sensor_model)
@@ -153,13 +134,14 @@ fn check_model(map: &Path, reader: &MapReader, first: &Path, wanted: &MapConfig)
         return Ok(());
     };
     let hint = "so that evidence does not add up: say which map's voxels to take with --prefer first, last or more-observed";
-    Err(Error::argument(map.display().to_string(), format!("{what}, {hint}")))
+    Err(Error::argument(map.folder().display().to_string(), format!("{what}, {hint}")))
 }
 
-fn related(maps: &[PathBuf], readers: &[MapReader]) -> Vec<(PathBuf, PathBuf)> {
-    let id_of = |reader: &MapReader| reader.metadata().ext.as_ref().map(|ext| ext.map_id.clone());
-    let ids: Vec<Option<String>> = readers.iter().map(id_of).collect();
+fn related(maps: &[MapReader]) -> Vec<(usize, usize)> {
     let pairs = (0..maps.len()).flat_map(|later| (0..later).map(move |earlier| (earlier, later)));
-    let pairs = pairs.filter(|&(earlier, later)| ids[later].is_some() && ids[earlier] == ids[later]);
-    pairs.map(|(earlier, later)| (maps[earlier].clone(), maps[later].clone())).collect()
+    let is_related = |&(earlier, later): &(usize, usize)| {
+        let (a, b): (&MapReader, &MapReader) = (&maps[earlier], &maps[later]);
+        a.map_id().is_some() && a.map_id() == b.map_id()
+    };
+    pairs.filter(is_related).collect()
 }

@@ -29,11 +29,11 @@ mod table_merge;
 
 pub use clear::{Cleared, clear, clear_on};
 pub use convert::convert;
-pub use crop::{crop, crop_on};
+pub use crop::crop;
 pub use decay::{Decay, Decayed, decay, decay_on};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
 pub use map_writer::{MapWriter, WrittenMap};
-pub use merge::{Merged, merge, merge_on};
+pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::Part;
 pub use revert::{Reverted, revert, revert_on};

@@ -50,6 +50,15 @@ pub fn read_maps<T>(
     again_if_changed(|| read(&first.open()?, &second.open()?))
 }
 
+/// The same from any number of maps.
+pub fn read_all_maps<T>(
+    maps: &[PathBuf],
+    mut read: impl FnMut(&[MapReader]) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    let maps = maps.iter().map(|map| MapAt::of(map)).collect::<Result<Vec<_>>>()?;
+    again_if_changed(|| read(&maps.iter().map(MapAt::open).collect::<Result<Vec<_>>>()?))
+}
+
 fn again_if_changed<T>(mut attempt: impl FnMut() -> anyhow::Result<T>) -> anyhow::Result<T> {
     for _ in 1..ATTEMPTS {
         match attempt() {

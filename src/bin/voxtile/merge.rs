@@ -1,11 +1,12 @@
 use crate::args::MergeArgs;
+use crate::map_at::read_all_maps;
 use crate::memory;
 use crate::progress::Progress;
 use crate::written::print_written;
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use voxtile::session::{Merged, merge};
 
@@ -21,9 +22,11 @@ struct Summary<'a> {
 pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let prefer = args.prefer.map(Into::into);
-    let merged = merge(&args.maps, &args.output, prefer, |done, all| progress.set(done, all))?;
+    let merged = read_all_maps(&args.maps, |maps| {
+        Ok(merge(maps, &args.output, prefer, |done, all| progress.set(done, all))?)
+    })?;
     drop(progress);
-    let warnings = warnings_of(&merged);
+    let warnings = warnings_of(&args.maps, &merged);
     for warning in &warnings {
         eprintln!("voxtile: warning: {warning}");
     }
@@ -44,13 +47,13 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn warnings_of(merged: &Merged) -> Vec<String> {
+fn warnings_of(maps: &[PathBuf], merged: &Merged) -> Vec<String> {
     let related = merged.related.iter().filter(|_| merged.is_added);
-    let warning = |(earlier, later): &(std::path::PathBuf, std::path::PathBuf)| {
+    let warning = |&(earlier, later): &(usize, usize)| {
         format!(
             "{} and {} go back to the same map: evidence that both have counts twice; --prefer takes it once",
-            earlier.display(),
-            later.display()
+            maps[earlier].display(),
+            maps[later].display()
         )
     };
     related.map(warning).collect()

@@ -1,8 +1,8 @@
-use super::random_maps::{config, disk, path, random_voxels, read_map, write_map};
+use super::random_maps::{config, disk, open, path, random_voxels, read_map, write_map};
 use crate::support::random_scans::Random;
 use crate::support::reference_map::Voxels;
 use voxtile::mapper::MapView;
-use voxtile::session::{Part, Prefer, clear_on, crop_on, merge_on};
+use voxtile::session::{Part, Prefer, clear_on, crop, merge};
 use voxtile::space::Aabb;
 use voxtile::{Error, MapConfig, MapReader, Questions};
 
@@ -45,13 +45,13 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
         let parts = [(Part::Inside(region), "inside"), (Part::Outside(region), "outside")];
         for (part, name) in parts {
             let expected = naive(&config, &voxels, &part);
-            let written = crop_on(disk.shared(), &path("whole"), &part, &path(name), |_, _| {}).unwrap();
+            let written = crop(&open(&disk, &path("whole")).unwrap(), &part, path(name), |_, _| {}).unwrap();
             assert_eq!(read_map(&disk, &path(name)), expected, "seed {seed}, {name}");
             assert_eq!(written.voxels, expected.len() as u64);
             cut_through += u64::from(!expected.is_empty() && expected.len() < voxels.len());
         }
-        let halves = [path("inside"), path("outside")];
-        merge_on(disk.shared(), &halves, &path("again"), Some(Prefer::First), |_, _| {}).unwrap();
+        let halves = ["inside", "outside"].map(|half| open(&disk, &path(half)).unwrap());
+        merge(&halves, path("again"), Some(Prefer::First), |_, _| {}).unwrap();
         let again = MapReader::open_on(disk.shared(), &path("again"), 1).unwrap();
         assert_eq!(again.digest().unwrap(), whole, "seed {seed}");
         for (part, name) in parts {
@@ -79,9 +79,8 @@ fn a_part_keeps_the_number_of_scans_and_no_identity() {
     let config = config(&mut random);
     write_map(&disk, &path("whole"), &config, &random_voxels(&mut random, 50));
     let everywhere = Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] };
-    crop_on(disk.shared(), &path("whole"), &Part::Inside(everywhere), &path("part"), |_, _| {}).unwrap();
-    let open = |name| MapReader::open_on(disk.shared(), &path(name), 1).unwrap();
-    let (whole, part) = (open("whole"), open("part"));
+    crop(&open(&disk, &path("whole")).unwrap(), &Part::Inside(everywhere), path("part"), |_, _| {}).unwrap();
+    let [whole, part] = ["whole", "part"].map(|name| open(&disk, &path(name)).unwrap());
     assert_eq!(whole.digest().unwrap(), part.digest().unwrap());
     let id_of = |reader: &MapReader| reader.metadata().ext.as_ref().unwrap().map_id.clone();
     assert_ne!(id_of(&whole), id_of(&part));
@@ -96,7 +95,7 @@ fn a_box_that_is_none_is_refused() {
         [Aabb { min: [0.0; 3], max: [1.0, 0.0, 1.0] }, Aabb { min: [0.0, f64::NAN, 0.0], max: [1.0; 3] }]
     {
         for part in [Part::Inside(region), Part::Outside(region)] {
-            let cropped = crop_on(disk.shared(), &path("whole"), &part, &path("part"), |_, _| {});
+            let cropped = crop(&open(&disk, &path("whole")).unwrap(), &part, path("part"), |_, _| {});
             assert!(matches!(cropped, Err(Error::InvalidArgument { .. })));
             let cleared = clear_on(disk.shared(), &path("whole"), &part, |_, _| {});
             assert!(matches!(cleared, Err(Error::InvalidArgument { .. })));

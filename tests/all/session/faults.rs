@@ -1,8 +1,8 @@
-use super::random_maps::path;
+use super::random_maps::{open, path};
 use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use crate::support::random_scans::{Random, random_scan};
 use std::path::PathBuf;
-use voxtile::session::{Decay, Part, clear_on, crop_on, decay_on, merge_on};
+use voxtile::session::{self, Decay, Part, clear_on, decay_on};
 use voxtile::space::Aabb;
 use voxtile::{Error, MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Result, Storage};
 
@@ -29,11 +29,12 @@ fn region() -> Aabb {
 }
 
 fn merge(disk: &FaultyDisk) -> Result<()> {
-    merge_on(disk.shared(), &[path("a"), path("b")], &path("out"), None, |_, _| {}).map(drop)
+    let maps = [open(disk, &path("a"))?, open(disk, &path("b"))?];
+    session::merge(&maps, path("out"), None, |_, _| {}).map(drop)
 }
 
 fn crop(disk: &FaultyDisk) -> Result<()> {
-    crop_on(disk.shared(), &path("a"), &Part::Inside(region()), &path("out"), |_, _| {}).map(drop)
+    session::crop(&open(disk, &path("a"))?, &Part::Inside(region()), path("out"), |_, _| {}).map(drop)
 }
 
 fn clear(disk: &FaultyDisk) -> Result<()> {
@@ -163,6 +164,7 @@ fn maps_of_the_seeds_own_format_are_cut_and_cleared_too() {
     clear(&disk).unwrap();
     // Both have gone to the same voxels, and only one of them is a new map.
     assert_eq!(digest(&disk, "out", "cropped"), digest(&disk, "a", "cleared outside"));
-    let refused = merge_on(disk.shared(), &[path("a"), path("b")], &path("c"), None, |_, _| {});
-    assert!(refused.unwrap_err().to_string().contains("seed's format"));
+    disk.take(&path("out"));
+    // `a` is voxtile's own by now, `b` is not.
+    assert!(merge(&disk).unwrap_err().to_string().contains("seed's format"));
 }

@@ -7,7 +7,7 @@ use voxtile::sensor::{Evidence, Iwlo, SensorModel};
 use voxtile::session::MapWriter;
 use voxtile::space::VoxelKey;
 use voxtile::tile::Table;
-use voxtile::{MapConfig, MapReader, Storage};
+use voxtile::{MapConfig, MapReader, Result, Storage};
 
 /// Tiles of 5 voxels, so that bricks of 8 reach across their borders.
 pub fn config(random: &mut Random) -> MapConfig {
@@ -67,9 +67,13 @@ fn table_of(voxels: &Voxels) -> Table {
     table
 }
 
+pub fn open(disk: &FaultyDisk, folder: &Path) -> Result<MapReader> {
+    MapReader::open_on(disk.shared(), folder, 2)
+}
+
 /// The voxels of a map on disk.
 pub fn read_map(disk: &FaultyDisk, folder: &Path) -> Voxels {
-    voxels_of(&MapReader::open_on(disk.shared(), folder, 2).unwrap_or_else(|error| panic!("{error}")))
+    voxels_of(&open(disk, folder).unwrap_or_else(|error| panic!("{error}")))
 }
 
 pub fn path(name: &str) -> PathBuf {

@@ -4,7 +4,7 @@ use voxtile::session::Prefer;
 
 #[derive(Debug, Args)]
 pub struct MergeArgs {
-    /// Folders of the maps, two or more, of the same resolution and tile size
+    /// Folders of the maps, two or more, of the same resolution and tile size; MAP@SNAPSHOT for a snapshot
     #[arg(value_name = "MAP", num_args = 2.., required = true)]
     pub maps: Vec<PathBuf>,
     /// Folder of the map to make; it is not there before all of it is
@@ -42,7 +42,7 @@ impl From<PreferName> for Prefer {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct CropArgs {
-    /// Folder of the map
+    /// Folder of the map; MAP@SNAPSHOT for a snapshot of it
     pub map: PathBuf,
     #[command(flatten)]
     pub part: PartArgs,
