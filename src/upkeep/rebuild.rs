@@ -159,7 +159,7 @@ fn scan_number_of(table: &ReadTable) -> Option<u64> {
 }
 
 /// A table by itself, without a log: whole, of this map and tile; `None` if there is no file.
-fn read_alone(
+pub(super) fn read_alone(
     disk: &dyn Disk,
     path: &Path,
     storage: Storage,

@@ -1,8 +1,10 @@
 use super::finding::Finding;
+use super::rebuild::read_alone;
 use super::repair::{Action, ActionKind, Repairer};
 use super::snapshots::{WholeTables, lost_tiles};
 use crate::config::MapConfig;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::space::TileIndex;
 use crate::store::{Snapshot, TileStore};
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
@@ -49,22 +51,36 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if lost.is_empty() {
             return Ok(());
         }
-        for (tile, error) in &lost {
+        for (tile, _) in &lost {
             snapshot.commits.tiles.remove(tile);
             let kept = store.kept_tables(*tile)?;
             let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
-            let path = self.layout.kept(*tile, flush_number);
-            if let Error::Damaged { cause, .. } = error
-                && self.kind(&path)?.is_some()
-            {
-                self.quarantine(&path, &cause.reason)?;
-            }
+            self.quarantine_if_damaged(store, config, *tile, flush_number)?;
         }
         store.replace_snapshot(snapshot)?;
         let reason = format!("{} tiles whose tables are missing or damaged", lost.len());
         self.note(ActionKind::Forgotten, &self.layout.snapshot(&snapshot.name), reason);
         self.counts.snapshot_tiles_lost += lost.len() as u64;
         Ok(())
+    }
+
+    /// Where the table that a snapshot saw is missing, names lead it to another version, which is whole and others'.
+    fn quarantine_if_damaged(
+        &mut self,
+        store: &TileStore,
+        config: &MapConfig,
+        tile: TileIndex,
+        flush_number: u64,
+    ) -> Result<()> {
+        let (path, storage) = (self.layout.kept(tile, flush_number), self.layout.storage());
+        let map_id = store.map_id().unwrap_or_default();
+        match read_alone(self.disk, &path, storage, &config.grid, map_id, tile)? {
+            Some(Err(error)) => {
+                let finding = Finding::of(error)?;
+                self.quarantine(&path, &finding.reason)
+            }
+            Some(Ok(_)) | None => Ok(()),
+        }
     }
 
     /// Kept tables that none of the snapshots sees: one that cannot be read may have.

@@ -303,6 +303,45 @@ fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, 
     }
 }
 
+/// Several snapshots see one damaged table, and others later ones of the same tile: those lose nothing.
+#[test]
+fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
+    let (disk, map) = (FaultyDisk::new(Fault::None), Path::new("/map"));
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map, config(Storage::Seed)).unwrap();
+    let mut digests = BTreeMap::new();
+    for names in [&["a", "b", "c"][..], &["d", "e"], &["f"], &[]] {
+        // The same tiles each time.
+        mapper.insert_scan(&scan(4)).unwrap();
+        mapper.flush().unwrap();
+        for of in names {
+            mapper.snapshot(&name(of)).unwrap();
+            digests.insert(*of, mapper.digest().unwrap().to_string());
+        }
+    }
+    drop(mapper);
+    let files = disk.files();
+    let kept: Vec<_> = files.keys().filter(|path| path.to_string_lossy().contains(".flush")).collect();
+    assert!(kept.len() > 5);
+    for path in kept {
+        for is_missing in [true, false] {
+            let damaged = disk.copy();
+            match is_missing {
+                true => damaged.take(path),
+                false => damaged.put(path, b"damaged"),
+            }
+            repair_on(damaged.shared(), map, |_| (), |_, _| ()).unwrap();
+            assert!(verify_on(damaged.shared(), map, |_| (), |_, _| ()).unwrap().is_whole());
+            let flush = path.to_string_lossy().rsplit_once(".flush").unwrap().1.to_owned();
+            let hit = [("1", &["a", "b", "c"][..]), ("2", &["d", "e"]), ("3", &["f"])];
+            let (_, hit) = hit.iter().find(|(number, _)| *number == flush).unwrap();
+            for (of, digest) in &digests {
+                let found = digest_of(&damaged, map, Some(of)).unwrap();
+                assert_eq!(found == *digest, !hit.contains(of), "{}: {of}", path.display());
+            }
+        }
+    }
+}
+
 /// Whatever is put together again from the tiles: snapshots see what they saw, also after what comes then.
 #[test]
 fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
