@@ -132,23 +132,16 @@ fn look_at_tile(
         let next_name = file.next_name(layout.storage());
         let Some(at) = names.iter().position(|name| name == next_name) else { continue };
         let next = layout.next(tile, file);
-        match stamp.map(|stamp| stamp.of(file)) {
-            Some(committed) if has_stamp(disk, &next, committed)? => {
-                // Where the file in place is the committed one, this is an uncommitted one of the same bytes, which may not
-                // be on the medium: octrees often stay the same while the evidence changes.
-                if !has_stamp(disk, &layout.current(tile, file), committed)? {
-                    unrenamed = true;
-                    continue;
-                }
-            }
-            Some(committed)
-                if is_of_last_commit && !has_stamp(disk, &layout.current(tile, file), committed)? =>
-            {
-                // Neither is what was committed: damage, which is reported when the tile is read. Keep both.
+        if let Some(committed) = stamp.map(|stamp| stamp.of(file)) {
+            let waits = has_stamp(disk, &next, committed)?;
+            if (waits || is_of_last_commit) && !has_stamp(disk, &layout.current(tile, file), committed)? {
+                // If neither is what was committed: damage, which is reported when the tile is read. Keep both.
+                unrenamed |= waits;
                 continue;
             }
-            _ => {}
         }
+        // Never committed; also where it has the bytes of the committed file in place, for it may not be on the medium:
+        // octrees often stay the same while the evidence changes.
         remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
