@@ -133,13 +133,14 @@ fn look_at_tile(
         let Some(at) = names.iter().position(|name| name == next_name) else { continue };
         let next = layout.next(tile, file);
         match stamp.map(|stamp| stamp.of(file)) {
-            Some(committed) if has_stamp(disk, &next, committed)? => {
-                // Where the file in place is the committed one, this is an uncommitted one of the same bytes, which may not
-                // be on the medium: octrees often stay the same while the evidence changes.
-                if !has_stamp(disk, &layout.current(tile, file), committed)? {
-                    unrenamed = true;
-                    continue;
-                }
+            // Where the file in place is the committed one, this is an uncommitted one of the same bytes, which may not be on
+            // the medium: octrees often stay the same while the evidence changes.
+            Some(committed)
+                if has_stamp(disk, &next, committed)?
+                    && !has_stamp(disk, &layout.current(tile, file), committed)? =>
+            {
+                unrenamed = true;
+                continue;
             }
             Some(committed)
                 if is_of_last_commit && !has_stamp(disk, &layout.current(tile, file), committed)? =>
