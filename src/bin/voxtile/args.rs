@@ -53,7 +53,8 @@ pub enum Command {
     Clear(ClearArgs),
     /// Let the evidence of a map fade by the scans that have come since, in place
     Decay(DecayArgs),
-    /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit
+    /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit, and
+    /// snapshots are not taken along
     Convert(ConvertArgs),
     /// Check every file of a map for damage; exit code 1 if there is any
     Verify(VerifyArgs),
