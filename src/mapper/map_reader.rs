@@ -13,8 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// A map on disk, opened to be asked: it takes no lock, beside a writer too, and never writes.
 ///
 /// It sees the last flush before it was opened, whole, however often a writer flushes meanwhile: the writer keeps what
-/// this reader sees. Only where the file system has no locks, or when the writer was started anew after a crash, tiles
-/// that changed are answered with [`Error::Changed`]: open the map again.
+/// this reader sees. Only where the file system has no locks, or when another writer was started meanwhile, tiles that
+/// changed are answered with [`Error::Changed`]: open the map again.
 #[derive(Debug)]
 pub struct MapReader {
     config: MapConfig,

@@ -238,15 +238,17 @@ impl Mapper for OutOfCoreTileMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
         let scan_number = self.scan_number;
         let residency = self.residency.get_mut().unwrap_or_else(PoisonError::into_inner);
-        residency.begin_scan();
         let most_bytes = MemoryPlan::new(self.config.memory).updates_bytes;
         let put_in_files = &mut |part| residency.put_in_files(part, scan_number);
-        let updates = trace(&mut self.tracer, &self.config, scan, most_bytes, put_in_files)?;
-        self.accept(updates)
+        let traced = trace(&mut self.tracer, &self.config, scan, most_bytes, put_in_files);
+        let inserted = traced.and_then(|updates| self.accept(updates));
+        if inserted.is_err() {
+            self.residency_mut().give_up_scan();
+        }
+        inserted
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
-        self.residency_mut().begin_scan();
         let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
         self.accept(updates)
     }

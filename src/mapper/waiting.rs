@@ -92,9 +92,12 @@ impl Residency {
         }
     }
 
-    /// Begins a scan: whatever an earlier one left in files without being accepted does not count.
-    pub(super) fn begin_scan(&mut self) {
-        self.coming.clear();
+    /// Takes back what a scan that was not accepted has put into files: it does not count, and its room may be what the
+    /// next flush needs.
+    pub(super) fn give_up_scan(&mut self) {
+        for index in std::mem::take(&mut self.coming).into_keys() {
+            self.store.cut_waiting(index, self.pending.in_file(index).file);
+        }
     }
 
     /// Puts a part of a scan that has not been accepted yet into files, behind what waits for the same tiles.
@@ -123,7 +126,8 @@ impl Residency {
     }
 
     fn append(&self, index: TileIndex, before: InFile, updates: &PackedUpdates) -> Result<InFile> {
-        let file = self.store.append_waiting(index, before.file, updates.as_bytes())?;
+        let appended = self.store.append_waiting(index, before.file, updates.as_bytes());
+        let file = appended.inspect_err(|_| self.store.cut_waiting(index, before.file))?;
         Ok(InFile { file, updates: before.updates + updates.len() })
     }
 }

@@ -84,7 +84,7 @@ impl Decay {
         }
         if !(self.forget_below >= 0.0 && self.forget_below.is_finite()) {
             let reason = format!("{} is no log-odds of at least 0", self.forget_below);
-            return Err(Error::argument("forget below", reason));
+            return Err(Error::argument("forget_below", reason));
         }
         Ok(())
     }

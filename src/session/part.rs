@@ -30,7 +30,7 @@ impl Part {
     ///
     /// # Errors
     ///
-    /// A box that is empty or has a corner that is no number.
+    /// A box that is empty, has no voxel's center in it, or has a corner that is no number.
     pub(super) fn voxels(&self, grid: &Grid) -> Result<VoxelPart> {
         let (region, is_outside) = match self {
             Self::Inside(region) => (region, false),
@@ -40,7 +40,12 @@ impl Part {
             let reason = format!("{:?} is not below {:?} along every axis", region.min, region.max);
             return Err(Error::argument("region", reason));
         }
-        Ok(VoxelPart { voxels: grid.voxels_in(region), is_outside })
+        let voxels = grid.voxels_in(region);
+        if voxels.is_empty() {
+            let reason = format!("between {:?} and {:?} there is no voxel's center", region.min, region.max);
+            return Err(Error::argument("region", reason));
+        }
+        Ok(VoxelPart { voxels, is_outside })
     }
 }
 

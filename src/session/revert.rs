@@ -5,7 +5,7 @@ use crate::mapper::config_from;
 use crate::mapper::tile_files::read_stored_table;
 use crate::mapper::tile_saver::TileSaver;
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk, SnapshotName, TileFile, TileStamp, TileStore};
+use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileFile, TileStamp, TileStore};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -63,6 +63,7 @@ pub fn revert_on(
 ) -> Result<Reverted> {
     let mut store = TileStore::open(disk.clone(), folder)?;
     let past = TileStore::open_snapshot(disk.clone(), folder, name)?;
+    check_is_of_map(&store, &past)?;
     if let Some(keep_as) = keep_as {
         check_is_free(&store, keep_as)?;
         store.create_snapshot(keep_as)?;
@@ -102,6 +103,25 @@ fn revert_to(
     reverted.flush_number = store.commits().flush_number;
     reverted.tiles = tiles.len() as u64;
     Ok(reverted)
+}
+
+/// Whether a snapshot says what a map can be made again, with nothing else in the way.
+fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
+    let lengths = |metadata: &Metadata| [metadata.resolution_m, metadata.tile_size_m].map(f64::to_bits);
+    if lengths(store.metadata()) != lengths(past.metadata())
+        || store.metadata().storage() != past.metadata().storage()
+    {
+        let reason = "the snapshot has another resolution, tile size or storage than its map";
+        let path = past.opened_snapshot().map(|name| past.layout().snapshot(name)).unwrap_or_default();
+        return Err(FormatError::at_offset(0, reason).in_map(&path, None));
+    }
+    for tile in store.strays() {
+        if past.stamp(tile).is_some() {
+            let hint = "it is no part of the map as it is; `voxtile repair` moves it out of the way";
+            return Err(Error::AlreadyExists { path: store.layout().tile_folder(tile), hint });
+        }
+    }
+    Ok(())
 }
 
 struct Reverter<'a> {

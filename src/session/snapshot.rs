@@ -27,7 +27,8 @@ pub struct SnapshotInfo {
     pub voxels: u64,
     /// Bytes of the tables that it sees.
     pub table_bytes: u64,
-    /// Bytes that are on disk for this snapshot alone: they are free when it is deleted.
+    /// Bytes that no other snapshot and not the present map names: at most so many are free when it is deleted. Fewer are where
+    /// a revert has linked a table, so that it is there under two names.
     pub own_bytes: u64,
     /// Why it cannot be read, if it cannot; the numbers are 0 then.
     pub damage: Option<String>,
@@ -101,7 +102,11 @@ pub fn snapshots_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<Vec<SnapshotIn
                 owners.count(&store, infos.len(), &snapshot)?;
                 infos.push(SnapshotInfo::of(&snapshot));
             }
-            Err(error @ Error::Damaged { .. }) => infos.push(SnapshotInfo::damaged(&name, &error)),
+            Err(error @ (Error::Damaged { .. } | Error::Io { .. })) => {
+                infos.push(SnapshotInfo::damaged(&name, &error));
+            }
+            // Deleted since they were listed.
+            Err(Error::InvalidArgument { .. }) => {}
             Err(error) => return Err(error),
         }
     }

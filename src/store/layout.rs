@@ -107,7 +107,9 @@ impl Layout {
 
     /// The flush number of a kept table's name; `None` for another name.
     pub fn flush_of_kept(&self, name: &str) -> Option<u64> {
-        name.strip_prefix(TileFile::Table.name(self.storage))?.strip_prefix(KEPT_SUFFIX)?.parse().ok()
+        let number = name.strip_prefix(TileFile::Table.name(self.storage))?.strip_prefix(KEPT_SUFFIX)?;
+        // The one spelling: `007` is another name than what it would be looked for under.
+        number.parse().ok().filter(|flush_number: &u64| flush_number.to_string() == number)
     }
 
     /// Updates that wait for a tile while the map is written to.

@@ -1,3 +1,4 @@
+use super::commit_log::Commits;
 use super::tile_stamp::MAX_NUMBER;
 use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;
@@ -128,6 +129,16 @@ impl Metadata {
     /// How the tiles are stored.
     pub fn storage(&self) -> Storage {
         self.ext.as_ref().map_or(Storage::Seed, |ext| ext.storage)
+    }
+
+    /// The same as of a commit: its tiles' hull and its numbers.
+    pub(super) fn as_of(&self, commits: &Commits) -> Self {
+        let mut metadata = Self { bounds: Bounds::of(commits.tiles.keys().copied()), ..self.clone() };
+        if let Some(ext) = &mut metadata.ext {
+            ext.empty = metadata.bounds.is_none();
+            (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
+        }
+        metadata
     }
 
     /// Whether the two say the same but for what every flush brings: bounds and numbers.

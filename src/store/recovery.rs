@@ -83,6 +83,25 @@ pub(super) fn recover(
     Ok(leftovers)
 }
 
+/// Removes what an attempt to give tiles of the seed's format their trailers left. Returns how many files.
+pub(super) fn remove_uncommitted(
+    disk: &dyn Disk,
+    layout: &Layout,
+    tiles: &FxHashSet<TileIndex>,
+) -> Result<u64> {
+    let mut removed = 0;
+    for &tile in tiles {
+        let folder = layout.tile_folder(tile);
+        if kind(disk, &folder)? != Some(EntryKind::Folder) {
+            continue;
+        }
+        for file in layout.files() {
+            remove(disk, &layout.next(tile, *file), &mut removed)?;
+        }
+    }
+    Ok(removed)
+}
+
 /// Removes kept tables that no snapshot sees: they were kept for readers, or for a snapshot that is deleted.
 fn remove_unseen(
     disk: &dyn Disk,
@@ -93,10 +112,9 @@ fn remove_unseen(
     let folder = layout.snapshots();
     if kind(disk, &folder)? == Some(EntryKind::Folder) {
         remove(disk, &layout.snapshot_next(), &mut leftovers.removed)?;
-        if !kept.is_empty() {
-            // A deletion that a killed writer could not make durable would come back and miss its tables.
-            disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
-        }
+        // A deletion that a killed writer could not make durable would come back and miss its tables: those that are kept,
+        // and those that are going to be replaced.
+        disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
     }
     for (&tile, flushes) in kept {
         for &flush_number in flushes.iter().filter(|&&n| !leftovers.snapshots.sees_kept(tile, n)) {

@@ -2,7 +2,7 @@ use super::commit_log::{CommitLog, Commits};
 use super::disk::Disk;
 use super::layout::{Layout, TileFile, tile_of_folder};
 use super::map_folder;
-use super::metadata::{Bounds, Metadata};
+use super::metadata::Metadata;
 use crate::config::Storage;
 use crate::error::{DecodeError, Error, FormatError, Result};
 use std::io;
@@ -83,14 +83,9 @@ impl Remains {
         layout: &Layout,
         map_id: [u8; 16],
         commits: &Commits,
-        mut metadata: Metadata,
+        metadata: &Metadata,
     ) -> Result<()> {
-        metadata.bounds = Bounds::of(commits.tiles.keys().copied());
-        if let Some(ext) = &mut metadata.ext {
-            ext.empty = metadata.bounds.is_none();
-            (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
-        }
-        let text = metadata.to_text();
+        let text = metadata.as_of(commits).to_text();
         let sync = || {
             let folder = layout.folder();
             disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))

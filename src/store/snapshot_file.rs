@@ -31,19 +31,31 @@ impl Snapshot {
     ///
     /// A disk that refuses.
     pub fn list(disk: &dyn Disk, layout: &Layout) -> Result<Vec<SnapshotName>> {
-        let folder = layout.snapshots();
-        match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
-            Some(EntryKind::Folder) => {}
-            None => return Ok(Vec::new()),
-            Some(_) => {
-                let reason = "something else has the name of the folder of snapshots";
-                return Err(FormatError::at_offset(0, reason).in_map(&folder, None));
-            }
+        if !Self::has_folder(disk, layout)? {
+            return Ok(Vec::new());
         }
+        let folder = layout.snapshots();
         let names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;
         let mut names: Vec<_> = names.into_iter().filter_map(|name| SnapshotName::new(name).ok()).collect();
         names.sort_unstable();
         Ok(names)
+    }
+
+    /// Whether a map has a folder for snapshots. A link that has its name is none: it could lead anywhere.
+    ///
+    /// # Errors
+    ///
+    /// Something else that has the name of the folder; a disk that refuses.
+    pub(super) fn has_folder(disk: &dyn Disk, layout: &Layout) -> Result<bool> {
+        let folder = layout.snapshots();
+        match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
+            Some(EntryKind::Folder) => Ok(true),
+            None => Ok(false),
+            Some(_) => {
+                let reason = "something else has the name of the folder of snapshots";
+                Err(FormatError::at_offset(0, reason).in_map(&folder, None))
+            }
+        }
     }
 
     /// Reads a snapshot of the map with this id.
@@ -52,6 +64,7 @@ impl Snapshot {
     ///
     /// [`Error::InvalidArgument`] if there is none of this name; damage; a disk that refuses.
     pub fn read(disk: &dyn Disk, layout: &Layout, name: &SnapshotName, map_id: [u8; 16]) -> Result<Self> {
+        Self::has_folder(disk, layout)?;
         let path = layout.snapshot(name);
         let damaged = |at, reason: String| Err(FormatError::at_offset(at, reason).in_map(&path, None));
         let input = match disk.open(&path) {
@@ -77,7 +90,9 @@ impl Snapshot {
             let (found, wanted) = (hex(&log.map_id()), hex(&map_id));
             return damaged(12, format!("the snapshot is of map {found}, not of {wanted}"));
         }
-        match commits.metadata.clone().filter(|metadata| metadata.ext.is_some()) {
+        let is_of_map =
+            |metadata: &Metadata| metadata.ext.as_ref().is_some_and(|ext| ext.map_id == hex(&map_id));
+        match commits.metadata.clone().filter(is_of_map) {
             Some(metadata) => Ok(Self { name: name.clone(), map_id, metadata, commits, bytes }),
             None => damaged(bytes, "the snapshot does not say what the map was".into()),
         }

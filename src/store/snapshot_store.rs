@@ -5,7 +5,7 @@ use super::disk::{Disk, EntryKind};
 use super::layout::Layout;
 use super::layout::TileFile;
 use super::map_folder;
-use super::metadata::{Bounds, Metadata};
+use super::metadata::Metadata;
 use super::snapshot_file::Snapshot;
 use super::snapshot_name::SnapshotName;
 use super::snapshots::Snapshots;
@@ -84,21 +84,22 @@ impl TileStore {
             return Err(Error::argument("map", "a map of the seed's format must be adopted first"));
         };
         let (folder, path) = (self.layout.snapshots(), self.layout.snapshot(name));
-        if self.kind(&path)?.is_some() {
+        let has_folder = Snapshot::has_folder(&*self.disk, &self.layout)?;
+        if has_folder && self.kind(&path)?.is_some() {
             let hint = "choose another name, or delete that snapshot first";
             return Err(Error::AlreadyExists { path, hint });
         }
-        if self.kind(&folder)?.is_none() {
+        if !has_folder {
             self.disk.create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
         }
         // Perhaps made by an attempt that could not.
         self.sync_folder(self.layout.folder())?;
         self.write_snapshot(&path, map_id, &self.metadata, &self.commits)?;
+        // Also if the name cannot be made durable, nor be removed: what may come back must not miss its tables.
+        self.snapshots.share(self.commits.tiles.keys().copied());
         let named = self.sync_folder(&folder);
-        match named {
-            Ok(()) => self.snapshots.share(self.commits.tiles.keys().copied()),
-            // If that fails too there is one more than was promised, whose tables the next writer keeps.
-            Err(_) => drop(self.disk.remove_file(&path)),
+        if named.is_err() {
+            let _ = self.disk.remove_file(&path);
         }
         named
     }
@@ -127,12 +128,7 @@ impl TileStore {
         metadata: &Metadata,
         commits: &Commits,
     ) -> Result<()> {
-        let mut metadata = metadata.clone();
-        metadata.bounds = Bounds::of(commits.tiles.keys().copied());
-        if let Some(ext) = &mut metadata.ext {
-            ext.empty = metadata.bounds.is_none();
-            (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
-        }
+        let metadata = metadata.as_of(commits);
         let next = self.layout.snapshot_next();
         let write = || {
             CommitLog::write_whole(&*self.disk, &next, map_id, commits, &metadata.to_text())?;
@@ -148,6 +144,7 @@ impl TileStore {
     /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses.
     pub fn delete_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.settle()?;
+        Snapshot::has_folder(&*self.disk, &self.layout)?;
         let path = self.layout.snapshot(name);
         match self.kind(&path)? {
             Some(EntryKind::File(_)) => {}

@@ -4,7 +4,7 @@ use super::layout::{Layout, TileFile};
 use super::map_folder::{self, Lock};
 use super::metadata::Metadata;
 use super::readers::Readers;
-use super::recovery::recover;
+use super::recovery::{recover, remove_uncommitted};
 use super::snapshot_name::SnapshotName;
 use super::snapshots::{Snapshots, seen_by};
 use super::tile_location::{StoredTile, TileLocation};
@@ -73,6 +73,7 @@ impl TileStore {
     /// Makes an empty map in a folder that is missing, empty, or holds what an interrupted creation left.
     pub fn create(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         let layout = Layout::new(folder);
+        map_folder::check_place(&*disk, folder)?;
         map_folder::create_folders(&*disk, folder)?;
         // Before the lock, which leaves a file behind, and after it, when nobody else can begin a map here.
         map_folder::check_is_free(&*disk, folder)?;
@@ -120,6 +121,8 @@ impl TileStore {
             store.renamed = leftovers.renamed;
             store.unremoved = store.commits.last_removed.iter().copied().collect();
             store.put_in_place()?;
+        } else {
+            store.leftovers_removed = remove_uncommitted(&*store.disk, &store.layout, &store.foreign)?;
         }
         Ok(store)
     }
@@ -183,7 +186,8 @@ impl TileStore {
         let written_flush = written.map(|ext| ext.flush_number);
         // The log is the truth; the file may be older, if a crash came between the two.
         let metadata = match &commits.metadata {
-            Some(committed) if written_flush != Some(commits.flush_number) => committed.clone(),
+            // What it says of tiles and numbers is as of the record that has it, which may be older than the last.
+            Some(committed) if written_flush != Some(commits.flush_number) => committed.as_of(&commits),
             _ => metadata,
         };
         Ok(Self { written_flush, ..Self::new(disk, layout, metadata, Some(log), commits) })

@@ -59,6 +59,17 @@ impl TileStore {
         Ok(updates)
     }
 
+    /// Cuts off what stands behind the updates that count. If that fails it does no harm but for the room that it takes.
+    pub fn cut_waiting(&self, tile: TileIndex, file: WaitingFile) {
+        if file.bytes == 0 {
+            return self.remove_waiting(tile);
+        }
+        let path = self.layout.waiting(tile);
+        if let Err(error) = self.disk.append(&path, file.bytes) {
+            log::debug!("{}: not cut: {error}", path.display());
+        }
+    }
+
     /// Removes a tile's file of waiting updates: they were applied, or nobody wants them any more. A file that stays
     /// does no harm.
     pub fn remove_waiting(&self, tile: TileIndex) {

@@ -182,7 +182,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             Ok(id) if id != Some(&hex(&map_id)) => self.quarantine_copy(&paths[1], "it is of another map")?,
             Ok(_) => {}
         }
-        remains.write(self.disk, &self.layout, map_id, &commits, metadata)?;
+        remains.write(self.disk, &self.layout, map_id, &commits, &metadata)?;
         let (source, tiles) = match is_from_tiles {
             true => {
                 ("the tiles; without the log nothing tells whether all are of one flush", commits.tiles.len())

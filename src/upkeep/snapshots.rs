@@ -4,11 +4,12 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::tile_files;
 use crate::space::TileIndex;
-use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStore};
-use std::collections::BTreeSet;
+use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStamp, TileStore};
+use std::collections::BTreeMap;
 
-/// Kept tables that have been looked at and are whole: several snapshots may see one.
-pub(super) type WholeTables = BTreeSet<(TileIndex, u64)>;
+/// Kept tables that have been looked at and are whole, and as which version: several snapshots may see one. A snapshot whose
+/// own is lost is led to one that it does not mean.
+pub(super) type WholeTables = BTreeMap<(TileIndex, u64), TileStamp>;
 
 /// The tiles of a snapshot whose tables cannot be read as the snapshot names them. Tables that are the map's own too are left
 /// to whoever looks at the map.
@@ -29,14 +30,14 @@ pub(super) fn lost_tiles(
     for (&tile, stamp) in tiles {
         let kept = past.kept_tables(tile)?.range(snapshot.commits.flush_number..).next().copied();
         let is_known = match kept {
-            Some(flush_number) => whole.contains(&(tile, flush_number)),
+            Some(flush_number) => whole.get(&(tile, flush_number)) == Some(stamp),
             None => store.stamp(tile) == Some(*stamp),
         };
         if is_known {
             continue;
         }
         match tile_files::load_table(&past, &config.grid, tile) {
-            Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number)))),
+            Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), *stamp))),
             Err(error @ Error::Damaged { .. }) => lost.push((tile, error)),
             Err(error) => return Err(error),
         }

@@ -304,7 +304,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         for name in self.list(folder)? {
             let path = folder.join(&name);
             let kept = self.layout.flush_of_kept(&name);
-            if kept.is_some_and(|flush_number| seen.contains(&(tile, flush_number))) {
+            if kept.is_some_and(|flush_number| seen.contains_key(&(tile, flush_number))) {
                 continue;
             }
             if name.ends_with(".next") || kept.is_some() {

@@ -3,7 +3,8 @@ use crate::support::random_scans::{Random, random_scan};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::session::convert;
+use voxtile::session::{Part, convert, crop};
+use voxtile::space::Aabb;
 use voxtile::upkeep::verify_on;
 use voxtile::{
     Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Result, Scan, Storage,
@@ -106,6 +107,28 @@ fn a_build_goes_on_with_the_other_form_as_with_the_first() {
         reader(&disk, name).unwrap().digest().unwrap()
     });
     assert_eq!(digests[0], digests[1]);
+}
+
+/// The power went after the commit and before `metadata.json` was replaced: the log is the truth.
+#[test]
+fn a_map_made_of_one_whose_metadata_is_behind_has_its_scans_all_the_same() {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &place("map"), config()).unwrap();
+    mapper.begin_input(INPUT).unwrap();
+    let metadata = place("map/metadata.json");
+    let behind = disk.files()[&metadata].clone();
+    mapper.insert_scan(&scan(0)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    disk.put(&metadata, &behind);
+    converted(&disk, "map", "small", Storage::Compact).unwrap();
+    let everywhere = Part::Inside(Aabb { min: [-50.0; 3], max: [50.0; 3] });
+    crop(&reader(&disk, "map").unwrap(), &everywhere, place("part"), |_, _| ()).unwrap();
+    for made in ["map", "small", "part"] {
+        assert_eq!(reader(&disk, made).unwrap().scan_number(), 1, "{made}");
+    }
+    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &place("small"), config()).unwrap();
+    assert_eq!(mapper.resume_input(INPUT).unwrap(), 1);
 }
 
 #[test]

@@ -236,6 +236,10 @@ fn snapshots() -> Life {
         Act::Delete("b"),
         Act::Scans(5..6),
         Act::Delete("c"),
+        // Nothing that it sees has changed until it is gone.
+        Act::Snapshot("d"),
+        Act::Delete("d"),
+        Act::Scans(6..8),
     ])
 }
 

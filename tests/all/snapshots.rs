@@ -304,6 +304,31 @@ fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, 
 }
 
 /// Several snapshots see one damaged table, and others later ones of the same tile: those lose nothing.
+/// The names of its tables lead a snapshot that has lost one to the next, whichever name comes first.
+#[test]
+fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
+    for names in [["a", "b"], ["b", "a"]] {
+        let (disk, map) = (FaultyDisk::new(Fault::None), PathBuf::from("/map"));
+        let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &map, config(Storage::Seed)).unwrap();
+        for (seed, of) in (1..).zip([Some(names[0]), Some(names[1]), None]) {
+            for number in 0..8 {
+                mapper.insert_scan(&scan(4 * (8 * seed + number))).unwrap();
+            }
+            mapper.flush().unwrap();
+            of.into_iter().for_each(|of| mapper.snapshot(&name(of)).unwrap());
+        }
+        drop(mapper);
+        let kept = |path: &PathBuf| path.to_string_lossy().contains(".flush");
+        let tables: Vec<_> = disk.files().into_keys().filter(kept).collect();
+        let twice = tables.windows(2).find(|two| two[0].parent() == two[1].parent()).unwrap();
+        disk.take(&twice[0]);
+        let mut found = Vec::new();
+        verify_on(disk.shared(), &map, |finding| found.push(finding.clone()), |_, _| ()).unwrap();
+        assert!(found.iter().any(|finding| finding.severity == Severity::Damage), "{names:?}: {found:?}");
+        assert!(digest_of(&disk, &map, Some(names[0])).is_err());
+    }
+}
+
 #[test]
 fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
     let (disk, map) = (FaultyDisk::new(Fault::None), Path::new("/map"));

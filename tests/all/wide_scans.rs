@@ -2,7 +2,7 @@
 
 use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use crate::support::random_scans::{Random, random_scan};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan,
@@ -120,6 +120,14 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
         refusals += usize::from(is_refused);
         disk.make_room();
         if is_refused {
+            let waits = |path: &PathBuf| path.ends_with("updates.next");
+            let bytes: usize =
+                disk.files().iter().filter(|(path, _)| waits(path)).map(|(_, bytes)| bytes.len()).sum();
+            assert_eq!(
+                mapper.statistics().pending_file_bytes,
+                bytes as u64,
+                "of a scan that is not in the map"
+            );
             assert_eq!(mapper.digest().unwrap(), digests[1], "refused at {at}");
             mapper.insert_scan(&scans[2]).unwrap();
         }

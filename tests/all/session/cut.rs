@@ -42,6 +42,12 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
         write_map(&disk, &path("whole"), &config, &voxels);
         let whole = MapReader::open_on(disk.shared(), &path("whole"), 1).unwrap().digest().unwrap();
         let region = random_box(&mut random);
+        if config.grid.voxels_in(&region).is_empty() {
+            let refused =
+                crop(&open(&disk, &path("whole")).unwrap(), &Part::Outside(region), path("none"), |_, _| {});
+            assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "seed {seed}");
+            continue;
+        }
         let parts = [(Part::Inside(region), "inside"), (Part::Outside(region), "outside")];
         for (part, name) in parts {
             let expected = naive(&config, &voxels, &part);
@@ -102,4 +108,19 @@ fn a_box_that_is_none_is_refused() {
         }
     }
     assert!(!disk.files().keys().any(|file| file.starts_with(path("part"))));
+}
+
+#[test]
+fn no_map_is_made_inside_of_another() {
+    let mut random = Random(7);
+    let (disk, config) = (disk(), config(&mut random));
+    write_map(&disk, &path("whole"), &config, &random_voxels(&mut random, 50));
+    disk.shared().create_folder(&path("whole/snapshots")).unwrap();
+    let before = disk.files();
+    let everything = Part::Inside(Aabb { min: [-1e3; 3], max: [1e3; 3] });
+    for inside in ["whole/tile_0_0_90", "whole/snapshots/x"] {
+        let refused = crop(&open(&disk, &path("whole")).unwrap(), &everything, path(inside), |_, _| {});
+        assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "{inside}: {refused:?}");
+    }
+    assert_eq!(disk.files(), before);
 }

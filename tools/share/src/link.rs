@@ -22,9 +22,11 @@ pub struct Message {
 }
 
 /// Messages that wait to be taken. What does not fit is lost, and catch-up mends it.
-const WAITING: usize = 4096;
+const WAITING: usize = 1024;
 /// Larger messages are none of ours.
 const MAX_BYTES: usize = 64 << 10;
+/// And so are longer keys.
+const MAX_KEY: usize = 128;
 
 impl Link {
     pub fn open(args: &Args) -> anyhow::Result<Self> {
@@ -46,6 +48,10 @@ impl Link {
         // Zenoh's own defaults would listen on every interface and scout by multicast; a file has to ask for that.
         if !file.says("mode") {
             set("mode", "\"peer\"".into())?;
+        }
+        if !file.says("transport/link/rx/max_message_size") {
+            // Zenoh's own is a gigabyte, put together from fragments before anybody looks at it.
+            set("transport/link/rx/max_message_size", (2 * MAX_BYTES).to_string())?;
         }
         if args.scout || !file.says("scouting/multicast/enabled") {
             set("scouting/multicast/enabled", args.scout.to_string())?;
@@ -73,7 +79,7 @@ impl Link {
         let sender = self.sender.clone();
         let take = move |sample: zenoh::sample::Sample| {
             let payload = sample.payload();
-            if payload.len() > MAX_BYTES {
+            if payload.len() > MAX_BYTES || sample.key_expr().len() > MAX_KEY {
                 return;
             }
             let message =
