@@ -66,7 +66,7 @@ fn wrong_snapshots_are_told_what_is_wrong() {
     output(&["build", text(&scans), "-o", text(&map)]);
     let map = text(&map);
     output(&["snapshot", map, "a"]);
-    let past = format!("{map}@none");
+    let (past, present) = (format!("{map}@none"), format!("{map}@a"));
     for (arguments, message) in [
         (&["snapshot", map, "a"][..], "delete that snapshot first"),
         (&["snapshot", map, "now"], "cannot be a snapshot's name"),
@@ -76,6 +76,11 @@ fn wrong_snapshots_are_told_what_is_wrong() {
         (&["revert", map, "a", "--keep-as", "a"], "delete that snapshot first"),
         (&["digest", &past], "has none with the name none"),
         (&["diff", map, "a", "b"], "has none with the name b"),
+        (&["clear", &present, "--region", "0", "0", "0", "1", "1", "1"], "can be read and not changed"),
+        (&["decay", &present, "--halflife", "10"], "can be read and not changed"),
+        (&["verify", &present], "can be read and not changed"),
+        (&["convert", map, "-o", &present, "--storage", "compact"], "can be read and not changed"),
+        (&["build", text(&scans), "-o", &present], "can be read and not changed"),
     ] {
         let (code, said) = failure(arguments);
         assert_eq!(code, 2, "{arguments:?}: {said}");

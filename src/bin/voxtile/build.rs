@@ -1,6 +1,7 @@
 use crate::INTERRUPTED;
 use crate::args::{BuildArgs, InsertName, ModelName};
 use crate::flush_schedule::FlushSchedule;
+use crate::map_at::whole_map;
 use crate::octree_choice::octree_config;
 use crate::progress::Progress;
 use crate::scan_input::{self, is_standard_input};
@@ -37,7 +38,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
         // A first scan that cannot be mapped should not leave an empty map behind.
         first = next_scan(&mut *source)?;
         check(first.as_ref(), &config)?;
-        OutOfCoreTileMapper::create(&args.output, config)?
+        OutOfCoreTileMapper::create(whole_map(&args.output)?, config)?
     };
     let done = if args.resume {
         mapper.resume_input(&fingerprint)?

@@ -1,4 +1,5 @@
 use crate::args::ClearArgs;
+use crate::map_at::whole_map;
 use crate::memory;
 use crate::part::part_of;
 use crate::progress::Progress;
@@ -19,7 +20,7 @@ struct Summary<'a> {
 
 pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
-    let cleared = clear(&args.map, &part_of(&args.part)?, |done, all| progress.set(done, all))?;
+    let cleared = clear(whole_map(&args.map)?, &part_of(&args.part)?, |done, all| progress.set(done, all))?;
     drop(progress);
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -1,5 +1,5 @@
 use crate::args::ConvertArgs;
-use crate::map_at::read_map;
+use crate::map_at::{read_map, whole_map};
 use crate::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
@@ -39,8 +39,9 @@ pub fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let progress = Progress::over_tiles(0);
     let mut conversion = read_map(&args.map, |reader| {
-        let written =
-            convert(reader, &args.output, args.storage.into(), |done, all| progress.set(done, all))?;
+        let written = convert(reader, whole_map(&args.output)?, args.storage.into(), |done, all| {
+            progress.set(done, all)
+        })?;
         Ok(Conversion::of(args, reader, &written)?)
     })?;
     drop(progress);

@@ -1,5 +1,5 @@
 use crate::args::CropArgs;
-use crate::map_at::read_map;
+use crate::map_at::{read_map, whole_map};
 use crate::memory;
 use crate::part::part_of;
 use crate::progress::Progress;
@@ -20,9 +20,9 @@ struct Summary<'a> {
 
 pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
-    let part = part_of(&args.part)?;
+    let (part, output) = (part_of(&args.part)?, whole_map(&args.output)?);
     let written =
-        read_map(&args.map, |map| Ok(crop(map, &part, &args.output, |done, all| progress.set(done, all))?))?;
+        read_map(&args.map, |map| Ok(crop(map, &part, output, |done, all| progress.set(done, all))?))?;
     drop(progress);
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -1,4 +1,5 @@
 use crate::args::DecayArgs;
+use crate::map_at::whole_map;
 use crate::memory;
 use crate::progress::Progress;
 use indicatif::HumanCount;
@@ -20,7 +21,7 @@ pub fn run(args: &DecayArgs) -> anyhow::Result<ExitCode> {
     let mut rule = Decay::new(args.halflife).with_forget_below(args.forget_below.unwrap_or(0.0));
     rule.scans = args.scans;
     let progress = Progress::over_tiles(0);
-    let decayed = decay(&args.map, &rule, |done, all| progress.set(done, all))?;
+    let decayed = decay(whole_map(&args.map)?, &rule, |done, all| progress.set(done, all))?;
     drop(progress);
     let mut out = std::io::stdout().lock();
     if args.json {
@@ -29,6 +30,9 @@ pub fn run(args: &DecayArgs) -> anyhow::Result<ExitCode> {
     } else {
         let Decayed { scans, factor, voxels, voxels_forgotten, tiles, tiles_removed, .. } = decayed;
         writeln!(out, "decayed   by {} scans: log-odds times {factor:.6}", HumanCount(scans))?;
+        if scans == 0 {
+            writeln!(out, "          the map has taken none since it last faded; --scans N names a number")?;
+        }
         writeln!(out, "voxels    {}; {} forgotten", HumanCount(voxels), HumanCount(voxels_forgotten))?;
         writeln!(
             out,

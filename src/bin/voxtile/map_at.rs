@@ -34,6 +34,24 @@ impl MapAt {
     }
 }
 
+/// A map that is to be changed, made or looked at as a whole: not a snapshot of one.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` where there is a map at `MAP`.
+pub fn whole_map(path: &Path) -> Result<&Path> {
+    let MapAt { map, snapshot } = MapAt::of(path)?;
+    if snapshot.is_some() && map.join("metadata.json").exists() {
+        let reason = format!(
+            "names a snapshot, which can be read and not changed; name the map {}, or make a map of the snapshot with `voxtile \
+             convert`",
+            map.display()
+        );
+        return Err(Error::argument(path.display().to_string(), reason));
+    }
+    Ok(path)
+}
+
 /// Answers from one state of a map, or from a snapshot of it (`MAP@SNAPSHOT`); if a writer flushes the map meanwhile, begins
 /// again with the new state.
 pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Result<T>) -> anyhow::Result<T> {

@@ -1,5 +1,5 @@
 use crate::args::MergeArgs;
-use crate::map_at::read_all_maps;
+use crate::map_at::{read_all_maps, whole_map};
 use crate::memory;
 use crate::progress::Progress;
 use crate::written::print_written;
@@ -23,7 +23,7 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let prefer = args.prefer.map(Into::into);
     let merged = read_all_maps(&args.maps, |maps| {
-        Ok(merge(maps, &args.output, prefer, |done, all| progress.set(done, all))?)
+        Ok(merge(maps, whole_map(&args.output)?, prefer, |done, all| progress.set(done, all))?)
     })?;
     drop(progress);
     let warnings = warnings_of(&args.maps, &merged);

@@ -1,4 +1,5 @@
 use crate::args::RepairArgs;
+use crate::map_at::whole_map;
 use crate::progress::Progress;
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -21,7 +22,7 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let mut done = Vec::new();
     let repair = repair(
-        &args.map,
+        whole_map(&args.map)?,
         |action| {
             if !args.json {
                 progress.print(&action.to_string());

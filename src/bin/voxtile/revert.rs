@@ -1,4 +1,5 @@
 use crate::args::RevertArgs;
+use crate::map_at::whole_map;
 use crate::memory;
 use crate::progress::Progress;
 use indicatif::HumanCount;
@@ -21,7 +22,7 @@ struct Summary<'a> {
 pub fn run(args: &RevertArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let keep_as = args.keep_as.as_ref();
-    let reverted = revert(&args.map, &args.name, keep_as, |done, all| progress.set(done, all))?;
+    let reverted = revert(whole_map(&args.map)?, &args.name, keep_as, |done, all| progress.set(done, all))?;
     drop(progress);
     let mut out = std::io::stdout().lock();
     if args.json {

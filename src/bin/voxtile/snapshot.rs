@@ -1,4 +1,5 @@
 use crate::args::SnapshotArgs;
+use crate::map_at::whole_map;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::session::{SnapshotInfo, delete_snapshot, snapshot, snapshots};
@@ -10,10 +11,10 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
     let info = if args.delete {
         // What it was, before it is gone.
         let info = find()?;
-        delete_snapshot(&args.map, &args.name)?;
+        delete_snapshot(whole_map(&args.map)?, &args.name)?;
         info
     } else {
-        snapshot(&args.map, &args.name)?;
+        snapshot(whole_map(&args.map)?, &args.name)?;
         find()?
     };
     let mut out = std::io::stdout().lock();

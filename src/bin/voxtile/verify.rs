@@ -1,4 +1,5 @@
 use crate::args::VerifyArgs;
+use crate::map_at::whole_map;
 use crate::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
@@ -24,7 +25,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let mut findings = Vec::new();
     let verification = verify(
-        &args.map,
+        whole_map(&args.map)?,
         |finding| {
             if !args.json {
                 progress.print(&finding.to_string());
