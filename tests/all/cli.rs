@@ -468,10 +468,16 @@ fn ctrl_c_flushes_and_says_how_far_it_got() {
 #[cfg(unix)]
 #[test]
 fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
-    use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     let voxtile = folder.path().join("voxtile");
-    std::fs::copy(env!("CARGO_BIN_EXE_voxtile"), &voxtile).unwrap();
+    // By a process of its own: what this one writes cannot be run while a process that another test has just begun still
+    // holds it open.
+    let shell = |line: &str, path: &std::path::Path| {
+        let program = env!("CARGO_BIN_EXE_voxtile");
+        let status = std::process::Command::new("sh").args(["-c", line, program]).arg(path).status();
+        assert!(status.unwrap().success(), "{line}");
+    };
+    shell(r#"cp "$0" "$1""#, &voxtile);
     let run = || {
         let mut command = std::process::Command::new(&voxtile);
         command
@@ -486,8 +492,7 @@ fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
     assert!(said.contains("cannot run voxtile-share") && said.lines().count() == 1, "{said}");
 
     let program = folder.path().join("voxtile-share");
-    std::fs::write(&program, "#!/bin/sh\necho \"$@\"\nexit 7\n").unwrap();
-    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    shell(r##"printf '#!/bin/sh\necho "$@"\nexit 7\n' >"$1" && chmod +x "$1""##, &program);
     let ran = run();
     assert_eq!(String::from_utf8_lossy(&ran.stdout), "--subscribe -o map --help\n");
     assert_eq!(ran.status.code(), Some(7));
