@@ -15,6 +15,8 @@ mod convert;
 mod corruption;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
 mod faults;
+/// Files of every kind, of every version.
+mod format_fixtures;
 /// Inputs that fuzzing found worth keeping, once more.
 mod fuzz_corpus;
 /// Builds that are resumed, maps that are verified and repaired, from the command line.
