@@ -5,6 +5,7 @@ use crate::maths::logit;
 use crate::sensor::SensorModel;
 use crate::space::Grid;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 pub use storage::Storage;
 
 /// How a map is made and how much memory it may use.
@@ -75,6 +76,15 @@ pub enum InsertMode {
     PerScan,
     /// Once a ray, in the order of the points (OctoMap's `insertPointCloudRays`).
     PerRay,
+}
+
+impl fmt::Display for InsertMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::PerScan => "per-scan",
+            Self::PerRay => "per-ray",
+        })
+    }
 }
 
 /// What each tile keeps for coarse questions. The answers and the files are the same.

@@ -89,6 +89,9 @@ pub enum Error {
         /// The folder of the map.
         path: PathBuf,
     },
+    /// What was under way was to be given up, and is: nothing of it is in the map.
+    #[error("stopped as asked; the map is as before")]
+    Stopped,
     /// The operation would undo unsaved work: flush first, or say that it may be lost.
     #[error("tile {tile} has updates that are not on disk; flush first, or ask to discard them")]
     UnsavedChanges {

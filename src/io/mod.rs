@@ -7,12 +7,16 @@
 //! voxtile's scan stream ┘
 //! ```
 
+mod file_order;
 mod fingerprint;
 mod lzf;
 mod pcd;
 mod pcd_folder;
+mod pcd_viewpoint;
 mod points;
+mod pose_source;
 mod poses;
+mod scan_chain;
 mod scan_graph;
 mod scan_log;
 mod scan_stream;
@@ -23,7 +27,9 @@ mod voxel_writer;
 
 pub use pcd::{PcdCloud, read_pcd};
 pub use points::read_points;
+pub use pose_source::PoseSource;
 pub use poses::{parse_poses, read_poses};
+pub use scan_chain::{ScanChain, ScanMark};
 pub use scan_graph::read_scan_graph;
 pub use scan_log::read_scan_log;
 pub use scan_stream::read_scan_stream;

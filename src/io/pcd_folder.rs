@@ -1,22 +1,23 @@
+use super::file_order::{name_of, sort_naturally};
 use super::fingerprint::Fingerprint;
 use super::pcd::read_pcd;
-use super::poses::read_poses;
+use super::pcd_viewpoint::viewpoint_of_file;
+use super::pose_source::{PoseSource, poses_of};
 use super::sensor_scan::SensorScan;
 use super::source::ScanSource;
-use crate::error::{Error, Result};
+use crate::error::{Error, FormatError, Result};
 use nalgebra::Isometry3;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// PCD files in the order of their names, one scan each, and their poses.
+/// PCD files in the natural order of their names, one scan each, and their poses.
 pub(super) struct PcdFolder {
     files: Vec<PathBuf>,
     /// One a file; `None` takes each file's `VIEWPOINT`.
     poses: Option<Vec<Isometry3<f64>>>,
+    pose_source: PoseSource,
     next: usize,
 }
-
-const POSE_FILES: [&str; 2] = ["poses_tum.txt", "poses_kitti.txt"];
 
 impl PcdFolder {
     pub(super) fn open(path: &Path, poses: Option<&Path>) -> Result<Self> {
@@ -30,27 +31,17 @@ impl PcdFolder {
             let reason = "no .pcd file in this folder, nor in a folder scans/ below it";
             return Err(Error::argument(path.display().to_string(), reason));
         }
-        Self::new(files, poses, &folder)
+        Self::new(files, poses, Some(&folder))
     }
 
     pub(super) fn open_file(path: &Path, poses: Option<&Path>) -> Result<Self> {
         // The poses beside a single file are those of its whole folder.
-        let nowhere = Path::new("");
-        Self::new(vec![path.to_owned()], poses, nowhere)
+        Self::new(vec![path.to_owned()], poses, None)
     }
 
-    fn new(files: Vec<PathBuf>, poses: Option<&Path>, folder: &Path) -> Result<Self> {
-        let found = poses.map(Path::to_owned).or_else(|| poses_for(folder));
-        let Some(path) = found else { return Ok(Self { files, poses: None, next: 0 }) };
-        let poses = read_poses(&path)?;
-        if poses.len() != files.len() {
-            let (poses, files) = (poses.len(), files.len());
-            let reason = format!(
-                "{poses} poses for {files} scan files; there must be one line a file, in sorted order"
-            );
-            return Err(Error::argument(path.display().to_string(), reason));
-        }
-        Ok(Self { files, poses: Some(poses), next: 0 })
+    fn new(files: Vec<PathBuf>, poses: Option<&Path>, folder: Option<&Path>) -> Result<Self> {
+        let (pose_source, poses) = poses_of(&files, poses, folder)?;
+        Ok(Self { files, poses, pose_source, next: 0 })
     }
 }
 
@@ -63,6 +54,10 @@ impl ScanSource for PcdFolder {
         let Some(path) = self.files.get(self.next) else { return Ok(None) };
         let bytes = fs::read(path).map_err(|error| Error::io(path, "read", error))?;
         let cloud = read_pcd(&bytes).map_err(|error| error.in_input(path))?;
+        if self.pose_source == PoseSource::Viewpoint && viewpoint_of_file(path).is_none() {
+            let reason = "no VIEWPOINT in this file, which other files of the folder have: where it was taken is not known";
+            return Err(FormatError::at_line(1, reason).in_input(path));
+        }
         let world_from_sensor = self.poses.as_ref().map_or(cloud.world_from_sensor, |poses| poses[self.next]);
         self.next += 1;
         Ok(Some(SensorScan {
@@ -77,6 +72,15 @@ impl ScanSource for PcdFolder {
         let skipped = scans.min(self.files.len() - self.next);
         self.next += skipped;
         Ok(skipped)
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        self.next += 1;
+        true
+    }
+
+    fn pose_source(&self) -> PoseSource {
+        self.pose_source.clone()
     }
 
     fn fingerprint(&self) -> Result<String> {
@@ -96,20 +100,6 @@ fn pcd_files(folder: &Path) -> Result<Vec<PathBuf>> {
             files.push(path);
         }
     }
-    files.sort_unstable_by(|a, b| a.file_name().cmp(&b.file_name()));
+    sort_naturally(&mut files);
     Ok(files)
-}
-
-/// The pose file in a folder, or beside it.
-fn poses_for(folder: &Path) -> Option<PathBuf> {
-    if folder.as_os_str().is_empty() {
-        return None;
-    }
-    let beside = folder.join("..");
-    let places = [folder, &*beside];
-    places.iter().flat_map(|place| POSE_FILES.map(|name| place.join(name))).find(|path| path.is_file())
-}
-
-fn name_of(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -1,6 +1,107 @@
 use crate::error::{Error, FormatError, Result};
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
-use std::path::Path;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Poses of a file, with their time stamps where it has any.
+pub(super) struct Poses {
+    poses: Vec<Isometry3<f64>>,
+    /// Seconds, each with the number of its line; of a TUM file alone.
+    stamps: Vec<(u64, f64)>,
+}
+
+/// The beginning of a file that is looked at to tell what it is.
+const GLANCE_BYTES: u64 = 1 << 14;
+/// Numbers in file names are compared with time stamps if both are beyond this many seconds: counts are not.
+const LEAST_STAMP_S: f64 = 1e6;
+
+impl Poses {
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+        let text = String::from_utf8_lossy(&text);
+        let lines: std::result::Result<Vec<_>, _> = lines(&text).collect();
+        let lines = lines.map_err(|error| error.in_input(path))?;
+        let stamps = lines.iter().filter_map(|(line, pose)| pose.stamp_s.map(|stamp_s| (*line, stamp_s)));
+        Ok(Self { stamps: stamps.collect(), poses: lines.iter().map(|(_, pose)| pose.world_from_sensor).collect() })
+    }
+
+    /// Whether these are the poses of these files: as many, and in the order of time as the files are in theirs.
+    ///
+    /// # Errors
+    ///
+    /// Another number of poses, time stamps that go back.
+    pub(super) fn check(&self, path: &Path, files: &[PathBuf]) -> Result<()> {
+        let wrong = |reason: String| Err(Error::argument(path.display().to_string(), reason));
+        if self.poses.len() != files.len() {
+            let (poses, files) = (self.poses.len(), files.len());
+            return wrong(format!(
+                "{poses} poses for {files} scan files; there must be one line a file, in the natural order of their names \
+                 (scan2 before scan10)"
+            ));
+        }
+        if let Some(pair) = self.stamps.windows(2).find(|pair| pair[1].1 < pair[0].1) {
+            let ((_, before), (line, stamp)) = (pair[0], pair[1]);
+            return wrong(format!(
+                "line {line}: time stamp {stamp} comes after {before}, but line by line these are the poses of the files in \
+                 the natural order of their names; put the lines in that order (stamps that mean nothing may all be 0)"
+            ));
+        }
+        if let Some((file, seconds)) = self.first_beside_its_file(files) {
+            log::warn!(
+                "{}: the number in {} is {seconds:.3} s further from its pose's time stamp than those of most files: is a \
+                 line or a file missing?",
+                path.display(),
+                file.display()
+            );
+        }
+        Ok(())
+    }
+
+    pub(super) fn into_poses(self) -> Vec<Isometry3<f64>> {
+        self.poses
+    }
+
+    /// Where the names of files are time stamps, the first that does not belong to its pose, and by how many seconds.
+    fn first_beside_its_file<'f>(&self, files: &'f [PathBuf]) -> Option<(&'f PathBuf, f64)> {
+        let stamps: Vec<f64> = self.stamps.iter().map(|&(_, stamp)| stamp).collect();
+        let (first, last) = (*stamps.first()?, *stamps.last()?);
+        let names: Vec<f64> = files.iter().map(|path| number_in(path)).collect::<Option<_>>()?;
+        if stamps.len() != names.len() || first < LEAST_STAMP_S || last <= first {
+            return None;
+        }
+        let spacing = (last - first) / (stamps.len() - 1) as f64;
+        let near = first - (last - first) - 1.0..=last + (last - first) + 1.0;
+        let unit = [1.0, 1e-3, 1e-6, 1e-9].into_iter().find(|unit| near.contains(&(names[0] * unit)))?;
+        let apart: Vec<f64> = names.iter().zip(&stamps).map(|(name, stamp)| name * unit - stamp).collect();
+        let mut sorted = apart.clone();
+        sorted.sort_by(f64::total_cmp);
+        let most = sorted[sorted.len() / 2];
+        let beside = |&k: &usize| (apart[k] - most).abs() > 0.5 * spacing;
+        (0..apart.len()).find(beside).map(|k| (&files[k], (apart[k] - most).abs()))
+    }
+}
+
+/// Whether a file is a text that begins as a file of poses does.
+pub(super) fn looks_like_poses(path: &Path) -> bool {
+    let is_text = path.extension().is_some_and(|extension| {
+        ["txt", "tum", "kitti", "csv"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+    });
+    let mut text = Vec::new();
+    let mut glance = || File::open(path)?.take(GLANCE_BYTES).read_to_end(&mut text);
+    if !is_text || !path.is_file() || glance().is_err() {
+        return false;
+    }
+    let first = lines(&String::from_utf8_lossy(&text)).next();
+    first.is_some_and(|line| line.is_ok())
+}
+
+/// The number that the name of a file ends with.
+fn number_in(path: &Path) -> Option<f64> {
+    let stem = path.file_stem()?.to_str()?;
+    let digits = stem.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '.').len();
+    stem[digits..].trim_start_matches('.').parse().ok()
+}
 
 /// Reads poses, sensor to world, one a line; empty lines and those that begin with `#` are skipped.
 ///
@@ -20,18 +121,34 @@ pub fn read_poses(path: &Path) -> Result<Vec<Isometry3<f64>>> {
 ///
 /// Those of [`read_poses`] that are about a line.
 pub fn parse_poses(text: &str) -> std::result::Result<Vec<Isometry3<f64>>, FormatError> {
-    let lines =
-        (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.trim().starts_with('#'));
-    lines.map(|(number, line)| parse(line).map_err(|reason| FormatError::at_line(number, reason))).collect()
+    lines(text).map(|line| line.map(|(_, pose)| pose.world_from_sensor)).collect()
 }
 
-fn parse(line: &str) -> std::result::Result<Isometry3<f64>, String> {
+/// A line of a file of poses.
+struct StampedPose {
+    /// Seconds, in a TUM file.
+    stamp_s: Option<f64>,
+    world_from_sensor: Isometry3<f64>,
+}
+
+/// The poses of a text, each with the number of its line.
+fn lines(text: &str) -> impl Iterator<Item = std::result::Result<(u64, StampedPose), FormatError>> {
+    let lines =
+        (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.trim().starts_with('#'));
+    lines.map(|(number, line)| match parse(line) {
+        Ok(pose) => Ok((number, pose)),
+        Err(reason) => Err(FormatError::at_line(number, reason)),
+    })
+}
+
+fn parse(line: &str) -> std::result::Result<StampedPose, String> {
     let numbers: Vec<f64> = line
         .split([' ', '\t', ',', '\r'])
         .filter(|word| !word.is_empty())
         .map(|word| word.parse().map_err(|_| format!("`{word}` is not a number")))
         .collect::<std::result::Result<_, _>>()?;
-    // The time is not used; everything else must be finite.
+    // The time is good for a check; everything else must be finite.
+    let stamp_s = (numbers.len() == 8).then(|| numbers[0]).filter(|stamp| stamp.is_finite());
     let pose = if numbers.len() == 8 { &numbers[1..] } else { &numbers[..] };
     if let Some(number) = pose.iter().find(|number| !number.is_finite()) {
         return Err(format!("{number} in a pose"));
@@ -39,7 +156,8 @@ fn parse(line: &str) -> std::result::Result<Isometry3<f64>, String> {
     match *pose {
         [x, y, z, qx, qy, qz, qw] => {
             let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz))?;
-            Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+            let world_from_sensor = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+            Ok(StampedPose { stamp_s, world_from_sensor })
         }
         [a, b, c, x, d, e, f, y, g, h, i, z] => {
             let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
@@ -50,7 +168,8 @@ fn parse(line: &str) -> std::result::Result<Isometry3<f64>, String> {
             let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
             // The matrix is a rotation only to a few digits; a pose must not scale.
             let rotation = UnitQuaternion::new_normalize(rotation.into_inner());
-            Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+            let world_from_sensor = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+            Ok(StampedPose { stamp_s, world_from_sensor })
         }
         _ => Err(format!("{} numbers; a pose has 8 (TUM) or 12 (KITTI)", numbers.len())),
     }

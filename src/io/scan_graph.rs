@@ -16,7 +16,9 @@ use std::path::{Path, PathBuf};
 ///
 /// A stream that fails or ends before its first four bytes; what is wrong with a scan comes with that scan.
 pub fn read_scan_graph<R: Read>(input: R, file_bytes: u64, path: &Path) -> Result<impl ScanSource + use<R>> {
-    let mut graph = ScanGraph { path: path.to_owned(), input, offset: 0, file_bytes, nodes: 0, done: 0 };
+    let path = path.to_owned();
+    let mut graph =
+        ScanGraph { path, input, offset: 0, file_bytes, nodes: 0, done: 0, is_past_error: false };
     // An empty graph is an empty file.
     if file_bytes > 0 {
         graph.nodes = u32::from_le_bytes(graph.bytes()?);
@@ -37,6 +39,8 @@ struct ScanGraph<R> {
     file_bytes: u64,
     nodes: u32,
     done: u32,
+    /// Whether the scan that was an error is behind us.
+    is_past_error: bool,
 }
 
 const POINT_BYTES: u64 = 28;
@@ -89,19 +93,26 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let at = self.offset;
         let [x, y, z] = self.vector()?;
         let [qw, qx, qy, qz] = self.vector()?;
+        let id = u32::from_le_bytes(self.bytes()?);
+        self.done += 1;
+        // What is wrong with a pose is no matter of where the next scan begins.
+        self.is_past_error = true;
         if ![x, y, z, qw, qx, qy, qz].iter().all(|number| number.is_finite()) {
             return Err(FormatError::at_offset(at, "a pose that is not finite").in_input(&self.path));
         }
         let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz))
             .map_err(|reason| FormatError::at_offset(at, reason).in_input(&self.path))?;
-        let id = u32::from_le_bytes(self.bytes()?);
-        self.done += 1;
+        self.is_past_error = false;
         Ok(Some(SensorScan {
             name: id.to_string(),
             points_in_sensor,
             intensities: None,
             world_from_sensor: Isometry3::from_parts(Translation3::new(x, y, z), rotation),
         }))
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        std::mem::take(&mut self.is_past_error)
     }
 
     fn fingerprint(&self) -> Result<String> {

@@ -27,6 +27,7 @@ pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result
         label: String::new(),
         has_intensities: false,
         done: 0,
+        is_past_error: false,
     };
     stream.read_header()?;
     Ok(stream)
@@ -40,6 +41,8 @@ struct ScanStream<R> {
     label: String,
     has_intensities: bool,
     done: u64,
+    /// Whether the scan that was an error is behind us: what was wrong with it is no matter of where it ends.
+    is_past_error: bool,
 }
 
 /// Room made at once for the points of a scan: the count in a damaged stream may be any.
@@ -102,12 +105,16 @@ impl<R: Read> ScanStream<R> {
         Ok(Some(u32::from_le_bytes([first[0], b, c, d])))
     }
 
-    fn pose(&mut self) -> Result<Isometry3<f64>> {
-        let at = self.offset;
+    fn pose_numbers(&mut self) -> Result<[f64; 7]> {
         let mut numbers = [0.0; 7];
         for number in &mut numbers {
             *number = f64::from_le_bytes(self.bytes("a pose")?);
         }
+        Ok(numbers)
+    }
+
+    /// The pose of the numbers that begin at an offset.
+    fn pose(&self, numbers: [f64; 7], at: u64) -> Result<Isometry3<f64>> {
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(self.wrong(at, "a pose that is not finite"));
         }
@@ -129,7 +136,9 @@ impl<R: Read> ScanSource for ScanStream<R> {
 
     fn next_scan(&mut self) -> Result<Option<SensorScan>> {
         let Some(count) = self.next_count()? else { return Ok(None) };
-        let world_from_sensor = self.pose()?;
+        self.is_past_error = false;
+        let at = self.offset;
+        let numbers = self.pose_numbers()?;
         let count = count as usize;
         let mut points_in_sensor = Vec::with_capacity(count.min(MOST_RESERVED));
         let mut intensities = self.has_intensities.then(|| Vec::with_capacity(count.min(MOST_RESERVED)));
@@ -145,7 +154,14 @@ impl<R: Read> ScanSource for ScanStream<R> {
         }
         let name = self.done.to_string();
         self.done += 1;
+        let pose = self.pose(numbers, at);
+        self.is_past_error = pose.is_err();
+        let world_from_sensor = pose?;
         Ok(Some(SensorScan { name, points_in_sensor, intensities, world_from_sensor }))
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        std::mem::take(&mut self.is_past_error)
     }
 
     fn fingerprint(&self) -> Result<String> {

@@ -1,11 +1,12 @@
 use super::pcd_folder::PcdFolder;
+use super::pose_source::PoseSource;
 use super::scan_graph::read_scan_graph;
 use super::scan_log::read_scan_log;
 use super::scan_stream::read_scan_stream;
 use super::sensor_scan::SensorScan;
 use crate::error::{Error, Result};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
 /// Scans one at a time, in order.
@@ -34,8 +35,21 @@ pub trait ScanSource {
         Ok(scans)
     }
 
+    /// After an error of [`ScanSource::next_scan`], goes past the scan that could not be read, so that the next call gives
+    /// the one behind it; `false` where nobody can tell where that begins.
+    fn pass_unread(&mut self) -> bool {
+        false
+    }
+
+    /// Where the poses come from.
+    fn pose_source(&self) -> PoseSource {
+        PoseSource::Scans
+    }
+
     /// What tells this input from others, wherever it lies: number and size of its files, and a BLAKE3 over their
     /// names, sizes and bytes and the poses. Reads every file once. Of a stream that can be read but once: its label.
+    ///
+    /// This is how maps of earlier versions know their input; a [`ScanChain`](super::ScanChain) tells scan by scan.
     ///
     /// # Errors
     ///
@@ -46,14 +60,19 @@ pub trait ScanSource {
 /// Opens scans by what the path is: a folder of PCD files (or one that holds it as `scans/`), one PCD file, an
 /// OctoMap scan graph (`.graph`) or scan log (`.log`), a scan stream of voxtile's (`.scans`).
 ///
-/// Poses of PCD files come from `poses`, or from `poses_tum.txt` or `poses_kitti.txt` in or beside the folder, or from
-/// the `VIEWPOINT` of each file.
+/// PCD files come in the natural order of their names (`scan2` before `scan10`). Their poses come from `poses`, or from
+/// `poses_tum.txt` or `poses_kitti.txt` in or beside the folder, or from the `VIEWPOINT` of each file;
+/// [`ScanSource::pose_source`] tells. `identity` as `poses` says that all scans are in the world frame.
 ///
 /// # Errors
 ///
-/// A path that is none of these, poses that do not match the files in number, a file that cannot be read.
-pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource>> {
-    let metadata = std::fs::metadata(path).map_err(|error| Error::io(path, "open", error))?;
+/// A path that is none of these, poses that do not match the files in number or order of time, more than one scan without
+/// any pose, a file that cannot be read.
+pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource + Send>> {
+    let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => Error::argument(path.display().to_string(), "there is no such file or folder"),
+        _ => Error::io(path, "open", error),
+    })?;
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     let open = || match File::open(path) {
         Ok(file) => Ok(BufReader::with_capacity(1 << 16, file)),

@@ -1,21 +1,28 @@
 //! How a map becomes durable: what waits is applied, what is dirty is written, and all of it committed.
 
 use super::adoption::adopt;
-use super::residency::{Input, Residency};
+use super::residency::Residency;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::space::TileIndex;
-use crate::store::{Extension, Metadata, hex};
+use crate::store::{Extension, InputRecord, MOST_INPUTS, Metadata, hex};
 use crate::tile::Tile;
 use std::sync::Arc;
 
 impl Residency {
-    /// Flushes, and with the flush what the map is being built from now.
-    pub(super) fn begin_input(&mut self, input: Input, scan_number: u64) -> Result<()> {
-        let before = self.input.replace(input);
+    /// Flushes, and with the flush what the map is being built from now. An input that the map took no scan of is
+    /// forgotten for it, and so is the earliest of too many.
+    pub(super) fn begin_input(&mut self, input: InputRecord, scan_number: u64) -> Result<()> {
+        let before = self.inputs.clone();
+        if self.inputs.last().is_some_and(|last| last.first_scan == scan_number) {
+            self.inputs.pop();
+        }
+        self.inputs.push(input);
+        let excess = self.inputs.len().saturating_sub(MOST_INPUTS);
+        self.inputs.drain(..excess);
         let flushed = self.flush(scan_number);
         if flushed.is_err() {
-            self.input = before;
+            self.inputs = before;
         }
         flushed
     }
@@ -104,13 +111,13 @@ impl Residency {
 
     /// Makes a map of the seed's format, before its first change, one of voxtile's own.
     pub(super) fn adopt(&mut self) -> Result<()> {
-        let Self { store, saver, config, input, .. } = self;
-        adopt(store, saver, config, |map_id| new_metadata(config, map_id, input.as_ref()))
+        let Self { store, saver, config, inputs, .. } = self;
+        adopt(store, saver, config, |map_id| new_metadata(config, map_id, inputs))
     }
 
     fn metadata(&self) -> Metadata {
         let map_id = self.store.map_id().unwrap_or_default();
-        let mut metadata = new_metadata(&self.config, map_id, self.input.as_ref());
+        let mut metadata = new_metadata(&self.config, map_id, &self.inputs);
         if let (Some(ext), Some(before)) = (&mut metadata.ext, &self.store.metadata().ext) {
             ext.decayed_scan = before.decayed_scan;
         }
@@ -119,7 +126,7 @@ impl Residency {
 }
 
 /// The metadata of a map; bounds and numbers are the store's to fill in.
-pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&Input>) -> Metadata {
+pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[InputRecord]) -> Metadata {
     let ext = Extension {
         empty: true,
         map_id: hex(&map_id),
@@ -128,8 +135,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&
         sensor_model: config.sensor_model,
         occupancy_threshold: config.occupancy_threshold,
         rays: config.rays,
-        input_fingerprint: input.map(|input| input.fingerprint.clone()),
-        input_first_scan: input.map_or(0, |input| input.first_scan),
+        inputs: inputs.to_vec(),
         decayed_scan: 0,
         storage: config.storage,
     };

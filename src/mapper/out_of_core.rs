@@ -1,15 +1,15 @@
 use super::flush::new_metadata;
 use super::map_id::new_map_id;
 use super::memory_plan::MemoryPlan;
-use super::residency::{Input, Residency};
+use super::residency::Residency;
 use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
-use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates};
+use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, VoxelIndex};
-use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStore};
+use crate::store::{Disk, FsDisk, InputContent, InputRecord, Metadata, SnapshotName, TileStore};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -49,7 +49,7 @@ impl OutOfCoreTileMapper {
     pub fn create_on(disk: Arc<dyn Disk>, folder: &Path, config: MapConfig) -> Result<Self> {
         let config = config.validated()?;
         let map_id = new_map_id();
-        let store = TileStore::create(disk, folder, new_metadata(&config, map_id, None), map_id)?;
+        let store = TileStore::create(disk, folder, new_metadata(&config, map_id, &[]), map_id)?;
         Ok(Self::new(config, store))
     }
 
@@ -75,9 +75,9 @@ impl OutOfCoreTileMapper {
     /// # Errors
     ///
     /// As for [`Mapper::flush`].
-    pub fn begin_input(&mut self, fingerprint: impl Into<String>) -> Result<()> {
+    pub fn begin_input(&mut self, input: impl Into<InputRecord>) -> Result<()> {
         let scan_number = self.scan_number;
-        let input = Input { fingerprint: fingerprint.into(), first_scan: scan_number };
+        let input = InputRecord { first_scan: scan_number, ..input.into() };
         self.residency_mut().begin_input(input, scan_number)
     }
 
@@ -88,25 +88,50 @@ impl OutOfCoreTileMapper {
     ///
     /// [`Error::Mismatch`] with what differs, if the map was built from another input or with other ranges or another
     /// insert mode; and as for [`Mapper::flush`].
-    pub fn resume_input(&mut self, fingerprint: &str) -> Result<u64> {
+    pub fn resume_input(&mut self, name: &str) -> Result<u64> {
         let scan_number = self.scan_number;
-        let rays = self.config.rays;
-        let residency = self.residency_mut();
-        let found = match residency.input() {
-            Some(input) if input.fingerprint == fingerprint => {
+        let found = match self.residency_mut().inputs.last() {
+            Some(input) if input.content.is_none() && input.name == name => {
                 let done = scan_number - input.first_scan.min(scan_number);
-                check_rays(residency.store(), &rays)?;
+                self.check_rays()?;
                 return Ok(done);
             }
-            Some(input) => input.fingerprint.clone(),
+            Some(input) => input.name.clone(),
             None if scan_number == 0 => {
-                self.begin_input(fingerprint)?;
+                self.begin_input(name)?;
                 return Ok(0);
             }
             None => "that it does not know".to_owned(),
         };
-        let path = residency.store().folder().to_owned();
-        Err(Error::Mismatch { path, what: "been built from input", found, wanted: fingerprint.to_owned() })
+        let wanted = name.to_owned();
+        Err(Error::Mismatch { path: self.folder(), what: "been built from input", found, wanted })
+    }
+
+    /// What the map was built from, the latest last.
+    pub fn inputs(&self) -> Vec<InputRecord> {
+        self.lock().inputs.clone()
+    }
+
+    /// Says what has been taken of the input that the map is being built from; the next flush keeps it. To be said after
+    /// each scan, so that every flush has what belongs to it.
+    pub fn note_input_content(&mut self, content: InputContent) {
+        if let Some(input) = self.residency_mut().inputs.last_mut() {
+            input.content = Some(content);
+        }
+    }
+
+    /// What was begun with some ranges and insert mode goes on with them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Mismatch`] if the map was last built with others.
+    pub fn check_rays(&self) -> Result<()> {
+        check_rays(self.lock().store(), &self.config.rays)
+    }
+
+    /// Lets a scan that is being inserted be given up: [`Mapper::insert_scan`] then ends with [`Error::Stopped`].
+    pub fn stop_with(&mut self, stop: Stop) {
+        self.tracer.stop_with(stop);
     }
 
     /// Flushes, and keeps the map as it is then under a name: a snapshot, which stays until it is deleted
@@ -241,6 +266,7 @@ impl Mapper for OutOfCoreTileMapper {
         let most_bytes = MemoryPlan::new(self.config.memory).updates_bytes;
         let put_in_files = &mut |part| residency.put_in_files(part, scan_number);
         let traced = trace(&mut self.tracer, &self.config, scan, most_bytes, put_in_files);
+        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
         let inserted = traced.and_then(|updates| self.accept(updates));
         if inserted.is_err() {
             self.residency_mut().give_up_scan();
@@ -263,7 +289,6 @@ impl Mapper for OutOfCoreTileMapper {
     }
 }
 
-/// What was begun with some ranges and insert mode goes on with them.
 fn check_rays(store: &TileStore, rays: &RayConfig) -> Result<()> {
     let Some(ext) = &store.metadata().ext else { return Ok(()) };
     let mismatch = |what, found: String, wanted: String| {
@@ -277,7 +302,7 @@ fn check_rays(store: &TileStore, rays: &RayConfig) -> Result<()> {
         return mismatch("been built with ranges of", range(&ext.rays), range(rays));
     }
     if ext.rays.insert_mode != rays.insert_mode {
-        let mode = |rays: &RayConfig| format!("{:?}", rays.insert_mode);
+        let mode = |rays: &RayConfig| rays.insert_mode.to_string();
         return mismatch("been built with insert mode", mode(&ext.rays), mode(rays));
     }
     Ok(())
@@ -302,7 +327,7 @@ fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> R
     }
     let Some(ext) = &metadata.ext else { return Ok(()) };
     if ext.sensor_model != config.sensor_model {
-        let (found, wanted) = (format!("{:?}", ext.sensor_model), format!("{:?}", config.sensor_model));
+        let (found, wanted) = (ext.sensor_model.to_string(), config.sensor_model.to_string());
         return Err(mismatch("sensor model", found, wanted));
     }
     if ext.occupancy_threshold != config.occupancy_threshold {

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::scan::{ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, VoxelIndex};
-use crate::store::TileStore;
+use crate::store::{InputRecord, TileStore};
 use crate::tile::{OctreeFactory, Table, Tile};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
@@ -56,8 +56,8 @@ pub(super) struct Residency {
     pub(super) scan_bytes: usize,
     pub(super) io: IoCounts,
     pub(super) stalls: Stalls,
-    /// What the map is being built from, kept with it at the next flush.
-    pub(super) input: Option<Input>,
+    /// What the map was built from and, last, is being built from, kept with it at the next flush.
+    pub(super) inputs: Vec<InputRecord>,
 }
 
 /// By how many bytes an update may be expected to make a tile larger, or what waits for it.
@@ -82,21 +82,10 @@ pub(super) struct Fetched {
     pub(super) is_dirty: bool,
 }
 
-/// An input that a map is built from, and how many scans the map had taken before.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Input {
-    pub(super) fingerprint: String,
-    pub(super) first_scan: u64,
-}
-
 impl Residency {
     pub(super) fn new(config: MapConfig, store: TileStore) -> Self {
         let plan = MemoryPlan::new(config.memory);
-        let ext = store.metadata().ext.as_ref();
-        let input = ext.and_then(|ext| {
-            let first_scan = ext.input_first_scan;
-            ext.input_fingerprint.clone().map(|fingerprint| Input { fingerprint, first_scan })
-        });
+        let inputs = store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone());
         Self {
             octrees: OctreeFactory::new(config.octree),
             plan,
@@ -114,7 +103,7 @@ impl Residency {
             scan_bytes: plan.least_scan_bytes,
             io: IoCounts::default(),
             stalls: Stalls::default(),
-            input,
+            inputs,
             config,
         }
     }
@@ -259,10 +248,6 @@ impl Residency {
         self.pending.contains(index)
             || self.tiles.peek(index).is_some_and(|tile| tile.is_dirty())
             || self.cold.get(index).is_some_and(|tile| tile.is_dirty)
-    }
-
-    pub(super) fn input(&self) -> Option<&Input> {
-        self.input.as_ref()
     }
 
     /// Drops a tile from memory, so that the next question reads it from disk.

@@ -87,7 +87,7 @@ impl Shape {
             Self::Box(bounds) => bounds,
         };
         let finite = bounds.min.iter().chain(&bounds.max).all(|coordinate| coordinate.is_finite());
-        if finite { Ok(bounds) } else { Err(Error::argument("body", format!("{self:?} is not finite"))) }
+        if finite { Ok(bounds) } else { Err(Error::argument("body", format!("{bounds} is not finite"))) }
     }
 
     /// Whether the body touches a voxel.

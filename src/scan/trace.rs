@@ -10,6 +10,7 @@ use super::ray_end::RayEnd;
 use super::ray_origin::RayOrigin;
 use super::rounds::rounds;
 use super::slab_ray::SlabRay;
+use super::stop::Stop;
 use super::trace_memory::TraceMemory;
 use super::window::Window;
 use super::{PackedUpdates, Scan, ScanReport, ScanUpdates};
@@ -34,6 +35,7 @@ pub struct ScanTracer {
     /// One for every part of the rays.
     every_ray: Vec<EveryRayCollector>,
     memory: TraceMemory,
+    stop: Stop,
 }
 
 impl ScanTracer {
@@ -81,7 +83,7 @@ impl ScanTracer {
         put_aside: &mut PutAside<'_>,
     ) -> Result<ScanUpdates> {
         check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
-        let fan = Fan::new(grid, model, rays, scan)?;
+        let fan = Fan::new(grid, model, rays, scan, self.stop.clone())?;
         let once_a_voxel = rays.insert_mode == InsertMode::PerScan;
         let collectors = fan.parts(once_a_voxel);
         let met = self.memory.may_be_short(&fan.window, collectors).then(|| fan.pages_on_the_way());
@@ -124,7 +126,7 @@ impl ScanTracer {
             InsertMode::PerScan => self.trace(grid, model, rays, scan),
             InsertMode::PerRay => {
                 check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
-                Ok(Fan::new(grid, model, rays, scan)?.every_ray_in_order())
+                Ok(Fan::new(grid, model, rays, scan, self.stop.clone())?.every_ray_in_order())
             }
         }
     }
@@ -132,6 +134,17 @@ impl ScanTracer {
     /// A tracer that keeps to so many bytes for its marks, if need be by following the rays several times.
     pub fn with_memory_bytes(bytes: usize) -> Self {
         Self { memory: TraceMemory::new(bytes), ..Self::default() }
+    }
+
+    /// From when this is set on, rays of a scan are left out, so that the trace comes to its end: its updates are then
+    /// good for nothing.
+    pub(crate) fn stop_with(&mut self, stop: Stop) {
+        self.stop = stop;
+    }
+
+    /// Whether the last trace was to be given up.
+    pub(crate) fn stop(&self) -> &Stop {
+        &self.stop
     }
 
     fn note_memory(&mut self) {
@@ -184,14 +197,21 @@ struct Fan<'a> {
     origin: RayOrigin,
     window: Window,
     range: RangeRule,
+    stop: Stop,
 }
 
 impl<'a> Fan<'a> {
-    fn new(grid: &'a Grid, model: &'a SensorModel, rays: &'a RayConfig, scan: &'a Scan) -> Result<Self> {
+    fn new(
+        grid: &'a Grid,
+        model: &'a SensorModel,
+        rays: &'a RayConfig,
+        scan: &'a Scan,
+        stop: Stop,
+    ) -> Result<Self> {
         let voxel = origin_voxel(grid, scan)?;
         let origin = RayOrigin::new(grid.to_voxel_units(scan.origin), voxel);
         let range = RangeRule::new(rays, scan.origin);
-        let mut fan = Self { grid, model, rays, scan, origin, window: Window::default(), range };
+        let mut fan = Self { grid, model, rays, scan, origin, window: Window::default(), range, stop };
         fan.window = Window::around(voxel, fan.bounds());
         Ok(fan)
     }
@@ -315,6 +335,9 @@ impl<'a> Fan<'a> {
     /// Where the ray to a point ends; `None` if it does not count.
     #[inline]
     fn ray(&self, number: usize, report: &mut ScanReport) -> Option<RayEnd> {
+        if self.stop.is_set() {
+            return None;
+        }
         let intensity = self.scan.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
         let skipped = &mut report.skipped;
         if self.model.needs_intensity() && intensity.is_nan() {

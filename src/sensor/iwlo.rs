@@ -2,6 +2,7 @@ use super::Evidence;
 use crate::error::{Error, Result};
 use crate::maths::sigmoid;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Intensity-weighted log-odds: a strong echo counts more than a weak one, a new voxel learns faster than an
 /// old one. For sonar, radar and lidar intensity.
@@ -67,6 +68,19 @@ impl Default for Iwlo {
     }
 }
 
+impl fmt::Display for Iwlo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { occupied, free, sharpness, decay_rate, min_alpha, min, max, .. } = self;
+        let Self { intensity_threshold, intensity_max, .. } = self;
+        write!(f, "iwlo with occupied {occupied}, free {free}, sharpness {sharpness}, decay rate {decay_rate}, ")?;
+        write!(f, "min alpha {min_alpha}, min {min}, max {max}, intensities {intensity_threshold} to {intensity_max}, ")?;
+        match self.adaptive {
+            true => write!(f, "adaptive below {} by {}", self.adaptive_probability, self.adaptive_ratio),
+            false => f.write_str("not adaptive"),
+        }
+    }
+}
+
 impl Iwlo {
     /// The model, or what is wrong with it.
     pub fn validated(self) -> Result<Self> {
@@ -84,7 +98,7 @@ impl Iwlo {
             self.adaptive_probability,
             self.adaptive_ratio,
         ];
-        let wrong = |what: &str| Err(Error::argument("sensor model iwlo", format!("{what}, not {self:?}")));
+        let wrong = |what: &str| Err(Error::argument("sensor model iwlo", format!("{what}, not {self}")));
         if !numbers.iter().all(|number| number.is_finite()) {
             return wrong("every parameter must be a finite number");
         }

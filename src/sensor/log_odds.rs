@@ -2,6 +2,7 @@ use super::Evidence;
 use crate::error::{Error, Result};
 use crate::maths::logit;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// OctoMap's model: a constant is added for a hit, another for a miss, and the sum is clamped.
 ///
@@ -32,6 +33,13 @@ impl Default for LogOdds {
     }
 }
 
+impl fmt::Display for LogOdds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { hit, miss, min, max } = self;
+        write!(f, "log-odds with hit {hit}, miss {miss}, min {min}, max {max}")
+    }
+}
+
 impl LogOdds {
     /// A model from probabilities, each in (0, 1).
     pub fn from_probabilities(hit: f64, miss: f64, min: f64, max: f64) -> Result<Self> {
@@ -44,7 +52,7 @@ impl LogOdds {
         if !(finite && self.hit > 0.0 && self.miss < 0.0 && self.min < self.max) {
             return Err(Error::argument(
                 "sensor model log-odds",
-                format!("needs finite values with miss < 0 < hit and min < max, not {self:?}"),
+                format!("needs finite values with miss < 0 < hit and min < max, not {self}"),
             ));
         }
         Ok(self)

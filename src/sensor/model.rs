@@ -1,6 +1,7 @@
 use super::{Evidence, Iwlo, LogOdds};
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// How observations become evidence; chosen when a map is created and kept in its `metadata.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +26,15 @@ pub enum Observation {
 impl Default for SensorModel {
     fn default() -> Self {
         Self::LogOdds(LogOdds::default())
+    }
+}
+
+impl fmt::Display for SensorModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LogOdds(model) => model.fmt(f),
+            Self::Iwlo(model) => model.fmt(f),
+        }
     }
 }
 

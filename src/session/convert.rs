@@ -23,7 +23,7 @@ pub fn convert(
 ) -> Result<WrittenMap> {
     let mut metadata = map.metadata().clone();
     if metadata.ext.is_none() {
-        metadata = new_metadata(map.config(), new_map_id(), None);
+        metadata = new_metadata(map.config(), new_map_id(), &[]);
     }
     if let Some(ext) = &mut metadata.ext {
         ext.storage = storage;

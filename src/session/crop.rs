@@ -41,7 +41,7 @@ pub fn crop(
 
 /// What a part says of itself: what the whole says, but for its identity.
 fn metadata_of_part(map: &MapReader) -> Metadata {
-    let mut metadata = new_metadata(map.config(), new_map_id(), None);
+    let mut metadata = new_metadata(map.config(), new_map_id(), &[]);
     if let (Some(ext), Some(whole)) = (&mut metadata.ext, &map.metadata().ext) {
         (ext.scan_number, ext.decayed_scan) = (whole.scan_number, whole.decayed_scan);
     }

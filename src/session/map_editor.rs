@@ -104,6 +104,6 @@ impl MapEditor {
     fn begin_writing(&mut self) -> Result<()> {
         self.is_written_to = true;
         let Self { saver, config, store, .. } = self;
-        adopt(store, saver, config, |map_id| new_metadata(config, map_id, None))
+        adopt(store, saver, config, |map_id| new_metadata(config, map_id, &[]))
     }
 }

@@ -64,7 +64,7 @@ impl MapWriter {
     /// As for [`MapWriter::create`].
     pub fn create_on(disk: Arc<dyn Disk>, folder: &Path, config: &MapConfig) -> Result<Self> {
         let config = config.clone().validated()?;
-        Self::create_as(disk, folder, new_metadata(&config, new_map_id(), None))
+        Self::create_as(disk, folder, new_metadata(&config, new_map_id(), &[]))
     }
 
     /// Begins a map that says of itself what `metadata` says: parameters, id, number of scans, input. Tiles, bounds and

@@ -126,7 +126,7 @@ fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
     let what = if !map.is_verified() {
         "it is of the seed's format, which does not tell the sensor model".to_owned()
     } else if config.sensor_model != wanted.sensor_model {
-        format!("its sensor model is {:?}, that of {first} is {:?}", config.sensor_model, wanted.sensor_model)
+        format!("its sensor model is {}, that of {first} is {}", config.sensor_model, wanted.sensor_model)
     } else if config.occupancy_threshold != wanted.occupancy_threshold {
         let (found, wanted) = (config.occupancy_threshold, wanted.occupancy_threshold);
         format!("its voxels are occupied from probability {found}, those of {first} from {wanted}")

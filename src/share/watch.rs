@@ -75,7 +75,7 @@ fn check_grid(grid: &Grid, sender: &Sender) -> Result<()> {
         return Ok(());
     }
     let reason =
-        format!("voxels and tiles of the map and of the sender differ: {grid:?}, {:?}", sender.grid());
+        format!("voxels and tiles of the map and of the sender differ: {grid}, {}", sender.grid());
     Err(Error::argument("grid", reason))
 }
 

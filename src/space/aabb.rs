@@ -1,4 +1,5 @@
 use super::{Point, VoxelIndex};
+use std::fmt;
 
 /// An axis-aligned box in metres, half-open: `min <= p < max` along every axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -7,6 +8,12 @@ pub struct Aabb {
     pub min: Point,
     /// Upper corner in metres, excluded.
     pub max: Point,
+}
+
+impl fmt::Display for Aabb {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the box from {:?} to {:?} m", self.min, self.max)
+    }
 }
 
 impl Aabb {

@@ -1,4 +1,5 @@
 use super::{Aabb, Point, TileIndex, VoxelBox, VoxelIndex};
+use std::fmt;
 use thiserror::Error;
 
 /// Most voxels along the edge of a tile.
@@ -45,6 +46,12 @@ pub enum GridError {
         /// Nearest valid tile size above, in metres (or the largest valid one).
         larger_m: f64,
     },
+}
+
+impl fmt::Display for Grid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "voxels of {} m in tiles of {} m", self.resolution_m, self.tile_size_m)
+    }
 }
 
 impl Grid {

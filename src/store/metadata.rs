@@ -1,4 +1,5 @@
 use super::commit_log::Commits;
+use super::input_record::InputRecord;
 use super::tile_stamp::MAX_NUMBER;
 use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;
@@ -45,11 +46,9 @@ pub struct Extension {
     pub occupancy_threshold: f64,
     /// Which part of a ray counted when the map was last written to.
     pub rays: RayConfig,
-    /// Fingerprint of the input that the map was last built from, if its builder gave one.
-    pub input_fingerprint: Option<String>,
-    /// Number of scans that the map had taken before the first of that input.
-    #[serde(default)]
-    pub input_first_scan: u64,
+    /// What the map was built from, the latest last: of more than a thousand inputs the earliest are forgotten.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<InputRecord>,
     /// Number of the last scan in the map when its evidence last faded; 0 if it never has.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub decayed_scan: u64,
@@ -88,13 +87,33 @@ impl MapParameters {
     }
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 struct Document {
     version: String,
     resolution: f64,
     tile_size: f64,
     bounds: Bounds,
-    ext: Option<Extension>,
+    ext: Option<ReadExtension>,
+}
+
+/// An extension as earlier versions wrote it, too: with the name of the last input alone.
+#[derive(Deserialize)]
+struct ReadExtension {
+    #[serde(flatten)]
+    ext: Extension,
+    input_fingerprint: Option<String>,
+    #[serde(default)]
+    input_first_scan: u64,
+}
+
+impl ReadExtension {
+    fn into_extension(self) -> Extension {
+        let Self { mut ext, input_fingerprint, input_first_scan: first_scan } = self;
+        if let Some(name) = input_fingerprint {
+            ext.inputs.push(InputRecord { name, first_scan, content: None });
+        }
+        ext
+    }
 }
 
 const VERSION: &str = "1.0";
@@ -189,19 +208,19 @@ impl Metadata {
         if document.ext.is_some() || text.contains("\"crc32\"") {
             check_crc(text)?;
         }
-        if let Some(ext) = &document.ext
-            && [ext.flush_number, ext.scan_number, ext.input_first_scan, ext.decayed_scan]
-                .iter()
-                .any(|&number| number > MAX_NUMBER)
+        let ext = document.ext.map(ReadExtension::into_extension);
+        if let Some(ext) = &ext
+            && !([ext.flush_number, ext.scan_number, ext.decayed_scan].iter().all(|&n| n <= MAX_NUMBER)
+                && ext.inputs.iter().all(InputRecord::is_sound))
         {
             return Err(FormatError::at_offset(0, "flush or scan number is too high to be true"));
         }
-        let is_empty = document.ext.as_ref().is_some_and(|ext| ext.empty);
+        let is_empty = ext.as_ref().is_some_and(|ext| ext.empty);
         Ok(Self {
             resolution_m: document.resolution,
             tile_size_m: document.tile_size,
             bounds: (!is_empty).then_some(document.bounds),
-            ext: document.ext,
+            ext,
         })
     }
 }
@@ -227,6 +246,7 @@ fn decimal(length_m: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::InputContent;
 
     fn metadata() -> Metadata {
         let ext = Extension {
@@ -237,8 +257,7 @@ mod tests {
             sensor_model: SensorModel::default(),
             occupancy_threshold: 0.5,
             rays: RayConfig::default(),
-            input_fingerprint: Some("abc".into()),
-            input_first_scan: 45,
+            inputs: vec![InputRecord { first_scan: 45, ..InputRecord::from("abc") }],
             decayed_scan: 0,
             storage: Storage::Seed,
         };
@@ -254,6 +273,35 @@ mod tests {
                     \"min\": [-7, -1, 0],\n    \"max\": [0, 2, 4]\n  },\n  \"ext\": {\n    \"empty\": false";
         assert!(text.starts_with(seed), "{text}");
         assert_eq!(Metadata::from_text(&text), Ok(written));
+    }
+
+    #[test]
+    fn inputs_are_kept_with_their_content_and_those_of_earlier_versions_are_read() {
+        let mut written = metadata();
+        let content = InputContent {
+            scans: 12,
+            begins_with: Some("0a".repeat(16)),
+            scan_chain: "0b".repeat(16),
+            pose_chain: "0c".repeat(16),
+            skipped: vec![3, 7],
+        };
+        let ext = written.ext.as_mut().unwrap();
+        ext.inputs.push(InputRecord { name: "a \"b\"".into(), first_scan: 60, content: Some(content) });
+        assert_eq!(Metadata::from_text(&written.to_text()), Ok(written.clone()));
+        written.ext.as_mut().unwrap().inputs[1].first_scan = u64::MAX;
+        assert!(Metadata::from_text(&written.to_text()).is_err());
+
+        let mut without = metadata();
+        without.ext.as_mut().unwrap().inputs.clear();
+        let text = without.to_text();
+        let text = text.replace(
+            "    \"crc32\"",
+            "    \"input_fingerprint\": \"abc\",\n    \"input_first_scan\": 45,\n    \"crc32\"",
+        );
+        let end = text.find(CHECKSUM_KEY).unwrap() + CHECKSUM_KEY.len();
+        let crc = crc32fast::hash(&text.as_bytes()[..end]);
+        let earlier = format!("{}{crc:08x}{END}", &text[..end]);
+        assert_eq!(Metadata::from_text(&earlier), Ok(metadata()));
     }
 
     #[test]

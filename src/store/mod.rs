@@ -11,6 +11,7 @@
 mod commit_log;
 mod disk;
 mod flush;
+mod input_record;
 mod layout;
 mod map_folder;
 mod metadata;
@@ -31,6 +32,8 @@ mod waiting_file;
 
 pub use commit_log::{CommitLog, Commits, Flush};
 pub use disk::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
+pub(crate) use input_record::MOST_INPUTS;
+pub use input_record::{InputContent, InputRecord};
 pub use layout::{Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, TileFile, folder_name, tile_of_folder};
 pub use map_folder::{Lock, read_log};
 pub use metadata::{Bounds, Extension, MapParameters, Metadata};

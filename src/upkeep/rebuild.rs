@@ -145,7 +145,7 @@ impl Index {
         if known_scan.is_none_or(|known| stamp.scan_number > known) {
             // Nothing tells how many scans the tiles have in common: an input cannot be gone on with.
             if let Some(ext) = &mut self.metadata.ext {
-                ext.input_fingerprint = None;
+                ext.inputs.clear();
             }
         }
         self.commits.scan_number = self.commits.scan_number.max(stamp.scan_number);
@@ -263,8 +263,7 @@ fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<(
         sensor_model: parameters.sensor_model,
         occupancy_threshold: parameters.occupancy_threshold,
         rays: crate::config::RayConfig::default(),
-        input_fingerprint: None,
-        input_first_scan: 0,
+        inputs: Vec::new(),
         decayed_scan: 0,
         storage: layout.storage(),
     };

@@ -1,0 +1,108 @@
+use super::pcd_viewpoint::viewpoint_of_file;
+use super::poses::{Poses, looks_like_poses};
+use crate::error::{Error, Result};
+use nalgebra::Isometry3;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Where the poses of scans come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PoseSource {
+    /// The input has one with each scan.
+    Scans,
+    /// A file of poses, one a scan.
+    File(PathBuf),
+    /// The `VIEWPOINT` of each PCD file.
+    Viewpoint,
+    /// Nowhere: every scan is in the world frame.
+    Identity,
+}
+
+/// Names of pose files that are looked for.
+const POSE_FILES: [&str; 2] = ["poses_tum.txt", "poses_kitti.txt"];
+/// In place of the name of a file: every scan is in the world frame, and that is meant.
+const IDENTITY: &str = "identity";
+/// Most files that an error names.
+const MOST_NAMED: usize = 4;
+
+impl fmt::Display for PoseSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scans => f.write_str("with each scan, in the input"),
+            Self::File(path) => write!(f, "{}", path.display()),
+            Self::Viewpoint => f.write_str("VIEWPOINT of each file"),
+            Self::Identity => f.write_str("identity: the scans are in the world frame"),
+        }
+    }
+}
+
+/// Finds the poses of PCD files: those that were asked for, or a file of poses in or beside their folder, or the
+/// `VIEWPOINT` in each. `folder` is `None` for a single file.
+///
+/// # Errors
+///
+/// A file of poses that is none, or not one pose a scan in the order of time; more than one scan, and poses nowhere.
+pub(super) fn poses_of(
+    files: &[PathBuf],
+    asked_for: Option<&Path>,
+    folder: Option<&Path>,
+) -> Result<(PoseSource, Option<Vec<Isometry3<f64>>>)> {
+    let path = match asked_for {
+        Some(path) if path == Path::new(IDENTITY) => {
+            return Ok((PoseSource::Identity, Some(vec![Isometry3::identity(); files.len()])));
+        }
+        Some(path) => Some(path.to_owned()),
+        None => folder.and_then(pose_file_for),
+    };
+    if let Some(path) = path {
+        let poses = Poses::read(&path)?;
+        poses.check(&path, files)?;
+        return Ok((PoseSource::File(path), Some(poses.into_poses())));
+    }
+    let is_placed = |path: &PathBuf| viewpoint_of_file(path).is_some_and(|viewpoint| !viewpoint.is_identity());
+    if files.iter().any(is_placed) {
+        return Ok((PoseSource::Viewpoint, None));
+    }
+    if files.len() > 1 {
+        return Err(no_poses(files, folder));
+    }
+    Ok((PoseSource::Identity, None))
+}
+
+fn no_poses(files: &[PathBuf], folder: Option<&Path>) -> Error {
+    let folder = folder.unwrap_or(Path::new("."));
+    let found = files_like_poses(folder);
+    let found = match &found[..] {
+        [] => String::new(),
+        [one] => format!(" ({one} looks like one)"),
+        more => format!(" ({} look like some)", more.join(", ")),
+    };
+    let reason = format!(
+        "{} scans and no poses: there is no poses_tum.txt or poses_kitti.txt in or beside the folder, and no VIEWPOINT in \
+         the files but the identity; name a file with --poses FILE{found}, or say --poses identity if all scans are in \
+         the world frame",
+        files.len()
+    );
+    Error::argument(folder.display().to_string(), reason)
+}
+
+/// The pose file in a folder, or beside it.
+fn pose_file_for(folder: &Path) -> Option<PathBuf> {
+    let beside = folder.join("..");
+    let places = [folder, &*beside];
+    places.iter().flat_map(|place| POSE_FILES.map(|name| place.join(name))).find(|path| path.is_file())
+}
+
+/// A few files in a folder or beside it that begin as a file of poses does.
+fn files_like_poses(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    for place in [folder.to_owned(), folder.join("..")] {
+        let mut paths: Vec<PathBuf> =
+            fs::read_dir(place).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+        paths.sort_unstable();
+        found.extend(paths.iter().filter(|path| looks_like_poses(path)).map(|path| path.display().to_string()));
+    }
+    found.truncate(MOST_NAMED);
+    found
+}

@@ -1,0 +1,188 @@
+use super::sensor_scan::SensorScan;
+
+/// Tells a scan from others: its points and intensities, and apart from these its pose. How a file stored them, and what
+/// it is called, does not matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScanMark {
+    scan: [u8; MARK_BYTES],
+    pose: [u8; MARK_BYTES],
+    has_points: bool,
+}
+
+/// Tells the beginning of an input from others, scan by scan: the marks of its scans, and apart from these of their poses,
+/// each chained to those before.
+///
+/// What it takes does not grow with the scans, and whoever knows it can go on from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ScanChain {
+    scans: u64,
+    scan_chain: [u8; MARK_BYTES],
+    pose_chain: [u8; MARK_BYTES],
+}
+
+const MARK_BYTES: usize = 16;
+/// Points that are hashed at a time.
+const POINTS_AT_A_TIME: usize = 1024;
+
+impl ScanMark {
+    /// The mark of a scan.
+    pub fn of(scan: &SensorScan) -> Self {
+        let mut hasher = hasher("voxtile 1 scan");
+        hasher.update(&(scan.points_in_sensor.len() as u64).to_le_bytes());
+        let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * 24);
+        for points in scan.points_in_sensor.chunks(POINTS_AT_A_TIME) {
+            bytes.clear();
+            points.iter().flatten().for_each(|&number| bytes.extend(bits(number).to_le_bytes()));
+            hasher.update(&bytes);
+        }
+        for intensities in scan.intensities.iter().flat_map(|all| all.chunks(POINTS_AT_A_TIME)) {
+            bytes.clear();
+            intensities.iter().for_each(|&number| bytes.extend(bits(f64::from(number)).to_le_bytes()));
+            hasher.update(&bytes);
+        }
+        Self { scan: mark(&hasher), pose: pose_mark(scan), has_points: !scan.points_in_sensor.is_empty() }
+    }
+
+    /// Whether the scan has points: one without is like many others.
+    pub fn has_points(&self) -> bool {
+        self.has_points
+    }
+
+    /// What the scan is, without its pose, as 32 hexadecimal digits.
+    pub fn scan_text(&self) -> String {
+        to_text(&self.scan)
+    }
+}
+
+impl ScanChain {
+    /// The chain as its texts tell it; `None` if they are not 32 hexadecimal digits each.
+    pub fn from_texts(scans: u64, scan_chain: &str, pose_chain: &str) -> Option<Self> {
+        Some(Self { scans, scan_chain: from_text(scan_chain)?, pose_chain: from_text(pose_chain)? })
+    }
+
+    /// Number of scans so far.
+    pub fn scans(&self) -> u64 {
+        self.scans
+    }
+
+    /// The chain of the scans, as 32 hexadecimal digits.
+    pub fn scan_text(&self) -> String {
+        to_text(&self.scan_chain)
+    }
+
+    /// The chain of their poses, likewise.
+    pub fn pose_text(&self) -> String {
+        to_text(&self.pose_chain)
+    }
+
+    /// Adds a scan.
+    pub fn add(&mut self, mark: &ScanMark) {
+        self.chain(&mark.scan, &mark.pose);
+    }
+
+    /// Adds a scan that could not be read.
+    pub fn add_unread(&mut self) {
+        self.chain(b"could not be read", b"could not be read");
+    }
+
+    fn chain(&mut self, scan: &[u8], pose: &[u8]) {
+        self.scans += 1;
+        for (chain, new) in [(&mut self.scan_chain, scan), (&mut self.pose_chain, pose)] {
+            let mut hasher = hasher("voxtile 1 chain");
+            hasher.update(chain);
+            hasher.update(new);
+            *chain = mark(&hasher);
+        }
+    }
+}
+
+fn hasher(context: &str) -> blake3::Hasher {
+    blake3::Hasher::new_derive_key(context)
+}
+
+fn mark(hasher: &blake3::Hasher) -> [u8; MARK_BYTES] {
+    let mut mark = [0; MARK_BYTES];
+    hasher.finalize_xof().fill(&mut mark);
+    mark
+}
+
+fn pose_mark(scan: &SensorScan) -> [u8; MARK_BYTES] {
+    let mut hasher = hasher("voxtile 1 pose");
+    let (t, q) = (scan.world_from_sensor.translation.vector, scan.world_from_sensor.rotation.coords);
+    for number in [t.x, t.y, t.z, q.x, q.y, q.z, q.w] {
+        hasher.update(&bits(number).to_le_bytes());
+    }
+    mark(&hasher)
+}
+
+/// The bits of a number; one spelling of what is no number.
+fn bits(number: f64) -> u64 {
+    if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() }
+}
+
+fn to_text(mark: &[u8; MARK_BYTES]) -> String {
+    mark.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn from_text(text: &str) -> Option<[u8; MARK_BYTES]> {
+    if text.len() != 2 * MARK_BYTES || !text.is_ascii() {
+        return None;
+    }
+    let mut mark = [0; MARK_BYTES];
+    for (k, byte) in mark.iter_mut().enumerate() {
+        *byte = u8::from_str_radix(&text[2 * k..2 * k + 2], 16).ok()?;
+    }
+    Some(mark)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Isometry3;
+
+    fn scan(points: &[[f64; 3]], x: f64) -> SensorScan {
+        SensorScan {
+            name: "any".into(),
+            points_in_sensor: points.to_vec(),
+            intensities: None,
+            world_from_sensor: Isometry3::translation(x, 0.0, 0.0),
+        }
+    }
+
+    #[test]
+    fn a_chain_tells_scans_and_poses_apart_and_goes_on_from_its_texts() {
+        let scans = [scan(&[[1.0, 2.0, 3.0]], 0.0), scan(&[], 1.0), scan(&[[f64::NAN; 3]; 3000], 2.0)];
+        let chain_of = |scans: &[SensorScan]| {
+            let mut chain = ScanChain::default();
+            scans.iter().for_each(|scan| chain.add(&ScanMark::of(scan)));
+            chain
+        };
+        let whole = chain_of(&scans);
+        let first = chain_of(&scans[..2]);
+        let mut on = ScanChain::from_texts(2, &first.scan_text(), &first.pose_text()).unwrap();
+        on.add(&ScanMark::of(&scans[2]));
+        assert_eq!(on, whole);
+
+        let mut moved = scans.clone();
+        moved[1].world_from_sensor = Isometry3::translation(1.5, 0.0, 0.0);
+        let moved = chain_of(&moved);
+        assert_eq!(moved.scan_text(), whole.scan_text());
+        assert_ne!(moved.pose_text(), whole.pose_text());
+
+        let mut changed = scans.clone();
+        changed[2].points_in_sensor[2999] = [0.0; 3];
+        let changed = chain_of(&changed);
+        assert_ne!(changed.scan_text(), whole.scan_text());
+        assert_eq!(changed.pose_text(), whole.pose_text());
+
+        let [mut a, mut b] = [scans[0].clone(), scans[0].clone()];
+        (a.intensities, b.intensities) = (Some(vec![1.0]), Some(vec![2.0]));
+        let marks = [&scans[0], &a, &b].map(|scan| ScanMark::of(scan).scan_text());
+        assert!(marks[0] != marks[1] && marks[1] != marks[2], "{marks:?}");
+
+        let mut unread = chain_of(&scans[..1]);
+        unread.add_unread();
+        assert_ne!(unread, first);
+        assert_eq!(ScanChain::from_texts(0, "0g", ""), None);
+    }
+}
