@@ -67,6 +67,7 @@ pub mod maths;
 pub mod octree;
 pub mod query;
 pub mod scan;
+mod scratch;
 pub mod sensor;
 pub mod session;
 pub mod share;

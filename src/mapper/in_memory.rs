@@ -106,7 +106,10 @@ impl MapView for InMemoryMapper {
 
 impl Mapper for InMemoryMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        let updates = trace(&mut self.tracer, &self.config, scan, usize::MAX, &mut |_| Ok(()))?;
+        let updates = {
+            ScanTracer::check(&self.config.grid, &self.config.sensor_model, scan)?;
+            trace(&mut self.tracer, &self.config, scan.origin, scan, None)?
+        };
         Ok(self.accept(updates))
     }
 

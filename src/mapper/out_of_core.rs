@@ -6,9 +6,9 @@ use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
-use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates, Stop};
+use crate::scan::{Overflow, PointBatch, Scan, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
-use crate::space::{TileIndex, VoxelIndex};
+use crate::space::{Point, TileIndex, VoxelIndex};
 use crate::store::{Disk, FsDisk, InputContent, InputRecord, Metadata, SnapshotName, TileStore};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -145,6 +145,32 @@ impl OutOfCoreTileMapper {
         self.residency_mut().store.create_snapshot(name)
     }
 
+    /// [`Mapper::insert_scan`] for points wherever they lie, seen from `origin` in metres, world frame: a scan may be larger
+    /// than memory.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Mapper::insert_scan`], and points that cannot be read.
+    pub fn insert_points(&mut self, origin: Point, points: &dyn ScanPoints) -> Result<ScanReport> {
+        let scan_number = self.scan_number;
+        let plan = MemoryPlan::new(self.config.memory);
+        let residency = self.residency.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let store = residency.store();
+        let (disk, folder) = (store.disk().clone(), store.folder().to_owned());
+        let make_scratch = &|| disk.scratch(&folder);
+        let put_aside = &mut |part| residency.put_in_files(part, scan_number);
+        let most_bytes = plan.updates_bytes;
+        let overflow = Overflow { most_bytes, folder: &folder, make_scratch, put_aside };
+        let overflow = (most_bytes < usize::MAX).then_some(overflow);
+        let traced = trace(&mut self.tracer, &self.config, origin, points, overflow);
+        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
+        let inserted = traced.and_then(|updates| self.accept(updates));
+        if inserted.is_err() {
+            self.residency_mut().give_up_scan();
+        }
+        inserted
+    }
+
     /// The folder of the map.
     pub fn folder(&self) -> std::path::PathBuf {
         self.lock().store().folder().to_owned()
@@ -261,17 +287,8 @@ impl MapView for OutOfCoreTileMapper {
 
 impl Mapper for OutOfCoreTileMapper {
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        let scan_number = self.scan_number;
-        let residency = self.residency.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let most_bytes = MemoryPlan::new(self.config.memory).updates_bytes;
-        let put_in_files = &mut |part| residency.put_in_files(part, scan_number);
-        let traced = trace(&mut self.tracer, &self.config, scan, most_bytes, put_in_files);
-        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
-        let inserted = traced.and_then(|updates| self.accept(updates));
-        if inserted.is_err() {
-            self.residency_mut().give_up_scan();
-        }
-        inserted
+        ScanTracer::check(&self.config.grid, &self.config.sensor_model, scan)?;
+        self.insert_points(scan.origin, scan)
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {

@@ -2,7 +2,7 @@
 
 use super::pending::{InFile, Pending};
 use super::residency::Residency;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scan::PackedUpdates;
 use crate::space::TileIndex;
 use crate::tile::Tile;
@@ -73,12 +73,13 @@ impl Residency {
     /// Applies to a tile what waits for it.
     pub(super) fn apply_waiting(&mut self, tile: &mut Tile) -> Result<()> {
         let (model, index) = (&self.config.sensor_model, tile.index());
-        let InFile { file, updates } = self.pending.in_file(index);
+        let InFile { file, .. } = self.pending.in_file(index);
         if file.bytes > 0 {
             let (store, stalls) = (&self.store, &mut self.stalls);
-            let bytes = stalls.during(|| store.read_waiting(index, file))?;
+            let waiting = stalls.during(|| store.open_waiting(index, file))?;
             self.io.bytes_read += file.bytes;
-            PackedUpdates::from_parts(bytes, updates).iter().for_each(|updates| tile.apply(model, &updates));
+            PackedUpdates::unpack(waiting, |updates| tile.apply(model, &updates))
+                .map_err(|error| Error::io(&store.layout().waiting(index), "read", error))?;
         }
         let in_memory = self.pending.in_memory(index).into_iter().flat_map(PackedUpdates::iter);
         in_memory.for_each(|updates| tile.apply(model, &updates));

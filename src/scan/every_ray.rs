@@ -1,9 +1,13 @@
 use super::ScanReport;
-use super::counted_page::{CountedPage, Counts, brick_in_page, place_in_page};
-use super::page_choice::PageChoice;
+use super::counted_page::{CountedPage, Counts};
+use super::far_runs::FarRuns;
+use super::footprint::Footprint;
 use super::page_map::PageMap;
+use super::scan_parts::ScanParts;
 use super::slab_ray::SlabRay;
+use super::sparse_page::{brick_in_page, place_in_page};
 use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
+use super::trace_limit::{Allowance, CollectorLimit};
 use super::updates::{BrickRuns, Run, ScanUpdates, TileUpdates};
 use super::window::Window;
 use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex};
@@ -19,7 +23,16 @@ pub(super) struct EveryRayCollector {
     pages: PageMap<CountedPage>,
     /// The runs that a hit has ended, in order.
     ended: Vec<EndedRun>,
+    /// What rays leave outside the window, where memory is limited; otherwise pages have that, too.
+    far: Option<FarRuns>,
+    most_bytes: usize,
+    allowance: Allowance,
 }
+
+/// What a ray may leave for each slab that it passes, in bytes: three eighths of a brick of 1 KiB, and three 64ths of a page.
+const BYTES_OF_SLAB: usize = 448;
+/// The same beside its slabs: the page and the brick that it ends in.
+const BYTES_OF_RAY: usize = 4 << 10;
 
 /// Misses and then a hit.
 #[derive(Clone, Copy, Debug)]
@@ -39,44 +52,65 @@ struct Brick<'a> {
 }
 
 impl EveryRayCollector {
-    /// Forgets everything, and begins anew with another window; the memory is kept.
-    pub(super) fn clear(&mut self, window: Window, choice: PageChoice<'_>) {
-        self.pages.clear(window, choice);
+    /// Forgets everything, and begins anew with another window; the memory is kept. With a limit, what lies outside the
+    /// window is kept by tiles of `grid`.
+    pub(super) fn clear(&mut self, window: Window, limit: Option<(&CollectorLimit, &Grid)>) {
+        self.pages.clear(window, usize::MAX);
         self.ended.clear();
+        self.far = limit.map(|(_, grid)| FarRuns::new(*grid));
+        self.most_bytes = limit.map_or(usize::MAX, |(limit, _)| limit.small_bytes);
+        self.allowance.grant(self.most_bytes);
     }
 
-    /// Number of pages with marks.
-    pub(super) fn pages(&self) -> usize {
-        self.pages.pages().len()
+    /// Whether another ray may leave more than there is room for. The first always has room.
+    #[inline]
+    pub(super) fn is_full_for(&mut self, ray: &SlabRay) -> bool {
+        let new_bytes = BYTES_OF_RAY + BYTES_OF_SLAB * ray.slabs() as usize;
+        self.allowance.is_spent_by(new_bytes) && self.look_whether_full(new_bytes)
+    }
+
+    #[cold]
+    fn look_whether_full(&mut self, new_bytes: usize) -> bool {
+        let pages: usize =
+            self.pages.pages().iter().map(|page| size_of::<CountedPage>() + page.heap_bytes()).sum();
+        let far = self.far.as_ref().map_or(0, FarRuns::bytes);
+        let bytes = pages + far + self.ended.len() * size_of::<EndedRun>();
+        let left = self.most_bytes.saturating_sub(bytes);
+        // Otherwise it would be looked at again at once.
+        self.allowance.grant(left);
+        bytes > 0 && left < new_bytes.max(self.most_bytes / 8)
     }
 
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
-        self.pages.bytes() + self.ended.capacity() * size_of::<EndedRun>()
+        let far = self.far.as_ref().map_or(0, FarRuns::bytes);
+        self.pages.bytes() + self.ended.capacity() * size_of::<EndedRun>() + far
     }
 
     /// A ray passes all voxels before its last. At most [`MAX_RAYS`](super::counted_page::MAX_RAYS) of them.
     pub(super) fn pass(&mut self, ray: &SlabRay) {
-        let mut far = Vec::new();
-        ray.pass(&mut self.pages, 0, false, |voxel| far.push(voxel));
-        for voxel in far {
-            let page = self.pages.number_of(voxel);
-            *self.pages.pages_mut()[page].count(place_in_page(voxel)) += 1;
-        }
+        let Self { pages, far: Some(far), .. } = self else {
+            let mut far = Vec::new();
+            ray.pass(&mut self.pages, 0, false, |voxel| far.push(voxel));
+            for voxel in far {
+                let page = self.pages.number_of(voxel);
+                *self.pages.pages_mut()[page].count(place_in_page(voxel)) += 1;
+            }
+            return;
+        };
+        ray.pass(pages, 0, false, |voxel| far.pass(voxel));
     }
 
     /// A ray ends in a voxel, with an intensity if it matters.
     pub(super) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
+        if let Some(far) = &mut self.far
+            && self.pages.window().local(voxel).is_none()
+        {
+            return far.hit(voxel, intensity);
+        }
         let (page, place) = (self.pages.number_of(voxel), place_in_page(voxel));
         let misses = std::mem::take(self.pages.pages_mut()[page].count(place));
-        if !self.pages.is_scratch(page) {
-            self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
-        }
-    }
-
-    /// Forgets what is not looked at.
-    pub(super) fn finish(&mut self) {
-        self.pages.clear_scratch();
+        self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
     }
 
     /// Number of hits and of misses.
@@ -128,7 +162,7 @@ impl EveryRayCollector {
         }
         let brick_of = |run: &EndedRun| {
             let page = run.page as usize;
-            first_of_page[page] + self.pages.pages()[page].brick_of(run.place)
+            first_of_page[page] + self.pages.pages()[page].number_of(run.place)
         };
         let mut ends = vec![0_u32; bricks.len() + 1];
         self.ended.iter().for_each(|run| ends[brick_of(run) + 1] += 1);
@@ -205,6 +239,23 @@ impl Brick<'_> {
 
 fn is_in(mask: &BrickMask, place: u16) -> bool {
     mask[usize::from(place) / 64] >> (place % 64) & 1 == 1
+}
+
+/// Gives in the updates of several collectors, the first of which saw the first rays.
+pub(super) fn put_in_order(grid: &Grid, collectors: &mut [EveryRayCollector], parts: &ScanParts<'_>) {
+    for collector in collectors {
+        for (tile, bricks) in collector.runs_by_tile(grid) {
+            let runs = || bricks.iter().flat_map(|brick| &brick.runs);
+            let hits = runs().filter(|run| run.hit.is_some()).count() as u64;
+            let misses = runs().map(|run| u64::from(run.misses)).sum();
+            if hits + misses > 0 {
+                parts.put(std::iter::once((tile, TileUpdates::Runs(bricks), (hits, misses))));
+            }
+        }
+        if let Some(far) = &mut collector.far {
+            parts.put(far.take());
+        }
+    }
 }
 
 /// The updates of several collectors, the first of which saw the first rays.

@@ -1,3 +1,5 @@
+use super::slab_path::Stretch;
+
 /// What rays leave in a page of voxels.
 ///
 /// A page is looked at as slabs, one voxel thick, along an axis `A`; `B` and `C` are the other axes, the lower first.
@@ -8,6 +10,11 @@ pub(super) trait Footprint: Default {
 
     /// Bytes of memory on the heap.
     fn heap_bytes(&self) -> usize;
+
+    /// A page without rays that takes little memory while few rays come.
+    fn sparse() -> Self {
+        Self::default()
+    }
 
     /// A page without rays in the memory of this one; `None` if that is not worth keeping.
     fn cleared(self) -> Option<Self> {
@@ -22,4 +29,14 @@ pub(super) trait Footprint: Default {
 
     /// A ray comes into a slab by one voxel and goes out by another, or by the same.
     fn pass_through<const A: usize>(&mut self, slab: u32, entry: Self::Cell, exit: Self::Cell);
+
+    /// A ray passes the slabs of a stretch from slab `a` on; returns in how many that is certain.
+    #[inline]
+    fn pass_stretch<const A: usize, const B: usize, const C: usize>(
+        &mut self,
+        stretch: &Stretch,
+        a: u32,
+    ) -> u32 {
+        stretch.pass::<A, B, C, Self>(self, a)
+    }
 }

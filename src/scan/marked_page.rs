@@ -1,16 +1,24 @@
 use super::footprint::Footprint;
+use super::slab_path::Stretch;
+use super::sparse_page::{BrickContent, SparsePage, part_of_place};
 use super::window::{Local, PAGE_EDGE};
-use crate::space::{BrickMask, VoxelIndex};
+use crate::space::{BRICK_VOXELS, BrickMask, VoxelIndex};
 
 /// Which voxels of a page the rays of a scan pass or end in.
-///
-/// A word for every column of 64 voxels along z, columns in the order of x and then y: a voxel is marked by one
-/// operation on one word, found without a table.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MarkedPage {
-    passed: Columns,
+    passed: Marks,
     /// Of few pages, beside a ground or a wall.
-    hits: Option<Columns>,
+    hits: Option<Marks>,
+}
+
+/// Marked voxels of a page.
+#[derive(Clone, Debug)]
+enum Marks {
+    /// Fast.
+    Columns(Columns),
+    /// Small: where memory is short.
+    Bricks(Box<SparsePage<BrickMask>>),
 }
 
 /// The marks of one brick.
@@ -24,10 +32,12 @@ pub(super) struct MarkedBrick {
     pub(super) passed: BrickMask,
 }
 
-const COLUMNS: usize = (PAGE_EDGE * PAGE_EDGE) as usize;
-
+/// A word for every column of 64 voxels along z, columns in the order of x and then y: a voxel is marked by one
+/// operation on one word, found without a table.
 #[derive(Clone, Debug)]
 struct Columns(Box<[u64; COLUMNS]>);
+
+const COLUMNS: usize = (PAGE_EDGE * PAGE_EDGE) as usize;
 
 impl Default for Columns {
     fn default() -> Self {
@@ -81,22 +91,122 @@ const fn spread() -> [u64; 16] {
     spread
 }
 
+impl BrickContent for BrickMask {
+    const EMPTY: Self = [0; 8];
+}
+
+impl Default for Marks {
+    fn default() -> Self {
+        Self::Columns(Columns::default())
+    }
+}
+
+impl Marks {
+    fn sparse() -> Self {
+        Self::Bricks(Box::default())
+    }
+
+    fn empty_like(&self) -> Self {
+        match self {
+            Self::Columns(_) => Self::default(),
+            Self::Bricks(_) => Self::sparse(),
+        }
+    }
+
+    fn heap_bytes(&self) -> usize {
+        match self {
+            Self::Columns(_) => size_of::<[u64; COLUMNS]>(),
+            Self::Bricks(bricks) => size_of::<SparsePage<BrickMask>>() + bricks.bricks_bytes(),
+        }
+    }
+
+    #[inline]
+    fn mark(&mut self, x: u32, y: u32, z: u32) {
+        match self {
+            Self::Columns(columns) => columns.mark(x, y, z),
+            Self::Bricks(bricks) => {
+                mark(bricks, part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z))
+            }
+        }
+    }
+
+    /// Which bricks at `(x, y)`, in bricks, have marks: byte `k` is not 0 if brick `k` has.
+    fn union(&self, x: usize, y: usize) -> u64 {
+        match self {
+            Self::Columns(columns) => columns.union(x, y),
+            Self::Bricks(bricks) => {
+                let is_in = |z: &usize| bricks.brick_at(place_of_brick(x, y, *z)).is_some();
+                (0..8).filter(is_in).fold(0, |union, z| union | 1 << (8 * z))
+            }
+        }
+    }
+
+    /// The mask of one brick in Morton order.
+    fn brick(&self, x: usize, y: usize, z: usize) -> BrickMask {
+        match self {
+            Self::Columns(columns) => columns.brick(x, y, z),
+            Self::Bricks(bricks) => bricks.brick_at(place_of_brick(x, y, z)).copied().unwrap_or_default(),
+        }
+    }
+
+    fn absorb(&mut self, other: &Self) {
+        match (self, other) {
+            (Self::Columns(columns), Self::Columns(others)) => columns.absorb(others),
+            (mine, other) => {
+                let bricks = (0..8).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
+                for [x, y, z] in bricks {
+                    let mask = other.brick(x, y, z);
+                    for place in crate::space::places(mask) {
+                        let local = local_of(place);
+                        let at = |k: usize, brick: usize| 8 * brick as u32 + local[k];
+                        mine.mark(at(0, x), at(1, y), at(2, z));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The voxel at a place of a brick, relative to the brick's lowest.
+fn local_of(place: usize) -> Local {
+    std::array::from_fn(|axis| {
+        (0..3).fold(0, |index, bit| index | (place as u32 >> (3 * bit + axis as u32) & 1) << bit)
+    })
+}
+
+/// The place of a brick in its page's Morton order.
+fn place_of_brick(x: usize, y: usize, z: usize) -> usize {
+    let [x, y, z] = [x, y, z].map(|k| 8 * k as u32);
+    (part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z)) as usize / BRICK_VOXELS
+}
+
+#[inline]
+fn mark(bricks: &mut SparsePage<BrickMask>, place: u32) {
+    bricks.brick(place)[place as usize % BRICK_VOXELS / 64] |= 1 << (place % 64);
+}
+
 impl MarkedPage {
     /// A ray ends in a voxel.
     pub(super) fn hit(&mut self, [x, y, z]: VoxelIndex) {
-        self.hits.get_or_insert_default().mark(x as u32, y as u32, z as u32);
+        let hits = self.hits.get_or_insert_with(|| self.passed.empty_like());
+        hits.mark(x as u32, y as u32, z as u32);
     }
 
-    /// Whether all voxels of the page from `low` to `high` are passed or hit.
+    /// Whether all voxels of the page from `low` to `high` are passed or hit, as far as is easily told.
     #[inline]
     pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
+        let Marks::Columns(passed) = &self.passed else { return false };
+        let hits = self.hits.as_ref().and_then(|hits| match hits {
+            Marks::Columns(hits) => Some(hits),
+            Marks::Bricks(_) => None,
+        });
         let [x0, y0, z0] = low.map(|k| k & 63);
         let [x1, y1, z1] = high.map(|k| k & 63);
         let wanted = u64::MAX >> (63 - z1) & u64::MAX << z0;
         for column in (x0 << 6..=x1 << 6).step_by(64) {
             for column in (column | y0) as usize..=(column | y1) as usize {
-                let left = wanted & !self.passed.0[column];
-                if left != 0 && self.hits.as_ref().is_none_or(|hits| left & !hits.0[column] != 0) {
+                let left = wanted & !passed.0[column];
+                if left != 0 && hits.is_none_or(|hits| left & !hits.0[column] != 0) {
                     return false;
                 }
             }
@@ -108,8 +218,17 @@ impl MarkedPage {
     pub(super) fn absorb(&mut self, other: &Self) {
         self.passed.absorb(&other.passed);
         if let Some(hits) = &other.hits {
-            self.hits.get_or_insert_default().absorb(hits);
+            self.hits.get_or_insert_with(|| self.passed.empty_like()).absorb(hits);
         }
+    }
+
+    /// Number of bricks with marks.
+    pub(super) fn count_bricks(&self) -> usize {
+        let in_column = |(x, y)| {
+            let marks = self.passed.union(x, y) | self.hits.as_ref().map_or(0, |hits| hits.union(x, y));
+            (0..8).filter(|z| marks >> (8 * z) & 0xff != 0).count()
+        };
+        (0..8).flat_map(|x| (0..8).map(move |y| (x, y))).map(in_column).sum()
     }
 
     /// The bricks with marks; `page` is the page's index, its voxels' indices over 64.
@@ -138,7 +257,11 @@ impl Footprint for MarkedPage {
     type Cell = (u32, u32);
 
     fn heap_bytes(&self) -> usize {
-        (1 + usize::from(self.hits.is_some())) * size_of::<[u64; COLUMNS]>()
+        self.passed.heap_bytes() + self.hits.as_ref().map_or(0, Marks::heap_bytes)
+    }
+
+    fn sparse() -> Self {
+        Self { passed: Marks::sparse(), hits: None }
     }
 
     #[inline]
@@ -157,6 +280,72 @@ impl Footprint for MarkedPage {
 
     #[inline]
     fn pass_through<const A: usize>(&mut self, slab: u32, entry: (u32, u32), exit: (u32, u32)) {
+        self.pass::<A>(slab, entry);
+        self.pass::<A>(slab, exit);
+    }
+
+    // The form of the marks is asked for once a stretch, not once a voxel.
+    #[inline]
+    fn pass_stretch<const A: usize, const B: usize, const C: usize>(
+        &mut self,
+        stretch: &Stretch,
+        a: u32,
+    ) -> u32 {
+        match &mut self.passed {
+            Marks::Columns(columns) => stretch.pass::<A, B, C, _>(columns, a),
+            Marks::Bricks(bricks) => stretch.pass::<A, B, C, _>(&mut **bricks, a),
+        }
+    }
+}
+
+impl Footprint for Columns {
+    type Cell = (u32, u32);
+
+    fn heap_bytes(&self) -> usize {
+        size_of::<[u64; COLUMNS]>()
+    }
+
+    #[inline]
+    fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> (u32, u32) {
+        (b, c)
+    }
+
+    #[inline]
+    fn pass<const A: usize>(&mut self, slab: u32, (b, c): (u32, u32)) {
+        match A {
+            0 => self.mark(slab, b, c),
+            1 => self.mark(b, slab, c),
+            _ => self.mark(b, c, slab),
+        }
+    }
+
+    #[inline]
+    fn pass_through<const A: usize>(&mut self, slab: u32, entry: (u32, u32), exit: (u32, u32)) {
+        self.pass::<A>(slab, entry);
+        self.pass::<A>(slab, exit);
+    }
+}
+
+impl Footprint for SparsePage<BrickMask> {
+    /// The part of the voxel's place that its indices along the slab make.
+    type Cell = u32;
+
+    fn heap_bytes(&self) -> usize {
+        self.bricks_bytes()
+    }
+
+    #[inline]
+    fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> u32 {
+        part_of_place(B, b) | part_of_place(C, c)
+    }
+
+    #[inline]
+    fn pass<const A: usize>(&mut self, slab: u32, cell: u32) {
+        mark(self, part_of_place(A, slab) | cell);
+    }
+
+    #[inline]
+    fn pass_through<const A: usize>(&mut self, slab: u32, entry: u32, exit: u32) {
         self.pass::<A>(slab, entry);
         self.pass::<A>(slab, exit);
     }

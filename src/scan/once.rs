@@ -1,59 +1,84 @@
 use super::ScanReport;
+use super::far_bricks::FarBricks;
+use super::footprint::Footprint;
 use super::head_start::HeadStarts;
 use super::marked_page::{MarkedBrick, MarkedPage};
-use super::page_choice::PageChoice;
+use super::once_bricks::{Intensities, hits_and_misses, updates_by_tile};
 use super::page_map::PageMap;
 use super::ray_end::RayEnd;
 use super::ray_origin::RayOrigin;
+use super::scan_parts::ScanParts;
 use super::slab_ray::SlabRay;
-use super::tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
-use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
+use super::tile_order::in_order_of_tiles;
+use super::trace_limit::{Allowance, CollectorLimit};
+use super::updates::{ScanUpdates, TileUpdates};
 use super::window::{PAGE_EDGE, Window};
-use crate::space::{
-    BRICK_EDGE, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, VoxelKey, place_of_voxel, places,
-};
+use crate::space::{Grid, VoxelIndex};
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 /// Most rays that are taken at a time.
 pub(super) const BATCH: usize = 256;
 
 /// Collects what one scan says about voxels, each once: a hit over any miss, and of its hits the largest intensity.
+///
+/// Where memory is short, only the pages that rays come to first are fast, and what lies in others goes to
+/// [`ScanParts`] whenever there is too much of it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OnceCollector {
     pages: PageMap<MarkedPage>,
     head_starts: HeadStarts,
-    /// Bricks outside the window, by index: a page for each would be large for the few voxels of a stray ray.
-    far: FxHashMap<VoxelIndex, MarkedBrick>,
-    /// The largest intensity of every hit voxel; empty for sensor models that need none.
-    intensities: FxHashMap<VoxelIndex, f32>,
+    /// Bricks outside the window.
+    far: FarBricks,
+    intensities: Intensities,
+    most_small_bytes: usize,
+    allowance: Allowance,
 }
+
+/// What a ray may leave for each slab that it passes, in bytes: three eighths of a brick of 64 bytes in a list that may be
+/// half empty, and three 64ths of a page.
+const BYTES_OF_SLAB: usize = 128;
+/// The same beside its slabs: the page and the brick that it ends in.
+const BYTES_OF_RAY: usize = 4 << 10;
 
 impl OnceCollector {
     /// Forgets everything, and begins anew with another window; the memory is kept.
-    pub(super) fn clear(&mut self, window: Window, choice: PageChoice<'_>) {
-        self.pages.clear(window, choice);
+    pub(super) fn clear(&mut self, window: Window, limit: &CollectorLimit) {
+        self.pages.clear(window, limit.fast_pages);
         self.head_starts.clear();
         self.far.clear();
         self.intensities.clear();
-    }
-
-    /// Number of pages with marks.
-    pub(super) fn pages(&self) -> usize {
-        self.pages.pages().len()
+        self.most_small_bytes = limit.small_bytes;
+        self.allowance.grant(limit.small_bytes);
     }
 
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
-        let far_brick = size_of::<(VoxelIndex, MarkedBrick)>() + 1;
-        self.pages.bytes()
-            + self.head_starts.bytes()
-            + self.far.capacity() * 8 / 7 * far_brick
-            + self.intensities.capacity() * 8 / 7 * (size_of::<(VoxelIndex, f32)>() + 1)
+        self.pages.bytes() + self.head_starts.bytes() + self.far.bytes() + self.intensities_bytes()
     }
 
-    /// Takes some rays from one origin, at most [`BATCH`]: their hits, and the voxels before their last.
-    pub(super) fn take(&mut self, origin: &RayOrigin, ends: &[RayEnd], needs_intensity: bool) {
+    fn intensities_bytes(&self) -> usize {
+        self.intensities.capacity() * 8 / 7 * (size_of::<(VoxelIndex, f32)>() + 1)
+    }
+
+    /// Bytes of the marks alone.
+    pub(super) fn marks_bytes(&self) -> usize {
+        self.pages.pages().iter().map(MarkedPage::heap_bytes).sum::<usize>() + self.far.bytes()
+    }
+
+    /// Number of bricks with marks.
+    pub(super) fn count_bricks(&self) -> usize {
+        self.pages.pages().iter().map(MarkedPage::count_bricks).sum::<usize>() + self.far.len()
+    }
+
+    /// Takes some rays from one origin, at most [`BATCH`]: their hits, and the voxels before their last. What there is no
+    /// room for goes to `parts`, if there is a limit.
+    pub(super) fn take(
+        &mut self,
+        origin: &RayOrigin,
+        ends: &[RayEnd],
+        needs_intensity: bool,
+        parts: Option<&ScanParts<'_>>,
+    ) {
         for end in ends {
             if let Some(intensity) = end.hit {
                 self.hit(end.voxel, needs_intensity.then_some(intensity));
@@ -66,13 +91,23 @@ impl OnceCollector {
             left[count % BATCH] = (number, slabs.unwrap_or(0));
             count += usize::from(slabs.is_some());
         }
-        let Self { pages, far, .. } = self;
-        let takes_far = pages.takes_far();
         for &(number, slabs) in &left[..count] {
             let end = ends[number];
-            SlabRay::new(origin, end).pass(pages, slabs, end.hit.is_some(), |voxel| {
-                if takes_far {
-                    set(&mut far_brick(far, voxel).passed, voxel);
+            let ray = SlabRay::new(origin, end);
+            if let Some(parts) = parts {
+                let new_bytes =
+                    BYTES_OF_RAY + BYTES_OF_SLAB * (ray.slabs() - slabs.min(ray.slabs())) as usize;
+                if self.allowance.is_spent_by(new_bytes) {
+                    self.keep_to_limit(new_bytes, parts);
+                }
+            }
+            let Self { pages, far, intensities, most_small_bytes, .. } = self;
+            ray.pass(pages, slabs, end.hit.is_some(), |voxel| {
+                far.pass(voxel);
+                if let Some(parts) = parts
+                    && far.bytes() > *most_small_bytes / 2
+                {
+                    parts.put_marked(far.take().into_iter(), intensities);
                 }
             });
         }
@@ -84,26 +119,50 @@ impl OnceCollector {
     }
 
     fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
-        let is_looked_at = match self.pages.window().local(voxel) {
-            Some(near) => {
-                let page = self.pages.number_at(near);
-                self.pages.pages_mut()[page].hit(voxel);
-                !self.pages.is_scratch(page)
-            }
-            None if self.pages.takes_far() => {
-                set(&mut far_brick(&mut self.far, voxel).hits, voxel);
-                true
-            }
-            None => false,
-        };
-        if let Some(intensity) = intensity.filter(|_| is_looked_at) {
+        match self.pages.window().local(voxel) {
+            Some(near) => self.pages.at(near).hit(voxel),
+            None => self.far.hit(voxel),
+        }
+        if let Some(intensity) = intensity {
             keep_largest(&mut self.intensities, voxel, intensity);
         }
     }
 
-    /// Forgets what is not looked at.
-    pub(super) fn finish(&mut self) {
-        self.pages.clear_scratch();
+    /// Makes room for so many bytes, if there is none: the marks of small pages go to `parts`, and if need be all.
+    #[cold]
+    fn keep_to_limit(&mut self, new_bytes: usize, parts: &ScanParts<'_>) {
+        let first_small = self.pages.first_small();
+        let pages_bytes: usize = self.pages.pages()[first_small..]
+            .iter()
+            .map(|page| size_of::<MarkedPage>() + page.heap_bytes())
+            .sum();
+        let bytes = pages_bytes + self.far.bytes() + self.intensities_bytes();
+        // Otherwise it would be looked at again at once.
+        let least = new_bytes.max(self.most_small_bytes / 8);
+        if bytes + least <= self.most_small_bytes {
+            return self.allowance.grant(self.most_small_bytes - bytes);
+        }
+        let first = if self.intensities_bytes() > self.most_small_bytes / 4 { 0 } else { first_small };
+        self.put_in_parts(first, parts);
+        self.allowance.grant(self.most_small_bytes - self.intensities_bytes().min(self.most_small_bytes));
+    }
+
+    /// Gives in the marks of the pages from this number on, and all outside the window. What head starts know to be marked
+    /// stays so.
+    fn put_in_parts(&mut self, first: usize, parts: &ScanParts<'_>) {
+        let mut pages = self.pages.take_from(first);
+        pages.sort_unstable_by_key(|(index, _)| *index);
+        let bricks = pages.iter().flat_map(|(index, page)| page.bricks(*index));
+        parts.put_marked(bricks, &self.intensities);
+        parts.put_marked(self.far.take().into_iter(), &self.intensities);
+        if first == 0 {
+            self.intensities = Intensities::default();
+        }
+    }
+
+    /// Gives in everything.
+    pub(super) fn finish(&mut self, parts: &ScanParts<'_>) {
+        self.put_in_parts(0, parts);
     }
 
     /// Adds what another collector with the same window has seen.
@@ -112,14 +171,7 @@ impl OnceCollector {
             let number = self.pages.number_of(index.map(|k| k * PAGE_EDGE as i32));
             self.pages.pages_mut()[number].absorb(page);
         }
-        for (index, brick) in &other.far {
-            let mine =
-                self.far.entry(*index).or_insert(MarkedBrick { hits: [0; 8], passed: [0; 8], ..*brick });
-            for word in 0..8 {
-                mine.hits[word] |= brick.hits[word];
-                mine.passed[word] |= brick.passed[word];
-            }
-        }
+        self.far.absorb(&other.far);
         for (&voxel, &intensity) in &other.intensities {
             keep_largest(&mut self.intensities, voxel, intensity);
         }
@@ -129,87 +181,29 @@ impl OnceCollector {
     pub(super) fn updates(&mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
         let pages = self.pages.pages().par_iter().zip(self.pages.indices());
         let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
-        bricks.extend(self.far.values());
-        let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
-        let this = &*self;
-        let updates = bricks_by_tile(grid, &indices)
-            .into_par_iter()
-            .map(|(tile, numbers)| (tile, this.updates_of_tile(grid, tile, &bricks, &numbers)));
-        let mut tiles: Vec<(TileIndex, Vec<BrickUpdate>)> = updates.collect();
-        tiles.retain(|(_, bricks)| !bricks.is_empty());
-        for brick in tiles.iter().flat_map(|(_, bricks)| bricks) {
-            report.hits += ones(&brick.hits);
-            report.misses += ones(&brick.misses);
+        bricks.extend(self.far.take());
+        let tiles = updates_by_tile(grid, &bricks, &self.intensities);
+        for (_, bricks) in &tiles {
+            let (hits, misses) = hits_and_misses(bricks);
+            report.hits += hits;
+            report.misses += misses;
         }
         let tiles = tiles.into_iter().map(|(tile, bricks)| (tile, TileUpdates::Once(bricks))).collect();
         in_order_of_tiles(grid, tiles, report)
     }
-
-    fn updates_of_tile(
-        &self,
-        grid: &Grid,
-        tile: TileIndex,
-        bricks: &[MarkedBrick],
-        numbers: &[u32],
-    ) -> Vec<BrickUpdate> {
-        let update = |&number: &u32| {
-            let MarkedBrick { index, mut hits, passed: mut misses } = bricks[number as usize];
-            let part = part_in_tile(grid, tile, index);
-            for word in 0..8 {
-                hits[word] &= part[word];
-                misses[word] &= part[word] & !hits[word];
-            }
-            let is_empty = hits == [0; 8] && misses == [0; 8];
-            let intensities = || self.intensities_of(index, &hits);
-            (!is_empty).then(|| BrickUpdate {
-                brick: brick_code(index),
-                hits,
-                misses,
-                intensities: intensities(),
-            })
-        };
-        numbers.iter().filter_map(update).collect()
-    }
-
-    /// The intensities of the given hits of a brick, in the order of the mask.
-    fn intensities_of(&self, brick: VoxelIndex, hits: &BrickMask) -> Box<[f32]> {
-        if self.intensities.is_empty() {
-            return Box::default();
-        }
-        let intensity = |place| {
-            let VoxelKey(local) = MortonCode(place as u64).to_key();
-            let voxel = std::array::from_fn(|k| brick[k] * BRICK_EDGE + i32::from(local[k]));
-            self.intensities.get(&voxel).copied().unwrap_or_default()
-        };
-        places(*hits).map(intensity).collect()
-    }
 }
 
-fn keep_largest(intensities: &mut FxHashMap<VoxelIndex, f32>, voxel: VoxelIndex, intensity: f32) {
+fn keep_largest(intensities: &mut Intensities, voxel: VoxelIndex, intensity: f32) {
     let largest = intensities.entry(voxel).or_insert(intensity);
     if intensity.total_cmp(largest).is_gt() {
         *largest = intensity;
     }
 }
 
-fn far_brick(bricks: &mut FxHashMap<VoxelIndex, MarkedBrick>, voxel: VoxelIndex) -> &mut MarkedBrick {
-    let index = voxel.map(|k| k.div_euclid(BRICK_EDGE));
-    bricks.entry(index).or_insert(MarkedBrick { index, hits: [0; 8], passed: [0; 8] })
-}
-
-fn set(mask: &mut BrickMask, voxel: VoxelIndex) {
-    let place = place_of_voxel(voxel);
-    mask[place / 64] |= 1 << (place % 64);
-}
-
-fn ones(mask: &BrickMask) -> u64 {
-    mask.iter().map(|word| u64::from(word.count_ones())).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::Point;
+    use crate::space::{BRICK_EDGE, BrickMask, Point};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -278,8 +272,8 @@ mod tests {
         let [(low_x, high_x), (low_y, high_y)] = [0, 1].map(|k| (bounds.0[k], bounds.1[k]));
         let window = Window::around(origin.voxel, ([low_x, low_y, -50.0], [high_x, high_y, 50.0]));
         assert!(window.pages()[0] > 240 && window.pages()[1] > 240);
-        collector.clear(window, PageChoice::All);
-        collector.take(origin, &ends, false);
+        collector.clear(window, &CollectorLimit::NONE);
+        collector.take(origin, &ends, false, None);
         assert!(collector.far.is_empty());
         assert!(collected(&collector) == walked(origin, &ends));
     }
@@ -304,7 +298,7 @@ mod tests {
                 origin.point.map(|x| x - 2.0 * reach),
                 origin.point.map(|x| x + 2.0 * reach),
             ));
-            collector.clear(window, PageChoice::All);
+            collector.clear(window, &CollectorLimit::NONE);
             let mut shared = 0;
             for round in 0..8 {
                 let part: Vec<RayEnd> = ends.iter().skip(round).step_by(8).copied().collect();
@@ -312,7 +306,7 @@ mod tests {
                     .iter()
                     .filter(|end| collector.head_starts.of(&SlabRay::new(origin, **end)) != Some(0))
                     .count();
-                part.chunks(BATCH).for_each(|batch| collector.take(origin, batch, false));
+                part.chunks(BATCH).for_each(|batch| collector.take(origin, batch, false, None));
                 collector.share(origin, &[8, 4, 2, 1]);
             }
             prop_assert_eq!(collected(&collector), walked(origin, &ends));

@@ -1,4 +1,5 @@
 use super::ScanReport;
+use super::scan_parts::ScanParts;
 use super::tile_order::in_order_of_tiles;
 use super::updates::{OrderedUpdates, ScanUpdates, TileUpdates};
 use crate::sensor::Observation;
@@ -16,6 +17,11 @@ pub(super) struct OrderedCollector<'a> {
     hits: u64,
     misses: u64,
 }
+
+/// What an update takes, in a list that may be half empty; more with an intensity.
+const BYTES_OF_UPDATE: usize = 16;
+/// What a tile takes beside its updates.
+const BYTES_OF_TILE: usize = 256;
 
 impl<'a> OrderedCollector<'a> {
     pub(super) fn new(grid: &'a Grid, keep_intensities: bool) -> Self {
@@ -46,6 +52,21 @@ impl<'a> OrderedCollector<'a> {
         });
         let (_, min, updates) = &mut self.lists[self.latest];
         updates.push(offset_in(*min), observation, self.keep_intensities);
+    }
+
+    /// Bytes of memory, at most.
+    pub(super) fn bytes(&self) -> usize {
+        BYTES_OF_UPDATE * (self.hits + self.misses) as usize + BYTES_OF_TILE * self.lists.len()
+    }
+
+    /// Gives in what was collected, which is forgotten.
+    pub(super) fn put_in(&mut self, parts: &ScanParts<'_>) {
+        self.slots.clear();
+        (self.hits, self.misses) = (0, 0);
+        parts.put(self.lists.drain(..).map(|(tile, _, updates)| {
+            let counts = updates.hits_and_misses();
+            (tile, TileUpdates::Ordered(updates), counts)
+        }));
     }
 
     pub(super) fn into_updates(self, mut report: ScanReport) -> ScanUpdates {

@@ -1,5 +1,6 @@
 use super::updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdates};
 use crate::space::{BrickCode, BrickMask};
+use std::io::{self, BufRead};
 
 /// Updates of one tile from any number of scans, in order and packed: a fourth to a tenth of the memory that they take
 /// ready for use.
@@ -58,9 +59,27 @@ impl PackedUpdates {
         }
     }
 
+    /// What one scan says.
+    pub(super) fn of(updates: &TileUpdates) -> Self {
+        let mut packed = Self::default();
+        packed.push(updates);
+        packed
+    }
+
     /// What [`PackedUpdates::as_bytes`] of that many updates gave, and nothing else.
-    pub(crate) fn from_parts(bytes: Vec<u8>, updates: usize) -> Self {
+    pub(super) fn from_parts(bytes: Vec<u8>, updates: usize) -> Self {
         Self { bytes, updates }
+    }
+
+    /// Appends what others say after these.
+    pub(super) fn append(&mut self, others: &Self) {
+        self.bytes.extend_from_slice(&others.bytes);
+        self.updates += others.updates;
+    }
+
+    /// Gives back memory that is not needed.
+    pub(super) fn shrink(&mut self) {
+        self.bytes.shrink_to_fit();
     }
 
     /// The updates as bytes, which stay the same when more are appended.
@@ -70,8 +89,24 @@ impl PackedUpdates {
 
     /// What each of the scans says, in order.
     pub fn iter(&self) -> impl Iterator<Item = TileUpdates> {
-        let mut input = Unpacker { bytes: &self.bytes };
-        std::iter::from_fn(move || (!input.bytes.is_empty()).then(|| input.updates()))
+        let mut input = Unpacker { input: &*self.bytes };
+        std::iter::from_fn(move || {
+            let next = input.next().transpose()?;
+            Some(next.expect("what was packed is whole"))
+        })
+    }
+
+    /// Hands over what each of the scans says, in order, from bytes that [`PackedUpdates::as_bytes`] gave.
+    ///
+    /// # Errors
+    ///
+    /// An `input` that cannot be read, or ends too soon.
+    pub(crate) fn unpack(input: impl BufRead, mut take: impl FnMut(TileUpdates)) -> io::Result<()> {
+        let mut input = Unpacker { input };
+        while let Some(updates) = input.next()? {
+            take(updates);
+        }
+        Ok(())
     }
 
     /// Number of updates.
@@ -143,90 +178,112 @@ fn set_of(are_in: [bool; 8]) -> u8 {
 }
 
 /// Reads what [`Packer`] wrote, and nothing else.
-struct Unpacker<'a> {
-    bytes: &'a [u8],
+struct Unpacker<R> {
+    input: R,
 }
 
-impl Unpacker<'_> {
-    fn updates(&mut self) -> TileUpdates {
-        match self.byte() {
-            ONCE => TileUpdates::Once(self.bricks(Self::brick_update)),
-            RUNS => TileUpdates::Runs(self.bricks(Self::brick_runs)),
+/// Most room that is made at once for what a number announces.
+const MOST_RESERVED: usize = 1 << 12;
+
+impl<R: BufRead> Unpacker<R> {
+    /// What one scan says; `None` at the end.
+    fn next(&mut self) -> io::Result<Option<TileUpdates>> {
+        if self.input.fill_buf()?.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(match self.byte()? {
+            ONCE => TileUpdates::Once(self.bricks(Self::brick_update)?),
+            RUNS => TileUpdates::Runs(self.bricks(Self::brick_runs)?),
             _ => {
-                let voxels = self.many(|input| u32::from_le_bytes(input.take()));
-                let intensities = self.many(Self::float);
+                let voxels = self.many(|input| Ok(u32::from_le_bytes(input.take()?)))?;
+                let intensities = self.many(Self::float)?;
                 TileUpdates::Ordered(OrderedUpdates::from_parts(voxels, intensities))
             }
-        }
+        }))
     }
 
-    fn bricks<T>(&mut self, mut brick: impl FnMut(&mut Self, BrickCode) -> T) -> Vec<T> {
+    fn bricks<T>(
+        &mut self,
+        mut brick: impl FnMut(&mut Self, BrickCode) -> io::Result<T>,
+    ) -> io::Result<Vec<T>> {
         let mut last = 0_u64;
         self.many(|input| {
-            last = last.wrapping_add(input.number());
+            last = last.wrapping_add(input.number()?);
             brick(input, BrickCode(last))
         })
     }
 
-    fn brick_update(&mut self, brick: BrickCode) -> BrickUpdate {
-        let (hits, misses) = (self.mask(), self.mask());
-        BrickUpdate { brick, hits, misses, intensities: self.many(Self::float).into() }
+    fn brick_update(&mut self, brick: BrickCode) -> io::Result<BrickUpdate> {
+        let (hits, misses) = (self.mask()?, self.mask()?);
+        Ok(BrickUpdate { brick, hits, misses, intensities: self.many(Self::float)?.into() })
     }
 
-    fn brick_runs(&mut self, brick: BrickCode) -> BrickRuns {
-        BrickRuns { brick, runs: self.many(Self::run).into() }
+    fn brick_runs(&mut self, brick: BrickCode) -> io::Result<BrickRuns> {
+        Ok(BrickRuns { brick, runs: self.many(Self::run)?.into() })
     }
 
-    fn run(&mut self) -> Run {
-        let place = self.number() as u16;
-        let misses = self.number();
-        Run { place, misses: (misses >> 1) as u16, hit: (misses & 1 == 1).then(|| self.float()) }
+    fn run(&mut self) -> io::Result<Run> {
+        let place = self.number()? as u16;
+        let misses = self.number()?;
+        let hit = if misses & 1 == 1 { Some(self.float()?) } else { None };
+        Ok(Run { place, misses: (misses >> 1) as u16, hit })
     }
 
-    fn mask(&mut self) -> BrickMask {
-        let words = self.byte();
-        std::array::from_fn(|k| if words >> k & 1 == 1 { self.word() } else { 0 })
+    fn mask(&mut self) -> io::Result<BrickMask> {
+        let words = self.byte()?;
+        let mut mask = [0; 8];
+        for (_, word) in mask.iter_mut().enumerate().filter(|(k, _)| words >> k & 1 == 1) {
+            *word = self.word()?;
+        }
+        Ok(mask)
     }
 
-    fn word(&mut self) -> u64 {
-        let bytes = self.byte();
-        u64::from_le_bytes(std::array::from_fn(|k| if bytes >> k & 1 == 1 { self.byte() } else { 0 }))
+    fn word(&mut self) -> io::Result<u64> {
+        let set = self.byte()?;
+        let mut bytes = [0; 8];
+        for (_, byte) in bytes.iter_mut().enumerate().filter(|(k, _)| set >> k & 1 == 1) {
+            *byte = self.byte()?;
+        }
+        Ok(u64::from_le_bytes(bytes))
     }
 
     /// As many things as a number before them says. The list grows with what comes.
-    fn many<T>(&mut self, mut one: impl FnMut(&mut Self) -> T) -> Vec<T> {
-        let count = self.number() as usize;
-        // Each takes a byte at least.
-        let mut all = Vec::with_capacity(count.min(self.bytes.len()));
-        all.extend((0..count).map(|_| one(self)));
-        all
+    fn many<T>(&mut self, mut one: impl FnMut(&mut Self) -> io::Result<T>) -> io::Result<Vec<T>> {
+        let count = self.number()? as usize;
+        let mut all = Vec::with_capacity(count.min(MOST_RESERVED));
+        for _ in 0..count {
+            all.push(one(self)?);
+        }
+        Ok(all)
     }
 
-    fn number(&mut self) -> u64 {
+    fn number(&mut self) -> io::Result<u64> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
-            let byte = self.byte();
+            let byte = self.byte()?;
             number |= u64::from(byte & 0x7f) << shift;
             if byte < 0x80 {
                 break;
             }
         }
-        number
+        Ok(number)
     }
 
-    fn float(&mut self) -> f32 {
-        f32::from_le_bytes(self.take())
+    fn float(&mut self) -> io::Result<f32> {
+        Ok(f32::from_le_bytes(self.take()?))
     }
 
-    fn byte(&mut self) -> u8 {
-        let [byte] = self.take();
-        byte
+    #[inline]
+    fn byte(&mut self) -> io::Result<u8> {
+        let [byte] = self.take()?;
+        Ok(byte)
     }
 
-    fn take<const N: usize>(&mut self) -> [u8; N] {
-        let (taken, rest) = self.bytes.split_first_chunk().expect("what was packed is whole");
-        self.bytes = rest;
-        *taken
+    #[inline]
+    fn take<const N: usize>(&mut self) -> io::Result<[u8; N]> {
+        let mut taken = [0; N];
+        self.input.read_exact(&mut taken)?;
+        Ok(taken)
     }
 }
 

@@ -1,12 +1,8 @@
 use super::footprint::Footprint;
 use super::marked_page::MarkedPage;
-use super::page_choice::PageChoice;
 use super::window::{Local, PAGE_EDGE, Window};
 use crate::space::VoxelIndex;
 use rustc_hash::FxHashMap;
-
-/// In the directory: a page that is not looked at.
-const SCRATCH: u32 = 1;
 
 /// Pages of voxels in which the rays of a scan leave something.
 ///
@@ -24,49 +20,40 @@ pub(super) struct PageMap<F> {
     indices: Vec<VoxelIndex>,
     /// Cleared pages of earlier scans.
     spare: Vec<F>,
-    /// Whether some pages of the window are not looked at: what would go there goes to the page with number 0.
-    has_scratch: bool,
-    /// Whether what lies outside the window is looked at.
-    takes_far: bool,
+    /// So many pages, the first that rays come to, may be fast; those after them are small.
+    most_fast: usize,
 }
 
 impl<F: Footprint> PageMap<F> {
-    /// Forgets all pages, and begins anew with another window; the memory is kept.
-    pub(super) fn clear(&mut self, window: Window, choice: PageChoice<'_>) {
+    /// Forgets all pages, and begins anew with another window, in which so many pages may be fast; the memory is kept.
+    pub(super) fn clear(&mut self, window: Window, most_fast: usize) {
         self.window = window;
+        self.most_fast = most_fast;
         self.directory.clear();
-        let pages = window.pages().map(|pages| pages as usize).iter().product();
-        self.directory.resize(pages, u32::from(matches!(choice, PageChoice::Only(_))));
-        if let PageChoice::Only(pages) | PageChoice::AllBut(pages) = choice {
-            pages.iter().for_each(|&page| self.directory[page as usize] ^= SCRATCH);
-        }
-        self.has_scratch = !matches!(choice, PageChoice::All);
-        self.takes_far = !matches!(choice, PageChoice::Only(_));
+        self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
         self.far.clear();
         // No more than the last scan had: a scan with stray rays far away leaves nothing for good.
         self.spare.clear();
         self.spare.extend(self.pages.drain(..).filter_map(F::cleared));
         self.indices.clear();
-        if self.has_scratch {
-            self.push(window.base().map(|k| k.div_euclid(PAGE_EDGE as i32)));
+    }
+
+    /// Takes the pages from this number on out, with their indices.
+    pub(super) fn take_from(&mut self, first: usize) -> Vec<(VoxelIndex, F)> {
+        let first = first.min(self.pages.len());
+        for &index in &self.indices[first..] {
+            let voxel = index.map(|k| k.wrapping_mul(PAGE_EDGE as i32));
+            match self.window.local(voxel) {
+                Some(local) => self.directory[self.window.page_of(local)] = 0,
+                None => drop(self.far.remove(&index)),
+            }
         }
+        self.indices.drain(first..).zip(self.pages.drain(first..)).collect()
     }
 
-    /// Forgets what went to pages that are not looked at.
-    pub(super) fn clear_scratch(&mut self) {
-        if self.has_scratch {
-            self.pages[0] = F::default();
-        }
-    }
-
-    /// Whether a page, by its number, stands for those that are not looked at.
-    pub(super) fn is_scratch(&self, number: usize) -> bool {
-        self.has_scratch && number == 0
-    }
-
-    /// Whether what lies outside the window is looked at.
-    pub(super) fn takes_far(&self) -> bool {
-        self.takes_far
+    /// Number of the first page that is small.
+    pub(super) fn first_small(&self) -> usize {
+        self.most_fast.min(self.pages.len())
     }
 
     /// Bytes of memory on the heap.
@@ -103,9 +90,6 @@ impl<F: Footprint> PageMap<F> {
         if let Some(local) = self.window.local(voxel) {
             return self.number_at(local);
         }
-        if !self.takes_far {
-            return 0;
-        }
         let index = voxel.map(|k| k.div_euclid(PAGE_EDGE as i32));
         if let Some(&number) = self.far.get(&index) {
             return number as usize;
@@ -140,7 +124,9 @@ impl<F: Footprint> PageMap<F> {
     }
 
     fn push(&mut self, index: VoxelIndex) -> usize {
-        self.pages.push(self.spare.pop().unwrap_or_default());
+        let new = || if self.pages.len() < self.most_fast { F::default() } else { F::sparse() };
+        let page = self.spare.pop().unwrap_or_else(new);
+        self.pages.push(page);
         self.indices.push(index);
         self.pages.len() - 1
     }
@@ -150,11 +136,8 @@ impl PageMap<MarkedPage> {
     /// Whether all voxels from `low` to `high`, both in the window, are marked.
     #[inline]
     pub(super) fn are_marked(&self, low: Local, high: Local) -> bool {
-        let page = |voxel| {
-            let number = (self.directory[self.window.page_of(voxel)] as usize).wrapping_sub(1);
-            // In pages that are not looked at rays go fast by themselves, and nobody knows what is marked.
-            if self.is_scratch(number) { None } else { self.pages.get(number) }
-        };
+        let page =
+            |voxel| self.pages.get((self.directory[self.window.page_of(voxel)] as usize).wrapping_sub(1));
         let is_one_page = (0..3).all(|k| (low[k] ^ high[k]) < PAGE_EDGE as u32);
         if is_one_page {
             return page(low).is_some_and(|page| page.are_marked(low, high));

@@ -125,12 +125,6 @@ impl SlabPath {
         is_near(self.at_b) || is_near(self.at_c)
     }
 
-    /// Whether the last of so many crossings after `done` others tells where the ray is then.
-    #[inline]
-    pub(super) fn is_certain_after(&self, done: u32, slabs: u32) -> bool {
-        slabs > 0 && !self.after(done + slabs - 1).is_near_border()
-    }
-
     /// The voxel between the one by which the ray came into a slab and the one by which it goes out, if these differ along
     /// both axes. `None` if crossings are too near to a border, or to each other, to tell without the closed form.
     #[inline]

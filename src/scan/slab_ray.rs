@@ -142,11 +142,7 @@ impl<'a> SlabRay<'a> {
             while done < slabs {
                 let stretch = path.stretch([a, b, c], [last[A], last[B], last[C]], done, slabs);
                 let page = pages.number_at(voxel::<A, B, C>(a, b, c));
-                // What is passed in a page that is not looked at does not matter, only where the ray leaves it.
-                let certain = match pages.is_scratch(page) && path.is_certain_after(done, stretch.slabs) {
-                    true => stretch.slabs,
-                    false => stretch.pass::<A, B, C, F>(&mut pages.pages_mut()[page], a),
-                };
+                let certain = pages.pages_mut()[page].pass_stretch::<A, B, C>(&stretch, a);
                 if certain > 0 {
                     (b, c) = path.after(done + certain - 1).voxel();
                     a = if is_up { a + certain } else { a - certain };
@@ -278,9 +274,9 @@ pub(super) fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u
 
 #[cfg(test)]
 mod tests {
-    use super::super::counted_page::{CountedPage, brick_in_page};
+    use super::super::counted_page::CountedPage;
     use super::super::marked_page::MarkedPage;
-    use super::super::page_choice::PageChoice;
+    use super::super::sparse_page::brick_in_page;
     use super::super::window::Window;
     use super::*;
     use crate::space::place_of_voxel;
@@ -335,8 +331,8 @@ mod tests {
         let window = Window::around(origin.voxel, bounds);
         let mut marked = PageMap::<MarkedPage>::default();
         let mut counted = PageMap::<CountedPage>::default();
-        marked.clear(window, PageChoice::All);
-        counted.clear(window, PageChoice::All);
+        marked.clear(window, usize::MAX);
+        counted.clear(window, usize::MAX);
         let unknown =
             rays.iter().filter(|ray| is_unknown(ray, &mut PageMap::<MarkedPage>::clone(&marked))).count();
         for ray in &rays {

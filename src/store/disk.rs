@@ -1,3 +1,4 @@
+use crate::scratch::Scratch;
 use std::any::Any;
 use std::fmt::Debug;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -50,6 +51,10 @@ pub trait Disk: Debug + Send + Sync {
     fn remove_folder(&self, path: &Path) -> io::Result<()>;
     /// The names in a folder, in no particular order; names that are not UTF-8 are left out.
     fn list(&self, path: &Path) -> io::Result<Vec<String>>;
+    /// A file without a name on the same file system as a folder, which goes when it is dropped.
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
+        Ok(Box::new(tempfile::tempfile_in(folder)?))
+    }
     /// What has a name, links not followed; `None` if nothing has.
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>>;
     /// Locks a file, made if missing, until the returned value is dropped; `None` if another holds it.

@@ -228,6 +228,11 @@ impl TileStore {
         }
     }
 
+    /// Where the map's files are kept.
+    pub fn disk(&self) -> &Arc<dyn Disk> {
+        &self.disk
+    }
+
     /// The map's folder.
     pub fn folder(&self) -> &Path {
         self.layout.folder()

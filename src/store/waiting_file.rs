@@ -2,7 +2,9 @@ use super::tile_store::TileStore;
 use super::tile_writer::make_folder;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
+
+const BUFFER_BYTES: usize = 1 << 16;
 
 /// How much of a tile's file of waiting updates counts: so many bytes with this checksum. What stands behind them is of
 /// an attempt that was given up.
@@ -38,25 +40,36 @@ impl TileStore {
         Ok(WaitingFile { bytes: file.bytes + updates.len() as u64, crc: crc.finalize() })
     }
 
-    /// The updates that wait in a tile's file.
+    /// The updates that wait in a tile's file, of which every byte was checked: there may be more than memory has room for.
     ///
     /// # Errors
     ///
     /// A disk that refuses, and a file that is not what was written.
-    pub fn read_waiting(&self, tile: TileIndex, file: WaitingFile) -> Result<Vec<u8>> {
-        if file.bytes == 0 {
-            return Ok(Vec::new());
-        }
+    pub fn open_waiting(&self, tile: TileIndex, file: WaitingFile) -> Result<impl BufRead + use<>> {
         let path = self.layout.waiting(tile);
-        let input = self.disk.open(&path).map_err(|error| Error::io(&path, "open", error))?;
-        let mut updates = Vec::with_capacity(file.bytes.min(input.file_bytes()) as usize);
-        input.take(file.bytes).read_to_end(&mut updates).map_err(|error| Error::io(&path, "read", error))?;
-        if updates.len() as u64 != file.bytes || crc32fast::hash(&updates) != file.crc {
+        let open = || {
+            let input = self.disk.open(&path).map_err(|error| Error::io(&path, "open", error))?;
+            Ok(BufReader::with_capacity(BUFFER_BYTES, input).take(file.bytes))
+        };
+        let mut crc = crc32fast::Hasher::new();
+        let mut input = open()?;
+        let mut bytes = 0;
+        loop {
+            let some = input.fill_buf().map_err(|error| Error::io(&path, "read", error))?;
+            if some.is_empty() {
+                break;
+            }
+            crc.update(some);
+            let count = some.len();
+            bytes += count as u64;
+            input.consume(count);
+        }
+        if bytes != file.bytes || crc.finalize() != file.crc {
             let reason = "the updates that wait here for their tile are not those written; \
                           go on from the last flush";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
-        Ok(updates)
+        open()
     }
 
     /// Cuts off what stands behind the updates that count. If that fails it does no harm but for the room that it takes.

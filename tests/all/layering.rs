@@ -29,10 +29,10 @@ fn the_folders_know_only_what_lies_before_them_in_the_flow() {
     let allowed: [(&str, &[&str]); 12] = [
         ("space", &[]),
         ("sensor", &["error", "maths"]),
-        ("scan", &["config", "error", "sensor", "space"]),
+        ("scan", &["config", "error", "scratch", "sensor", "space"]),
         ("octree", &["error", "space"]),
         ("tile", &["config", "error", "octree", "scan", "sensor", "space"]),
-        ("store", &["config", "error", "sensor", "space"]),
+        ("store", &["config", "error", "scratch", "sensor", "space"]),
         ("io", &["error", "maths", "scan", "space"]),
         // Voxels of an archive by the interface of mappers and questions alone.
         ("local", &["error", "mapper", "maths", "query", "scan", "sensor", "space"]),

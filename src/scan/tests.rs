@@ -1,0 +1,205 @@
+//! Scans in little memory: the same updates as with any.
+
+use super::tile_order::brick_code;
+use super::{Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder};
+use crate::config::{InsertMode, RayConfig};
+use crate::error::Result;
+use crate::scratch::Scratch;
+use crate::sensor::{Iwlo, Observation, SensorModel};
+use crate::space::{BRICK_EDGE, Grid, Point, TileIndex, VoxelIndex, place_of_voxel, places};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+use std::io::{self, Cursor};
+use std::path::Path;
+
+/// What is said about each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
+/// brick and place in it.
+type Said = BTreeMap<(TileIndex, u64, usize), Vec<Option<u32>>>;
+
+fn add(said: &mut Said, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
+    let mut push = |brick, place, hit: Option<f32>| {
+        said.entry((tile, brick, place)).or_default().push(hit.map(f32::to_bits));
+    };
+    match updates {
+        TileUpdates::Once(bricks) => {
+            for brick in bricks {
+                assert!(brick.hits.iter().zip(&brick.misses).all(|(hits, misses)| hits & misses == 0));
+                for (place, observation) in places(brick.touched()).zip(brick.observations()) {
+                    push(brick.brick.0, place, intensity(observation));
+                }
+            }
+        }
+        TileUpdates::Runs(bricks) => {
+            for (brick, run) in bricks.iter().flat_map(|brick| brick.runs.iter().map(move |run| (brick, run)))
+            {
+                for _ in 0..run.misses {
+                    push(brick.brick.0, run.place.into(), None);
+                }
+                if run.hit.is_some() {
+                    push(brick.brick.0, run.place.into(), run.hit);
+                }
+            }
+        }
+        TileUpdates::Ordered(updates) => {
+            let min = grid.voxels_of_tile(tile).min;
+            for (offset, observation) in updates.iter() {
+                let voxel: VoxelIndex = std::array::from_fn(|k| min[k] + offset[k]);
+                let brick = brick_code(voxel.map(|k| k.div_euclid(BRICK_EDGE)));
+                push(brick.0, place_of_voxel(voxel), intensity(observation));
+            }
+        }
+        TileUpdates::Packed(packed) => packed.iter().for_each(|updates| add(said, grid, tile, &updates)),
+    }
+}
+
+fn intensity(observation: Observation) -> Option<f32> {
+    match observation {
+        Observation::Hit(intensity) => Some(intensity),
+        Observation::Miss => None,
+    }
+}
+
+struct Setting {
+    grid: Grid,
+    model: SensorModel,
+    rays: RayConfig,
+    order: UpdateOrder,
+}
+
+impl Setting {
+    fn whole(&self, scan: &Scan) -> (Said, ScanReport) {
+        let Self { grid, model, rays, order } = self;
+        let tracer = &mut ScanTracer::default();
+        let updates = tracer.trace_points(grid, model, rays, scan.origin, scan, *order, None).unwrap();
+        let mut said = Said::new();
+        updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
+        (said, updates.report)
+    }
+
+    /// The same with so many bytes for marks, and for updates; also, how many times some were put aside.
+    fn in_parts(
+        &self,
+        tracer: &mut ScanTracer,
+        scan: &Scan,
+        most_bytes: usize,
+    ) -> Result<(Said, ScanReport, usize)> {
+        let Self { grid, model, rays, order } = self;
+        let (mut said, mut times) = (Said::new(), 0);
+        let mut put_aside = |part: Vec<(TileIndex, PackedUpdates)>| {
+            times += 1;
+            for (tile, updates) in part {
+                add(&mut said, grid, tile, &TileUpdates::Packed(updates));
+            }
+            Ok(())
+        };
+        let make_scratch = &|| Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
+        let folder = Path::new("map");
+        let overflow = Overflow { most_bytes, folder, make_scratch, put_aside: &mut put_aside };
+        let ScanUpdates { tiles, report } =
+            tracer.trace_points(grid, model, rays, scan.origin, scan, *order, Some(overflow))?;
+        tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
+        Ok((said, report, times))
+    }
+}
+
+fn settings(tile_size_m: f64) -> Vec<Setting> {
+    let modes = [
+        (InsertMode::PerScan, UpdateOrder::OfVoxels),
+        (InsertMode::PerRay, UpdateOrder::OfVoxels),
+        (InsertMode::PerRay, UpdateOrder::OfRays),
+    ];
+    let setting = |(insert_mode, order)| Setting {
+        grid: Grid::new(0.1, tile_size_m).unwrap(),
+        model: SensorModel::Iwlo(Iwlo::default()),
+        rays: RayConfig { insert_mode, ..RayConfig::default() },
+        order,
+    };
+    modes.map(setting).into()
+}
+
+/// Rays all around, of which many are alike.
+fn dense(rays: u32, reach_m: f64) -> Scan {
+    let origin = [0.03, -0.02, 0.05];
+    let point = |k: u32| -> Point {
+        let (azimuth, up) = (f64::from(k) * 2.399_963, 2.0 * f64::from(k) / f64::from(rays) - 1.0);
+        let (flat, reach) = ((1.0 - up * up).sqrt(), reach_m * (0.75 + 0.25 * (5.0 * azimuth).sin()));
+        [origin[0] + reach * flat * azimuth.cos(), origin[1] + reach * flat * azimuth.sin(), reach * up]
+    };
+    let intensities = (0..rays).map(|k| (k * 37 % 256) as f32).collect();
+    Scan { origin, points: (0..rays).map(point).collect(), intensities: Some(intensities) }
+}
+
+#[test]
+fn dense_rays_in_little_memory_say_the_same_by_any_number_of_threads() {
+    let scan = dense(9_000, 5.0);
+    for setting in settings(10.0) {
+        let (said, report) = setting.whole(&scan);
+        for (threads, bytes) in [(1, 1 << 20), (3, 1 << 20), (3, 16 << 20)] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut tracer = ScanTracer::with_memory_bytes(bytes);
+            for _ in 0..2 {
+                let parts = pool.install(|| setting.in_parts(&mut tracer, &scan, bytes / 2)).unwrap();
+                assert_eq!(parts.1, report, "{:?} {threads} {bytes}", setting.order);
+                assert!(parts.0 == said, "{:?} {threads} {bytes}", setting.order);
+            }
+        }
+    }
+}
+
+#[test]
+fn long_rays_keep_to_their_memory() {
+    let scan = dense(80, 500.0);
+    for setting in settings(25.6) {
+        let bytes = 2 << 20;
+        let mut tracer = ScanTracer::with_memory_bytes(bytes);
+        let (said, report, times) = setting.in_parts(&mut tracer, &scan, bytes).unwrap();
+        assert!(times > 0);
+        // What is kept from scan to scan; numbers of pages and head starts are 1 MiB and some.
+        assert!(tracer.bytes() < bytes + (2 << 20), "{}", tracer.bytes());
+        assert!((said, report) == setting.whole(&scan));
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
+    let scan = dense(100, 200.0);
+    for setting in settings(10.0) {
+        let Setting { grid, model, rays, order } = &setting;
+        let make_scratch = &|| Err(io::Error::from(io::ErrorKind::StorageFull));
+        let (folder, put_aside) = (Path::new("some_map"), &mut |_| Ok(()));
+        let overflow = Overflow { most_bytes: 1 << 16, folder, make_scratch, put_aside };
+        let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
+        let traced = tracer.trace_points(grid, model, rays, scan.origin, &scan, *order, Some(overflow));
+        assert!(traced.unwrap_err().to_string().contains("some_map"));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn little_memory_makes_the_same_updates(
+        origin in prop::array::uniform3(-50.0..50.0_f64),
+        ends in prop::collection::vec((prop::array::uniform3(-60.0..60.0_f64), 0.0..255_f32), 1..40),
+        stray in any::<bool>(),
+        tile_size_m in prop::sample::select(vec![10.0, 0.4, 3.7]),
+        most_bytes in prop::sample::select(vec![0_usize, 1 << 12, 1 << 16]),
+    ) {
+        let mut points: Vec<Point> =
+            ends.iter().map(|(way, _)| std::array::from_fn(|k| origin[k] + way[k])).collect();
+        if stray {
+            points[0] = [origin[0] + 500.0, origin[1], origin[2] - 400.0];
+        }
+        let intensities = Some(ends.iter().map(|(_, intensity)| *intensity).collect());
+        let scan = Scan { origin, points, intensities };
+        for setting in settings(tile_size_m) {
+            let (said, report) = setting.whole(&scan);
+            let mut tracer = ScanTracer::with_memory_bytes(1 << 16);
+            for _ in 0..2 {
+                let parts = setting.in_parts(&mut tracer, &scan, most_bytes).unwrap();
+                prop_assert_eq!(parts.1, report);
+                prop_assert!(parts.0 == said);
+            }
+        }
+    }
+}
