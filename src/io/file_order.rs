@@ -52,9 +52,15 @@ mod tests {
 
     #[test]
     fn files_come_as_people_count() {
-        assert_eq!(sorted(&["full10.pcd", "full2.pcd", "full1.pcd"]), ["full1.pcd", "full2.pcd", "full10.pcd"]);
+        assert_eq!(
+            sorted(&["full10.pcd", "full2.pcd", "full1.pcd"]),
+            ["full1.pcd", "full2.pcd", "full10.pcd"]
+        );
         assert_eq!(sorted(&["010.pcd", "002.pcd"]), ["002.pcd", "010.pcd"]);
-        assert_eq!(sorted(&["9.5.pcd", "10.25.pcd", "10.3.pcd", "10.1.pcd"])[1..], ["10.1.pcd", "10.25.pcd", "10.3.pcd"]);
+        assert_eq!(
+            sorted(&["9.5.pcd", "10.25.pcd", "10.3.pcd", "10.1.pcd"])[1..],
+            ["10.1.pcd", "10.25.pcd", "10.3.pcd"]
+        );
         // Hexadecimal numbers of one length.
         assert_eq!(sorted(&["0a1f.pcd", "0a10.pcd"]), ["0a10.pcd", "0a1f.pcd"]);
         assert_eq!(sorted(&["1.pcd", "01.pcd"]).len(), 2);

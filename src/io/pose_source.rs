@@ -60,7 +60,8 @@ pub(super) fn poses_of(
         poses.check(&path, files)?;
         return Ok((PoseSource::File(path), Some(poses.into_poses())));
     }
-    let is_placed = |path: &PathBuf| viewpoint_of_file(path).is_some_and(|viewpoint| !viewpoint.is_identity());
+    let is_placed =
+        |path: &PathBuf| viewpoint_of_file(path).is_some_and(|viewpoint| !viewpoint.is_identity());
     if files.iter().any(is_placed) {
         return Ok((PoseSource::Viewpoint, None));
     }
@@ -101,7 +102,9 @@ fn files_like_poses(folder: &Path) -> Vec<String> {
         let mut paths: Vec<PathBuf> =
             fs::read_dir(place).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
         paths.sort_unstable();
-        found.extend(paths.iter().filter(|path| looks_like_poses(path)).map(|path| path.display().to_string()));
+        found.extend(
+            paths.iter().filter(|path| looks_like_poses(path)).map(|path| path.display().to_string()),
+        );
     }
     found.truncate(MOST_NAMED);
     found

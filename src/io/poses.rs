@@ -23,7 +23,10 @@ impl Poses {
         let lines: std::result::Result<Vec<_>, _> = lines(&text).collect();
         let lines = lines.map_err(|error| error.in_input(path))?;
         let stamps = lines.iter().filter_map(|(line, pose)| pose.stamp_s.map(|stamp_s| (*line, stamp_s)));
-        Ok(Self { stamps: stamps.collect(), poses: lines.iter().map(|(_, pose)| pose.world_from_sensor).collect() })
+        Ok(Self {
+            stamps: stamps.collect(),
+            poses: lines.iter().map(|(_, pose)| pose.world_from_sensor).collect(),
+        })
     }
 
     /// Whether these are the poses of these files: as many, and in the order of time as the files are in theirs.

@@ -17,8 +17,7 @@ use std::path::{Path, PathBuf};
 /// A stream that fails or ends before its first four bytes; what is wrong with a scan comes with that scan.
 pub fn read_scan_graph<R: Read>(input: R, file_bytes: u64, path: &Path) -> Result<impl ScanSource + use<R>> {
     let path = path.to_owned();
-    let mut graph =
-        ScanGraph { path, input, offset: 0, file_bytes, nodes: 0, done: 0, is_past_error: false };
+    let mut graph = ScanGraph { path, input, offset: 0, file_bytes, nodes: 0, done: 0, is_past_error: false };
     // An empty graph is an empty file.
     if file_bytes > 0 {
         graph.nodes = u32::from_le_bytes(graph.bytes()?);

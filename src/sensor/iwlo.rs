@@ -72,8 +72,14 @@ impl fmt::Display for Iwlo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { occupied, free, sharpness, decay_rate, min_alpha, min, max, .. } = self;
         let Self { intensity_threshold, intensity_max, .. } = self;
-        write!(f, "iwlo with occupied {occupied}, free {free}, sharpness {sharpness}, decay rate {decay_rate}, ")?;
-        write!(f, "min alpha {min_alpha}, min {min}, max {max}, intensities {intensity_threshold} to {intensity_max}, ")?;
+        write!(
+            f,
+            "iwlo with occupied {occupied}, free {free}, sharpness {sharpness}, decay rate {decay_rate}, "
+        )?;
+        write!(
+            f,
+            "min alpha {min_alpha}, min {min}, max {max}, intensities {intensity_threshold} to {intensity_max}, "
+        )?;
         match self.adaptive {
             true => write!(f, "adaptive below {} by {}", self.adaptive_probability, self.adaptive_ratio),
             false => f.write_str("not adaptive"),

@@ -74,8 +74,7 @@ fn check_grid(grid: &Grid, sender: &Sender) -> Result<()> {
     if grid == sender.grid() {
         return Ok(());
     }
-    let reason =
-        format!("voxels and tiles of the map and of the sender differ: {grid}, {}", sender.grid());
+    let reason = format!("voxels and tiles of the map and of the sender differ: {grid}, {}", sender.grid());
     Err(Error::argument("grid", reason))
 }
 

@@ -93,15 +93,16 @@ impl Build<'_> {
         loop {
             let (mapper, schedule) = (&mut *self.mapper, &mut self.schedule);
             // An input that is quiet does not keep what came from being made durable.
-            let scan = match self.intake.next(&mut || flush_if(schedule.is_due_waiting(), mapper, schedule))? {
-                Next::Scan(scan) => scan,
-                Next::Stopped => return Ok(()),
-                Next::End => {
-                    // The last scans may have been skipped.
-                    mapper.note_input_content(self.intake.content());
-                    return Ok(());
-                }
-            };
+            let scan =
+                match self.intake.next(&mut || flush_if(schedule.is_due_waiting(), mapper, schedule))? {
+                    Next::Scan(scan) => scan,
+                    Next::Stopped => return Ok(()),
+                    Next::End => {
+                        // The last scans may have been skipped.
+                        mapper.note_input_content(self.intake.content());
+                        return Ok(());
+                    }
+                };
             match mapper.insert_scan(&scan) {
                 Ok(report) => self.report += report,
                 Err(Error::Stopped) => return Ok(()),
@@ -175,7 +176,8 @@ fn begin(
     let inputs = mapper.inputs();
     let is_this = |input: &InputRecord| {
         let content = input.content.as_ref();
-        intake.begins_with().is_some() && content.and_then(|content| content.begins_with.as_deref()) == intake.begins_with()
+        intake.begins_with().is_some()
+            && content.and_then(|content| content.begins_with.as_deref()) == intake.begins_with()
     };
     if let Some(at) = inputs.iter().rposition(is_this).filter(|_| !args.again) {
         let content = inputs[at].content.clone().unwrap_or_default();

@@ -35,8 +35,13 @@ pub fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
 /// Names the option that makes a tile fit its voxels.
 fn name_the_option(error: Error) -> anyhow::Error {
     match error {
-        Error::Grid(GridError::NotWhole { smaller_m, larger_m, .. }) => anyhow::Error::new(error)
-            .context(format!("add --tile-size {smaller_m} or --tile-size {larger_m}, or choose another --resolution")),
+        Error::Grid(GridError::NotWhole { smaller_m, larger_m, .. }) => {
+            let fitting = match smaller_m == larger_m {
+                true => format!("--tile-size {smaller_m}"),
+                false => format!("--tile-size {smaller_m} or --tile-size {larger_m}"),
+            };
+            anyhow::Error::new(error).context(format!("add {fitting}, or choose another --resolution"))
+        }
         error => error.into(),
     }
 }

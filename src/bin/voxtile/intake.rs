@@ -95,7 +95,10 @@ impl Intake {
         if !self.pass(content.scans)? {
             return Ok(false);
         }
-        let differs = match (self.chain.scan_text() == content.scan_chain, self.chain.pose_text() == content.pose_chain) {
+        let differs = match (
+            self.chain.scan_text() == content.scan_chain,
+            self.chain.pose_text() == content.pose_chain,
+        ) {
             (true, true) => return Ok(true),
             (true, false) => "the same scans have other poses than",
             (false, _) => "they are not",
