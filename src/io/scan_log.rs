@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Numbers are read as `f32`, as OctoMap does, so that log and graph give the same map. `path` names the stream in
 /// errors; it is opened for the fingerprint only.
 pub fn read_scan_log<R: BufRead>(input: R, path: &Path) -> impl ScanSource + use<R> {
-    ScanLog { path: path.to_owned(), input, line: 0, pose: None, done: 0, is_bad_node: false }
+    ScanLog { path: path.to_owned(), input, line: 0, pose: None, done: 0 }
 }
 
 struct ScanLog<R> {
@@ -23,8 +23,6 @@ struct ScanLog<R> {
     /// Pose of the scan whose points come next.
     pose: Option<Isometry3<f64>>,
     done: usize,
-    /// Whether what was an error is the line `NODE` of the scan behind the next.
-    is_bad_node: bool,
 }
 
 /// A longer line is none of a scan log.

@@ -119,7 +119,7 @@ fn a_map_is_built_asked_exported_and_added_to() {
     assert_eq!(json(&part)["voxels"].as_u64(), Some(0));
 
     let digest = output(&["digest", map]);
-    output(&["build", text(&scans), "-o", map, "--append"]);
+    output(&["build", text(&scans), "-o", map, "--append", "--again"]);
     assert_ne!(output(&["digest", map]), digest);
     assert_eq!(json(&["info", map, "--json"])["scan_number"].as_u64(), Some(6));
 }
@@ -191,7 +191,8 @@ fn the_same_scans_give_the_same_digest_whatever_the_octree_and_its_cache() {
     for line in ["cache     ", "hit rate", "octrees   ", "queue     ", "stages    "] {
         assert!(told.contains(line), "{told}");
     }
-    let told = output(&["build", text(&scans), "-o", text(&map), "--append", "--voxel-cache", "serial"]);
+    let told =
+        output(&["build", text(&scans), "-o", text(&map), "--append", "--again", "--voxel-cache", "serial"]);
     assert!(told.contains("hit rate") && !told.contains("queue"), "{told}");
     let out = folder.path().join("demo");
     let demo = ["demo", "--out", text(&out), "--length", "4", "--voxel-cache", "parallel", "--json"];
@@ -227,7 +228,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
     let other = file("scans.xyz", b"1 2 3\n");
     let cases: Vec<(Vec<&str>, i32, &str)> = vec![
         (vec!["build", scans, "-o", map], 2, "use --resume to go on with these scans"),
-        (vec!["build", "nowhere", "-o", new], 1, "nowhere: cannot open"),
+        (vec!["build", "nowhere", "-o", new], 2, "nowhere: there is no such file or folder"),
         (vec!["build", text(&empty_folder), "-o", new], 2, "no .pcd file in this folder"),
         (
             vec!["build", &other, "-o", new],
@@ -248,8 +249,16 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
         (
             vec!["build", scans, "-o", new, "--resolution", "0.3"],
             2,
-            "nearest valid tile sizes are 9.9 m and 10.2 m",
+            "add --tile-size 9.9 or --tile-size 10.2",
         ),
+        (vec!["build", scans, "-o", new, "--resolution", "7"], 2, "add --tile-size 14, or choose another"),
+        (vec!["build", scans, "-o", &plain], 2, "is a file; a map is a folder"),
+        (
+            vec!["build", scans, "-o", map, "--append"],
+            2,
+            "the map has 3 scans of an input that begins as this one",
+        ),
+        (vec!["build", scans, "-o", map, "--again"], 2, "--append"),
         (vec!["build", scans, "-o", new, "--resolution", "-1"], 2, "resolution"),
         (
             vec!["build", scans, "-o", new, "--max-range", "0"],
@@ -447,7 +456,7 @@ fn ctrl_c_flushes_and_says_how_far_it_got() {
     let map = folder.path().join("map");
     let binary = assert_cmd::cargo::cargo_bin("voxtile");
     let child = std::process::Command::new(binary)
-        .args(["build", text(&scans), "-o", text(&map), "--resolution", "0.02"])
+        .args(["build", text(&scans), "-o", text(&map), "--resolution", "0.02", "--poses", "identity"])
         .stderr(std::process::Stdio::piped())
         .stdout(std::process::Stdio::null())
         .spawn()

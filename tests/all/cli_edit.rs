@@ -58,7 +58,7 @@ fn a_part_is_cleared_in_place() {
     assert!(output(&["verify", map]).contains("whole"));
     // What is unknown now can be mapped again.
     let scans = folder.path().join("scans");
-    output(&["build", text(&scans), "-o", map, "--append"]);
+    output(&["build", text(&scans), "-o", map, "--append", "--again"]);
     assert_eq!(json(&["info", map, "--json"])["scan_number"].as_u64(), Some(6));
     let told = output(&[&["clear", map, "--outside"], &ELSEWHERE[..]].concat());
     assert!(told.contains("tiles     0; "), "{told}");

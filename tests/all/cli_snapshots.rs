@@ -12,7 +12,7 @@ fn a_bad_session_is_undone_and_the_past_can_be_looked_at() {
         let before = output(&["digest", map]);
         let said = output(&["snapshot", map, "good"]);
         assert!(said.contains("kept      good: flush") && said.contains("scan 3"), "{said}");
-        output(&["build", text(&scans), "-o", map, "--append"]);
+        output(&["build", text(&scans), "-o", map, "--append", "--again"]);
         let after = output(&["digest", map]);
         assert_ne!(before, after);
 

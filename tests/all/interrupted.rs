@@ -41,13 +41,13 @@ fn a_resumed_build_takes_every_scan_once_and_refuses_anything_else() {
     let text_of_file = fs::read_to_string(&file).unwrap().replacen("0.55", "0.56", 1);
     fs::write(&file, text_of_file).unwrap();
     let cases: [(&[&str], &str); 8] = [
-        (&[text(&other_input)], "2 files, "),
-        (&[text(&changed_input)], "been built from input 3 files, "),
+        (&[text(&other_input)], "has 2 scans, and the map has taken 3 from it"),
+        (&[text(&changed_input)], "of its first 3 scans, the map has taken all, but they are not those"),
         (&[scans, "--resolution", "0.1"], "resolution 0.2 m, not 0.1 m"),
         (&[scans, "--tile-size", "20"], "tile size 10 m, not 20 m"),
         (&[scans, "--max-range", "10"], "ranges of 0 m to 9 m, not 0 m to 10 m"),
         (&[scans, "--min-range", "1"], "ranges of 0 m to 9 m, not 1 m to 9 m"),
-        (&[scans, "--insert", "per-scan"], "insert mode PerRay, not PerScan"),
+        (&[scans, "--insert", "per-scan"], "insert mode per-ray, not per-scan"),
         (&[scans, "--sensor-model", "iwlo"], "sensor model"),
     ];
     for (arguments, message) in cases {
@@ -58,11 +58,138 @@ fn a_resumed_build_takes_every_scan_once_and_refuses_anything_else() {
     assert_eq!(digest(map), digest(whole), "what is refused changes nothing");
 }
 
+/// A folder of scans, each at its own place along x in metres, that differ from those of other seeds.
+fn numbered(folder: &Path, seed: u32, numbers: std::ops::Range<u32>) {
+    fs::create_dir_all(folder).unwrap();
+    for number in numbers {
+        let points: String = (0..50)
+            .map(|k| format!("{} {} 0.5\n", 3 + seed, 0.1 * f64::from(k) + 0.01 * f64::from(number)))
+            .collect();
+        let text = format!(
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 50\nHEIGHT 1\nVIEWPOINT {number} 0 0.5 1 0 0 0\nDATA ascii\n{points}"
+        );
+        fs::write(folder.join(format!("scan{number}.pcd")), text).unwrap();
+    }
+}
+
+#[test]
+fn inputs_are_known_again_gone_on_with_when_they_grow_and_refused_when_they_change() {
+    let folder = TempDir::new().unwrap();
+    let [a, b, map, whole] = ["a", "b", "map", "whole"].map(|name| folder.path().join(name));
+    numbered(&a, 1, 1..6);
+    numbered(&b, 2, 1..4);
+    let map = text(&map);
+    let build =
+        |input: &Path, how: &[&str]| json(&[&["build", text(input), "-o", map, "--json"], how].concat());
+    // One command line, with a map or without one.
+    let once = ["--append", "--resume"];
+    assert_eq!(build(&a, &once)["scans"], 5);
+    assert_eq!((&build(&b, &once)["scans"], &build(&a, &once)["scans"]), (&3.into(), &0.into()));
+    // It has grown by scans whose names come last only when people count.
+    numbered(&a, 1, 1..13);
+    let grown = build(&a, &once);
+    assert_eq!(
+        (&grown["scans"], &grown["resumed_after"], &grown["scan_number"]),
+        (&7.into(), &5.into(), &15.into())
+    );
+    assert_eq!(build(&a, &["--resume"])["scans"], 0);
+    assert_eq!(build(&b, &once)["scans"], 0);
+
+    // The same as without all that: hits and misses of these scans do not depend on the order of the inputs.
+    let parts = [("b", 1..4, 2), ("a", 1..13, 1)];
+    let [first, second] = parts.map(|(name, numbers, seed)| {
+        let again = folder.path().join(format!("again_{name}"));
+        numbered(&again, seed, numbers);
+        again
+    });
+    for input in [&a, &first, &second] {
+        let (code, stderr) = failure(&["build", text(input), "-o", map, "--append"]);
+        assert!(code == 2 && stderr.contains("--append --again"), "{stderr}");
+    }
+    assert_eq!(json(&["info", map, "--json"])["scan_number"], 15);
+    output(&["build", text(&a), "-o", text(&whole)]);
+    output(&["build", text(&b), "-o", text(&whole), "--append"]);
+    assert_eq!(json(&["info", text(&whole), "--json"])["voxels"], json(&["info", map, "--json"])["voxels"]);
+
+    // A scan among those that were taken, and then a pose.
+    let third = a.join("scan3.pcd");
+    let good = fs::read_to_string(&third).unwrap();
+    fs::write(&third, good.replacen("4 0.03", "4 0.04", 1)).unwrap();
+    let (code, stderr) = failure(&["build", text(&a), "-o", map, "--resume"]);
+    assert!(code == 2 && stderr.contains("but they are not those that it took"), "{stderr}");
+    fs::write(&third, good.replacen("VIEWPOINT 3 ", "VIEWPOINT 3.5 ", 1)).unwrap();
+    let (code, stderr) = failure(&["build", text(&a), "-o", map, "--append", "--resume"]);
+    assert!(code == 2 && stderr.contains("the same scans have other poses than those"), "{stderr}");
+    fs::write(&third, good).unwrap();
+    assert_eq!(build(&a, &["--append", "--again"])["scans"], 12);
+}
+
+#[test]
+fn scans_that_cannot_be_read_are_skipped_named_and_stay_skipped() {
+    let folder = TempDir::new().unwrap();
+    let [a, good, map, whole] = ["a", "good", "map", "whole"].map(|name| folder.path().join(name));
+    numbered(&a, 1, 0..8);
+    numbered(&good, 1, 0..8);
+    for bad in ["scan2.pcd", "scan7.pcd"] {
+        fs::write(a.join(bad), "no cloud\n").unwrap();
+        fs::remove_file(good.join(bad)).unwrap();
+    }
+    let map = text(&map);
+    let (code, stderr) = failure(&["build", text(&a), "-o", map]);
+    assert!(code == 1 && stderr.contains("scan2.pcd") && stderr.contains("after 2 scans"), "{stderr}");
+    let went_on = json(&["build", text(&a), "-o", map, "--resume", "--skip-bad", "--json"]);
+    assert_eq!((&went_on["scans"], &went_on["resumed_after"]), (&4.into(), &2.into()));
+    let unread: Vec<&str> =
+        went_on["unread_scans"].as_array().unwrap().iter().map(|scan| scan.as_str().unwrap()).collect();
+    assert!(unread[0].starts_with("scan 2: ") && unread[0].contains("scan2.pcd"), "{unread:?}");
+    assert!(unread[1].starts_with("scan 7: ") && unread.len() == 2, "{unread:?}");
+    output(&["build", text(&good), "-o", text(&whole)]);
+    assert_eq!(digest(map), digest(text(&whole)));
+
+    // It grows; what was skipped stays so, also when it can be read, and without being asked for again.
+    numbered(&a, 1, 2..3);
+    numbered(&a, 1, 8..10);
+    numbered(&good, 1, 8..10);
+    let grown = json(&["build", text(&a), "-o", map, "--resume", "--json"]);
+    assert_eq!((&grown["scans"], &grown["resumed_after"]), (&2.into(), &6.into()));
+    output(&["build", text(&good), "-o", text(&whole), "--resume"]);
+    assert_eq!(digest(map), digest(text(&whole)));
+}
+
+/// Maps of earlier versions know one input, by its files.
+#[test]
+fn an_input_of_an_earlier_version_is_gone_on_with() {
+    let folder = TempDir::new().unwrap();
+    let [a, map, whole] = ["a", "map", "whole"].map(|name| folder.path().join(name));
+    numbered(&a, 1, 0..6);
+    let config = voxtile::MapConfig::new(0.1, 10.0).unwrap().with_range(0.0, 100.0);
+    let mut mapper = voxtile::OutOfCoreTileMapper::create(&map, config).unwrap();
+    let mut source = voxtile::io::open_scans(&a, None).unwrap();
+    mapper.begin_input(source.fingerprint().unwrap()).unwrap();
+    for _ in 0..4 {
+        let scan = source.next_scan().unwrap().unwrap().into_scan();
+        voxtile::Mapper::insert_scan(&mut mapper, &scan).unwrap();
+    }
+    voxtile::Mapper::flush(&mut mapper).unwrap();
+    drop(mapper);
+    let (map, whole) = (text(&map), text(&whole));
+    let (code, stderr) = failure(&["build", text(&a), "-o", map, "--append"]);
+    assert!(code == 2 && stderr.contains("the map has 4 scans"), "{stderr}");
+    let resumed = json(&["build", text(&a), "-o", map, "--resume", "--json"]);
+    assert_eq!((&resumed["scans"], &resumed["resumed_after"]), (&2.into(), &4.into()));
+    output(&["build", text(&a), "-o", whole]);
+    assert_eq!(digest(map), digest(whole));
+    // From now on it is known scan by scan.
+    numbered(&a, 1, 6..7);
+    assert_eq!(json(&["build", text(&a), "-o", map, "--resume", "--json"])["scans"], 1);
+}
+
 #[test]
 fn what_was_added_can_be_resumed_too() {
     let (first, second, folder) = (TempDir::new().unwrap(), TempDir::new().unwrap(), TempDir::new().unwrap());
-    let (first, second) = (scans(&first), scans(&second));
-    drop_first(&second);
+    let first = scans(&first);
+    let second = second.path().join("scans");
+    numbered(&second, 1, 0..2);
     let map = folder.path().join("map");
     let map = text(&map);
     output(&["build", text(&first), "-o", map]);
@@ -72,10 +199,10 @@ fn what_was_added_can_be_resumed_too() {
         (&resumed["scans"], &resumed["resumed_after"], &resumed["scan_number"]),
         (&0.into(), &2.into(), &5.into())
     );
-    let (code, stderr) = failure(&["build", text(&first), "-o", map, "--resume"]);
-    assert!(code == 2 && stderr.contains("been built from input 2 files"), "{stderr}");
-    let (code, _) = failure(&["build", text(&first), "-o", map, "--resume", "--append"]);
-    assert_eq!(code, 2);
+    let third = folder.path().join("third");
+    numbered(&third, 2, 0..2);
+    let (code, stderr) = failure(&["build", text(&third), "-o", map, "--resume"]);
+    assert!(code == 2 && stderr.contains("been built from input"), "{stderr}");
     for wrong in ["0", "-1", "x", "5m", "s"] {
         let (code, stderr) = failure(&["build", text(&first), "-o", map, "--resume", "--flush-every", wrong]);
         assert!(code == 2 && stderr.contains("flush-every"), "{stderr}");

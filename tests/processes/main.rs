@@ -7,6 +7,8 @@
 //! ```
 #![cfg(unix)]
 
+/// Inputs that are added by one command, repeated until it succeeds.
+mod exactly_once;
 /// SIGKILL at random times, resumed until the end.
 mod killed;
 /// What a command takes of memory, told by itself.
@@ -22,6 +24,6 @@ mod readers;
 mod refused;
 /// Snapshots and reverts that are killed.
 mod snapshots;
-/// SIGTERM and Ctrl-C: flushed and ended.
+/// SIGTERM and Ctrl-C: flushed and ended, whatever the input does.
 mod stopped;
 mod survey;

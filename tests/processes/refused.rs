@@ -74,6 +74,25 @@ fn a_disk_that_is_only_for_reading_answers_and_is_not_written_to() {
     assert!(message.contains("Read-only file system"), "{message}");
 }
 
+/// Threads with more stack than there are addresses: the system gives none, or one, and then no other.
+#[cfg(all(target_os = "linux", target_pointer_width = "64"))]
+#[test]
+fn without_threads_there_are_fewer_and_the_map_is_the_same() {
+    let scans = Scans::new(8, 1);
+    let (folder, _) = folder_for_maps();
+    for (number, stack_bytes) in [1_u64 << 47, 1 << 46, (1 << 46) / 3].into_iter().enumerate() {
+        for how in [["--threads", "4"], ["--voxel-cache", "parallel"]] {
+            let map = folder.path().join(format!("{number}{}", how[0]));
+            let mut build = scans.build(&map, &how);
+            let output = build.env("RUST_MIN_STACK", stack_bytes.to_string()).output().unwrap();
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success() && !message.contains("panicked"), "{message}");
+            assert!(message.contains("mapping with"), "{message}");
+            assert_eq!(digest(&map), Ok((8, scans.digests[8].clone())));
+        }
+    }
+}
+
 #[test]
 fn too_many_open_files_lose_nothing() {
     let scans = Scans::new(12, 1);

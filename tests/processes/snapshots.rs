@@ -18,7 +18,7 @@ fn a_snapshot_a_revert_and_a_deletion_that_are_killed_have_happened_or_not() {
     let map_text = map.to_str().unwrap();
     let run = |arguments: &[&str]| assert!(command(arguments).status().unwrap().success(), "{arguments:?}");
     run(&["snapshot", map_text, "base"]);
-    assert!(scans.build(&map, &["--append"]).status().unwrap().success());
+    assert!(scans.build(&map, &["--append", "--again"]).status().unwrap().success());
     run(&["snapshot", map_text, "twice"]);
     let past = |name: &str| PathBuf::from(format!("{map_text}@{name}"));
     let expected = [digest(&past("base")).unwrap(), digest(&past("twice")).unwrap()];

@@ -1,35 +1,105 @@
-use crate::survey::{Scans, digest, folder_for_maps};
-use std::process::Command;
+use crate::survey::{
+    Scans, StreamedBuild, digest, flushed_scans, folder_for_maps, signal, signals_are_caught, wait_until,
+};
+use std::io::{BufRead, BufReader, Read};
+use std::process::Child;
 use std::thread::sleep;
 use std::time::Duration;
+use voxtile::Scan;
 
 #[test]
 fn a_signal_ends_a_build_with_all_of_its_scans_in_the_map() {
     let scans = Scans::new(60, 1);
-    for signal in ["-TERM", "-INT"] {
+    for name in ["TERM", "INT"] {
         let (_folder, map) = folder_for_maps();
         let mut stopped = 0;
         loop {
             let mut child = scans.build(&map, &["--resume", "--flush-every", "end"]).spawn().unwrap();
-            // Once the map is there, the signals are caught.
-            while !map.join("metadata.json").exists() && child.try_wait().unwrap().is_none() {
-                sleep(Duration::from_millis(1));
-            }
-            sleep(Duration::from_millis(30));
-            assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().is_ok());
+            wait_until("signals are caught", || {
+                signals_are_caught(child.id()) || child.try_wait().unwrap().is_some()
+            });
+            // Now or later, so that it is met at all kinds of work, and gets to its end.
+            sleep(Duration::from_millis(7 * stopped));
+            signal(&child, name);
             let output = child.wait_with_output().unwrap();
             let message = String::from_utf8_lossy(&output.stderr);
             if output.status.success() {
                 break;
             }
             assert_eq!(output.status.code(), Some(130), "{message}");
-            assert_eq!(message.lines().count(), 1, "{message}");
-            let (number, seen) = digest(&map).unwrap();
-            assert!(message.contains(&format!("stopped after {number} scans")), "{message}");
+            assert_eq!(message.lines().count(), 2, "{message}");
+            assert!(message.contains("a second Ctrl-C or SIGTERM"), "{message}");
+            let (number, seen) = digest(&map).unwrap_or((0, scans.digests[0].clone()));
+            let is_told = message.contains(&format!("stopped after {number} scans"))
+                || (message.contains("stopped before the first scan"));
+            assert!(is_told, "{message}");
             assert_eq!(seen, scans.digests[number]);
             stopped += 1;
         }
         assert!(stopped > 0, "the build was faster than the signal");
         assert_eq!(digest(&map), Ok((60, scans.digests[60].clone())));
     }
+}
+
+/// Reads what a process says until a line holds a text.
+fn read_until(child: &mut Child, text: &str) -> BufReader<impl Read + use<>> {
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains(text) {
+        line.clear();
+        assert!(lines.read_line(&mut line).unwrap() > 0, "it ended without saying `{text}`");
+    }
+    lines
+}
+
+#[test]
+fn an_input_that_is_quiet_keeps_nothing_from_being_flushed_and_nobody_from_stopping() {
+    let scans = StreamedBuild::scans(1, 5);
+    let (_folder, map) = folder_for_maps();
+    let mut build = StreamedBuild::spawn(&map, &["--flush-every", "0.3s"]);
+    build.write(&scans);
+    // The input stays open from here on, and says nothing.
+    wait_until("the timer flushes", || flushed_scans(&map) == Some(5));
+    signal(&build.child, "TERM");
+    let mut lines = read_until(&mut build.child, "a second Ctrl-C or SIGTERM ends at once");
+    let status = build.child.wait().unwrap();
+    let mut rest = String::new();
+    lines.read_to_string(&mut rest).unwrap();
+    assert_eq!(status.code(), Some(130), "{rest}");
+    assert!(rest.contains("stopped after 5 scans; all of them are in the map"), "{rest}");
+    let expected = StreamedBuild::digest_of(&scans);
+    assert_eq!(digest(&map).unwrap(), (5, expected));
+    drop(build);
+
+    // Before there is a first scan, there is no map.
+    let (_folder, map) = folder_for_maps();
+    let mut build = StreamedBuild::spawn(&map, &[]);
+    wait_until("signals are caught", || signals_are_caught(build.child.id()));
+    signal(&build.child, "INT");
+    read_until(&mut build.child, "stopped before the first scan");
+    assert_eq!(build.child.wait().unwrap().code(), Some(130));
+    assert!(!map.exists());
+}
+
+/// A scan of long rays in all directions, which takes long to follow at this resolution.
+fn endless_scan(rays: u32) -> Scan {
+    let point = |k: u32| {
+        let (azimuth, up) = (f64::from(k) * 2.399_963, 2.0 * f64::from(k) / f64::from(rays) - 1.0);
+        let flat = (1.0 - up * up).sqrt();
+        [900.0 * flat * azimuth.cos(), 900.0 * flat * azimuth.sin(), 900.0 * up]
+    };
+    Scan { origin: [0.0; 3], points: (0..rays).map(point).collect(), intensities: None }
+}
+
+#[test]
+fn a_scan_that_takes_minutes_is_given_up() {
+    let (_folder, map) = folder_for_maps();
+    let how = ["--max-range", "1000", "--resolution", "0.02", "--tile-size", "4", "--memory", "64MiB"];
+    let mut build = StreamedBuild::spawn_with(&map, &how);
+    build.write(&[endless_scan(400_000)]);
+    wait_until("the map is begun", || flushed_scans(&map).is_some());
+    signal(&build.child, "TERM");
+    read_until(&mut build.child, "stopped after 0 scans");
+    assert_eq!(build.child.wait().unwrap().code(), Some(130));
+    assert_eq!(digest(&map).unwrap().0, 0);
 }

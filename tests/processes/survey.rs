@@ -1,10 +1,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use voxtile::io::open_scans;
+use voxtile::io::{ScanStreamWriter, open_scans};
 use voxtile::simulation::{City, Drive, Lidar, Survey};
-use voxtile::{InMemoryMapper, MapConfig, Mapper, Questions};
+use voxtile::{InMemoryMapper, MapConfig, Mapper, Questions, Scan};
 
 /// A folder of scans, and the digest of their map after each number of them.
 pub struct Scans {
@@ -96,4 +98,104 @@ fn pcd(origin: [f64; 3], points_in_world: &[&[f64; 3]]) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// A build of scans that this process writes into it, one by one.
+pub struct StreamedBuild {
+    pub child: Child,
+    writer: ScanStreamWriter<ChildStdin>,
+}
+
+impl StreamedBuild {
+    /// So many scans of a drive, as their stream keeps them: to a few digits.
+    pub fn scans(seed: u64, count: usize) -> Vec<Scan> {
+        Survey::tour(seed, 300).take(count).collect()
+    }
+
+    /// A build that keeps few tiles in memory.
+    pub fn spawn(map: &Path, how: &[&str]) -> Self {
+        let resolution = RESOLUTION_M.to_string();
+        let few = ["--resolution", &resolution, "--cache-tiles", "4"];
+        Self::spawn_with(map, &[&few[..], how].concat())
+    }
+
+    pub fn spawn_with(map: &Path, how: &[&str]) -> Self {
+        let mut command = voxtile();
+        command.args(["build", "-", "-o"]).arg(map).args(how);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let writer = ScanStreamWriter::new(child.stdin.take().unwrap(), "drive", false).unwrap();
+        Self { child, writer }
+    }
+
+    pub fn write(&mut self, scans: &[Scan]) {
+        scans.iter().for_each(|scan| self.writer.write_world(scan).unwrap());
+        self.writer.flush().unwrap();
+    }
+
+    /// Ends the input and waits for the build.
+    pub fn end(self) -> ExitStatus {
+        let Self { mut child, writer } = self;
+        drop(writer);
+        child.wait().unwrap()
+    }
+
+    pub fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    /// The digest of the map of these scans, from a build that nothing disturbs.
+    pub fn digest_of(scans: &[Scan]) -> String {
+        let (_folder, map) = folder_for_maps();
+        let mut build = Self::spawn(&map, &[]);
+        build.write(scans);
+        assert!(build.end().success());
+        digest(&map).unwrap().1
+    }
+}
+
+/// Waits for something that comes sooner or later, on a busy machine much later.
+pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    const PATIENCE: Duration = Duration::from_secs(300);
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < PATIENCE, "waited in vain: {what}");
+        sleep(Duration::from_millis(2));
+    }
+}
+
+/// What a map's metadata says, if there is a map: it is replaced whole.
+fn metadata(map: &Path) -> Option<serde_json::Value> {
+    let text = fs::read_to_string(map.join("metadata.json")).ok()?;
+    Some(serde_json::from_str(&text).expect("metadata are JSON at all times"))
+}
+
+/// Number of the last scan in a map's last flush; `None` while there is no map.
+pub fn flushed_scans(map: &Path) -> Option<u64> {
+    metadata(map)?.pointer("/ext/scan_number")?.as_u64()
+}
+
+/// How many inputs a map knows.
+pub fn inputs(map: &Path) -> usize {
+    let inputs = metadata(map).and_then(|metadata| Some(metadata.pointer("/ext/inputs")?.as_array()?.len()));
+    inputs.unwrap_or(0)
+}
+
+/// Whether a process has said that it wants to hear of SIGINT and SIGTERM; where the system does not tell, it is waited for
+/// a while.
+pub fn signals_are_caught(process: u32) -> bool {
+    let Ok(status) = fs::read_to_string(format!("/proc/{process}/status")) else {
+        sleep(Duration::from_millis(500));
+        return true;
+    };
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    [2, 15].iter().all(|signal| caught & (1 << (signal - 1)) != 0)
+}
+
+/// Sends a signal to a process of ours.
+pub fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status();
+    assert!(status.is_ok());
 }

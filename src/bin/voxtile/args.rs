@@ -114,15 +114,23 @@ pub struct BuildArgs {
     #[arg(long, value_name = "MODE")]
     pub insert: Option<InsertName>,
     /// File of poses, sensor to world, one line a scan: TUM (t tx ty tz qx qy qz qw) or KITTI (3x4 matrix, row by row)
+    /// in the natural order of the files' names; or identity: all scans are in the world frame
     /// [default: poses_tum.txt or poses_kitti.txt in or beside SCANS, else the VIEWPOINT of each PCD file]
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Add the scans to an existing map
+    /// Add the scans to an existing map, which must not have scans of this input yet
     #[arg(long)]
     pub append: bool,
-    /// Go on with a build that was interrupted, with the same scans, or begin it: every scan counts exactly once
-    #[arg(long, conflicts_with = "append")]
+    /// Go on with a build that was interrupted, or with an input that has grown; or begin it, where there is no map or with
+    /// --append: every scan counts exactly once, however often the command is repeated
+    #[arg(long)]
     pub resume: bool,
+    /// Add the scans even if the map has scans of this input: they count once more
+    #[arg(long, requires = "append", conflicts_with = "resume")]
+    pub again: bool,
+    /// Go past scans that cannot be read, and say which, in place of ending with an error
+    #[arg(long)]
+    pub skip_bad: bool,
     /// Make durable what was mapped every N scans, or with s every so many seconds (25, 60s), or only at the end (end):
     /// what a crash can lose
     #[arg(long, value_name = "N", default_value = "60s")]

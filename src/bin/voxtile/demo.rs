@@ -1,7 +1,9 @@
+use crate::INTERRUPTED;
 use crate::args::{ColorName, DemoArgs};
 use crate::octree_choice::octree_config;
 use crate::picture::{ColorBy, TopDown, View};
 use crate::progress::Progress;
+use crate::stop_signal;
 use crate::summary::Summary;
 use std::io::Write;
 use std::path::Path;
@@ -19,11 +21,8 @@ const SPACING_M: u32 = 2;
 
 pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
+    let stop = stop_signal::catch()?;
     let map = args.out.join("map_tiles");
-    if map.exists() {
-        let hint = "the demo makes its map anew; remove it or choose another --out";
-        return Err(Error::AlreadyExists { path: map, hint }.into());
-    }
     // Few tiles and little room for what waits, so that the demo shows the disk at work.
     let config = MapConfig::new(args.resolution, 10.0)?
         .with_range(0.0, 40.0)
@@ -31,24 +30,40 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         .with_cache_tiles(args.cache_tiles)
         .with_pending_bytes(4 << 20)
         .with_storage(args.storage.into());
-    let mut mapper = OutOfCoreTileMapper::create(&map, config)?;
-    mapper.begin_input(format!("demo city {} over {} m", args.seed, args.length))?;
+    let (mut mapper, done) = begin(args, &map, config)?;
+    mapper.stop_with(stop.clone());
     let scans = args.length.div_ceil(SPACING_M) as usize;
     let drive = Drive::new(args.seed, f64::from(SPACING_M));
     let survey = Survey::new(City::new(args.seed), drive, Lidar::demo(), args.seed);
     let mut report = ScanReport::default();
     let mut path: Vec<Point> = Vec::with_capacity(scans);
+    let mut inserted = 0;
     let progress = Progress::over_scans(Some(scans));
-    for scan in survey.take(scans) {
-        report += mapper.insert_scan(&scan)?;
+    for (number, scan) in (0..).zip(survey.take(scans)) {
         path.push(scan.origin);
         progress.step();
+        if number < done {
+            // In the map already; the picture wants to know where it was taken.
+            continue;
+        }
+        match mapper.insert_scan(&scan) {
+            Ok(of_scan) => report += of_scan,
+            Err(Error::Stopped) => break,
+            Err(error) => return Err(error.into()),
+        }
+        inserted += 1;
         progress.show(&mapper);
     }
     progress.say("flushing");
     mapper.flush()?;
     drop(progress);
-    Summary::of(&map, scans as u64, report, &mapper, started.elapsed())?.print(args.json)?;
+    if stop.is_set() {
+        let all = done + inserted;
+        eprintln!("voxtile: stopped after {all} scans; all of them are in the map; the same command goes on");
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    let summary = Summary::of(&map, inserted, report, &mapper, started.elapsed())?;
+    Summary { resumed_after: done, ..summary }.print(args.json)?;
     drop(mapper);
 
     let picture = args.out.join("map.png");
@@ -57,6 +72,28 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         say_what_next(&args.out, &map, &picture, path.first().copied().unwrap_or_default())?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Begins the demo's map, or goes on with one that was interrupted; returns how many of its scans are there.
+fn begin(args: &DemoArgs, map: &Path, config: MapConfig) -> anyhow::Result<(OutOfCoreTileMapper, u64)> {
+    let name = format!("demo city {} over {} m", args.seed, args.length);
+    let mut mapper = match MapReader::open(map, 1) {
+        Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(map, config)?,
+        _ => OutOfCoreTileMapper::open(map, config).map_err(|error| match error {
+            Error::Mismatch { .. } => another_demo(map),
+            error => error,
+        })?,
+    };
+    match mapper.resume_input(&name) {
+        Ok(done) => Ok((mapper, done)),
+        Err(Error::Mismatch { .. }) => Err(another_demo(map).into()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn another_demo(map: &Path) -> Error {
+    let hint = "the demo goes on only with its own map of the same options; remove it or choose another --out";
+    Error::AlreadyExists { path: map.to_owned(), hint }
 }
 
 /// Draws a map on disk from above, tile by tile, and the way of the sensor.

@@ -51,6 +51,14 @@ impl FlushSchedule {
         }
     }
 
+    /// Asked while no scan comes: whether to flush now what came since the last flush.
+    pub fn is_due_waiting(&self) -> bool {
+        match self.every {
+            FlushEvery::Time(time) => self.scans > 0 && self.since.elapsed() >= time,
+            FlushEvery::Scans(_) | FlushEvery::End => false,
+        }
+    }
+
     /// The map was flushed.
     pub fn flushed(&mut self) {
         (self.scans, self.since) = (0, Instant::now());

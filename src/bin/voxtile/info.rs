@@ -7,8 +7,11 @@ use std::io::Write;
 use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::sensor::SensorModel;
-use voxtile::store::Bounds;
+use voxtile::store::{Bounds, InputRecord};
 use voxtile::{Questions, Result, Storage};
+
+/// Inputs that are shown to people; JSON has them all.
+const INPUTS_SHOWN: usize = 5;
 
 #[derive(Debug, Serialize)]
 struct Info {
@@ -21,7 +24,8 @@ struct Info {
     storage: Storage,
     scan_number: u64,
     flush_number: u64,
-    input_fingerprint: Option<String>,
+    /// What it was built from, the latest last.
+    inputs: Vec<InputRecord>,
     /// Number of the last scan when evidence last faded; 0 if it never has.
     decayed_scan: u64,
     tiles: u64,
@@ -70,7 +74,7 @@ impl Info {
             storage: config.storage,
             scan_number: reader.scan_number(),
             flush_number: reader.flush_number(),
-            input_fingerprint: ext.and_then(|ext| ext.input_fingerprint.clone()),
+            inputs: ext.map_or(Vec::new(), |ext| ext.inputs.clone()),
             decayed_scan: ext.map_or(0, |ext| ext.decayed_scan),
             tiles: reader.tile_indices().len() as u64,
             tile_bounds,
@@ -101,6 +105,9 @@ impl Info {
             HumanCount(self.scan_number),
             HumanCount(self.flush_number)
         )?;
+        for input in self.inputs.iter().rev().take(INPUTS_SHOWN).rev() {
+            writeln!(out, "input        from scan {}: {}", HumanCount(input.first_scan), input.name)?;
+        }
         if self.decayed_scan > 0 {
             writeln!(out, "faded        last after scan {}", HumanCount(self.decayed_scan))?;
         }

@@ -2,6 +2,7 @@
 
 mod args;
 mod build;
+mod build_config;
 mod byte_size;
 mod clear;
 mod convert;
@@ -13,6 +14,7 @@ mod digest;
 mod export;
 mod flush_schedule;
 mod info;
+mod intake;
 mod local;
 mod local_table;
 mod map_at;
@@ -29,10 +31,13 @@ mod raycast;
 mod repair;
 mod revert;
 mod scan_input;
+mod scan_reader;
 mod share;
 mod snapshot;
 mod snapshots;
+mod stop_signal;
 mod summary;
+mod threads;
 mod verify;
 mod written;
 
@@ -51,12 +56,11 @@ fn main() -> ExitCode {
         // Before there is a second thread, and before anything is read from standard input.
         one_heap::begin_with_one_heap();
     }
-    if let Some(threads) = threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-        if let Err(error) = pool.build_global() {
-            eprintln!("voxtile: cannot start {threads} threads: {error}");
-            return ExitCode::FAILURE;
-        }
+    if matches!(command, Command::Build(_) | Command::Local(_) | Command::Demo(_))
+        && let Err(error) = threads::start(threads)
+    {
+        eprintln!("voxtile: {error:#}");
+        return ExitCode::FAILURE;
     }
     let outcome = match command {
         Command::Build(args) => build::run(&args),

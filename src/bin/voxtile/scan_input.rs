@@ -1,7 +1,10 @@
-use std::io::BufReader;
+use std::io::{BufReader, stdin};
 use std::path::Path;
 use voxtile::io::{ScanSource, open_scans, read_scan_stream};
 use voxtile::{Error, Result};
+
+/// Most letters of an input's name that a map keeps.
+const MOST_LETTERS: usize = 200;
 
 /// Whether scans are to come from standard input.
 pub fn is_standard_input(scans: &Path) -> bool {
@@ -9,13 +12,29 @@ pub fn is_standard_input(scans: &Path) -> bool {
 }
 
 /// Opens scans, which are a scan stream if they come from standard input.
-pub fn open(scans: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource>> {
+pub fn open(scans: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource + Send>> {
     if !is_standard_input(scans) {
         return open_scans(scans, poses);
     }
     if poses.is_some() {
         return Err(Error::argument("--poses", "a scan stream has its own poses; leave the option out"));
     }
-    let input = BufReader::with_capacity(1 << 18, std::io::stdin().lock());
+    let input = BufReader::with_capacity(1 << 18, stdin());
     Ok(Box::new(read_scan_stream(input, Path::new("standard input"), false)?))
+}
+
+/// What a map calls an input, for people: the last part of its path (the last two, where that is `scans`), or the label of
+/// a stream.
+pub fn name_of(scans: &Path, source: &dyn ScanSource) -> String {
+    if is_standard_input(scans) {
+        return source.fingerprint().unwrap_or_else(|_| "standard input".to_owned());
+    }
+    let path = scans.canonicalize().unwrap_or_else(|_| scans.to_owned());
+    let part = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let last = part(&path).unwrap_or_else(|| scans.display().to_string());
+    let name = match path.parent().and_then(part) {
+        Some(parent) if last == "scans" => format!("{parent}/{last}"),
+        _ => last,
+    };
+    name.chars().take(MOST_LETTERS).collect()
 }

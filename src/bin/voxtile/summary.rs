@@ -17,6 +17,12 @@ pub struct Summary {
     /// Scans of the same input that were in the map before.
     pub resumed_after: u64,
     pub interrupted: bool,
+    /// Where the poses come from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poses: Option<String>,
+    /// The scans that were skipped, with the reason of each.
+    #[serde(rename = "unread_scans")]
+    pub unread: Vec<String>,
     #[serde(flatten)]
     pub report: ScanReport,
     pub scan_number: u64,
@@ -70,6 +76,8 @@ impl Summary {
             scans,
             resumed_after: 0,
             interrupted: false,
+            poses: None,
+            unread: Vec::new(),
             report,
             scan_number: reader.scan_number(),
             voxels,
@@ -102,6 +110,13 @@ impl Summary {
         writeln!(out, "scans     {} in {:.1} s ({rate:.1} a second)", HumanCount(self.scans), self.seconds)?;
         if self.resumed_after > 0 {
             writeln!(out, "resumed   after {} scans", HumanCount(self.resumed_after))?;
+        }
+        if let Some(poses) = &self.poses {
+            writeln!(out, "poses     {poses}")?;
+        }
+        if !self.unread.is_empty() {
+            writeln!(out, "unread    {} scans, skipped", HumanCount(self.unread.len() as u64))?;
+            self.unread.iter().try_for_each(|scan| writeln!(out, "          {scan}"))?;
         }
         writeln!(
             out,

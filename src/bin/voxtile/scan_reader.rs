@@ -1,0 +1,167 @@
+use crate::scan_input;
+use anyhow::bail;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::Duration;
+use voxtile::io::{PoseSource, ScanMark, ScanSource};
+use voxtile::scan::Stop;
+use voxtile::{Error, Scan};
+
+/// How long an input may keep us waiting before we look up.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Reads an input on a thread of its own, scan by scan and only when asked to: whoever asks can stop waiting, whatever the
+/// input does, and no scan lies about that was not asked for. Where the system gives no thread, it reads here.
+pub struct ScanReader {
+    place: Place,
+    stop: Stop,
+}
+
+/// What is known of an input once it is open.
+pub struct Opened {
+    pub name: String,
+    pub scans: Option<usize>,
+    pub poses: PoseSource,
+}
+
+/// A scan in the world frame, and what tells it from others.
+pub struct ReadScan {
+    pub scan: Scan,
+    pub mark: ScanMark,
+}
+
+/// What came of asking for a scan.
+pub enum Read {
+    Scan(ReadScan),
+    /// One that cannot be read; the next call gives the one behind it.
+    Unread(Error),
+    End,
+    /// It was asked to stop before there was a scan.
+    Stopped,
+}
+
+enum Place {
+    Thread { requests: Sender<Request>, answers: Receiver<Answer> },
+    Here(Box<dyn ScanSource + Send>),
+}
+
+enum Request {
+    Scan,
+    Fingerprint,
+}
+
+enum Answer {
+    Opened(voxtile::Result<Opened>),
+    Read(voxtile::Result<Read>),
+    Fingerprint(voxtile::Result<String>),
+}
+
+impl ScanReader {
+    /// Opens an input; `None` if it was asked to stop before that had come to an end.
+    pub fn open(
+        scans: PathBuf,
+        poses: Option<PathBuf>,
+        stop: Stop,
+    ) -> anyhow::Result<Option<(Self, Opened)>> {
+        let (requests, requests_in) = channel();
+        let (answers_out, answers) = channel();
+        let (path, pose_path) = (scans.clone(), poses.clone());
+        let read = move || {
+            let mut source = match scan_input::open(&path, pose_path.as_deref()) {
+                Ok(source) => source,
+                Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
+            };
+            let opened = Opened::of(&path, &*source);
+            let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
+            while is_wanted && let Ok(request) = requests_in.recv() {
+                is_wanted = answers_out.send(answer(&mut *source, &request)).is_ok();
+            }
+        };
+        match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
+            Ok(_) => {
+                let mut reader = Self { place: Place::Thread { requests, answers }, stop };
+                match reader.wait(&mut || Ok(()))? {
+                    Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
+                    _ => Ok(None),
+                }
+            }
+            Err(error) => {
+                log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
+                let source = scan_input::open(&scans, poses.as_deref())?;
+                let opened = Opened::of(&scans, &*source);
+                Ok(Some((Self { place: Place::Here(source), stop }, opened)))
+            }
+        }
+    }
+
+    /// The next scan. While it does not come, `idle` is called ten times a second.
+    pub fn next(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Read> {
+        match self.ask(Request::Scan, idle)? {
+            Some(Answer::Read(read)) => Ok(read?),
+            _ => Ok(Read::Stopped),
+        }
+    }
+
+    /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
+    pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
+        match self.ask(Request::Fingerprint, &mut || Ok(()))? {
+            Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
+            _ => Ok(None),
+        }
+    }
+
+    fn ask(
+        &mut self,
+        request: Request,
+        idle: &mut dyn FnMut() -> voxtile::Result<()>,
+    ) -> anyhow::Result<Option<Answer>> {
+        match &mut self.place {
+            Place::Here(_) if self.stop.is_set() => return Ok(None),
+            Place::Here(source) => return Ok(Some(answer(&mut **source, &request))),
+            // A thread that is gone is noticed by waiting for it.
+            Place::Thread { requests, .. } => drop(requests.send(request)),
+        }
+        self.wait(idle)
+    }
+
+    fn wait(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Option<Answer>> {
+        let Place::Thread { answers, .. } = &self.place else { return Ok(None) };
+        loop {
+            if self.stop.is_set() {
+                return Ok(None);
+            }
+            match answers.recv_timeout(PATIENCE) {
+                Ok(answer) => return Ok(Some(answer)),
+                Err(RecvTimeoutError::Timeout) => idle()?,
+                Err(RecvTimeoutError::Disconnected) => bail!("the thread that reads the scans is gone"),
+            }
+        }
+    }
+}
+
+impl Opened {
+    fn of(scans: &std::path::Path, source: &dyn ScanSource) -> Self {
+        let name = scan_input::name_of(scans, source);
+        Self { name, scans: source.len_hint(), poses: source.pose_source() }
+    }
+}
+
+fn answer(source: &mut dyn ScanSource, request: &Request) -> Answer {
+    match request {
+        Request::Scan => Answer::Read(read(source)),
+        Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
+    }
+}
+
+fn read(source: &mut dyn ScanSource) -> voxtile::Result<Read> {
+    match source.next_scan() {
+        Ok(Some(scan)) => {
+            let mark = ScanMark::of(&scan);
+            Ok(Read::Scan(ReadScan { scan: scan.into_scan(), mark }))
+        }
+        Ok(None) => Ok(Read::End),
+        Err(error) if source.pass_unread() => Ok(Read::Unread(error)),
+        Err(error) => Err(error),
+    }
+}
