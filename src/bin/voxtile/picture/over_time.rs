@@ -47,7 +47,7 @@ impl Panel {
 
 impl OverTime {
     /// Draws everything and saves it.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
+    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
         self.draw().write_png(path)
     }
 

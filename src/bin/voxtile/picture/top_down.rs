@@ -116,7 +116,7 @@ impl TopDown {
     }
 
     /// Draws everything and saves it.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
+    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
         self.draw().write_png(path)
     }
 
