@@ -80,9 +80,10 @@ impl BrickValues {
     /// Every voxel with its value, part by part.
     #[cfg(test)]
     pub(crate) fn voxels(&self) -> impl Iterator<Item = (crate::space::MortonCode, f32)> {
-        let codes = self.parts.iter().flat_map(|part| {
-            crate::space::places(part.known).map(|place| part.brick.voxel(place))
-        });
+        let codes = self
+            .parts
+            .iter()
+            .flat_map(|part| crate::space::places(part.known).map(|place| part.brick.voxel(place)));
         codes.zip(self.values.iter().copied())
     }
 

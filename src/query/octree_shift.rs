@@ -80,8 +80,10 @@ impl OctreeShift {
 /// A voxel of the brick that lies one further along the axes that `share` has a bit for.
 fn neighbour(code: MortonCode, share: usize) -> MortonCode {
     let VoxelKey(key) = code.to_key();
-    VoxelKey(std::array::from_fn(|axis| key[axis].wrapping_add((share >> axis & 1) as u16 * BRICK_EDGE as u16)))
-        .morton()
+    VoxelKey(std::array::from_fn(|axis| {
+        key[axis].wrapping_add((share >> axis & 1) as u16 * BRICK_EDGE as u16)
+    }))
+    .morton()
 }
 
 /// The voxel at a place of a brick, counted from the brick's first.

@@ -206,7 +206,8 @@ impl Disk for FsDisk {
                     let rest = absolute.strip_prefix(there).unwrap_or(Path::new(""));
                     return Ok(if rest.as_os_str().is_empty() { resolved } else { resolved.join(rest) });
                 }
-                Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {}
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {}
                 Err(error) => return Err(error),
             }
         }

@@ -18,7 +18,8 @@ pub(super) fn check_place(disk: &dyn Disk, path: &Path) -> Result<()> {
     let resolved = disk.resolve(path).map_err(|error| Error::io(path, "look for", error))?;
     for outer in resolved.ancestors().skip(1) {
         if is_map(disk, outer)? {
-            let reason = format!("{} lies in the map {}; choose a place outside", path.display(), outer.display());
+            let reason =
+                format!("{} lies in the map {}; choose a place outside", path.display(), outer.display());
             return Err(Error::argument("output", reason));
         }
     }
@@ -33,7 +34,8 @@ fn is_map(disk: &dyn Disk, folder: &Path) -> Result<bool> {
     if !matches!(kind, Some(EntryKind::File(_))) {
         return Ok(false);
     }
-    let has_tiles = || disk.list(folder).is_ok_and(|names| names.iter().any(|name| tile_of_folder(name).is_some()));
+    let has_tiles =
+        || disk.list(folder).is_ok_and(|names| names.iter().any(|name| tile_of_folder(name).is_some()));
     let has_log = || disk.kind(&layout.commit_log()).is_ok_and(|kind| kind.is_some());
     Ok(has_log() || has_tiles() || read_metadata(disk, &layout).is_ok())
 }

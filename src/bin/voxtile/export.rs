@@ -70,7 +70,10 @@ impl<'a> Export<'a> {
         }
         let is_text = matches!(format, ExportFormat::Voxels(VoxelFormat::Csv));
         if is_standard_output(&args.output) && !is_text && io::stdout().is_terminal() {
-            return Err(Error::argument("--output", "standard output is a terminal; send it to a file or a pipe"));
+            return Err(Error::argument(
+                "--output",
+                "standard output is a terminal; send it to a file or a pipe",
+            ));
         }
         Ok(Self { args, format, region, origin_file: OriginFile::of(&args.output)? })
     }
@@ -110,7 +113,8 @@ impl<'a> Export<'a> {
 
     fn voxels(&self, format: VoxelFormat, reader: &MapReader) -> anyhow::Result<Exported> {
         let (grid, min_probability) = (reader.config().grid, self.args.min_probability);
-        let origin = self.origin(Some(format), &grid, || hull(&grid, &reader.tile_indices(), self.region.as_ref()))?;
+        let origin =
+            self.origin(Some(format), &grid, || hull(&grid, &reader.tile_indices(), self.region.as_ref()))?;
         let voxels = self.count_voxels(reader)?;
         let file = VoxelFile { format, voxels, resolution_m: grid.resolution_m(), origin_m: origin.corner_m };
         self.write(&origin, &grid, |out| {
@@ -160,7 +164,8 @@ impl<'a> Export<'a> {
         let (region, memory_bytes) = (self.region.as_ref(), self.args.memory.bytes());
         let export = OctreeExport { format, region, origin: origin.voxel, memory_bytes };
         let mut spool = scratch_for(&self.args.output)?;
-        let voxels = self.write(&origin, &grid, |mut out| reader.write_octree(&export, &mut spool, &mut out))?;
+        let voxels =
+            self.write(&origin, &grid, |mut out| reader.write_octree(&export, &mut spool, &mut out))?;
         Ok(Exported { voxels, origin })
     }
 

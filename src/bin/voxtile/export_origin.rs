@@ -35,7 +35,10 @@ impl ExportOrigin {
         // False for NaN, too.
         let is_index = |x: &f64| *x >= f64::from(i32::MIN) && *x <= f64::from(i32::MAX);
         if !voxel.iter().all(is_index) {
-            let reason = format!("{asked_m:?} m is not finite, or too far away for voxels of {} m", grid.resolution_m());
+            let reason = format!(
+                "{asked_m:?} m is not finite, or too far away for voxels of {} m",
+                grid.resolution_m()
+            );
             return Err(Error::argument("--origin", reason));
         }
         // A thousandth: what is typed in metres is seldom the corner to the last bit.
@@ -158,7 +161,13 @@ impl OriginFile {
     }
 
     /// Says where a file is that is about to get its name. Who reads the two in between is told by the file's hash.
-    pub fn write(&self, output: &Path, hash: blake3::Hash, origin: &ExportOrigin, grid: &Grid) -> anyhow::Result<()> {
+    pub fn write(
+        &self,
+        output: &Path,
+        hash: blake3::Hash,
+        origin: &ExportOrigin,
+        grid: &Grid,
+    ) -> anyhow::Result<()> {
         let record = OriginRecord {
             format: FORMAT.to_owned(),
             file: output.file_name().unwrap_or_default().to_string_lossy().into_owned(),

@@ -24,6 +24,7 @@ mod octree_file;
 mod one_heap;
 mod output_file;
 mod part;
+mod path_text;
 mod picture;
 mod progress;
 mod query;
@@ -40,6 +41,7 @@ mod written;
 
 use args::{Cli, Command};
 use clap::Parser;
+use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -56,7 +58,7 @@ fn main() -> ExitCode {
     if let Some(threads) = threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
         if let Err(error) = pool.build_global() {
-            eprintln!("voxtile: cannot start {threads} threads: {error}");
+            say(format_args!("cannot start {threads} threads: {error}"));
             return ExitCode::FAILURE;
         }
     }
@@ -86,9 +88,18 @@ fn main() -> ExitCode {
         if is_closed_pipe(&error) {
             return ExitCode::SUCCESS;
         }
-        eprintln!("voxtile: {error:#}");
+        match error.downcast_ref::<std::io::Error>() {
+            // All files have a name in their error.
+            Some(error) => say(format_args!("standard output: cannot write: {error}")),
+            None => say(format_args!("{error:#}")),
+        }
         exit_code_of(&error)
     })
+}
+
+/// One line for a person. Where standard error refuses it there is nobody to tell.
+pub fn say(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr().lock(), "voxtile: {line}");
 }
 
 /// Ended by Ctrl-C or SIGTERM, after everything so far was flushed.

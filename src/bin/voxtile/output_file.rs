@@ -1,4 +1,3 @@
-use anyhow::Context;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -96,7 +95,7 @@ impl OutputFile {
             }
             Unfinished::Copied(file) if is_standard_output(&target) => {
                 // As it is: `main` knows a reader that has seen enough.
-                copy(file, &mut io::stdout().lock()).context("standard output")
+                Ok(copy(file, &mut io::stdout().lock())?)
             }
             Unfinished::Copied(file) => {
                 let mut stream = File::options().write(true).open(&target).map_err(refused)?;
@@ -135,6 +134,17 @@ pub fn scratch_for(target: &Path) -> Result<File> {
     file.map_err(|error| Error::io(target, "create a temporary file for", error))
 }
 
+/// Whether a picture can be made at a path; what goes to standard output is the summary.
+pub fn check_picture(target: &Path) -> Result<()> {
+    if is_standard_output(target) {
+        return Err(Error::argument(
+            "--output",
+            "a picture needs a file: standard output is for the summary",
+        ));
+    }
+    check_target(target).map(drop)
+}
+
 fn named_beside(target: &Path) -> io::Result<NamedTempFile> {
     let mut prefix = target.file_name().unwrap_or_default().to_owned();
     prefix.push(".");
@@ -159,9 +169,9 @@ fn check_target(target: &Path) -> Result<Place> {
         Err(error) => return Err(Error::io(target, "look at", error)),
         Ok(metadata) if metadata.is_file() => None,
         Ok(metadata) if metadata.is_dir() => Some("is a folder; name a file in it"),
-        Ok(metadata) if metadata.is_symlink() => {
-            Some("is a symbolic link, and links are not followed; name the file itself, or - for standard output")
-        }
+        Ok(metadata) if metadata.is_symlink() => Some(
+            "is a symbolic link, and links are not followed; name the file itself, or - for standard output",
+        ),
         // A pipe or a device.
         Ok(_) => return Ok(Place::Stream),
     };

@@ -1,5 +1,5 @@
 use super::font;
-use super::palette::{Rgb, mixed};
+use super::palette::{self, Rgb, mixed};
 use crate::output_file::OutputFile;
 use std::io;
 use std::path::Path;
@@ -49,6 +49,15 @@ impl Canvas {
                 continue;
             };
             self.fill(x, y, [2 * half + 1, 1], color, 1.0);
+        }
+    }
+
+    /// The way of the sensor: a disc around the middle of each pixel, with a dark rim, so that it shows on any color.
+    pub fn path(&mut self, middles: impl Iterator<Item = [usize; 2]>, radius: usize) {
+        let middles: Vec<[usize; 2]> = middles.collect();
+        // All rims first: where discs lie close, they make one line.
+        for (radius, color) in [(radius + 1 + radius / 2, palette::UNKNOWN), (radius, palette::PATH)] {
+            middles.iter().for_each(|&middle| self.disc(middle, radius, color));
         }
     }
 
