@@ -385,3 +385,43 @@ fn names_may_be_any_bytes() {
         assert!(folder.path().join(name).is_file());
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn outputs_that_refuse_are_told_and_no_panic() {
+    use std::process::{Command, Stdio};
+    let folder = TempDir::new().unwrap();
+    let map = near_map(&folder);
+    let map = text(&map);
+    let run = |arguments: &[&str], stdout: Stdio, stderr: Stdio| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_voxtile"));
+        command.args(arguments).stdin(Stdio::null()).stdout(stdout).stderr(stderr);
+        command.spawn().unwrap().wait_with_output().unwrap()
+    };
+    let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
+    let closed = || Stdio::from(std::io::pipe().unwrap().1);
+    let ray = ["raycast", map, "--origin", "0", "0", "0.6", "--direction", "1e300", "1e290", "1e200"];
+    for arguments in [
+        &["info", map][..],
+        &["info", map, "--json"],
+        &["query", map, "1", "2", "3"],
+        &ray,
+        &["diff", map, map],
+        &["digest", map],
+        &["verify", map],
+        &["snapshots", map],
+        &["export", map, "-o", "-", "--format", "csv"],
+    ] {
+        let refused = run(arguments, full(), Stdio::piped());
+        let stderr = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(1), "{arguments:?}: {stderr}");
+        assert!(stderr.contains("standard output: cannot write: No space left"), "{arguments:?}: {stderr}");
+        // A reader that has seen enough is no error.
+        let unread = run(arguments, closed(), Stdio::piped());
+        assert_eq!((unread.status.code(), unread.stderr.len()), (Some(0), 0), "{arguments:?}");
+    }
+    for stderr in [full(), closed()] {
+        assert_eq!(run(&["info", "nowhere"], Stdio::null(), stderr).status.code(), Some(1));
+    }
+    assert!(output(&ray).contains("hit at"));
+}

@@ -48,7 +48,7 @@ impl OutputFile {
             Place::File => named_beside(target).map(Unfinished::Named),
             Place::Stream => tempfile::tempfile().map(Unfinished::Copied),
         };
-        let unfinished = unfinished.map_err(|error| Error::io(target, "create a file for", error))?;
+        let unfinished = unfinished.map_err(|error| Error::io(target, "create", error))?;
         Ok(Self { target: target.to_owned(), out: BufWriter::with_capacity(1 << 18, unfinished) })
     }
 
@@ -131,7 +131,7 @@ pub fn scratch_for(target: &Path) -> Result<File> {
         Place::File => tempfile::tempfile_in(folder_of(target)),
         Place::Stream => tempfile::tempfile(),
     };
-    file.map_err(|error| Error::io(target, "create a temporary file for", error))
+    file.map_err(|error| Error::io(target, "create a temporary file beside", error))
 }
 
 /// Whether a picture can be made at a path; what goes to standard output is the summary.
