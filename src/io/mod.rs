@@ -36,4 +36,4 @@ pub use scan_stream::read_scan_stream;
 pub use scan_stream_writer::ScanStreamWriter;
 pub use sensor_scan::SensorScan;
 pub use source::{ScanSource, open_scans};
-pub use voxel_writer::{VoxelFormat, VoxelRecord, VoxelWriter};
+pub use voxel_writer::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};

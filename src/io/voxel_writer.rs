@@ -5,7 +5,7 @@ use std::path::Path;
 /// A voxel as it is exported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelRecord {
-    /// Its center in metres, world frame.
+    /// Its center in metres, counted from the file's origin.
     pub center_m: Point,
     /// Probability of being occupied.
     pub probability: f64,
@@ -20,7 +20,8 @@ pub struct VoxelRecord {
 pub enum VoxelFormat {
     /// PLY, binary little-endian: x y z as double, probability float, log_odds double, observation_count int.
     Ply,
-    /// PCD 0.7, binary: x y z as F8, so that large coordinates stay exact; intensity F4 holds the probability.
+    /// PCD 0.7, binary, as PCL reads it: x y z as F4, intensity F4 holds the probability, observation_count I4. A file's
+    /// origin is its `VIEWPOINT`.
     Pcd,
     /// Text with a line of names; every number reads back to the same bits.
     Csv,
@@ -38,50 +39,104 @@ impl VoxelFormat {
     }
 }
 
-/// Streams voxels into a file. Their number must be known before: the headers of PLY and PCD name it.
+/// What a file of voxels says before the first of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelFile {
+    /// Which file.
+    pub format: VoxelFormat,
+    /// Number of voxels: the headers of PLY and PCD name it.
+    pub voxels: u64,
+    /// Edge of a voxel in metres.
+    pub resolution_m: f64,
+    /// Where in the world the file's origin is, in metres: to be added to its coordinates. CSV does not tell it.
+    pub origin_m: Point,
+}
+
+impl VoxelFile {
+    /// So many voxels from a PCD file's origin along an axis `f32` still tells where a center is to an eighth of a voxel, and
+    /// [`VoxelWriter::write`] takes no farther one.
+    pub const PCD_REACH_VOXELS: i32 = 1 << 21;
+}
+
+/// Streams voxels into a file.
 #[derive(Debug)]
 pub struct VoxelWriter<W> {
-    format: VoxelFormat,
+    file: VoxelFile,
     out: W,
-    announced: u64,
     written: u64,
 }
 
 impl<W: Write> VoxelWriter<W> {
-    /// Begins a file of `count` voxels of `resolution_m` metres.
-    pub fn new(format: VoxelFormat, count: u64, resolution_m: f64, mut out: W) -> io::Result<Self> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    ///
+    /// An `out` that refuses.
+    pub fn new(file: VoxelFile, mut out: W) -> io::Result<Self> {
+        let VoxelFile { format, voxels, resolution_m, origin_m: [x, y, z] } = file;
+        let is_moved = file.origin_m != [0.0; 3];
         match format {
-            VoxelFormat::Ply => write!(
-                out,
-                "ply\nformat binary_little_endian 1.0\ncomment occupied voxels, edge {resolution_m} m\nelement vertex \
-                 {count}\nproperty double x\nproperty double y\nproperty double z\nproperty float \
-                 probability\nproperty double log_odds\nproperty int observation_count\nend_header\n"
-            )?,
-            VoxelFormat::Pcd => write!(
-                out,
-                "# .PCD v0.7 - occupied voxels, edge {resolution_m} m\nVERSION 0.7\nFIELDS x y z intensity \
-                 observation_count\nSIZE 8 8 8 4 4\nTYPE F F F F I\nCOUNT 1 1 1 1 1\nWIDTH {count}\nHEIGHT \
-                 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
-            )?,
+            VoxelFormat::Ply => {
+                writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+                writeln!(out, "comment occupied voxels, edge {resolution_m} m")?;
+                if is_moved {
+                    writeln!(out, "comment origin {x} {y} {z} m: to be added to x y z")?;
+                }
+                write!(
+                    out,
+                    "element vertex {voxels}\nproperty double x\nproperty double y\nproperty double z\nproperty float \
+                     probability\nproperty double log_odds\nproperty int observation_count\nend_header\n"
+                )?;
+            }
+            VoxelFormat::Pcd => {
+                writeln!(out, "# .PCD v0.7 - occupied voxels, edge {resolution_m} m")?;
+                if is_moved {
+                    writeln!(out, "# origin {x} {y} {z} m: to be added to x y z, as VIEWPOINT says, too")?;
+                }
+                write!(
+                    out,
+                    "VERSION 0.7\nFIELDS x y z intensity observation_count\nSIZE 4 4 4 4 4\nTYPE F F F F I\nCOUNT 1 1 1 1 \
+                     1\nWIDTH {voxels}\nHEIGHT 1\nVIEWPOINT {x} {y} {z} 1 0 0 0\nPOINTS {voxels}\nDATA binary\n"
+                )?;
+            }
             VoxelFormat::Csv => writeln!(out, "x,y,z,probability,log_odds,observation_count")?,
         }
-        Ok(Self { format, out, announced: count, written: 0 })
+        Ok(Self { file, out, written: 0 })
     }
 
     /// Appends a voxel.
+    ///
+    /// # Errors
+    ///
+    /// An `out` that refuses; in a PCD file, a center too far from the file's origin for `f32`.
     pub fn write(&mut self, voxel: &VoxelRecord) -> io::Result<()> {
         self.written += 1;
         let VoxelRecord { center_m, probability, log_odds, observation_count } = *voxel;
         let [x, y, z] = center_m;
-        if self.format == VoxelFormat::Csv {
-            return writeln!(self.out, "{x},{y},{z},{probability},{log_odds},{observation_count}");
-        }
-        for coordinate in center_m {
-            self.out.write_all(&coordinate.to_le_bytes())?;
-        }
-        self.out.write_all(&(probability as f32).to_le_bytes())?;
-        if self.format == VoxelFormat::Ply {
-            self.out.write_all(&log_odds.to_le_bytes())?;
+        match self.file.format {
+            VoxelFormat::Csv => {
+                return writeln!(self.out, "{x},{y},{z},{probability},{log_odds},{observation_count}");
+            }
+            VoxelFormat::Ply => {
+                for coordinate in center_m {
+                    self.out.write_all(&coordinate.to_le_bytes())?;
+                }
+                self.out.write_all(&(probability as f32).to_le_bytes())?;
+                self.out.write_all(&log_odds.to_le_bytes())?;
+            }
+            VoxelFormat::Pcd => {
+                let reach_m = f64::from(VoxelFile::PCD_REACH_VOXELS) * self.file.resolution_m;
+                if let Some(far) = center_m.iter().find(|coordinate| !(coordinate.abs() <= reach_m)) {
+                    let reason = format!(
+                        "{far} m from the file's origin a float32 of PCD does not tell voxels of {} m apart",
+                        self.file.resolution_m
+                    );
+                    return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
+                }
+                for value in [x, y, z, probability] {
+                    self.out.write_all(&(value as f32).to_le_bytes())?;
+                }
+            }
         }
         self.out.write_all(&observation_count.to_le_bytes())
     }
@@ -92,8 +147,8 @@ impl<W: Write> VoxelWriter<W> {
     ///
     /// Another number of voxels than was announced: the file's header would be wrong.
     pub fn finish(mut self) -> io::Result<W> {
-        if self.written != self.announced {
-            let reason = format!("{} voxels announced, {} written", self.announced, self.written);
+        if self.written != self.file.voxels {
+            let reason = format!("{} voxels announced, {} written", self.file.voxels, self.written);
             return Err(io::Error::other(reason));
         }
         self.out.flush()?;

@@ -77,6 +77,16 @@ impl BrickValues {
         self.parts.iter().map(|part| part.brick).collect()
     }
 
+    /// Every voxel with its value, part by part.
+    #[cfg(test)]
+    pub(crate) fn voxels(&self) -> impl Iterator<Item = (crate::space::MortonCode, f32)> {
+        let codes = self
+            .parts
+            .iter()
+            .flat_map(|part| crate::space::places(part.known).map(|place| part.brick.voxel(place)));
+        codes.zip(self.values.iter().copied())
+    }
+
     /// Lays out the voxels of parts of one brick.
     pub(super) fn gather(&self, parts: Range<usize>, content: &mut BrickContent) {
         content.clear();

@@ -13,6 +13,10 @@ pub(super) fn occupancy_at_depth(view: &impl MapView, point: Point, depth: u8) -
     }
     let config = view.config();
     let Some(voxel) = config.grid.voxel_of(point) else { return Ok(Occupancy::Unknown) };
+    if depth == FINEST_DEPTH {
+        // The voxel itself: the table has it exactly, the octree as `f32`.
+        return Ok(Occupancy::of(config, view.evidence(voxel)?));
+    }
     let mut max: Option<f32> = None;
     let node = voxels_of_node(voxel, depth);
     for index in tiles_in(view, &node) {

@@ -1,4 +1,4 @@
-use super::octree_blocks::{REACH, out_of_reach};
+use super::octree_reach::{REACH, out_of_reach};
 use super::region::{for_each_occupied, for_each_voxel_in};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
@@ -25,7 +25,7 @@ pub(super) fn merged_octree(view: &impl MapView, region: Option<&Aabb>, max_voxe
         None => for_each_occupied(view, Some(0.0), None, take)?,
     }
     if let Some(voxel) = outside {
-        return Err(out_of_reach(view, voxel));
+        return Err(out_of_reach(&view.config().grid, voxel, None));
     }
     if count > max_voxels {
         let hint = "name a smaller region (--region)";

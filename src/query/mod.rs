@@ -18,6 +18,8 @@ mod merged;
 mod nearest;
 mod occupancy;
 mod octree_blocks;
+mod octree_reach;
+mod octree_shift;
 mod point;
 mod questions;
 mod ray;

@@ -1,3 +1,5 @@
+use super::octree_reach::{REACH, out_of_reach};
+use super::octree_shift::OctreeShift;
 use super::region::voxels_around;
 use crate::error::{Error, Result};
 use crate::mapper::{MapView, TileRef};
@@ -12,6 +14,9 @@ pub struct OctreeExport<'a> {
     pub format: OctreeFormat,
     /// Only the voxels whose center is in this half-open box; `None` takes the whole map.
     pub region: Option<&'a Aabb>,
+    /// The map's voxel that becomes voxel 0 of the file, whose coordinates are those of the map less this voxel's lower
+    /// corner: so a map far from its origin comes into the reach of OctoMap's keys. `[0; 3]` shifts nothing.
+    pub origin: VoxelIndex,
     /// Memory in bytes for the part of the tree that is put together at a time; beside it there are one tile and a few
     /// bytes for each part. With less memory tiles are read more often.
     pub memory_bytes: usize,
@@ -19,9 +24,6 @@ pub struct OctreeExport<'a> {
 
 /// The depth of bricks, which are not divided further.
 const BRICK_DEPTH: u8 = 13;
-
-/// The voxels that OctoMap's keys reach.
-pub(super) const REACH: VoxelBox = VoxelBox { min: [-32768; 3], end: [32768; 3] };
 
 pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
     view: &impl MapView,
@@ -45,6 +47,7 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
         for_each_block(
             view,
             export.region,
+            export.origin,
             block_bytes,
             |first, depth, values| -> std::result::Result<(), E> {
                 Ok(stream.add_block(first, depth, values)?)
@@ -59,61 +62,60 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
 
 /// Visits the map's voxels as blocks of OctoMap's tree, in Morton order: first voxel, depth, and the values. A block
 /// has `block_bytes` of values at most, unless it is a single brick.
-pub(super) fn for_each_block<E: From<Error>>(
+fn for_each_block<E: From<Error>>(
     view: &impl MapView,
     region: Option<&Aabb>,
+    origin: VoxelIndex,
     block_bytes: usize,
     visit: impl FnMut(MortonCode, u8, &mut BrickValues) -> std::result::Result<(), E>,
 ) -> std::result::Result<(), E> {
-    let tiles = tiles_of(view, region)?;
-    let mut blocks = Blocks { view, region, block_bytes, values: BrickValues::default(), visit };
+    let shift = OctreeShift::by(origin);
+    let tiles = tiles_of(view, region, &shift)?;
+    let mut blocks = Blocks { view, region, shift, block_bytes, values: BrickValues::default(), visit };
     blocks.descend(MortonCode(0), 0, &tiles)
 }
 
 /// The tiles that may have voxels for the tree, once it is known that none is out of reach.
-fn tiles_of(view: &impl MapView, region: Option<&Aabb>) -> Result<Vec<TileIndex>> {
+fn tiles_of(view: &impl MapView, region: Option<&Aabb>, shift: &OctreeShift) -> Result<Vec<TileIndex>> {
     let grid = &view.config().grid;
     let around = region.map(|region| voxels_around(grid, region));
-    let mut tiles = Vec::new();
-    for index in view.tile_indices() {
-        let voxels = grid.voxels_of_tile(index);
-        if around.is_some_and(|around| around.intersection(&voxels).is_empty()) {
-            continue;
-        }
+    let mut tiles = view.tile_indices();
+    tiles.retain(|&index| {
+        around.is_none_or(|around| !around.intersection(&grid.voxels_of_tile(index)).is_empty())
+    });
+    let mut within_reach = Vec::with_capacity(tiles.len());
+    for &index in &tiles {
+        let voxels = shift.of_box(&grid.voxels_of_tile(index));
         let in_reach = REACH.intersection(&voxels);
         if in_reach != voxels
             && let Some(tile) = view.tile_in_passing(index)?
-            && let Some(outside) = first_outside(view, &tile, region)
+            && let Some(outside) = first_outside(view, &tile, region, shift)
         {
-            return Err(out_of_reach(view, outside));
+            return Err(out_of_reach(grid, outside, Some(&tiles)));
         }
         if !in_reach.is_empty() {
-            tiles.push(index);
+            within_reach.push(index);
         }
     }
-    Ok(tiles)
+    Ok(within_reach)
 }
 
-fn first_outside(view: &impl MapView, tile: &TileRef<'_>, region: Option<&Aabb>) -> Option<VoxelIndex> {
+fn first_outside(
+    view: &impl MapView,
+    tile: &TileRef<'_>,
+    region: Option<&Aabb>,
+    shift: &OctreeShift,
+) -> Option<VoxelIndex> {
     let grid = &view.config().grid;
     let wanted = |voxel| region.is_none_or(|region| region.contains(grid.center_m(voxel)));
-    tile.voxels().map(|voxel| voxel.index).find(|&voxel| !REACH.contains(voxel) && wanted(voxel))
-}
-
-/// The error of a voxel that OctoMap has no key for.
-pub(super) fn out_of_reach(view: &impl MapView, voxel: VoxelIndex) -> Error {
-    let half_m = 32768.0 * view.config().grid.resolution_m();
-    let center = view.config().grid.center_m(voxel);
-    let reason = format!(
-        "the voxel at {center:?} m is outside the {half_m} m around the origin that OctoMap's keys reach at this \
-         resolution; name a region (--region) inside"
-    );
-    Error::argument("merged octree", reason)
+    let mut voxels = tile.voxels().map(|voxel| voxel.index);
+    voxels.find(|&voxel| !REACH.contains(shift.of_voxel(voxel)) && wanted(voxel))
 }
 
 struct Blocks<'a, V, F> {
     view: &'a V,
     region: Option<&'a Aabb>,
+    shift: OctreeShift,
     block_bytes: usize,
     values: BrickValues,
     visit: F,
@@ -140,21 +142,23 @@ impl<V: MapView, F> Blocks<'_, V, F> {
         for child in 0..8 {
             let first = MortonCode(first.0 + child * MortonCode::span(depth + 1));
             let voxels = voxels_of_node(first, depth + 1);
-            let grid = self.view.config().grid;
-            let reaches_in =
-                |tile: &&TileIndex| !grid.voxels_of_tile(**tile).intersection(&voxels).is_empty();
+            let reaches_in = |tile: &&TileIndex| !self.voxels_of(**tile).intersection(&voxels).is_empty();
             let tiles: Vec<TileIndex> = tiles.iter().filter(reaches_in).copied().collect();
             self.descend(first, depth + 1, &tiles)?;
         }
         Ok(())
     }
 
+    /// The voxels of a tile where the octree has them.
+    fn voxels_of(&self, tile: TileIndex) -> VoxelBox {
+        self.shift.of_box(&self.view.config().grid.voxels_of_tile(tile))
+    }
+
     /// Whether it is worth trying: by what the map knows of its tiles without reading them.
     fn may_fit(&self, first: MortonCode, depth: u8, tiles: &[TileIndex]) -> bool {
-        let grid = &self.view.config().grid;
         let node = voxels_of_node(first, depth);
         let expected = tiles.iter().map(|&index| {
-            let tile = grid.voxels_of_tile(index);
+            let tile = self.voxels_of(index);
             let share = volume(&tile.intersection(&node)) / volume(&tile);
             self.view.voxels_of_tile_hint(index).map_or(0.0, |voxels| voxels as f64 * share)
         });
@@ -170,15 +174,15 @@ impl<V: MapView, F> Blocks<'_, V, F> {
         for &index in tiles {
             let Some(tile) = self.view.tile_in_passing(index)? else { continue };
             let table = tile.table();
-            for brick in table.bricks().filter(|brick| node.contains(brick)) {
-                self.values.begin(brick);
-                table.for_each_in(brick, |place, evidence| {
-                    let center_m = || grid.center_m(tile.index_of(brick.voxel(place)));
-                    if self.region.is_none_or(|region| region.contains(center_m())) {
-                        self.values.add(place, evidence.log_odds as f32);
-                    }
+            for brick in table.bricks() {
+                self.shift.add_brick(brick, &node, &mut self.values, |add| {
+                    table.for_each_in(brick, |place, evidence| {
+                        let center_m = || grid.center_m(tile.index_of(brick.voxel(place)));
+                        if self.region.is_none_or(|region| region.contains(center_m())) {
+                            add(place, evidence.log_odds as f32);
+                        }
+                    });
                 });
-                self.values.end();
                 if depth < BRICK_DEPTH && self.values.bytes() > self.block_bytes {
                     return Ok(false);
                 }

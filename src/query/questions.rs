@@ -31,8 +31,9 @@ pub trait Questions: MapView + Sized {
         point::voxel_at(self, point)
     }
 
-    /// What the map says of the octree node at `depth` (1, half of OctoMap's space, to 16, a voxel) that holds a
-    /// point: the largest log-odds under the node, as `f32`.
+    /// What the map says of the octree node at `depth` that holds a point: from 1, half of OctoMap's space, to 15, two voxels
+    /// wide, the largest log-odds under the node as `f32`, OctoMap's precision. At 16 the node is the voxel, and the answer
+    /// is that of [`Questions::occupancy_at`], to the bit.
     ///
     /// # Errors
     ///

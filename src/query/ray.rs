@@ -36,7 +36,7 @@ pub struct RayHit {
 pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<RayHit>> {
     let config = view.config();
     let grid = &config.grid;
-    let (origin, direction) = (query.origin, query.direction);
+    let (origin, direction) = (query.origin, of_usable_size(query.direction));
     let start = grid
         .voxel_of(origin)
         .ok_or_else(|| Error::argument("origin", format!("{origin:?} m is not finite or too far away")))?;
@@ -47,22 +47,24 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
     if query.max_range_m.is_some_and(|range| range.is_nan() || range < 0.0) {
         return Err(Error::argument("max range", "must be a length of at least 0 m"));
     }
-    let Some(reach_m) = reach_of_map(view, origin) else {
-        // An empty map: nothing to hit but the unknown at the origin.
-        let blocked = query.unknown == UnknownAs::Obstacle;
-        let hit = RayHit { voxel: start, center_m: grid.center_m(start), distance_m: 0.0, probability: None };
-        return Ok(blocked.then_some(hit));
-    };
-    let range_m = match query.unknown {
-        UnknownAs::Free => query.max_range_m.map_or(reach_m, |range| range.min(reach_m)),
-        // Beyond the map all is unknown, which stops the ray by itself.
-        UnknownAs::Obstacle => query.max_range_m.unwrap_or(f64::INFINITY),
-    };
     let mut walk = RayWalk::along(
         grid.to_voxel_units(origin),
         start,
         grid.to_voxel_units(direction.map(|d| d / length)), // Times come out in metres.
     );
+    // Outside the box around all tiles all is unknown.
+    let hull = hull_of_map(view);
+    let enters = hull.as_ref().is_some_and(|hull| match query.unknown {
+        UnknownAs::Free => walk.enter(hull),
+        UnknownAs::Obstacle => hull.contains(start),
+    });
+    let Some(hull) = hull.filter(|_| enters) else {
+        // Nothing to hit but the unknown at the origin.
+        let blocked = query.unknown == UnknownAs::Obstacle;
+        let hit = RayHit { voxel: start, center_m: grid.center_m(start), distance_m: 0.0, probability: None };
+        return Ok(blocked.then_some(hit));
+    };
+    let range_m = query.max_range_m.unwrap_or(f64::INFINITY);
     let mut tiles = TileCursor::new(view);
     while walk.entry_time() <= range_m {
         let voxel = walk.voxel();
@@ -81,23 +83,28 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
             }
             Some(_) => walk.advance(),
         }
-        if walk.voxel() == voxel {
-            // The end of all voxels.
+        let is_over = query.unknown == UnknownAs::Free && !hull.contains(walk.voxel());
+        if is_over || walk.voxel() == voxel {
+            // Beyond the map, or at the end of all voxels.
             return Ok(None);
         }
     }
     Ok(None)
 }
 
-/// Distance in metres from which on a ray from `origin` can meet nothing; `None` for an empty map.
-fn reach_of_map(view: &impl MapView, origin: Point) -> Option<f64> {
+/// The same direction with a length that can be computed, where its squares would be too large or too small for that.
+fn of_usable_size(direction: Point) -> Point {
+    let longest = direction.iter().fold(0.0, |longest: f64, d| longest.max(d.abs()));
+    let is_usable = (1e-100..1e100).contains(&longest) || !(longest.is_finite() && longest > 0.0);
+    if is_usable { direction } else { direction.map(|d| d / longest) }
+}
+
+/// The voxels of a box around all tiles; `None` for an empty map.
+fn hull_of_map(view: &impl MapView) -> Option<VoxelBox> {
     let Bounds { min, max } = Bounds::of(view.tile_indices().into_iter())?;
-    let tile_size_m = view.config().grid.tile_size_m();
-    let farthest = |k: usize| {
-        let (low, high) = (f64::from(min[k]) * tile_size_m, (f64::from(max[k]) + 1.0) * tile_size_m);
-        (origin[k] - low).abs().max((high - origin[k]).abs())
-    };
-    Some((0..3).map(|k| farthest(k) * farthest(k)).sum::<f64>().sqrt() + tile_size_m)
+    let grid = &view.config().grid;
+    let [low, high] = [min, max].map(|corner| grid.voxels_of_tile(corner.into()));
+    Some(VoxelBox { min: low.min, end: high.end })
 }
 
 fn brick_of(voxel: VoxelIndex) -> VoxelBox {

@@ -149,6 +149,44 @@ impl RayWalk {
         self.entry = exit;
     }
 
+    /// Goes to the first voxel inside `region`, where single steps would lead; the present one if it is inside. False, and
+    /// nowhere, if the ray from here on never meets the region.
+    pub fn enter(&mut self, region: &VoxelBox) -> bool {
+        if region.is_empty() {
+            return false;
+        }
+        // Along each axis that is not inside yet, the crossing that brings it in. The last of these enters the region; of
+        // equal times the highest axis goes last.
+        let mut entry: Option<(f64, usize)> = None;
+        for axis in 0..3 {
+            let (voxel, first, last) = (self.voxel[axis], region.min[axis], region.end[axis] - 1);
+            let before = match self.step[axis] {
+                _ if (first..=last).contains(&voxel) => continue,
+                1 if voxel < first && first <= self.last[axis] => first - 1,
+                -1 if voxel > last && last >= self.last[axis] => last + 1,
+                _ => return false,
+            };
+            let time = self.crossing(axis, before);
+            if entry.is_none_or(|(latest, _)| time >= latest) {
+                entry = Some((time, axis));
+            }
+        }
+        let Some((time, entry_axis)) = entry else { return true };
+        let voxel = std::array::from_fn(|axis| match axis == entry_axis {
+            true if self.step[axis] > 0 => region.min[axis],
+            true => region.end[axis] - 1,
+            false => self.voxel_before(axis, self.last[axis], time, axis < entry_axis),
+        });
+        // Along another axis the ray may have left the region's width by then.
+        if !region.contains(voxel) {
+            return false;
+        }
+        self.voxel = voxel;
+        self.next = std::array::from_fn(|axis| self.crossing(axis, self.voxel[axis]));
+        self.entry = time;
+        true
+    }
+
     /// The voxel along `axis`, between the present one and `border`, that the ray is in when `exit` comes:
     /// crossings before `exit` are done, and those at `exit` if `ties_first`. Times grow along the ray, so the
     /// border between done and not done is found by bisection.
@@ -255,6 +293,30 @@ mod tests {
                     leave = leave.min(near.max(far));
                 }
                 prop_assert!(enter <= leave + 1e-9, "{:?} is not on the ray", voxel);
+            }
+        }
+
+        #[test]
+        fn a_box_is_entered_where_single_steps_enter_it(
+            from in prop::array::uniform3(-60.0..60.0_f64),
+            to in prop::array::uniform3(-60.0..60.0_f64),
+            snap in prop::bool::ANY,
+        ) {
+            // Snapped, many crossings are ties, and some rays go along an axis.
+            let grid = |p: Point| if snap { p.map(|x| (x / 8.0).round() * 8.0 + 0.5) } else { p };
+            let (from, to) = (grid(from), grid(to));
+            let region = VoxelBox { min: [-9, -20, 0], end: [17, 19, 30] };
+            let mut jumped = walk(from, to);
+            let entered = jumped.enter(&region);
+            let mut stepped = walk(from, to);
+            while !region.contains(stepped.voxel()) && !stepped.is_at_end() {
+                stepped.advance();
+            }
+            prop_assert_eq!(entered, region.contains(stepped.voxel()));
+            if entered {
+                prop_assert_eq!(jumped.voxel(), stepped.voxel());
+                prop_assert_eq!(jumped.entry_time().to_bits(), stepped.entry_time().to_bits());
+                prop_assert_eq!(voxels(jumped), voxels(stepped));
             }
         }
 

@@ -143,6 +143,15 @@ impl Grid {
         voxel.map(|index| (f64::from(index) + 0.5) * self.resolution_m)
     }
 
+    /// The lower border in metres of the voxels with this index along an axis, without the noise of the multiplication
+    /// (0.30000000000000004 is 0.3): to be shown and stored.
+    pub fn corner_m(&self, index: i32) -> f64 {
+        let corner_m = f64::from(index) * self.resolution_m;
+        let readable_m = readable(corner_m);
+        // Of voxels of nanometres, digits would be lost.
+        if (readable_m - corner_m).abs() < 1e-3 * self.resolution_m { readable_m } else { corner_m }
+    }
+
     /// The voxels whose center is in a box.
     pub fn voxels_in(&self, region: &Aabb) -> VoxelBox {
         // Centers ascend with their index, so the first one from a bound on is found by halving.

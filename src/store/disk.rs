@@ -57,6 +57,10 @@ pub trait Disk: Debug + Send + Sync {
     }
     /// What has a name, links not followed; `None` if nothing has.
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>>;
+    /// The same place as an absolute path without links, as far as it is there.
+    fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
+        Ok(path.to_owned())
+    }
     /// Locks a file, made if missing, until the returned value is dropped; `None` if another holds it.
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>>;
 }
@@ -197,6 +201,22 @@ impl Disk for FsDisk {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error),
         }
+    }
+
+    fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
+        let absolute = std::path::absolute(path)?;
+        for there in absolute.ancestors() {
+            match there.canonicalize() {
+                Ok(resolved) => {
+                    let rest = absolute.strip_prefix(there).unwrap_or(Path::new(""));
+                    return Ok(if rest.as_os_str().is_empty() { resolved } else { resolved.join(rest) });
+                }
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(absolute)
     }
 
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {

@@ -2,7 +2,7 @@
 
 use super::commit_log::{CommitLog, Commits};
 use super::disk::{Disk, DiskRead};
-use super::layout::{Layout, QUARANTINE, SNAPSHOTS, tile_of_folder};
+use super::layout::{Layout, tile_of_folder};
 use super::metadata::Metadata;
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::TileIndex;
@@ -44,21 +44,6 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     }
     let hint = "open it, name --append to add scans to it, or choose an empty folder";
     Err(Error::AlreadyExists { path: folder.to_owned(), hint })
-}
-
-/// A map does not lie inside of another, where it would be taken for one of its tiles or snapshots.
-pub(super) fn check_place(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    let parent = parent_of(folder);
-    let is_of_map = [SNAPSHOTS, QUARANTINE].iter().any(|name| parent.ends_with(name));
-    for outer in [Some(parent), is_of_map.then(|| parent_of(parent))].into_iter().flatten() {
-        let metadata = Layout::new(outer).metadata();
-        if disk.kind(&metadata).map_err(|error| Error::io(&metadata, "look at", error))?.is_some() {
-            let reason =
-                format!("{} lies in the map {}; choose a folder outside", folder.display(), outer.display());
-            return Err(Error::argument("output", reason));
-        }
-    }
-    Ok(())
 }
 
 /// Makes a folder and those above it, durably: a map must not vanish with the name of its folder.

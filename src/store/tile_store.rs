@@ -3,6 +3,7 @@ use super::disk::{Disk, DiskRead};
 use super::layout::{Layout, TileFile};
 use super::map_folder::{self, Lock};
 use super::metadata::Metadata;
+use super::place;
 use super::readers::Readers;
 use super::recovery::{recover, remove_uncommitted};
 use super::snapshot_name::SnapshotName;
@@ -73,7 +74,7 @@ impl TileStore {
     /// Makes an empty map in a folder that is missing, empty, or holds what an interrupted creation left.
     pub fn create(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         let layout = Layout::new(folder);
-        map_folder::check_place(&*disk, folder)?;
+        place::check_place(&*disk, folder)?;
         map_folder::create_folders(&*disk, folder)?;
         // Before the lock, which leaves a file behind, and after it, when nobody else can begin a map here.
         map_folder::check_is_free(&*disk, folder)?;

@@ -2,6 +2,7 @@ use super::disk::{Disk, EntryKind};
 use super::layout::{Layout, tile_of_folder};
 use super::map_folder::{self, Lock};
 use super::metadata::Metadata;
+use super::place;
 use super::tile_store::TileStore;
 use crate::error::{Error, Result};
 use std::io;
@@ -29,7 +30,7 @@ impl UnfinishedMap {
     ///
     /// A folder with other content, another process that makes the same map, a disk that refuses.
     pub fn begin(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
-        map_folder::check_place(&*disk, folder)?;
+        place::check_place(&*disk, folder)?;
         check_is_free(&*disk, folder)?;
         let unfinished = unfinished_folder(folder)?;
         remove_unfinished(&*disk, &unfinished)?;

@@ -115,7 +115,7 @@ impl Tile {
     }
 
     /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that holds
-    /// the voxel; `None` if all are unknown.
+    /// the voxel; `None` if all are unknown. At depth 16 [`Tile::evidence`] has the same without rounding.
     pub fn max_log_odds_under(&self, voxel: VoxelIndex, depth: u8) -> Option<f32> {
         self.octree.max_under(&self.table, VoxelKey::from_index(voxel).morton(), depth)
     }

@@ -324,7 +324,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
         ),
         (vec!["export", map, "-o", "a.xyz"], 2, "the extension must be .ply, .pcd, .csv, .bt or .ot"),
         (vec!["export", map, "-o", "a.ply", "--region", "1", "1", "1", "0", "2", "2"], 2, "needs X0 < X1"),
-        (vec!["export", map, "-o", "no/such/a.ply"], 1, "no/such/a.ply.part: cannot create"),
+        (vec!["export", map, "-o", "no/such/a.ply"], 1, "no/such/a.ply: cannot create"),
     ];
     for (arguments, code, message) in cases {
         let (found, stderr) = failure(&arguments);

@@ -6,6 +6,9 @@ mod cli;
 /// The commands that merge, crop, clear and fade.
 #[cfg(feature = "cli")]
 mod cli_edit;
+/// Files that are exported: whole or not there, where they say, and no stranger's.
+#[cfg(feature = "cli")]
+mod cli_export;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;

@@ -35,7 +35,7 @@ fn streamed(
     let mut bytes = Vec::new();
     // What an earlier attempt left in a spool does no harm.
     let mut spool = Cursor::new(vec![7; 100]);
-    let export = OctreeExport { format, region, memory_bytes };
+    let export = OctreeExport { format, region, origin: [0; 3], memory_bytes };
     let voxels = map.write_octree::<Box<dyn std::error::Error>>(&export, &mut spool, &mut bytes)?;
     Ok((voxels, bytes))
 }
@@ -160,12 +160,45 @@ fn voxels_that_octomap_has_no_key_for_are_an_error_before_anything_is_written() 
     for format in FORMATS {
         let error = streamed(&map, format, None, 1000).unwrap_err();
         assert!(matches!(error.downcast_ref(), Some(Error::InvalidArgument { .. })), "{error}");
-        assert!(error.to_string().contains("--region"), "{error}");
+        assert!(error.to_string().contains("--origin 2000 0 0"), "{error}");
     }
     let inside = Aabb { min: [-1.0; 3], max: [3276.8, 1.0, 1.0] };
     check(&map, Some(&inside));
     let nowhere = Aabb { min: [5_000.0; 3], max: [6_000.0; 3] };
     check(&map, Some(&nowhere));
+}
+
+#[test]
+fn a_file_with_an_origin_is_that_of_the_map_moved_by_whole_voxels() {
+    let mut random = Random(32);
+    let far = [63_781_370, -41_820_013, 1_003];
+    for shift in [[8, -16, 4_096], [1, 0, -3], far, [2_000_000_000, -2_000_000_000, 17], [0, 0, 40_000]] {
+        let mut voxels: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+        // Random voxels, a cube that is pruned whole where it lies now, and one that is where it lies then.
+        for _ in 0..400 {
+            voxels.insert(std::array::from_fn(|_| random.below(60) as i32 - 30), 1 + random.below(3) as u32);
+        }
+        voxels.extend(cube([-32, 0, 64], 8).map(|voxel| (voxel, 2)));
+        voxels.extend(cube(shift.map(|k: i32| 80 - (k & 7)), 8).map(|voxel| (voxel, 1)));
+        let moved = |voxel: [i32; 3]| -> [i32; 3] { std::array::from_fn(|k| voxel[k] + shift[k]) };
+        let mut near = InMemoryMapper::new(config()).unwrap();
+        let mut away = InMemoryMapper::new(config()).unwrap();
+        update(&mut near, voxels.iter().map(|(&voxel, &hits)| (voxel, hits)));
+        update(&mut away, voxels.iter().map(|(&voxel, &hits)| (moved(voxel), hits)));
+        for format in FORMATS {
+            let (count, expected) = streamed(&near, format, None, usize::MAX).unwrap();
+            assert_eq!(count, voxels.len() as u64);
+            for memory_bytes in [0, 3_000, usize::MAX] {
+                let export = OctreeExport { format, region: None, origin: shift, memory_bytes };
+                let (mut spool, mut bytes) = (Cursor::new(Vec::new()), Vec::new());
+                away.write_octree::<Box<dyn std::error::Error>>(&export, &mut spool, &mut bytes).unwrap();
+                assert!(
+                    bytes == expected,
+                    "{format:?} moved by {shift:?} with {memory_bytes} bytes of memory"
+                );
+            }
+        }
+    }
 }
 
 /// Any division of a tree into blocks gives the bytes of the tree.

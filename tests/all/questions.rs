@@ -1,11 +1,15 @@
 use crate::support::random_scans::{Random, random_scan};
 use crate::support::reference_map::voxels_of;
 use crate::support::unsynced_disk::UnsyncedDisk;
+use std::collections::HashMap;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use voxtile::query::{RayQuery, Shape, UnknownAs};
-use voxtile::scan::RayWalk;
+use voxtile::scan::{PointBatch, RayWalk};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
-use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions};
+use voxtile::{
+    InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions,
+};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_pending_bytes(5_000)
@@ -72,6 +76,113 @@ fn rays_end_where_single_steps_end() {
         assert!(answer.is_none() || unlimited == answer);
     }
     assert!(hits > 40, "{hits} hits");
+}
+
+#[test]
+fn rays_from_afar_end_where_single_steps_end() {
+    let folder = TempDir::new().unwrap();
+    let (map, out_of_core) = maps(&folder);
+    let grid = map.config().grid;
+    let occupied: HashMap<VoxelIndex, f64> = map
+        .all_occupied_voxels(None)
+        .unwrap()
+        .into_iter()
+        .map(|voxel| (voxel.index, voxel.evidence.probability()))
+        .collect();
+    let mut targets: Vec<VoxelIndex> = occupied.keys().copied().collect();
+    targets.sort_unstable();
+    let farthest = targets.iter().flatten().map(|index| index.abs()).max().unwrap();
+    let mut random = Random(51);
+    let mut hits = 0;
+    for number in 0..61 {
+        let distance_m = if number == 60 { 1e7 } else { 10_f64.powi(number % 5) };
+        let target = targets[random.below(targets.len() as u64) as usize];
+        let mut direction = random.point([0.0; 3], 1.0);
+        if number % 4 == 0 {
+            // Along an axis: the other two never cross.
+            direction = std::array::from_fn(|k| f64::from(u8::from(k == number as usize % 3)));
+        }
+        let origin = std::array::from_fn(|k| grid.center_m(target)[k] - distance_m * direction[k]);
+        let query = RayQuery { origin, direction, max_range_m: None, unknown: UnknownAs::Free };
+        let began = Instant::now();
+        let answer = map.cast_ray(&query).unwrap();
+        assert!(began.elapsed() < Duration::from_millis(200), "{:?} from {distance_m} m", began.elapsed());
+        assert_eq!(out_of_core.cast_ray(&query).unwrap(), answer);
+
+        let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
+        let unit = grid.to_voxel_units(direction.map(|d| d / length));
+        let mut walk = RayWalk::along(grid.to_voxel_units(origin), grid.voxel_of(origin).unwrap(), unit);
+        let is_past = |voxel: VoxelIndex| {
+            (0..3).any(|k| unit[k] != 0.0 && f64::from(voxel[k]) * unit[k].signum() > f64::from(farthest))
+        };
+        let stopped = loop {
+            let voxel = walk.voxel();
+            if let Some(probability) = occupied.get(&voxel).filter(|_| voxel[0].abs() <= farthest) {
+                break Some((voxel, walk.entry_time(), Some(*probability)));
+            }
+            if is_past(voxel) {
+                break None;
+            }
+            walk.advance();
+        };
+        assert_eq!(answer.map(|hit| (hit.voxel, hit.distance_m, hit.probability)), stopped);
+        hits += u32::from(stopped.is_some());
+        // The same way, away from the map: nothing, and at once.
+        let away = RayQuery { direction: direction.map(|d| -d), ..query };
+        if distance_m > 100.0 {
+            assert_eq!(map.cast_ray(&away).unwrap(), None);
+        }
+        let short = RayQuery { max_range_m: Some(distance_m / 2.0), ..query };
+        assert!(map.cast_ray(&short).unwrap().is_none_or(|hit| hit.distance_m <= distance_m / 2.0));
+    }
+    assert!(hits > 30, "{hits} hits");
+}
+
+#[test]
+fn rays_along_the_ends_of_all_voxels() {
+    let (low, high) = (i32::MIN, i32::MAX - 1);
+    let grid = config().grid;
+    for [from, to] in [[[low; 3], [high; 3]], [[high, 5, low], [low, 5, low]], [[high; 3], [low, high, high]]]
+    {
+        let mut map = InMemoryMapper::new(config()).unwrap();
+        let points = [grid.center_m(to)];
+        map.batch_update(&PointBatch { points: &points, intensities: None, is_occupied: &[true] }).unwrap();
+        let (origin, target) = (grid.center_m(from), points[0]);
+        let direction = std::array::from_fn(|k| target[k] - origin[k]);
+        for unknown in [UnknownAs::Free, UnknownAs::Obstacle] {
+            let hit =
+                map.cast_ray(&RayQuery { origin, direction, max_range_m: None, unknown }).unwrap().unwrap();
+            assert_eq!(hit.voxel, if unknown == UnknownAs::Free { to } else { from });
+            let away = RayQuery { origin, direction: direction.map(|d| -d), max_range_m: None, unknown };
+            assert_eq!(map.cast_ray(&away).unwrap().is_some(), unknown == UnknownAs::Obstacle);
+        }
+    }
+}
+
+#[test]
+fn at_the_finest_depth_an_octree_answers_as_the_table_does() {
+    let folder = TempDir::new().unwrap();
+    let (in_memory, mut out_of_core) = maps(&folder);
+    out_of_core.flush().unwrap();
+    let reader = MapReader::open(folder.path().join("map"), 4).unwrap();
+    let voxels = {
+        let mut voxels = Vec::new();
+        in_memory.for_each_occupied(Some(0.0), None, |voxel| voxels.push(voxel)).unwrap();
+        voxels
+    };
+    let rounded =
+        voxels.iter().filter(|voxel| f64::from(voxel.evidence.log_odds as f32) != voxel.evidence.log_odds);
+    assert!(rounded.count() > 100);
+    let grid = in_memory.config().grid;
+    let points: Vec<_> =
+        voxels.iter().map(|voxel| grid.center_m(voxel.index)).chain([[1e3; 3], [f64::NAN; 3]]).collect();
+    let exact = in_memory.occupancy_at_points(&points).unwrap();
+    for (point, exact) in points.iter().zip(&exact) {
+        assert_eq!(in_memory.occupancy_at_depth(*point, 16).unwrap(), *exact);
+        assert_eq!(out_of_core.occupancy_at_depth(*point, 16).unwrap(), *exact);
+        assert_eq!(reader.occupancy_at_depth(*point, 16).unwrap(), *exact);
+        assert_eq!(reader.occupancy_at(*point).unwrap(), *exact);
+    }
 }
 
 #[test]

@@ -280,21 +280,44 @@ pub struct RaycastArgs {
 pub struct ExportArgs {
     /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
-    /// File to write; its extension says what: .ply .pcd .csv hold occupied voxels, .bt .ot the whole octree
+    /// File to write, or - for standard output; its extension says what: .ply .pcd .csv hold occupied voxels, .bt .ot the
+    /// whole octree
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     pub output: PathBuf,
+    /// What to write, whatever the extension
+    #[arg(long, value_name = "FORMAT")]
+    pub format: Option<ExportFormatName>,
     /// Voxels of at least this probability; 0 takes all observed ones [default: the map's occupancy threshold]
     #[arg(long, value_name = "P")]
     pub min_probability: Option<f64>,
     /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,
+    /// Coordinates in the file are those of the map less this, in metres: the nearest corner of a voxel, said in the summary
+    /// and in FILE.origin.json. A map far from its origin needs it as .bt or .ot; a .pcd chooses one where float32 is too
+    /// coarse [default: 0 0 0]
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3)]
+    pub origin: Option<Vec<f64>>,
     /// Memory for putting a .bt or .ot file together, beside that of one tile (64MiB, 1GiB)
     #[arg(long, value_name = "SIZE", default_value = "64MiB")]
     pub memory: ByteSize,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormatName {
+    /// Points with doubles, probability, log-odds and count
+    Ply,
+    /// Points with float32, as PCL reads them
+    Pcd,
+    /// Text
+    Csv,
+    /// OctoMap's free and occupied voxels
+    Bt,
+    /// OctoMap's log-odds
+    Ot,
 }
 
 #[derive(Debug, Args)]

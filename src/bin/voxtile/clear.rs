@@ -12,6 +12,7 @@ use voxtile::session::{Cleared, clear};
 
 #[derive(Serialize)]
 struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     cleared: Cleared,

@@ -28,6 +28,7 @@ struct Conversion<'a> {
 /// A map, and how it is stored.
 #[derive(Serialize)]
 struct Form<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a Path,
     storage: Storage,
     /// `None` for a map of the seed's own format, which does not say.

@@ -12,6 +12,7 @@ use voxtile::session::{WrittenMap, crop};
 
 #[derive(Serialize)]
 struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     written: WrittenMap,

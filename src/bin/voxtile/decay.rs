@@ -11,6 +11,7 @@ use voxtile::session::{Decay, Decayed, decay};
 
 #[derive(Serialize)]
 struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     decayed: Decayed,

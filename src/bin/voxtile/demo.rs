@@ -123,7 +123,7 @@ fn draw(args: &DemoArgs, map: &Path, path: &[Point], picture: &Path) -> anyhow::
         }
     }
     path.iter().for_each(|&place| top_down.add_to_path(place));
-    Ok(top_down.write_png(picture)?)
+    top_down.write_png(picture)
 }
 
 fn say_what_next(folder: &Path, map: &Path, picture: &Path, [x, y, z]: Point) -> std::io::Result<()> {

@@ -24,6 +24,7 @@ struct Report {
 /// One of the two.
 #[derive(Serialize)]
 struct Side {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: PathBuf,
     snapshot: Option<String>,
     flush_number: u64,

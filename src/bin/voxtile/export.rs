@@ -1,20 +1,21 @@
-use crate::args::ExportArgs;
-use crate::map_at::read_map;
+use crate::args::{ExportArgs, ExportFormatName};
+use crate::export_origin::{ExportOrigin, OriginFile};
+use crate::map_at::{point_of, read_map};
 use crate::memory;
 use crate::octree_file;
+use crate::output_file::{OutputFile, is_standard_output, scratch_for};
 use crate::part::region_of;
 use crate::progress::Progress;
 use indicatif::HumanCount;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
-use voxtile::io::{VoxelFormat, VoxelRecord, VoxelWriter};
+use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::maths::logit;
-use voxtile::octree::{Octree, OctreeFormat, write_bt, write_ot};
+use voxtile::octree::{OctreeFormat, write_bt, write_ot};
 use voxtile::query::OctreeExport;
-use voxtile::space::Aabb;
+use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
 use voxtile::{Error, Questions};
 
 #[derive(Clone, Copy)]
@@ -23,167 +24,266 @@ enum ExportFormat {
     Octree(OctreeFormat),
 }
 
+/// What to write, once it is known that the arguments fit each other.
+struct Export<'a> {
+    args: &'a ExportArgs,
+    format: ExportFormat,
+    region: Option<Aabb>,
+    /// `None` for a stream.
+    origin_file: Option<OriginFile>,
+}
+
+/// What was written.
+struct Exported {
+    voxels: u64,
+    origin: ExportOrigin,
+}
+
 pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
-    let region = args.region.as_deref().map(region_of).transpose()?;
-    if args.min_probability.is_some_and(|probability| !(0.0..=1.0).contains(&probability)) {
-        return Err(Error::argument("--min-probability", "must be from 0 to 1").into());
-    }
-    let extension = args.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    let format = match (extension, VoxelFormat::of_path(&args.output)) {
-        (_, Some(format)) => ExportFormat::Voxels(format),
-        ("bt" | "ot", None) if args.min_probability.is_some() => {
-            let reason = "an octree file holds free and occupied voxels alike; leave the option out";
-            return Err(Error::argument("--min-probability", reason).into());
-        }
-        ("bt", None) => ExportFormat::Octree(OctreeFormat::Bt),
-        ("ot", None) => ExportFormat::Octree(OctreeFormat::Ot),
-        _ => {
-            let reason =
-                format!("{}: the extension must be .ply, .pcd, .csv, .bt or .ot", args.output.display());
-            return Err(Error::argument("--output", reason).into());
-        }
-    };
-    let region = region.as_ref();
-    let count = match format {
-        _ if octree_file::is_octree_file(&args.map) => export_octree_file(args, format, region)?,
-        ExportFormat::Voxels(format) => {
-            read_map(&args.map, |reader| export_voxels(args, format, region, reader))?
-        }
-        ExportFormat::Octree(format) => {
-            read_map(&args.map, |reader| export_octree(args, format, region, reader))?
-        }
-    };
-    let mut out = io::stdout().lock();
-    if args.json {
-        let peak = memory::peak_bytes();
-        let summary = serde_json::json!({ "file": args.output, "voxels": count, "peak_rss_bytes": peak });
-        writeln!(out, "{summary}")?;
+    let export = Export::of(args)?;
+    let exported = if octree_file::is_octree_file(&args.map) {
+        export.from_octree_file()?
     } else {
-        writeln!(out, "{} voxels in {}", HumanCount(count), args.output.display())?;
+        read_map(&args.map, |reader| match export.format {
+            ExportFormat::Voxels(format) => export.voxels(format, reader),
+            ExportFormat::Octree(format) => export.octree(format, reader),
+        })?
+    };
+    if is_standard_output(&args.output) {
+        export.say(&exported, &mut io::stderr().lock())?;
+    } else {
+        export.say(&exported, &mut io::stdout().lock())?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn export_voxels(
-    args: &ExportArgs,
-    format: VoxelFormat,
-    region: Option<&Aabb>,
-    reader: &MapReader,
-) -> anyhow::Result<u64> {
-    let grid = reader.config().grid;
-    let count = count_voxels(args, region, reader)?;
-    write_whole(&args.output, |out| {
-        let progress = Progress::over_tiles(reader.tile_indices().len());
-        let mut writer = VoxelWriter::new(format, count, grid.resolution_m(), out)?;
-        let mut written = Ok(());
-        let mut tile = None;
-        reader.for_each_occupied(args.min_probability, region, |voxel| {
-            let index = Some(grid.tile_of_voxel(voxel.index));
-            if tile != index {
-                tile = index;
-                progress.step();
-            }
-            if written.is_ok() {
-                written = writer.write(&VoxelRecord {
-                    center_m: grid.center_m(voxel.index),
-                    probability: voxel.evidence.probability(),
-                    log_odds: voxel.evidence.log_odds,
-                    observation_count: voxel.evidence.observation_count,
-                });
-            }
-        })?;
-        written?;
-        writer.finish()?;
-        Ok(count)
-    })
-}
-
-/// How many voxels there are to export: the headers name it before the first. In constant memory, and without reading
-/// a tile where the log of the map knows.
-fn count_voxels(args: &ExportArgs, region: Option<&Aabb>, reader: &MapReader) -> voxtile::Result<u64> {
-    match (reader.voxel_counts(), args.min_probability, region) {
-        (Some((_, occupied)), None, None) => return Ok(occupied),
-        (Some((voxels, _)), Some(0.0), None) => return Ok(voxels),
-        _ => {}
+impl<'a> Export<'a> {
+    fn of(args: &'a ExportArgs) -> voxtile::Result<Self> {
+        let region = args.region.as_deref().map(region_of).transpose()?;
+        if args.min_probability.is_some_and(|probability| !(0.0..=1.0).contains(&probability)) {
+            return Err(Error::argument("--min-probability", "must be from 0 to 1"));
+        }
+        let format = format_of(args)?;
+        if matches!(format, ExportFormat::Octree(_)) && args.min_probability.is_some() {
+            let reason = "an octree file holds free and occupied voxels alike; leave the option out";
+            return Err(Error::argument("--min-probability", reason));
+        }
+        let is_text = matches!(format, ExportFormat::Voxels(VoxelFormat::Csv));
+        if is_standard_output(&args.output) && !is_text && io::stdout().is_terminal() {
+            return Err(Error::argument(
+                "--output",
+                "standard output is a terminal; send it to a file or a pipe",
+            ));
+        }
+        Ok(Self { args, format, region, origin_file: OriginFile::of(&args.output)? })
     }
-    let mut count = 0;
-    reader.for_each_occupied(args.min_probability, region, |_| count += 1)?;
-    Ok(count)
-}
 
-/// Writes an octree file of any size. Its parts lie in a file beside it until all of them are known.
-fn export_octree(
-    args: &ExportArgs,
-    format: OctreeFormat,
-    region: Option<&Aabb>,
-    reader: &MapReader,
-) -> anyhow::Result<u64> {
-    let path = args.output.with_added_extension("spool");
-    let spool = File::options().read(true).write(true).create(true).truncate(true).open(&path);
-    let mut spool = spool.map_err(|error| Error::io(&path, "create", error))?;
-    let export = OctreeExport { format, region, memory_bytes: args.memory.bytes() };
-    let outcome = write_whole(&args.output, |mut out| reader.write_octree(&export, &mut spool, &mut out));
-    fs::remove_file(&path).ok();
-    outcome
-}
-
-fn write_octree(
-    args: &ExportArgs,
-    format: OctreeFormat,
-    tree: &Octree,
-    resolution_m: f64,
-    threshold: f32,
-) -> anyhow::Result<u64> {
-    write_whole(&args.output, |mut out| {
-        match format {
-            OctreeFormat::Bt => write_bt(tree, resolution_m, threshold, &mut out)?,
-            OctreeFormat::Ot => write_ot(tree, resolution_m, &mut out)?,
+    /// Writes the whole file, and beside it where it is.
+    fn write<T>(
+        &self,
+        origin: &ExportOrigin,
+        grid: &Grid,
+        write: impl FnOnce(&mut dyn Write) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
+        let mut file = OutputFile::create(&self.args.output)?;
+        let value = write(&mut file.out()).map_err(|error| self.with_name(error))?;
+        match &self.origin_file {
+            // First: who has only one of the two has one too many, and no shifted file that does not say so.
+            Some(beside) if origin.is_moved() => {
+                let hash = file.hash()?;
+                beside.write(&self.args.output, hash, origin, grid)?;
+                file.finish()?;
+            }
+            Some(beside) => {
+                file.finish()?;
+                beside.remove()?;
+            }
+            None => file.finish()?,
         }
-        Ok(tree.expanded_leaf_count())
-    })
-}
-
-/// From one of OctoMap's files to another file; OctoMap's threshold is log-odds 0.
-fn export_octree_file(args: &ExportArgs, format: ExportFormat, region: Option<&Aabb>) -> anyhow::Result<u64> {
-    let file = octree_file::read(&args.map)?;
-    let format = match format {
-        ExportFormat::Voxels(format) => format,
-        ExportFormat::Octree(_) if region.is_some() => {
-            return Err(
-                Error::argument("--region", "from an octree file to another is the whole tree").into()
-            );
-        }
-        ExportFormat::Octree(format) => {
-            return write_octree(args, format, &file.tree, file.resolution_m, 0.0);
-        }
-    };
-    let min_log_odds = args.min_probability.map_or(0.0, |probability| logit(probability) as f32);
-    let keep = |center_m| region.is_none_or(|region| region.contains(center_m));
-    let count = octree_file::count_voxels(&file, min_log_odds, keep)?;
-    write_whole(&args.output, |out| {
-        let mut writer = VoxelWriter::new(format, count, file.resolution_m, out)?;
-        octree_file::for_each_voxel(&file, min_log_odds, |voxel| match keep(voxel.center_m) {
-            true => Ok::<_, anyhow::Error>(writer.write(voxel)?),
-            false => Ok(()),
-        })?;
-        writer.finish()?;
-        Ok(count)
-    })
-}
-
-/// Writes a file beside its place and moves it there once it is whole.
-fn write_whole<T>(path: &Path, write: impl FnOnce(&mut dyn Write) -> anyhow::Result<T>) -> anyhow::Result<T> {
-    let part: PathBuf = path.with_added_extension("part");
-    let file = File::create(&part).map_err(|error| Error::io(&part, "create", error))?;
-    let mut out = BufWriter::with_capacity(1 << 18, file);
-    let outcome = write(&mut out).and_then(|value| {
-        out.flush()?;
-        fs::rename(&part, path)?;
         Ok(value)
-    });
-    if outcome.is_err() {
-        // The error to report is the first one.
-        fs::remove_file(&part).ok();
     }
-    outcome
+
+    /// What a disk refused while the file was written does not say by itself which file that was.
+    fn with_name(&self, error: anyhow::Error) -> anyhow::Error {
+        match error.downcast::<io::Error>() {
+            Ok(error) => Error::io(&self.args.output, "write", error).into(),
+            Err(error) => error,
+        }
+    }
+
+    fn voxels(&self, format: VoxelFormat, reader: &MapReader) -> anyhow::Result<Exported> {
+        let (grid, min_probability) = (reader.config().grid, self.args.min_probability);
+        let origin =
+            self.origin(Some(format), &grid, || hull(&grid, &reader.tile_indices(), self.region.as_ref()))?;
+        let voxels = self.count_voxels(reader)?;
+        let file = VoxelFile { format, voxels, resolution_m: grid.resolution_m(), origin_m: origin.corner_m };
+        self.write(&origin, &grid, |out| {
+            let progress = Progress::over_tiles(reader.tile_indices().len());
+            let mut writer = VoxelWriter::new(file, out)?;
+            let mut written = Ok(());
+            let mut tile = None;
+            reader.for_each_occupied(min_probability, self.region.as_ref(), |voxel| {
+                let index = Some(grid.tile_of_voxel(voxel.index));
+                if tile != index {
+                    tile = index;
+                    progress.step();
+                }
+                if written.is_ok() {
+                    written = writer.write(&VoxelRecord {
+                        center_m: origin.center_m(voxel.index, &grid),
+                        probability: voxel.evidence.probability(),
+                        log_odds: voxel.evidence.log_odds,
+                        observation_count: voxel.evidence.observation_count,
+                    });
+                }
+            })?;
+            written?;
+            writer.finish()?;
+            Ok(Exported { voxels, origin })
+        })
+    }
+
+    /// How many voxels there are to export: the headers name it before the first. In constant memory, and without reading
+    /// a tile where the log of the map knows.
+    fn count_voxels(&self, reader: &MapReader) -> voxtile::Result<u64> {
+        let (min_probability, region) = (self.args.min_probability, self.region.as_ref());
+        match (reader.voxel_counts(), min_probability, region) {
+            (Some((_, occupied)), None, None) => return Ok(occupied),
+            (Some((voxels, _)), Some(0.0), None) => return Ok(voxels),
+            _ => {}
+        }
+        let mut count = 0;
+        reader.for_each_occupied(min_probability, region, |_| count += 1)?;
+        Ok(count)
+    }
+
+    /// Writes an octree file of any size. Its parts lie in a file without a name until all of them are known.
+    fn octree(&self, format: OctreeFormat, reader: &MapReader) -> anyhow::Result<Exported> {
+        let grid = reader.config().grid;
+        let origin = self.origin(None, &grid, || None)?;
+        let (region, memory_bytes) = (self.region.as_ref(), self.args.memory.bytes());
+        let export = OctreeExport { format, region, origin: origin.voxel, memory_bytes };
+        let mut spool = scratch_for(&self.args.output)?;
+        let voxels =
+            self.write(&origin, &grid, |mut out| reader.write_octree(&export, &mut spool, &mut out))?;
+        Ok(Exported { voxels, origin })
+    }
+
+    /// From one of OctoMap's files to another file; OctoMap's threshold is log-odds 0.
+    fn from_octree_file(&self) -> anyhow::Result<Exported> {
+        let file = octree_file::read(&self.args.map)?;
+        // The tile size has no meaning here; two voxels always make a grid.
+        let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m)?;
+        let format = match self.format {
+            ExportFormat::Voxels(format) => format,
+            ExportFormat::Octree(_) if self.region.is_some() || self.args.origin.is_some() => {
+                let reason = "from an octree file to another is the whole tree, where it is";
+                return Err(Error::argument("--region, --origin", reason).into());
+            }
+            ExportFormat::Octree(format) => {
+                let voxels = file.tree.expanded_leaf_count();
+                let origin = ExportOrigin::default();
+                self.write(&origin, &grid, |mut out| {
+                    match format {
+                        OctreeFormat::Bt => write_bt(&file.tree, file.resolution_m, 0.0, &mut out)?,
+                        OctreeFormat::Ot => write_ot(&file.tree, file.resolution_m, &mut out)?,
+                    }
+                    Ok(())
+                })?;
+                return Ok(Exported { voxels, origin });
+            }
+        };
+        let origin = self.origin(Some(format), &grid, || None)?;
+        let min_log_odds = self.args.min_probability.map_or(0.0, |probability| logit(probability) as f32);
+        let keep = |center_m| self.region.is_none_or(|region| region.contains(center_m));
+        let voxels = octree_file::count_voxels(&file, min_log_odds, keep)?;
+        let header = VoxelFile { format, voxels, resolution_m: file.resolution_m, origin_m: origin.corner_m };
+        self.write(&origin, &grid, |out| {
+            let mut writer = VoxelWriter::new(header, out)?;
+            octree_file::for_each_voxel(&file, min_log_odds, |index, voxel| match keep(voxel.center_m) {
+                true => {
+                    let center_m = origin.center_m(index, &grid);
+                    Ok::<_, anyhow::Error>(writer.write(&VoxelRecord { center_m, ..*voxel })?)
+                }
+                false => Ok(()),
+            })?;
+            writer.finish()?;
+            Ok(Exported { voxels, origin })
+        })
+    }
+
+    /// Where the file's coordinates begin: where they are asked to, or, in a PCD file of a far map, where they must.
+    fn origin(
+        &self,
+        format: Option<VoxelFormat>,
+        grid: &Grid,
+        voxels: impl FnOnce() -> Option<VoxelBox>,
+    ) -> voxtile::Result<ExportOrigin> {
+        match (&self.args.origin, format) {
+            (Some(asked), _) => ExportOrigin::near(point_of(asked), grid),
+            (None, Some(VoxelFormat::Pcd)) => {
+                voxels().map_or(Ok(ExportOrigin::default()), |voxels| ExportOrigin::for_pcd(&voxels, grid))
+            }
+            (None, _) => Ok(ExportOrigin::default()),
+        }
+    }
+
+    fn say(&self, exported: &Exported, out: &mut impl Write) -> anyhow::Result<()> {
+        let Exported { voxels, origin } = exported;
+        let file = self.args.output.display().to_string();
+        let beside = self.origin_file.as_ref().filter(|_| origin.is_moved()).map(OriginFile::path);
+        if self.args.json {
+            let summary = serde_json::json!({
+                "file": file,
+                "voxels": voxels,
+                "origin_m": origin.corner_m,
+                "origin_voxel": origin.voxel,
+                "origin_file": beside.map(|path| path.display().to_string()),
+                "peak_rss_bytes": memory::peak_bytes(),
+            });
+            writeln!(out, "{summary}")?;
+            return Ok(());
+        }
+        let file = if is_standard_output(&self.args.output) { "standard output" } else { &file };
+        writeln!(out, "{} voxels in {file}", HumanCount(*voxels))?;
+        if origin.is_moved() || origin.asked_m.is_some() {
+            origin.print(beside, out)?;
+        }
+        Ok(())
+    }
+}
+
+fn format_of(args: &ExportArgs) -> voxtile::Result<ExportFormat> {
+    let extension = args.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let voxels = VoxelFormat::of_path(&args.output).map(ExportFormat::Voxels);
+    Ok(match (args.format, extension) {
+        (Some(ExportFormatName::Ply), _) => ExportFormat::Voxels(VoxelFormat::Ply),
+        (Some(ExportFormatName::Pcd), _) => ExportFormat::Voxels(VoxelFormat::Pcd),
+        (Some(ExportFormatName::Csv), _) => ExportFormat::Voxels(VoxelFormat::Csv),
+        (Some(ExportFormatName::Bt), _) | (None, "bt") => ExportFormat::Octree(OctreeFormat::Bt),
+        (Some(ExportFormatName::Ot), _) | (None, "ot") => ExportFormat::Octree(OctreeFormat::Ot),
+        _ => voxels.ok_or_else(|| missing_format(&args.output))?,
+    })
+}
+
+fn missing_format(output: &Path) -> Error {
+    let reason = if is_standard_output(output) {
+        "standard output has no extension; add --format ply, pcd, csv, bt or ot".to_owned()
+    } else {
+        format!("{}: the extension must be .ply, .pcd, .csv, .bt or .ot, or add --format", output.display())
+    };
+    Error::argument("--output", reason)
+}
+
+/// A box around the voxels of all tiles that may have one to export.
+fn hull(grid: &Grid, tiles: &[TileIndex], region: Option<&Aabb>) -> Option<VoxelBox> {
+    let wanted = region.map(|region| grid.voxels_in(region));
+    let boxes = tiles.iter().map(|&tile| {
+        let voxels = grid.voxels_of_tile(tile);
+        wanted.map_or(voxels, |wanted| wanted.intersection(&voxels))
+    });
+    boxes.filter(|voxels| !voxels.is_empty()).reduce(|a, b| VoxelBox {
+        min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
+        end: std::array::from_fn(|k| a.end[k].max(b.end[k])),
+    })
 }

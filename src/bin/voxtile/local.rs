@@ -1,5 +1,6 @@
 use crate::args::{LocalArgs, PresetName};
 use crate::local_table::{Row, print_table};
+use crate::output_file::check_picture;
 use crate::picture::{OverTime, Panel};
 use crate::progress::Progress;
 use crate::scan_input::{self, is_standard_input};
@@ -28,6 +29,7 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
         return Err(Error::argument("SCANS", reason).into());
     }
     // All arguments before the first scan.
+    check_picture(&args.output)?;
     for setup in &setups {
         LocalMap::new(args.resolution, setup.parameters)?;
     }

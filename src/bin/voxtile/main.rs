@@ -12,6 +12,7 @@ mod demo;
 mod diff;
 mod digest;
 mod export;
+mod export_origin;
 mod flush_schedule;
 mod info;
 mod intake;
@@ -23,7 +24,9 @@ mod merge;
 mod octree_choice;
 mod octree_file;
 mod one_heap;
+mod output_file;
 mod part;
+mod path_text;
 mod picture;
 mod progress;
 mod query;
@@ -43,6 +46,7 @@ mod written;
 
 use args::{Cli, Command};
 use clap::Parser;
+use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -59,7 +63,7 @@ fn main() -> ExitCode {
     if matches!(command, Command::Build(_) | Command::Local(_) | Command::Demo(_))
         && let Err(error) = threads::start(threads)
     {
-        eprintln!("voxtile: {error:#}");
+        say(format_args!("{error:#}"));
         return ExitCode::FAILURE;
     }
     let outcome = match command {
@@ -88,9 +92,18 @@ fn main() -> ExitCode {
         if is_closed_pipe(&error) {
             return ExitCode::SUCCESS;
         }
-        eprintln!("voxtile: {error:#}");
+        match error.downcast_ref::<std::io::Error>() {
+            // All files have a name in their error.
+            Some(error) => say(format_args!("standard output: cannot write: {error}")),
+            None => say(format_args!("{error:#}")),
+        }
         exit_code_of(&error)
     })
+}
+
+/// One line for a person. Where standard error refuses it there is nobody to tell.
+pub fn say(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr().lock(), "voxtile: {line}");
 }
 
 /// Ended by Ctrl-C or SIGTERM, after everything so far was flushed.

@@ -12,6 +12,7 @@ use voxtile::session::{Merged, merge};
 
 #[derive(Serialize)]
 struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     merged: Merged,
@@ -28,7 +29,7 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     drop(progress);
     let warnings = warnings_of(&args.maps, &merged);
     for warning in &warnings {
-        eprintln!("voxtile: warning: {warning}");
+        crate::say(format_args!("warning: {warning}"));
     }
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -6,7 +6,7 @@ use std::io::{BufReader, Write};
 use std::path::Path;
 use voxtile::io::VoxelRecord;
 use voxtile::octree::{self, Leaf, OctreeFile};
-use voxtile::space::{Grid, MortonCode, Point};
+use voxtile::space::{Grid, MortonCode, Point, VoxelIndex};
 use voxtile::{Error, Result};
 
 /// Most voxels that the pruned leaves of a file may stand for when they are written out one by one: a file of twenty
@@ -69,7 +69,7 @@ pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(Point) -
         return Err(Error::TooLarge { what: "number of voxels in the file", size, limit: MAX_VOXELS, hint });
     }
     let mut count = 0;
-    for_each_voxel(file, min_log_odds, |voxel| {
+    for_each_voxel(file, min_log_odds, |_, voxel| {
         count += u64::from(keep(voxel.center_m));
         Ok::<_, Error>(())
     })?;
@@ -80,7 +80,7 @@ pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(Point) -
 pub fn for_each_voxel<E: From<Error>>(
     file: &OctreeFile,
     min_log_odds: f32,
-    mut visit: impl FnMut(&VoxelRecord) -> std::result::Result<(), E>,
+    mut visit: impl FnMut(VoxelIndex, &VoxelRecord) -> std::result::Result<(), E>,
 ) -> std::result::Result<(), E> {
     // The tile size has no meaning here; two voxels always make a grid.
     let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m).map_err(Error::from)?;
@@ -91,12 +91,13 @@ pub fn for_each_voxel<E: From<Error>>(
         for offset in 0..MortonCode::span(depth) {
             let voxel = MortonCode(code.0 + offset).to_key().to_index_from([-32768; 3]);
             let log_odds = f64::from(value);
-            visit(&VoxelRecord {
+            let record = VoxelRecord {
                 center_m: grid.center_m(voxel),
                 probability: voxtile::maths::sigmoid(log_odds),
                 log_odds,
                 observation_count: 0,
-            })?;
+            };
+            visit(voxel, &record)?;
         }
     }
     Ok(())

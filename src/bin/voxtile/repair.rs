@@ -12,6 +12,7 @@ const MAX_ACTIONS: usize = 10_000;
 
 #[derive(Serialize)]
 struct Report<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a std::path::Path,
     #[serde(flatten)]
     repair: Repair,

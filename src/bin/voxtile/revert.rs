@@ -11,6 +11,7 @@ use voxtile::session::{Reverted, revert};
 
 #[derive(Serialize)]
 struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a Path,
     snapshot: &'a str,
     kept_as: Option<&'a str>,

@@ -19,7 +19,7 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
     };
     let mut out = std::io::stdout().lock();
     if args.json {
-        let answer = serde_json::json!({ "map": args.map, "deleted": args.delete, "snapshot": info });
+        let answer = serde_json::json!({ "map": args.map.display().to_string(), "deleted": args.delete, "snapshot": info });
         writeln!(out, "{answer}")?;
     } else if args.delete {
         writeln!(out, "deleted   {}", args.name)?;

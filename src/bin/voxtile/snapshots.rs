@@ -8,7 +8,11 @@ pub fn run(args: &SnapshotsArgs) -> anyhow::Result<ExitCode> {
     let infos = snapshots(&args.map)?;
     let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(out, "{}", serde_json::json!({ "map": args.map, "snapshots": infos }))?;
+        writeln!(
+            out,
+            "{}",
+            serde_json::json!({ "map": args.map.display().to_string(), "snapshots": infos })
+        )?;
         return Ok(ExitCode::SUCCESS);
     }
     if infos.is_empty() {

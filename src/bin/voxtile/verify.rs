@@ -13,6 +13,7 @@ const MAX_FINDINGS: usize = 10_000;
 
 #[derive(Serialize)]
 struct Report<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a std::path::Path,
     whole: bool,
     #[serde(flatten)]

@@ -6,7 +6,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use voxtile::io::{VoxelFormat, VoxelRecord, VoxelWriter};
+use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::octree::OctreeFormat;
 use voxtile::query::OctreeExport;
 use voxtile::{MapReader, MapView, Questions};
@@ -99,7 +99,7 @@ impl Export {
     fn write_octree(&self, map: &MapReader, format: OctreeFormat, out: &mut impl Write) -> Result<u64> {
         let spool = self.folder.join("spool");
         let mut spool = File::options().read(true).write(true).create_new(true).open(spool)?;
-        let export = OctreeExport { format, region: None, memory_bytes: self.memory_bytes };
+        let export = OctreeExport { format, region: None, origin: [0; 3], memory_bytes: self.memory_bytes };
         map.write_octree::<anyhow::Error>(&export, &mut spool, out)
     }
 }
@@ -107,7 +107,13 @@ impl Export {
 fn write_occupied(map: &MapReader, out: &mut impl Write) -> Result<u64> {
     let grid = map.config().grid;
     let (_, count) = map.voxel_counts().context("the map does not know how many voxels it has")?;
-    let mut writer = VoxelWriter::new(VoxelFormat::Ply, count, grid.resolution_m(), out)?;
+    let file = VoxelFile {
+        format: VoxelFormat::Ply,
+        voxels: count,
+        resolution_m: grid.resolution_m(),
+        origin_m: [0.0; 3],
+    };
+    let mut writer = VoxelWriter::new(file, out)?;
     let mut written = Ok(());
     map.for_each_occupied(None, None, |voxel| {
         if written.is_ok() {

@@ -1,9 +1,8 @@
 use super::font;
-use super::palette::{Rgb, mixed};
-use std::fs::File;
-use std::io::{self, BufWriter};
+use super::palette::{self, Rgb, mixed};
+use crate::output_file::OutputFile;
+use std::io;
 use std::path::Path;
-use voxtile::{Error, Result};
 
 /// Pixels, row by row from the top. What is drawn outside is cut off.
 pub struct Canvas {
@@ -53,6 +52,15 @@ impl Canvas {
         }
     }
 
+    /// The way of the sensor: a disc around the middle of each pixel, with a dark rim, so that it shows on any color.
+    pub fn path(&mut self, middles: impl Iterator<Item = [usize; 2]>, radius: usize) {
+        let middles: Vec<[usize; 2]> = middles.collect();
+        // All rims first: where discs lie close, they make one line.
+        for (radius, color) in [(radius + 1 + radius / 2, palette::UNKNOWN), (radius, palette::PATH)] {
+            middles.iter().for_each(|&middle| self.disc(middle, radius, color));
+        }
+    }
+
     /// Writes text whose upper left corner is given, each dot of a letter `dot` pixels wide.
     pub fn text(&mut self, left: usize, top: usize, dot: usize, color: Rgb, text: &str) {
         for (index, letter) in text.chars().enumerate() {
@@ -73,23 +81,23 @@ impl Canvas {
     }
 
     /// Saves the picture as PNG.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
-        self.encode(path).map_err(|source| Error::io(path, "write the picture", source))
+    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
+        let mut file = OutputFile::create(path)?;
+        let encoded = self.encode(file.out());
+        file.written(encoded)?;
+        file.finish()
     }
 
-    fn encode(&self, path: &Path) -> io::Result<()> {
+    fn encode(&self, out: &mut impl io::Write) -> io::Result<()> {
         let too_large = |_| io::Error::other("the picture is too large for PNG");
         let width = u32::try_from(self.width).map_err(too_large)?;
         let height = u32::try_from(self.height).map_err(too_large)?;
-        let mut file = BufWriter::new(File::create(path)?);
-        let mut encoder = png::Encoder::new(&mut file, width, height);
+        let mut encoder = png::Encoder::new(out, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&self.bytes)?;
-        writer.finish()?;
-        // A full disk shows when the last bytes leave the buffer, not when it is dropped.
-        io::Write::flush(&mut file)
+        Ok(writer.finish()?)
     }
 }
 

@@ -75,6 +75,9 @@ impl Legend {
             canvas.fill(swatch + 1, top + 1, [7 * dot - 2; 2], color, 1.0);
             canvas.text(swatch + 11 * dot, top, dot, palette::FAINT_INK, label);
         }
+        let (sensor, top) = (swatch.saturating_sub(60 * dot), foot + 4 * dot);
+        canvas.path(std::iter::once([sensor + 3 * dot, top + 3 * dot]), dot + 1);
+        canvas.text(sensor + 11 * dot, top, dot, palette::FAINT_INK, "sensor");
     }
 }
 

@@ -47,7 +47,7 @@ impl Panel {
 
 impl OverTime {
     /// Draws everything and saves it.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
+    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
         self.draw().write_png(path)
     }
 
@@ -99,15 +99,12 @@ impl OverTime {
                 let Some([x, y]) = pixel(x_m, y_m) else { continue };
                 let share =
                     |z: i32| (f64::from(z) - f64::from(low)) / (f64::from(high) - f64::from(low)).max(1.0);
-                let color = column.map_or(palette::FREE, |z| color_of(share(z)));
+                let color = column.map_or(palette::INFLATED, |z| color_of(share(z)));
                 canvas.fill(x, y, [zoom; 2], color, 1.0);
             }
         }
-        for at in &panel.path {
-            if let Some(middle) = pixel(at[0], at[1]) {
-                canvas.disc(middle.map(|k| k + zoom / 2), 1, palette::PATH);
-            }
-        }
+        let path = panel.path.iter().filter_map(|at| pixel(at[0], at[1]));
+        canvas.path(path.map(|corner| corner.map(|k| k + zoom / 2)), 1);
     }
 
     fn height_m(&self, z: i32) -> f64 {
@@ -152,7 +149,7 @@ fn draw_foot(canvas: &mut Canvas, foot: usize, metres_a_pixel: f64, [low_m, high
     canvas.text(MARGIN, foot, DOT, palette::INK, &length_label(length_m));
     canvas.fill(MARGIN, bar, [length, 2 * DOT], palette::INK, 1.0);
     let left = MARGIN + 160;
-    canvas.fill(left, foot, [7 * DOT; 2], palette::FREE, 1.0);
+    canvas.fill(left, foot, [7 * DOT; 2], palette::INFLATED, 1.0);
     canvas.text(left + 10 * DOT, foot, DOT, palette::FAINT_INK, "inflated");
     canvas.fill(left + 130, foot + 2 * DOT, [3 * DOT; 2], palette::PATH, 1.0);
     canvas.text(left + 130 + 6 * DOT, foot, DOT, palette::FAINT_INK, "sensor");

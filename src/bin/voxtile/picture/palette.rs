@@ -5,6 +5,8 @@ pub type Rgb = [u8; 3];
 pub const UNKNOWN: Rgb = [13, 16, 22];
 /// Where only free space has been seen.
 pub const FREE: Rgb = [36, 43, 54];
+/// Around what is occupied: without a hue, so that no height has this color, and far from the paper.
+pub const INFLATED: Rgb = [92, 98, 108];
 /// Letters and bars.
 pub const INK: Rgb = [226, 230, 236];
 /// Letters that should not shout.
@@ -61,6 +63,7 @@ mod tests {
         let steps: Vec<f64> = (0..=20).map(|i| lightness(color_of(f64::from(i) / 20.0))).collect();
         assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
         assert!(lightness(UNKNOWN) + 15.0 < lightness(FREE));
+        assert!(lightness(UNKNOWN) + 60.0 < lightness(INFLATED));
         assert!(lightness(FREE) + 10.0 < steps[0]);
         assert_eq!(color_of(2.0), color_of(1.0));
         assert_eq!(color_of(f64::NAN), color_of(0.0));

@@ -116,7 +116,7 @@ impl TopDown {
     }
 
     /// Draws everything and saves it.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
+    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
         self.draw().write_png(path)
     }
 
@@ -269,15 +269,11 @@ impl TopDown {
 
     fn draw_path(&self, canvas: &mut Canvas, pane: &Pane, dot: usize) {
         // As wide as a street lane needs, and no wider: on a large map it would hide the streets.
-        let radius = ((0.35 * pane.zoom as f64 / self.frame.cell_m) as usize).clamp(1, dot);
-        for y in pane.first[1]..pane.first[1] + pane.cells[1] {
-            for x in pane.first[0]..pane.first[0] + pane.cells[0] {
-                if self.cell(x, y).is_on_path {
-                    let middle = pane.pixel([x, y]).map(|pixel| pixel + pane.zoom / 2);
-                    canvas.disc(middle, radius, palette::PATH);
-                }
-            }
-        }
+        let radius = ((0.35 * pane.zoom as f64 / self.frame.cell_m) as usize).clamp(1, dot + 1);
+        let rows = pane.first[1]..pane.first[1] + pane.cells[1];
+        let cells = rows.flat_map(|y| (pane.first[0]..pane.first[0] + pane.cells[0]).map(move |x| [x, y]));
+        let on_path = cells.filter(|&[x, y]| self.cell(x, y).is_on_path);
+        canvas.path(on_path.map(|cell| pane.pixel(cell).map(|pixel| pixel + pane.zoom / 2)), radius);
     }
 }
 

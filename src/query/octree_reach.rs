@@ -1,0 +1,66 @@
+//! How far OctoMap's keys reach, and what to do about a map that lies farther away.
+
+use crate::error::Error;
+use crate::space::{Grid, Point, TileIndex, VoxelBox, VoxelIndex};
+
+/// The voxels that OctoMap's keys reach.
+pub(super) const REACH: VoxelBox = VoxelBox { min: [-32768; 3], end: [32768; 3] };
+
+/// The error of a voxel that OctoMap has no key for; with the tiles of a file to be written, it says which origin of the file
+/// would help.
+pub(super) fn out_of_reach(grid: &Grid, voxel: VoxelIndex, tiles: Option<&[TileIndex]>) -> Error {
+    let half_m = f64::from(REACH.end[0]) * grid.resolution_m();
+    let (center, width_m) = (grid.center_m(voxel), 2.0 * half_m);
+    let hint = match tiles.map(|tiles| origin_for(grid, tiles)) {
+        None => "name a region (--region) inside".to_owned(),
+        Some(Some([x, y, z])) => {
+            format!("--origin {x} {y} {z} brings all of it into reach, a region (--region) a part")
+        }
+        Some(None) => format!(
+            "no --origin helps, for the map is wider than the {width_m} m that they reach in all: export it region by region \
+             (--region), each with an --origin inside"
+        ),
+    };
+    let reason = format!(
+        "the voxel at {center:?} m is outside the {half_m} m around the origin that OctoMap's keys reach at this \
+         resolution; {hint}"
+    );
+    Error::argument("octree", reason)
+}
+
+/// A corner of a voxel in metres, as round as can be, around which all tiles are in reach; `None` if there is none.
+fn origin_for(grid: &Grid, tiles: &[TileIndex]) -> Option<Point> {
+    let boxes = || tiles.iter().map(|&tile| grid.voxels_of_tile(tile));
+    let mut origin_m = [0.0; 3];
+    for (axis, origin_m) in origin_m.iter_mut().enumerate() {
+        let min = boxes().map(|voxels| i64::from(voxels.min[axis])).min()?;
+        let end = boxes().map(|voxels| i64::from(voxels.end[axis])).max()?;
+        let fits = |origin: i64| {
+            min - origin >= i64::from(REACH.min[axis]) && end - origin <= i64::from(REACH.end[axis])
+        };
+        let middle = (min + end).div_euclid(2);
+        let round = |step: i64| (middle + step / 2).div_euclid(step) * step;
+        let candidates = [0].into_iter().chain([10_000, 1_000, 100, 10, 1].map(round));
+        let origin = candidates.into_iter().find(|&origin| fits(origin))?;
+        *origin_m = grid.corner_m(i32::try_from(origin).ok()?);
+    }
+    Some(origin_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_origin_that_is_proposed_is_round_and_brings_all_tiles_into_reach() {
+        let grid = Grid::new(0.1, 10.0).unwrap();
+        let tiles = [TileIndex::new(50_000, 400_012, 1), TileIndex::new(50_200, 400_100, -2)];
+        assert_eq!(origin_for(&grid, &tiles), Some([501_000.0, 4_001_000.0, 0.0]));
+        // Nearly as wide as the keys reach: only its very middle will do.
+        let wide = [TileIndex::new(1_000, 0, 0), TileIndex::new(1_654, 0, 0)];
+        assert_eq!(origin_for(&grid, &wide), Some([13_275.0, 0.0, 0.0]));
+        let too_wide = [TileIndex::new(0, 0, 0), TileIndex::new(656, 0, 0)];
+        assert_eq!(origin_for(&grid, &too_wide), None);
+        assert_eq!(origin_for(&grid, &[]), None);
+    }
+}

@@ -1,0 +1,121 @@
+use crate::octree::BrickValues;
+use crate::space::{BRICK_EDGE, BrickCode, MortonCode, VoxelBox, VoxelIndex, VoxelKey, place_of_voxel};
+use std::ops::Range;
+
+/// The way of a map's voxels into an octree whose middle, where OctoMap's coordinates are 0, is at another voxel of the map.
+///
+/// Indices are subtracted as whole numbers, so nothing is rounded.
+#[derive(Debug)]
+pub(super) struct OctreeShift {
+    /// The map's voxel that has index 0 in the octree.
+    origin: VoxelIndex,
+    /// What is left of bricks: where in its brick the octree has the first voxel of one of the map's.
+    first: VoxelIndex,
+    /// Of one brick of the map, what falls into each of the eight bricks of the octree, by place.
+    shares: [Vec<(u16, f32)>; 8],
+}
+
+impl OctreeShift {
+    pub(super) fn by(origin: VoxelIndex) -> Self {
+        let first = origin.map(|index| index.wrapping_neg() & (BRICK_EDGE - 1));
+        Self { origin, first, shares: Default::default() }
+    }
+
+    /// Where the octree has a box of the map's voxels. What lies beyond `i32` is cut off: no octree reaches there.
+    pub(super) fn of_box(&self, voxels: &VoxelBox) -> VoxelBox {
+        VoxelBox { min: self.of_voxel(voxels.min), end: self.of_voxel(voxels.end) }
+    }
+
+    /// Where the octree has a voxel of the map.
+    pub(super) fn of_voxel(&self, voxel: VoxelIndex) -> VoxelIndex {
+        std::array::from_fn(|axis| voxel[axis].saturating_sub(self.origin[axis]))
+    }
+
+    /// Adds the values of one of the map's bricks that lie in a range of the octree's. `visit` tells the brick's voxels:
+    /// place and value, ascending by place.
+    pub(super) fn add_brick(
+        &mut self,
+        brick: BrickCode,
+        wanted: &Range<BrickCode>,
+        values: &mut BrickValues,
+        visit: impl FnOnce(&mut dyn FnMut(usize, f32)),
+    ) {
+        let first = self.of_key(brick.voxel(0));
+        if self.first == [0; 3] {
+            let brick = first.brick();
+            if wanted.contains(&brick) {
+                values.begin(brick);
+                visit(&mut |place, value| values.add(place, value));
+                values.end();
+            }
+            return;
+        }
+        let bricks: [BrickCode; 8] = std::array::from_fn(|share| neighbour(first, share).brick());
+        if !bricks.iter().any(|brick| wanted.contains(brick)) {
+            return;
+        }
+        self.shares.iter_mut().for_each(Vec::clear);
+        let (shares, first) = (&mut self.shares, self.first);
+        visit(&mut |place, value| {
+            let local = local_of(place);
+            let shifted: VoxelIndex = std::array::from_fn(|axis| local[axis] + first[axis]);
+            let share: i32 = (0..3).map(|axis| (shifted[axis] / BRICK_EDGE) << axis).sum();
+            shares[share as usize].push((place_of_voxel(shifted) as u16, value));
+        });
+        for (share, brick) in self.shares.iter_mut().zip(bricks).filter(|(_, brick)| wanted.contains(brick)) {
+            share.sort_unstable_by_key(|&(place, _)| place);
+            values.begin(brick);
+            share.iter().for_each(|&(place, value)| values.add(place.into(), value));
+            values.end();
+        }
+    }
+
+    /// Keys repeat every 65536 voxels, which changes nothing about differences of them.
+    fn of_key(&self, code: MortonCode) -> MortonCode {
+        let VoxelKey(key) = code.to_key();
+        VoxelKey(std::array::from_fn(|axis| key[axis].wrapping_sub(self.origin[axis] as u16))).morton()
+    }
+}
+
+/// A voxel of the brick that lies one further along the axes that `share` has a bit for.
+fn neighbour(code: MortonCode, share: usize) -> MortonCode {
+    let VoxelKey(key) = code.to_key();
+    VoxelKey(std::array::from_fn(|axis| {
+        key[axis].wrapping_add((share >> axis & 1) as u16 * BRICK_EDGE as u16)
+    }))
+    .morton()
+}
+
+/// The voxel at a place of a brick, counted from the brick's first.
+fn local_of(place: usize) -> VoxelIndex {
+    MortonCode(place as u64).to_key().0.map(i32::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_voxel_comes_to_the_place_of_its_shifted_index() {
+        for origin in [[0; 3], [8, -16, 65536], [1, -2, 7], [-63_781_373, 5, 2_000_000_001]] {
+            for corner in [[0; 3], [40, -48, 8]] {
+                let voxels = |k: usize| local_of(k).map(|k| k);
+                // Voxels near the octree's middle, wherever in the map that is.
+                let first: VoxelIndex = std::array::from_fn(|k| (origin[k] + corner[k]) & !(BRICK_EDGE - 1));
+                let mut shift = OctreeShift::by(origin);
+                let mut values = BrickValues::default();
+                let all = BrickCode(0)..BrickCode(BrickCode::END);
+                shift.add_brick(BrickCode::of_voxel(first), &all, &mut values, |add| {
+                    (0..512).for_each(|place| add(place, place as f32));
+                });
+                assert_eq!(values.len(), 512);
+                let mut found: Vec<(MortonCode, f32)> = values.voxels().collect();
+                found.sort_by(|a, b| a.1.total_cmp(&b.1));
+                for (place, (code, _)) in found.into_iter().enumerate() {
+                    let voxel: VoxelIndex = std::array::from_fn(|k| first[k] + voxels(place)[k] - origin[k]);
+                    assert_eq!(code, VoxelKey::from_index(voxel).morton(), "{origin:?} {voxel:?}");
+                }
+            }
+        }
+    }
+}

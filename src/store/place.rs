@@ -1,0 +1,41 @@
+use super::disk::{Disk, EntryKind, FsDisk};
+use super::layout::{Layout, tile_of_folder};
+use super::map_folder::read_metadata;
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Whether a file or folder may be made at a path: not inside of a map, where it would be taken for a part of it, or where the
+/// map's next change could remove it. Links on the way there are followed.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] if the path lies in a map, at whatever depth; a disk that refuses.
+pub fn check_outside_of_maps(path: &Path) -> Result<()> {
+    check_place(&FsDisk, path)
+}
+
+pub(super) fn check_place(disk: &dyn Disk, path: &Path) -> Result<()> {
+    let resolved = disk.resolve(path).map_err(|error| Error::io(path, "look for", error))?;
+    for outer in resolved.ancestors().skip(1) {
+        if is_map(disk, outer)? {
+            let reason =
+                format!("{} lies in the map {}; choose a place outside", path.display(), outer.display());
+            return Err(Error::argument("output", reason));
+        }
+    }
+    Ok(())
+}
+
+/// Other programs have files of the name `metadata.json`, too.
+fn is_map(disk: &dyn Disk, folder: &Path) -> Result<bool> {
+    let layout = Layout::new(folder);
+    let metadata = layout.metadata();
+    let kind = disk.kind(&metadata).map_err(|error| Error::io(&metadata, "look at", error))?;
+    if !matches!(kind, Some(EntryKind::File(_))) {
+        return Ok(false);
+    }
+    let has_tiles =
+        || disk.list(folder).is_ok_and(|names| names.iter().any(|name| tile_of_folder(name).is_some()));
+    let has_log = || disk.kind(&layout.commit_log()).is_ok_and(|kind| kind.is_some());
+    Ok(has_log() || has_tiles() || read_metadata(disk, &layout).is_ok())
+}

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""Compares the points that another program read from a file with the voxels of the map: every point is in its voxel.
+
+    compare.py MAP.csv RESOLUTION FILE WHO [--any-order] < POINTS
+
+MAP.csv is the map's export without an origin; FILE.origin.json, where it is there, tells what is to be added to FILE's
+points. A line `# origin X Y Z` before the points, which a PCD's VIEWPOINT gives, must say the same. Python alone.
+"""
+import csv
+import json
+import math
+import pathlib
+import sys
+
+
+def main():
+    table, resolution, path, who = sys.argv[1], float(sys.argv[2]), sys.argv[3], sys.argv[4]
+
+    def voxel(point):
+        return tuple(math.floor(x / resolution) for x in point)
+
+    with open(table, newline="") as rows:
+        expected = [voxel(float(row[k]) for k in "xyz") for row in csv.DictReader(rows)]
+    beside = pathlib.Path(path + ".origin.json")
+    origin = json.loads(beside.read_text())["origin_m"] if beside.exists() else [0.0, 0.0, 0.0]
+    found, worst = [], 0.0
+    for line in sys.stdin:
+        words = line.replace(",", " ").split()
+        if words[:2] == ["#", "origin"]:
+            told = [float(x) for x in words[2:5]]
+            if told != origin:
+                sys.exit(f"{who}: {path}: the origin is told as {told}, and is {origin}")
+        elif words and not words[0].startswith(("#", "/")):
+            point = [float(x) + o for x, o in zip(words[:3], origin)]
+            found.append(voxel(point))
+            worst = max(worst, *(abs(x / resolution - math.floor(x / resolution) - 0.5) for x in point))
+    if "--any-order" in sys.argv:
+        expected.sort()
+        found.sort()
+    if len(found) != len(expected):
+        sys.exit(f"{who}: {path}: {len(found)} points, the map has {len(expected)} occupied voxels")
+    wrong = sum(a != b for a, b in zip(found, expected))
+    if wrong or not found:
+        sys.exit(f"{who}: {path}: {wrong} of {len(found)} points are not in their voxel")
+    name = pathlib.Path(path).name
+    print(f"{who:12} {name:14} {len(found):8} points, each in its voxel; at most {worst:.5f} voxels from its center")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+#!/bin/sh
+# Other programs read what `voxtile export` writes: PCL, plyfile, pypcd4 and OctoMap, and all but with --short Open3D and
+# CloudCompare. Near the origin and far from it (UTM, ECEF), every point must come back to its voxel.
+#
+#   tools/interchange/run.sh [--short]
+#
+# Needs python3 with venv, and of Debian: g++, libeigen3-dev, libboost-dev, libpcl-io (the library alone; PCL's headers are
+# unpacked to a temporary folder, for libpcl-dev brings a gigabyte), liboctomap-dev; without --short cloudcompare and
+# python3-open3d too. Installs nothing but plyfile and pypcd4, into a temporary folder. Exits with 1 if a comparison fails.
+set -eu
+cd "$(dirname "$0")/../.."
+here=tools/interchange
+target=${CARGO_TARGET_DIR:-target}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+cargo build --release --quiet --bin voxtile
+voxtile=$target/release/voxtile
+
+python3 -m venv "$work/venv"
+"$work/venv/bin/pip" install --quiet --disable-pip-version-check plyfile pypcd4
+python=$work/venv/bin/python
+
+# So that the package manager, which may fetch as another user, can write there.
+chmod 755 "$work" && mkdir -m 777 "$work/pcl"
+(cd "$work/pcl" && apt-get download -qq libpcl-dev >/dev/null && dpkg -x libpcl-dev_*.deb .)
+library() { # name without its version
+    ls /usr/lib/*/"$1".so* | sort | tail -1
+}
+g++ -std=c++17 -O1 -w -I "$(ls -d "$work"/pcl/usr/include/pcl-*)" -I /usr/include/eigen3 "$here/pcl_reader.cpp" \
+    -o "$work/pcl_reader" "$(library libpcl_io)" "$(library libpcl_common)"
+g++ -std=c++17 -O1 -w "$here/octomap_reader.cpp" -o "$work/octomap_reader" -loctomap -loctomath
+
+failed=0
+resolution=0.2
+
+compare() { # table, file, who, options; the points come from standard input
+    python3 "$here/compare.py" "$1" $resolution "$2" "$3" ${4-} || failed=1
+}
+
+# What a scan of a map near the origin is far from it: the occupied voxels, seen from above.
+far_map() { # name, x, y, z
+    cloud=$work/$1.pcd
+    {
+        printf 'VERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH %s\nHEIGHT 1\n' "$points"
+        printf 'VIEWPOINT %s %s %s 1 0 0 0\nPOINTS %s\nDATA ascii\n' "$2" "$3" "$4" "$points"
+        sed 1d "$work/near.csv" | cut -d, -f1-3 | tr , ' '
+    } >"$cloud"
+    "$voxtile" build "$cloud" -o "$work/$1" --resolution $resolution --max-range 1000 >/dev/null
+    "$voxtile" export "$work/$1" -o "$work/$1.csv" >/dev/null
+    rm "$cloud"
+}
+
+"$voxtile" demo --out "$work/demo" --length 10 --resolution $resolution >/dev/null
+mv "$work/demo/map_tiles" "$work/near"
+"$voxtile" export "$work/near" -o "$work/near.csv" >/dev/null
+points=$(($(wc -l <"$work/near.csv") - 1))
+far_map utm 500123.456 4182321.789 57.3
+far_map ecef -2694044.21 -4266368.81 3888310.6
+
+for map in near utm ecef; do
+    table=$work/$map.csv
+    for format in pcd ply; do
+        "$voxtile" export "$work/$map" -o "$work/$map.$format" >/dev/null
+    done
+    "$work/pcl_reader" "$work/$map.pcd" | compare "$table" "$work/$map.pcd" PCL
+    "$python" "$here/points.py" pypcd4 "$work/$map.pcd" | compare "$table" "$work/$map.pcd" pypcd4
+    "$python" "$here/points.py" plyfile "$work/$map.ply" | compare "$table" "$work/$map.ply" plyfile
+    case $map in
+    near) origin= ;;
+    utm) origin="--origin 500000 4182000 0" ;;
+    ecef) origin="--origin -2694000 -4266000 3888000" ;;
+    esac
+    for format in bt ot; do
+        # shellcheck disable=SC2086
+        "$voxtile" export "$work/$map" -o "$work/$map.$format" $origin >/dev/null
+        "$work/octomap_reader" "$work/$map.$format" | compare "$table" "$work/$map.$format" OctoMap --any-order
+    done
+    [ "${1-}" = --short ] && continue
+    for format in pcd ply; do
+        /usr/bin/python3 "$here/points.py" open3d "$work/$map.$format" | compare "$table" "$work/$map.$format" Open3D
+        QT_QPA_PLATFORM=offscreen timeout 120 CloudCompare -SILENT -NO_TIMESTAMP -C_EXPORT_FMT ASC -PREC 12 -SEP SPACE \
+            -AUTO_SAVE OFF -O -GLOBAL_SHIFT 0 0 0 "$work/$map.$format" -SAVE_CLOUDS FILE "$work/read.asc" >"$work/cc.log" 2>&1 ||
+            { tail -5 "$work/cc.log" && failed=1; }
+        compare "$table" "$work/$map.$format" CloudCompare <"$work/read.asc"
+        rm -f "$work/read.asc"
+    done
+done
+exit $failed
