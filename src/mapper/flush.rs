@@ -132,6 +132,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], input: Option<&
         input_first_scan: input.map_or(0, |input| input.first_scan),
         decayed_scan: 0,
         storage: config.storage,
+        snapshots: None,
     };
     let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
     Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }

@@ -1,4 +1,5 @@
 use super::commit_log::Commits;
+use super::snapshot_list::SnapshotList;
 use super::tile_stamp::MAX_NUMBER;
 use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;
@@ -56,6 +57,10 @@ pub struct Extension {
     /// How the tiles are stored; maps of the seed's files do not say.
     #[serde(default, skip_serializing_if = "Storage::is_seed")]
     pub storage: Storage,
+    /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions that did
+    /// not list them: every file of the folder of snapshots is one then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snapshots: Option<SnapshotList>,
 }
 
 /// What makes a map the map it is. It stands in every tile, so that a map can be put together again from its tiles.
@@ -191,8 +196,9 @@ impl Metadata {
         }
         if let Some(ext) = &document.ext
             && [ext.flush_number, ext.scan_number, ext.input_first_scan, ext.decayed_scan]
-                .iter()
-                .any(|&number| number > MAX_NUMBER)
+                .into_iter()
+                .chain(ext.snapshots.iter().flat_map(SnapshotList::flushes))
+                .any(|number| number > MAX_NUMBER)
         {
             return Err(FormatError::at_offset(0, "flush or scan number is too high to be true"));
         }
@@ -241,6 +247,7 @@ mod tests {
             input_first_scan: 45,
             decayed_scan: 0,
             storage: Storage::Seed,
+            snapshots: None,
         };
         let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());
         Metadata { resolution_m: 0.05, tile_size_m: 10.0, bounds, ext: Some(ext) }
