@@ -83,6 +83,17 @@ pub enum Error {
         /// The folder of the map.
         path: PathBuf,
     },
+    /// The file that keeps other writers out was removed or replaced, so that another may be at work: close the map, and open it
+    /// again to go on from its last flush.
+    #[error(
+        "{}: the file was removed or replaced while this process held it locked, so another may be writing to the map; \
+         nothing was written since; open the map again to go on from its last flush",
+        path.display()
+    )]
+    LockLost {
+        /// The file.
+        path: PathBuf,
+    },
     /// A writer flushed the map while it was being read: open it again.
     #[error("{}: the map was flushed while it was being read; open it again", path.display())]
     Changed {
@@ -170,6 +181,12 @@ impl Error {
         Self::InvalidArgument { argument: argument.into(), reason: reason.into() }
     }
 
+    /// Whether the medium refused: a sector that cannot be read or written, or a damaged file system. It concerns one file, and
+    /// stays.
+    pub fn is_of_medium(&self) -> bool {
+        matches!(self, Self::Io { cause, .. } if is_of_medium(cause))
+    }
+
     /// A refusal of the operating system about a path.
     pub fn io(path: &Path, action: &'static str, cause: io::Error) -> Self {
         Self::Io { path: path.to_owned(), action, cause }
@@ -218,4 +235,16 @@ impl DecodeError {
 
 fn of_tile(tile: &Option<TileIndex>) -> String {
     tile.map(|tile| format!("tile {tile} is ")).unwrap_or_default()
+}
+
+/// Whether an error is of the medium: a sector that cannot be read or written, or a file system that finds itself damaged.
+/// Such an error concerns one file and stays; others, such as too many open files, say nothing of the file.
+pub(crate) fn is_of_medium(error: &io::Error) -> bool {
+    // EIO, ENXIO, ENODATA, EBADMSG, EUCLEAN and EREMOTEIO.
+    #[cfg(unix)]
+    const OF_MEDIUM: [i32; 6] = [5, 6, 61, 74, 117, 121];
+    // ERROR_CRC, ERROR_SECTOR_NOT_FOUND, ERROR_READ_FAULT, ERROR_IO_DEVICE, ERROR_FILE_CORRUPT and ERROR_DISK_CORRUPT.
+    #[cfg(not(unix))]
+    const OF_MEDIUM: [i32; 6] = [23, 27, 30, 1117, 1392, 1393];
+    error.raw_os_error().is_some_and(|code| OF_MEDIUM.contains(&code))
 }

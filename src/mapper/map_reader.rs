@@ -77,6 +77,42 @@ impl MapReader {
         Ok(Self { config, octrees, store, disk, cache_tiles, cache: Mutex::new(cache) })
     }
 
+    /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not changed
+    /// stay there. From then on the writer need not keep what this reader saw before: a reader that lives long and is never
+    /// refreshed costs, for each tile that is flushed anew, the bytes of the version that it sees.
+    ///
+    /// A reader of a snapshot, which does not change, stays where it is.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapReader::open`], and [`Error::Mismatch`] if there is another map in the folder by now. The reader goes on seeing
+    /// what it saw then.
+    pub fn refresh(&mut self) -> Result<bool> {
+        if self.snapshot().is_some() {
+            return Ok(false);
+        }
+        let folder = self.store.folder().to_owned();
+        let store = TileStore::open_read_only(self.disk.clone(), &folder)?;
+        let id = |store: &TileStore| store.metadata().ext.as_ref().map(|ext| ext.map_id.clone());
+        let (seen, found) = (id(&self.store), id(&store));
+        if seen.is_some() && seen != found {
+            let [wanted, found] = [seen, found].map(|id| id.unwrap_or_else(|| "none".into()));
+            return Err(Error::Mismatch { path: folder, what: "the id", found, wanted });
+        }
+        let config = config_from(store.metadata(), &store.layout().metadata())?;
+        let config = config.with_cache_tiles(self.cache_tiles).validated()?;
+        let is_newer = seen != found || store.commits().flush_number != self.flush_number();
+        let cache = self.cache.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let tiles: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
+        for index in tiles {
+            if store.stamp(index).is_none() || store.stamp(index) != self.store.stamp(index) {
+                cache.tiles.pop(&index);
+            }
+        }
+        (self.store, self.config) = (store, config);
+        Ok(is_newer)
+    }
+
     /// The configuration that a map was made with, to go on with it. What only concerns a run has its defaults.
     ///
     /// # Errors
@@ -173,7 +209,7 @@ impl MapReader {
         let folder = self.store.folder();
         if let Some(name) = self.snapshot() {
             // Deleted meanwhile?
-            return self.store.snapshot(name).err().unwrap_or(error);
+            return TileStore::open_snapshot(self.disk.clone(), folder, name).err().unwrap_or(error);
         }
         let now =
             TileStore::open_read_only(self.disk.clone(), folder).map(|store| store.commits().flush_number);

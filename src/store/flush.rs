@@ -2,7 +2,7 @@
 
 use super::commit_log::{CommitLog, Flush};
 use super::layout::TileFile;
-use super::map_folder;
+use super::map_folder::{self, Lock};
 use super::metadata::{Bounds, Metadata};
 use super::tile_stamp::{FileStamp, TileStamp};
 use super::tile_store::TileStore;
@@ -86,6 +86,7 @@ impl TileStore {
     /// it is logged as a warning and made good later.
     pub fn commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<()> {
         self.settle()?;
+        self.keep_for_late_readers();
         let log_path = self.layout.commit_log();
         let Some(mut log) = self.log else {
             return Err(Error::argument("map", "a map of the seed's format must be adopted first"));
@@ -101,11 +102,15 @@ impl TileStore {
         changed.sort_unstable_by_key(|&(tile, _)| tile);
         let mut removed: Vec<_> = self.removed.iter().copied().collect();
         removed.sort_unstable();
-        let is_new = self.metadata.ext.is_none() || !self.metadata.is_same_but_for_progress(&metadata);
+        let number = self.commits.flush_number + 1;
+        let metadata = self.fill_in(metadata, number, scan_number);
+        let is_new = !self.is_list_logged
+            || self.metadata.ext.is_none()
+            || !self.metadata.is_same_but_for_progress(&metadata);
         if !changed.is_empty() || !removed.is_empty() || is_new || scan_number != self.commits.scan_number {
             self.sync_next(&changed)?;
-            let number = self.commits.flush_number + 1;
-            let metadata = self.fill_in(metadata, number, scan_number);
+            // As late as can be: what another writer commits must not be cut off.
+            self.check_lock()?;
             let text = metadata.to_text();
             let metadata_text = is_new.then_some(&*text);
             let flush = Flush { number, scan_number, changed: &changed, removed: &removed, metadata_text };
@@ -117,6 +122,11 @@ impl TileStore {
             }
             // Committed.
             self.log = Some(log);
+            self.is_list_logged = true;
+            let is_born = |tile: &TileIndex| !self.commits.tiles.contains_key(tile);
+            for tile in changed.iter().map(|(tile, _)| *tile).filter(is_born) {
+                self.readers.note_birth(tile, number);
+            }
             self.next.clear();
             self.removed.clear();
             self.foreign.clear();
@@ -145,6 +155,7 @@ impl TileStore {
 
     /// Brings about what earlier calls left open, before anything that builds upon it is written.
     pub(super) fn settle(&mut self) -> Result<()> {
+        self.check_lock()?;
         if let (false, Some(log)) = (self.is_log_settled, self.log) {
             // A record that came to disk after all names files that must stay as they are until it is cut off.
             let path = self.layout.commit_log();
@@ -214,11 +225,24 @@ impl TileStore {
         Ok(())
     }
 
-    fn fill_in(&self, mut metadata: Metadata, flush_number: u64, scan_number: u64) -> Metadata {
+    /// Looks whether others are still kept from writing.
+    pub(super) fn check_lock(&self) -> Result<()> {
+        self.lock.as_ref().map_or(Ok(()), Lock::check)
+    }
+
+    /// Where `metadata.json` could not be replaced after the last commit, readers of it may have opened that commit.
+    pub(super) fn keep_for_late_readers(&mut self) {
+        if self.is_metadata_behind() {
+            self.readers.may_see(self.commits.flush_number);
+        }
+    }
+
+    pub(super) fn fill_in(&self, mut metadata: Metadata, flush_number: u64, scan_number: u64) -> Metadata {
         metadata.bounds = Bounds::of(self.tiles());
         if let Some(ext) = &mut metadata.ext {
-            // A map keeps its storage, whatever the caller says.
+            // A map keeps its storage and its snapshots, whatever the caller says.
             ext.storage = self.layout.storage();
+            ext.snapshots = self.listed.clone();
             ext.empty = metadata.bounds.is_none();
             (ext.flush_number, ext.scan_number) = (flush_number, scan_number);
         }
@@ -250,11 +274,16 @@ impl TileStore {
     /// Replaces the log by one record of the whole map.
     pub(super) fn replace_log(&mut self) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
-        let (disk, text) = (&*self.disk, self.metadata.to_text());
+        let mut metadata = self.metadata.clone();
+        if let Some(ext) = &mut metadata.ext {
+            ext.snapshots = self.listed.clone();
+        }
+        let (disk, text) = (&*self.disk, metadata.to_text());
         let compacted = map_folder::replace(disk, &self.layout.commit_log(), |next| {
             CommitLog::write_whole(disk, next, log.map_id(), &self.commits, &text)
         })?;
         self.log = Some(compacted);
+        self.is_list_logged = true;
         // What is appended from now on is in this file only; every commit syncs the folder first.
         self.sync_folder(self.layout.folder())
     }

@@ -1,18 +1,20 @@
 //! The folder of a map as a whole: its lock, its two own files, its tile folders.
 
 use super::commit_log::{CommitLog, Commits};
-use super::disk::{Disk, DiskRead};
-use super::layout::{Layout, tile_of_folder};
+use super::disk::{Disk, DiskLock, DiskRead};
+use super::layout::{Layout, QUARANTINE, SNAPSHOTS, tile_of_folder};
 use super::metadata::Metadata;
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::TileIndex;
 use rustc_hash::FxHashSet;
-use std::any::Any;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Held while a store may write; a process that ends, however it ends, lets go of it.
-pub struct Lock(#[expect(dead_code, reason = "held for its drop")] Box<dyn Any + Send + Sync>);
+pub struct Lock {
+    lock: Box<dyn DiskLock>,
+    path: PathBuf,
+}
 
 impl Lock {
     /// Takes the lock of a map.
@@ -23,8 +25,20 @@ impl Lock {
     pub fn take(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
         let path = layout.lock();
         match disk.lock(&path).map_err(|error| Error::io(&path, "lock", error))? {
-            Some(lock) => Ok(Self(lock)),
+            Some(lock) => Ok(Self { lock, path }),
             None => Err(Error::Locked { path: layout.folder().to_owned() }),
+        }
+    }
+
+    /// Looks whether the lock still keeps others out. It does not once somebody has removed its file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::LockLost`] if it does not; a disk that refuses.
+    pub fn check(&self) -> Result<()> {
+        match self.lock.is_in_place().map_err(|error| Error::io(&self.path, "look at", error))? {
+            true => Ok(()),
+            false => Err(Error::LockLost { path: self.path.clone() }),
         }
     }
 }

@@ -1,5 +1,6 @@
 use super::commit_log::Commits;
 use super::input_record::InputRecord;
+use super::snapshot_list::SnapshotList;
 use super::tile_stamp::MAX_NUMBER;
 use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;
@@ -55,6 +56,10 @@ pub struct Extension {
     /// How the tiles are stored; maps of the seed's files do not say.
     #[serde(default, skip_serializing_if = "Storage::is_seed")]
     pub storage: Storage,
+    /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions that did
+    /// not list them: every file of the folder of snapshots is one then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snapshots: Option<SnapshotList>,
 }
 
 /// What makes a map the map it is. It stands in every tile, so that a map can be put together again from its tiles.
@@ -210,7 +215,10 @@ impl Metadata {
         }
         let ext = document.ext.map(ReadExtension::into_extension);
         if let Some(ext) = &ext
-            && !([ext.flush_number, ext.scan_number, ext.decayed_scan].iter().all(|&n| n <= MAX_NUMBER)
+            && !([ext.flush_number, ext.scan_number, ext.decayed_scan]
+                .into_iter()
+                .chain(ext.snapshots.iter().flat_map(SnapshotList::flushes))
+                .all(|number| number <= MAX_NUMBER)
                 && ext.inputs.iter().all(InputRecord::is_sound))
         {
             return Err(FormatError::at_offset(0, "flush or scan number is too high to be true"));
@@ -260,6 +268,7 @@ mod tests {
             inputs: vec![InputRecord { first_scan: 45, ..InputRecord::from("abc") }],
             decayed_scan: 0,
             storage: Storage::Seed,
+            snapshots: None,
         };
         let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());
         Metadata { resolution_m: 0.05, tile_size_m: 10.0, bounds, ext: Some(ext) }

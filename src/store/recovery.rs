@@ -1,9 +1,12 @@
 use super::commit_log::Commits;
 use super::disk::{Disk, EntryKind};
 use super::layout::{Layout, WAITING, tile_of_folder};
+use super::snapshot_file::Snapshot;
+use super::snapshot_list::SnapshotList;
+use super::snapshot_name::SnapshotName;
 use super::snapshots::{KeptTables, Snapshots};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, is_of_medium};
 use crate::space::TileIndex;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
@@ -32,11 +35,14 @@ pub(super) struct Leftovers {
 /// committed and tables kept for readers, and finds the committed ones that wait for their names.
 ///
 /// Safe to repeat and to break off anywhere.
+///
+/// A file or folder that the medium refuses to show is left as it is: reading its tile tells, and the others go on.
 pub(super) fn recover(
     disk: &dyn Disk,
     layout: &Layout,
     commits: &Commits,
     map_id: [u8; 16],
+    listed: Option<&SnapshotList>,
 ) -> Result<Leftovers> {
     let changed: FxHashSet<TileIndex> = commits.last_changed.iter().copied().collect();
     let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
@@ -60,7 +66,7 @@ pub(super) fn recover(
             State::Whole if is_of_last_commit => {
                 leftovers.renamed.insert(tile);
             }
-            State::Whole => {}
+            State::Whole | State::Unreadable => {}
             State::Unrenamed => {
                 leftovers.unrenamed.insert(tile);
             }
@@ -74,13 +80,54 @@ pub(super) fn recover(
             }
         }
     }
-    leftovers.snapshots = Snapshots::look(disk, layout, map_id, &kept)?;
+    settle_snapshots(disk, layout, map_id, listed, &mut leftovers.removed)?;
+    leftovers.snapshots = Snapshots::look(disk, layout, map_id, commits, listed, &kept)?;
     remove_unseen(disk, layout, &kept, &mut leftovers)?;
     for tile in hollow.into_iter().filter(|tile| !leftovers.snapshots.pinned().contains_key(tile)) {
         let path = layout.tile_folder(tile);
-        disk.remove_folder(&path).map_err(|error| Error::io(&path, "remove", error))?;
+        tolerate(disk.remove_folder(&path), &path, "remove")?;
     }
     Ok(leftovers)
+}
+
+/// Finishes what the log says of snapshots: one that was made gets its name, one that was deleted loses its file.
+fn settle_snapshots(
+    disk: &dyn Disk,
+    layout: &Layout,
+    map_id: [u8; 16],
+    listed: Option<&SnapshotList>,
+    removed: &mut u64,
+) -> Result<()> {
+    let folder = layout.snapshots();
+    if kind(disk, &folder)? != Some(EntryKind::Folder) {
+        return Ok(());
+    }
+    let next = layout.snapshot_next();
+    if matches!(kind(disk, &next)?, Some(EntryKind::File(_))) {
+        let mut names = listed.into_iter().flat_map(SnapshotList::names);
+        let is_due = |name: &&SnapshotName| {
+            matches!(disk.kind(&layout.snapshot(name)), Ok(None))
+                && Snapshot::read(disk, layout, name, map_id, listed).is_ok()
+        };
+        match names.find(is_due) {
+            Some(name) => tolerate(disk.rename(&next, &layout.snapshot(name)), &next, "rename")?,
+            None => remove(disk, &next, removed)?,
+        }
+    }
+    if let Some(listed) = listed {
+        for name in Snapshot::list(disk, layout).unwrap_or_default() {
+            // What somebody else put there stays.
+            let is_deleted = || {
+                let file = Snapshot::read_file(disk, &layout.snapshot(&name), &name, map_id);
+                file.is_ok_and(|file| file.is_some_and(|file| file.has_own_name()))
+            };
+            if !listed.contains(&name) && is_deleted() {
+                remove(disk, &layout.snapshot(&name), removed)?;
+            }
+        }
+    }
+    // In a map that lists none, a deletion that a killed writer could not make durable would come back and miss its tables.
+    tolerate(disk.sync_folder(&folder), &folder, "sync")
 }
 
 /// Removes what an attempt to give tiles of the seed's format their trailers left. Returns how many files.
@@ -109,13 +156,6 @@ fn remove_unseen(
     kept: &KeptTables,
     leftovers: &mut Leftovers,
 ) -> Result<()> {
-    let folder = layout.snapshots();
-    if kind(disk, &folder)? == Some(EntryKind::Folder) {
-        remove(disk, &layout.snapshot_next(), &mut leftovers.removed)?;
-        // A deletion that a killed writer could not make durable would come back and miss its tables: those that are kept,
-        // and those that are going to be replaced.
-        disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
-    }
     for (&tile, flushes) in kept {
         for &flush_number in flushes.iter().filter(|&&n| !leftovers.snapshots.sees_kept(tile, n)) {
             remove(disk, &layout.kept(tile, flush_number), &mut leftovers.removed)?;
@@ -126,6 +166,7 @@ fn remove_unseen(
 
 enum State {
     Whole,
+    Unreadable,
     Unrenamed,
     Empty,
     Stray,
@@ -144,7 +185,14 @@ fn look_at_tile(
         // A file or a link with a tile's name: reading the tile, if there is one, tells.
         return Ok((State::Stray, BTreeSet::new()));
     }
-    let mut names = list(disk, &folder)?;
+    let mut names = match disk.list(&folder) {
+        Err(error) if is_of_medium(&error) => {
+            log::warn!("{}: cannot list: {error}; the tile cannot be read", folder.display());
+            let state = if stamp.is_some() { State::Unreadable } else { State::Stray };
+            return Ok((state, BTreeSet::new()));
+        }
+        names => names.map_err(|error| Error::io(&folder, "list", error))?,
+    };
     let mut unrenamed = false;
     for &file in layout.files() {
         let next_name = file.next_name(layout.storage());
@@ -177,8 +225,23 @@ fn look_at_tile(
     Ok((state, kept))
 }
 
+/// What has a name; something that is no part of a map where the medium does not tell.
 fn kind(disk: &dyn Disk, path: &Path) -> Result<Option<EntryKind>> {
-    disk.kind(path).map_err(|error| Error::io(path, "look at", error))
+    match disk.kind(path) {
+        Err(error) if is_of_medium(&error) => Ok(Some(EntryKind::Other)),
+        kind => kind.map_err(|error| Error::io(path, "look at", error)),
+    }
+}
+
+/// Goes on where the medium refuses a step that another opening can make good.
+fn tolerate(result: io::Result<()>, path: &Path, action: &'static str) -> Result<()> {
+    match result {
+        Err(error) if is_of_medium(&error) => {
+            log::warn!("{}: cannot {action}: {error}", path.display());
+            Ok(())
+        }
+        result => result.map_err(|error| Error::io(path, action, error)),
+    }
 }
 
 fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
@@ -191,20 +254,24 @@ fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
         return Ok(());
     }
     *removed += 1;
-    disk.remove_file(path).map_err(|error| Error::io(path, "remove", error))
+    tolerate(disk.remove_file(path), path, "remove")
 }
 
-/// Whether a file has this length and checksum. One of another length is not read.
+/// Whether a file has this length and checksum. One of another length is not read, and one that cannot be read has not.
 fn has_stamp(disk: &dyn Disk, path: &Path, stamp: FileStamp) -> Result<bool> {
+    let is_none = |error: &io::Error| {
+        matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) || is_of_medium(error)
+    };
     let input = match disk.open(path) {
         Ok(input) if input.file_bytes() != stamp.bytes => return Ok(false),
         Ok(input) => input,
-        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
-            return Ok(false);
-        }
+        Err(error) if is_none(&error) => return Ok(false),
         Err(error) => return Err(Error::io(path, "open", error)),
     };
     let mut input = Stamping::new(input);
-    io::copy(&mut input, &mut io::sink()).map_err(|error| Error::io(path, "read", error))?;
-    Ok(input.finish().0 == stamp)
+    match io::copy(&mut input, &mut io::sink()) {
+        Err(error) if is_of_medium(&error) => Ok(false),
+        Err(error) => Err(Error::io(path, "read", error)),
+        Ok(_) => Ok(input.finish().0 == stamp),
+    }
 }

@@ -4,7 +4,7 @@ use super::layout::{Layout, TileFile, tile_of_folder};
 use super::map_folder;
 use super::metadata::Metadata;
 use crate::config::Storage;
-use crate::error::{DecodeError, Error, FormatError, Result};
+use crate::error::{DecodeError, Error, FormatError, Result, is_of_medium};
 use std::io;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ impl Remains {
     /// A disk that refuses; damage is no error here.
     pub fn read(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
         let metadata = match map_folder::read_metadata(disk, layout) {
-            Err(error @ Error::Io { .. }) if !is_no_file(&error) => return Err(error),
+            Err(error @ Error::Io { .. }) if !is_no_file(&error) && !error.is_of_medium() => return Err(error),
             metadata => metadata,
         };
         let path = layout.commit_log();
@@ -42,14 +42,14 @@ impl Remains {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 Err(FormatError::at_offset(0, "the file is missing").into())
             }
-            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput || is_of_medium(&error) => {
                 Err(FormatError::at_offset(0, error.to_string()).into())
             }
             Err(error) => return Err(Error::io(&path, "open", error)),
         };
         let (log_map_id, log_error) = match read {
             Ok(log) => (Some(log.map_id()), None),
-            Err(DecodeError::Io(error)) => return Err(Error::io(&path, "read", error)),
+            Err(DecodeError::Io(error)) if !is_of_medium(&error) => return Err(Error::io(&path, "read", error)),
             Err(error) => (None, Some(error.in_map(&path, None))),
         };
         Ok(Self { metadata, log_error, log_map_id, commits })

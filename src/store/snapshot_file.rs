@@ -4,10 +4,12 @@ use super::commit_log::{CommitLog, Commits};
 use super::disk::{Disk, EntryKind};
 use super::layout::Layout;
 use super::metadata::Metadata;
+use super::snapshot_list::SnapshotList;
 use super::snapshot_name::SnapshotName;
 use super::tile_store::hex;
 use crate::error::{Error, FormatError, Result};
 use std::io;
+use std::path::Path;
 
 /// What a snapshot says: every tile and the metadata as of a flush.
 #[derive(Clone, Debug)]
@@ -25,7 +27,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The names of a map's snapshots, in order. Files with names that no snapshot may have are left out.
+    /// The names in the folder of snapshots, in order. Files with names that no snapshot may have are left out.
     ///
     /// # Errors
     ///
@@ -58,33 +60,85 @@ impl Snapshot {
         }
     }
 
-    /// Reads a snapshot of the map with this id.
+    /// Reads a snapshot of the map with this id. Where `listed` says which snapshots the map has, it must be the one that is
+    /// meant there.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is none of this name; damage; a disk that refuses.
-    pub fn read(disk: &dyn Disk, layout: &Layout, name: &SnapshotName, map_id: [u8; 16]) -> Result<Self> {
+    /// [`Error::InvalidArgument`] if there is none of this name; damage, to which belongs a file that is missing or is another
+    /// snapshot's; a disk that refuses.
+    pub fn read(
+        disk: &dyn Disk,
+        layout: &Layout,
+        name: &SnapshotName,
+        map_id: [u8; 16],
+        listed: Option<&SnapshotList>,
+    ) -> Result<Self> {
+        let map = layout.folder().display();
+        let unknown = |reason: String| Err(Error::argument("snapshot", reason));
+        if listed.is_some_and(|listed| !listed.contains(name)) {
+            return unknown(format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them"));
+        }
         Self::has_folder(disk, layout)?;
         let path = layout.snapshot(name);
-        let damaged = |at, reason: String| Err(FormatError::at_offset(at, reason).in_map(&path, None));
-        let input = match disk.open(&path) {
+        let read = match Self::read_file(disk, &path, name, map_id)? {
+            Some(snapshot) => Some(snapshot),
+            // Committed, and without its name still.
+            None if listed.is_some() => Self::read_file(disk, &layout.snapshot_next(), name, map_id)
+                .ok()
+                .flatten()
+                .filter(Self::has_own_name),
+            None => None,
+        };
+        let damaged = |reason: String| Err(FormatError::at_offset(0, reason).in_map(&path, None));
+        let Some(snapshot) = read else {
+            return match listed {
+                Some(_) => damaged(format!(
+                    "the snapshot's file is missing, and the map has this snapshot; put the file back, or give the snapshot \
+                     up with `voxtile snapshot {map} {name} --delete`"
+                )),
+                None => {
+                    unknown(format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them"))
+                }
+            };
+        };
+        if let Some(own) = snapshot.name_inside().filter(|own| *own != name) {
+            return damaged(format!("the file is that of the snapshot {own}; put it back under that name"));
+        }
+        if let Some(flush_number) = listed.and_then(|listed| listed.flush_of(name))
+            && flush_number != snapshot.commits.flush_number
+        {
+            let found = snapshot.commits.flush_number;
+            return damaged(format!("the file is of flush {found}, and this snapshot is of flush {flush_number}"));
+        }
+        Ok(snapshot)
+    }
+
+    /// Reads the file of a snapshot, whoever it is; `None` if there is none.
+    ///
+    /// # Errors
+    ///
+    /// Damage; a disk that refuses.
+    pub fn read_file(
+        disk: &dyn Disk,
+        path: &Path,
+        name: &SnapshotName,
+        map_id: [u8; 16],
+    ) -> Result<Option<Self>> {
+        let damaged = |at, reason: String| Err(FormatError::at_offset(at, reason).in_map(path, None));
+        let input = match disk.open(path) {
             Ok(input) => input,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let map = layout.folder().display();
-                let reason =
-                    format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them");
-                return Err(Error::argument("snapshot", reason));
-            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
                 return damaged(0, error.to_string());
             }
-            Err(error) => return Err(Error::io(&path, "open", error)),
+            Err(error) => return Err(Error::io(path, "open", error)),
         };
         let bytes = input.file_bytes();
         let (log, mut commits) = CommitLog::read(&mut io::BufReader::new(input), bytes)
-            .map_err(|error| error.in_map(&path, None))?;
+            .map_err(|error| error.in_map(path, None))?;
         if let Some(torn) = commits.torn.take() {
-            return Err(torn.in_map(&path, None));
+            return Err(torn.in_map(path, None));
         }
         if log.map_id() != map_id {
             let (found, wanted) = (hex(&log.map_id()), hex(&map_id));
@@ -93,8 +147,18 @@ impl Snapshot {
         let is_of_map =
             |metadata: &Metadata| metadata.ext.as_ref().is_some_and(|ext| ext.map_id == hex(&map_id));
         match commits.metadata.clone().filter(is_of_map) {
-            Some(metadata) => Ok(Self { name: name.clone(), map_id, metadata, commits, bytes }),
+            Some(metadata) => Ok(Some(Self { name: name.clone(), map_id, metadata, commits, bytes })),
             None => damaged(bytes, "the snapshot does not say what the map was".into()),
         }
+    }
+
+    /// The name in the file itself; `None` in files of versions that did not write it.
+    pub fn name_inside(&self) -> Option<&SnapshotName> {
+        self.metadata.ext.as_ref()?.snapshots.as_ref()?.names().next()
+    }
+
+    /// Whether the file has the name that is in it.
+    pub(super) fn has_own_name(&self) -> bool {
+        self.name_inside() == Some(&self.name)
     }
 }

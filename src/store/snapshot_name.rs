@@ -1,10 +1,12 @@
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
 /// The name of a snapshot, which is a file's name too: 1 to 64 letters of `A-Z a-z 0-9 . _ -`, the first of them no dot, and not
 /// `now`, which means the map as it is.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct SnapshotName(String);
 
 /// What the map as it is is called among snapshots.
@@ -45,6 +47,20 @@ impl FromStr for SnapshotName {
 
     fn from_str(name: &str) -> Result<Self> {
         Self::new(name)
+    }
+}
+
+impl TryFrom<String> for SnapshotName {
+    type Error = Error;
+
+    fn try_from(name: String) -> Result<Self> {
+        Self::new(name)
+    }
+}
+
+impl From<SnapshotName> for String {
+    fn from(name: SnapshotName) -> Self {
+        name.0
     }
 }
 

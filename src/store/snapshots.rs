@@ -2,6 +2,7 @@ use super::commit_log::Commits;
 use super::disk::Disk;
 use super::layout::Layout;
 use super::snapshot_file::Snapshot;
+use super::snapshot_list::SnapshotList;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -20,49 +21,99 @@ pub(super) struct Snapshots {
     shared: FxHashSet<TileIndex>,
     /// Kept tables that a snapshot sees.
     pinned: KeptTables,
-    /// Whether there is a snapshot that cannot be read: it may see anything.
+    /// Whether there is a snapshot that cannot be read, and of which nothing is known: it may see anything.
     see_all: bool,
+    /// The snapshots themselves.
+    found: SnapshotList,
 }
 
 impl Snapshots {
-    /// Looks which of the kept tables the snapshots of a map see. One snapshot is in memory at a time.
+    /// Looks which of the kept tables the snapshots of a map see, and which snapshots there are. One is in memory at a time.
+    ///
+    /// A snapshot that is missing or cannot be read is no error: it counts as one that saw every tile as of its flush, and
+    /// where nothing tells its flush, as one that sees everything.
     ///
     /// # Errors
     ///
-    /// A disk that refuses. A damaged snapshot counts as one that sees everything.
+    /// A disk that refuses more than one file.
     pub(super) fn look(
         disk: &dyn Disk,
         layout: &Layout,
         map_id: [u8; 16],
+        map: &Commits,
+        listed: Option<&SnapshotList>,
         kept: &KeptTables,
     ) -> Result<Self> {
         let mut snapshots = Self::default();
-        let names = match Snapshot::list(disk, layout) {
-            Err(error @ Error::Damaged { .. }) => {
-                snapshots.cannot_read(&error, kept);
+        let names: Vec<_> = match (listed, Snapshot::list(disk, layout)) {
+            (Some(listed), _) => listed.names().cloned().collect(),
+            (None, Ok(names)) => names,
+            (None, Err(error)) => {
+                snapshots.cannot_read(error, None, map, kept)?;
                 return Ok(snapshots);
             }
-            names => names?,
         };
         for name in names {
-            match Snapshot::read(disk, layout, &name, map_id) {
-                Ok(snapshot) => snapshots.take(&snapshot.commits, kept),
-                Err(error @ Error::Damaged { .. }) => snapshots.cannot_read(&error, kept),
-                Err(error) => return Err(error),
-            }
+            let flush_number = match Snapshot::read(disk, layout, &name, map_id, listed) {
+                Ok(snapshot) => {
+                    snapshots.take(&snapshot.commits, kept);
+                    Some(snapshot.commits.flush_number)
+                }
+                Err(error) => {
+                    let flush_number = listed.and_then(|listed| listed.flush_of(&name));
+                    snapshots.cannot_read(error, flush_number, map, kept)?;
+                    flush_number
+                }
+            };
+            snapshots.found.insert(name, flush_number);
         }
         Ok(snapshots)
     }
 
-    fn cannot_read(&mut self, error: &Error, kept: &KeptTables) {
-        log::warn!("{error}; until then every table is kept");
-        self.see_all = true;
-        self.pinned = kept.clone();
+    fn cannot_read(
+        &mut self,
+        error: Error,
+        flush_number: Option<u64>,
+        map: &Commits,
+        kept: &KeptTables,
+    ) -> Result<()> {
+        if !matches!(error, Error::Damaged { .. }) && !error.is_of_medium() {
+            return Err(error);
+        }
+        match flush_number {
+            Some(flush_number) => {
+                log::warn!("{error}; until then every table as of flush {flush_number} is kept");
+                let tiles: FxHashSet<_> = map.tiles.keys().chain(kept.keys()).copied().collect();
+                self.take_tiles(tiles.into_iter(), flush_number, kept);
+            }
+            None => {
+                log::warn!("{error}; until then every table is kept");
+                self.see_all = true;
+                for (&tile, flushes) in kept {
+                    self.pinned.entry(tile).or_default().extend(flushes);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The snapshots that were found, and the flushes that they are of.
+    pub(super) fn found(&self) -> &SnapshotList {
+        &self.found
     }
 
     fn take(&mut self, commits: &Commits, kept: &KeptTables) {
-        for &tile in commits.tiles.keys() {
-            match seen_by(kept.get(&tile), commits.flush_number) {
+        self.take_tiles(commits.tiles.keys().copied(), commits.flush_number, kept);
+    }
+
+    fn take_tiles(
+        &mut self,
+        tiles: impl Iterator<Item = TileIndex>,
+        as_of_flush: u64,
+        kept: &KeptTables,
+    ) {
+        for tile in tiles {
+            match seen_by(kept.get(&tile), as_of_flush) {
                 Some(flush_number) => self.pin(tile, flush_number),
                 None => drop(self.shared.insert(tile)),
             }

@@ -2,6 +2,7 @@
 
 use super::disk::EntryKind;
 use super::layout::TileFile;
+use super::quarantine::Quarantine;
 use super::tile_store::TileStore;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
@@ -10,11 +11,12 @@ use std::path::Path;
 
 impl TileStore {
     pub(super) fn tidy_up(&mut self) -> Result<()> {
-        self.put_in_place()?;
+        // At once: who opens the map in between cannot tell the writer which flush it reads.
         if self.written_flush != Some(self.commits.flush_number) {
             self.write_metadata()?;
         }
-        self.readers.release(&*self.disk, &self.layout);
+        self.put_in_place()?;
+        self.readers.release(&*self.disk, &self.layout, &self.snapshots);
         self.compact_log()
     }
 
@@ -23,7 +25,8 @@ impl TileStore {
     pub(super) fn put_in_place(&mut self) -> Result<()> {
         self.keep_replaced()?;
         self.finish_renames()?;
-        self.finish_removals()
+        self.finish_removals()?;
+        self.finish_snapshots()
     }
 
     /// Keeps the tables in place that the last commit replaces or removes, where a reader or a snapshot sees them. Those of
@@ -31,12 +34,15 @@ impl TileStore {
     fn keep_replaced(&mut self) -> Result<()> {
         let tiles: Vec<_> = self.unrenamed.iter().chain(&self.unremoved).copied().collect();
         // Asked after the commit: who begins to read later sees it.
-        let has_readers = !tiles.is_empty() && self.readers.are_there();
+        if !tiles.is_empty() {
+            self.readers.look();
+        }
         let flush_number = self.commits.flush_number.saturating_sub(1);
         let mut seen = Vec::new();
         for tile in tiles {
             let is_seen = self.snapshots.sees_present(tile);
-            let is_wanted = (is_seen || has_readers) && !self.snapshots.sees_kept(tile, flush_number);
+            let is_wanted = (is_seen || self.readers.see(tile, flush_number, &self.snapshots))
+                && !self.snapshots.sees_kept(tile, flush_number);
             if is_wanted && self.is_replaced_in_place(tile)? {
                 let (from, to) =
                     (self.layout.current(tile, TileFile::Table), self.layout.kept(tile, flush_number));
@@ -74,12 +80,23 @@ impl TileStore {
     fn finish_renames(&mut self) -> Result<()> {
         while let Some(&tile) = self.unrenamed.first() {
             for &file in self.layout.files() {
-                self.rename(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
+                self.put_in_its_place(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
             }
             self.unrenamed.remove(&tile);
             self.renamed.insert(tile);
         }
         self.sync_renamed()
+    }
+
+    /// Gives a committed file its name. A folder or link that has it, which no map contains, is moved to quarantine.
+    fn put_in_its_place(&self, next: &Path, current: &Path) -> Result<()> {
+        let renamed = self.rename(next, current);
+        if renamed.is_err() && !matches!(self.disk.kind(current), Err(_) | Ok(None | Some(EntryKind::File(_)))) {
+            let to = Quarantine::new(&*self.disk, &self.layout).take(current)?;
+            log::warn!("{}: no file, and in the way of one; now {}", current.display(), to.display());
+            return self.rename(next, current);
+        }
+        renamed
     }
 
     fn sync_renamed(&mut self) -> Result<()> {
@@ -115,7 +132,10 @@ impl TileStore {
         }
         for &file in self.layout.files() {
             for path in [self.layout.current(tile, file), self.layout.next(tile, file)] {
-                self.remove_file(&path)?;
+                // What is no file is not voxtile's, and stays.
+                if matches!(self.kind(&path)?, Some(EntryKind::File(_))) {
+                    self.remove_file(&path)?;
+                }
             }
         }
         let names = self.disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;

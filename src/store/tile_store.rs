@@ -6,6 +6,7 @@ use super::metadata::Metadata;
 use super::place;
 use super::readers::Readers;
 use super::recovery::{recover, remove_uncommitted};
+use super::snapshot_list::SnapshotList;
 use super::snapshot_name::SnapshotName;
 use super::snapshots::{Snapshots, seen_by};
 use super::tile_location::{StoredTile, TileLocation};
@@ -56,6 +57,14 @@ pub struct TileStore {
     pub(super) readers: Readers,
     /// A writer's.
     pub(super) snapshots: Snapshots,
+    /// The map's snapshots; `None` where nothing says which there are.
+    pub(super) listed: Option<SnapshotList>,
+    /// Whether the log says so too.
+    pub(super) is_list_logged: bool,
+    /// A snapshot that is committed and may not have its name yet.
+    pub(super) unnamed_snapshot: Option<SnapshotName>,
+    /// A snapshot whose deletion is committed and whose file may be there still.
+    pub(super) deleted_snapshot: Option<SnapshotName>,
     /// The snapshot that was opened in place of the map as it is.
     pub(super) snapshot: Option<SnapshotName>,
     /// Held while the store may write.
@@ -80,6 +89,11 @@ impl TileStore {
         map_folder::check_is_free(&*disk, folder)?;
         let lock = Lock::take(&*disk, &layout)?;
         map_folder::check_is_free(&*disk, folder)?;
+        let mut metadata = metadata;
+        if let Some(ext) = &mut metadata.ext {
+            // Of another map, perhaps.
+            ext.snapshots = None;
+        }
         let commits = Commits::default();
         let log_path = layout.commit_log();
         let log = CommitLog::write_whole(&*disk, &log_path, map_id, &commits, &metadata.to_text())
@@ -114,8 +128,14 @@ impl TileStore {
                 store.replace_log()?;
             }
             let map_id = store.map_id().unwrap_or_default();
-            let leftovers = recover(&*store.disk, &store.layout, &store.commits, map_id)?;
+            let (disk, layout, listed) = (&*store.disk, &store.layout, store.listed.as_ref());
+            let leftovers = recover(disk, layout, &store.commits, map_id, listed)?;
             store.snapshots = leftovers.snapshots;
+            if store.listed.is_none() && !store.snapshots.found().is_empty() {
+                // Of a version that did not list them: the next commit does.
+                store.listed = Some(store.snapshots.found().clone());
+                store.is_list_logged = false;
+            }
             store.strays = leftovers.strays;
             store.leftovers_removed = leftovers.removed;
             store.unrenamed = leftovers.unrenamed;
@@ -132,13 +152,19 @@ impl TileStore {
     /// goes on seeing it while the writer flushes again.
     pub fn open_read_only(disk: Arc<dyn Disk>, folder: &Path) -> Result<Self> {
         let layout = Layout::new(folder);
-        for _ in 0..OPEN_ATTEMPTS {
+        for attempt in 0..OPEN_ATTEMPTS {
             let (metadata, shared) = map_folder::read_metadata_shared(&*disk, &layout)?;
             let store = Self::read(disk.clone(), layout.clone(), metadata)?;
             // Only if it still is the present one has the writer seen, at its next flush, that it is read.
             let now = map_folder::read_metadata(&*disk, &layout)?;
-            if now.ext.map(|ext| ext.flush_number) == store.written_flush {
+            // Where the log is ahead of it, the writer does not know which flush is read: a moment later it does, unless it was
+            // killed.
+            let is_known = !store.is_metadata_behind() || attempt + 1 >= OPEN_ATTEMPTS / 2;
+            if now.ext.map(|ext| ext.flush_number) == store.written_flush && is_known {
                 return Ok(Self { shared_metadata: Some(SharedMetadata(shared)), ..store });
+            }
+            if !is_known {
+                disk.pause();
             }
         }
         Err(Error::Changed { path: folder.to_owned() })
@@ -155,7 +181,7 @@ impl TileStore {
         Self::new(disk, Layout::new(folder), metadata, Some(CommitLog::of_map(map_id)), commits)
     }
 
-    fn read(disk: Arc<dyn Disk>, layout: Layout, metadata: Metadata) -> Result<Self> {
+    pub(super) fn read(disk: Arc<dyn Disk>, layout: Layout, metadata: Metadata) -> Result<Self> {
         let log = map_folder::read_log(&*disk, &layout)?;
         let log_path = layout.commit_log();
         let damaged = |at, reason: String| Err(FormatError::at_offset(at, reason).in_map(&log_path, None));
@@ -204,6 +230,7 @@ impl TileStore {
         let layout = layout.with_storage(metadata.storage());
         let (next, suspect, removed, unrenamed, renamed) = Default::default();
         let (unremoved, strays, foreign, readers, snapshots) = Default::default();
+        let listed = metadata.ext.as_ref().and_then(|ext| ext.snapshots.clone());
         Self {
             disk,
             layout,
@@ -223,6 +250,10 @@ impl TileStore {
             foreign,
             readers,
             snapshots,
+            listed,
+            is_list_logged: true,
+            unnamed_snapshot: None,
+            deleted_snapshot: None,
             snapshot: None,
             lock: None,
             shared_metadata: None,

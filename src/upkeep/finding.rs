@@ -50,9 +50,10 @@ impl Finding {
         }
     }
 
-    /// Whether an error is about a link, or anything else that is no file, in place of a file.
-    pub(super) fn is_link(error: &Error) -> bool {
+    /// Whether an error is about a file by itself: a link or anything else that is no file, or what the medium refuses.
+    pub(super) fn is_of_file(error: &Error) -> bool {
         matches!(error, Error::Io { cause, .. } if cause.kind() == std::io::ErrorKind::InvalidInput)
+            || error.is_of_medium()
     }
 
     /// The finding that an error stands for, if it is damage; other errors are passed back.
@@ -62,8 +63,25 @@ impl Finding {
             Error::Io { path, cause, .. } if cause.kind() == std::io::ErrorKind::InvalidInput => {
                 Ok(Self::damage(&path, None, &FormatError::at_offset(0, cause.to_string())))
             }
+            error if error.is_of_medium() => Ok(Self::unreadable(&error, None)),
             error => Err(error),
         }
+    }
+
+    /// The finding that an error of the medium stands for.
+    fn unreadable(error: &Error, tile: Option<TileIndex>) -> Self {
+        let Error::Io { path, action, cause } = error else {
+            return Self::damage(Path::new(""), tile, &FormatError::at_offset(0, error.to_string()));
+        };
+        let reason = format!("cannot {action}: {cause}; the medium refuses, or its file system is damaged");
+        let mut finding = Self::damage(path, tile, &FormatError::at_offset(0, reason));
+        finding.offset = None;
+        finding
+    }
+
+    /// The same finding, of a tile.
+    pub(super) fn in_tile(self, tile: TileIndex) -> Self {
+        Self { tile: Some(self.tile.unwrap_or(tile.to_array())), ..self }
     }
 }
 

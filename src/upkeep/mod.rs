@@ -9,7 +9,6 @@
 //! Both need memory for the list of tiles and one tile. What is promised is in `docs/durability.md`.
 
 mod finding;
-mod quarantine;
 mod rebuild;
 mod repair;
 mod repair_snapshots;

@@ -2,11 +2,11 @@
 
 use super::snapshots::last_known_flush;
 use crate::config::{MapConfig, Storage};
-use crate::error::{Error, FormatError, Result};
+use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::mapper::tile_files::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
-    Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Stamping,
+    Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Snapshot, Stamping,
     StoredTile, TileFile, TileStamp, hex, id_from_hex, tile_of_folder,
 };
 use crate::tile::format::{Trailer, read_compact_front, read_trailer};
@@ -92,6 +92,7 @@ fn index_from_tiles(
         damaged: Vec::new(),
         is_from_tiles: true,
     };
+    index.join_snapshots(disk, layout, written);
     for (done, &tile) in (1..).zip(&tiles) {
         index.add(disk, layout, &config, tile, known_scan)?;
         progress(done, tiles.len() as u64);
@@ -107,6 +108,21 @@ fn index_from_tiles(
 }
 
 impl Index {
+    /// The snapshots that `metadata.json` names, and those that are there: a log that cannot be read does not tell which of
+    /// them were deleted, and without a list all of them count.
+    fn join_snapshots(&mut self, disk: &dyn Disk, layout: &Layout, written: Option<&Metadata>) {
+        let Some(ext) = &mut self.metadata.ext else { return };
+        ext.snapshots = written.and_then(|metadata| metadata.ext.as_ref()?.snapshots.clone());
+        let Some(listed) = &mut ext.snapshots else { return };
+        for name in Snapshot::list(disk, layout).unwrap_or_default() {
+            if !listed.contains(&name)
+                && let Ok(snapshot) = Snapshot::read(disk, layout, &name, self.map_id, None)
+            {
+                listed.insert(name, Some(snapshot.commits.flush_number));
+            }
+        }
+    }
+
     fn add(
         &mut self,
         disk: &dyn Disk,
@@ -174,12 +190,13 @@ pub(super) fn read_alone(
             let error = FormatError::at_offset(0, error.to_string()).in_map(path, Some(tile));
             return Ok(Some(Err(error)));
         }
+        Err(error) if is_of_medium(&error) => return Ok(Some(Err(Error::io(path, "open", error)))),
         Err(error) => return Err(Error::io(path, "open", error)),
     };
     let bytes = input.file_bytes();
     let (path, input, map_id) = (path.to_owned(), Stamping::new(input), Some(map_id));
     match read_stored_table(grid, tile, StoredTile { path, input, bytes, map_id, stamp: None, storage }) {
-        Err(error @ Error::Damaged { .. }) => Ok(Some(Err(error))),
+        Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => Ok(Some(Err(error))),
         Err(error) => Err(error),
         Ok(table) => Ok(Some(Ok(table))),
     }
@@ -266,6 +283,7 @@ fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<(
         inputs: Vec::new(),
         decayed_scan: 0,
         storage: layout.storage(),
+        snapshots: None,
     };
     let (resolution_m, tile_size_m) = (parameters.resolution, parameters.tile_size);
     Ok((trailer.map_id, Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }))

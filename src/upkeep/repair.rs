@@ -1,5 +1,4 @@
 use super::finding::Finding;
-use super::quarantine::Quarantine;
 use super::rebuild::{self, Index};
 use super::tile_check::{check_tile, write_octree};
 use crate::config::MapConfig;
@@ -7,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::mapper::config_from;
 use crate::mapper::tile_saver::TileSaver;
 use crate::space::TileIndex;
-use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Remains, TileFile, TileStore, hex};
+use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Quarantine, Remains, TileFile, TileStore, hex};
 use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
 use std::fmt;
@@ -41,6 +40,8 @@ pub enum ActionKind {
     Removed,
     /// No longer named by the log, because its files are missing; or by a snapshot, because they are missing or damaged.
     Forgotten,
+    /// Nothing: the medium refused.
+    Left,
 }
 
 /// What a repair did.
@@ -51,10 +52,21 @@ pub struct Repair {
     pub tiles: u64,
     /// Tiles that are no longer part of some snapshot.
     pub snapshot_tiles_lost: u64,
+    /// Snapshots that the map no longer has.
+    pub snapshots_lost: u64,
     /// Tiles that are no longer part of the map: their space is unknown again.
     pub tiles_lost: u64,
+    /// Damage that is still there, because the medium refused.
+    pub left: u64,
     /// Number of things done; 0 if the map was whole.
     pub actions: u64,
+}
+
+impl Repair {
+    /// Whether all that the map and its snapshots held is there, and nothing is damaged any more.
+    pub fn is_complete(&self) -> bool {
+        self.tiles_lost + self.snapshot_tiles_lost + self.snapshots_lost + self.left == 0
+    }
 }
 
 /// Does what is possible for a damaged map: index and octrees are derived, damaged tiles go to `quarantine/`, what a
@@ -86,17 +98,13 @@ pub fn repair_on(
 ) -> Result<Repair> {
     let layout = Layout::new(folder);
     let mut repairer = Repairer { disk: &*disk, layout, done, progress, counts: Repair::default() };
+    repairer.repair_lock()?;
     let mut store = match TileStore::open(disk.clone(), folder) {
-        Ok(store) => store,
-        Err(Error::Damaged { tile: None, .. }) => {
+        Err(error) if matches!(error, Error::Damaged { tile: None, .. }) || Finding::is_of_file(&error) => {
             repairer.repair_index()?;
             TileStore::open(disk.clone(), folder)?
         }
-        Err(error) if Finding::is_link(&error) => {
-            repairer.repair_index()?;
-            TileStore::open(disk.clone(), folder)?
-        }
-        Err(error) => return Err(error),
+        store => store?,
     };
     let config = config_from(store.metadata(), &store.layout().metadata())?;
     repairer.layout = store.layout().clone();
@@ -141,7 +149,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         others.iter().try_for_each(|name| self.quarantine(&folder.join(name), why))
     }
 
-    fn quarantine_copy(&mut self, path: &Path, why: &str) -> Result<()> {
+    pub(super) fn quarantine_copy(&mut self, path: &Path, why: &str) -> Result<()> {
         if let Some(to) = Quarantine::new(self.disk, &self.layout).take_copy(path)? {
             self.note(ActionKind::Quarantined, path, format!("{why}; kept as {}", to.display()));
         }
@@ -150,6 +158,17 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
         self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
+    }
+
+    /// Makes way for the lock, which any file can be.
+    fn repair_lock(&mut self) -> Result<()> {
+        let path = self.layout.lock();
+        match self.kind(&path)? {
+            Some(EntryKind::Folder | EntryKind::Other) if self.kind(&self.layout.metadata())?.is_some() => {
+                self.quarantine(&path, "no regular file: nobody could lock the map")
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Writes `commits.log` and `metadata.json` anew from what is left of them and from the tiles.
@@ -239,8 +258,14 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         tiles.sort_unstable();
         let mut lost = Vec::new();
         for (done, &tile) in (1..).zip(&tiles) {
-            if !self.repair_tile(store, config, tile)? {
-                lost.push(tile);
+            match self.repair_tile(store, config, tile) {
+                Ok(true) => {}
+                Ok(false) => lost.push(tile),
+                Err(error) if error.is_of_medium() => {
+                    self.counts.left += 1;
+                    self.note(ActionKind::Left, &self.layout.tile_folder(tile), error.to_string());
+                }
+                Err(error) => return Err(error),
             }
             (self.progress)(done, tiles.len() as u64);
         }
@@ -266,7 +291,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     /// Repairs a tile that the map holds; false if it cannot stay in the map.
     fn repair_tile(&mut self, store: &mut TileStore, config: &MapConfig, tile: TileIndex) -> Result<bool> {
-        let check = check_tile(self.disk, store, config, tile)?;
+        let mut check = check_tile(self.disk, store, config, tile)?;
+        if matches!(&check.table, Err(error) if error.is_of_medium()) {
+            // Not for what passes.
+            check = check_tile(self.disk, store, config, tile)?;
+        }
         let table = match check.table {
             Ok(table) => table,
             Err(error) => {
@@ -282,7 +311,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         };
         let Some(Err(cause)) = check.octree else { return Ok(true) };
         let path = self.layout.current(tile, TileFile::Octree);
-        self.quarantine_copy(&path, &cause.reason)?;
+        match self.quarantine_copy(&path, &cause.reason) {
+            // What can be derived is replaced all the same.
+            Err(error) if error.is_of_medium() => {}
+            copied => copied?,
+        }
         if !matches!(self.kind(&path)?, None | Some(EntryKind::File(_))) {
             self.quarantine(&path, "no file")?;
         }
@@ -311,6 +344,7 @@ impl fmt::Display for Action {
             ActionKind::Renamed => "renamed",
             ActionKind::Removed => "removed",
             ActionKind::Forgotten => "forgotten",
+            ActionKind::Left => "left",
         };
         write!(f, "{kind}: {}: {}", self.path.display(), self.reason)
     }

@@ -5,31 +5,33 @@ use super::snapshots::{WholeTables, lost_tiles};
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::space::TileIndex;
-use crate::store::{Snapshot, TileStore};
+use crate::store::{Snapshot, SnapshotName, TileStore};
+use std::collections::BTreeMap;
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
-    /// Snapshots that cannot be read go to quarantine, and with them the kept tables that no other one sees. Of the others,
-    /// tiles go whose tables cannot be read.
+    /// Snapshots that are found under another name get their own again. Those that cannot be read go to quarantine, and with
+    /// them and with those that are missing the kept tables that no other one sees. Of the others, tiles go whose tables cannot
+    /// be read.
     pub(super) fn repair_snapshots(&mut self, store: &mut TileStore, config: &MapConfig) -> Result<()> {
         if store.map_id().is_none() {
             return Ok(());
         }
-        let names = match store.snapshot_names() {
-            Err(error) => {
-                let finding = Finding::of(error)?;
-                self.quarantine(&self.layout.snapshots(), &finding.reason)?;
-                return self.quarantine_unseen(store, &[]);
-            }
-            Ok(names) => names,
-        };
-        let (mut snapshots, mut is_one_damaged) = (Vec::new(), false);
-        for name in names {
+        if let Err(error) = Snapshot::list(self.disk, &self.layout) {
+            let finding = Finding::of(error)?;
+            self.quarantine(&self.layout.snapshots(), &finding.reason)?;
+        }
+        self.put_names_right(store)?;
+        let (mut snapshots, mut gone) = (Vec::new(), Vec::new());
+        for name in store.snapshot_names()? {
             match store.snapshot(&name) {
                 Ok(snapshot) => snapshots.push(snapshot),
                 Err(error) => {
-                    let finding = Finding::of(error)?;
-                    self.quarantine(&self.layout.snapshot(&name), &finding.reason)?;
-                    is_one_damaged = true;
+                    let (finding, path) = (Finding::of(error)?, self.layout.snapshot(&name));
+                    match self.kind(&path) {
+                        Ok(None) => self.note(ActionKind::Forgotten, &path, "the snapshot's file is missing"),
+                        _ => self.quarantine(&path, &finding.reason)?,
+                    }
+                    gone.push(name);
                 }
             }
         }
@@ -37,7 +39,61 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         for snapshot in &mut snapshots {
             self.repair_snapshot(store, config, snapshot, &mut whole)?;
         }
-        if is_one_damaged { self.quarantine_unseen(store, &snapshots) } else { Ok(()) }
+        if gone.is_empty() {
+            return Ok(());
+        }
+        self.counts.snapshots_lost += gone.len() as u64;
+        self.quarantine_unseen(store, &snapshots)?;
+        store.give_up_snapshots(&gone)
+    }
+
+    /// Puts snapshots that the log names and that lie under other names back under their own.
+    fn put_names_right(&mut self, store: &TileStore) -> Result<()> {
+        let (Some(map_id), Some(listed)) = (store.map_id(), store.snapshot_list().cloned()) else {
+            return Ok(());
+        };
+        let mut found = BTreeMap::new();
+        let mut misnamed = Vec::new();
+        let is_wanted = |snapshot: &Snapshot| {
+            let own = snapshot.name_inside().filter(|own| store.snapshot(own).is_err())?;
+            (listed.flush_of(own) == Some(snapshot.commits.flush_number)).then(|| own.clone())
+        };
+        for name in Snapshot::list(self.disk, &self.layout)? {
+            let path = self.layout.snapshot(&name);
+            if let Ok(Some(snapshot)) = Snapshot::read_file(self.disk, &path, &name, map_id)
+                && let Some(own) = is_wanted(&snapshot).filter(|own| *own != name)
+            {
+                self.quarantine_copy(&path, &format!("the file is that of the snapshot {own}"))?;
+                found.insert(own, snapshot);
+                misnamed.push(name);
+            }
+        }
+        // What an earlier repair, which was cut short, has taken there.
+        let quarantine = self.layout.quarantine();
+        for file in self.disk.list(&quarantine).unwrap_or_default() {
+            if let Some(name) = file.strip_prefix("snapshots.").and_then(|name| SnapshotName::new(name).ok())
+                && let Ok(Some(snapshot)) =
+                    Snapshot::read_file(self.disk, &quarantine.join(&file), &name, map_id)
+                && let Some(own) = is_wanted(&snapshot)
+            {
+                found.entry(own).or_insert(snapshot);
+            }
+        }
+        for (own, snapshot) in found {
+            let path = self.layout.snapshot(&own);
+            let is_there = self.kind(&path)?.is_some();
+            if is_there && !misnamed.contains(&own) {
+                self.quarantine(&path, "it cannot be read; the snapshot is whole under another name")?;
+            }
+            misnamed.retain(|name| *name != own);
+            store.replace_snapshot(&Snapshot { name: own, ..snapshot })?;
+            self.note(ActionKind::Renamed, &path, "the snapshot had another name");
+        }
+        // Copied already, and no snapshot.
+        for name in misnamed.iter().filter(|name| !listed.contains(name)) {
+            self.quarantine(&self.layout.snapshot(name), "commits.log names no such snapshot")?;
+        }
+        Ok(())
     }
 
     fn repair_snapshot(

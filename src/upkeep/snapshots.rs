@@ -38,7 +38,7 @@ pub(super) fn lost_tiles(
         }
         match tile_files::load_table(&past, &config.grid, tile) {
             Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), *stamp))),
-            Err(error @ Error::Damaged { .. }) => lost.push((tile, error)),
+            Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => lost.push((tile, error)),
             Err(error) => return Err(error),
         }
     }
@@ -54,7 +54,7 @@ pub(super) fn last_known_flush(
 ) -> u64 {
     let mut last = 0;
     for name in Snapshot::list(disk, layout).unwrap_or_default() {
-        if let Ok(snapshot) = Snapshot::read(disk, layout, &name, map_id) {
+        if let Ok(snapshot) = Snapshot::read(disk, layout, &name, map_id, None) {
             last = last.max(snapshot.commits.flush_number);
         }
     }

@@ -1,5 +1,5 @@
 use crate::config::MapConfig;
-use crate::error::{Error, FormatError, Result};
+use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::mapper::tile_files::{self, ReadTable};
 use crate::space::TileIndex;
 use crate::store::{Disk, FileStamp, Stamping, TileFile, TileStamp, TileStore};
@@ -30,7 +30,7 @@ pub(super) fn check_tile(
             let path = store.layout().current(tile, TileFile::Table);
             Err(FormatError::at_offset(0, "the map does not hold this tile").in_map(&path, Some(tile)))
         }
-        Err(error @ Error::Damaged { .. }) => Err(error),
+        Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => Err(error),
         Err(error) => return Err(error),
     };
     let has_octree = store.layout().files().contains(&TileFile::Octree);
@@ -49,14 +49,23 @@ fn check_octree(
 ) -> Result<std::result::Result<(), FormatError>> {
     let layout = store.layout();
     let current = layout.current(tile, TileFile::Octree);
-    let found = stamp_of(disk, &current)?;
+    let found = match stamp_of(disk, &current) {
+        Err(Error::Io { action, cause, .. }) if is_of_medium(&cause) => {
+            let reason = format!("cannot {action}: {cause}; it is derived from the table");
+            return Ok(Err(FormatError::at_offset(0, reason)));
+        }
+        found => found?,
+    };
     // A writer beside this reader may have committed it without renaming it yet.
     if found == Some(stamp.octree)
-        || stamp_of(disk, &layout.next(tile, TileFile::Octree))? == Some(stamp.octree)
+        || stamp_of(disk, &layout.next(tile, TileFile::Octree)).is_ok_and(|next| next == Some(stamp.octree))
     {
         return Ok(Ok(()));
     }
     Ok(Err(match found {
+        None if matches!(disk.kind(&current), Ok(Some(_))) => {
+            FormatError::at_offset(0, "no regular file; it is derived from the table")
+        }
         None => FormatError::at_offset(0, "the file is missing; it is derived from the table"),
         Some(FileStamp { bytes, .. }) if bytes != stamp.octree.bytes => {
             let wanted = stamp.octree.bytes;

@@ -7,7 +7,7 @@ use crate::error::{Error, FormatError, Result};
 use crate::mapper::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotName, TileFile,
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotList, SnapshotName, TileFile,
     TileStamp, TileStore, read_log, tile_of_folder,
 };
 use serde::Serialize;
@@ -52,7 +52,8 @@ impl Verification {
 ///
 /// # Errors
 ///
-/// No map there, or a disk that refuses to be read. Damage is a finding, not an error.
+/// No map there, or a disk that refuses more than single files. Damage is a finding, and so is a file or folder that the medium
+/// does not give back; the others are looked at all the same.
 pub fn verify(
     folder: impl AsRef<Path>,
     found: impl FnMut(&Finding),
@@ -74,6 +75,7 @@ pub fn verify_on(
 ) -> Result<Verification> {
     let layout = Layout::new(folder);
     let mut verifier = Verifier {
+        listed: None,
         disk: &*disk,
         layout,
         found,
@@ -91,9 +93,10 @@ pub fn verify_on(
     };
     if let Some(store) = store {
         verifier.layout = store.layout().clone();
+        verifier.listed = store.snapshot_list().cloned();
         let path = store.layout().metadata();
         match config_from(store.metadata(), &path) {
-            Ok(config) => verifier.verify_map(&store, &config)?,
+            Ok(config) => verifier.verify_map(&disk, &store, &config)?,
             Err(error) => {
                 let finding = Finding::of(error)?;
                 verifier.report(finding);
@@ -109,6 +112,8 @@ struct Verifier<'a, F, P> {
     found: F,
     progress: P,
     counts: Verification,
+    /// The snapshots that the log names; `None` if it names none.
+    listed: Option<SnapshotList>,
     /// Tiles that are no longer in the list of tiles because they are damaged, which has been told.
     told: BTreeSet<TileIndex>,
 }
@@ -126,7 +131,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.report(Finding::damage(path, tile, &FormatError::at_offset(0, reason)));
     }
 
-    fn verify_map(&mut self, store: &TileStore, config: &MapConfig) -> Result<()> {
+    fn verify_map(&mut self, disk: &Arc<dyn Disk>, store: &TileStore, config: &MapConfig) -> Result<()> {
         self.counts.verified = store.map_id().is_some();
         self.counts.flush_number = store.commits().flush_number;
         self.counts.scan_number = store.commits().scan_number;
@@ -148,7 +153,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             self.verify_tile(store, config, *tile)?;
             (self.progress)(done, tiles.len() as u64);
         }
-        let seen = self.verify_snapshots(store, config)?;
+        let seen = self.verify_snapshots(disk, store, config)?;
         self.look_around(&seen, |tile| tiles.binary_search(&tile).is_ok())
     }
 
@@ -163,7 +168,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             }
             Err(error) => {
                 let finding = Finding::of(error)?;
-                self.report(finding);
+                self.report(finding.in_tile(tile));
                 return Ok(());
             }
         };
@@ -198,7 +203,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 for (tile, error) in damaged {
                     self.told.insert(tile);
                     let finding = Finding::of(error)?;
-                    self.report(finding);
+                    self.report(finding.in_tile(tile));
                 }
                 let folder = self.layout.folder();
                 Ok(Some(TileStore::of_commits(disk.clone(), folder, map_id, metadata, commits)))
@@ -213,7 +218,12 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     }
 
     /// Looks at the snapshots, and at the tables that only they see. Returns those that are whole.
-    fn verify_snapshots(&mut self, store: &TileStore, config: &MapConfig) -> Result<WholeTables> {
+    fn verify_snapshots(
+        &mut self,
+        disk: &Arc<dyn Disk>,
+        store: &TileStore,
+        config: &MapConfig,
+    ) -> Result<WholeTables> {
         let mut whole = WholeTables::new();
         let names = match store.snapshot_names() {
             Err(error) => {
@@ -233,7 +243,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 Err(error) => vec![error],
                 Ok(lost) => lost.into_iter().map(|(_, error)| error).collect(),
             };
-            if !store.snapshot_names()?.contains(&name) {
+            let is_deleted = |now: TileStore| now.snapshot_names().is_ok_and(|names| !names.contains(&name));
+            if !errors.is_empty()
+                && TileStore::open_read_only(disk.clone(), self.layout.folder()).is_ok_and(is_deleted)
+            {
                 continue;
             }
             for error in errors {
@@ -246,18 +259,18 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     }
 
     fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
-        if self.disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?
-            != Some(EntryKind::Folder)
-        {
+        if self.kind(folder)? != Some(EntryKind::Folder) {
             return Ok(()); // Told already.
         }
         for name in self.list(folder)? {
+            let path = folder.join(&name);
             let reason = match SnapshotName::new(&*name) {
-                Ok(_) => continue,
+                Ok(name) if self.listed.as_ref().is_none_or(|listed| listed.contains(&name)) => continue,
+                Ok(_) => "no snapshot of the map: commits.log does not name it",
                 Err(_) if name == SNAPSHOT_NEXT => "left behind, or being written",
                 Err(_) => "no snapshot: it has no name of one",
             };
-            self.report(Finding::note(&folder.join(&name), None, reason));
+            self.report(Finding::note(&path, None, reason));
         }
         Ok(())
     }
@@ -268,7 +281,12 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         for name in self.list(&folder)? {
             let path = folder.join(&name);
             match (&*name, tile_of_folder(&name)) {
-                ("metadata.json" | "commits.log" | "writer.lock", _) => {}
+                ("metadata.json" | "commits.log", _) => {}
+                ("writer.lock", _) => {
+                    if matches!(self.kind(&path)?, Some(EntryKind::Folder | EntryKind::Other)) {
+                        self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
+                    }
+                }
                 (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
                 (QUARANTINE, _) => {
                     self.report(Finding::note(&path, None, "taken out of the map by a repair"))
@@ -293,7 +311,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         seen: &WholeTables,
         is_known: bool,
     ) -> Result<()> {
-        let kind = self.disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?;
+        let kind = self.kind(folder)?;
         if kind != Some(EntryKind::Folder) {
             if !is_known {
                 self.damage(folder, Some(tile), "something with a tile's name that is no folder");
@@ -340,9 +358,28 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         commits.tiles.get(&tile).copied()
     }
 
-    fn list(&self, folder: &Path) -> Result<Vec<String>> {
-        let mut names = self.disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
+    /// What has a name; nothing, and a finding, where the medium does not tell.
+    fn kind(&mut self, path: &Path) -> Result<Option<EntryKind>> {
+        let kind = self.disk.kind(path).map_err(|error| Error::io(path, "look at", error));
+        self.unless_unreadable(kind)
+    }
+
+    /// The names in a folder; none, and a finding, where it cannot be read.
+    fn list(&mut self, folder: &Path) -> Result<Vec<String>> {
+        let names = self.disk.list(folder).map_err(|error| Error::io(folder, "list", error));
+        let mut names = self.unless_unreadable(names)?;
         names.sort_unstable();
         Ok(names)
+    }
+
+    fn unless_unreadable<T: Default>(&mut self, result: Result<T>) -> Result<T> {
+        match result {
+            Err(error) if error.is_of_medium() => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                Ok(T::default())
+            }
+            result => result,
+        }
     }
 }

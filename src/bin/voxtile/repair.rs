@@ -34,6 +34,7 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
         |tiles, all| progress.set(tiles, all),
     )?;
     drop(progress);
+    let is_complete = repair.is_complete();
     let mut out = std::io::stdout().lock();
     if args.json {
         writeln!(out, "{}", serde_json::to_string(&Report { map: &args.map, repair, done })?)?;
@@ -45,6 +46,16 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
             out,
             "repaired: the map has {tiles} tiles; {lost} could not stay, their space is unknown again"
         )?;
+        if repair.snapshots_lost + repair.snapshot_tiles_lost > 0 {
+            let (snapshots, tiles) =
+                (HumanCount(repair.snapshots_lost), HumanCount(repair.snapshot_tiles_lost));
+            writeln!(out, "snapshots: {snapshots} could not stay; others lost {tiles} tiles")?;
+        }
+        if repair.left > 0 {
+            let left = HumanCount(repair.left);
+            writeln!(out, "still damaged: {left} tiles, because the disk refuses; copy the map to another one")?;
+        }
     }
-    Ok(ExitCode::SUCCESS)
+    // A script must not take a map with holes for a whole one.
+    Ok(if is_complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

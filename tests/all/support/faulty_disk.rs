@@ -1,10 +1,9 @@
 use super::random_scans::Random;
-use std::any::Any;
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
-use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
 
 /// A disk in memory that fails or loses power at the operation it is told to.
 ///
@@ -427,6 +426,16 @@ struct Watch {
 struct Locked {
     disk: FaultyDisk,
     inode: Inode,
+    path: PathBuf,
+}
+
+impl DiskLock for Locked {
+    fn is_in_place(&self) -> io::Result<bool> {
+        let mut state = self.disk.state();
+        state.attempt(Kind::Reads)?;
+        // An unfinished map that has got its name has taken the file along.
+        Ok(state.names.get(&self.path) == Some(&Entry::File(self.inode)))
+    }
 }
 
 impl Read for Reader {
@@ -666,7 +675,7 @@ impl Disk for FaultyDisk {
         }))
     }
 
-    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
         let mut state = self.state();
         let is_there = state.names.contains_key(path);
         state.attempt(if is_there { Kind::Changes } else { Kind::NeedsRoom })?;
@@ -675,6 +684,10 @@ impl Disk for FaultyDisk {
         if std::mem::replace(&mut content.locked, true) {
             return Ok(None);
         }
-        Ok(Some(Box::new(Locked { disk: self.clone(), inode })))
+        Ok(Some(Box::new(Locked { disk: self.clone(), inode, path: path.to_owned() })))
+    }
+
+    fn pause(&self) {
+        std::thread::yield_now();
     }
 }

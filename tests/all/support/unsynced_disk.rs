@@ -1,10 +1,9 @@
-use std::any::Any;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
-use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
 
 /// The file system without waiting for the medium: for tests that are not about crashes.
 #[derive(Debug)]
@@ -126,7 +125,7 @@ impl Disk for UnsyncedDisk {
         FsDisk.kind(path)
     }
 
-    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
         FsDisk.lock(path)
     }
 }

@@ -1,11 +1,10 @@
 use crate::bucket::Bucket;
 use serde::{Deserialize, Serialize};
-use std::any::Any;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use voxtile::store::{Disk, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
 
 /// How fast a disk is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -185,7 +184,7 @@ impl Disk for MeteredDisk {
         FsDisk.kind(path)
     }
 
-    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn Any + Send + Sync>>> {
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
         FsDisk.lock(path)
     }
 }

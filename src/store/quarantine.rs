@@ -1,21 +1,28 @@
-use crate::error::{Error, Result};
-use crate::store::{Disk, Layout};
+use super::disk::{Disk, EntryKind};
+use super::layout::Layout;
+use crate::error::{Error, Result, is_of_medium};
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// The folder in a map that takes what repair takes out: nothing is deleted.
-pub(super) struct Quarantine<'a> {
+#[derive(Debug)]
+pub struct Quarantine<'a> {
     disk: &'a dyn Disk,
     layout: &'a Layout,
 }
 
 impl<'a> Quarantine<'a> {
-    pub(super) fn new(disk: &'a dyn Disk, layout: &'a Layout) -> Self {
+    /// The quarantine of a map.
+    pub fn new(disk: &'a dyn Disk, layout: &'a Layout) -> Self {
         Self { disk, layout }
     }
 
     /// Moves a file or folder of the map; returns where to.
-    pub(super) fn take(&self, path: &Path) -> Result<PathBuf> {
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn take(&self, path: &Path) -> Result<PathBuf> {
         let to = self.place_for(path)?;
         self.disk.rename(path, &to).map_err(|error| Error::io(path, "move to quarantine", error))?;
         self.sync(&self.layout.quarantine())?;
@@ -25,13 +32,19 @@ impl<'a> Quarantine<'a> {
         Ok(to)
     }
 
-    /// Copies a file that is about to be replaced; returns where to, `None` if there is no file.
-    pub(super) fn take_copy(&self, path: &Path) -> Result<Option<PathBuf>> {
+    /// Copies a file that is about to be replaced; returns where to, `None` if there is no file. What is none, or cannot be
+    /// read, is moved as it is.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn take_copy(&self, path: &Path) -> Result<Option<PathBuf>> {
         let mut input = match self.disk.open(path) {
             Ok(input) => input,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            // Not a file: moved as it is.
-            Err(error) if error.kind() == io::ErrorKind::InvalidInput => return self.take(path).map(Some),
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput || is_of_medium(&error) => {
+                return self.take(path).map(Some);
+            }
             Err(error) => return Err(Error::io(path, "open", error)),
         };
         let to = self.place_for(path)?;
@@ -40,7 +53,13 @@ impl<'a> Quarantine<'a> {
             io::copy(&mut input, &mut out)?;
             out.sync()
         };
-        copied().map_err(|error| Error::io(path, "copy to quarantine", error))?;
+        match copied() {
+            Err(error) if is_of_medium(&error) => {
+                let _ = self.disk.remove_file(&to);
+                return self.take(path).map(Some);
+            }
+            copied => copied.map_err(|error| Error::io(path, "copy to quarantine", error))?,
+        }
         self.sync(&self.layout.quarantine())?;
         Ok(Some(to))
     }
@@ -66,7 +85,7 @@ impl<'a> Quarantine<'a> {
         Ok(to)
     }
 
-    fn kind(&self, path: &Path) -> Result<Option<crate::store::EntryKind>> {
+    fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
         self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
     }
 

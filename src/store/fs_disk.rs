@@ -1,0 +1,278 @@
+use super::disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+/// The real file system.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FsDisk;
+
+/// How many milliseconds to wait for a lock that a writer holds for an instant.
+const LOCK_ATTEMPTS: usize = 100;
+
+struct FsRead {
+    file: File,
+    bytes: u64,
+}
+
+impl Disk for FsDisk {
+    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        let file = File::open(only_a_file(path)?)?;
+        let bytes = file.metadata()?.len();
+        Ok(Box::new(FsRead { file, bytes }))
+    }
+
+    fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        let file = File::open(only_a_file(path)?)?;
+        // A writer that looks for readers holds the lock for an instant.
+        for _ in 0..LOCK_ATTEMPTS {
+            match file.try_lock_shared() {
+                Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(1)),
+                Ok(()) | Err(TryLockError::Error(_)) => break,
+            }
+        }
+        let bytes = file.metadata()?.len();
+        Ok(Box::new(FsRead { file, bytes }))
+    }
+
+    fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
+        Ok(Box::new(File::open(only_a_file(path)?)?))
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        if has_other_names(path) {
+            fs::remove_file(path)?;
+        }
+        Ok(Box::new(File::create(only_a_file(path)?)?))
+    }
+
+    fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
+        let file = OpenOptions::new().append(true).open(only_a_file(path)?)?;
+        let bytes = file.metadata()?.len();
+        if bytes < offset {
+            let reason = format!("{bytes} bytes, {offset} expected: somebody else changed the file");
+            return Err(io::Error::other(reason));
+        }
+        if bytes > offset {
+            file.set_len(offset)?;
+        }
+        Ok(Box::new(file))
+    }
+
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        OpenOptions::new().write(true).open(only_a_file(path)?)?.sync_all()
+    }
+
+    fn sync_folder(&self, path: &Path) -> io::Result<()> {
+        // Only Unix lets a folder be opened and synced; elsewhere renames are durable by themselves.
+        if cfg!(unix) { File::open(path)?.sync_all() } else { Ok(()) }
+    }
+
+    fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
+        [at_once(files, |path| self.sync_file(path)), at_once(folders, |path| self.sync_folder(path))]
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)
+    }
+
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        // Elsewhere it cannot be told that a file has other names.
+        if cfg!(unix) {
+            fs::hard_link(only_a_file(from)?, to)
+        } else {
+            Err(io::ErrorKind::Unsupported.into())
+        }
+    }
+
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        fs::remove_file(path)
+    }
+
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        fs::create_dir(path)
+    }
+
+    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+        fs::remove_dir(path)
+    }
+
+    fn list(&self, path: &Path) -> io::Result<Vec<String>> {
+        let names = fs::read_dir(path)?.map(|entry| Ok(entry?.file_name().into_string().ok()));
+        names.filter_map(io::Result::transpose).collect()
+    }
+
+    fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {
+        match fs::symlink_metadata(path) {
+            Ok(metadata) if metadata.is_file() => Ok(Some(EntryKind::File(metadata.len()))),
+            Ok(metadata) if metadata.is_dir() => Ok(Some(EntryKind::Folder)),
+            Ok(_) => Ok(Some(EntryKind::Other)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
+        let absolute = std::path::absolute(path)?;
+        for there in absolute.ancestors() {
+            match there.canonicalize() {
+                Ok(resolved) => {
+                    let rest = absolute.strip_prefix(there).unwrap_or(Path::new(""));
+                    return Ok(if rest.as_os_str().is_empty() { resolved } else { resolved.join(rest) });
+                }
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(absolute)
+    }
+
+    fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
+        // A process that this one is just starting holds all its files for an instant, let go or not.
+        for _ in 0..LOCK_ATTEMPTS {
+            let lock = FsLock { file: open_for_writers(only_a_file(path)?)?, path: path.to_owned() };
+            match lock.file.try_lock() {
+                // Between the two steps the file may have been removed, and another process have made the next.
+                Ok(()) if lock.is_in_place()? => return Ok(Some(Box::new(lock))),
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(1)),
+                Err(TryLockError::Error(error)) => return Err(error),
+            }
+        }
+        Ok(None)
+    }
+}
+
+struct FsLock {
+    file: File,
+    path: PathBuf,
+}
+
+impl DiskLock for FsLock {
+    #[cfg(unix)]
+    fn is_in_place(&self) -> io::Result<bool> {
+        use std::os::unix::fs::MetadataExt;
+        let held = self.file.metadata()?;
+        match fs::symlink_metadata(&self.path) {
+            Ok(named) => Ok((named.dev(), named.ino()) == (held.dev(), held.ino())),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// A file that is open keeps its name there.
+    #[cfg(not(unix))]
+    fn is_in_place(&self) -> io::Result<bool> {
+        self.path.try_exists()
+    }
+}
+
+/// Opens a file, made if missing, that only who may write it can open: everybody who can open a file can lock it.
+fn open_for_writers(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(false);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+        let file = options.mode(0o622).open(path)?;
+        let mode = file.metadata()?.permissions().mode();
+        // Group and others: who may not write may not read.
+        let unwritten = !(mode << 1) & 0o044;
+        if mode & unwritten != 0 {
+            // Only its owner can; to others it is as before.
+            let _ = file.set_permissions(fs::Permissions::from_mode(mode & !unwritten));
+        }
+        Ok(file)
+    }
+    #[cfg(not(unix))]
+    options.open(path)
+}
+
+impl Read for FsRead {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.file.read(buffer)
+    }
+}
+
+impl DiskRead for FsRead {
+    fn file_bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+impl ReaderWatch for File {
+    fn has_readers(&self) -> bool {
+        match self.try_lock() {
+            Err(TryLockError::WouldBlock) => true,
+            // Without locks no reader can hold one.
+            Err(TryLockError::Error(_)) => false,
+            Ok(()) => {
+                // Closing the file would release it too.
+                let _ = self.unlock();
+                false
+            }
+        }
+    }
+}
+
+impl DiskWrite for File {
+    fn sync(&mut self) -> io::Result<()> {
+        self.sync_all()
+    }
+}
+
+/// Syncs many paths. A sync is waiting, not work: a file system that is asked for several at once writes them together.
+fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> Vec<io::Result<()>> {
+    const AT_ONCE: usize = 16;
+    if paths.len() < 2 {
+        return paths.iter().map(|path| sync(path)).collect();
+    }
+    let next = AtomicUsize::new(0);
+    let results: Vec<OnceLock<io::Result<()>>> = paths.iter().map(|_| OnceLock::new()).collect();
+    let sync_next = || {
+        while let Some(number) = Some(next.fetch_add(1, Ordering::Relaxed))
+            && let Some(path) = paths.get(number)
+        {
+            let _ = results[number].set(sync(path));
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 1..AT_ONCE.min(paths.len()) {
+            // Where no thread is to be had, this one does it all.
+            let _ = thread::Builder::new().spawn_scoped(scope, sync_next);
+        }
+        sync_next();
+    });
+    let never_tried = || Err(io::Error::other("the sync was not tried"));
+    results.into_iter().map(|result| result.into_inner().unwrap_or_else(never_tried)).collect()
+}
+
+/// Whether a file has names beside this one.
+fn has_other_names(path: &Path) -> bool {
+    #[cfg(unix)]
+    let names = |metadata: fs::Metadata| std::os::unix::fs::MetadataExt::nlink(&metadata);
+    #[cfg(not(unix))]
+    let names = |_: fs::Metadata| 1;
+    fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_file() && names(metadata) > 1)
+}
+
+/// A link inside a map could lead anywhere, and a pipe would be waited for: only files are opened, and names that
+/// nothing has.
+fn only_a_file(path: &Path) -> io::Result<&Path> {
+    match fs::symlink_metadata(path) {
+        Ok(metadata) if !metadata.is_file() => {
+            let reason = if metadata.is_symlink() {
+                "a symbolic link; links inside a map are not followed"
+            } else {
+                "not a regular file"
+            };
+            Err(io::Error::new(io::ErrorKind::InvalidInput, reason))
+        }
+        _ => Ok(path),
+    }
+}
