@@ -1,7 +1,7 @@
 use super::answers::after;
 use super::codec::{Ask, DigestEntry};
-use super::set::VoxelSet;
 use super::parts::Parts;
+use super::set::VoxelSet;
 use super::set_range::SetRange;
 use crate::space::TileIndex;
 use std::time::Duration;

@@ -51,7 +51,8 @@ impl Content {
         let mut own = set.bricks_between(from, last).peekable();
         let mut found = Vec::new();
         while found.len() < most {
-            let places = own.peek().map(|(place, _)| *place).into_iter().chain(theirs.peek().map(|next| next.0));
+            let places =
+                own.peek().map(|(place, _)| *place).into_iter().chain(theirs.peek().map(|next| next.0));
             let Some(place) = places.min() else { break };
             let before = own.next_if(|next| next.0 == place).map_or([0; 8], |(_, mask)| mask);
             let after = theirs.next_if(|next| next.0 == place).map_or([0; 8], |(_, mask)| mask);

@@ -69,7 +69,7 @@ mod union;
 mod watch;
 
 pub use fold::{FoldReport, fold_layer};
-pub use layer_file::{read_layer, write_layer};
+pub use layer_file::{read_layer, read_layer_within, write_layer};
 pub use policy::ExportPolicy;
 pub use receiver::Receiver;
 pub use receiver_config::{ReceiverConfig, ReceiverCounts};

@@ -131,8 +131,7 @@ mod tests {
             assert!(parts.remove(range(2 * k, 2 * k)));
         });
         assert_eq!(parts.parts.len(), MAX_PARTS);
-        let is_wanted =
-            |parts: &Parts, code| parts.iter().any(|part| part.contains(range(code, code).first));
+        let is_wanted = |parts: &Parts, code| parts.iter().any(|part| part.contains(range(code, code).first));
         (0..3 * MAX_PARTS as u64).for_each(|k| assert!(is_wanted(&parts, 2 * k + 1)));
         let mut parts = Parts::default();
         (0..3 * MAX_PARTS as u64).rev().for_each(|k| parts.put(range(2 * k + 10, 2 * k + 10)));

@@ -92,6 +92,11 @@ impl Receiver {
         self.layer.as_mut()
     }
 
+    /// The layer, for whoever listens no more.
+    pub fn into_layer(self) -> Option<VoxelSet> {
+        self.layer
+    }
+
     /// What was seen so far.
     pub fn counts(&self) -> ReceiverCounts {
         self.counts
@@ -155,9 +160,8 @@ impl Receiver {
             }
             Packet::Content { range, voxels, .. } => {
                 let Some(layer) = &self.layer else { return Ok(()) };
-                let content = Content::new(layer.grid(), range, &voxels).ok_or_else(|| {
-                    FormatError::at_offset(0, "content with voxels outside of its range")
-                })?;
+                let content = Content::new(layer.grid(), range, &voxels)
+                    .ok_or_else(|| FormatError::at_offset(0, "content with voxels outside of its range"))?;
                 self.take_content(sequence, range, &content, &mut Work::of_a_packet(), now);
             }
             Packet::Digests { first, entries, .. } => self.take_digests(sequence, first, &entries, now),
@@ -188,7 +192,14 @@ impl Receiver {
     }
 
     /// Replaces a part of the layer, but for what came after the packet that the part is as of.
-    fn take_content(&mut self, as_of: u64, range: SetRange, content: &Content, work: &mut Work, now: Duration) {
+    fn take_content(
+        &mut self,
+        as_of: u64,
+        range: SetRange,
+        content: &Content,
+        work: &mut Work,
+        now: Duration,
+    ) {
         let Some(stream) = &mut self.stream else { return };
         if as_of < stream.stamps.forgotten() {
             return;

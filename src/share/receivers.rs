@@ -16,6 +16,15 @@ pub struct Receivers<K> {
     robots: BTreeMap<K, Receiver>,
 }
 
+impl<K> IntoIterator for Receivers<K> {
+    type Item = (K, Receiver);
+    type IntoIter = std::collections::btree_map::IntoIter<K, Receiver>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.robots.into_iter()
+    }
+}
+
 /// What one packet can add, before anybody has to forget: voxels each alone in its tile.
 const PACKET_BYTES: usize = super::codec::MAX_VOXELS_PER_PACKET * VoxelSet::MOST_BYTES_A_VOXEL;
 
@@ -103,6 +112,11 @@ impl<K: Ord + Clone> Receivers<K> {
     /// What every robot may have, whatever the others do.
     pub fn part_bytes(&self) -> usize {
         self.for_all() / self.robots.len().max(1)
+    }
+
+    /// What nobody has of the memory, and no packet needs.
+    pub fn free_bytes(&self) -> usize {
+        self.for_all().saturating_sub(self.memory_bytes())
     }
 
     fn for_all(&self) -> usize {

@@ -1,6 +1,7 @@
 use super::set_range::{LAST_CODE, SetPosition, SetRange};
 use crate::space::{
-    BRICK_VOXELS, BrickCode, BrickMask, Grid, LAST_VOXEL_INDEX, MortonCode, TileIndex, VoxelIndex, VoxelKey, places,
+    BRICK_VOXELS, BrickCode, BrickMask, Grid, LAST_VOXEL_INDEX, MortonCode, TileIndex, VoxelBox, VoxelIndex,
+    VoxelKey, places,
 };
 use std::collections::BTreeMap;
 
@@ -145,6 +146,27 @@ impl VoxelSet {
             codes
                 .filter(move |code| (first..=last).contains(&code.0))
                 .map(move |code| code.to_key().to_index_from(min))
+        })
+    }
+
+    /// The voxels in a box. Looks at the tiles along x that reach into it, and at what lies in those that do: at what is
+    /// there, however large the box is.
+    pub(super) fn in_box(&self, voxels: &VoxelBox) -> impl Iterator<Item = VoxelIndex> {
+        let last = voxels.end.map(|end| end.saturating_sub(1));
+        let (first, last) = (self.grid.tile_of_voxel(voxels.min), self.grid.tile_of_voxel(last));
+        let tiles = (!voxels.is_empty()).then(|| {
+            let from = TileIndex::new(first.x, i32::MIN, i32::MIN);
+            self.tiles.range(from..=TileIndex::new(last.x, i32::MAX, i32::MAX))
+        });
+        let reaches_in = move |tile: &TileIndex| {
+            (first.y..=last.y).contains(&tile.y) && (first.z..=last.z).contains(&tile.z)
+        };
+        let tiles = tiles.into_iter().flatten().filter(move |(index, _)| reaches_in(index));
+        tiles.flat_map(move |(&index, tile)| {
+            let min = self.grid.voxels_of_tile(index).min;
+            let codes =
+                tile.bricks.iter().flat_map(|(brick, mask)| places(*mask).map(|place| brick.voxel(place)));
+            codes.map(move |code| code.to_key().to_index_from(min)).filter(|voxel| voxels.contains(*voxel))
         })
     }
 

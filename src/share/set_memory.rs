@@ -18,7 +18,8 @@ const ENTRIES: usize = 5;
 
 impl VoxelSet {
     /// Bytes of memory that a voxel takes at most: one that begins a tile.
-    pub(super) const MOST_BYTES_A_VOXEL: usize = TILE_NODE.div_ceil(ENTRIES) + BRICK_NODE + BRICK_NODE / ENTRIES;
+    pub(super) const MOST_BYTES_A_VOXEL: usize =
+        TILE_NODE.div_ceil(ENTRIES) + BRICK_NODE + BRICK_NODE / ENTRIES;
 
     /// Bytes of memory on the heap, at most: what nodes take that are as empty as they may be. By voxels that lie alone
     /// it is 190 bytes each within a tile, of which 120 to 150 are taken, and 1300 for one that is alone in its tile.

@@ -95,8 +95,8 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
         let mut receivers = Receivers::new(MEMORY).unwrap();
         (0..3).for_each(|robot| receivers.insert(robot, config(seed + u64::from(robot)), None).unwrap());
         let mut honest = Sender::new(grid(), 1, SenderConfig::default()).unwrap();
-        let mut hostile =
-            [1, 2].map(|robot: u8| (robot, Hostile { random: Random::of(seed, &[robot.into()]), sequence: 1 }));
+        let mut hostile = [1, 2]
+            .map(|robot: u8| (robot, Hostile { random: Random::of(seed, &[robot.into()]), sequence: 1 }));
         let (mut now, mut fullest) = (Duration::ZERO, 0);
         let mut random = Random::of(seed, &[]);
         for step in 0..200 {
