@@ -32,3 +32,4 @@ pub use occupancy::{Occupancy, UnknownAs};
 pub use octree_blocks::OctreeExport;
 pub use questions::Questions;
 pub use ray::{RayHit, RayQuery};
+pub(crate) use region::voxels_around;

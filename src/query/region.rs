@@ -96,9 +96,10 @@ pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
 }
 
 /// The voxels whose center may lie in a box, and a few around.
-pub(super) fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
+pub(crate) fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
+    // Room for the few around; voxels have indices up to the ends.
     let to_index =
-        |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN / 2), f64::from(i32::MAX / 2)) as i32;
+        |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN + 1), f64::from(i32::MAX - 2)) as i32;
     VoxelBox {
         min: grid.to_voxel_units(region.min).map(|coordinate| to_index(coordinate) - 1),
         end: grid.to_voxel_units(region.max).map(|coordinate| to_index(coordinate) + 2),

@@ -1,7 +1,8 @@
 use super::answers::after;
 use super::codec::{Ask, DigestEntry};
+use super::parts::Parts;
 use super::set::VoxelSet;
-use super::set_range::{SetPosition, SetRange};
+use super::set_range::SetRange;
 use crate::space::TileIndex;
 use std::time::Duration;
 
@@ -24,24 +25,23 @@ struct Asked {
     rest: Parts,
 }
 
-/// Parts of a set, to be ticked off.
-#[derive(Clone, Debug, Default)]
-struct Parts(Vec<SetRange>);
-
 /// Parts that one ask for voxels lists.
 const PARTS_PER_ASK: usize = 20;
 /// Answers after which the next ask goes out; a sender answers with as many by default.
 const PACKETS_PER_ASK: usize = 16;
 
 impl CatchUp {
+    /// Bytes of memory, at most.
+    pub(super) const MOST_BYTES: usize = 3 * Parts::MOST_BYTES;
+
     pub(super) fn is_done(&self) -> bool {
-        self.digests.0.is_empty() && self.content.0.is_empty()
+        self.digests.is_empty() && self.content.is_empty()
     }
 
     /// Begins with everything.
     pub(super) fn begin(&mut self, layer: &VoxelSet) {
         *self = Self::default();
-        if layer.is_empty() { &mut self.content } else { &mut self.digests }.0.push(SetRange::ALL);
+        if layer.is_empty() { &mut self.content } else { &mut self.digests }.put(SetRange::ALL);
     }
 
     /// Takes digests; returns the parts of which the sender has no voxels.
@@ -73,12 +73,17 @@ impl CatchUp {
                 || entry.voxels <= FEW_VOXELS
                 || is_single(layer, range)
             {
-                self.content.0.push(range);
+                self.content.put(range);
             } else {
-                self.digests.0.push(range);
+                self.digests.put(range);
             }
         }
         empty
+    }
+
+    /// Has a part fetched.
+    pub(super) fn want_content(&mut self, range: SetRange) {
+        self.content.put(range);
     }
 
     /// Ticks off a part whose voxels came.
@@ -106,22 +111,24 @@ impl CatchUp {
         patience: Duration,
     ) -> Option<Ask> {
         if let Some(asked) = &self.last_ask {
-            let is_answered = asked.rest.0.is_empty() || asked.packets >= PACKETS_PER_ASK;
+            let is_answered = asked.rest.is_empty() || asked.packets >= PACKETS_PER_ASK;
             let is_over = is_answered || now >= asked.heard_at + patience;
             if !is_over || now < asked.at + interval {
                 return None;
             }
         }
-        let (ask, rest) = if let Some(&range) = self.digests.0.first() {
+        // Before there is no room for what further digests say.
+        let digests = if self.content.is_half_full() { None } else { self.digests.iter().next() };
+        let (ask, rest) = if let Some(range) = digests {
             (Ask::Digests { epoch, range }, vec![range])
-        } else if !self.content.0.is_empty() {
-            let ranges: Vec<SetRange> = self.content.0.iter().copied().take(PARTS_PER_ASK).collect();
+        } else if !self.content.is_empty() {
+            let ranges: Vec<SetRange> = self.content.iter().take(PARTS_PER_ASK).collect();
             (Ask::Content { epoch, ranges: ranges.clone() }, ranges)
         } else {
             self.last_ask = None;
             return None;
         };
-        self.last_ask = Some(Asked { at: now, heard_at: now, packets: 0, rest: Parts(rest) });
+        self.last_ask = Some(Asked { at: now, heard_at: now, packets: 0, rest: rest.into_iter().collect() });
         Some(ask)
     }
 }
@@ -130,41 +137,5 @@ impl CatchUp {
 const FEW_VOXELS: u64 = 256;
 
 fn is_single(layer: &VoxelSet, range: SetRange) -> bool {
-    range.first.tile == range.last.tile || layer.tiles_between(range.first.tile, range.last.tile).len() <= 1
-}
-
-impl Parts {
-    /// Takes a part away; whether there was any of it.
-    fn remove(&mut self, part: SetRange) -> bool {
-        let before = std::mem::take(&mut self.0);
-        let mut was_there = false;
-        for range in before {
-            if part.last < range.first || range.last < part.first {
-                self.0.push(range);
-                continue;
-            }
-            was_there = true;
-            if range.first < part.first {
-                self.0.push(SetRange { first: range.first, last: before_position(part.first) });
-            }
-            if part.last < range.last {
-                self.0.push(SetRange { first: part.last.next(), last: range.last });
-            }
-        }
-        was_there
-    }
-}
-
-/// The place before one that is not the first of all.
-fn before_position(position: SetPosition) -> SetPosition {
-    if position.code > 0 {
-        return SetPosition { code: position.code - 1, ..position };
-    }
-    let TileIndex { x, y, z } = position.tile;
-    let tile = match (y, z) {
-        (i32::MIN, i32::MIN) => TileIndex::new(x.saturating_sub(1), i32::MAX, i32::MAX),
-        (_, i32::MIN) => TileIndex::new(x, y - 1, i32::MAX),
-        _ => TileIndex::new(x, y, z - 1),
-    };
-    SetPosition { tile, code: super::set_range::LAST_CODE }
+    !layer.has_several_tiles(range.first.tile, range.last.tile)
 }

@@ -1,32 +1,83 @@
-use super::set::VoxelSet;
+use super::set::{VoxelSet, position_of};
 use super::set_range::{SetPosition, SetRange};
-use crate::space::{TileIndex, VoxelIndex, places};
+use crate::space::{BrickCode, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex};
+use std::collections::BTreeMap;
 
-/// Voxels of a part of a set that are not as in another set, and what they are there.
-pub(super) fn differences(from: &VoxelSet, to: &VoxelSet, range: SetRange) -> Vec<(VoxelIndex, bool)> {
-    let (first, last) = (range.first.tile, range.last.tile);
-    let mut tiles: Vec<TileIndex> = from.tiles_between(first, last);
-    tiles.extend(to.tiles_between(first, last));
-    tiles.sort_unstable();
-    tiles.dedup();
-    let mut found = Vec::new();
-    for tile in tiles {
-        let min = from.grid().voxels_of_tile(tile).min;
-        let mut bricks: Vec<_> =
-            from.bricks_of(tile).chain(to.bricks_of(tile)).map(|(brick, _)| brick).collect();
-        bricks.sort_unstable();
-        bricks.dedup();
-        for brick in bricks {
-            let (before, after) = (from.brick(tile, brick), to.brick(tile, brick));
-            for place in places(std::array::from_fn(|k| before[k] ^ after[k])) {
-                let code = brick.voxel(place);
-                let position = SetPosition { tile, code: code.0 };
-                if range.contains(position) {
-                    let is_in = after[place / 64] >> (place % 64) & 1 == 1;
-                    found.push((code.to_key().to_index_from(min), is_in));
-                }
+/// A brick of a tile, in the order of a set.
+pub(super) type BrickPlace = (TileIndex, BrickCode);
+
+/// The voxels of a part of a set, as bricks: as many as come in a packet. None by default.
+#[derive(Default)]
+pub(super) struct Content(BTreeMap<BrickPlace, BrickMask>);
+
+/// A brick that is not as in a set.
+pub(super) struct Difference {
+    pub(super) place: BrickPlace,
+    /// What it should be.
+    pub(super) after: BrickMask,
+    /// Where it is not.
+    pub(super) differing: BrickMask,
+}
+
+impl Content {
+    /// Of voxels; `None` if one lies outside of the range.
+    pub(super) fn new(grid: &Grid, range: SetRange, voxels: &[VoxelIndex]) -> Option<Self> {
+        let mut bricks = BTreeMap::new();
+        for &voxel in voxels {
+            let position = position_of(grid, voxel);
+            if !range.contains(position) {
+                return None;
+            }
+            let code = MortonCode(position.code);
+            let mask: &mut BrickMask = bricks.entry((position.tile, code.brick())).or_default();
+            mask[code.place_in_brick() / 64] |= 1 << (code.place_in_brick() % 64);
+        }
+        Some(Self(bricks))
+    }
+
+    /// Bricks of a range, from one on, that are not in a set as they are here: in order, at most so many.
+    pub(super) fn differences(
+        &self,
+        set: &VoxelSet,
+        from: BrickPlace,
+        range: SetRange,
+        most: usize,
+    ) -> Vec<Difference> {
+        let last = brick_at(range.last);
+        if from > last {
+            return Vec::new();
+        }
+        let mut theirs = self.0.range(from..=last).map(|(&place, &mask)| (place, mask)).peekable();
+        let mut own = set.bricks_between(from, last).peekable();
+        let mut found = Vec::new();
+        while found.len() < most {
+            let places =
+                own.peek().map(|(place, _)| *place).into_iter().chain(theirs.peek().map(|next| next.0));
+            let Some(place) = places.min() else { break };
+            let before = own.next_if(|next| next.0 == place).map_or([0; 8], |(_, mask)| mask);
+            let after = theirs.next_if(|next| next.0 == place).map_or([0; 8], |(_, mask)| mask);
+            let inside = mask_inside(range, place);
+            let differing: BrickMask = std::array::from_fn(|k| (before[k] ^ after[k]) & inside[k]);
+            if differing != [0; 8] {
+                found.push(Difference { place, after, differing });
             }
         }
+        found
     }
-    found
+}
+
+/// The brick that holds a place.
+pub(super) fn brick_at(position: SetPosition) -> BrickPlace {
+    (position.tile, MortonCode(position.code).brick())
+}
+
+/// The voxels of a brick that lie in a range.
+fn mask_inside(range: SetRange, (tile, brick): BrickPlace) -> BrickMask {
+    let contains = |place| range.contains(SetPosition { tile, code: brick.voxel(place).0 });
+    if contains(0) && contains(511) {
+        return [u64::MAX; 8];
+    }
+    let mut mask = [0; 8];
+    (0..512).filter(|&place| contains(place)).for_each(|place| mask[place / 64] |= 1 << (place % 64));
+    mask
 }

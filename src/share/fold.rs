@@ -18,8 +18,11 @@ pub struct FoldReport {
     pub hits: u64,
 }
 
-/// Folds a layer into an archive: every voxel of the layer that is not occupied in the archive gets one hit, each tile as
-/// one batch. So what the archive knows of its own scans weighs more, and folding the same layer again changes only what
+/// Voxels of a batch: a tile may hold a billion.
+const VOXELS_AT_A_TIME: usize = 1 << 16;
+
+/// Folds a layer into an archive: every voxel of the layer that is not occupied in the archive gets one hit, tile by tile
+/// in batches. So what the archive knows of its own scans weighs more, and folding the same layer again changes only what
 /// one hit has not made occupied.
 ///
 /// # Errors
@@ -36,21 +39,27 @@ pub fn fold_layer(layer: &VoxelSet, mapper: &mut impl Mapper) -> Result<FoldRepo
         return Err(Error::argument("resolution", reason));
     }
     let mut report = FoldReport { voxels: layer.len(), ..FoldReport::default() };
-    for tile in layer.tiles() {
-        let voxels = layer.in_range(SetRange::of_tiles(tile, tile));
-        let centers: Vec<Point> = voxels.map(|voxel| layer.grid().center_m(voxel)).collect();
-        let occupancies = mapper.occupancy_at_points(&centers)?;
-        let new = centers.iter().zip(&occupancies).filter(|(_, occupancy)| !occupancy.is_occupied());
-        let points: Vec<Point> = new.map(|(center, _)| *center).collect();
-        report.known += (centers.len() - points.len()) as u64;
-        report.hits += points.len() as u64;
-        if !points.is_empty() {
-            let is_occupied = vec![true; points.len()];
-            mapper.batch_update(&PointBatch {
-                points: &points,
-                intensities: None,
-                is_occupied: &is_occupied,
-            })?;
+    let tiles = layer.tiles().map(|tile| layer.in_range(SetRange::of_tiles(tile, tile)));
+    for mut voxels in tiles {
+        loop {
+            let some = voxels.by_ref().take(VOXELS_AT_A_TIME);
+            let centers: Vec<Point> = some.map(|voxel| layer.grid().center_m(voxel)).collect();
+            if centers.is_empty() {
+                break;
+            }
+            let occupancies = mapper.occupancy_at_points(&centers)?;
+            let new = centers.iter().zip(&occupancies).filter(|(_, occupancy)| !occupancy.is_occupied());
+            let points: Vec<Point> = new.map(|(center, _)| *center).collect();
+            report.known += (centers.len() - points.len()) as u64;
+            report.hits += points.len() as u64;
+            if !points.is_empty() {
+                let is_occupied = vec![true; points.len()];
+                mapper.batch_update(&PointBatch {
+                    points: &points,
+                    intensities: None,
+                    is_occupied: &is_occupied,
+                })?;
+            }
         }
     }
     Ok(report)

@@ -60,6 +60,19 @@ fn write_some(voxels: &[VoxelIndex], out: &mut impl Write) -> io::Result<()> {
 ///
 /// What [`write_layer`] does not write, a digest that is not that of the voxels, too many voxels, an `input` that refuses.
 pub fn read_layer(input: &mut impl Read, max_voxels: u64) -> Result<VoxelSet, DecodeError> {
+    read_layer_within(input, max_voxels, usize::MAX)
+}
+
+/// [`read_layer`] in at most so many bytes of memory, and a packet's more.
+///
+/// # Errors
+///
+/// As for [`read_layer`], and a layer that takes more.
+pub fn read_layer_within(
+    input: &mut impl Read,
+    max_voxels: u64,
+    max_bytes: usize,
+) -> Result<VoxelSet, DecodeError> {
     let mut label = [0; 16];
     input.read_exact(&mut label)?;
     if label != *LABEL {
@@ -87,6 +100,11 @@ pub fn read_layer(input: &mut impl Read, max_voxels: u64) -> Result<VoxelSet, De
             break;
         }
         put_all(&mut layer, &voxels, max_voxels, offset)?;
+        if layer.memory_bytes() > max_bytes {
+            let reason =
+                format!("a layer of more than the {max_bytes} bytes of memory that there are for it");
+            return Err(FormatError::at_offset(offset, reason).into());
+        }
     }
     let mut digest = [0; 32];
     input.read_exact(&mut digest)?;

@@ -1,13 +1,15 @@
 use super::catch_up::CatchUp;
-use super::codec::{Ask, Header, MAX_LISTED, Packet, Status, Update};
-use super::differences::differences;
+use super::codec::{Ask, DigestEntry, Header, MAX_LISTED, Packet, Status, Update};
+use super::differences::Content;
+use super::layer_limits::LayerLimits;
 use super::nonce::Nonce;
 use super::receiver_config::{ReceiverConfig, ReceiverCounts};
-use super::set::{VoxelSet, position_of};
+use super::replace::Work;
+use super::set::VoxelSet;
 use super::set_range::SetRange;
 use super::stream::Stream;
 use crate::error::FormatError;
-use crate::space::{Grid, VoxelIndex};
+use crate::space::{Grid, TileIndex};
 use std::time::Duration;
 
 /// Listens to one robot and keeps a layer: its set of voxels. Whoever has it calls [`Receiver::poll`] a few times a
@@ -15,32 +17,54 @@ use std::time::Duration;
 #[derive(Clone, Debug)]
 pub struct Receiver {
     config: ReceiverConfig,
-    layer: Option<VoxelSet>,
-    stream: Option<Stream>,
+    pub(super) limits: LayerLimits,
+    pub(super) layer: Option<VoxelSet>,
+    pub(super) stream: Option<Stream>,
+    /// Bytes of memory for what is remembered of packets.
+    pub(super) stamp_bytes: usize,
     catch_up: CatchUp,
-    counts: ReceiverCounts,
+    pub(super) counts: ReceiverCounts,
     nonce: Nonce,
     /// Since when there is something that only the sender can explain.
     puzzled_since: Option<Duration>,
     ask_missing_at: Duration,
     /// The layer was the sender's set as of this packet.
     equal_as_of: Option<u64>,
-    is_over_limit: bool,
+    pub(super) is_over_limit: bool,
+    /// A status that the layer is still to be compared with, and when there may be work for that.
+    to_compare: Option<Status>,
+    compare_at: Duration,
+    /// The last one that was refused.
+    refused_grid: Option<Grid>,
 }
 
 /// After so long without an answer a sender is believed, since there may be no way back to it.
 const ONE_WAY: Duration = Duration::from_secs(5);
 /// First time between two asks for the same packet: its voxels come with a frame.
 const RETRY: Duration = Duration::from_millis(1500);
+/// Time between two comparisons of a layer, by voxel and by tile: some twenty times what a comparison takes.
+const COMPARE_NS_A_VOXEL: u64 = 100;
+const COMPARE_NS_A_TILE: u64 = 2000;
 
 impl Receiver {
     /// A receiver that has heard nothing.
     pub fn new(config: ReceiverConfig) -> Self {
+        Self::started(config, None)
+    }
+
+    /// A receiver that goes on with the layer of an earlier one.
+    pub fn with_layer(config: ReceiverConfig, layer: VoxelSet) -> Self {
+        Self::started(config, Some(layer))
+    }
+
+    pub(super) fn started(config: ReceiverConfig, layer: Option<VoxelSet>) -> Self {
         let nonce = Nonce::new(config.nonce_seed);
-        Self {
+        let mut receiver = Self {
+            limits: LayerLimits::new(&config, 0),
             config,
-            layer: None,
+            layer,
             stream: None,
+            stamp_bytes: 0,
             catch_up: CatchUp::default(),
             counts: ReceiverCounts::default(),
             nonce,
@@ -48,12 +72,14 @@ impl Receiver {
             ask_missing_at: Duration::ZERO,
             equal_as_of: None,
             is_over_limit: false,
-        }
-    }
-
-    /// A receiver that goes on with the layer of an earlier one.
-    pub fn with_layer(config: ReceiverConfig, layer: VoxelSet) -> Self {
-        Self { layer: Some(layer), ..Self::new(config) }
+            to_compare: None,
+            compare_at: Duration::ZERO,
+            refused_grid: None,
+        };
+        receiver.set_part_bytes(receiver.config.memory_bytes);
+        receiver.set_memory_bytes(receiver.config.memory_bytes);
+        receiver.cut_to_bytes(receiver.config.memory_bytes);
+        receiver
     }
 
     /// The robot's voxels as far as they came; `None` before anything came.
@@ -64,6 +90,11 @@ impl Receiver {
     /// The layer, for its digests.
     pub fn layer_mut(&mut self) -> Option<&mut VoxelSet> {
         self.layer.as_mut()
+    }
+
+    /// The layer, for whoever listens no more.
+    pub fn into_layer(self) -> Option<VoxelSet> {
+        self.layer
     }
 
     /// What was seen so far.
@@ -90,6 +121,11 @@ impl Receiver {
     /// Whether voxels were refused: the layer cannot become equal then, and is not compared any more.
     pub fn is_over_limit(&self) -> bool {
         self.is_over_limit
+    }
+
+    /// The grid of the robot's voxels, if it was refused.
+    pub fn refused_grid(&self) -> Option<&Grid> {
+        self.refused_grid.as_ref()
     }
 
     /// Takes the bytes of a packet.
@@ -122,13 +158,13 @@ impl Receiver {
             Packet::Changes { repaired, updates, .. } => {
                 self.take_changes(sequence, &repaired, &updates, now)
             }
-            Packet::Content { range, voxels, .. } => return self.take_content(sequence, range, &voxels, now),
-            Packet::Digests { first, entries, .. } => {
-                let Some(layer) = &mut self.layer else { return Ok(()) };
-                for range in self.catch_up.take_digests(first, &entries, layer, now) {
-                    self.take_content(sequence, range, &[], now)?;
-                }
+            Packet::Content { range, voxels, .. } => {
+                let Some(layer) = &self.layer else { return Ok(()) };
+                let content = Content::new(layer.grid(), range, &voxels)
+                    .ok_or_else(|| FormatError::at_offset(0, "content with voxels outside of its range"))?;
+                self.take_content(sequence, range, &content, &mut Work::of_a_packet(), now);
             }
+            Packet::Digests { first, entries, .. } => self.take_digests(sequence, first, &entries, now),
             Packet::Status(_) => {}
         }
         Ok(())
@@ -146,13 +182,13 @@ impl Receiver {
         let grid = *layer.grid();
         for update in updates {
             if !stream.stamps.is_later(&grid, update.voxel, sequence)
-                && !put_within(&self.config, layer, update.voxel, update.is_in)
+                && !self.limits.put(layer, update.voxel, update.is_in)
             {
                 self.counts.refused_voxels += 1;
                 self.is_over_limit = true;
             }
         }
-        stream.stamps.note(sequence, updates.iter().map(|update| update.voxel).collect());
+        stream.stamps.note(sequence, updates.iter().map(|update| update.voxel));
     }
 
     /// Replaces a part of the layer, but for what came after the packet that the part is as of.
@@ -160,32 +196,30 @@ impl Receiver {
         &mut self,
         as_of: u64,
         range: SetRange,
-        voxels: &[VoxelIndex],
+        content: &Content,
+        work: &mut Work,
         now: Duration,
-    ) -> Result<(), FormatError> {
-        let (Some(stream), Some(layer)) = (&mut self.stream, &mut self.layer) else { return Ok(()) };
-        let grid = *layer.grid();
-        if voxels.iter().any(|&voxel| !range.contains(position_of(&grid, voxel))) {
-            return Err(FormatError::at_offset(0, "content with voxels outside of its range"));
-        }
+    ) {
+        let Some(stream) = &mut self.stream else { return };
         if as_of < stream.stamps.forgotten() {
-            return Ok(());
+            return;
         }
         stream.reach(as_of, now, self.config.patience);
-        let mut content = VoxelSet::new(grid);
-        voxels.iter().for_each(|&voxel| {
-            content.put(voxel, true);
-        });
-        for (voxel, is_in) in differences(layer, &content, range) {
-            if !stream.stamps.is_later(&grid, voxel, as_of) && !put_within(&self.config, layer, voxel, is_in)
-            {
-                self.counts.refused_voxels += 1;
-                self.is_over_limit = true;
-            }
+        let Some(done) = self.replace(as_of, range, content, work) else { return };
+        if let Some(stream) = &mut self.stream {
+            stream.stamps.note_part(done, as_of);
         }
-        stream.stamps.note_part(range, as_of);
-        self.catch_up.take_content(range, now);
-        Ok(())
+        self.catch_up.take_content(done, now);
+    }
+
+    fn take_digests(&mut self, as_of: u64, first: TileIndex, entries: &[DigestEntry], now: Duration) {
+        let Some(layer) = &mut self.layer else { return };
+        let mut work = Work::of_a_packet();
+        for range in self.catch_up.take_digests(first, entries, layer, now) {
+            // Until it is done: there may not be work left for it.
+            self.catch_up.want_content(range);
+            self.take_content(as_of, range, &Content::default(), &mut work, now);
+        }
     }
 
     fn take_status(&mut self, status: &Status, now: Duration) {
@@ -210,13 +244,16 @@ impl Receiver {
         }
         stream.reach(sequence, now, self.config.patience);
         let is_lost = stream.give_up_before(status.oldest);
-        self.compare(status, is_lost);
+        self.compare(status, is_lost, now);
     }
 
     /// Begins anew with what a sender says of itself.
     fn adopt(&mut self, status: &Status, now: Duration) {
-        let grid = Grid::new(status.resolution_m, status.tile_size_m).ok();
+        // The voxels farthest away have a place, too.
+        let has_places = |grid: &Grid| grid.center_m([i32::MIN; 3]).iter().all(|k| k.is_finite());
+        let grid = Grid::new(status.resolution_m, status.tile_size_m).ok().filter(has_places);
         let Some(grid) = grid.filter(|grid| self.config.grid.is_none_or(|accepted| accepted == *grid)) else {
+            self.refused_grid = grid.or(self.refused_grid);
             self.counts.refused_grids += 1;
             return;
         };
@@ -224,18 +261,25 @@ impl Receiver {
             self.layer = Some(VoxelSet::new(grid));
         }
         self.equal_as_of = None;
-        self.stream = Some(Stream::new(status.header.epoch, status.header.sequence, now));
+        self.stream = Some(Stream::new(status.header.epoch, status.header.sequence, now, self.stamp_bytes));
         self.catch_up = CatchUp::default();
         self.puzzled_since = None;
-        self.compare(status, false);
+        self.to_compare = None;
+        self.compare(status, false, now);
     }
 
-    /// Compares the layer with a status, once all packets before it are there; catches up if they differ.
-    fn compare(&mut self, status: &Status, is_lost: bool) {
+    /// Compares the layer with a status, once all packets before it are there; catches up if they differ. That takes work
+    /// by voxels and tiles, so that it may have to wait.
+    fn compare(&mut self, status: &Status, is_lost: bool, now: Duration) {
         let (Some(stream), Some(layer)) = (&self.stream, &mut self.layer) else { return };
         let can_compare = stream.is_complete() && stream.highest == status.header.sequence;
         let mut differs = is_lost;
-        if can_compare {
+        if can_compare && now < self.compare_at {
+            self.to_compare = Some(*status);
+        } else if can_compare {
+            let wait_ns = COMPARE_NS_A_VOXEL.saturating_mul(layer.len())
+                + COMPARE_NS_A_TILE.saturating_mul(layer.tile_count() as u64);
+            self.compare_at = now + Duration::from_nanos(wait_ns);
             let is_equal = layer.len() == status.voxels && *layer.digest().as_bytes() == status.digest;
             self.equal_as_of = is_equal.then_some(stream.highest);
             differs |= !is_equal;
@@ -252,6 +296,11 @@ impl Receiver {
 
     /// Asks to be sent now, to the robot.
     pub fn poll(&mut self, now: Duration) -> Vec<Vec<u8>> {
+        if now >= self.compare_at
+            && let Some(status) = self.to_compare.take()
+        {
+            self.compare(&status, false, now);
+        }
         if !self.config.asks {
             return Vec::new();
         }
@@ -277,17 +326,4 @@ impl Receiver {
         self.counts.ask_bytes += asks.iter().map(|ask| ask.len() as u64).sum::<u64>();
         asks
     }
-}
-
-/// Puts a voxel into a layer, or takes it out; `false` if that is beyond the limits.
-fn put_within(config: &ReceiverConfig, layer: &mut VoxelSet, voxel: VoxelIndex, is_in: bool) -> bool {
-    let is_inside = config.region.as_ref().is_none_or(|region| region.contains(voxel));
-    let tile = layer.grid().tile_of_voxel(voxel);
-    let has_room =
-        || layer.len() < config.max_voxels && (layer.tile_count() < config.max_tiles || layer.has_tile(tile));
-    let is_allowed = !is_in || (is_inside && (has_room() || layer.contains(voxel)));
-    if is_allowed {
-        layer.put(voxel, is_in);
-    }
-    is_allowed
 }

@@ -7,7 +7,10 @@ use std::time::Duration;
 pub struct ReceiverConfig {
     /// The only grid that is accepted; `None` for any. Default: any.
     pub grid: Option<Grid>,
-    /// Most voxels of a robot. Default: 2^26, some 400 MB.
+    /// Most bytes of memory of a receiver, all that it holds included. Default: 512 MiB. What a voxel takes is told by
+    /// [`VoxelSet::memory_bytes`](super::VoxelSet::memory_bytes): 3 bytes in a wall, up to 1300 alone in its tile.
+    pub memory_bytes: usize,
+    /// Most voxels of a robot. Default: 2^26.
     pub max_voxels: u64,
     /// Most tiles of a robot. Default: 2^17.
     pub max_tiles: usize,
@@ -27,6 +30,7 @@ impl Default for ReceiverConfig {
     fn default() -> Self {
         Self {
             grid: None,
+            memory_bytes: 512 << 20,
             max_voxels: 1 << 26,
             max_tiles: 1 << 17,
             region: None,
@@ -52,8 +56,10 @@ pub struct ReceiverCounts {
     pub malformed: u64,
     /// Packets of a life of the sender, or with a number, that the sender has not confirmed.
     pub unconfirmed: u64,
-    /// Voxels beyond the limits on region, tiles and voxels.
+    /// Voxels beyond the limits on memory, region, tiles and voxels.
     pub refused_voxels: u64,
+    /// Voxels that were forgotten, since other robots were short of memory.
+    pub cut_voxels: u64,
     /// Statuses with another grid than the one that is accepted.
     pub refused_grids: u64,
     /// Asks.

@@ -35,6 +35,20 @@ impl SetPosition {
         };
         Self { tile, code: 0 }
     }
+
+    /// The place before this one, which is not the first of all.
+    pub(super) fn before(self) -> Self {
+        if self.code > 0 {
+            return Self { code: self.code - 1, ..self };
+        }
+        let TileIndex { x, y, z } = self.tile;
+        let tile = match (y, z) {
+            (i32::MIN, i32::MIN) => TileIndex::new(x.saturating_sub(1), i32::MAX, i32::MAX),
+            (_, i32::MIN) => TileIndex::new(x, y - 1, i32::MAX),
+            _ => TileIndex::new(x, y, z - 1),
+        };
+        Self { tile, code: LAST_CODE }
+    }
 }
 
 impl SetRange {

@@ -24,10 +24,18 @@ struct Missing {
 /// How far a packet may be from the last one. Beyond it the sender is asked whether that is true.
 pub(super) const WINDOW: u64 = 4096;
 
+/// Bytes of the missing packets, at most: 11 in a node, five at least.
+const MISSING_BYTES: usize = WINDOW as usize / 5 * 11 * size_of::<(u64, Missing)>() * 5 / 4;
+
 impl Stream {
+    /// Bytes of memory, at most, where stamps were given so many.
+    pub(super) fn most_bytes(stamp_bytes: usize) -> usize {
+        Stamps::most_bytes(stamp_bytes) + MISSING_BYTES
+    }
+
     /// The packets after one, which the sender said it has sent.
-    pub(super) fn new(epoch: u32, sequence: u64, now: Duration) -> Self {
-        let stamps = Stamps::new(sequence);
+    pub(super) fn new(epoch: u32, sequence: u64, now: Duration, stamp_bytes: usize) -> Self {
+        let stamps = Stamps::new(sequence, stamp_bytes);
         Self { epoch, highest: sequence, highest_at: now, missing: BTreeMap::new(), stamps }
     }
 

@@ -1,7 +1,7 @@
 use super::set::VoxelSet;
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::query::{Occupancy, Questions, Shape, UnknownAs};
+use crate::query::{Occupancy, Questions, Shape, UnknownAs, voxels_around};
 use crate::scan::{MAX_RAY_STEPS, RayWalk};
 use crate::space::{Grid, Point, VoxelIndex};
 
@@ -74,7 +74,7 @@ impl<'a, V: MapView> WithLayers<'a, V> {
     ///
     /// # Errors
     ///
-    /// A sphere that is not finite or too large, a tile of the map that cannot be read.
+    /// A sphere that is not finite, one too large where unknown is an obstacle, a tile of the map that cannot be read.
     pub fn sphere_collision(
         &self,
         center: Point,
@@ -86,17 +86,13 @@ impl<'a, V: MapView> WithLayers<'a, V> {
         if own.is_some() {
             return Ok(own);
         }
-        let grid = self.grid();
-        let corner = |sign: f64| grid.voxel_of(center.map(|k| k + sign * radius_m));
-        let (Some(low), Some(high)) = (corner(-1.0), corner(1.0)) else { return Ok(None) };
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    let voxel = [x, y, z];
-                    if self.is_in_layer(voxel) && touches(grid, voxel, center, radius_m) {
-                        return Ok(Some(voxel));
-                    }
-                }
+        let (grid, body) = (self.grid(), Shape::Sphere { center, radius_m });
+        let around = voxels_around(grid, &body.bounds()?);
+        for layer in self.layers {
+            // The bricks that are there, not the voxels that there could be.
+            let found = layer.in_box(&around).find(|&voxel| body.touches_voxel(grid, voxel));
+            if found.is_some() {
+                return Ok(found);
             }
         }
         Ok(None)
@@ -117,17 +113,4 @@ impl<'a, V: MapView> WithLayers<'a, V> {
         let own = Occupancy::of(self.map.config(), self.map.evidence(voxel)?);
         Ok(own.is_occupied() || (own == Occupancy::Unknown && unknown == UnknownAs::Obstacle))
     }
-}
-
-/// Whether a sphere touches a voxel.
-fn touches(grid: &Grid, voxel: VoxelIndex, center: Point, radius_m: f64) -> bool {
-    let r = grid.resolution_m();
-    let squared: f64 = (0..3)
-        .map(|k| {
-            let low = f64::from(voxel[k]) * r;
-            let nearest = center[k].clamp(low, low + r);
-            (center[k] - nearest) * (center[k] - nearest)
-        })
-        .sum();
-    squared <= radius_m * radius_m
 }

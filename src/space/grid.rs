@@ -5,6 +5,9 @@ use thiserror::Error;
 /// Most voxels along the edge of a tile.
 pub const MAX_VOXELS_PER_TILE_EDGE: u32 = 1024;
 
+/// The largest index of a voxel along an axis. The one behind it is the end of half-open boxes, and no point's voxel.
+pub const LAST_VOXEL_INDEX: i32 = i32::MAX - 1;
+
 /// The two lengths that cut space: voxels of `resolution_m`, tiles of `tile_size_m`.
 ///
 /// The voxel of a coordinate `x` is `floor(x * (1 / resolution))`, OctoMap's own arithmetic: a coordinate that

@@ -18,7 +18,7 @@ mod torus;
 
 pub use aabb::{Aabb, VoxelBox};
 pub use brick::{BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, mask_of_box, place_of_voxel, places};
-pub use grid::{Grid, GridError, MAX_VOXELS_PER_TILE_EDGE};
+pub use grid::{Grid, GridError, LAST_VOXEL_INDEX, MAX_VOXELS_PER_TILE_EDGE};
 pub use key::VoxelKey;
 pub use morton::MortonCode;
 pub use tile_index::TileIndex;

@@ -487,15 +487,20 @@ fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
         assert!(status.unwrap().success(), "{line}");
     };
     shell(r#"cp "$0" "$1""#, &voxtile);
-    let run = || {
+    let share = |args: &[&str]| {
         let mut command = std::process::Command::new(&voxtile);
-        command
-            .args(["share", "--subscribe", "-o", "map", "--help"])
-            .env("PATH", folder.path())
-            .output()
-            .unwrap()
+        command.arg("share").args(args).env("PATH", folder.path()).output().unwrap()
     };
-    let missing = run();
+    let run = || share(&["--subscribe", "-o", "map", "--help"]);
+    for help in [&["--help"][..], &["-h"], &["--subscribe", "--help"], &[]] {
+        let helped = share(help);
+        let said = String::from_utf8_lossy(&helped.stdout).into_owned();
+        assert!(helped.status.success() && helped.stderr.is_empty(), "{help:?}");
+        for word in ["--publish", "--subscribe", "cargo build --release -p voxtile-share", "not here"] {
+            assert!(said.contains(word), "{help:?}: {said}");
+        }
+    }
+    let missing = share(&["--subscribe", "-o", "map"]);
     let said = String::from_utf8_lossy(&missing.stderr).into_owned();
     assert!(!missing.status.success());
     assert!(said.contains("cannot run voxtile-share") && said.lines().count() == 1, "{said}");

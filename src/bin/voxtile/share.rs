@@ -1,5 +1,7 @@
 use crate::args::ShareArgs;
 use anyhow::Context;
+use std::ffi::OsString;
+use std::io;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
@@ -7,13 +9,42 @@ use std::process::{Command, ExitCode};
 /// as large.
 pub fn run(args: &ShareArgs) -> anyhow::Result<ExitCode> {
     let program = beside_this_program().unwrap_or_else(|| PathBuf::from(name()));
-    let status = Command::new(program).args(&args.arguments).status().with_context(|| {
-        let hint = "put it beside voxtile or on the PATH (cargo build --release -p voxtile-share makes it)";
-        format!("cannot run {}: {hint}", name())
-    })?;
+    let status = match Command::new(program).args(&args.arguments).status() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound && asks_for_help(&args.arguments) => {
+            println!("{HELP}");
+            return Ok(ExitCode::SUCCESS);
+        }
+        status => status.with_context(|| {
+            let hint =
+                "put it beside voxtile or on the PATH (cargo build --release -p voxtile-share makes it)";
+            format!("cannot run {}: {hint}", name())
+        })?,
+    };
     // Ended by a signal: there is no code.
     let code = status.code().and_then(|code| u8::try_from(code).ok());
     Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
+}
+
+/// What there is to say without the program, whose own help has all options.
+const HELP: &str = "\
+Share what is occupied with other robots: publish a map or scans, subscribe to others
+
+Usage: voxtile share --publish <MAP_OR_SCANS> --robot <NAME> [OPTIONS]
+       voxtile share --subscribe -o <MAP> [OPTIONS]
+       voxtile share --fold <LAYER> -o <MAP>
+       voxtile share --measure <SCANS>...
+
+The work is done by the program voxtile-share, which is not here: neither beside voxtile nor on the PATH. It comes
+separately, since its network library is six times as large as voxtile. To get it, in the sources of voxtile:
+
+    cargo build --release -p voxtile-share
+
+and put target/release/voxtile-share beside voxtile or into a folder of the PATH. Then this help lists all options.
+docs/sharing.md says what is shared, and how.";
+
+fn asks_for_help(arguments: &[OsString]) -> bool {
+    arguments.first().is_none_or(|first| first == "help")
+        || arguments.iter().any(|argument| argument == "--help" || argument == "-h")
 }
 
 fn beside_this_program() -> Option<PathBuf> {

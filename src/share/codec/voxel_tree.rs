@@ -4,7 +4,7 @@ use super::bytes::{Reader, put_signed};
 use super::context::{ChildContext, direction_context};
 use super::neighbors::{Faces, around};
 use crate::error::{Error, FormatError, Result};
-use crate::space::VoxelIndex;
+use crate::space::{LAST_VOXEL_INDEX, VoxelIndex};
 
 /// A voxel that comes into a set or goes out of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,7 +34,8 @@ const MIXED: u8 = 3;
 ///
 /// # Errors
 ///
-/// More than [`MAX_VOXELS_PER_PACKET`] voxels, or voxels that are a million voxels apart.
+/// More than [`MAX_VOXELS_PER_PACKET`] voxels, voxels that are a million voxels apart, or an index above
+/// [`LAST_VOXEL_INDEX`].
 pub fn encode_updates(updates: &[Update]) -> Result<Vec<u8>> {
     if updates.is_empty() {
         return Ok(vec![0]);
@@ -60,7 +61,8 @@ pub fn encode_updates(updates: &[Update]) -> Result<Vec<u8>> {
 ///
 /// # Errors
 ///
-/// What no encoder writes, and more than [`MAX_VOXELS_PER_PACKET`] voxels.
+/// What no encoder writes: more than [`MAX_VOXELS_PER_PACKET`] voxels, an index above [`LAST_VOXEL_INDEX`]. Whatever is
+/// read can be written again.
 pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Update>, FormatError> {
     let mut reader = Reader::new(bytes, offset);
     let first = reader.byte()?;
@@ -73,13 +75,8 @@ pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Upda
     }
     let mut origin = [0_i32; 3];
     for k in &mut origin {
-        let brick = reader.signed()?;
-        // The whole cube has indices.
-        let end = (brick << 3).checked_add(1 << levels);
-        *k = i32::try_from(brick.checked_mul(8).unwrap_or(i64::MAX))
-            .ok()
-            .filter(|_| end.is_some_and(|end| end <= i64::from(i32::MAX)))
-            .ok_or_else(|| reader.error("the voxels lie outside of all indices"))?;
+        let corner = reader.signed()?.checked_mul(8).and_then(|corner| i32::try_from(corner).ok());
+        *k = corner.ok_or_else(|| reader.error("the voxels lie outside of all indices"))?;
     }
     let mut bits = BitReader::new(reader.rest());
     let voxels = walk(&mut bits, levels, mode == MIXED, &[])?;
@@ -87,11 +84,14 @@ pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Upda
         return Err(reader.error("there are bytes behind the last voxel"));
     }
     let update = |(code, is_in): (u64, bool)| {
-        let local = gather(code);
-        let voxel = std::array::from_fn(|k| origin[k] + local[k] as i32);
-        Update { voxel, is_in: if mode == MIXED { is_in } else { mode == ALL_COME } }
+        let is_in = if mode == MIXED { is_in } else { mode == ALL_COME };
+        // The cube may reach beyond all indices, its voxels may not.
+        let voxel = voxel_in(origin, gather(code)).ok_or_else(|| {
+            reader.error(format!("a voxel behind the last one, which has index {LAST_VOXEL_INDEX}"))
+        })?;
+        Ok(Update { voxel, is_in })
     };
-    Ok(voxels.into_iter().map(update).collect())
+    voxels.into_iter().map(update).collect()
 }
 
 impl Cube {
@@ -110,7 +110,11 @@ impl Cube {
         let last = corner(i32::max, i32::MIN);
         let extent = (0..3).map(|k| i64::from(last[k]) - i64::from(origin[k])).max().unwrap_or(0);
         let levels = 64 - extent.leading_zeros();
-        if levels > MAX_LEVELS || last.iter().any(|&k| k > i32::MAX - (1 << MAX_LEVELS)) {
+        if last.iter().any(|&k| k > LAST_VOXEL_INDEX) {
+            let reason = format!("{last:?} is behind the last one, which has index {LAST_VOXEL_INDEX}");
+            return Err(Error::argument("voxels of a packet", reason));
+        }
+        if levels > MAX_LEVELS {
             return Err(Error::argument(
                 "voxels of a packet",
                 "they are a million voxels apart; send less at a time",
@@ -241,6 +245,15 @@ fn code_directions(
         voxels.push((code, is_in));
     }
     Ok(voxels)
+}
+
+/// The voxel at a place of a cube, if it is one.
+fn voxel_in(origin: VoxelIndex, local: [u32; 3]) -> Option<VoxelIndex> {
+    let mut voxel = origin;
+    for (k, local) in voxel.iter_mut().zip(local) {
+        *k = k.checked_add_unsigned(local).filter(|&k| k <= LAST_VOXEL_INDEX)?;
+    }
+    Some(voxel)
 }
 
 /// Puts bit `k` of x, y and z at bits `3k`, `3k + 1` and `3k + 2`.

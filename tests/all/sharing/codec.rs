@@ -4,8 +4,8 @@ use voxtile::share::codec::{
     Ask, CONTEXTS, DigestEntry, Header, MAX_VOXELS_PER_PACKET, Packet, Status, Update, VERSION,
     count_contexts, decode_updates, encode_updates,
 };
-use voxtile::share::{SetPosition, SetRange};
-use voxtile::space::TileIndex;
+use voxtile::share::{SetPosition, SetRange, VoxelSet, read_layer, write_layer};
+use voxtile::space::{Grid, LAST_VOXEL_INDEX, TileIndex};
 
 /// Voxels here and there, some together, around any origin.
 fn updates() -> impl Strategy<Value = Vec<Update>> {
@@ -128,6 +128,31 @@ fn voxels_too_far_apart_are_refused() {
     assert!(encode_updates(&far).is_err());
     let end = [Update { voxel: [i32::MAX; 3], is_in: true }];
     assert!(encode_updates(&end).is_err());
+}
+
+/// What is decoded can be written, up to the ends of all indices.
+#[test]
+fn a_voxel_that_cannot_be_written_is_not_read() {
+    let last = LAST_VOXEL_INDEX;
+    for voxel in [[last; 3], [2_147_483_632, 0, 0], [last - (1 << 20), 0, i32::MIN], [i32::MIN; 3]] {
+        let updates = [Update { voxel, is_in: true }];
+        assert_eq!(decode_updates(&encode_updates(&updates).unwrap(), 0).unwrap(), updates);
+        let mut set = VoxelSet::new(Grid::new(0.1, 10.0).unwrap());
+        assert!(set.put(voxel, true));
+        let mut file = Vec::new();
+        write_layer(&mut set, &mut file).unwrap();
+        assert!(read_layer(&mut &file[..], 10).unwrap() == set);
+        // A point has this voxel: it can become part of a map.
+        assert_eq!(set.grid().voxel_of(set.grid().center_m(voxel)), Some(voxel));
+    }
+    // All voxels of the last brick: those of index 2^31 - 1 are none.
+    let brick = [1 << 5 | 3, 254, 255, 255, 255, 1, 0, 0];
+    for bits in [[0; 8], [255; 8]] {
+        let Ok(updates) = decode_updates(&[&brick[..], &bits].concat(), 0) else { continue };
+        assert!(encode_updates(&updates).is_ok(), "{updates:?}");
+    }
+    let refused = decode_updates(&[&brick[..], &[255; 8]].concat(), 0);
+    assert!(VoxelSet::new(Grid::new(0.1, 10.0).unwrap()).put([i32::MAX, 0, 0], true) == false, "{refused:?}");
 }
 
 #[test]

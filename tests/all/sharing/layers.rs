@@ -198,3 +198,26 @@ fn a_layer_comes_back_from_its_file_and_damage_is_told() {
         }
     }
 }
+
+/// A sphere of any size asks for no more than what is there, and one that is none is refused.
+#[test]
+fn a_collision_takes_no_longer_in_a_larger_sphere() {
+    let map = InMemoryMapper::new(config()).unwrap();
+    let far = layer([[1_000_000, -5, 7], [i32::MAX - 1, i32::MIN, 0]]);
+    let layers = [&far];
+    let all = WithLayers::new(&map, &layers).unwrap();
+    let hit = |radius_m| all.sphere_collision([0.0; 3], radius_m, UnknownAs::Free).unwrap();
+    assert_eq!(hit(99_000.0), None);
+    assert_eq!(hit(101_000.0), Some([1_000_000, -5, 7]));
+    assert!(hit(1e9).is_some() && hit(1e300).is_some());
+    assert_eq!(hit(0.0), None);
+    let near_the_end = [(f64::from(i32::MAX) - 0.5) * 0.1, f64::from(i32::MIN) * 0.1, 0.0];
+    let at_the_end = all.sphere_collision(near_the_end, 0.2, UnknownAs::Free).unwrap();
+    assert_eq!(at_the_end, Some([i32::MAX - 1, i32::MIN, 0]));
+    for radius_m in [f64::NAN, f64::INFINITY, -1.0] {
+        assert!(all.sphere_collision([0.0; 3], radius_m, UnknownAs::Free).is_err(), "{radius_m}");
+    }
+    assert!(all.sphere_collision([f64::NAN; 3], 1.0, UnknownAs::Free).is_err());
+    // Where unknown is an obstacle, its first voxel ends the question; a map that is asked for too many says so.
+    assert!(all.sphere_collision([0.0; 3], 1e9, UnknownAs::Obstacle).is_err());
+}

@@ -1,3 +1,4 @@
+use crate::byte_size::ByteSize;
 use crate::robot_name::RobotName;
 use clap::{ArgGroup, Parser};
 use std::path::PathBuf;
@@ -82,10 +83,14 @@ pub struct Args {
     /// Subscribing: leave MAP as it is; only keep the layers
     #[arg(long)]
     pub keep_apart: bool,
-    /// Most robots that are listened to
+    /// Memory for the layers of all robots. Once it is full, every robot has a right to an equal part: who has more forgets
+    /// voxels as others need theirs, and what a robot sends beyond its part is refused
+    #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Limits")]
+    pub memory: ByteSize,
+    /// Most robots that are listened to; robots that --robot names always are
     #[arg(long, value_name = "N", default_value_t = 64, help_heading = "Limits")]
     pub max_robots: usize,
-    /// Most voxels of a robot, in memory and on disk
+    /// Most voxels of a robot
     #[arg(long, value_name = "N", default_value_t = 1 << 26, help_heading = "Limits")]
     pub max_voxels: u64,
     /// Most tiles of a robot

@@ -1,7 +1,8 @@
 use crate::args::Args;
+use crate::inbox::{Inbox, Message};
 use crate::network_file::NetworkFile;
 use anyhow::{Context, anyhow};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::Arc;
 use std::time::Duration;
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
@@ -9,20 +10,11 @@ use zenoh::{Config, Session, Wait};
 /// A connection to other robots: bytes under keys.
 pub struct Link {
     session: Session,
-    sender: SyncSender<Message>,
-    messages: Receiver<Message>,
+    inbox: Arc<Inbox>,
     /// Kept alive, or nothing comes any more.
     subscribers: Vec<zenoh::pubsub::Subscriber<()>>,
 }
 
-/// Bytes that came under a key.
-pub struct Message {
-    pub key: String,
-    pub bytes: Vec<u8>,
-}
-
-/// Messages that wait to be taken. What does not fit is lost, and catch-up mends it.
-const WAITING: usize = 1024;
 /// Larger messages are none of ours.
 const MAX_BYTES: usize = 64 << 10;
 /// And so are longer keys.
@@ -70,23 +62,20 @@ impl Link {
         }
         let session =
             zenoh::open(config).wait().map_err(|error| anyhow!("cannot open the network: {error}"))?;
-        let (sender, messages) = sync_channel(WAITING);
-        Ok(Self { session, sender, messages, subscribers: Vec::new() })
+        Ok(Self { session, inbox: Arc::default(), subscribers: Vec::new() })
     }
 
     /// Listens to all keys of a form.
     pub fn subscribe(&mut self, keys: &str) -> anyhow::Result<()> {
-        let sender = self.sender.clone();
+        let inbox = self.inbox.clone();
         let take = move |sample: zenoh::sample::Sample| {
             let payload = sample.payload();
             if payload.len() > MAX_BYTES || sample.key_expr().len() > MAX_KEY {
                 return;
             }
-            let message =
-                Message { key: sample.key_expr().to_string(), bytes: payload.to_bytes().into_owned() };
-            match sender.try_send(message) {
-                Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
-            }
+            let key = sample.key_expr().as_str();
+            let Some((robot, ..)) = parse_key(key) else { return };
+            inbox.put(robot, Message { key: key.to_owned(), bytes: payload.to_bytes().into_owned() });
         };
         let subscriber = self.session.declare_subscriber(keys).callback(take).wait();
         self.subscribers.push(subscriber.map_err(|error| anyhow!("{keys}: {error}"))?);
@@ -101,7 +90,12 @@ impl Link {
 
     /// The next message, if one comes within a time.
     pub fn next(&self, wait: Duration) -> Option<Message> {
-        self.messages.recv_timeout(wait).ok()
+        self.inbox.next(wait)
+    }
+
+    /// Where messages wait.
+    pub fn inbox(&self) -> &Inbox {
+        &self.inbox
     }
 
     pub fn close(self) {

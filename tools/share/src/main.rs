@@ -3,8 +3,13 @@
 //! All that is clever is in [`voxtile::share`]; here are the transport, the clock and the files.
 
 mod args;
+/// That of the command `voxtile`.
+#[path = "../../../src/bin/voxtile/byte_size.rs"]
+mod byte_size;
 mod files;
 mod fold;
+mod inbox;
+mod layer_store;
 mod link;
 /// That of the library's tests.
 #[path = "../../../tests/all/sharing/lossy_link.rs"]
@@ -13,6 +18,7 @@ mod lossy_link;
 mod measure;
 mod network_file;
 mod publish;
+mod reports;
 mod robot_name;
 mod subscribe;
 

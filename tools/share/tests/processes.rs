@@ -1,91 +1,12 @@
 //! Real processes that share maps over loopback, some with a bad link between them: digests are equal at the end.
 
-use std::io::{BufRead, BufReader};
-use std::net::TcpListener;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+mod support;
+
 use std::time::Duration;
+use support::{SHARE, endpoint, layers_of, publisher, run, scans, set_of, start, subscriber};
 use tempfile::TempDir;
-use voxtile::Scan;
-use voxtile::io::ScanStreamWriter;
-use voxtile::simulation::Survey;
 
-const SHARE: &str = env!("CARGO_BIN_EXE_voxtile-share");
 const BAD_LINK: &str = env!("CARGO_BIN_EXE_bad-link");
-
-/// Ends with its test.
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn start(program: &str, args: &[&str]) -> Process {
-    let mut command = Command::new(program);
-    command.args(args).stdin(Stdio::null()).stdout(Stdio::piped());
-    Process(command.spawn().unwrap())
-}
-
-/// An endpoint that nobody listens at yet.
-fn endpoint() -> String {
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    format!("tcp/127.0.0.1:{port}")
-}
-
-/// Some scans of a made-up street.
-fn scans(folder: &Path, seed: u64, count: usize) -> PathBuf {
-    let path = folder.join(format!("{seed}.scans"));
-    let mut writer = ScanStreamWriter::new(std::fs::File::create(&path).unwrap(), "street", false).unwrap();
-    for scan in Survey::demo(seed).take(count) {
-        let scan: Scan = Scan { intensities: None, ..scan };
-        writer.write_world(&scan).unwrap();
-    }
-    path
-}
-
-fn publisher(robot: &str, scans: &Path, endpoint: &str) -> Process {
-    let scans = scans.to_str().unwrap();
-    let args =
-        ["--publish", scans, "--robot", robot, "--listen", endpoint, "--latency", "0.2", "--rate", "20"];
-    start(SHARE, &[&args[..], &["--resolution", "0.2", "--json"]].concat())
-}
-
-/// Voxels and digest of the set, once all scans are mapped.
-fn set_of(publisher: &mut Process) -> (u64, String) {
-    let mut line = String::new();
-    BufReader::new(publisher.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
-    let line: serde_json::Value = serde_json::from_str(&line).unwrap();
-    (line["voxels"].as_u64().unwrap(), line["digest"].as_str().unwrap().to_string())
-}
-
-fn subscriber(map: &Path, endpoints: &[&str], more: &[&str]) -> Process {
-    let mut args = vec!["--subscribe", "-o", map.to_str().unwrap(), "--json"];
-    endpoints.iter().for_each(|endpoint| args.extend(["--connect", endpoint]));
-    args.extend(more);
-    start(SHARE, &args)
-}
-
-/// Robot, voxels, digest and whether it is equal, of each layer.
-fn layers_of(subscriber: Process) -> Vec<(String, u64, String, bool)> {
-    let mut subscriber = subscriber;
-    let mut out = String::new();
-    std::io::Read::read_to_string(subscriber.0.stdout.as_mut().unwrap(), &mut out).unwrap();
-    assert!(subscriber.0.wait().unwrap().success());
-    let layer = |line: &str| {
-        let line: serde_json::Value = serde_json::from_str(line).unwrap();
-        let text = |key: &str| line[key].as_str().unwrap().to_string();
-        (text("robot"), line["voxels"].as_u64().unwrap(), text("digest"), line["is_equal"].as_bool().unwrap())
-    };
-    out.lines().map(layer).collect()
-}
-
-fn run(args: &[&str]) -> Output {
-    Command::new(SHARE).args(args).output().unwrap()
-}
 
 #[test]
 fn two_processes_have_equal_sets_and_the_layer_is_folded_into_a_map() {
@@ -98,7 +19,7 @@ fn two_processes_have_equal_sets_and_the_layer_is_folded_into_a_map() {
     // It may have been equal for three seconds on the way: another one hears the end.
     drop(subscriber);
     let again = self::subscriber(&map, &[&endpoint], &["--until-equal", "--for", "120"]);
-    assert_eq!(layers_of(again), [("spotter".to_string(), voxels, digest, true)]);
+    assert_eq!(layers_of(&mut { again }), [("spotter".to_string(), voxels, digest, true)]);
     let map = voxtile::MapReader::open(&map, 16).unwrap();
     assert_eq!(voxtile::Questions::all_occupied_voxels(&map, None).unwrap().len() as u64, voxels);
 }
@@ -117,7 +38,7 @@ fn five_processes_and_a_bad_link_that_is_cut() {
     let subscribers =
         maps.each_ref().map(|map| subscriber(map, &[&link], &["--until-equal", "--for", "150"]));
     for subscriber in subscribers {
-        let layers = layers_of(subscriber);
+        let layers = layers_of(&mut { subscriber });
         assert_eq!(layers.len(), 2, "{layers:?}");
         for ((robot, voxels, digest, is_equal), (name, set)) in
             layers.into_iter().zip(["a", "b"].iter().zip(&sets))
@@ -145,7 +66,7 @@ fn killed_and_started_again_on_either_side() {
     drop(listening);
     let (voxels, digest) = set_of(&mut second);
     let listening = subscriber(&map, &[&link], &["--until-equal", "--for", "150", "--keep-apart"]);
-    assert_eq!(layers_of(listening), [("r".to_string(), voxels, digest, true)]);
+    assert_eq!(layers_of(&mut { listening }), [("r".to_string(), voxels, digest, true)]);
     assert!(!map.exists());
     let layer = folder.path().join("map.layers/r.layer");
     let folded = run(&["--fold", layer.to_str().unwrap(), "-o", map.to_str().unwrap(), "--json"]);
@@ -187,7 +108,7 @@ fn over_tls_only_robots_with_a_certificate_of_the_fleet_hear_each_other() {
     let heard = |config: &str, seconds: &str| {
         let map = folder.path().join("map");
         let more = ["--zenoh-config", config, "--until-equal", "--for", seconds, "--keep-apart"];
-        layers_of(subscriber(&map, &[&endpoint], &more))
+        layers_of(&mut subscriber(&map, &[&endpoint], &more))
     };
     assert_eq!(heard(&config("stranger", &strangers), "4"), []);
     assert_eq!(heard(&config("friend", &fleet), "120"), [("spotter".to_string(), set.0, set.1, true)]);

@@ -1,0 +1,162 @@
+use super::set_range::{SetPosition, SetRange};
+use std::collections::BTreeMap;
+
+/// Parts of a set that were replaced whole, and as of which packet: of parts one over the other, the latest.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PartStamps {
+    /// Disjoint parts by where they begin: where they end, and the packet.
+    parts: BTreeMap<SetPosition, (SetPosition, u64)>,
+}
+
+impl PartStamps {
+    pub(super) fn len(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// The earliest packet that a part is as of.
+    pub(super) fn oldest(&self) -> Option<u64> {
+        self.parts.values().map(|(_, as_of)| *as_of).min()
+    }
+
+    /// Whether a place lies in a part that is as of a packet, or of a later one.
+    pub(super) fn is_as_of(&self, position: SetPosition, sequence: u64) -> bool {
+        let before = self.parts.range(..=position).next_back();
+        before.is_some_and(|(_, (last, as_of))| position <= *last && *as_of >= sequence)
+    }
+
+    /// What of a range does not lie in parts that are as of a packet, or of a later one.
+    pub(super) fn gaps(&self, range: SetRange, sequence: u64) -> Vec<SetRange> {
+        let mut gaps = Vec::new();
+        let mut begin = range.first;
+        for (part, as_of) in self.overlapping(range) {
+            if as_of < sequence {
+                continue;
+            }
+            if begin < part.first {
+                gaps.push(SetRange { first: begin, last: part.first.before() });
+            }
+            if range.last <= part.last {
+                return gaps;
+            }
+            begin = part.last.next();
+        }
+        gaps.push(SetRange { first: begin, last: range.last });
+        gaps
+    }
+
+    /// Notes that a range is as of a packet.
+    pub(super) fn note(&mut self, range: SetRange, as_of: u64) {
+        let gaps = self.gaps(range, as_of);
+        let older: Vec<(SetRange, u64)> =
+            self.overlapping(range).filter(|(_, stamp)| *stamp < as_of).collect();
+        for (part, stamp) in older {
+            self.parts.remove(&part.first);
+            if part.first < range.first {
+                self.parts.insert(part.first, (range.first.before(), stamp));
+            }
+            if range.last < part.last {
+                self.parts.insert(range.last.next(), (part.last, stamp));
+            }
+        }
+        gaps.into_iter().for_each(|gap| self.insert(gap, as_of));
+    }
+
+    /// Inserts where there is nothing, as one with what adjoins and is as of the same packet.
+    fn insert(&mut self, mut part: SetRange, as_of: u64) {
+        let before = self.parts.range(..part.first).next_back();
+        if let Some((&first, &(last, stamp))) = before
+            && stamp == as_of
+            && last == part.first.before()
+        {
+            part.first = first;
+        }
+        if part.last < SetRange::ALL.last
+            && let Some(&(last, stamp)) = self.parts.get(&part.last.next())
+            && stamp == as_of
+        {
+            self.parts.remove(&part.last.next());
+            part.last = last;
+        }
+        self.parts.insert(part.first, (part.last, as_of));
+    }
+
+    /// Forgets parts that are as of a packet, or of earlier ones.
+    pub(super) fn forget_up_to(&mut self, sequence: u64) {
+        self.parts.retain(|_, (_, as_of)| *as_of > sequence);
+    }
+
+    /// The parts that reach into a range, in order.
+    fn overlapping(&self, range: SetRange) -> impl Iterator<Item = (SetRange, u64)> {
+        let begin = match self.parts.range(..=range.first).next_back() {
+            Some((&first, (last, _))) if *last >= range.first => first,
+            _ => range.first,
+        };
+        let parts = self.parts.range(begin..=range.last);
+        parts.map(|(&first, &(last, as_of))| (SetRange { first, last }, as_of))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Random;
+    use crate::space::TileIndex;
+
+    /// Places of a small world: two tiles of 20 codes at the ends of what a tile has.
+    fn position(number: u64) -> SetPosition {
+        let (tile, code) = (TileIndex::new(0, 0, (number / 20) as i32), number % 20);
+        let code = if code < 10 { code } else { super::super::set_range::LAST_CODE - (19 - code) };
+        SetPosition { tile, code }
+    }
+
+    #[test]
+    fn every_place_has_the_latest_stamp_of_the_parts_over_it() {
+        for seed in 0..50 {
+            let mut random = Random::of(seed, &[]);
+            let mut parts = PartStamps::default();
+            // Places between 9 and 10 of a tile count with 9: ranges begin and end at places that are there.
+            let mut plain = vec![None::<u64>; 40];
+            for step in 0..60 {
+                let mut ends = [random.below(40), random.below(40)];
+                ends.sort_unstable();
+                let as_of = 1 + random.below(8);
+                let range = SetRange { first: position(ends[0]), last: position(ends[1]) };
+                let wanted: Vec<bool> = (ends[0]..=ends[1])
+                    .map(|k| plain[k as usize].is_none_or(|stamp| stamp < as_of))
+                    .collect();
+                let gaps = parts.gaps(range, as_of);
+                for (k, wanted) in (ends[0]..=ends[1]).zip(wanted) {
+                    assert_eq!(gaps.iter().any(|gap| gap.contains(position(k))), wanted, "{seed} {step}");
+                }
+                parts.note(range, as_of);
+                for k in ends[0]..=ends[1] {
+                    plain[k as usize] = plain[k as usize].max(Some(as_of));
+                }
+                if random.chance(0.1) {
+                    let sequence = random.below(6);
+                    parts.forget_up_to(sequence);
+                    plain.iter_mut().for_each(|stamp| *stamp = stamp.filter(|&stamp| stamp > sequence));
+                }
+                for (k, stamp) in plain.iter().enumerate() {
+                    let is_as_of =
+                        |sequence| parts.is_as_of(position(k as u64), sequence) == (*stamp >= Some(sequence));
+                    assert!((1..10).all(is_as_of), "{seed} {step} {k}: {parts:?}");
+                }
+                assert_eq!(parts.oldest(), parts.parts.values().map(|part| part.1).min());
+            }
+        }
+    }
+
+    #[test]
+    fn parts_one_behind_the_other_are_one() {
+        let mut parts = PartStamps::default();
+        for k in (0..10).rev().chain(12..19).chain(10..12).chain(20..30) {
+            parts.note(SetRange { first: position(k), last: position(k) }, 7);
+        }
+        // Between 9 and 10 there is much that was not noted; 19 was not.
+        assert_eq!(parts.len(), 3);
+        parts.note(SetRange::ALL, 7);
+        parts.note(SetRange::ALL, 8);
+        assert_eq!(parts.len(), 1);
+    }
+}

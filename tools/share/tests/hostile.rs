@@ -1,0 +1,203 @@
+//! A real subscriber under hostile packets, damaged layers and a disk that refuses: it keeps to its memory and goes on with
+//! the others.
+
+mod support;
+
+use std::fs;
+use std::io::Read;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use support::{
+    Process, SHARE, endpoint, layers_and_success, layers_of, publisher, run, scans, set_of, start, stop,
+    subscriber,
+};
+use tempfile::TempDir;
+use voxtile::share::codec::{Ask, Header, Packet, Status, Update};
+use voxtile::simulation::Random;
+use zenoh::{Config, Session, Wait};
+
+fn open(listen: &str) -> Session {
+    let mut config = Config::default();
+    for (key, value) in [
+        ("mode", "\"peer\"".to_string()),
+        ("scouting/multicast/enabled", "false".to_string()),
+        ("listen/endpoints", format!("[\"{listen}\"]")),
+        ("connect/endpoints", "[]".to_string()),
+    ] {
+        config.insert_json5(key, &value).unwrap();
+    }
+    zenoh::open(config).wait().unwrap()
+}
+
+/// Says what a robot has to say to be listened to, with whatever lengths.
+fn answer_asks(session: &Session, robot: &'static str, resolution_m: f64) -> zenoh::pubsub::Subscriber<()> {
+    let answers = session.clone();
+    let take = move |sample: zenoh::sample::Sample| {
+        let Ok(Ask::Status { nonce }) = Ask::decode(&sample.payload().to_bytes()) else { return };
+        let status = Status {
+            header: Header { epoch: 1, sequence: 0 },
+            nonce,
+            oldest: 1,
+            resolution_m,
+            tile_size_m: 100.0 * resolution_m,
+            voxels: 1 << 40,
+            digest: [1; 32],
+        };
+        let key = sample.key_expr().as_str().replace("/asks/", "/answers/");
+        answers.put(key, Packet::Status(status).encode().unwrap()).wait().unwrap();
+    };
+    session.declare_subscriber(format!("voxtile/{robot}/asks/*")).callback(take).wait().unwrap()
+}
+
+fn changes(sequence: u64, voxels: impl Iterator<Item = [i32; 3]>) -> Vec<u8> {
+    let updates = voxels.map(|voxel| Update { voxel, is_in: true }).collect();
+    let header = Header { epoch: 1, sequence };
+    Packet::Changes { header, repaired: Vec::new(), updates }.encode().unwrap()
+}
+
+/// The peak of a process, in bytes.
+#[cfg(target_os = "linux")]
+fn peak_rss_bytes(process: u32) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
+    line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() << 10
+}
+
+/// Three robots send what takes most memory, and what is no packet at all; one is honest.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
+    const MEMORY: u64 = 96 << 20;
+    let folder = TempDir::new().unwrap();
+    let (honest, hostile, map) = (endpoint(), endpoint(), folder.path().join("map"));
+    let session = open(&hostile);
+    let robots = ["evil-a", "evil-b", "evil-c"];
+    let _answers = robots.map(|robot| answer_asks(&session, robot, 0.2));
+    let mut publisher = publisher("honest", &scans(folder.path(), 1, 30), &honest);
+    let (voxels, digest) = set_of(&mut publisher);
+    let memory = MEMORY.to_string();
+    let more = ["--keep-apart", "--for", "90", "--memory", &memory];
+    let mut subscriber = subscriber(&map, &[&honest, &hostile], &more);
+    let layer = folder.path().join("map.layers/honest.layer");
+    let begin = Instant::now();
+    let mut random = Random::of(1, &[]);
+    let mut sent = 0_u64;
+    for sequence in 1.. {
+        for robot in robots {
+            let corner: [i32; 3] = std::array::from_fn(|_| random.below(1 << 30) as i32 - (1 << 29));
+            // Each alone in its tile.
+            let alone = (0..800).map(|k| {
+                std::array::from_fn(|axis| corner[axis] + [k % 10, k / 10 % 10, k / 100][axis] * 101)
+            });
+            let mut packets = vec![changes(sequence, alone)];
+            packets.push(changes(sequence + 3000, [[i32::MAX - 1; 3]].into_iter()));
+            packets.push((0..random.below(2000)).map(|_| random.below(256) as u8).collect());
+            for bytes in packets {
+                sent += bytes.len() as u64;
+                session.put(format!("voxtile/{robot}/packets"), bytes).wait().unwrap();
+            }
+        }
+        // Names that nobody has, too.
+        session.put(format!("voxtile/nobody-{sequence}/packets"), vec![0; 60_000]).wait().unwrap();
+        if begin.elapsed() > Duration::from_secs(40) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let peak = peak_rss_bytes(subscriber.id());
+    stop(&subscriber);
+    let layers = layers_of(&mut subscriber);
+    println!("{peak} bytes at most of {MEMORY} and 48 MiB, {sent} bytes sent: {layers:?}");
+    assert!(peak < MEMORY + (48 << 20), "{peak} bytes");
+    assert!(sent > 20 << 20, "{sent} bytes");
+    let of_honest = layers.iter().find(|layer| layer.0 == "honest").unwrap();
+    assert_eq!((of_honest.1, &of_honest.2, of_honest.3), (voxels, &digest, true));
+    assert!(layer.exists());
+    // The memory was full of what the others sent.
+    let hostile: u64 = layers.iter().filter(|layer| layer.0 != "honest").map(|layer| layer.1).sum();
+    assert!(hostile > 30_000, "{hostile} voxels");
+}
+
+/// A layer that is damaged, one that cannot be saved, voxels of another size, a voxel at the end of all indices: each
+/// is one robot's own trouble, is told once, and the others are saved and folded.
+#[test]
+fn one_robots_fault_stays_its_own() {
+    let folder = TempDir::new().unwrap();
+    let (honest, other, map) = (endpoint(), endpoint(), folder.path().join("map"));
+    let layers = folder.path().join("map.layers");
+    fs::create_dir_all(layers.join("unsaved.layer")).unwrap();
+    fs::create_dir_all(layers.join("unsaved.layer.next/x")).unwrap();
+    fs::write(layers.join("damaged.layer"), b"voxtile-layer-1\nand then nothing").unwrap();
+    let session = open(&other);
+    let _answers = [
+        answer_asks(&session, "damaged", 0.2),
+        answer_asks(&session, "unsaved", 0.2),
+        answer_asks(&session, "other-size", 0.3),
+        answer_asks(&session, "far-away", 0.2),
+    ];
+    let mut honest_publisher = publisher("honest", &scans(folder.path(), 2, 20), &honest);
+    let (voxels, digest) = set_of(&mut honest_publisher);
+    let args =
+        ["--subscribe", "-o", map.to_str().unwrap(), "--json", "--connect", &honest, "--connect", &other];
+    let mut command = Command::new(SHARE);
+    let child = command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut subscriber = Process(child);
+    let begin = Instant::now();
+    let mut random = Random::of(2, &[]);
+    for sequence in 1.. {
+        for robot in ["damaged", "unsaved", "other-size", "far-away"] {
+            let voxel = match robot {
+                "far-away" => [i32::MAX - 1, i32::MIN, 0],
+                _ => std::array::from_fn(|_| random.below(100) as i32),
+            };
+            let bytes = changes(sequence, [voxel].into_iter());
+            session.put(format!("voxtile/{robot}/packets"), bytes).wait().unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(20));
+        if begin.elapsed() > Duration::from_secs(15) {
+            break;
+        }
+    }
+    stop(&subscriber);
+    let (came, is_success) = layers_and_success(&mut subscriber);
+    let mut told = String::new();
+    subscriber.0.stderr.as_mut().unwrap().read_to_string(&mut told).unwrap();
+    println!("{told}");
+    assert!(!is_success);
+    for (robot, word) in
+        [("damaged", "is kept as"), ("unsaved", "cannot"), ("other-size", "voxels of 0.3 m"), ("honest", "")]
+    {
+        let lines = told.lines().filter(|line| line.contains(&format!("{robot}: "))).count();
+        assert!(lines <= 2, "{robot} is told of {lines} times: {told}");
+        assert!(told.contains(word), "{word}: {told}");
+    }
+    assert_eq!(fs::read(aside(&layers, "damaged")).unwrap(), b"voxtile-layer-1\nand then nothing");
+    let of_honest = came.iter().find(|layer| layer.0 == "honest").unwrap();
+    assert_eq!((of_honest.1, &of_honest.2, of_honest.3), (voxels, &digest, true));
+    for robot in ["honest", "damaged", "far-away", "other-size"] {
+        assert!(layers.join(format!("{robot}.layer")).is_file(), "{robot}");
+    }
+    // All but that of another size are in the map.
+    let map_voxels = voxtile::MapReader::open(&map, 16).unwrap();
+    let folded = voxtile::Questions::all_occupied_voxels(&map_voxels, None).unwrap();
+    assert!(folded.len() as u64 > voxels);
+    assert!(folded.iter().any(|voxel| voxel.index == [i32::MAX - 1, i32::MIN, 0]));
+    // Folded again by hand, the saved layer is known.
+    let layer = layers.join("honest.layer");
+    let again = run(&["--fold", layer.to_str().unwrap(), "-o", map.to_str().unwrap(), "--json"]);
+    assert!(again.status.success());
+}
+
+fn aside(layers: &Path, robot: &str) -> std::path::PathBuf {
+    layers.join(format!("{robot}.layer.aside-1"))
+}
+
+/// What does not fit into the least memory, or is no size, is said.
+#[test]
+fn too_little_memory_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    let mut process = start(SHARE, &["--subscribe", "-o", map.to_str().unwrap(), "--memory", "1MiB"]);
+    assert_eq!(process.0.wait().unwrap().code(), Some(2));
+}
