@@ -2,7 +2,7 @@
 
 use super::commit_log::{CommitLog, Commits};
 use super::disk::{Disk, DiskLock, DiskRead};
-use super::layout::{Layout, QUARANTINE, SNAPSHOTS, tile_of_folder};
+use super::layout::{Layout, tile_of_folder};
 use super::metadata::Metadata;
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::TileIndex;

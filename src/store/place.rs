@@ -1,4 +1,5 @@
-use super::disk::{Disk, EntryKind, FsDisk};
+use super::disk::{Disk, EntryKind};
+use super::fs_disk::FsDisk;
 use super::layout::{Layout, tile_of_folder};
 use super::map_folder::read_metadata;
 use crate::error::{Error, Result};
