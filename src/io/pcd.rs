@@ -1,8 +1,12 @@
 use super::lzf;
-use super::poses::unit_quaternion;
-use crate::error::FormatError;
+use super::pcd_header::{Encoding, Header, MOST_HEADER_BYTES};
+use super::point_store::{PointRoom, PointStore};
+use crate::error::{Error, FormatError};
 use crate::space::Point;
-use nalgebra::{Isometry3, Quaternion, Translation3};
+use nalgebra::Isometry3;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::path::Path;
 
 /// The points of a PCD file.
 #[derive(Clone, Debug)]
@@ -15,57 +19,82 @@ pub struct PcdCloud {
     pub world_from_sensor: Isometry3<f64>,
 }
 
-type Result<T> = std::result::Result<T, FormatError>;
-
 /// Reads a PCD file (versions 0.5 to 0.7; `ascii`, `binary` or `binary_compressed`). What follows the last point is
 /// left unread: PCL pads its files.
 ///
 /// # Errors
 ///
 /// A header that is not as it should be (with the line), points that are missing or are no numbers.
-pub fn read_pcd(file: &[u8]) -> Result<PcdCloud> {
-    let header = Header::parse(file)?;
-    let data = &file[header.data_at..];
-    let columns = Columns::of(&header)?;
-    let values = match header.encoding {
-        Encoding::Ascii => return header.read_ascii(data, &columns),
-        Encoding::Binary => Values { bytes: data, header: &header, by_column: false },
-        Encoding::Compressed => {
-            let unpacked = header.unpack(data)?;
-            return Values { bytes: &unpacked, header: &header, by_column: true }.read(&columns);
+pub fn read_pcd(file: &[u8]) -> Result<PcdCloud, FormatError> {
+    let mut points = PointStore::default();
+    match read(Cursor::new(file), file.len() as u64, &mut points) {
+        Ok(world_from_sensor) => {
+            let (points, intensities) = points.into_parts();
+            Ok(PcdCloud { points, intensities, world_from_sensor })
         }
+        Err(PcdError::Format(error)) => Err(error),
+        Err(PcdError::Read(error)) => Err(FormatError::at_offset(0, error.to_string())),
+        Err(PcdError::Store(error)) => Err(FormatError::at_offset(0, error.to_string())),
+    }
+}
+
+/// The same from a file of any size; returns the `VIEWPOINT`.
+pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::Result<Isometry3<f64>> {
+    let open = || {
+        let file = File::open(path)?;
+        let bytes = file.metadata()?.len();
+        Ok((BufReader::with_capacity(1 << 16, file), bytes))
     };
-    values.read(&columns)
+    let (input, bytes) = open().map_err(|error| Error::io(path, "read", error))?;
+    read(input, bytes, points).map_err(|error| match error {
+        PcdError::Format(error) => error.in_input(path),
+        PcdError::Read(error) => Error::io(path, "read", error),
+        PcdError::Store(error) => error,
+    })
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Encoding {
-    Ascii,
-    Binary,
-    Compressed,
+/// Why a file cannot be read.
+enum PcdError {
+    Format(FormatError),
+    Read(io::Error),
+    /// Its points have no room.
+    Store(Error),
 }
 
-struct Field {
-    name: String,
-    /// Bytes of one value: 1, 2, 4 or 8.
-    size: usize,
-    /// `I`, `U` or `F`.
-    kind: u8,
-    count: usize,
-    /// Bytes before this field in a point.
-    offset: usize,
-    /// Values before this field in a point.
-    first_value: usize,
+impl From<FormatError> for PcdError {
+    fn from(error: FormatError) -> Self {
+        Self::Format(error)
+    }
 }
 
-struct Header {
-    fields: Vec<Field>,
-    points: usize,
-    point_bytes: usize,
-    encoding: Encoding,
-    world_from_sensor: Isometry3<f64>,
-    data_at: usize,
-    data_line: u64,
+impl From<io::Error> for PcdError {
+    fn from(error: io::Error) -> Self {
+        Self::Read(error)
+    }
+}
+
+impl From<Error> for PcdError {
+    fn from(error: Error) -> Self {
+        Self::Store(error)
+    }
+}
+
+type Result<T, E = PcdError> = std::result::Result<T, E>;
+
+fn read(mut input: impl BufRead + Seek, file_bytes: u64, points: &mut PointStore) -> Result<Isometry3<f64>> {
+    let mut start = Vec::new();
+    (&mut input).take(MOST_HEADER_BYTES as u64).read_to_end(&mut start)?;
+    let header = Header::parse(&start)?;
+    drop(start);
+    input.seek(SeekFrom::Start(header.data_at as u64))?;
+    let columns = Columns::of(&header)?;
+    points.begin(columns.intensity.is_some());
+    match header.encoding {
+        Encoding::Ascii => read_ascii(&header, &columns, input, points)?,
+        Encoding::Binary => read_binary(&header, &columns, input, file_bytes, points)?,
+        Encoding::Compressed => read_compressed(&header, &columns, input, file_bytes, points)?,
+    }
+    Ok(header.world_from_sensor)
 }
 
 /// Which fields are read.
@@ -76,173 +105,8 @@ struct Columns {
 
 const INTENSITY_NAMES: [&str; 4] = ["intensity", "Intensity", "i", "reflectivity"];
 
-impl Header {
-    fn parse(file: &[u8]) -> Result<Self> {
-        let mut entries: Vec<(String, Vec<String>, u64)> = Vec::new();
-        let (mut at, mut line_number) = (0, 0);
-        loop {
-            line_number += 1;
-            let Some(length) = file[at..].iter().position(|&byte| byte == b'\n') else {
-                let reason = "the header ends without a line DATA; this is no PCD file";
-                return Err(FormatError::at_line(line_number, reason));
-            };
-            let line = String::from_utf8_lossy(&file[at..at + length]).into_owned();
-            at += length + 1;
-            let mut words = line.split_ascii_whitespace().map(str::to_owned);
-            let Some(key) = words.next().filter(|key| !key.starts_with('#')) else { continue };
-            if !KEYS.contains(&key.as_str()) {
-                return Err(FormatError::at_line(line_number, format!("`{key}` is no key of a PCD header")));
-            }
-            let is_data = key == "DATA";
-            entries.push((key, words.collect(), line_number));
-            if is_data {
-                break;
-            }
-        }
-        Self::from_entries(&entries, at, line_number)
-    }
-
-    fn from_entries(entries: &[(String, Vec<String>, u64)], data_at: usize, data_line: u64) -> Result<Self> {
-        let find =
-            |key: &str| entries.iter().find(|(name, ..)| name == key).map(|(_, words, line)| (words, *line));
-        let need = |key: &str| {
-            find(key).ok_or_else(|| FormatError::at_line(data_line, format!("the header has no line {key}")))
-        };
-        let (names, _) = find("FIELDS")
-            .or_else(|| find("COLUMNS"))
-            .ok_or_else(|| FormatError::at_line(data_line, "the header has no line FIELDS"))?;
-        let (sizes, sizes_line) = need("SIZE")?;
-        let (kinds, kinds_line) = need("TYPE")?;
-        let ones = vec!["1".to_owned(); names.len()];
-        let (counts, counts_line) = find("COUNT").unwrap_or((&ones, data_line));
-        for (key, words, line) in
-            [("SIZE", sizes, sizes_line), ("TYPE", kinds, kinds_line), ("COUNT", counts, counts_line)]
-        {
-            if words.len() != names.len() {
-                let reason = format!("{key} has {} entries for {} fields", words.len(), names.len());
-                return Err(FormatError::at_line(line, reason));
-            }
-        }
-        let mut fields: Vec<Field> = Vec::new();
-        let (mut offset, mut first_value) = (0_usize, 0_usize);
-        for (number, name) in names.iter().enumerate() {
-            let size = parse(&sizes[number], sizes_line)?;
-            let count: usize = parse(&counts[number], counts_line)?;
-            let kind = kinds[number].as_bytes().first().copied().unwrap_or_default().to_ascii_uppercase();
-            let is_known = matches!((kind, size), (b'I' | b'U', 1 | 2 | 4 | 8) | (b'F', 4 | 8));
-            if !is_known || count > 1 << 16 {
-                let reason =
-                    format!("field {name} of type {} size {size} count {count} is not known", kinds[number]);
-                return Err(FormatError::at_line(sizes_line, reason));
-            }
-            fields.push(Field { name: name.clone(), size, kind, count, offset, first_value });
-            (offset, first_value) = (offset + size * count, first_value + count);
-        }
-        let points = number_of_points(&find, data_line)?;
-        let world_from_sensor = match find("VIEWPOINT") {
-            None => Isometry3::identity(),
-            Some((words, line)) => viewpoint(words, line)?,
-        };
-        let (encoding, line) = need("DATA")?;
-        let encoding = match encoding.first().map(String::as_str) {
-            Some("ascii") => Encoding::Ascii,
-            Some("binary") => Encoding::Binary,
-            Some("binary_compressed") => Encoding::Compressed,
-            other => {
-                let reason =
-                    format!("DATA {} is not ascii, binary or binary_compressed", other.unwrap_or_default());
-                return Err(FormatError::at_line(line, reason));
-            }
-        };
-        Ok(Self { fields, points, point_bytes: offset, encoding, world_from_sensor, data_at, data_line })
-    }
-
-    fn read_ascii(&self, data: &[u8], columns: &Columns) -> Result<PcdCloud> {
-        let mut cloud = self.empty_cloud(columns);
-        let mut lines = (self.data_line + 1..).zip(data.split(|&byte| byte == b'\n'));
-        for done in 0..self.points {
-            let (number, line) = loop {
-                let Some((number, line)) = lines.next() else {
-                    let reason = format!("the file ends after {done} of {} points", self.points);
-                    return Err(FormatError::at_line(self.data_line + done as u64, reason));
-                };
-                if !line.trim_ascii().is_empty() {
-                    break (number, line);
-                }
-            };
-            let line = String::from_utf8_lossy(line);
-            let words: Vec<&str> = line.split_ascii_whitespace().collect();
-            let value = |column: usize| -> Result<f64> {
-                let field = &self.fields[column];
-                let word = words.get(field.first_value).ok_or_else(|| {
-                    FormatError::at_line(
-                        number,
-                        format!("{} values; field {} is missing", words.len(), field.name),
-                    )
-                })?;
-                // A number of a four-byte field is one of its values, as in the binary encodings.
-                let parsed = match (field.kind, field.size) {
-                    (b'F', 4) => word.parse::<f32>().map(f64::from),
-                    _ => word.parse(),
-                };
-                parsed.map_err(|_| FormatError::at_line(number, format!("`{word}` is not a number")))
-            };
-            let [x, y, z] = columns.xyz;
-            cloud.points.push([value(x)?, value(y)?, value(z)?]);
-            if let (Some(column), Some(intensities)) = (columns.intensity, &mut cloud.intensities) {
-                intensities.push(value(column)? as f32);
-            }
-        }
-        Ok(cloud)
-    }
-
-    /// Unpacks `binary_compressed`: packed size, unpacked size, then the fields one after the other.
-    fn unpack(&self, data: &[u8]) -> Result<Vec<u8>> {
-        let wrong = |reason: String| FormatError::at_offset(self.data_at as u64, reason);
-        let (sizes, packed) = data
-            .split_at_checked(8)
-            .ok_or_else(|| wrong("the file ends before the sizes of the packed data".into()))?;
-        let size = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| sizes[at + k])) as usize;
-        let wanted = self.point_bytes.saturating_mul(self.points);
-        if size(4) != wanted {
-            return Err(wrong(format!(
-                "{} bytes unpacked for {} points of {}",
-                size(4),
-                self.points,
-                self.point_bytes
-            )));
-        }
-        if size(0) > packed.len() {
-            return Err(wrong(format!("{} bytes of packed data announced, {} there", size(0), packed.len())));
-        }
-        if wanted == 0 {
-            return Ok(Vec::new());
-        }
-        lzf::unpack(&packed[..size(0)], wanted).ok_or_else(|| wrong("the packed data is damaged".into()))
-    }
-
-    fn empty_cloud(&self, columns: &Columns) -> PcdCloud {
-        let intensities = columns.intensity.map(|_| Vec::new());
-        PcdCloud { points: Vec::new(), intensities, world_from_sensor: self.world_from_sensor }
-    }
-}
-
-const KEYS: [&str; 11] = [
-    "VERSION",
-    "FIELDS",
-    "COLUMNS",
-    "SIZE",
-    "TYPE",
-    "COUNT",
-    "WIDTH",
-    "HEIGHT",
-    "VIEWPOINT",
-    "POINTS",
-    "DATA",
-];
-
 impl Columns {
-    fn of(header: &Header) -> Result<Self> {
+    fn of(header: &Header) -> Result<Self, FormatError> {
         let find = |name: &str| header.fields.iter().position(|field| field.name == name && field.count > 0);
         let need = |name: &str| {
             find(name).ok_or_else(|| {
@@ -254,92 +118,208 @@ impl Columns {
     }
 }
 
-/// Binary values: point after point, or, when packed, field after field.
-struct Values<'a> {
-    bytes: &'a [u8],
-    header: &'a Header,
-    by_column: bool,
-}
+/// A longer line is none of a PCD file.
+const MOST_LINE_BYTES: u64 = 1 << 20;
 
-impl Values<'_> {
-    fn read(&self, columns: &Columns) -> Result<PcdCloud> {
-        let header = self.header;
-        let wanted = header.point_bytes.checked_mul(header.points);
-        if wanted.is_none_or(|wanted| wanted > self.bytes.len()) {
-            let there = self.bytes.len() / header.point_bytes.max(1);
-            let reason = format!("the file ends after {there} of {} points", header.points);
-            return Err(FormatError::at_offset((header.data_at + self.bytes.len()) as u64, reason));
-        }
-        let mut cloud = header.empty_cloud(columns);
-        cloud.points.reserve_exact(header.points);
-        for point in 0..header.points {
-            cloud.points.push(columns.xyz.map(|column| self.value(point, column)));
-            if let (Some(column), Some(intensities)) = (columns.intensity, &mut cloud.intensities) {
-                intensities.push(self.value(point, column) as f32);
+fn read_ascii(
+    header: &Header,
+    columns: &Columns,
+    mut input: impl BufRead,
+    points: &mut PointStore,
+) -> Result<()> {
+    let mut number = header.data_line;
+    let mut line = Vec::new();
+    for done in 0..header.points {
+        loop {
+            line.clear();
+            number += 1;
+            let read = (&mut input).take(MOST_LINE_BYTES).read_until(b'\n', &mut line)?;
+            if read == 0 {
+                let reason = format!("the file ends after {done} of {} points", header.points);
+                return Err(FormatError::at_line(header.data_line + done as u64, reason).into());
+            }
+            if read as u64 == MOST_LINE_BYTES {
+                return Err(FormatError::at_line(number, "the line is too long for a PCD file").into());
+            }
+            if !line.trim_ascii().is_empty() {
+                break;
             }
         }
-        Ok(cloud)
-    }
-
-    fn value(&self, point: usize, column: usize) -> f64 {
-        let field = &self.header.fields[column];
-        let at = if self.by_column {
-            field.offset * self.header.points + point * field.size * field.count
-        } else {
-            point * self.header.point_bytes + field.offset
+        let text = String::from_utf8_lossy(&line);
+        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        let value = |column: usize| -> Result<f64, FormatError> {
+            let field = &header.fields[column];
+            let word = words.get(field.first_value).ok_or_else(|| {
+                FormatError::at_line(
+                    number,
+                    format!("{} values; field {} is missing", words.len(), field.name),
+                )
+            })?;
+            // A number of a four-byte field is one of its values, as in the binary encodings.
+            let parsed = match (field.kind, field.size) {
+                (b'F', 4) => word.parse::<f32>().map(f64::from),
+                _ => word.parse(),
+            };
+            parsed.map_err(|_| FormatError::at_line(number, format!("`{word}` is not a number")))
         };
-        let bytes = &self.bytes[at..at + field.size];
-        // Little-endian, widened to eight bytes.
-        let mut wide = [0; 8];
-        wide[..field.size].copy_from_slice(bytes);
-        let unsigned = u64::from_le_bytes(wide);
-        let unused_bits = 64 - 8 * field.size;
-        match (field.kind, field.size) {
-            (b'F', 4) => f64::from(f32::from_bits(unsigned as u32)),
-            (b'F', _) => f64::from_bits(unsigned),
-            (b'U', _) => unsigned as f64,
-            _ => ((unsigned << unused_bits) as i64 >> unused_bits) as f64,
-        }
+        let [x, y, z] = columns.xyz;
+        let point = [value(x)?, value(y)?, value(z)?];
+        let intensity = columns.intensity.map(value).transpose()?.unwrap_or_default();
+        points.push(point, intensity as f32)?;
     }
+    Ok(())
 }
 
-fn number_of_points<'a>(
-    find: &impl Fn(&str) -> Option<(&'a Vec<String>, u64)>,
-    data_line: u64,
-) -> Result<usize> {
-    let number = |key: &str| -> Result<Option<(usize, u64)>> {
-        let Some((words, line)) = find(key) else { return Ok(None) };
-        let word = words.first().ok_or_else(|| FormatError::at_line(line, format!("{key} has no number")))?;
-        Ok(Some((parse(word, line)?, line)))
+/// Bytes that are read at a time.
+const BYTES_AT_A_TIME: usize = 1 << 16;
+
+/// Point after point.
+fn read_binary(
+    header: &Header,
+    columns: &Columns,
+    mut input: impl Read,
+    file_bytes: u64,
+    points: &mut PointStore,
+) -> Result<()> {
+    let there = file_bytes.saturating_sub(header.data_at as u64);
+    let wanted = (header.point_bytes as u64).checked_mul(header.points as u64);
+    if wanted.is_none_or(|wanted| wanted > there) {
+        let points = there / (header.point_bytes as u64).max(1);
+        let reason = format!("the file ends after {points} of {} points", header.points);
+        return Err(FormatError::at_offset(file_bytes, reason).into());
+    }
+    points.reserve(header.points);
+    let at_a_time = (BYTES_AT_A_TIME / header.point_bytes.max(1)).max(1);
+    let mut bytes = Vec::new();
+    for first in (0..header.points).step_by(at_a_time) {
+        bytes.resize(at_a_time.min(header.points - first) * header.point_bytes, 0);
+        input.read_exact(&mut bytes)?;
+        for record in bytes.chunks_exact(header.point_bytes) {
+            let value = |column: usize| {
+                let field = &header.fields[column];
+                number(field.kind, &record[field.offset..field.offset + field.size])
+            };
+            let intensity = columns.intensity.map_or(0.0, value);
+            points.push(columns.xyz.map(value), intensity as f32)?;
+        }
+    }
+    Ok(())
+}
+
+/// Packed size, unpacked size, then the packed fields one after the other.
+fn read_compressed(
+    header: &Header,
+    columns: &Columns,
+    mut input: impl Read,
+    file_bytes: u64,
+    points: &mut PointStore,
+) -> Result<()> {
+    let wrong = |reason: String| PcdError::Format(FormatError::at_offset(header.data_at as u64, reason));
+    let there = file_bytes.saturating_sub(header.data_at as u64);
+    let mut sizes = [0; 8];
+    if there < sizes.len() as u64 {
+        return Err(wrong("the file ends before the sizes of the packed data".into()));
+    }
+    input.read_exact(&mut sizes)?;
+    let there = there - sizes.len() as u64;
+    let size = |at: usize| u64::from(u32::from_le_bytes(std::array::from_fn(|k| sizes[at + k])));
+    let wanted = (header.point_bytes as u64).saturating_mul(header.points as u64);
+    let (packed, unpacked) = (size(0), size(4));
+    if unpacked != wanted {
+        return Err(wrong(format!(
+            "{unpacked} bytes unpacked for {} points of {}",
+            header.points, header.point_bytes
+        )));
+    }
+    if packed > there {
+        return Err(wrong(format!("{packed} bytes of packed data announced, {there} there")));
+    }
+    if wanted == 0 {
+        return Ok(());
+    }
+    if !lzf::can_be(packed, wanted) {
+        return Err(wrong("the packed data is damaged".into()));
+    }
+    let mut fields = Fields::new(points.room(), wanted)?;
+    let is_whole = match &mut fields {
+        Fields::InMemory(bytes) => lzf::unpack(&mut input.take(packed), wanted, bytes)?,
+        Fields::InFile(file) => lzf::unpack(&mut input.take(packed), wanted, file)?,
     };
-    let size = match (number("WIDTH")?, number("HEIGHT")?) {
-        (Some((width, _)), height) => width.checked_mul(height.map_or(1, |(height, _)| height)),
-        (None, _) => None,
-    };
-    match (number("POINTS")?, size) {
-        (Some((points, line)), Some(size)) if points != size => {
-            Err(FormatError::at_line(line, format!("POINTS {points} is not WIDTH times HEIGHT, {size}")))
+    if !is_whole {
+        return Err(wrong("the packed data is damaged".into()));
+    }
+    points.reserve(header.points);
+    let at_a_time = BYTES_AT_A_TIME / 8;
+    let wanted: Vec<usize> = columns.xyz.into_iter().chain(columns.intensity).collect();
+    let mut values = vec![Vec::new(); wanted.len()];
+    for first in (0..header.points).step_by(at_a_time) {
+        let count = at_a_time.min(header.points - first);
+        for (values, &column) in values.iter_mut().zip(&wanted) {
+            fields.read(header, column, first, count, values)?;
         }
-        (Some((points, _)), _) => Ok(points),
-        (None, Some(size)) => Ok(size),
-        (None, None) => {
-            Err(FormatError::at_line(data_line, "the header has neither POINTS nor WIDTH and HEIGHT"))
+        for k in 0..count {
+            let intensity = values.get(3).map_or(0.0, |values| values[k]);
+            points.push(std::array::from_fn(|axis| values[axis][k]), intensity as f32)?;
         }
+    }
+    Ok(())
+}
+
+/// Values field after field, as unpacked.
+enum Fields {
+    InMemory(Vec<u8>),
+    InFile(File),
+}
+
+impl Fields {
+    fn new(room: &PointRoom, bytes: u64) -> crate::Result<Self> {
+        match usize::try_from(bytes) {
+            // It grows with what comes.
+            Ok(bytes) if !room.is_too_much(bytes) => Ok(Self::InMemory(Vec::new())),
+            _ => room.file().map(Self::InFile),
+        }
+    }
+
+    /// The values of a field of some points.
+    fn read(
+        &mut self,
+        header: &Header,
+        column: usize,
+        first: usize,
+        count: usize,
+        values: &mut Vec<f64>,
+    ) -> io::Result<()> {
+        let field = &header.fields[column];
+        let stride = field.size * field.count;
+        let at = field.offset * header.points + first * stride;
+        let bytes = count * stride;
+        let mut read = Vec::new();
+        let bytes = match self {
+            Self::InMemory(all) => all.get(at..at + bytes).ok_or(io::ErrorKind::UnexpectedEof)?,
+            Self::InFile(file) => {
+                read.resize(bytes, 0);
+                file.seek(SeekFrom::Start(at as u64))?;
+                file.read_exact(&mut read)?;
+                &*read
+            }
+        };
+        values.clear();
+        values.extend(bytes.chunks_exact(stride).map(|point| number(field.kind, &point[..field.size])));
+        Ok(())
     }
 }
 
-fn viewpoint(words: &[String], line: u64) -> Result<Isometry3<f64>> {
-    let numbers = words.iter().map(|word| parse(word, line)).collect::<Result<Vec<f64>>>()?;
-    match numbers[..] {
-        [x, y, z, qw, qx, qy, qz] if numbers.iter().all(|number| number.is_finite()) => {
-            let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz))
-                .map_err(|reason| FormatError::at_line(line, format!("VIEWPOINT has {reason}")))?;
-            Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
-        }
-        _ => Err(FormatError::at_line(line, "VIEWPOINT needs seven finite numbers: tx ty tz qw qx qy qz")),
+/// A little-endian number.
+fn number(kind: u8, bytes: &[u8]) -> f64 {
+    // Widened to eight bytes.
+    let mut wide = [0; 8];
+    wide[..bytes.len()].copy_from_slice(bytes);
+    let unsigned = u64::from_le_bytes(wide);
+    let unused_bits = 64 - 8 * bytes.len();
+    match (kind, bytes.len()) {
+        (b'F', 4) => f64::from(f32::from_bits(unsigned as u32)),
+        (b'F', _) => f64::from_bits(unsigned),
+        (b'U', _) => unsigned as f64,
+        _ => ((unsigned << unused_bits) as i64 >> unused_bits) as f64,
     }
-}
-
-fn parse<N: std::str::FromStr>(word: &str, line: u64) -> Result<N> {
-    word.parse().map_err(|_| FormatError::at_line(line, format!("`{word}` is not a number that fits here")))
 }

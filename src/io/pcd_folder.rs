@@ -1,10 +1,10 @@
 use super::file_order::{name_of, sort_naturally};
 use super::fingerprint::Fingerprint;
-use super::pcd::read_pcd;
+use super::pcd::read_pcd_file;
 use super::pcd_viewpoint::viewpoint_of_file;
+use super::point_store::PointStore;
 use super::pose_source::{PoseSource, poses_of};
-use super::sensor_scan::SensorScan;
-use super::source::ScanSource;
+use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
 use nalgebra::Isometry3;
 use std::fs;
@@ -50,22 +50,16 @@ impl ScanSource for PcdFolder {
         Some(self.files.len())
     }
 
-    fn next_scan(&mut self) -> Result<Option<SensorScan>> {
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
         let Some(path) = self.files.get(self.next) else { return Ok(None) };
-        let bytes = fs::read(path).map_err(|error| Error::io(path, "read", error))?;
-        let cloud = read_pcd(&bytes).map_err(|error| error.in_input(path))?;
+        let viewpoint = read_pcd_file(path, points)?;
         if self.pose_source == PoseSource::Viewpoint && viewpoint_of_file(path).is_none() {
             let reason = "no VIEWPOINT in this file, which other files of the folder have: where it was taken is not known";
             return Err(FormatError::at_line(1, reason).in_input(path));
         }
-        let world_from_sensor = self.poses.as_ref().map_or(cloud.world_from_sensor, |poses| poses[self.next]);
+        let world_from_sensor = self.poses.as_ref().map_or(viewpoint, |poses| poses[self.next]);
         self.next += 1;
-        Ok(Some(SensorScan {
-            name: name_of(path),
-            points_in_sensor: cloud.points,
-            intensities: cloud.intensities,
-            world_from_sensor,
-        }))
+        Ok(Some(ScanHead { name: name_of(path), world_from_sensor }))
     }
 
     fn skip(&mut self, scans: usize) -> Result<usize> {

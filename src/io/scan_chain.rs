@@ -1,4 +1,6 @@
-use super::sensor_scan::SensorScan;
+use super::stored_scan::StoredScan;
+use crate::error::Result;
+use nalgebra::Isometry3;
 
 /// Tells a scan from others: its points and intensities, and apart from these its pose. How a file stored them, and what
 /// it is called, does not matter.
@@ -26,21 +28,36 @@ const POINTS_AT_A_TIME: usize = 1024;
 
 impl ScanMark {
     /// The mark of a scan.
-    pub fn of(scan: &SensorScan) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// Points that cannot be read.
+    pub fn of(scan: &StoredScan) -> Result<Self> {
+        let StoredScan { points_in_sensor: store, world_from_sensor, .. } = scan;
         let mut hasher = hasher("voxtile 1 scan");
-        hasher.update(&(scan.points_in_sensor.len() as u64).to_le_bytes());
-        let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * 24);
-        for points in scan.points_in_sensor.chunks(POINTS_AT_A_TIME) {
-            bytes.clear();
-            points.iter().flatten().for_each(|&number| bytes.extend(bits(number).to_le_bytes()));
-            hasher.update(&bytes);
+        hasher.update(&(store.len() as u64).to_le_bytes());
+        let mut bytes = Vec::new();
+        store.for_each_chunk(0..store.len(), &mut |points, _| {
+            for points in points.chunks(POINTS_AT_A_TIME) {
+                bytes.clear();
+                points.iter().flatten().for_each(|&number| bytes.extend(bits(number).to_le_bytes()));
+                hasher.update(&bytes);
+            }
+            true
+        })?;
+        if store.has_intensities() {
+            store.for_each_chunk(0..store.len(), &mut |_, intensities| {
+                for intensities in intensities.unwrap_or_default().chunks(POINTS_AT_A_TIME) {
+                    bytes.clear();
+                    intensities
+                        .iter()
+                        .for_each(|&number| bytes.extend(bits(f64::from(number)).to_le_bytes()));
+                    hasher.update(&bytes);
+                }
+                true
+            })?;
         }
-        for intensities in scan.intensities.iter().flat_map(|all| all.chunks(POINTS_AT_A_TIME)) {
-            bytes.clear();
-            intensities.iter().for_each(|&number| bytes.extend(bits(f64::from(number)).to_le_bytes()));
-            hasher.update(&bytes);
-        }
-        Self { scan: mark(&hasher), pose: pose_mark(scan), has_points: !scan.points_in_sensor.is_empty() }
+        Ok(Self { scan: mark(&hasher), pose: pose_mark(world_from_sensor), has_points: !store.is_empty() })
     }
 
     /// Whether the scan has points: one without is like many others.
@@ -106,9 +123,9 @@ fn mark(hasher: &blake3::Hasher) -> [u8; MARK_BYTES] {
     mark
 }
 
-fn pose_mark(scan: &SensorScan) -> [u8; MARK_BYTES] {
+fn pose_mark(pose: &Isometry3<f64>) -> [u8; MARK_BYTES] {
     let mut hasher = hasher("voxtile 1 pose");
-    let (t, q) = (scan.world_from_sensor.translation.vector, scan.world_from_sensor.rotation.coords);
+    let (t, q) = (pose.translation.vector, pose.rotation.coords);
     for number in [t.x, t.y, t.z, q.x, q.y, q.z, q.w] {
         hasher.update(&bits(number).to_le_bytes());
     }
@@ -138,49 +155,59 @@ fn from_text(text: &str) -> Option<[u8; MARK_BYTES]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Isometry3;
+    use crate::io::PointStore;
 
-    fn scan(points: &[[f64; 3]], x: f64) -> SensorScan {
-        SensorScan {
+    fn scan(points: &[[f64; 3]], intensity: Option<f32>, x_m: f64) -> StoredScan {
+        let mut points_in_sensor = PointStore::default();
+        points_in_sensor.begin(intensity.is_some());
+        points.iter().for_each(|point| points_in_sensor.push(*point, intensity.unwrap_or_default()).unwrap());
+        StoredScan {
             name: "any".into(),
-            points_in_sensor: points.to_vec(),
-            intensities: None,
-            world_from_sensor: Isometry3::translation(x, 0.0, 0.0),
+            points_in_sensor,
+            world_from_sensor: Isometry3::translation(x_m, 0.0, 0.0),
         }
+    }
+
+    fn mark_of(scan: &StoredScan) -> ScanMark {
+        ScanMark::of(scan).unwrap()
     }
 
     #[test]
     fn a_chain_tells_scans_and_poses_apart_and_goes_on_from_its_texts() {
-        let scans = [scan(&[[1.0, 2.0, 3.0]], 0.0), scan(&[], 1.0), scan(&[[f64::NAN; 3]; 3000], 2.0)];
-        let chain_of = |scans: &[SensorScan]| {
+        let first_points = [[1.0, 2.0, 3.0]];
+        let scans = || {
+            [scan(&first_points, None, 0.0), scan(&[], None, 1.0), scan(&[[f64::NAN; 3]; 3000], None, 2.0)]
+        };
+        let chain_of = |scans: &[StoredScan]| {
             let mut chain = ScanChain::default();
-            scans.iter().for_each(|scan| chain.add(&ScanMark::of(scan)));
+            scans.iter().for_each(|scan| chain.add(&mark_of(scan)));
             chain
         };
-        let whole = chain_of(&scans);
-        let first = chain_of(&scans[..2]);
+        let whole = chain_of(&scans());
+        let first = chain_of(&scans()[..2]);
         let mut on = ScanChain::from_texts(2, &first.scan_text(), &first.pose_text()).unwrap();
-        on.add(&ScanMark::of(&scans[2]));
+        on.add(&mark_of(&scans()[2]));
         assert_eq!(on, whole);
 
-        let mut moved = scans.clone();
+        let mut moved = scans();
         moved[1].world_from_sensor = Isometry3::translation(1.5, 0.0, 0.0);
         let moved = chain_of(&moved);
         assert_eq!(moved.scan_text(), whole.scan_text());
         assert_ne!(moved.pose_text(), whole.pose_text());
 
-        let mut changed = scans.clone();
-        changed[2].points_in_sensor[2999] = [0.0; 3];
+        let mut changed = scans();
+        let mut points = vec![[f64::NAN; 3]; 3000];
+        points[2999] = [0.0; 3];
+        changed[2] = scan(&points, None, 2.0);
         let changed = chain_of(&changed);
         assert_ne!(changed.scan_text(), whole.scan_text());
         assert_eq!(changed.pose_text(), whole.pose_text());
 
-        let [mut a, mut b] = [scans[0].clone(), scans[0].clone()];
-        (a.intensities, b.intensities) = (Some(vec![1.0]), Some(vec![2.0]));
-        let marks = [&scans[0], &a, &b].map(|scan| ScanMark::of(scan).scan_text());
+        let of = |intensity| mark_of(&scan(&first_points, intensity, 0.0)).scan_text();
+        let marks = [None, Some(1.0), Some(2.0)].map(of);
         assert!(marks[0] != marks[1] && marks[1] != marks[2], "{marks:?}");
 
-        let mut unread = chain_of(&scans[..1]);
+        let mut unread = chain_of(&scans()[..1]);
         unread.add_unread();
         assert_ne!(unread, first);
         assert_eq!(ScanChain::from_texts(0, "0g", ""), None);

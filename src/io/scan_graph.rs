@@ -1,7 +1,7 @@
 use super::fingerprint::Fingerprint;
+use super::point_store::PointStore;
 use super::poses::unit_quaternion;
-use super::sensor_scan::SensorScan;
-use super::source::ScanSource;
+use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
 use nalgebra::{Isometry3, Quaternion, Translation3};
 use std::io::Read;
@@ -78,7 +78,7 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         Some(self.nodes as usize)
     }
 
-    fn next_scan(&mut self) -> Result<Option<SensorScan>> {
+    fn read_scan(&mut self, store: &mut PointStore) -> Result<Option<ScanHead>> {
         if self.done == self.nodes {
             return Ok(None);
         }
@@ -88,7 +88,11 @@ impl<R: Read> ScanSource for ScanGraph<R> {
             let reason = format!("{points} points announced, more than the rest of the file can hold");
             return Err(FormatError::at_offset(at, reason).in_input(&self.path));
         }
-        let points_in_sensor = (0..points).map(|_| self.vector()).collect::<Result<Vec<[f64; 3]>>>()?;
+        store.begin(false);
+        store.reserve(points as usize);
+        for _ in 0..points {
+            store.push(self.vector()?, 0.0)?;
+        }
         let at = self.offset;
         let [x, y, z] = self.vector()?;
         let [qw, qx, qy, qz] = self.vector()?;
@@ -102,10 +106,8 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz))
             .map_err(|reason| FormatError::at_offset(at, reason).in_input(&self.path))?;
         self.is_past_error = false;
-        Ok(Some(SensorScan {
+        Ok(Some(ScanHead {
             name: id.to_string(),
-            points_in_sensor,
-            intensities: None,
             world_from_sensor: Isometry3::from_parts(Translation3::new(x, y, z), rotation),
         }))
     }

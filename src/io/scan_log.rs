@@ -1,6 +1,6 @@
 use super::fingerprint::Fingerprint;
-use super::sensor_scan::SensorScan;
-use super::source::ScanSource;
+use super::point_store::PointStore;
+use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
 use crate::maths::sin_cos;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
@@ -80,8 +80,8 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
         None
     }
 
-    fn next_scan(&mut self) -> Result<Option<SensorScan>> {
-        let mut points_in_sensor = Vec::new();
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        points.begin(false);
         let mut next = None;
         while let Some(line) = self.next_line()? {
             let node = line.strip_prefix("NODE").map(|words| self.pose(words)).transpose()?;
@@ -91,7 +91,7 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
                     next = Some(pose);
                     break;
                 }
-                (None, Some(_)) => points_in_sensor.push(self.numbers(&line)?),
+                (None, Some(_)) => points.push(self.numbers(&line)?, 0.0)?,
                 (None, None) => {
                     return Err(self.wrong("points before the first line NODE; this is no scan log"));
                 }
@@ -100,7 +100,7 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
         let Some(world_from_sensor) = std::mem::replace(&mut self.pose, next) else { return Ok(None) };
         let name = self.done.to_string();
         self.done += 1;
-        Ok(Some(SensorScan { name, points_in_sensor, intensities: None, world_from_sensor }))
+        Ok(Some(ScanHead { name, world_from_sensor }))
     }
 
     fn fingerprint(&self) -> Result<String> {

@@ -1,8 +1,8 @@
 use super::fingerprint::Fingerprint;
+use super::point_store::PointStore;
 use super::poses::unit_quaternion;
 use super::scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
-use super::sensor_scan::SensorScan;
-use super::source::ScanSource;
+use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
 use nalgebra::{Isometry3, Quaternion, Translation3};
 use std::io::{ErrorKind, Read};
@@ -134,30 +134,31 @@ impl<R: Read> ScanSource for ScanStream<R> {
         None
     }
 
-    fn next_scan(&mut self) -> Result<Option<SensorScan>> {
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
         let Some(count) = self.next_count()? else { return Ok(None) };
         self.is_past_error = false;
         let at = self.offset;
         let numbers = self.pose_numbers()?;
         let count = count as usize;
-        let mut points_in_sensor = Vec::with_capacity(count.min(MOST_RESERVED));
-        let mut intensities = self.has_intensities.then(|| Vec::with_capacity(count.min(MOST_RESERVED)));
+        points.begin(self.has_intensities);
+        points.reserve(count.min(MOST_RESERVED));
         for _ in 0..count {
             let mut point = [0.0; 3];
             for coordinate in &mut point {
                 *coordinate = f64::from(f32::from_le_bytes(self.bytes("a point")?));
             }
-            points_in_sensor.push(point);
-            if let Some(intensities) = &mut intensities {
-                intensities.push(f32::from_le_bytes(self.bytes("an intensity")?));
-            }
+            let intensity = match self.has_intensities {
+                true => f32::from_le_bytes(self.bytes("an intensity")?),
+                false => 0.0,
+            };
+            points.push(point, intensity)?;
         }
         let name = self.done.to_string();
         self.done += 1;
         let pose = self.pose(numbers, at);
         self.is_past_error = pose.is_err();
         let world_from_sensor = pose?;
-        Ok(Some(SensorScan { name, points_in_sensor, intensities, world_from_sensor }))
+        Ok(Some(ScanHead { name, world_from_sensor }))
     }
 
     fn pass_unread(&mut self) -> bool {

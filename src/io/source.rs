@@ -1,25 +1,66 @@
 use super::pcd_folder::PcdFolder;
+use super::point_store::{PointRoom, PointStore};
 use super::pose_source::PoseSource;
 use super::scan_graph::read_scan_graph;
 use super::scan_log::read_scan_log;
 use super::scan_stream::read_scan_stream;
 use super::sensor_scan::SensorScan;
+use super::stored_scan::StoredScan;
 use crate::error::{Error, Result};
+use nalgebra::Isometry3;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
+
+/// What is known of a scan beside its points.
+#[derive(Clone, Debug)]
+pub struct ScanHead {
+    /// What the scan is called in its source: a file name or a number.
+    pub name: String,
+    /// Pose of the sensor: `world = R * p + t`.
+    pub world_from_sensor: Isometry3<f64>,
+}
 
 /// Scans one at a time, in order.
 pub trait ScanSource {
     /// Number of scans, if known before they are read.
     fn len_hint(&self) -> Option<usize>;
 
-    /// The next scan; `None` after the last.
+    /// The next scan, with its points in `points`, which forgets what it had; `None` after the last.
     ///
     /// # Errors
     ///
     /// A file that cannot be read or is not what it should be, with its path and offset or line.
-    fn next_scan(&mut self) -> Result<Option<SensorScan>>;
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>>;
+
+    /// The next scan in memory, however large it is.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanSource::read_scan`].
+    fn next_scan(&mut self) -> Result<Option<SensorScan>> {
+        let mut points = PointStore::default();
+        let head = self.read_scan(&mut points)?;
+        Ok(head.map(|ScanHead { name, world_from_sensor }| {
+            let (points_in_sensor, intensities) = points.into_parts();
+            SensorScan { name, points_in_sensor, intensities, world_from_sensor }
+        }))
+    }
+
+    /// The next scan, with as many of its points in memory as there is room for.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanSource::read_scan`].
+    fn next_stored(&mut self, room: &PointRoom) -> Result<Option<StoredScan>> {
+        let mut points_in_sensor = PointStore::new(room.clone());
+        let head = self.read_scan(&mut points_in_sensor)?;
+        Ok(head.map(|ScanHead { name, world_from_sensor }| StoredScan {
+            name,
+            points_in_sensor,
+            world_from_sensor,
+        }))
+    }
 
     /// Passes over scans without building them; returns how many there were.
     ///

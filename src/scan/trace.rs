@@ -40,7 +40,24 @@ impl ScanTracer {
     /// As for [`ScanTracer::trace`].
     pub fn check(grid: &Grid, model: &SensorModel, scan: &Scan) -> Result<()> {
         check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
-        origin_voxel(grid, scan.origin).map(drop)
+        Self::check_points(grid, model, scan.origin, scan)
+    }
+
+    /// The same for points wherever they lie, seen from `origin` in metres, world frame.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanTracer::trace`].
+    pub fn check_points(
+        grid: &Grid,
+        model: &SensorModel,
+        origin: Point,
+        points: &dyn ScanPoints,
+    ) -> Result<()> {
+        if model.needs_intensity() && !points.has_intensities() {
+            return Err(no_intensities());
+        }
+        origin_voxel(grid, origin).map(drop)
     }
 
     /// What a scan says about voxels: its rays walked, and the updates grouped by tile.

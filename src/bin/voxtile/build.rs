@@ -8,19 +8,24 @@ use crate::progress::Progress;
 use crate::scan_reader::ScanReader;
 use crate::stop_signal;
 use crate::summary::Summary;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
+use voxtile::io::{PointRoom, StoredScan};
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::{ScanReport, ScanTracer};
 use voxtile::store::InputRecord;
-use voxtile::{Error, MapConfig, Scan};
+use voxtile::{Error, MapConfig, MemoryLimit};
+
+/// The share of the limit of memory that the points of a scan may take, as they are read and as they are mapped.
+const PARTS_OF_MEMORY: usize = 32;
 
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let stop = stop_signal::catch()?;
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
-    let opened = ScanReader::open(args.scans.clone(), args.poses.clone(), stop.clone())?;
+    let opened = ScanReader::open(args.scans.clone(), args.poses.clone(), room(args, &config), stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(stopped_early()) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
     let mut mapper = match exists {
@@ -103,7 +108,7 @@ impl Build<'_> {
                         return Ok(());
                     }
                 };
-            match mapper.insert_scan(&scan) {
+            match mapper.insert_points(scan.origin(), &scan) {
                 Ok(report) => self.report += report,
                 Err(Error::Stopped) => return Ok(()),
                 Err(error) => return Err(error.into()),
@@ -225,9 +230,21 @@ fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
     Error::argument(args.scans.display().to_string(), reason).into()
 }
 
-fn check(scan: Option<&Scan>, config: &MapConfig) -> voxtile::Result<()> {
+/// Points of a scan that the limit of memory has no room for lie beside the map, not where files may be kept in memory.
+fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
+    let beside = match args.output.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    match config.memory {
+        MemoryLimit::Bytes(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY, beside),
+        _ => PointRoom::default(),
+    }
+}
+
+fn check(scan: Option<&StoredScan>, config: &MapConfig) -> voxtile::Result<()> {
     let Some(scan) = scan else { return Ok(()) };
-    ScanTracer::check(&config.grid, &config.sensor_model, scan)
+    ScanTracer::check_points(&config.grid, &config.sensor_model, scan.origin(), scan)
 }
 
 /// Free space alone is rarely what was wanted.

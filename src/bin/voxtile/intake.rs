@@ -1,9 +1,9 @@
 use crate::scan_reader::{Read, ReadScan, ScanReader};
 use std::collections::VecDeque;
 use std::path::PathBuf;
-use voxtile::io::ScanChain;
+use voxtile::Error;
+use voxtile::io::{ScanChain, StoredScan};
 use voxtile::store::InputContent;
-use voxtile::{Error, Scan};
 
 /// Scans among which the first with points is looked for: it tells which input this is.
 const LEAD: usize = 16;
@@ -26,7 +26,7 @@ pub struct Intake {
 
 /// What came of asking for a scan to map.
 pub enum Next {
-    Scan(Scan),
+    Scan(StoredScan),
     End,
     Stopped,
 }
@@ -57,7 +57,7 @@ impl Intake {
     }
 
     /// The first scan of what has been read, if there is any.
-    pub fn first(&self) -> Option<&Scan> {
+    pub fn first(&self) -> Option<&StoredScan> {
         self.lead.iter().find_map(|read| match read {
             Read::Scan(ReadScan { scan, .. }) => Some(scan),
             _ => None,

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
-use voxtile::io::{PoseSource, ScanMark, ScanSource};
+use voxtile::Error;
+use voxtile::io::{PointRoom, PoseSource, ScanMark, ScanSource, StoredScan};
 use voxtile::scan::Stop;
-use voxtile::{Error, Scan};
 
 /// How long an input may keep us waiting before we look up.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -25,9 +25,9 @@ pub struct Opened {
     pub poses: PoseSource,
 }
 
-/// A scan in the world frame, and what tells it from others.
+/// A scan, and what tells it from others.
 pub struct ReadScan {
-    pub scan: Scan,
+    pub scan: StoredScan,
     pub mark: ScanMark,
 }
 
@@ -43,7 +43,7 @@ pub enum Read {
 
 enum Place {
     Thread { requests: Sender<Request>, answers: Receiver<Answer> },
-    Here(Box<dyn ScanSource + Send>),
+    Here(Box<dyn ScanSource + Send>, PointRoom),
 }
 
 enum Request {
@@ -62,11 +62,12 @@ impl ScanReader {
     pub fn open(
         scans: PathBuf,
         poses: Option<PathBuf>,
+        room: PointRoom,
         stop: Stop,
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
         let (answers_out, answers) = channel();
-        let (path, pose_path) = (scans.clone(), poses.clone());
+        let (path, pose_path, here) = (scans.clone(), poses.clone(), room.clone());
         let read = move || {
             let mut source = match scan_input::open(&path, pose_path.as_deref()) {
                 Ok(source) => source,
@@ -75,7 +76,7 @@ impl ScanReader {
             let opened = Opened::of(&path, &*source);
             let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
             while is_wanted && let Ok(request) = requests_in.recv() {
-                is_wanted = answers_out.send(answer(&mut *source, &request)).is_ok();
+                is_wanted = answers_out.send(answer(&mut *source, &request, &room)).is_ok();
             }
         };
         match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
@@ -90,7 +91,7 @@ impl ScanReader {
                 log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
                 let source = scan_input::open(&scans, poses.as_deref())?;
                 let opened = Opened::of(&scans, &*source);
-                Ok(Some((Self { place: Place::Here(source), stop }, opened)))
+                Ok(Some((Self { place: Place::Here(source, here), stop }, opened)))
             }
         }
     }
@@ -117,8 +118,8 @@ impl ScanReader {
         idle: &mut dyn FnMut() -> voxtile::Result<()>,
     ) -> anyhow::Result<Option<Answer>> {
         match &mut self.place {
-            Place::Here(_) if self.stop.is_set() => return Ok(None),
-            Place::Here(source) => return Ok(Some(answer(&mut **source, &request))),
+            Place::Here(..) if self.stop.is_set() => return Ok(None),
+            Place::Here(source, room) => return Ok(Some(answer(&mut **source, &request, room))),
             // A thread that is gone is noticed by waiting for it.
             Place::Thread { requests, .. } => drop(requests.send(request)),
         }
@@ -147,18 +148,18 @@ impl Opened {
     }
 }
 
-fn answer(source: &mut dyn ScanSource, request: &Request) -> Answer {
+fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom) -> Answer {
     match request {
-        Request::Scan => Answer::Read(read(source)),
+        Request::Scan => Answer::Read(read(source, room)),
         Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
     }
 }
 
-fn read(source: &mut dyn ScanSource) -> voxtile::Result<Read> {
-    match source.next_scan() {
+fn read(source: &mut dyn ScanSource, room: &PointRoom) -> voxtile::Result<Read> {
+    match source.next_stored(room) {
         Ok(Some(scan)) => {
-            let mark = ScanMark::of(&scan);
-            Ok(Read::Scan(ReadScan { scan: scan.into_scan(), mark }))
+            let mark = ScanMark::of(&scan)?;
+            Ok(Read::Scan(ReadScan { scan, mark }))
         }
         Ok(None) => Ok(Read::End),
         Err(error) if source.pass_unread() => Ok(Read::Unread(error)),

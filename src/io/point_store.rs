@@ -1,0 +1,244 @@
+use crate::error::{Error, Result};
+use crate::space::Point;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// The points of one scan in the sensor's frame, in metres: in memory as far as there is room, the others in a temporary
+/// file.
+///
+/// The file has no name and goes when the store is dropped.
+#[derive(Debug, Default)]
+pub struct PointStore {
+    /// The last points; all of them, where there is no file.
+    points: Vec<Point>,
+    intensities: Option<Vec<f32>>,
+    /// Points before these.
+    filed: usize,
+    file: Option<Mutex<File>>,
+    room: PointRoom,
+}
+
+/// How many points of a scan may be in memory, and where the others go.
+#[derive(Clone, Debug)]
+pub struct PointRoom {
+    most_points: usize,
+    folder: PathBuf,
+}
+
+/// Bytes of a point in the file: x y z as f64, and the intensity as f32, 0 if there is none.
+const RECORD_BYTES: usize = 28;
+/// Points that are read at a time.
+const POINTS_AT_A_TIME: usize = 1 << 14;
+
+impl Default for PointRoom {
+    fn default() -> Self {
+        Self { most_points: usize::MAX, folder: PathBuf::new() }
+    }
+}
+
+impl PointRoom {
+    /// Room for as many points as make up so many bytes, and beyond that on the file system of a folder.
+    pub fn new(most_bytes: usize, folder: &Path) -> Self {
+        Self { most_points: (most_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
+    }
+
+    /// Whether so many bytes are more than the points in memory may take.
+    pub(super) fn is_too_much(&self, bytes: usize) -> bool {
+        bytes / RECORD_BYTES > self.most_points
+    }
+
+    /// A file without a name, in this folder.
+    pub(super) fn file(&self) -> Result<File> {
+        tempfile::tempfile_in(&self.folder).map_err(|error| {
+            Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
+        })
+    }
+
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+impl PointStore {
+    /// A store without points.
+    pub fn new(room: PointRoom) -> Self {
+        Self { room, ..Self::default() }
+    }
+
+    /// Forgets all points; the next come with intensities or without.
+    pub(super) fn begin(&mut self, has_intensities: bool) {
+        self.points.clear();
+        self.intensities = has_intensities.then(Vec::new);
+        (self.filed, self.file) = (0, None);
+    }
+
+    pub(super) fn room(&self) -> &PointRoom {
+        &self.room
+    }
+
+    /// Makes room in memory for so many points that are sure to come.
+    pub(super) fn reserve(&mut self, points: usize) {
+        let points = points.min(self.room.most_points);
+        self.points.reserve_exact(points);
+        if let Some(intensities) = &mut self.intensities {
+            intensities.reserve_exact(points);
+        }
+    }
+
+    /// Adds a point; the intensity counts where the scan has them.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
+    #[inline]
+    pub(super) fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
+        if self.points.len() == self.room.most_points {
+            self.put_in_file()?;
+        }
+        self.points.push(point);
+        if let Some(intensities) = &mut self.intensities {
+            intensities.push(intensity);
+        }
+        Ok(())
+    }
+
+    #[cold]
+    fn put_in_file(&mut self) -> Result<()> {
+        let mut file = match self.file.take() {
+            Some(file) => file.into_inner().unwrap_or_else(PoisonError::into_inner),
+            None => self.room.file()?,
+        };
+        let cannot =
+            |error| Error::io(self.room.folder(), "keep the points of a scan in a temporary file in", error);
+        let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * RECORD_BYTES);
+        for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
+            bytes.clear();
+            for (number, point) in (chunk * POINTS_AT_A_TIME..).zip(points) {
+                point.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+                let intensity = self.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
+                bytes.extend(intensity.to_le_bytes());
+            }
+            file.write_all(&bytes).map_err(cannot)?;
+        }
+        self.filed += self.points.len();
+        self.points.clear();
+        if let Some(intensities) = &mut self.intensities {
+            intensities.clear();
+        }
+        self.file = Some(Mutex::new(file));
+        Ok(())
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.filed + self.points.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether each point has an intensity.
+    pub fn has_intensities(&self) -> bool {
+        self.intensities.is_some()
+    }
+
+    /// Hands over the points of a range in order, some at a time, with their intensities if they have any. `take` says
+    /// whether to go on.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
+    pub fn for_each_chunk(
+        &self,
+        range: Range<usize>,
+        take: &mut dyn FnMut(&[Point], Option<&[f32]>) -> bool,
+    ) -> Result<()> {
+        let in_file = range.start.min(self.filed)..range.end.min(self.filed);
+        let in_memory = range.start.max(self.filed) - self.filed..range.end.max(self.filed) - self.filed;
+        let mut next = in_file.start;
+        let (mut bytes, mut points, mut intensities) = (Vec::new(), Vec::new(), Vec::new());
+        while next < in_file.end {
+            let count = (in_file.end - next).min(POINTS_AT_A_TIME);
+            self.read(next, count, &mut bytes)?;
+            points.clear();
+            intensities.clear();
+            for record in bytes.chunks_exact(RECORD_BYTES) {
+                let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| record[8 * k + byte]));
+                points.push([number(0), number(1), number(2)]);
+                intensities.push(f32::from_le_bytes(std::array::from_fn(|byte| record[24 + byte])));
+            }
+            if !take(&points, self.has_intensities().then_some(&*intensities)) {
+                return Ok(());
+            }
+            next += count;
+        }
+        // Some at a time here, too: who takes them may make something larger of each.
+        for first in in_memory.clone().step_by(POINTS_AT_A_TIME) {
+            let some = first..in_memory.end.min(first + POINTS_AT_A_TIME);
+            let intensities = self.intensities.as_ref().map(|intensities| &intensities[some.clone()]);
+            if !take(&self.points[some], intensities) {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    fn read(&self, first: usize, count: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let Some(file) = &self.file else { return Ok(()) };
+        let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+        bytes.resize(count * RECORD_BYTES, 0);
+        let at = SeekFrom::Start((first * RECORD_BYTES) as u64);
+        file.seek(at).and_then(|_| file.read_exact(bytes)).map_err(|error| {
+            Error::io(self.room.folder(), "read the points of a scan back from a temporary file in", error)
+        })
+    }
+
+    /// Points and intensities, where all are in memory.
+    pub(super) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
+        (self.points, self.intensities)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_come_back_from_file_and_memory_in_order() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let count = 3 * POINTS_AT_A_TIME + 77;
+        for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
+            let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));
+            store.begin(has_intensities);
+            for k in 0..count {
+                store.push([k as f64, -0.5 * k as f64, f64::NAN], k as f32).unwrap();
+            }
+            assert_eq!((store.len(), store.file.is_some()), (count, most_bytes < usize::MAX));
+            for range in
+                [0..count, 5..6, 100..count - 3, POINTS_AT_A_TIME - 1..2 * POINTS_AT_A_TIME + 1, 7..7]
+            {
+                let mut next = range.start;
+                let mut take = |points: &[Point], intensities: Option<&[f32]>| {
+                    assert!(points.len() <= POINTS_AT_A_TIME);
+                    assert_eq!(intensities.is_some(), has_intensities);
+                    for (at, point) in points.iter().enumerate() {
+                        assert!(
+                            point[0] == next as f64 && point[1] == -0.5 * next as f64 && point[2].is_nan()
+                        );
+                        assert!(intensities.is_none_or(|intensities| intensities[at] == next as f32));
+                        next += 1;
+                    }
+                    true
+                };
+                store.for_each_chunk(range.clone(), &mut take).unwrap();
+                assert_eq!(next, range.end);
+            }
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

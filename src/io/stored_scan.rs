@@ -1,0 +1,47 @@
+use super::point_store::PointStore;
+use crate::error::Result;
+use crate::scan::{Scan, ScanPoints};
+use crate::space::Point;
+use nalgebra::Isometry3;
+use std::ops::Range;
+
+/// One scan as a sensor gives it, of any size: points in the sensor's frame, and where it was.
+///
+/// As [`ScanPoints`] its points are in the world frame.
+#[derive(Debug)]
+pub struct StoredScan {
+    /// What the scan is called in its source: a file name or a number.
+    pub name: String,
+    /// End points in metres, sensor frame.
+    pub points_in_sensor: PointStore,
+    /// Pose of the sensor: `world = R * p + t`.
+    pub world_from_sensor: Isometry3<f64>,
+}
+
+impl StoredScan {
+    /// Position of the sensor in metres, world frame.
+    pub fn origin(&self) -> Point {
+        self.world_from_sensor.translation.vector.into()
+    }
+}
+
+impl ScanPoints for StoredScan {
+    fn len(&self) -> usize {
+        self.points_in_sensor.len()
+    }
+
+    fn has_intensities(&self) -> bool {
+        self.points_in_sensor.has_intensities()
+    }
+
+    fn for_each_chunk(
+        &self,
+        range: Range<usize>,
+        take: &mut dyn FnMut(&[Point], Option<&[f32]>) -> bool,
+    ) -> Result<()> {
+        self.points_in_sensor.for_each_chunk(range, &mut |points, intensities| {
+            let scan = Scan::from_sensor_frame(points, None, &self.world_from_sensor);
+            take(&scan.points, intensities)
+        })
+    }
+}
