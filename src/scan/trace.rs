@@ -93,6 +93,7 @@ impl ScanTracer {
         };
         let mut parts = PackedParts::default();
         for &choice in &groups {
+            self.stop.check()?;
             let updates = match once_a_voxel {
                 true => fan.once_a_voxel(&mut self.once, choice),
                 false => fan.every_ray(&mut self.every_ray, choice),

@@ -94,7 +94,7 @@ fn endless_scan(rays: u32) -> Scan {
 #[test]
 fn a_scan_that_takes_minutes_is_given_up() {
     let (_folder, map) = folder_for_maps();
-    let how = ["--max-range", "1000", "--resolution", "0.02", "--tile-size", "4", "--memory", "64MiB"];
+    let how = ["--max-range", "1000", "--resolution", "0.02", "--tile-size", "4", "--memory", "256MiB"];
     let mut build = StreamedBuild::spawn_with(&map, &how);
     build.write(&[endless_scan(400_000)]);
     wait_until("the map is begun", || flushed_scans(&map).is_some());

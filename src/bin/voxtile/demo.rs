@@ -92,7 +92,8 @@ fn begin(args: &DemoArgs, map: &Path, config: MapConfig) -> anyhow::Result<(OutO
 }
 
 fn another_demo(map: &Path) -> Error {
-    let hint = "the demo goes on only with its own map of the same options; remove it or choose another --out";
+    let hint =
+        "the demo goes on only with its own map of the same options; remove it or choose another --out";
     Error::AlreadyExists { path: map.to_owned(), hint }
 }
 
