@@ -34,6 +34,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
         Some(mapper) => mapper,
         none => {
             // A first scan that cannot be mapped should not leave an empty map behind.
+            intake.check_first()?;
             check(intake.first(), &config)?;
             none.insert(OutOfCoreTileMapper::create(whole_map(&args.output)?, config)?)
         }
