@@ -1,6 +1,7 @@
 use super::marked_page::MarkedBrick;
 use super::once_bricks::{Intensities, hits_and_misses, united, updates_by_tile};
 use super::overflow::Overflow;
+use super::stop::Stop;
 use super::part_log::{MakeScratch, NONE, PartLog};
 use super::tile_order::in_order_of_tiles;
 use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
@@ -103,11 +104,12 @@ impl<'a> ScanParts<'a> {
     ///
     /// # Errors
     ///
-    /// Those of putting aside, and of the file of the parts.
+    /// Those of putting aside, and of the file of the parts; [`Error::Stopped`](crate::Error::Stopped).
     pub(super) fn into_updates(
         self,
         mut report: ScanReport,
         counts_once: bool,
+        stop: &Stop,
         overflow: &mut Overflow<'_>,
     ) -> crate::Result<ScanUpdates> {
         let mut parts = self.parts.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -118,6 +120,7 @@ impl<'a> ScanParts<'a> {
         lists.sort_unstable_by_key(|&(tile, _)| tile);
         let mut kept = Kept { tiles: Vec::new(), bytes: 0 };
         for &(tile, list) in &lists {
+            stop.check()?;
             let records = parts.records_of(&list).map_err(|error| overflow.error(error))?;
             let (hits, misses) = match counts_once && list.count > 1 {
                 true => {

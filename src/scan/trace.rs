@@ -137,7 +137,7 @@ impl ScanTracer {
             (_, true) => fan.every_ray_in_order_in_parts(&self.limit, &parts)?,
             _ => fan.every_ray_in_parts(&mut self.every_ray, &self.limit, &parts)?,
         };
-        parts.into_updates(report, counts_once, &mut overflow)
+        parts.into_updates(report, counts_once, &self.stop, &mut overflow)
     }
 
     /// A tracer that keeps to so many bytes where it can put aside what there is no room for.

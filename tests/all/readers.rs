@@ -164,6 +164,59 @@ fn poses_match_the_files_or_both_counts_are_told() {
     }
 }
 
+/// Scans that are told by their first point, as `name` says, without a `VIEWPOINT` that says anything.
+fn unplaced(folder: &Path, names: &[&str]) {
+    for (number, name) in names.iter().enumerate() {
+        let text =
+            format!("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n{number} 1 1\n");
+        fs::write(folder.join(name), text).unwrap();
+    }
+}
+
+#[test]
+fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
+    use voxtile::io::PoseSource;
+    let folder = TempDir::new().unwrap();
+    let names: Vec<String> = (0..12).map(|number| format!("full{number}.pcd")).collect();
+    unplaced(folder.path(), &names.iter().map(String::as_str).collect::<Vec<_>>());
+    fs::write(folder.path().join("trajectory.txt"), "0 0 0 0 0 0 0 1\n".repeat(12)).unwrap();
+    let error = open_scans(folder.path(), None).err().unwrap().to_string();
+    assert!(error.contains("12 scans and no poses"), "{error}");
+    assert!(error.contains("trajectory.txt looks like one") && error.contains("--poses identity"), "{error}");
+
+    let mut meant = open_scans(folder.path(), Some(Path::new("identity"))).unwrap();
+    assert_eq!(meant.pose_source(), PoseSource::Identity);
+    for number in 0..12 {
+        assert_eq!(meant.next_scan().unwrap().unwrap().points_in_sensor[0][0], f64::from(number));
+    }
+    let single = open_scans(&folder.path().join("full3.pcd"), None).unwrap();
+    assert_eq!(single.pose_source(), PoseSource::Identity);
+
+    let poses = folder.path().join("trajectory.txt");
+    assert_eq!(
+        open_scans(folder.path(), Some(&poses)).unwrap().pose_source(),
+        PoseSource::File(poses.clone())
+    );
+    let lines = (0..12).map(|number| format!("{} 0 0 0 0 0 0 1\n", if number == 7 { 3 } else { number }));
+    fs::write(&poses, lines.collect::<String>()).unwrap();
+    let error = open_scans(folder.path(), Some(&poses)).err().unwrap().to_string();
+    assert!(error.contains("line 8: time stamp 3 comes after 6"), "{error}");
+}
+
+#[test]
+fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
+    let folder = TempDir::new().unwrap();
+    for number in 0..2 {
+        fs::write(folder.path().join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
+    }
+    unplaced(folder.path(), &["2.pcd"]);
+    let mut source = open_scans(folder.path(), None).unwrap();
+    assert_eq!(source.pose_source(), voxtile::io::PoseSource::Viewpoint);
+    assert!(source.next_scan().unwrap().is_some() && source.next_scan().unwrap().is_some());
+    assert!(source.next_scan().unwrap_err().to_string().contains("no VIEWPOINT in this file"));
+    assert!(source.pass_unread() && source.next_scan().unwrap().is_none());
+}
+
 #[test]
 fn a_matrix_that_is_a_rotation_to_a_few_digits_gives_a_pose_that_does_not_scale() {
     let poses = parse_poses("0.6004 -0.8 0 1 0.8 0.6004 0 2 0 0 1.0004 3\n").unwrap();

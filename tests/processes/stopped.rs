@@ -1,8 +1,9 @@
 use crate::survey::{
-    Scans, StreamedBuild, digest, flushed_scans, folder_for_maps, signal, signals_are_caught, wait_until,
+    Scans, StreamedBuild, digest, flushed_scans, folder_for_maps, signal, signals_are_caught, voxtile,
+    wait_until,
 };
 use std::io::{BufRead, BufReader, Read};
-use std::process::Child;
+use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 use voxtile::Scan;
@@ -81,6 +82,34 @@ fn an_input_that_is_quiet_keeps_nothing_from_being_flushed_and_nobody_from_stopp
     assert!(!map.exists());
 }
 
+#[test]
+fn a_demo_that_is_stopped_goes_on_when_it_is_run_again() {
+    let (folder, _) = folder_for_maps();
+    let out = folder.path().join("demo");
+    let map = out.join("map_tiles");
+    let demo = || {
+        let mut command = voxtile();
+        command
+            .args(["demo", "--length", "60", "--out"])
+            .arg(&out)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        command
+    };
+    let mut child = demo().spawn().unwrap();
+    wait_until("the map is begun", || flushed_scans(&map).is_some());
+    signal(&child, "INT");
+    let mut lines = read_until(&mut child, "the same command goes on");
+    lines.read_to_string(&mut String::new()).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    for _ in 0..2 {
+        let output = demo().output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(digest(&map).unwrap().0, 30);
+        assert!(out.join("map.png").exists());
+    }
+}
+
 /// A scan of long rays in all directions, which takes long to follow at this resolution.
 fn endless_scan(rays: u32) -> Scan {
     let point = |k: u32| {
@@ -94,7 +123,7 @@ fn endless_scan(rays: u32) -> Scan {
 #[test]
 fn a_scan_that_takes_minutes_is_given_up() {
     let (_folder, map) = folder_for_maps();
-    let how = ["--max-range", "1000", "--resolution", "0.02", "--tile-size", "4", "--memory", "64MiB"];
+    let how = ["--max-range", "1000", "--resolution", "0.02", "--tile-size", "4", "--memory", "256MiB"];
     let mut build = StreamedBuild::spawn_with(&map, &how);
     build.write(&[endless_scan(400_000)]);
     wait_until("the map is begun", || flushed_scans(&map).is_some());

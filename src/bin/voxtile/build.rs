@@ -39,6 +39,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
         Some(mapper) => mapper,
         none => {
             // A first scan that cannot be mapped should not leave an empty map behind.
+            intake.check_first()?;
             check(intake.first(), &config)?;
             none.insert(OutOfCoreTileMapper::create(whole_map(&args.output)?, config)?)
         }
@@ -179,10 +180,9 @@ fn begin(
     name: &str,
 ) -> anyhow::Result<Option<u64>> {
     let inputs = mapper.inputs();
+    // Of inputs that begin with many scans without points nothing tells one from another but what comes later.
     let is_this = |input: &InputRecord| {
-        let content = input.content.as_ref();
-        intake.begins_with().is_some()
-            && content.and_then(|content| content.begins_with.as_deref()) == intake.begins_with()
+        input.content.as_ref().is_some_and(|content| content.begins_with.as_deref() == intake.begins_with())
     };
     if let Some(at) = inputs.iter().rposition(is_this).filter(|_| !args.again) {
         let content = inputs[at].content.clone().unwrap_or_default();

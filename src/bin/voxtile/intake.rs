@@ -64,6 +64,17 @@ impl Intake {
         })
     }
 
+    /// The error of a first scan that cannot be read, where it is not to be skipped.
+    pub fn check_first(&mut self) -> anyhow::Result<()> {
+        match self.lead.pop_front() {
+            Some(Read::Unread(error)) if !self.skips_bad => Err(error.into()),
+            first => {
+                first.into_iter().for_each(|first| self.lead.push_front(first));
+                Ok(())
+            }
+        }
+    }
+
     /// What the first scan with points is.
     pub fn begins_with(&self) -> Option<&str> {
         self.begins_with.as_deref()

@@ -4,6 +4,7 @@ use super::{bt, ot};
 use crate::error::{DecodeError, FormatError};
 use crate::octree::Octree;
 use crate::octree::block::{Block, BlockId};
+use std::fmt;
 use std::io::BufRead;
 
 /// Which of OctoMap's two file formats.
@@ -13,6 +14,15 @@ pub enum OctreeFormat {
     Bt,
     /// `.ot`: log-odds of every node.
     Ot,
+}
+
+impl fmt::Display for OctreeFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Bt => ".bt",
+            Self::Ot => ".ot",
+        })
+    }
 }
 
 /// What a `.bt` or `.ot` file holds.
@@ -87,7 +97,7 @@ fn read_format(
     let mut input = Input::new(input);
     let header = read_header(&mut input)?;
     if let Some(wanted) = wanted.filter(|&wanted| wanted != header.format) {
-        let reason = format!("the first line is that of {:?}, not of {wanted:?}", header.format);
+        let reason = format!("the first line is that of {}, not of {wanted}", header.format);
         return Err(FormatError::at_offset(0, reason).into());
     }
     let growing = GrowingTree { tree: Octree::new(), max_bytes };
