@@ -126,7 +126,8 @@ impl<W: Write> VoxelWriter<W> {
             }
             VoxelFormat::Pcd => {
                 let reach_m = f64::from(VoxelFile::PCD_REACH_VOXELS) * self.file.resolution_m;
-                if let Some(far) = center_m.iter().find(|coordinate| !(coordinate.abs() <= reach_m)) {
+                let is_far = |coordinate: &&f64| coordinate.is_nan() || coordinate.abs() > reach_m;
+                if let Some(far) = center_m.iter().find(is_far) {
                     let reason = format!(
                         "{far} m from the file's origin a float32 of PCD does not tell voxels of {} m apart",
                         self.file.resolution_m

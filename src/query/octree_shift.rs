@@ -99,7 +99,6 @@ mod tests {
     fn every_voxel_comes_to_the_place_of_its_shifted_index() {
         for origin in [[0; 3], [8, -16, 65536], [1, -2, 7], [-63_781_373, 5, 2_000_000_001]] {
             for corner in [[0; 3], [40, -48, 8]] {
-                let voxels = |k: usize| local_of(k).map(|k| k);
                 // Voxels near the octree's middle, wherever in the map that is.
                 let first: VoxelIndex = std::array::from_fn(|k| (origin[k] + corner[k]) & !(BRICK_EDGE - 1));
                 let mut shift = OctreeShift::by(origin);
@@ -112,7 +111,8 @@ mod tests {
                 let mut found: Vec<(MortonCode, f32)> = values.voxels().collect();
                 found.sort_by(|a, b| a.1.total_cmp(&b.1));
                 for (place, (code, _)) in found.into_iter().enumerate() {
-                    let voxel: VoxelIndex = std::array::from_fn(|k| first[k] + voxels(place)[k] - origin[k]);
+                    let voxel: VoxelIndex =
+                        std::array::from_fn(|k| first[k] + local_of(place)[k] - origin[k]);
                     assert_eq!(code, VoxelKey::from_index(voxel).morton(), "{origin:?} {voxel:?}");
                 }
             }

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Other programs read what `voxtile export` writes: PCL, plyfile, pypcd4 and OctoMap, and all but with --short Open3D and
-# CloudCompare. Near the origin and far from it (UTM, ECEF), every point must come back to its voxel.
+# Other programs read what `voxtile export` writes: PCL, plyfile, pypcd4 and OctoMap, and without --short Open3D and
+# CloudCompare, too. Near the origin and far from it (UTM, ECEF), every point must come back to its voxel.
 #
 #   tools/interchange/run.sh [--short]
 #
@@ -74,16 +74,17 @@ for map in near utm ecef; do
     for format in bt ot; do
         # shellcheck disable=SC2086
         "$voxtile" export "$work/$map" -o "$work/$map.$format" $origin >/dev/null
-        "$work/octomap_reader" "$work/$map.$format" | compare "$table" "$work/$map.$format" OctoMap --any-order
+        "$work/octomap_reader" "$work/$map.$format" 2>/dev/null | compare "$table" "$work/$map.$format" OctoMap --any-order
     done
     [ "${1-}" = --short ] && continue
     for format in pcd ply; do
         /usr/bin/python3 "$here/points.py" open3d "$work/$map.$format" | compare "$table" "$work/$map.$format" Open3D
-        QT_QPA_PLATFORM=offscreen timeout 120 CloudCompare -SILENT -NO_TIMESTAMP -C_EXPORT_FMT ASC -PREC 12 -SEP SPACE \
-            -AUTO_SAVE OFF -O -GLOBAL_SHIFT 0 0 0 "$work/$map.$format" -SAVE_CLOUDS FILE "$work/read.asc" >"$work/cc.log" 2>&1 ||
-            { tail -5 "$work/cc.log" && failed=1; }
-        compare "$table" "$work/$map.$format" CloudCompare <"$work/read.asc"
-        rm -f "$work/read.asc"
     done
+    # Debian's CloudCompare has no reader of .pcd. It has float32 inside, and shifts what is far away by itself.
+    QT_QPA_PLATFORM=offscreen timeout 120 CloudCompare -SILENT -NO_TIMESTAMP -C_EXPORT_FMT ASC -PREC 12 -SEP SPACE -AUTO_SAVE OFF \
+        -O -GLOBAL_SHIFT AUTO "$work/$map.ply" -SAVE_CLOUDS FILE "$work/read.asc" >"$work/cc.log" 2>&1 || tail -5 "$work/cc.log"
+    touch "$work/read.asc"
+    compare "$table" "$work/$map.ply" CloudCompare <"$work/read.asc"
+    rm "$work/read.asc"
 done
 exit $failed

@@ -42,7 +42,7 @@ struct Exported {
 pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
     let export = Export::of(args)?;
     let exported = if octree_file::is_octree_file(&args.map) {
-        export.from_octree_file()?
+        export.octree_file()?
     } else {
         read_map(&args.map, |reader| match export.format {
             ExportFormat::Voxels(format) => export.voxels(format, reader),
@@ -170,7 +170,7 @@ impl<'a> Export<'a> {
     }
 
     /// From one of OctoMap's files to another file; OctoMap's threshold is log-odds 0.
-    fn from_octree_file(&self) -> anyhow::Result<Exported> {
+    fn octree_file(&self) -> anyhow::Result<Exported> {
         let file = octree_file::read(&self.args.map)?;
         // The tile size has no meaning here; two voxels always make a grid.
         let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m)?;

@@ -92,8 +92,8 @@ fn main() -> ExitCode {
         if is_closed_pipe(&error) {
             return ExitCode::SUCCESS;
         }
-        match error.downcast_ref::<std::io::Error>() {
-            // All files have a name in their error.
+        // Of files and programs, errors tell the name.
+        match error.chain().next().and_then(|first| first.downcast_ref::<std::io::Error>()) {
             Some(error) => say(format_args!("standard output: cannot write: {error}")),
             None => say(format_args!("{error:#}")),
         }
