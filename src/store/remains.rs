@@ -29,7 +29,9 @@ impl Remains {
     /// A disk that refuses; damage is no error here.
     pub fn read(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
         let metadata = match map_folder::read_metadata(disk, layout) {
-            Err(error @ Error::Io { .. }) if !is_no_file(&error) && !error.is_of_medium() => return Err(error),
+            Err(error @ Error::Io { .. }) if !is_no_file(&error) && !error.is_of_medium() => {
+                return Err(error);
+            }
             metadata => metadata,
         };
         let path = layout.commit_log();
@@ -49,7 +51,9 @@ impl Remains {
         };
         let (log_map_id, log_error) = match read {
             Ok(log) => (Some(log.map_id()), None),
-            Err(DecodeError::Io(error)) if !is_of_medium(&error) => return Err(Error::io(&path, "read", error)),
+            Err(DecodeError::Io(error)) if !is_of_medium(&error) => {
+                return Err(Error::io(&path, "read", error));
+            }
             Err(error) => (None, Some(error.in_map(&path, None))),
         };
         Ok(Self { metadata, log_error, log_map_id, commits })

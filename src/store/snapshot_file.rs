@@ -77,7 +77,9 @@ impl Snapshot {
         let map = layout.folder().display();
         let unknown = |reason: String| Err(Error::argument("snapshot", reason));
         if listed.is_some_and(|listed| !listed.contains(name)) {
-            return unknown(format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them"));
+            return unknown(format!(
+                "{map} has none with the name {name}; `voxtile snapshots {map}` lists them"
+            ));
         }
         Self::has_folder(disk, layout)?;
         let path = layout.snapshot(name);
@@ -97,9 +99,9 @@ impl Snapshot {
                     "the snapshot's file is missing, and the map has this snapshot; put the file back, or give the snapshot \
                      up with `voxtile snapshot {map} {name} --delete`"
                 )),
-                None => {
-                    unknown(format!("{map} has none with the name {name}; `voxtile snapshots {map}` lists them"))
-                }
+                None => unknown(format!(
+                    "{map} has none with the name {name}; `voxtile snapshots {map}` lists them"
+                )),
             };
         };
         if let Some(own) = snapshot.name_inside().filter(|own| *own != name) {
@@ -109,7 +111,9 @@ impl Snapshot {
             && flush_number != snapshot.commits.flush_number
         {
             let found = snapshot.commits.flush_number;
-            return damaged(format!("the file is of flush {found}, and this snapshot is of flush {flush_number}"));
+            return damaged(format!(
+                "the file is of flush {found}, and this snapshot is of flush {flush_number}"
+            ));
         }
         Ok(snapshot)
     }

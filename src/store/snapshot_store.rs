@@ -157,8 +157,7 @@ impl TileStore {
         let (number, scan_number) = (self.commits.flush_number + 1, self.commits.scan_number);
         let metadata = self.fill_in(self.metadata.clone(), number, scan_number);
         let text = metadata.to_text();
-        let flush =
-            Flush { number, scan_number, changed: &[], removed: &[], metadata_text: Some(&text) };
+        let flush = Flush { number, scan_number, changed: &[], removed: &[], metadata_text: Some(&text) };
         let log_path = self.layout.commit_log();
         if let Err(error) = log.append(&*self.disk, &log_path, &flush) {
             self.listed = before;

@@ -106,12 +106,7 @@ impl Snapshots {
         self.take_tiles(commits.tiles.keys().copied(), commits.flush_number, kept);
     }
 
-    fn take_tiles(
-        &mut self,
-        tiles: impl Iterator<Item = TileIndex>,
-        as_of_flush: u64,
-        kept: &KeptTables,
-    ) {
+    fn take_tiles(&mut self, tiles: impl Iterator<Item = TileIndex>, as_of_flush: u64, kept: &KeptTables) {
         for tile in tiles {
             match seen_by(kept.get(&tile), as_of_flush) {
                 Some(flush_number) => self.pin(tile, flush_number),

@@ -91,7 +91,9 @@ impl TileStore {
     /// Gives a committed file its name. A folder or link that has it, which no map contains, is moved to quarantine.
     fn put_in_its_place(&self, next: &Path, current: &Path) -> Result<()> {
         let renamed = self.rename(next, current);
-        if renamed.is_err() && !matches!(self.disk.kind(current), Err(_) | Ok(None | Some(EntryKind::File(_)))) {
+        if renamed.is_err()
+            && !matches!(self.disk.kind(current), Err(_) | Ok(None | Some(EntryKind::File(_))))
+        {
             let to = Quarantine::new(&*self.disk, &self.layout).take(current)?;
             log::warn!("{}: no file, and in the way of one; now {}", current.display(), to.display());
             return self.rename(next, current);

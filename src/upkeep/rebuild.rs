@@ -6,8 +6,8 @@ use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::mapper::tile_files::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
-    Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Snapshot, Stamping,
-    StoredTile, TileFile, TileStamp, hex, id_from_hex, tile_of_folder,
+    Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Snapshot,
+    Stamping, StoredTile, TileFile, TileStamp, hex, id_from_hex, tile_of_folder,
 };
 use crate::tile::format::{Trailer, read_compact_front, read_trailer};
 use rustc_hash::FxHashMap;

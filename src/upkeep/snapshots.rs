@@ -38,7 +38,9 @@ pub(super) fn lost_tiles(
         }
         match tile_files::load_table(&past, &config.grid, tile) {
             Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), *stamp))),
-            Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => lost.push((tile, error)),
+            Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => {
+                lost.push((tile, error))
+            }
             Err(error) => return Err(error),
         }
     }

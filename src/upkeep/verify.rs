@@ -7,8 +7,8 @@ use crate::error::{Error, FormatError, Result};
 use crate::mapper::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotList, SnapshotName, TileFile,
-    TileStamp, TileStore, read_log, tile_of_folder,
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotList,
+    SnapshotName, TileFile, TileStamp, TileStore, read_log, tile_of_folder,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;

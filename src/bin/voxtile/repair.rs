@@ -52,7 +52,10 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
         }
         if repair.left > 0 {
             let left = HumanCount(repair.left);
-            writeln!(out, "still damaged: {left} tiles, because the disk refuses; copy the map to another one")?;
+            writeln!(
+                out,
+                "still damaged: {left} tiles, because the disk refuses; copy the map to another one"
+            )?;
         }
     }
     // A script must not take a map with holes for a whole one.
