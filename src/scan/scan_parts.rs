@@ -1,8 +1,8 @@
 use super::marked_page::MarkedBrick;
 use super::once_bricks::{Intensities, hits_and_misses, united, updates_by_tile};
 use super::overflow::Overflow;
-use super::stop::Stop;
 use super::part_log::{MakeScratch, NONE, PartLog};
+use super::stop::Stop;
 use super::tile_order::in_order_of_tiles;
 use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
 use super::{PackedUpdates, ScanReport};

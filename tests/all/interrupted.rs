@@ -253,7 +253,9 @@ fn damage_has_an_exit_code_and_a_line_and_is_repaired() {
     let damaged: serde_json::Value = serde_json::from_str(&damaged).unwrap();
     let finding = &damaged["findings"][0];
     assert_eq!((&finding["path"], &finding["offset"]), (&text(&table).into(), &0.into()));
-    let repaired = json(&["repair", map, "--json"]);
+    // A script must not take a map with holes for a whole one.
+    let repaired: serde_json::Value =
+        serde_json::from_str(&failing_output(&["repair", map, "--json"]).1).unwrap();
     assert_eq!(repaired["tiles_lost"], 1);
     assert_eq!(repaired["done"][0]["kind"], "quarantined");
     let name = tile.file_name().unwrap();

@@ -52,6 +52,8 @@ mod scan_stream;
 mod session;
 /// Map sharing: codec, convergence over bad links, layers.
 mod sharing;
+/// The names of snapshots: in their files, and in the log.
+mod snapshot_names;
 /// Snapshots, reverts and diffs against naive ones; their damage and repair.
 mod snapshots;
 /// Numbers that are large, negative or on a border.
@@ -61,6 +63,8 @@ mod store;
 mod support;
 /// Drives that a cache of tiles likes and some that it does not.
 mod trajectories;
+/// Files that the medium does not give back.
+mod unreadable;
 /// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
 mod voxel_cache;
 mod wide_scans;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use voxtile::simulation::{City, Drive, Lidar, Survey};
 use voxtile::space::TileIndex;
+use voxtile::upkeep::verify;
 use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions};
 
 fn config() -> MapConfig {
@@ -138,6 +139,121 @@ fn a_reader_sees_one_flush_whole_however_often_the_map_is_flushed_meanwhile() {
     let kept = walk(&path).into_iter().filter(|path| path.to_string_lossy().contains(".bin.flush"));
     assert_eq!(kept.count(), 0, "nobody reads any more");
     assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), writer.digest().unwrap());
+}
+
+/// Bytes of the tables that are kept for readers.
+fn kept_bytes(map: &Path) -> u64 {
+    let is_kept = |path: &PathBuf| path.to_string_lossy().contains(".bin.flush");
+    walk(map).into_iter().filter(is_kept).map(|path| fs::metadata(path).unwrap().len()).sum()
+}
+
+#[test]
+fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let mut writer = open(&path).unwrap();
+    let mut insert = |seed: u64| {
+        // The robot moves on, so that tiles come that the reader has never seen.
+        let x = 0.2 * seed as f64;
+        writer.insert_scan(&random_scan(&mut Random(seed), [x, 0.0, 0.0], 30)).unwrap();
+        writer.flush().unwrap();
+    };
+    insert(0);
+    let mut reader = MapReader::open(&path, 1).unwrap();
+    let (digest, seen_bytes) = (reader.digest().unwrap(), reader.disk_bytes().unwrap().0);
+    let mut later = None;
+    for seed in 1..31 {
+        insert(seed);
+        if seed == 20 {
+            later = Some(MapReader::open(&path, 1).unwrap());
+        }
+        let readers_bytes = seen_bytes + later.as_ref().map_or(0, |later| later.disk_bytes().unwrap().0);
+        let kept = kept_bytes(&path);
+        assert!(kept <= readers_bytes, "after {seed} flushes: {kept} bytes kept, {readers_bytes} seen");
+        let told = voxtile::session::kept_tables(&path).unwrap();
+        assert_eq!((told.reader_bytes, told.snapshot_bytes), (kept, 0));
+    }
+    assert_eq!(reader.digest().unwrap(), digest);
+    assert!(kept_bytes(&path) > 0);
+    assert!(reader.refresh().unwrap() && !reader.refresh().unwrap());
+    assert_eq!(reader.digest().unwrap(), MapReader::open(&path, 1).unwrap().digest().unwrap());
+    drop(later);
+    let now = reader.digest().unwrap();
+    insert(31);
+    assert!(kept_bytes(&path) <= reader.disk_bytes().unwrap().0);
+    assert_eq!(reader.digest().unwrap(), now, "beside a writer that has seen it refreshed");
+    reader.refresh().unwrap();
+    insert(32);
+    drop(reader);
+    insert(33);
+    assert_eq!(kept_bytes(&path), 0);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_lock_that_is_taken_away_or_taken_by_a_stranger_lets_no_two_write() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let lock = path.join("writer.lock");
+    let mut first = open(&path).unwrap();
+    let scan = |seed| random_scan(&mut Random(seed), [0.0; 3], 10);
+    first.insert_scan(&scan(1)).unwrap();
+    first.flush().unwrap();
+    // Who may read the map may not open what keeps writers out, and so cannot lock it.
+    let mode = fs::metadata(&lock).unwrap().permissions().mode();
+    assert_eq!(mode & !(mode << 1) & 0o044, 0, "{mode:o}");
+    fs::remove_file(&lock).unwrap();
+    let mut second = open(&path).unwrap();
+    second.insert_scan(&scan(2)).unwrap();
+    // Refused here already if a tile has to go.
+    let _ = first.insert_scan(&scan(3));
+    assert!(matches!(first.flush(), Err(Error::LockLost { .. })));
+    second.flush().unwrap();
+    let digest = second.digest().unwrap();
+    assert!(matches!(first.flush(), Err(Error::LockLost { .. })));
+    drop((first, second));
+    assert_eq!(open(&path).unwrap().digest().unwrap(), digest);
+    // One that others may read, as earlier versions made it.
+    fs::set_permissions(&lock, fs::Permissions::from_mode(0o664)).unwrap();
+    drop(open(&path).unwrap());
+    assert_eq!(fs::metadata(&lock).unwrap().permissions().mode() & 0o777, 0o660);
+    // What is no file is named, found and moved away.
+    fs::remove_file(&lock).unwrap();
+    fs::create_dir(&lock).unwrap();
+    assert!(open(&path).unwrap_err().to_string().contains("writer.lock"));
+    let mut found = Vec::new();
+    verify(&path, |finding| found.push(finding.path.clone()), |_, _| ()).unwrap();
+    assert_eq!(found, [lock]);
+    assert!(voxtile::upkeep::repair(&path, |_| (), |_, _| ()).unwrap().is_complete());
+    assert_eq!(open(&path).unwrap().digest().unwrap(), digest);
+}
+
+#[test]
+fn a_folder_in_place_of_an_octree_stops_nobody() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let mut writer = open(&path).unwrap();
+    let scan = |seed| random_scan(&mut Random(seed), [0.0; 3], 10);
+    writer.insert_scan(&scan(1)).unwrap();
+    writer.flush().unwrap();
+    let octrees: Vec<_> = walk(&path).into_iter().filter(|path| path.ends_with("octree.bt")).collect();
+    for octree in &octrees {
+        fs::remove_file(octree).unwrap();
+        fs::create_dir(octree).unwrap();
+        fs::write(octree.join("note"), "a stranger's").unwrap();
+    }
+    for seed in 2..4 {
+        writer.insert_scan(&scan(seed)).unwrap();
+        writer.flush().unwrap();
+    }
+    let digest = writer.digest().unwrap();
+    drop(writer);
+    assert!(octrees.iter().any(|octree| octree.is_file()));
+    assert!(walk(&path).iter().any(|path| path.ends_with("note")), "moved, not deleted");
+    voxtile::upkeep::repair(&path, |_| (), |_, _| ()).unwrap();
+    assert!(verify(&path, |_| (), |_, _| ()).unwrap().is_whole());
+    assert_eq!(open(&path).unwrap().digest().unwrap(), digest);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! The short form takes part in every test run. The long form:
 //!
 //! ```text
-//! VOXTILE_KILLS=1000 VOXTILE_READER_SECONDS=60 cargo test --release --test processes
+//! VOXTILE_KILLS=1000 VOXTILE_READER_SECONDS=60 VOXTILE_LIVES_SECONDS=3600 cargo test --release --test processes
 //! ```
 #![cfg(unix)]
 
@@ -11,6 +11,8 @@
 mod exactly_once;
 /// SIGKILL at random times, resumed until the end.
 mod killed;
+/// Random lives of maps: commands, kills and readers, against an expected state.
+mod lives;
 /// What a command takes of memory, told by itself.
 mod memory;
 /// Merges that are killed: no map, or the whole one.

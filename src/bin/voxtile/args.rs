@@ -58,7 +58,8 @@ pub enum Command {
     Convert(ConvertArgs),
     /// Check every file of a map for damage; exit code 1 if there is any
     Verify(VerifyArgs),
-    /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted
+    /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted; exit code 1 if there is such
+    /// a thing
     Repair(RepairArgs),
     /// Run scans through a local map, as a planner needs it: sizes and times in a table, and a picture
     Local(LocalArgs),

@@ -7,6 +7,7 @@ use std::io::Write;
 use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::sensor::SensorModel;
+use voxtile::session::{KeptTables, kept_tables};
 use voxtile::store::{Bounds, InputRecord};
 use voxtile::{Questions, Result, Storage};
 
@@ -35,6 +36,8 @@ struct Info {
     occupied: u64,
     table_bytes: u64,
     octree_bytes: u64,
+    /// What is kept beside the map as it is; `None` for a snapshot.
+    kept: Option<KeptTables>,
 }
 
 pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
@@ -83,6 +86,7 @@ impl Info {
             occupied,
             table_bytes,
             octree_bytes,
+            kept: reader.snapshot().is_none().then(|| kept_tables(reader.folder())).transpose()?,
         })
     }
 
@@ -118,9 +122,22 @@ impl Info {
         writeln!(out, "voxels       {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;
         let (table, octree) = (HumanBytes(self.table_bytes), HumanBytes(self.octree_bytes));
         match self.storage {
-            Storage::Seed => writeln!(out, "on disk      {table} in tables, {octree} in octrees"),
-            Storage::Compact => writeln!(out, "on disk      {table} in compact tables"),
+            Storage::Seed => writeln!(out, "on disk      {table} in tables, {octree} in octrees")?,
+            Storage::Compact => writeln!(out, "on disk      {table} in compact tables")?,
         }
+        let Some(kept) = &self.kept else { return Ok(()) };
+        if kept.snapshot_tables > 0 {
+            let (bytes, tables) = (HumanBytes(kept.snapshot_bytes), HumanCount(kept.snapshot_tables));
+            writeln!(out, "snapshots    {bytes} in {tables} tables that only they see")?;
+        }
+        if kept.reader_tables > 0 {
+            let (bytes, tables) = (HumanBytes(kept.reader_bytes), HumanCount(kept.reader_tables));
+            writeln!(
+                out,
+                "readers      {bytes} in {tables} tables that were flushed anew while somebody reads"
+            )?;
+        }
+        Ok(())
     }
 }
 

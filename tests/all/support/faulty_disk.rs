@@ -1,5 +1,5 @@
 use super::random_scans::Random;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -21,6 +21,9 @@ pub enum Fault {
     None,
     /// The operation fails; a write has written half.
     Fails(u64),
+    /// The operation fails, and from then on every operation on the same file or folder, until [`FaultyDisk::mend`]: what a disk
+    /// does with sectors that it cannot read or write.
+    Breaks(u64),
     /// The change fails; and a sync that fails leaves the file as it was on the medium, while later syncs of the same
     /// bytes report success, as Linux does.
     LosesSync(u64),
@@ -87,6 +90,10 @@ struct State {
     has_room: bool,
     has_links: bool,
     crashed: bool,
+    /// Files and folders that every operation fails on.
+    broken: BTreeSet<PathBuf>,
+    /// Files whose content cannot be read.
+    unreadable: BTreeSet<PathBuf>,
 }
 
 impl FaultyDisk {
@@ -110,6 +117,8 @@ impl FaultyDisk {
             has_room: true,
             has_links: true,
             crashed: false,
+            broken: BTreeSet::new(),
+            unreadable: BTreeSet::new(),
         };
         Self { state: Arc::new(Mutex::new(state)) }
     }
@@ -140,10 +149,34 @@ impl FaultyDisk {
         self
     }
 
-    /// Ends a lack of room.
+    /// Ends a lack of room, or puts a good disk with the same bytes in place of one that refuses.
     pub fn make_room(&self) {
         let mut state = self.state();
         (state.has_room, state.fault) = (true, Fault::None);
+        state.broken.clear();
+    }
+
+    /// Makes every operation on a file or folder fail.
+    pub fn break_path(&self, path: &Path) {
+        self.state().broken.insert(path.to_owned());
+    }
+
+    /// Makes the content of a file one that cannot be read; it can be renamed, replaced and removed.
+    pub fn make_unreadable(&self, path: &Path) {
+        self.state().unreadable.insert(path.to_owned());
+    }
+
+    /// The file or folder that [`Fault::Breaks`] has hit.
+    pub fn broken(&self) -> Option<PathBuf> {
+        self.state().broken.first().cloned()
+    }
+
+    /// Ends what [`Fault::Breaks`], [`FaultyDisk::break_path`] and [`FaultyDisk::make_unreadable`] began.
+    pub fn mend(&self) {
+        let mut state = self.state();
+        state.broken.clear();
+        state.unreadable.clear();
+        state.fault = Fault::None;
     }
 
     /// What fails from now on; operations are counted anew.
@@ -243,6 +276,11 @@ impl FaultyDisk {
     }
 }
 
+/// EIO.
+fn medium_error() -> io::Error {
+    io::Error::from_raw_os_error(5)
+}
+
 /// Blocks of what was written and not synced, some there and some not, up to a length that is there or not.
 fn mix(content: &Content, random: &mut Random) -> Vec<u8> {
     const BLOCK: usize = 512;
@@ -314,7 +352,7 @@ impl State {
         self.next_inode - 1
     }
 
-    fn operation(&mut self, kind: Kind) -> Verdict {
+    fn operation(&mut self, kind: Kind, path: &Path) -> Verdict {
         let number = self.operations;
         let change = self.changes;
         self.operations += 1;
@@ -325,6 +363,11 @@ impl State {
             Fault::Crashes(at) if change == at && kind != Kind::Reads => {
                 self.crashed = true;
                 Verdict::Fails(io::Error::other("the power is off"))
+            }
+            _ if self.broken.contains(path) => Verdict::Fails(medium_error()),
+            Fault::Breaks(at) if number == at => {
+                self.broken.insert(path.to_owned());
+                Verdict::Fails(medium_error())
             }
             Fault::Fails(at) if number == at => Verdict::Fails(io::Error::other("input/output error")),
             Fault::LosesSync(at) if change == at && kind != Kind::Reads => {
@@ -346,8 +389,8 @@ impl State {
         }
     }
 
-    fn attempt(&mut self, kind: Kind) -> io::Result<()> {
-        match self.operation(kind) {
+    fn attempt(&mut self, kind: Kind, path: &Path) -> io::Result<()> {
+        match self.operation(kind, path) {
             Verdict::Goes => Ok(()),
             Verdict::Fails(error) => Err(error),
         }
@@ -387,10 +430,10 @@ impl State {
         }
     }
 
-    fn sync(&mut self, inode: Inode) -> io::Result<()> {
+    fn sync(&mut self, inode: Inode, path: &Path) -> io::Result<()> {
         let loses =
             matches!(self.fault, Fault::LosesSync(at) | Fault::LosesSyncAndDies(at) if at == self.changes);
-        match self.operation(Kind::Changes) {
+        match self.operation(Kind::Changes, path) {
             Verdict::Goes => {
                 let content = self.content(inode);
                 if !content.lost {
@@ -408,6 +451,7 @@ impl State {
 
 struct Reader {
     disk: FaultyDisk,
+    path: PathBuf,
     bytes: Vec<u8>,
     at: usize,
     shared: Option<Inode>,
@@ -415,6 +459,7 @@ struct Reader {
 
 struct Writer {
     disk: FaultyDisk,
+    path: PathBuf,
     inode: Inode,
 }
 
@@ -432,7 +477,7 @@ struct Locked {
 impl DiskLock for Locked {
     fn is_in_place(&self) -> io::Result<bool> {
         let mut state = self.disk.state();
-        state.attempt(Kind::Reads)?;
+        state.attempt(Kind::Reads, &self.path)?;
         // An unfinished map that has got its name has taken the file along.
         Ok(state.names.get(&self.path) == Some(&Entry::File(self.inode)))
     }
@@ -440,7 +485,12 @@ impl DiskLock for Locked {
 
 impl Read for Reader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.disk.state().attempt(Kind::Reads)?;
+        let mut state = self.disk.state();
+        state.attempt(Kind::Reads, &self.path)?;
+        if state.unreadable.contains(&self.path) {
+            return Err(medium_error());
+        }
+        drop(state);
         let count = (&self.bytes[self.at..]).read(buffer)?;
         self.at += count;
         Ok(count)
@@ -464,7 +514,7 @@ impl Drop for Reader {
 impl Write for Writer {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         let mut state = self.disk.state();
-        let verdict = state.operation(Kind::NeedsRoom);
+        let verdict = state.operation(Kind::NeedsRoom, &self.path);
         let content = state.content(self.inode);
         // What is written anew is to be synced anew.
         content.lost = false;
@@ -487,7 +537,7 @@ impl Write for Writer {
 
 impl DiskWrite for Writer {
     fn sync(&mut self) -> io::Result<()> {
-        self.disk.state().sync(self.inode)
+        self.disk.state().sync(self.inode, &self.path)
     }
 }
 
@@ -506,46 +556,47 @@ impl Drop for Locked {
 impl Disk for FaultyDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         let mut state = self.state();
-        state.attempt(Kind::Reads)?;
+        state.attempt(Kind::Reads, path)?;
         let inode = state.file(path)?;
         let bytes = state.content(inode).seen.clone();
-        Ok(Box::new(Reader { disk: self.clone(), bytes, at: 0, shared: None }))
+        Ok(Box::new(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: None }))
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         let mut state = self.state();
-        state.attempt(Kind::Reads)?;
+        state.attempt(Kind::Reads, path)?;
         let inode = state.file(path)?;
         state.content(inode).readers += 1;
         let bytes = state.content(inode).seen.clone();
-        Ok(Box::new(Reader { disk: self.clone(), bytes, at: 0, shared: Some(inode) }))
+        Ok(Box::new(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: Some(inode) }))
     }
 
     fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>> {
         let mut state = self.state();
-        state.attempt(Kind::Reads)?;
+        state.attempt(Kind::Reads, path)?;
         let inode = state.file(path)?;
         Ok(Box::new(Watch { disk: self.clone(), inode }))
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
         let mut state = self.state();
-        state.attempt(Kind::NeedsRoom)?;
+        state.attempt(Kind::NeedsRoom, path)?;
         let inode = state.file_or_new(path)?;
         let is_linked = state.names.values().filter(|entry| **entry == Entry::File(inode)).count() > 1;
         if is_linked {
             state.change_name(NameChange::Remove(path.to_owned()));
         }
         let inode = state.file_or_new(path)?;
+        state.unreadable.remove(path);
         let content = state.content(inode);
         content.seen.clear();
         content.lost = false;
-        Ok(Box::new(Writer { disk: self.clone(), inode }))
+        Ok(Box::new(Writer { disk: self.clone(), path: path.to_owned(), inode }))
     }
 
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>> {
         let mut state = self.state();
-        state.attempt(Kind::Changes)?;
+        state.attempt(Kind::Changes, path)?;
         let inode = state.file(path)?;
         let content = state.content(inode);
         if (content.seen.len() as u64) < offset {
@@ -555,18 +606,18 @@ impl Disk for FaultyDisk {
             content.seen.truncate(offset as usize);
             content.lost = false;
         }
-        Ok(Box::new(Writer { disk: self.clone(), inode }))
+        Ok(Box::new(Writer { disk: self.clone(), path: path.to_owned(), inode }))
     }
 
     fn sync_file(&self, path: &Path) -> io::Result<()> {
         let mut state = self.state();
         let inode = state.file(path)?;
-        state.sync(inode)
+        state.sync(inode, path)
     }
 
     fn sync_folder(&self, path: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::Changes)?;
+        state.attempt(Kind::Changes, path)?;
         let is_in = |name: &Path| name.parent() == Some(path);
         let changes = std::mem::take(&mut state.unsynced_names);
         let is_synced = |change: &NameChange| match change {
@@ -595,11 +646,16 @@ impl Disk for FaultyDisk {
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::Changes)?;
+        let path = if state.broken.contains(to) { to } else { from };
+        state.attempt(Kind::Changes, path)?;
         let Some(entry) = state.names.get(from).copied() else { return Err(io::ErrorKind::NotFound.into()) };
         match (entry, state.names.get(to)) {
             (_, None) | (Entry::File(_), Some(Entry::File(_))) => {}
             _ => return Err(io::ErrorKind::AlreadyExists.into()),
+        }
+        state.unreadable.remove(to);
+        if state.unreadable.remove(from) {
+            state.unreadable.insert(to.to_owned());
         }
         state.change_name(NameChange::Rename(from.to_owned(), to.to_owned()));
         Ok(())
@@ -607,7 +663,7 @@ impl Disk for FaultyDisk {
 
     fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::NeedsRoom)?;
+        state.attempt(Kind::NeedsRoom, from)?;
         let inode = state.file(from)?;
         match state.names.contains_key(to) {
             _ if !state.has_links => return Err(io::ErrorKind::Unsupported.into()),
@@ -619,15 +675,16 @@ impl Disk for FaultyDisk {
 
     fn remove_file(&self, path: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::Changes)?;
+        state.attempt(Kind::Changes, path)?;
         state.file(path)?;
+        state.unreadable.remove(path);
         state.change_name(NameChange::Remove(path.to_owned()));
         Ok(())
     }
 
     fn create_folder(&self, path: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::NeedsRoom)?;
+        state.attempt(Kind::NeedsRoom, path)?;
         if state.names.contains_key(path) {
             return Err(io::ErrorKind::AlreadyExists.into());
         }
@@ -637,7 +694,7 @@ impl Disk for FaultyDisk {
 
     fn remove_folder(&self, path: &Path) -> io::Result<()> {
         let mut state = self.state();
-        state.attempt(Kind::Changes)?;
+        state.attempt(Kind::Changes, path)?;
         if state.names.keys().any(|name| name.parent() == Some(path)) {
             return Err(io::ErrorKind::DirectoryNotEmpty.into());
         }
@@ -658,7 +715,7 @@ impl Disk for FaultyDisk {
 
     fn list(&self, path: &Path) -> io::Result<Vec<String>> {
         let mut state = self.state();
-        state.attempt(Kind::Reads)?;
+        state.attempt(Kind::Reads, path)?;
         if state.names.get(path) != Some(&Entry::Folder) {
             return Err(io::ErrorKind::NotFound.into());
         }
@@ -668,7 +725,7 @@ impl Disk for FaultyDisk {
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {
         let mut state = self.state();
-        state.attempt(Kind::Reads)?;
+        state.attempt(Kind::Reads, path)?;
         Ok(state.names.get(path).map(|entry| match entry {
             Entry::Folder => EntryKind::Folder,
             Entry::File(inode) => EntryKind::File(state.contents[inode].seen.len() as u64),
@@ -678,7 +735,7 @@ impl Disk for FaultyDisk {
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
         let mut state = self.state();
         let is_there = state.names.contains_key(path);
-        state.attempt(if is_there { Kind::Changes } else { Kind::NeedsRoom })?;
+        state.attempt(if is_there { Kind::Changes } else { Kind::NeedsRoom }, path)?;
         let inode = state.file_or_new(path)?;
         let content = state.content(inode);
         if std::mem::replace(&mut content.locked, true) {

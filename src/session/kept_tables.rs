@@ -1,0 +1,84 @@
+use crate::error::{Error, Result};
+use crate::space::TileIndex;
+use crate::store::{Disk, EntryKind, FsDisk, TileStore, tile_of_folder};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+
+/// What is on disk of a map beside the map as it is: tables that were replaced and that somebody still sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct KeptTables {
+    /// Tables that readers see and no snapshot does. They go with the flush after the last of these readers, or when the map
+    /// is next opened for writing.
+    pub reader_tables: u64,
+    /// Their bytes.
+    pub reader_bytes: u64,
+    /// Tables that snapshots see.
+    pub snapshot_tables: u64,
+    /// Their bytes.
+    pub snapshot_bytes: u64,
+}
+
+/// Counts the tables that are kept beside the map in `folder`. Looks into every tile's folder; takes no lock, and beside a writer
+/// the numbers may be those of a moment.
+///
+/// # Errors
+///
+/// No map there, damage to what tells which tiles there are, a disk that refuses.
+pub fn kept_tables(folder: impl AsRef<Path>) -> Result<KeptTables> {
+    kept_tables_on(Arc::new(FsDisk), folder.as_ref())
+}
+
+/// [`kept_tables`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`kept_tables`].
+pub fn kept_tables_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<KeptTables> {
+    let store = TileStore::open_read_only(disk.clone(), folder)?;
+    let mut kept: BTreeMap<TileIndex, BTreeSet<u64>> = BTreeMap::new();
+    for name in disk.list(folder).map_err(|error| Error::io(folder, "list", error))? {
+        let Some(tile) = tile_of_folder(&name) else { continue };
+        let flushes = store.kept_tables(tile)?;
+        if !flushes.is_empty() {
+            kept.insert(tile, flushes);
+        }
+    }
+    let seen = seen_by_snapshots(&store, &kept)?;
+    let mut counts = KeptTables::default();
+    for (tile, flush_number) in kept.iter().flat_map(|(tile, flushes)| flushes.iter().map(|n| (*tile, *n))) {
+        let path = store.layout().kept(tile, flush_number);
+        // Gone since it was listed, or not to be told.
+        let Ok(Some(EntryKind::File(bytes))) = disk.kind(&path) else { continue };
+        let (tables, all_bytes) = match seen.contains(&(tile, flush_number)) {
+            true => (&mut counts.snapshot_tables, &mut counts.snapshot_bytes),
+            false => (&mut counts.reader_tables, &mut counts.reader_bytes),
+        };
+        *tables += 1;
+        *all_bytes += bytes;
+    }
+    Ok(counts)
+}
+
+/// Which of the kept tables snapshots see; what cannot be read may have seen any as of its flush.
+fn seen_by_snapshots(
+    store: &TileStore,
+    kept: &BTreeMap<TileIndex, BTreeSet<u64>>,
+) -> Result<BTreeSet<(TileIndex, u64)>> {
+    let mut seen = BTreeSet::new();
+    for name in store.snapshot_names()? {
+        let snapshot = store.snapshot(&name).ok();
+        let listed = store.snapshot_list().and_then(|listed| listed.flush_of(&name));
+        let as_of_flush = snapshot.as_ref().map(|snapshot| snapshot.commits.flush_number).or(listed);
+        for (&tile, flushes) in kept {
+            match as_of_flush {
+                _ if snapshot.as_ref().is_some_and(|of| !of.commits.tiles.contains_key(&tile)) => {}
+                Some(as_of_flush) => seen.extend(flushes.range(as_of_flush..).next().map(|&n| (tile, n))),
+                None => seen.extend(flushes.iter().map(|&n| (tile, n))),
+            }
+        }
+    }
+    Ok(seen)
+}

@@ -1,0 +1,191 @@
+use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use crate::support::random_scans::{Random, random_scan};
+use std::path::{Path, PathBuf};
+use voxtile::session::{delete_snapshot_on, revert_on, snapshots_on};
+use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
+use voxtile::upkeep::{Severity, repair_on, verify_on};
+use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Result};
+
+fn map() -> &'static Path {
+    Path::new("/map")
+}
+
+fn name(name: &str) -> SnapshotName {
+    SnapshotName::new(name).unwrap()
+}
+
+fn config() -> MapConfig {
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2)
+}
+
+/// Inserts scans into the same tiles each time, and flushes.
+fn go_on(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
+    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config())?;
+    for seed in seeds {
+        mapper.insert_scan(&random_scan(&mut Random(seed), [0.0; 3], 5))?;
+        mapper.flush()?;
+    }
+    Ok(())
+}
+
+/// A map with two snapshots of different flushes, which has changed since; and their digests.
+fn with_two() -> (FaultyDisk, [String; 2]) {
+    let disk = FaultyDisk::new(Fault::None);
+    drop(OutOfCoreTileMapper::create_on(disk.shared(), map(), config()).unwrap());
+    let digests = ["s1", "s2"].map(|of| {
+        go_on(&disk, if of == "s1" { 0..2 } else { 2..4 }).unwrap();
+        OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap().snapshot(&name(of)).unwrap();
+        digest_of(&disk, Some(of)).unwrap()
+    });
+    go_on(&disk, 4..6).unwrap();
+    (disk, digests)
+}
+
+fn digest_of(disk: &FaultyDisk, snapshot: Option<&str>) -> Result<String> {
+    let reader = match snapshot {
+        Some(of) => MapReader::open_snapshot_on(disk.shared(), map(), &name(of), 2)?,
+        None => MapReader::open_on(disk.shared(), map(), 2)?,
+    };
+    Ok(reader.digest()?.to_string())
+}
+
+fn damaged(disk: &FaultyDisk) -> Vec<PathBuf> {
+    let mut damaged = Vec::new();
+    let found = |finding: &voxtile::upkeep::Finding| {
+        if finding.severity == Severity::Damage {
+            damaged.push(finding.path.clone());
+        }
+    };
+    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap();
+    damaged
+}
+
+fn path(of: &str) -> PathBuf {
+    map().join("snapshots").join(of)
+}
+
+fn kept(disk: &FaultyDisk) -> usize {
+    disk.files().keys().filter(|path| path.to_string_lossy().contains(".flush")).count()
+}
+
+fn swap(disk: &FaultyDisk) {
+    let files = disk.files();
+    disk.put(&path("s1"), &files[&path("s2")]);
+    disk.put(&path("s2"), &files[&path("s1")]);
+}
+
+#[test]
+fn swapped_snapshots_are_found_refused_and_put_back() {
+    let (disk, digests) = with_two();
+    let now = digest_of(&disk, None).unwrap();
+    swap(&disk);
+    assert_eq!(damaged(&disk), [path("s1"), path("s2")]);
+    let error = revert_on(disk.shared(), map(), &name("s1"), None, |_, _| ()).unwrap_err().to_string();
+    assert!(error.contains("that of the snapshot s2"), "{error}");
+    assert!(digest_of(&disk, Some("s2")).is_err());
+    assert_eq!(digest_of(&disk, None).unwrap(), now);
+    // Mapping goes on, and what both see stays.
+    go_on(&disk, 6..9).unwrap();
+    let repaired = disk.copy();
+    swap(&disk);
+    for disk in [&disk, &repaired] {
+        let repair = repair_on(disk.shared(), map(), |_| (), |_, _| ()).unwrap();
+        assert!(repair.is_complete());
+        assert_eq!(damaged(disk), Vec::<PathBuf>::new());
+        for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
+            assert_eq!(digest_of(disk, Some(of)).unwrap(), *digest);
+        }
+    }
+}
+
+#[test]
+fn a_repair_of_swapped_snapshots_can_be_cut_short_anywhere() {
+    let (disk, digests) = with_two();
+    swap(&disk);
+    for at in 0.. {
+        let cut = disk.copy();
+        cut.set_fault(Fault::Crashes(at));
+        let _ = repair_on(cut.shared(), map(), |_| (), |_, _| ());
+        if !cut.has_crashed() {
+            assert!(at > 5);
+            break;
+        }
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
+            let left = cut.after_crash(unsynced);
+            repair_on(left.shared(), map(), |_| (), |_, _| ()).unwrap();
+            for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
+                assert_eq!(digest_of(&left, Some(of)).unwrap(), *digest, "crash at {at}, {unsynced:?}: {of}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_snapshot_that_is_missing_is_a_finding_and_its_tables_stay_until_a_person_decides() {
+    let (disk, digests) = with_two();
+    let file = disk.files()[&path("s1")].clone();
+    disk.take(&path("s1"));
+    assert_eq!(damaged(&disk), [path("s1")]);
+    assert!(snapshots_on(disk.shared(), map()).unwrap().iter().any(|info| info.damage.is_some()));
+    go_on(&disk, 6..9).unwrap();
+    assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
+    // Put back.
+    let again = disk.copy();
+    again.put(&path("s1"), &file);
+    assert_eq!(damaged(&again), Vec::<PathBuf>::new());
+    assert_eq!(digest_of(&again, Some("s1")).unwrap(), digests[0]);
+    // Given up by name.
+    let given_up = disk.copy();
+    delete_snapshot_on(given_up.shared(), map(), &name("s1")).unwrap();
+    assert_eq!(damaged(&given_up), Vec::<PathBuf>::new());
+    assert!(kept(&given_up) < kept(&disk));
+    assert_eq!(digest_of(&given_up, Some("s2")).unwrap(), digests[1]);
+    // Or by a repair, which deletes nothing.
+    let repair = repair_on(disk.shared(), map(), |_| (), |_, _| ()).unwrap();
+    assert_eq!((repair.snapshots_lost, repair.tiles_lost, repair.is_complete()), (1, 0, false));
+    assert_eq!(damaged(&disk), Vec::<PathBuf>::new());
+    assert_eq!(kept(&disk), kept(&again), "in quarantine");
+    assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
+}
+
+/// A map as versions wrote it that did not list snapshots.
+fn without_list(disk: &FaultyDisk) {
+    let (log, commits) = read_log(&*disk.shared(), &Layout::new(map())).unwrap().unwrap();
+    let mut metadata = TileStore::open_read_only(disk.shared(), map()).unwrap().metadata().clone();
+    metadata.ext.as_mut().unwrap().snapshots = None;
+    let text = metadata.to_text();
+    CommitLog::write_whole(&*disk.shared(), &map().join("commits.log"), log.map_id(), &commits, &text)
+        .unwrap();
+    disk.put(&map().join("metadata.json"), text.as_bytes());
+    for of in ["s1", "s2"] {
+        let layout = Layout::new(map());
+        let snapshot =
+            voxtile::store::Snapshot::read(&*disk.shared(), &layout, &name(of), log.map_id(), None);
+        let snapshot = snapshot.unwrap();
+        let mut metadata = snapshot.metadata;
+        metadata.ext.as_mut().unwrap().snapshots = None;
+        let text = metadata.to_text();
+        CommitLog::write_whole(&*disk.shared(), &path(of), log.map_id(), &snapshot.commits, &text).unwrap();
+    }
+}
+
+#[test]
+fn snapshots_of_maps_that_do_not_list_them_are_read_and_listed_at_the_next_commit() {
+    let (disk, digests) = with_two();
+    without_list(&disk);
+    assert_eq!(damaged(&disk), Vec::<PathBuf>::new());
+    for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
+        assert_eq!(digest_of(&disk, Some(of)).unwrap(), *digest);
+    }
+    go_on(&disk, 6..7).unwrap();
+    for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
+        assert_eq!(digest_of(&disk, Some(of)).unwrap(), *digest);
+    }
+    swap(&disk);
+    assert_eq!(damaged(&disk), [path("s1"), path("s2")], "by the flushes that the log names");
+    swap(&disk);
+    delete_snapshot_on(disk.shared(), map(), &name("s1")).unwrap();
+    assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
+    delete_snapshot_on(disk.shared(), map(), &name("s2")).unwrap();
+    assert_eq!((kept(&disk), damaged(&disk).len()), (0, 0));
+}

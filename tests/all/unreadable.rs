@@ -1,0 +1,147 @@
+use crate::support::faulty_disk::{Fault, FaultyDisk};
+use crate::support::random_scans::{Random, random_scan};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use voxtile::session::delete_snapshot_on;
+use voxtile::store::SnapshotName;
+use voxtile::upkeep::{Severity, repair_on, verify_on};
+use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Result, Storage};
+
+fn map() -> &'static Path {
+    Path::new("/map")
+}
+
+fn config(storage: Storage) -> MapConfig {
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_storage(storage)
+}
+
+fn snapshot() -> SnapshotName {
+    SnapshotName::new("s").unwrap()
+}
+
+/// A map of a few tiles with a snapshot that sees tables of its own.
+fn small(storage: Storage) -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map(), config(storage)).unwrap();
+    for seed in 0..4 {
+        let x = 3.0 * (seed % 2) as f64;
+        mapper.insert_scan(&random_scan(&mut Random(seed), [x, 0.0, 0.0], 5)).unwrap();
+        mapper.flush().unwrap();
+        if seed == 1 {
+            mapper.snapshot(&snapshot()).unwrap();
+        }
+    }
+    drop(mapper);
+    disk.copy()
+}
+
+fn digests(disk: &FaultyDisk) -> Result<[String; 2]> {
+    let now = MapReader::open_on(disk.shared(), map(), 2)?.digest()?;
+    let then = MapReader::open_snapshot_on(disk.shared(), map(), &snapshot(), 2)?.digest()?;
+    Ok([now, then].map(|digest| digest.to_string()))
+}
+
+fn damaged(disk: &FaultyDisk, what: &str) -> BTreeSet<PathBuf> {
+    let mut damaged = BTreeSet::new();
+    let found = |finding: &voxtile::upkeep::Finding| {
+        if finding.severity == Severity::Damage {
+            damaged.insert(finding.path.clone());
+        }
+    };
+    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error}"));
+    damaged
+}
+
+/// A scan far from all tiles, flushed.
+fn go_on(disk: &FaultyDisk, storage: Storage) -> Result<()> {
+    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config(storage))?;
+    mapper.insert_scan(&random_scan(&mut Random(9), [300.0, 0.0, 0.0], 5))?;
+    mapper.flush()
+}
+
+fn is_index(path: &Path) -> bool {
+    path.ends_with("metadata.json") || path.ends_with("commits.log")
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_repaired() {
+    for storage in [Storage::Seed, Storage::Compact] {
+        let whole = small(storage);
+        let before = digests(&whole).unwrap();
+        for path in whole.files().keys().filter(|path| !path.ends_with("writer.lock")) {
+            let what = format!("{}, {storage}", path.display());
+            let disk = whole.copy();
+            disk.make_unreadable(path);
+            let found = damaged(&disk, &what);
+            assert!(found.contains(path) && found.len() == 1, "{what}: {found:?}");
+            if !is_index(path) {
+                go_on(&disk, storage).unwrap_or_else(|error| panic!("{what}: {error}"));
+            }
+            if path.ends_with("s") {
+                // What it sees stays, and it can be deleted.
+                let deleted = disk.clone();
+                deleted.mend();
+                assert_eq!(digests(&deleted).unwrap()[1], before[1], "{what}");
+                disk.make_unreadable(path);
+                delete_snapshot_on(disk.shared(), map(), &snapshot()).unwrap();
+                assert_eq!(damaged(&disk, &what).len(), 0);
+                continue;
+            }
+            let disk = whole.copy();
+            disk.make_unreadable(path);
+            let octree = whole.files()[path].clone();
+            let repair = repair_on(disk.shared(), map(), |_| (), |_, _| ())
+                .unwrap_or_else(|error| panic!("{what}: {error}"));
+            assert!(repair.actions > 0, "{what}");
+            assert_eq!(damaged(&disk, &what), BTreeSet::new(), "{what}");
+            if path.ends_with("octree.bt") {
+                assert!(repair.is_complete() && disk.files()[path] == octree, "{what}");
+            }
+            if path.ends_with("octree.bt") || is_index(path) {
+                assert_eq!(digests(&disk).unwrap(), before, "{what}");
+            } else {
+                assert!(!repair.is_complete(), "{what}");
+            }
+            // Nothing was deleted.
+            disk.mend();
+            let is_in_quarantine = |path: &PathBuf| path.starts_with("/map/quarantine");
+            assert!(disk.files().keys().any(is_in_quarantine), "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
+    let whole = small(Storage::Seed);
+    let before = digests(&whole).unwrap();
+    for path in whole.files().keys().filter(|path| !path.ends_with("writer.lock")) {
+        let what = path.display().to_string();
+        let disk = whole.copy();
+        disk.break_path(path);
+        let found = damaged(&disk, &what);
+        assert!(found.contains(path), "{what}: {found:?}");
+        match go_on(&disk, Storage::Seed) {
+            Ok(()) => assert!(!is_index(path), "{what}"),
+            Err(error) => assert!(is_index(path) && error.to_string().contains(&what), "{what}: {error}"),
+        }
+        // A repair does what it can, or says which file stops it; nothing is lost.
+        if let Err(error) = repair_on(disk.shared(), map(), |_| (), |_, _| ()) {
+            assert!(error.to_string().contains(&what), "{what}: {error}");
+        }
+        disk.mend();
+        if is_index(path) {
+            assert_eq!(digests(&disk).unwrap(), before, "{what}");
+        }
+    }
+    for folder in whole.files().keys().filter_map(|path| path.parent()).collect::<BTreeSet<_>>() {
+        if folder != map() {
+            let disk = whole.copy();
+            disk.break_path(folder);
+            let what = folder.display().to_string();
+            assert!(!damaged(&disk, &what).is_empty(), "{what}");
+            go_on(&disk, Storage::Seed).unwrap_or_else(|error| panic!("{what}: {error}"));
+            disk.mend();
+            assert_eq!(digests(&disk).unwrap()[1], before[1], "{what}");
+        }
+    }
+}

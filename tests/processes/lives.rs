@@ -1,0 +1,180 @@
+use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting, voxtile};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+const SCANS: usize = 8;
+const ROUNDS: usize = 12;
+
+/// Numbers from a seed (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ z >> 31) % end
+    }
+}
+
+/// What a map may be by now: the number of scans in it, and of those in each snapshot.
+#[derive(Clone, Debug, Default)]
+struct Expected {
+    scans: usize,
+    snapshots: BTreeMap<&'static str, usize>,
+}
+
+/// One map from its making on. Whatever is killed, its state is that before the command or after it, or for a build one
+/// in between.
+struct Life<'a> {
+    scans: &'a Scans,
+    map: PathBuf,
+    random: Random,
+    expected: Expected,
+    kills: u64,
+    what: String,
+}
+
+impl Life<'_> {
+    /// Runs a command to its end, or kills it on the way; whether it ended.
+    fn run(&mut self, mut child: Child) -> bool {
+        if self.random.below(3) > 0 {
+            let output = child.wait_with_output().unwrap();
+            assert!(output.status.success(), "{}: {}", self.what, String::from_utf8_lossy(&output.stderr));
+            return true;
+        }
+        sleep(Duration::from_micros(self.random.below(60_000)));
+        let has_ended = child.try_wait().unwrap().is_some();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        self.kills += u64::from(!has_ended);
+        false
+    }
+
+    /// Adds the scans once more, with any options that change nothing of the map.
+    fn build(&mut self) {
+        let from = self.expected.scans;
+        let mut how = vec!["--append"];
+        how.extend(
+            [["--flush-every", "1"], ["--flush-every", "3"], ["--flush-every", "end"]]
+                [self.random.below(3) as usize],
+        );
+        how.extend(
+            [["--threads", "1"], ["--threads", "2"], ["--threads", "3"]][self.random.below(3) as usize],
+        );
+        let child = self.scans.build(&self.map, &how).spawn().unwrap();
+        self.run(child);
+        let (found, _) = digest(&self.map).unwrap_or_else(|error| panic!("{}: {error}", self.what));
+        assert!((from..=from + SCANS).contains(&found), "{}: {found} scans after {from}", self.what);
+        // Where it was killed, the rest of the round is added, so that rounds stay whole.
+        if found < from + SCANS {
+            let output = self.scans.build(&self.map, &["--resume"]).output().unwrap();
+            let message = String::from_utf8_lossy(&output.stderr);
+            let ended = digest(&self.map).unwrap().0;
+            assert!(ended == from + SCANS || ended == from, "{}: {ended}: {message}", self.what);
+            self.expected.scans = ended;
+        } else {
+            self.expected.scans = found;
+        }
+    }
+
+    fn command(&mut self, arguments: &[&str], after: Expected) {
+        let mut command = voxtile();
+        command.args(arguments).stdout(Stdio::null()).stderr(Stdio::piped());
+        let child = command.spawn().unwrap();
+        let before = self.expected.clone();
+        self.expected = match self.run(child) {
+            true => after,
+            // Asked of the map what became of it.
+            false => {
+                let mut now = Expected { scans: digest(&self.map).unwrap().0, ..Expected::default() };
+                for name in before.snapshots.keys().chain(after.snapshots.keys()) {
+                    if let Ok((scans, _)) = digest(&self.at(name)) {
+                        now.snapshots.insert(*name, scans);
+                    }
+                }
+                let is = |one: &Expected| one.scans == now.scans && one.snapshots == now.snapshots;
+                assert!(is(&before) || is(&after), "{}: {before:?}, then {now:?}", self.what);
+                now
+            }
+        };
+    }
+
+    fn at(&self, snapshot: &str) -> PathBuf {
+        PathBuf::from(format!("{}@{snapshot}", self.map.display()))
+    }
+
+    fn check(&self, place: &Path, scans: usize) {
+        let found =
+            digest(place).unwrap_or_else(|error| panic!("{}: {}: {error}", self.what, place.display()));
+        assert_eq!(found, (scans, self.scans.digests[scans].clone()), "{}: {}", self.what, place.display());
+    }
+
+    fn step(&mut self) {
+        let map = self.map.to_str().unwrap().to_owned();
+        let name = ["a", "b", "c"][self.random.below(3) as usize];
+        let kept = self.expected.snapshots.get(name).copied();
+        let mut after = self.expected.clone();
+        match (self.random.below(8), kept) {
+            (0..4, _) if self.expected.scans + SCANS <= SCANS * ROUNDS => self.build(),
+            (_, None) => {
+                after.snapshots.insert(name, after.scans);
+                self.command(&["snapshot", &map, name], after);
+            }
+            (6, Some(_)) => {
+                after.snapshots.remove(name);
+                self.command(&["snapshot", &map, name, "--delete"], after);
+            }
+            (_, Some(scans)) => {
+                after.scans = scans;
+                self.command(&["revert", &map, name], after);
+            }
+        }
+        self.check(&self.map, self.expected.scans);
+        for (name, scans) in &self.expected.snapshots {
+            self.check(&self.at(name), *scans);
+        }
+    }
+}
+
+/// Long random lives: `VOXTILE_LIVES_SECONDS=3600` for an hour of them.
+#[test]
+fn a_map_is_what_it_must_be_after_any_life_of_commands_kills_and_readers() {
+    let until = Instant::now() + Duration::from_secs(setting("VOXTILE_LIVES_SECONDS", 30));
+    let scans = Scans::new(SCANS, ROUNDS);
+    let seed = setting("VOXTILE_SEED", 1);
+    let (mut lives, mut steps, mut kills) = (0, 0, 0);
+    while Instant::now() < until {
+        let (_folder, map) = folder_for_maps();
+        let mut random = Random(seed + lives);
+        let storage = ["seed", "compact"][random.below(2) as usize];
+        assert!(scans.build(&map, &["--storage", storage]).status().unwrap().success());
+        let expected = Expected { scans: SCANS, ..Expected::default() };
+        let mut life =
+            Life { scans: &scans, map: map.clone(), random, expected, kills: 0, what: String::new() };
+        for step in 0..30 {
+            if Instant::now() > until {
+                break;
+            }
+            life.what = format!("seed {}, step {step}", seed + lives);
+            // Somebody reads meanwhile, and is never told anything but a state that was.
+            let reader =
+                voxtile().arg("digest").arg(&map).arg("--json").stdout(Stdio::piped()).spawn().unwrap();
+            life.step();
+            let answer = reader.wait_with_output().unwrap();
+            assert!(answer.status.success(), "{}: a reader beside it", life.what);
+            let answer: serde_json::Value = serde_json::from_slice(&answer.stdout).unwrap();
+            let number = answer["scan_number"].as_u64().unwrap() as usize;
+            assert_eq!(answer["digest"], scans.digests[number].as_str(), "{}", life.what);
+            steps += 1;
+        }
+        assert!(is_whole(&map), "{}", life.what);
+        kills += life.kills;
+        lives += 1;
+    }
+    println!("{lives} lives, {steps} steps, {kills} kills");
+}
