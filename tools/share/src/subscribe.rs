@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use voxtile::share::{Receiver, ReceiverConfig, Receivers, VoxelSet, fold_layer};
+use voxtile::share::{ReceiverConfig, Receivers, VoxelSet, fold_layer};
 use voxtile::space::{Grid, VoxelBox};
 use voxtile::{Error, MapReader, MapView, Mapper};
 
