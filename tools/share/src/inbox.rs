@@ -82,7 +82,8 @@ impl Inbox {
         let mut state = self.lock();
         if is_admitted {
             let spent = state.spent;
-            state.robots.entry(robot.to_owned()).or_default().spent = spent;
+            let new = || Queue { spent, ..Queue::default() };
+            state.robots.entry(robot.to_owned()).or_insert_with(new);
         } else if let Some(left) = state.robots.remove(robot) {
             state.bytes -= left.bytes;
         }
