@@ -38,6 +38,9 @@ impl Receiver {
     }
 
     fn bytes_beside_the_layer(&self) -> usize {
-        size_of::<Self>() + CatchUp::MOST_BYTES + Stream::most_bytes(self.stamp_bytes)
+        // Before a robot has said what it is, nothing is remembered.
+        let remembered =
+            self.stream.as_ref().map_or(0, |_| CatchUp::MOST_BYTES + Stream::most_bytes(self.stamp_bytes));
+        size_of::<Self>() + remembered
     }
 }

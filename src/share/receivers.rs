@@ -46,24 +46,27 @@ impl<K: Ord + Clone> Receivers<K> {
     }
 
     /// Adds a receiver for a robot, with the layer of an earlier one if there is one. Its limit of memory is what the
-    /// others leave; where that is too little, who has most forgets.
-    ///
-    /// # Errors
-    ///
-    /// So many robots that no layer has room.
-    pub fn insert(&mut self, robot: K, config: ReceiverConfig, layer: Option<VoxelSet>) -> Result<()> {
-        let others = self.robots.len() - usize::from(self.robots.contains_key(&robot));
-        let part = self.for_all() / (others + 1);
-        if part < Receiver::LEAST_BYTES {
-            let reason = format!("{} bytes are too little for {} robots", self.memory_bytes, others + 1);
-            return Err(Error::argument("memory", reason));
-        }
+    /// others leave; where that is too little, who has most forgets. A robot that has not said what it is takes no part.
+    pub fn insert(&mut self, robot: K, config: ReceiverConfig, layer: Option<VoxelSet>) {
         self.robots.insert(robot, Receiver::started(config, layer));
-        for receiver in self.robots.values_mut() {
-            receiver.set_part_bytes(part);
-        }
+        self.share_out();
+    }
+
+    /// Gives everybody the same part.
+    fn share_out(&mut self) {
+        let part = self.part_bytes();
+        self.robots.values_mut().for_each(|receiver| receiver.set_part_bytes(part));
         self.make_room();
-        Ok(())
+    }
+
+    /// Robots that have said what they are, or have a layer.
+    pub fn known(&self) -> usize {
+        self.robots.values().filter(|receiver| receiver.layer().is_some()).count()
+    }
+
+    /// Whether there is a part for one robot more.
+    pub fn has_room(&self) -> bool {
+        self.for_all() / (self.known() + 1) >= Receiver::LEAST_BYTES
     }
 
     /// Removes a robot, and returns its receiver.
@@ -71,7 +74,7 @@ impl<K: Ord + Clone> Receivers<K> {
         self.robots.remove(robot)
     }
 
-    /// Takes the bytes of a packet of a robot; of one that was not added, nothing.
+    /// Takes the bytes of a packet of a robot; of one that was not added, or that there is no part for, nothing.
     ///
     /// # Errors
     ///
@@ -79,11 +82,20 @@ impl<K: Ord + Clone> Receivers<K> {
     pub fn take(&mut self, robot: &K, bytes: &[u8], now: Duration) -> std::result::Result<(), FormatError> {
         let (all, part) = (self.memory_bytes(), self.part_bytes());
         let for_all = self.for_all();
+        let has_room = self.has_room();
         let Some(receiver) = self.robots.get_mut(robot) else { return Ok(()) };
+        let was_known = receiver.layer().is_some();
+        if !was_known && !has_room {
+            return Ok(());
+        }
         let free = for_all.saturating_sub(all - receiver.memory_bytes());
         receiver.set_memory_bytes(free.max(part));
         let taken = receiver.take(bytes, now);
-        self.make_room();
+        if receiver.layer().is_some() != was_known {
+            self.share_out();
+        } else {
+            self.make_room();
+        }
         taken
     }
 
@@ -111,7 +123,7 @@ impl<K: Ord + Clone> Receivers<K> {
 
     /// What every robot may have, whatever the others do.
     pub fn part_bytes(&self) -> usize {
-        self.for_all() / self.robots.len().max(1)
+        self.for_all() / self.known().max(1)
     }
 
     /// What nobody has of the memory, and no packet needs.

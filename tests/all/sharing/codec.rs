@@ -151,8 +151,7 @@ fn a_voxel_that_cannot_be_written_is_not_read() {
         let Ok(updates) = decode_updates(&[&brick[..], &bits].concat(), 0) else { continue };
         assert!(encode_updates(&updates).is_ok(), "{updates:?}");
     }
-    let refused = decode_updates(&[&brick[..], &[255; 8]].concat(), 0);
-    assert!(VoxelSet::new(Grid::new(0.1, 10.0).unwrap()).put([i32::MAX, 0, 0], true) == false, "{refused:?}");
+    assert!(!VoxelSet::new(Grid::new(0.1, 10.0).unwrap()).put([i32::MAX, 0, 0], true));
 }
 
 #[test]

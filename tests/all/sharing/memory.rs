@@ -93,7 +93,7 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
     const MEMORY: usize = Receivers::<u8>::LEAST_BYTES;
     for seed in 0..3 {
         let mut receivers = Receivers::new(MEMORY).unwrap();
-        (0..3).for_each(|robot| receivers.insert(robot, config(seed + u64::from(robot)), None).unwrap());
+        (0..3).for_each(|robot| receivers.insert(robot, config(seed + u64::from(robot)), None));
         let mut honest = Sender::new(grid(), 1, SenderConfig::default()).unwrap();
         let mut hostile = [1, 2]
             .map(|robot: u8| (robot, Hostile { random: Random::of(seed, &[robot.into()]), sequence: 1 }));
@@ -146,7 +146,7 @@ fn who_has_most_makes_room_for_who_comes_later() {
     let mut senders =
         [0_u8, 1].map(|robot| (robot, Sender::new(grid(), 1, SenderConfig::default()).unwrap()));
     for (robot, sender) in &mut senders {
-        receivers.insert(*robot, config(u64::from(*robot)), None).unwrap();
+        receivers.insert(*robot, config(u64::from(*robot)), None);
         let count = if *robot == 0 { 200_000 } else { 30_000 };
         (0..count).for_each(|k| sender.put([k % 1000 * 8, k / 1000 * 8, 0], true));
         for step in 0..600 {

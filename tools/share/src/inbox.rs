@@ -54,8 +54,7 @@ impl Inbox {
         queue.messages.push_back(message);
         state.bytes += size;
         while state.bytes > MAX_BYTES {
-            let queues = state.robots.values_mut().chain([&mut state.strangers]);
-            let Some(longest) = queues.max_by_key(|queue| queue.bytes) else { break };
+            let Some(longest) = state.queues().max_by_key(|queue| queue.bytes) else { break };
             let lost = longest.pop();
             state.bytes -= lost.map_or(0, |message| message.size());
         }
@@ -70,8 +69,8 @@ impl Inbox {
             .has_message
             .wait_timeout_while(self.lock(), wait, is_empty)
             .unwrap_or_else(PoisonError::into_inner);
-        let queues = state.robots.values_mut().chain([&mut state.strangers]);
-        let next = queues.filter(|queue| !queue.messages.is_empty()).min_by_key(|queue| queue.spent)?;
+        let next =
+            state.queues().filter(|queue| !queue.messages.is_empty()).min_by_key(|queue| queue.spent)?;
         let (message, spent) = (next.pop()?, next.spent);
         state.bytes -= message.size();
         state.spent = spent;
@@ -83,7 +82,8 @@ impl Inbox {
         let mut state = self.lock();
         if is_admitted {
             let spent = state.spent;
-            state.robots.entry(robot.to_owned()).or_default().spent = spent;
+            let new = || Queue { spent, ..Queue::default() };
+            state.robots.entry(robot.to_owned()).or_insert_with(new);
         } else if let Some(left) = state.robots.remove(robot) {
             state.bytes -= left.bytes;
         }
@@ -101,6 +101,10 @@ impl Inbox {
 }
 
 impl State {
+    fn queues(&mut self) -> impl Iterator<Item = &mut Queue> {
+        self.robots.values_mut().chain([&mut self.strangers])
+    }
+
     fn queue(&mut self, robot: &str) -> &mut Queue {
         match self.robots.get_mut(robot) {
             Some(queue) => queue,

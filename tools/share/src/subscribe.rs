@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use voxtile::share::{Receiver, ReceiverConfig, Receivers, VoxelSet, fold_layer};
+use voxtile::share::{ReceiverConfig, Receivers, VoxelSet, fold_layer};
 use voxtile::space::{Grid, VoxelBox};
 use voxtile::{Error, MapReader, MapView, Mapper};
 
@@ -19,8 +19,8 @@ const STEP: Duration = Duration::from_millis(50);
 const SAVE: Duration = Duration::from_secs(30);
 /// How long layers are to be equal to be called so.
 const EQUAL: Duration = Duration::from_secs(3);
-/// After so long a robot that has never answered makes room for another.
-const UNHEARD: Duration = Duration::from_secs(10);
+/// Robots that have not said yet what they are. The next one takes the place of the one that waits longest.
+const MAX_UNKNOWN: usize = 256;
 
 /// A robot that is listened to, beside its receiver.
 struct Robot {
@@ -93,8 +93,12 @@ impl Subscriber<'_> {
         let since = Instant::now();
         let Some((name, _, _)) = parse_key(key) else { return };
         let Ok(robot) = name.parse::<RobotName>() else { return };
-        if self.robots.contains_key(&robot) || self.admit(&robot, now) {
+        let is_admitted = self.robots.contains_key(&robot) || self.admit(&robot, now);
+        if is_admitted && (self.is_known(&robot) || self.has_place_for(&robot)) {
             let taken = self.receivers.take(&robot, bytes, now);
+            if self.is_known(&robot) {
+                self.link.inbox().admit(name, true);
+            }
             self.tell_of(&robot, taken.err().map(|error| error.to_string()));
         }
         self.link.inbox().has_spent(name, since);
@@ -106,9 +110,11 @@ impl Subscriber<'_> {
         if !named.is_empty() && !named.contains(robot) {
             return false;
         }
-        if named.is_empty() && self.robots.len() >= self.args.max_robots && !self.dismiss_unheard(now) {
-            let reason = format!("there are {} robots (--max-robots)", self.args.max_robots);
-            return self.refuse(robot, &reason);
+        if !self.has_place_for(robot) {
+            return false;
+        }
+        if self.robots.len() - self.receivers.known() >= MAX_UNKNOWN {
+            self.dismiss_unknown();
         }
         let mut store = LayerStore::new(&self.folder, robot);
         let room = LayerRoom {
@@ -117,11 +123,8 @@ impl Subscriber<'_> {
             max_bytes: self.receivers.free_bytes(),
         };
         let layer = store.load(robot, room, &mut self.reports);
-        if let Err(error) = self.receivers.insert(robot.clone(), self.config(), layer) {
-            return self.refuse(robot, &format!("{error} (--memory)"));
-        }
+        self.receivers.insert(robot.clone(), self.config(), layer);
         let name = robot.to_string();
-        self.link.inbox().admit(&name, true);
         let key = asks_key(&name, self.id);
         self.robots.insert(robot.clone(), Robot { store, key, since: now });
         true
@@ -137,17 +140,31 @@ impl Subscriber<'_> {
         false
     }
 
-    /// Stops listening to one that has never said what it is: names are made up as easily as packets.
-    fn dismiss_unheard(&mut self, now: Duration) -> bool {
-        let is_unheard = |robot: &&RobotName| {
-            self.receivers.get(robot).is_some_and(|receiver| receiver.layer().is_none())
-                && self.robots[*robot].since + UNHEARD <= now
-        };
-        let Some(robot) = self.robots.keys().find(is_unheard).cloned() else { return false };
-        self.receivers.remove(&robot);
-        self.robots.remove(&robot);
-        self.link.inbox().admit(&robot.to_string(), false);
+    /// Whether a robot has said what it is, or has a layer.
+    fn is_known(&self, robot: &RobotName) -> bool {
+        self.receivers.get(robot).is_some_and(|receiver| receiver.layer().is_some())
+    }
+
+    /// Whether one more robot may be known.
+    fn has_place_for(&mut self, robot: &RobotName) -> bool {
+        if !self.receivers.has_room() {
+            return self.refuse(robot, "there is no memory for one more (--memory)");
+        }
+        if self.args.robot.is_empty() && self.receivers.known() >= self.args.max_robots {
+            let reason = format!("there are {} robots (--max-robots)", self.args.max_robots);
+            return self.refuse(robot, &reason);
+        }
         true
+    }
+
+    /// Stops listening to who has waited longest without saying what it is: names are made up as easily as packets.
+    fn dismiss_unknown(&mut self) {
+        let unknown = self.robots.iter().filter(|(robot, _)| !self.is_known(robot));
+        let longest = unknown.min_by_key(|(_, waiting)| waiting.since).map(|(robot, _)| robot.clone());
+        if let Some(robot) = longest {
+            self.receivers.remove(&robot);
+            self.robots.remove(&robot);
+        }
     }
 
     fn config(&self) -> ReceiverConfig {
@@ -203,7 +220,11 @@ impl Subscriber<'_> {
     }
 
     fn is_equal(&self) -> bool {
-        !self.receivers.is_empty() && self.receivers.iter().all(|(_, receiver)| receiver.is_converged())
+        {
+            let mut known =
+                self.receivers.iter().filter(|(_, receiver)| receiver.layer().is_some()).peekable();
+            known.peek().is_some() && known.all(|(_, receiver)| receiver.is_converged())
+        }
     }
 
     fn save(&mut self) {

@@ -110,13 +110,13 @@ fn a_subscriber_keeps_to_its_memory_and_serves_others_under_hostile_packets() {
     let layers = layers_of(&mut subscriber);
     println!("{peak} bytes at most of {MEMORY} and 48 MiB, {sent} bytes sent: {layers:?}");
     assert!(peak < MEMORY + (48 << 20), "{peak} bytes");
-    assert!(sent > 20 << 20, "{sent} bytes");
+    assert!(sent > 5 << 20, "{sent} bytes");
     let of_honest = layers.iter().find(|layer| layer.0 == "honest").unwrap();
     assert_eq!((of_honest.1, &of_honest.2, of_honest.3), (voxels, &digest, true));
     assert!(layer.exists());
     // The memory was full of what the others sent.
     let hostile: u64 = layers.iter().filter(|layer| layer.0 != "honest").map(|layer| layer.1).sum();
-    assert!(hostile > 30_000, "{hostile} voxels");
+    assert!(hostile > 20_000, "{hostile} voxels");
 }
 
 /// A layer that is damaged, one that cannot be saved, voxels of another size, a voxel at the end of all indices: each
