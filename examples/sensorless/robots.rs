@@ -5,7 +5,7 @@ use crate::{RESOLUTION_M, STEP};
 use std::time::{Duration, Instant};
 use voxtile::local::{LocalMap, LocalParameters};
 use voxtile::share::{MapWatch, Receiver, ReceiverConfig, Sender, SenderConfig, VoxelSet};
-use voxtile::space::{Grid, Point, places};
+use voxtile::space::{Grid, Point};
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Result};
 
 /// A sensor.
@@ -93,15 +93,9 @@ impl Sharing {
     fn find_new(&mut self) {
         self.new_points.clear();
         for layer in self.spotters.iter().filter_map(|spotter| spotter.receiver.layer()) {
-            for tile in layer.tiles() {
-                let min = layer.grid().voxels_of_tile(tile).min;
-                for (brick, mask) in layer.bricks_of(tile) {
-                    let known = self.heard.brick(tile, brick);
-                    for place in places(std::array::from_fn(|k| mask[k] & !known[k])) {
-                        let voxel = brick.voxel(place).to_key().to_index_from(min);
-                        self.heard.put(voxel, true);
-                        self.new_points.push(layer.grid().center_m(voxel));
-                    }
+            for voxel in layer.iter() {
+                if self.heard.put(voxel, true) {
+                    self.new_points.push(layer.grid().center_m(voxel));
                 }
             }
         }
