@@ -62,6 +62,8 @@ impl Residency {
             self.send_to_disk(index, scan_number)?;
         }
         self.end_saves()?;
+        // A commit of many tiles takes memory, too.
+        self.make_room_for(0, self.plan.tiles, scan_number)?;
         self.adopt()?;
         self.store.commit(self.metadata(), scan_number)
     }

@@ -124,6 +124,7 @@ impl Residency {
         if self.plan.counts_scan {
             self.scan_bytes = self.scan_bytes.max(scan_bytes);
         }
+        self.check_index()?;
         self.take_arrived(scan_number)?;
         self.work_off(scan_number)?;
         for (tile, _) in &updates.tiles {
@@ -227,7 +228,7 @@ impl Residency {
     }
 
     /// Number of tiles in which something was observed.
-    fn count_tiles(&self) -> usize {
+    pub(super) fn count_tiles(&self) -> usize {
         let is_new = |index: &TileIndex| !self.store.contains(*index);
         let resident = self.tiles.iter().filter(|tile| is_new(&tile.index())).count();
         let cold = self.cold.iter().filter(|(index, _)| is_new(index)).count();

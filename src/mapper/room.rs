@@ -4,7 +4,7 @@ use super::residency::Residency;
 use super::statistics::MemoryCounts;
 use super::tile_traffic::Saved;
 use crate::config::Storage;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use crate::tile::Tile;
 use std::time::Instant;
@@ -24,6 +24,28 @@ impl Residency {
             on_the_way: self.traffic.bytes() as u64,
             index: (self.store.index_bytes() + known_bytes) as u64,
         }
+    }
+
+    /// Whether what is known of the map's tiles leaves room to work in.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] with the limit that would do, if it takes more than half of it.
+    pub(super) fn check_index(&self) -> Result<()> {
+        let index = self.memory().index as usize;
+        if index / 2 <= self.plan.bytes / 4 || self.plan.bytes == usize::MAX {
+            return Ok(());
+        }
+        let mib = |bytes: usize| bytes.div_ceil(1 << 20);
+        let reason = format!(
+            "{} MiB are too few for a map of {} tiles: to know which there are takes {} MiB; go on with at least {} MiB, or \
+             build with larger tiles",
+            mib(self.plan.bytes),
+            self.count_tiles(),
+            mib(index),
+            mib(4 * index),
+        );
+        Err(Error::argument("memory", reason))
     }
 
     /// Bytes that count towards the limit. The share of packed tiles counts as if it were full: the many small blocks that

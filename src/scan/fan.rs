@@ -7,7 +7,7 @@ use super::range::{RangeRule, Ranged};
 use super::ray::MAX_RAY_STEPS;
 use super::ray_end::RayEnd;
 use super::ray_origin::RayOrigin;
-use super::rounds::rounds;
+use super::rounds::{one_round, rounds};
 use super::scan_parts::ScanParts;
 use super::scan_points::ScanPoints;
 use super::slab_ray::SlabRay;
@@ -111,8 +111,15 @@ impl<'a> Fan<'a> {
             collector.clear(self.window, limit);
             let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
             let mut batch = Vec::with_capacity(BATCH);
+            let (mut seen, mut worth_sharing) = (0, 0);
             self.points.for_each_chunk(range, &mut |points, intensities| {
-                for round in rounds(0..points.len()) {
+                // What chunk after chunk adds is less and less, and to look takes as long each time.
+                let shares = seen >= worth_sharing;
+                if shares {
+                    worth_sharing = 2 * (seen + points.len());
+                }
+                seen += points.len();
+                for round in if shares { rounds(0..points.len()) } else { one_round(0..points.len()) } {
                     collector.share(&self.origin, round.shared_squares);
                     for number in round.points() {
                         batch.extend(self.ray(points[number], intensity(intensities, number), &mut report));

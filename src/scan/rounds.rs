@@ -25,11 +25,16 @@ pub(super) struct Round {
 /// The rounds in which the rays to these points are walked: some of them first, which may spare others much.
 pub(super) fn rounds(points: Range<usize>) -> Vec<Round> {
     if points.len() < LEAST_POINTS {
-        return vec![Round { all: points, stride: 1, places: &[0], shared_squares: &[] }];
+        return one_round(points);
     }
     let round =
         |(&places, &shared_squares)| Round { all: points.clone(), stride: STRIDE, places, shared_squares };
     PLACES.iter().zip(&SHARED_SQUARES).map(round).collect()
+}
+
+/// All at once, in order.
+pub(super) fn one_round(points: Range<usize>) -> Vec<Round> {
+    vec![Round { all: points, stride: 1, places: &[0], shared_squares: &[] }]
 }
 
 impl Round {

@@ -9,8 +9,12 @@ use super::tile_store::TileStore;
 use super::tile_writer::TileWriter;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
+use rustc_hash::FxHashMap;
 use std::io::{self, Write};
 use std::path::Path;
+
+/// Tiles whose files are synced at once.
+const TILES_SYNCED_AT_ONCE: usize = 4096;
 
 /// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
 const COMPACT_LOG_BYTES: u64 = 2048;
@@ -123,11 +127,14 @@ impl TileStore {
             // Committed.
             self.log = Some(log);
             self.is_list_logged = true;
-            let is_born = |tile: &TileIndex| !self.commits.tiles.contains_key(tile);
+            // Who opens the map only now is taken to see more than it does, for a while.
+            let is_read = self.readers.are_there();
+            let is_born = |tile: &TileIndex| is_read && !self.commits.tiles.contains_key(tile);
             for tile in changed.iter().map(|(tile, _)| *tile).filter(is_born) {
                 self.readers.note_birth(tile, number);
             }
-            self.next.clear();
+            // Its memory, too: the next flush may be of few tiles.
+            self.next = FxHashMap::default();
             self.removed.clear();
             self.foreign.clear();
             self.unrenamed.extend(changed.iter().map(|&(tile, _)| tile));
@@ -166,7 +173,19 @@ impl TileStore {
         self.put_in_place()
     }
 
+    /// Some tiles at a time: their paths take several times the memory of what else is known of them.
     fn sync_next(&mut self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
+        let last = changed.len().saturating_sub(1) / TILES_SYNCED_AT_ONCE;
+        if changed.is_empty() {
+            return self.sync_group(&[], true);
+        }
+        let groups = changed.chunks(TILES_SYNCED_AT_ONCE).enumerate();
+        groups
+            .map(|(number, group)| (group, number == last))
+            .try_for_each(|(group, is_last)| self.sync_group(group, is_last))
+    }
+
+    fn sync_group(&mut self, changed: &[(TileIndex, TileStamp)], is_last: bool) -> Result<()> {
         let layout = &self.layout;
         let files: Vec<_> = changed
             .iter()
@@ -174,7 +193,7 @@ impl TileStore {
             .collect();
         let folders = changed.iter().map(|&(tile, _)| layout.tile_folder(tile));
         // The map's own folder names the new tile folders.
-        let folders: Vec<_> = folders.chain([layout.folder().to_owned()]).collect();
+        let folders: Vec<_> = folders.chain(is_last.then(|| layout.folder().to_owned())).collect();
         let [synced_files, synced_folders] = self.disk.sync_all(&files, &folders);
         let per_tile = layout.files().len();
         for (number, result) in synced_files.iter().enumerate() {

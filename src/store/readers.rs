@@ -45,6 +45,11 @@ impl Readers {
         self.born.insert(tile, flush_number);
     }
 
+    /// Whether anybody reads the map.
+    pub(super) fn are_there(&self) -> bool {
+        self.watched.iter().any(|watched| watched.watch.has_readers())
+    }
+
     /// Looks who is still there.
     pub(super) fn look(&mut self) {
         let present = self.watched.last().map(|present| present.first);

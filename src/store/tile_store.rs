@@ -76,6 +76,10 @@ pub struct TileStore {
 
 struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Box<dyn DiskRead>);
 
+/// What a commit takes for each tile that it changes, beside the index: its place in the order, its part of the record, its
+/// name until it has that.
+const COMMIT_BYTES_OF_TILE: usize = size_of::<(TileIndex, TileStamp)>() + 12 + TileStamp::BYTES + 24;
+
 /// How often a reader begins to open a map again because a flush came in between.
 const OPEN_ATTEMPTS: usize = 100;
 
@@ -335,6 +339,7 @@ impl TileStore {
         let slot = size_of::<(TileIndex, TileStamp)>() + 1;
         (self.commits.tiles.capacity() + self.next.capacity()) * 8 / 7 * slot
             + (self.foreign.capacity() + self.strays.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
+            + self.next.len() * COMMIT_BYTES_OF_TILE
             + self.snapshots.bytes()
     }
 
