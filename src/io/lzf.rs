@@ -111,8 +111,8 @@ mod tests {
         let mut expected: Vec<u8> = Vec::new();
         for k in 0..256 {
             packed.push(31);
-            packed.extend((0..32).map(|byte| byte * 7 ^ k as u8));
-            expected.extend((0..32).map(|byte| byte * 7 ^ k as u8));
+            packed.extend((0..32).map(|byte| (byte * 7) ^ k as u8));
+            expected.extend((0..32).map(|byte| (byte * 7) ^ k as u8));
         }
         for _ in 0..1000 {
             packed.extend([7 << 5 | 31, 255, 255]);

@@ -39,7 +39,7 @@ pub fn read_pcd(file: &[u8]) -> Result<PcdCloud, FormatError> {
 }
 
 /// The same from a file of any size; returns the `VIEWPOINT`.
-pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::Result<Isometry3<f64>> {
+pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::error::Result<Isometry3<f64>> {
     let open = || {
         let file = File::open(path)?;
         let bytes = file.metadata()?.len();
@@ -272,7 +272,7 @@ enum Fields {
 }
 
 impl Fields {
-    fn new(room: &PointRoom, bytes: u64) -> crate::Result<Self> {
+    fn new(room: &PointRoom, bytes: u64) -> crate::error::Result<Self> {
         match usize::try_from(bytes) {
             // It grows with what comes.
             Ok(bytes) if !room.is_too_much(bytes) => Ok(Self::InMemory(Vec::new())),

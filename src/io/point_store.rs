@@ -1,4 +1,5 @@
 use crate::error::{Error, Result};
+use crate::scan::TakePoints;
 use crate::space::Point;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -153,11 +154,7 @@ impl PointStore {
     /// # Errors
     ///
     /// A file that cannot be read.
-    pub fn for_each_chunk(
-        &self,
-        range: Range<usize>,
-        take: &mut dyn FnMut(&[Point], Option<&[f32]>) -> bool,
-    ) -> Result<()> {
+    pub fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         let in_file = range.start.min(self.filed)..range.end.min(self.filed);
         let in_memory = range.start.max(self.filed) - self.filed..range.end.max(self.filed) - self.filed;
         let mut next = in_file.start;

@@ -1,6 +1,6 @@
 use super::point_store::PointStore;
 use crate::error::Result;
-use crate::scan::{Scan, ScanPoints};
+use crate::scan::{Scan, ScanPoints, TakePoints};
 use crate::space::Point;
 use nalgebra::Isometry3;
 use std::ops::Range;
@@ -34,11 +34,7 @@ impl ScanPoints for StoredScan {
         self.points_in_sensor.has_intensities()
     }
 
-    fn for_each_chunk(
-        &self,
-        range: Range<usize>,
-        take: &mut dyn FnMut(&[Point], Option<&[f32]>) -> bool,
-    ) -> Result<()> {
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         self.points_in_sensor.for_each_chunk(range, &mut |points, intensities| {
             let scan = Scan::from_sensor_frame(points, None, &self.world_from_sensor);
             take(&scan.points, intensities)

@@ -15,8 +15,9 @@ pub(super) struct MemoryPlan {
     pub(super) updates_bytes: usize,
     /// Bytes that are kept free for inserting scans from the beginning.
     pub(super) least_scan_bytes: usize,
-    /// Whether what a scan takes counts.
-    pub(super) counts_scan: bool,
+    /// Whether the bytes are a limit that is kept, so that what a scan takes counts, and a map that cannot keep to it is
+    /// refused. Where tiles are counted, all of it holds.
+    pub(super) is_kept: bool,
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,
     /// Most bytes of tiles in the compact form while others have to go.
@@ -33,7 +34,7 @@ impl MemoryPlan {
                 scan_bytes: usize::MAX,
                 updates_bytes: usize::MAX,
                 least_scan_bytes: 0,
-                counts_scan: true,
+                is_kept: true,
                 spare_bytes: 0,
                 cold_bytes: 0,
             },
@@ -41,7 +42,7 @@ impl MemoryPlan {
             MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
             // The marks of even a small scan take more than there is.
             MemoryLimit::Tight(bytes) => {
-                Self { least_scan_bytes: 0, counts_scan: false, ..Self::shares_of(bytes) }
+                Self { least_scan_bytes: 0, is_kept: false, ..Self::shares_of(bytes) }
             }
         }
     }
@@ -54,7 +55,7 @@ impl MemoryPlan {
             scan_bytes: bytes / 4,
             updates_bytes: bytes / 8,
             least_scan_bytes: bytes / 8,
-            counts_scan: true,
+            is_kept: true,
             spare_bytes: bytes / 4,
             cold_bytes: bytes / 8 * 3,
         }

@@ -121,7 +121,7 @@ impl Residency {
         scan_bytes: usize,
         scan_number: u64,
     ) -> Result<()> {
-        if self.plan.counts_scan {
+        if self.plan.is_kept {
             self.scan_bytes = self.scan_bytes.max(scan_bytes);
         }
         self.check_index()?;

@@ -33,7 +33,7 @@ impl Residency {
     /// [`Error::InvalidArgument`] with the limit that would do, if it takes more than half of it.
     pub(super) fn check_index(&self) -> Result<()> {
         let index = self.memory().index as usize;
-        if index / 2 <= self.plan.bytes / 4 || self.plan.bytes == usize::MAX {
+        if !self.plan.is_kept || index <= self.plan.bytes / 2 {
             return Ok(());
         }
         let mib = |bytes: usize| bytes.div_ceil(1 << 20);

@@ -49,7 +49,7 @@ pub(crate) use overflow::Overflow;
 pub use packed_updates::PackedUpdates;
 pub use ray::{MAX_RAY_STEPS, RayWalk};
 pub use report::{ScanReport, SkippedPoints};
-pub use scan_points::ScanPoints;
+pub use scan_points::{ScanPoints, TakePoints};
 pub use stop::Stop;
 pub use trace::ScanTracer;
 pub(crate) use trace::UpdateOrder;

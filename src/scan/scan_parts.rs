@@ -104,14 +104,14 @@ impl<'a> ScanParts<'a> {
     ///
     /// # Errors
     ///
-    /// Those of putting aside, and of the file of the parts; [`Error::Stopped`](crate::Error::Stopped).
+    /// Those of putting aside, and of the file of the parts; [`Error::Stopped`](crate::error::Error::Stopped).
     pub(super) fn into_updates(
         self,
         mut report: ScanReport,
         counts_once: bool,
         stop: &Stop,
         overflow: &mut Overflow<'_>,
-    ) -> crate::Result<ScanUpdates> {
+    ) -> crate::error::Result<ScanUpdates> {
         let mut parts = self.parts.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = parts.error {
             return Err(overflow.error(error));
@@ -216,7 +216,7 @@ impl Kept {
         tile: TileIndex,
         mut packed: PackedUpdates,
         overflow: &mut Overflow<'_>,
-    ) -> crate::Result<()> {
+    ) -> crate::error::Result<()> {
         packed.shrink();
         self.bytes += SLOT_BYTES + packed.bytes();
         match self.tiles.last_mut() {

@@ -3,6 +3,9 @@ use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
 
+/// Takes some points of a scan, in metres, with their intensities if they have any; says whether to go on.
+pub type TakePoints<'a> = dyn FnMut(&[Point], Option<&[f32]>) -> bool + 'a;
+
 /// The points of a scan, wherever they lie: in memory, or in a file that is larger than that.
 pub trait ScanPoints: Sync {
     /// Number of points.
@@ -22,11 +25,7 @@ pub trait ScanPoints: Sync {
     /// # Errors
     ///
     /// A file that cannot be read.
-    fn for_each_chunk(
-        &self,
-        range: Range<usize>,
-        take: &mut dyn FnMut(&[Point], Option<&[f32]>) -> bool,
-    ) -> Result<()>;
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()>;
 }
 
 impl ScanPoints for Scan {
@@ -38,11 +37,7 @@ impl ScanPoints for Scan {
         self.intensities.is_some()
     }
 
-    fn for_each_chunk(
-        &self,
-        range: Range<usize>,
-        take: &mut dyn FnMut(&[Point], Option<&[f32]>) -> bool,
-    ) -> Result<()> {
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         let intensities = self.intensities.as_ref().map(|intensities| &intensities[range.clone()]);
         take(&self.points[range], intensities);
         Ok(())

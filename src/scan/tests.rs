@@ -152,7 +152,7 @@ fn long_rays_keep_to_their_memory() {
     for setting in settings(25.6) {
         let bytes = 2 << 20;
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
-        let (said, report, times) = setting.in_parts(&mut tracer, &scan, bytes).unwrap();
+        let (said, report, times) = setting.in_parts(&mut tracer, &scan, bytes / 16).unwrap();
         assert!(times > 0);
         // What is kept from scan to scan; numbers of pages and head starts are 1 MiB and some.
         assert!(tracer.bytes() < bytes + (2 << 20), "{}", tracer.bytes());

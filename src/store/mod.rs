@@ -34,6 +34,7 @@ mod tile_writer;
 mod unfinished;
 mod waiting_file;
 
+pub use crate::scratch::Scratch;
 pub use commit_log::{CommitLog, Commits, Flush};
 pub use disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
 pub use fs_disk::FsDisk;

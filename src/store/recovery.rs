@@ -188,8 +188,7 @@ fn look_at_tile(
     let mut names = match disk.list(&folder) {
         Err(error) if is_of_medium(&error) => {
             log::warn!("{}: cannot list: {error}; the tile cannot be read", folder.display());
-            let state = if stamp.is_some() { State::Unreadable } else { State::Stray };
-            return Ok((state, BTreeSet::new()));
+            return Ok((look_without_names(disk, layout, tile, stamp, is_of_last_commit)?, BTreeSet::new()));
         }
         names => names.map_err(|error| Error::io(&folder, "list", error))?,
     };
@@ -223,6 +222,25 @@ fn look_at_tile(
         Some(_) => State::Whole,
     };
     Ok((state, kept))
+}
+
+/// The state of a tile of which nobody can list what there is: what was committed last may wait for its name all the same.
+fn look_without_names(
+    disk: &dyn Disk,
+    layout: &Layout,
+    tile: TileIndex,
+    stamp: Option<&TileStamp>,
+    is_of_last_commit: bool,
+) -> Result<State> {
+    let Some(stamp) = stamp else { return Ok(State::Stray) };
+    for &file in layout.files().iter().filter(|_| is_of_last_commit) {
+        let committed = stamp.of(file);
+        let waits = has_stamp(disk, &layout.next(tile, file), committed)?;
+        if waits && !has_stamp(disk, &layout.current(tile, file), committed)? {
+            return Ok(State::Unrenamed);
+        }
+    }
+    Ok(State::Unreadable)
 }
 
 /// What has a name; something that is no part of a map where the medium does not tell.

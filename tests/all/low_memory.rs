@@ -47,7 +47,7 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     let folder = TempDir::new().unwrap();
     let scans = scans(60);
     let mut expected = InMemoryMapper::new(config()).unwrap();
-    const BYTES: usize = 700_000;
+    const BYTES: usize = 900_000;
     let tight = config().with_tight_memory_bytes(BYTES);
     let disk = UnsyncedDisk::taking(Duration::ZERO);
     let mut mapper = OutOfCoreTileMapper::create_on(disk, &folder.path().join("map"), tight).unwrap();

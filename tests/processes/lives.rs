@@ -58,7 +58,7 @@ impl Life<'_> {
     /// Adds the scans once more, with any options that change nothing of the map.
     fn build(&mut self) {
         let from = self.expected.scans;
-        let mut how = vec!["--append"];
+        let mut how = vec!["--append", "--again"];
         how.extend(
             [["--flush-every", "1"], ["--flush-every", "3"], ["--flush-every", "end"]]
                 [self.random.below(3) as usize],

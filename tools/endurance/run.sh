@@ -12,7 +12,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 target=${CARGO_TARGET_DIR:-target}
 
-cargo build --release --quiet --locked --package endurance
+cargo build --release --quiet --locked --package voxtile --package endurance
 mkdir -p "$target/endurance"
 # Maps lie beside the program: /tmp may be memory.
 arguments=(--data "${VOXTILE_DATA:-../shared/data}" --page docs/endurance.md --work "$target/endurance/work")

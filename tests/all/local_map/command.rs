@@ -43,5 +43,5 @@ fn wrong_parameters_end_with_usage_and_no_picture() {
         assert!(!picture.exists());
     }
     assert_eq!(failure(&["local", text(&scans), "--preset", "other"]).0, 2);
-    assert_eq!(failure(&["local", "no/such/folder"]).0, 1);
+    assert_eq!(failure(&["local", "no/such/folder"]).0, 2);
 }

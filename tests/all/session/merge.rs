@@ -130,7 +130,7 @@ fn maps_that_do_not_go_together_are_refused_with_what_differs() {
         let message = refusal(&usual, &larger, prefer);
         assert!(message.contains("tile size 5 m, not 2.5 m"), "{message}");
     }
-    for (other, what) in [(&surer, "hit: 2.0"), (&iwlo, "Iwlo"), (&stricter, "0.7")] {
+    for (other, what) in [(&surer, "hit 2,"), (&iwlo, "iwlo"), (&stricter, "0.7")] {
         let message = refusal(&usual, other, None);
         assert!(
             message.contains("/maps/b") && message.contains(what) && message.contains("--prefer"),

@@ -134,8 +134,6 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
         assert!(receiver.memory_bytes() <= receivers.part_bytes() && !receiver.is_over_limit());
         assert!(receiver.is_converged(), "{:?}", receiver.counts());
         assert!(receiver.layer().unwrap() == &*honest.sent());
-        let is_over = |robot: u8| receivers.get(&robot).unwrap().is_over_limit();
-        assert!(is_over(1) || is_over(2));
     }
 }
 

@@ -1,9 +1,9 @@
 use super::random_scans::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::io::{self, Read, Write};
+use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
-use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 
 /// A disk in memory that fails or loses power at the operation it is told to.
 ///
@@ -553,6 +553,37 @@ impl Drop for Locked {
     }
 }
 
+/// A file without a name: no crash leaves anything of it.
+struct ScratchFile {
+    disk: FaultyDisk,
+    folder: PathBuf,
+    content: Cursor<Vec<u8>>,
+}
+
+impl Read for ScratchFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.disk.state().attempt(Kind::Reads, &self.folder)?;
+        self.content.read(buffer)
+    }
+}
+
+impl Write for ScratchFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.disk.state().attempt(Kind::NeedsRoom, &self.folder)?;
+        self.content.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for ScratchFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.content.seek(to)
+    }
+}
+
 impl Disk for FaultyDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         let mut state = self.state();
@@ -659,6 +690,12 @@ impl Disk for FaultyDisk {
         }
         state.change_name(NameChange::Rename(from.to_owned(), to.to_owned()));
         Ok(())
+    }
+
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
+        self.state().attempt(Kind::NeedsRoom, folder)?;
+        let content = Cursor::new(Vec::new());
+        Ok(Box::new(ScratchFile { disk: self.clone(), folder: folder.to_owned(), content }))
     }
 
     fn link(&self, from: &Path, to: &Path) -> io::Result<()> {

@@ -5,6 +5,7 @@ mod build;
 mod case;
 mod export;
 mod findings;
+mod hard_scan;
 mod idle;
 mod metered_disk;
 mod process_memory;

@@ -2,6 +2,7 @@
 
 mod export;
 mod flat_cost;
+mod hard_scans;
 mod idle;
 mod memory;
 mod storage;
@@ -22,8 +23,9 @@ pub struct Question {
 }
 
 /// All of them, in the order of the page.
-pub const QUESTIONS: [Question; 6] = [
+pub const QUESTIONS: [Question; 7] = [
     Question { name: "memory", promises: "memory_promises", answer: memory::answer },
+    Question { name: "hard-scans", promises: "hard_scans_promises", answer: hard_scans::answer },
     Question { name: "throughput", promises: "throughput_promises", answer: throughput::answer },
     Question { name: "storage", promises: "storage_promises", answer: storage::answer },
     Question { name: "flat-cost", promises: "flat_cost_promises", answer: flat_cost::answer },

@@ -69,7 +69,7 @@ const VOXEL: MortonCode = MortonCode(77);
 /// What the tree and what is in flight say of the voxel together; nothing while the tree is being written.
 fn value_of(tree: &SharedTree) -> Option<f32> {
     tree.try_ask(|tree, in_flight| {
-        let latest = in_flight.iter().flatten().filter(|(code, _)| *code == VOXEL).next_back();
+        let latest = in_flight.iter().flatten().rfind(|(code, _)| *code == VOXEL);
         latest.map(|(_, value)| *value).or_else(|| tree.get(VOXEL, 16)).unwrap_or(0.0)
     })
 }

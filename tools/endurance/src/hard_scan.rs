@@ -1,0 +1,230 @@
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use voxtile::Scan;
+use voxtile::io::ScanStreamWriter;
+use workload::SurveyName;
+
+/// An input that is hard on memory, and the map that the command makes of it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct HardScan {
+    /// What it is called.
+    pub name: String,
+    /// What is mapped.
+    pub points: Points,
+    /// Edge of a voxel, in metres.
+    pub resolution_m: f64,
+    /// Edge of a tile, in metres.
+    pub tile_size_m: f64,
+    /// In how much memory.
+    pub limit_mib: usize,
+    /// Whether every ray counts.
+    pub per_ray: bool,
+}
+
+/// What is mapped.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub enum Points {
+    /// One scan of rays all around a sensor.
+    Fan {
+        /// How many.
+        rays: u32,
+        /// How far they reach, in metres.
+        reach_m: f64,
+        /// How far up and down they go: 0 is level, 1 all of the sphere.
+        opening: f64,
+        /// Whether they end beyond the range, so that nothing is hit.
+        is_sky: bool,
+    },
+    /// A PCD file of points that are all alike, packed to next to nothing.
+    Packed {
+        /// How many.
+        points: u32,
+    },
+    /// A made-up survey.
+    Survey {
+        /// Which one.
+        survey: SurveyName,
+        /// How many scans.
+        scans: usize,
+    },
+}
+
+/// What the command took.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Taken {
+    /// Peak of its resident memory, in bytes.
+    pub peak_bytes: u64,
+    /// Its CPU time, in seconds.
+    pub cpu_s: f64,
+    /// Tiles of the map.
+    pub tiles: u64,
+    /// The map's digest.
+    pub digest: String,
+}
+
+/// Rays of a scan of a survey.
+const SURVEY_RAYS: u32 = 4_000;
+/// More than any map here takes.
+const UNLIMITED_MIB: usize = 1 << 24;
+
+impl HardScan {
+    /// What is mapped, in words.
+    pub fn description(&self) -> String {
+        let points = match &self.points {
+            Points::Fan { rays, reach_m, is_sky: false, .. } => format!("{rays} rays of up to {reach_m} m"),
+            Points::Fan { rays, reach_m, .. } => format!("{rays} rays of {reach_m} m that hit nothing"),
+            Points::Packed { points } => format!("a packed PCD file of {points} points"),
+            Points::Survey { survey, scans } => format!("`{}`, {scans} scans", survey.name()),
+        };
+        let each = if self.per_ray { ", every ray" } else { "" };
+        format!("{points}{each}; voxels of {} m, tiles of {} m", self.resolution_m, self.tile_size_m)
+    }
+
+    /// Writes the input; returns its file.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf> {
+        let (file, packed) = match &self.points {
+            Points::Packed { points } => ("hard.pcd", Some(*points)),
+            _ => ("hard.scans", None),
+        };
+        let path = folder.join(file);
+        let mut out = BufWriter::new(File::create(&path)?);
+        match packed {
+            Some(points) => write_packed(points, &mut out)?,
+            None => {
+                let mut stream = ScanStreamWriter::new(&mut out, &self.name, false)?;
+                self.scans().try_for_each(|scan| stream.write_world(&scan))?;
+            }
+        }
+        out.flush()?;
+        Ok(path)
+    }
+
+    fn scans(&self) -> Box<dyn Iterator<Item = Scan>> {
+        match self.points {
+            Points::Fan { rays, reach_m, opening, is_sky } => {
+                Box::new(std::iter::once(fan(rays, if is_sky { 2.0 * reach_m } else { reach_m }, opening)))
+            }
+            Points::Survey { survey, scans } => Box::new(survey.scans(1, 0, SURVEY_RAYS).take(scans)),
+            Points::Packed { .. } => Box::new(std::iter::empty()),
+        }
+    }
+
+    /// Has the command beside this program map it, within the limit or without one.
+    ///
+    /// # Errors
+    ///
+    /// A command that is not there or fails.
+    pub fn build(&self, input: &Path, map: &Path, is_limited: bool) -> Result<Taken> {
+        let reach_m = match self.points {
+            Points::Fan { reach_m, .. } => reach_m,
+            _ => 60.0,
+        };
+        let memory = format!("{}MiB", if is_limited { self.limit_mib } else { UNLIMITED_MIB });
+        let number = |number: f64| number.to_string();
+        let (resolution, tile, reach) =
+            (number(self.resolution_m), number(self.tile_size_m), number(reach_m));
+        let mut arguments = vec!["build", "--json", "--storage", "compact", "--memory", &memory];
+        arguments.extend(["--resolution", &resolution, "--tile-size", &tile, "--max-range", &reach]);
+        arguments.extend(["--insert", if self.per_ray { "per-ray" } else { "per-scan" }]);
+        let before = children_cpu_s()?;
+        let output = command()?.args(arguments).arg(input).arg("-o").arg(map).output()?;
+        let cpu_s = children_cpu_s()? - before;
+        ensure!(output.status.success(), "{}: {}", self.name, String::from_utf8_lossy(&output.stderr));
+        let built: serde_json::Value = serde_json::from_slice(&output.stdout)?;
+        let number = |key: &str| built[key].as_u64().with_context(|| format!("the summary has no {key}"));
+        let digest = command()?.arg("digest").arg(map).stderr(Stdio::inherit()).output()?;
+        let digest = String::from_utf8(digest.stdout)?;
+        fs::remove_dir_all(map)?;
+        Ok(Taken {
+            peak_bytes: number("peak_rss_bytes")?,
+            cpu_s,
+            tiles: number("tiles")?,
+            digest: digest.split_whitespace().next().context("no digest")?.to_owned(),
+        })
+    }
+}
+
+fn command() -> Result<Command> {
+    let program = std::env::current_exe()?.with_file_name("voxtile");
+    ensure!(program.is_file(), "{}: build the command first", program.display());
+    Ok(Command::new(program))
+}
+
+/// CPU time of the processes that this one has waited for, in seconds.
+fn children_cpu_s() -> Result<f64> {
+    /// What the kernel counts in, on every Linux that there is.
+    const TICKS_PER_SECOND: f64 = 100.0;
+    let stat = fs::read_to_string("/proc/self/stat")?;
+    // Behind the name, which may hold anything, the 16th and 17th of all.
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+    let ticks = |at: usize| fields.get(at).and_then(|ticks| ticks.parse::<f64>().ok());
+    let ticks = ticks(13).zip(ticks(14)).context("/proc/self/stat: no CPU time of children")?;
+    Ok((ticks.0 + ticks.1) / TICKS_PER_SECOND)
+}
+
+/// Rays in all directions of a band around a sensor, near and far as over a rough surface.
+fn fan(rays: u32, reach_m: f64, opening: f64) -> Scan {
+    let origin = [0.03, 0.04, 1.8];
+    let point = |k: u32| {
+        let (azimuth, up) =
+            (f64::from(k) * 2.399_963, opening * (2.0 * (f64::from(k) + 0.5) / f64::from(rays) - 1.0));
+        let reach = reach_m * (0.85 + 0.15 * (f64::from(k) * 0.37).sin());
+        let flat = (1.0 - up * up).max(0.0).sqrt() * reach;
+        [origin[0] + flat * azimuth.cos(), origin[1] + flat * azimuth.sin(), origin[2] + up * reach]
+    };
+    Scan { origin, points: (0..rays).map(point).collect(), intensities: None }
+}
+
+/// Points at (3, 4, 5) m: each field is one value and copies of it from four bytes back.
+fn write_packed(points: u32, out: &mut impl Write) -> Result<()> {
+    let mut packed: Vec<u8> = Vec::new();
+    for value in [3.0_f32, 4.0, 5.0] {
+        packed.push(3);
+        packed.extend(value.to_le_bytes());
+        let mut left = 4 * (points as usize - 1);
+        while left > 0 {
+            // At least three bytes, and none left over that would be fewer.
+            let length = if left > 264 + 2 { 264 } else { left.min(264) };
+            let length = if left > length && left - length < 3 { length - 3 } else { length };
+            let code = length - 2;
+            if code < 7 {
+                packed.extend([(code as u8) << 5, 3]);
+            } else {
+                packed.extend([7 << 5, (code - 7) as u8, 3]);
+            }
+            left -= length;
+        }
+    }
+    write!(
+        out,
+        "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {points}\nHEIGHT 1\n\
+         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\nDATA binary_compressed\n"
+    )?;
+    out.write_all(&(packed.len() as u32).to_le_bytes())?;
+    out.write_all(&(12 * points).to_le_bytes())?;
+    out.write_all(&packed)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_packed_file_holds_as_many_points_as_it_says() {
+        for points in [1, 2, 67, 68, 1000, 70_001] {
+            let mut file = Vec::new();
+            write_packed(points, &mut file).unwrap();
+            let cloud = voxtile::io::read_pcd(&file).unwrap();
+            assert_eq!(cloud.points, vec![[3.0, 4.0, 5.0]; points as usize]);
+        }
+    }
+}

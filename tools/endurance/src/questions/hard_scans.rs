@@ -1,0 +1,165 @@
+//! Does the memory stay where it is wanted, whatever the scan, the tiles and the file?
+
+use super::memory::BESIDE_MIB;
+use crate::findings::Findings;
+use crate::hard_scan::{HardScan, Points, Taken};
+use crate::promise::{Promise, Wanted};
+use crate::setting::{Setting, mib};
+use anyhow::Result;
+use report::{Cell, Table};
+use std::fs;
+use std::time::{Duration, Instant};
+use voxtile::MemoryLimit;
+use voxtile::simulation::Random;
+use voxtile::space::Grid;
+use workload::SurveyName;
+
+/// How many times the CPU time without a limit a map may take within one.
+const MOST_TIMES_CPU: f64 = 4.0;
+
+pub fn answer(setting: &Setting) -> Result<Findings> {
+    let mut findings = Findings::default();
+    let columns = [
+        "input",
+        "what",
+        "limit MiB",
+        "tiles",
+        "peak MiB",
+        "beyond MiB",
+        "CPU s",
+        "without a limit",
+        "digest",
+    ];
+    let caption =
+        "The command `voxtile build`, one process a map; CPU without a limit beside that within it.";
+    let mut table = Table::new("hard_scans", caption, columns);
+    for hard in cases(setting) {
+        let [limited, unlimited] = measured(setting, &hard)?;
+        findings.keep(&hard, &[&limited, &unlimited])?;
+        let beyond_mib = mib(limited.peak_bytes as f64) - hard.limit_mib as f64;
+        let times = limited.cpu_s / unlimited.cpu_s.max(0.1);
+        eprintln!("  {}: {beyond_mib:.0} MiB beyond {}, CPU {times:.1} times", hard.name, hard.limit_mib);
+        let promise = |what: &str, found, wanted, unit| {
+            Promise::new(format!("{}: {what}", hard.name), found, wanted, unit)
+        };
+        findings.promises.extend([
+            promise("peak of memory beyond the limit", beyond_mib, Wanted::AtMost(BESIDE_MIB), "MiB"),
+            promise(
+                "digests that are not that without a limit",
+                f64::from(u8::from(limited.digest != unlimited.digest)),
+                Wanted::AtMost(0.0),
+                "",
+            ),
+            Promise::about_time(
+                format!("{}: CPU time by that without a limit", hard.name),
+                times,
+                Wanted::AtMost(MOST_TIMES_CPU),
+                "x",
+            ),
+        ]);
+        table.push([
+            Cell::Text(hard.name.clone()),
+            Cell::Text(hard.description()),
+            Cell::Count(hard.limit_mib as u64),
+            Cell::Count(limited.tiles),
+            Cell::Number(mib(limited.peak_bytes as f64), 1),
+            Cell::Number(beyond_mib, 1),
+            Cell::Number(limited.cpu_s, 1),
+            Cell::Number(unlimited.cpu_s, 1),
+            Cell::Text(limited.digest.chars().take(8).collect()),
+        ]);
+    }
+    findings.answer.tables = vec![table];
+    findings.promises.push(search(setting)?);
+    Ok(findings)
+}
+
+/// Within the limit, and without one.
+fn measured(setting: &Setting, hard: &HardScan) -> Result<[Taken; 2]> {
+    fs::create_dir_all(&setting.work)?;
+    let input = hard.write(&setting.work)?;
+    let map = setting.work.join("hard");
+    let taken = [hard.build(&input, &map, true)?, hard.build(&input, &map, false)?];
+    fs::remove_file(input)?;
+    Ok(taken)
+}
+
+/// Each once broke the limit. A short run has smaller ones of the same kinds.
+fn cases(setting: &Setting) -> Vec<HardScan> {
+    let fan = |rays: [u32; 2], reach_m: [f64; 2], opening, is_sky| Points::Fan {
+        rays: setting.size(rays[0], rays[1]),
+        reach_m: setting.size(reach_m[0], reach_m[1]),
+        opening,
+        is_sky,
+    };
+    let hard = |name: &str, points, resolution_m, tile_size_m, limit_mib| HardScan {
+        name: name.to_owned(),
+        points,
+        resolution_m,
+        tile_size_m,
+        limit_mib,
+        per_ray: false,
+    };
+    let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(60, 4) };
+    let mut cases = vec![
+        hard("long rays", fan([20_000, 1_500], [450.0, 300.0], 0.3, false), 0.1, 10.0, setting.size(512, 64)),
+        hard("longer rays", fan([3_000, 200], [1_000.0, 800.0], 0.02, false), 0.1, 10.0, 64),
+        hard("millions of points", fan([4_000_000, 1_000_000], [30.0, 8.0], 0.3, false), 0.1, 10.0, 64),
+        hard("more millions", fan([10_000_000, 2_000_000], [12.0, 4.0], 0.3, false), 0.1, 10.0, 64),
+        hard("packed file", Points::Packed { points: setting.size(20_000_000, 5_000_000) }, 0.1, 10.0, 64),
+        hard("small tiles", teleports, 0.1, 0.4, 64),
+        hard("dense tile", fan([200_000, 30_000], [1.4, 0.7], 1.0, false), 0.01, 1.28, 96),
+        hard("sky", fan([100_000, 10_000], [60.0, 30.0], 1.0, true), 0.1, 10.0, 64),
+    ];
+    let every_ray = cases[0].clone();
+    cases.push(HardScan { name: "every long ray".to_owned(), per_ray: true, ..every_ray });
+    cases
+}
+
+/// The worst peak of random inputs in random limits.
+fn search(setting: &Setting) -> Result<Promise> {
+    let until = Instant::now() + Duration::from_secs(setting.size(1_800, 25));
+    let mut random = Random::of(u64::from(std::process::id()), &[15]);
+    let (mut worst_mib, mut worst, mut tried) = (f64::NEG_INFINITY, String::new(), 0);
+    while Instant::now() < until {
+        let resolution_m = [0.05, 0.1, 0.2, 0.5][random.below(4) as usize];
+        let tile_voxels = [4.0, 16.0, 50.0, 64.0][random.below(4) as usize];
+        let tile_size_m = tile_voxels * resolution_m;
+        let least = MemoryLimit::least_bytes(&Grid::new(resolution_m, tile_size_m)?).div_ceil(1 << 20);
+        // Voxels of all rays, so that each takes a second or two.
+        let voxels = random.between(1e5, setting.size(2e8, 1e7));
+        let rays = 10_f64.powf(random.between(1.0, 5.3)).min(voxels);
+        let reach_m = (voxels / rays).clamp(10.0, 100_000.0) * resolution_m;
+        // Of small tiles there are many, and what is known of them has to fit.
+        let reach_m = reach_m.min(tile_size_m * 3_000_000.0 / rays).max(2.0 * resolution_m);
+        let points = Points::Fan {
+            rays: rays as u32,
+            reach_m,
+            opening: random.between(0.0, 1.0),
+            is_sky: random.below(4) == 0,
+        };
+        let limit_mib = least + random.below(setting.size(200, 60)) as usize + 40;
+        let name = format!("random {tried}");
+        let hard =
+            HardScan { name, points, resolution_m, tile_size_m, limit_mib, per_ray: random.below(3) == 0 };
+        let input = hard.write(&setting.work)?;
+        let taken = match hard.build(&input, &setting.work.join("hard"), true) {
+            Ok(taken) => taken,
+            // Too many tiles for the limit is an answer, too.
+            Err(error) if error.to_string().contains("are too few for a map of") => {
+                let _ = fs::remove_dir_all(setting.work.join("hard"));
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let beyond_mib = mib(taken.peak_bytes as f64) - limit_mib as f64;
+        if beyond_mib > worst_mib {
+            worst = format!("{}, {limit_mib} MiB", hard.description());
+            worst_mib = beyond_mib;
+            eprintln!("  search, {worst}: {beyond_mib:.0} MiB beyond");
+        }
+        tried += 1;
+    }
+    let what = format!("worst of {tried} random inputs ({worst}): peak of memory beyond the limit");
+    Ok(Promise::new(what, worst_mib, Wanted::AtMost(BESIDE_MIB), "MiB"))
+}
