@@ -46,9 +46,9 @@ pub(super) struct Residency {
     /// What the scan that is being inserted has in files already; it counts when the scan is accepted.
     pub(super) coming: FxHashMap<TileIndex, InFile>,
     pub(super) ahead: LookAhead,
-    /// Tiles on disk that were read or written since the map was opened, and so are known to be whole. Updates wait
-    /// only for these, so that a damaged tile is found before a scan is accepted.
-    pub(super) known_whole: FxHashSet<TileIndex>,
+    /// Tiles that were on disk when the map was opened and were neither read nor written since, so that nobody knows whether
+    /// they are whole. Updates do not wait for these, so that a damaged tile is found before a scan is accepted.
+    pub(super) unread: FxHashSet<TileIndex>,
     pub(super) saved: BTreeSet<TileIndex>,
     /// Why a tile could not be saved beside the mapping; it is dirty still.
     pub(super) save_error: Option<Error>,
@@ -85,6 +85,7 @@ pub(super) struct Fetched {
 impl Residency {
     pub(super) fn new(config: MapConfig, store: TileStore) -> Self {
         let plan = MemoryPlan::new(config.memory);
+        let unread = store.tiles().chain(store.strays()).collect();
         let inputs = store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone());
         Self {
             octrees: OctreeFactory::new(config.octree),
@@ -97,7 +98,7 @@ impl Residency {
             pending: Pending::default(),
             coming: FxHashMap::default(),
             ahead: LookAhead::default(),
-            known_whole: FxHashSet::default(),
+            unread,
             saved: BTreeSet::new(),
             save_error: None,
             scan_bytes: plan.least_scan_bytes,
@@ -124,7 +125,7 @@ impl Residency {
         if self.plan.is_kept {
             self.scan_bytes = self.scan_bytes.max(scan_bytes);
         }
-        self.check_index()?;
+        self.check_index(updates)?;
         self.take_arrived(scan_number)?;
         self.work_off(scan_number)?;
         for (tile, _) in &updates.tiles {
@@ -327,7 +328,7 @@ impl Residency {
 
     /// Whether a tile is on disk and was not looked at yet.
     pub(super) fn is_unread(&self, index: TileIndex) -> bool {
-        self.store.contains(index) && !self.known_whole.contains(&index)
+        self.unread.contains(&index)
     }
 
     /// Puts a tile into memory with what waits for it, pushing out others first.
@@ -391,6 +392,6 @@ impl Residency {
     pub(super) fn has_read(&mut self, index: TileIndex, bytes: u64) {
         self.io.loads += 1;
         self.io.bytes_read += bytes;
-        self.known_whole.insert(index);
+        self.unread.remove(&index);
     }
 }

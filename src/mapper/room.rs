@@ -5,24 +5,30 @@ use super::statistics::MemoryCounts;
 use super::tile_traffic::Saved;
 use crate::config::Storage;
 use crate::error::{Error, Result};
+use crate::scan::ScanUpdates;
 use crate::space::TileIndex;
 use crate::tile::Tile;
 use std::time::Instant;
 
-/// What a tile takes in the set of those that are known to be whole, and in that of those saved.
-const KNOWN_BYTES_OF_TILE: usize = 4 * size_of::<TileIndex>();
+/// What a tile takes in the set of those that were not read yet.
+const UNREAD_BYTES_OF_TILE: usize = size_of::<TileIndex>() + 2;
+/// The same in the set of those saved.
+const SAVED_BYTES_OF_TILE: usize = 2 * size_of::<TileIndex>();
+/// What is known of a new tile once it is on disk.
+const BYTES_OF_NEW_TILE: usize = 200;
 
 impl Residency {
     /// Bytes of memory of all that grows.
     pub(super) fn memory(&self) -> MemoryCounts {
-        let known_bytes = KNOWN_BYTES_OF_TILE * self.known_whole.len();
+        let known_bytes =
+            UNREAD_BYTES_OF_TILE * self.unread.capacity() + SAVED_BYTES_OF_TILE * self.saved.len();
         MemoryCounts {
             tiles: self.tiles.bytes() as u64,
             compact_tiles: self.cold.bytes() as u64,
             pending: self.pending.bytes() as u64,
             scan: self.scan_bytes as u64,
             on_the_way: self.traffic.bytes() as u64,
-            index: (self.store.index_bytes() + known_bytes) as u64,
+            index: (self.store.index_bytes() + self.store.commit_bytes() + known_bytes) as u64,
         }
     }
 
@@ -31,8 +37,12 @@ impl Residency {
     /// # Errors
     ///
     /// [`Error::InvalidArgument`] with the limit that would do, if it takes more than half of it.
-    pub(super) fn check_index(&self) -> Result<()> {
-        let index = self.memory().index as usize;
+    pub(super) fn check_index(&self, updates: &ScanUpdates) -> Result<()> {
+        let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.coming.contains_key(*tile);
+        let tiles = updates.tiles.iter().map(|(tile, _)| tile).filter(is_new).count();
+        let tiles = tiles + self.coming.keys().filter(|tile| !self.exists(**tile)).count();
+        let memory = self.memory();
+        let index = memory.index as usize - self.store.commit_bytes() + BYTES_OF_NEW_TILE * tiles;
         if !self.plan.is_kept || index <= self.plan.bytes / 2 {
             return Ok(());
         }
@@ -41,9 +51,9 @@ impl Residency {
             "{} MiB are too few for a map of {} tiles: to know which there are takes {} MiB; go on with at least {} MiB, or \
              build with larger tiles",
             mib(self.plan.bytes),
-            self.count_tiles(),
+            self.count_tiles() + tiles,
             mib(index),
-            mib(4 * index),
+            mib(3 * index),
         );
         Err(Error::argument("memory", reason))
     }
@@ -169,7 +179,7 @@ impl Residency {
                 self.store.note_next(index, stamp);
                 self.io.saves += 1;
                 self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
-                self.known_whole.insert(index);
+                self.unread.remove(&index);
                 self.saved.insert(index);
             }
             Err(error) if is_here => self.save_error = Some(error),

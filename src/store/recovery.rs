@@ -198,11 +198,14 @@ fn look_at_tile(
         let Some(at) = names.iter().position(|name| name == next_name) else { continue };
         let next = layout.next(tile, file);
         if let Some(committed) = stamp.map(|stamp| stamp.of(file)) {
-            let waits = has_stamp(disk, &next, committed)?;
-            if (waits || is_of_last_commit) && !has_stamp(disk, &layout.current(tile, file), committed)? {
-                // If neither is what was committed: damage, which is reported when the tile is read. Keep both.
-                unrenamed |= waits;
-                continue;
+            let waits = content_of(disk, &next, committed)?;
+            if waits == Content::Committed || is_of_last_commit {
+                let in_place = content_of(disk, &layout.current(tile, file), committed)?;
+                if in_place != Content::Committed {
+                    // If neither is what was committed: damage, which is reported when the tile is read. Keep both.
+                    unrenamed |= waits.is_committed_beside(in_place);
+                    continue;
+                }
             }
         }
         // Never committed; also where it has the bytes of the committed file in place, for it may not be on the medium:
@@ -235,8 +238,9 @@ fn look_without_names(
     let Some(stamp) = stamp else { return Ok(State::Stray) };
     for &file in layout.files().iter().filter(|_| is_of_last_commit) {
         let committed = stamp.of(file);
-        let waits = has_stamp(disk, &layout.next(tile, file), committed)?;
-        if waits && !has_stamp(disk, &layout.current(tile, file), committed)? {
+        let waits = content_of(disk, &layout.next(tile, file), committed)?;
+        let in_place = content_of(disk, &layout.current(tile, file), committed)?;
+        if in_place != Content::Committed && waits.is_committed_beside(in_place) {
             return Ok(State::Unrenamed);
         }
     }
@@ -275,21 +279,39 @@ fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
     tolerate(disk.remove_file(path), path, "remove")
 }
 
-/// Whether a file has this length and checksum. One of another length is not read, and one that cannot be read has not.
-fn has_stamp(disk: &dyn Disk, path: &Path, stamp: FileStamp) -> Result<bool> {
-    let is_none = |error: &io::Error| {
-        matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) || is_of_medium(error)
-    };
+/// What a file has.
+#[derive(Clone, Copy, PartialEq)]
+enum Content {
+    /// What the log says of it.
+    Committed,
+    /// Something else, or it is not there.
+    Other,
+    /// Nobody can tell: the medium does not give it back.
+    Unreadable,
+}
+
+impl Content {
+    /// Whether a next version of the last commit is the committed one, beside what is in place and is not: also where it
+    /// cannot be read, for then nothing else can be what was committed.
+    fn is_committed_beside(self, in_place: Self) -> bool {
+        self == Self::Committed || self == Self::Unreadable && in_place == Self::Other
+    }
+}
+
+fn content_of(disk: &dyn Disk, path: &Path, stamp: FileStamp) -> Result<Content> {
+    let is_none =
+        |error: &io::Error| matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput);
     let input = match disk.open(path) {
-        Ok(input) if input.file_bytes() != stamp.bytes => return Ok(false),
+        Ok(input) if input.file_bytes() != stamp.bytes => return Ok(Content::Other),
         Ok(input) => input,
-        Err(error) if is_none(&error) => return Ok(false),
+        Err(error) if is_none(&error) => return Ok(Content::Other),
+        Err(error) if is_of_medium(&error) => return Ok(Content::Unreadable),
         Err(error) => return Err(Error::io(path, "open", error)),
     };
     let mut input = Stamping::new(input);
     match io::copy(&mut input, &mut io::sink()) {
-        Err(error) if is_of_medium(&error) => Ok(false),
+        Err(error) if is_of_medium(&error) => Ok(Content::Unreadable),
         Err(error) => Err(Error::io(path, "read", error)),
-        Ok(_) => Ok(input.finish().0 == stamp),
+        Ok(_) => Ok(if input.finish().0 == stamp { Content::Committed } else { Content::Other }),
     }
 }

@@ -339,8 +339,12 @@ impl TileStore {
         let slot = size_of::<(TileIndex, TileStamp)>() + 1;
         (self.commits.tiles.capacity() + self.next.capacity()) * 8 / 7 * slot
             + (self.foreign.capacity() + self.strays.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
-            + self.next.len() * COMMIT_BYTES_OF_TILE
             + self.snapshots.bytes()
+    }
+
+    /// Bytes of memory that the next commit takes beside the index.
+    pub fn commit_bytes(&self) -> usize {
+        self.next.len() * COMMIT_BYTES_OF_TILE
     }
 
     /// What is known of the latest version of a tile on disk without reading it.
