@@ -14,8 +14,8 @@ use std::time::Instant;
 const UNREAD_BYTES_OF_TILE: usize = size_of::<TileIndex>() + 2;
 /// The same in the set of those saved.
 const SAVED_BYTES_OF_TILE: usize = 2 * size_of::<TileIndex>();
-/// What is known of a new tile once it is on disk.
-const BYTES_OF_NEW_TILE: usize = 200;
+/// What a new tile takes beside its voxels until it is flushed: its part of the scan, what waits for it, and what is known of it.
+const BYTES_OF_NEW_TILE: usize = 400;
 
 impl Residency {
     /// Bytes of memory of all that grows.

@@ -85,6 +85,8 @@ struct State {
     unsynced_names: Vec<NameChange>,
     next_inode: Inode,
     fault: Fault,
+    /// Whether that was one that stays.
+    stays: bool,
     operations: u64,
     changes: u64,
     has_room: bool,
@@ -112,6 +114,7 @@ impl FaultyDisk {
             unsynced_names: Vec::new(),
             next_inode,
             fault,
+            stays: matches!(fault, Fault::Breaks(_)),
             operations: 0,
             changes: 0,
             has_room: true,
@@ -177,6 +180,11 @@ impl FaultyDisk {
         state.broken.clear();
         state.unreadable.clear();
         state.fault = Fault::None;
+    }
+
+    /// Whether the disk was made with a fault that stays.
+    pub fn had_a_fault_that_stays(&self) -> bool {
+        self.state().stays
     }
 
     /// What fails from now on; operations are counted anew.

@@ -100,14 +100,20 @@ fn cases(setting: &Setting) -> Vec<HardScan> {
         limit_mib,
         per_ray: false,
     };
-    let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(60, 4) };
+    let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(12, 3) };
     let mut cases = vec![
         hard("long rays", fan([20_000, 1_500], [450.0, 300.0], 0.3, false), 0.1, 10.0, setting.size(512, 64)),
-        hard("longer rays", fan([3_000, 200], [1_000.0, 800.0], 0.02, false), 0.1, 10.0, 64),
+        hard(
+            "longer rays",
+            fan([3_000, 200], [1_000.0, 800.0], 0.02, false),
+            0.1,
+            10.0,
+            setting.size(128, 64),
+        ),
         hard("millions of points", fan([4_000_000, 1_000_000], [30.0, 8.0], 0.3, false), 0.1, 10.0, 64),
         hard("more millions", fan([10_000_000, 2_000_000], [12.0, 4.0], 0.3, false), 0.1, 10.0, 64),
         hard("packed file", Points::Packed { points: setting.size(20_000_000, 5_000_000) }, 0.1, 10.0, 64),
-        hard("small tiles", teleports, 0.1, 0.4, 64),
+        hard("small tiles", teleports, 0.1, 0.4, setting.size(1024, 192)),
         hard("dense tile", fan([200_000, 30_000], [1.4, 0.7], 1.0, false), 0.01, 1.28, 96),
         hard("sky", fan([100_000, 10_000], [60.0, 30.0], 1.0, true), 0.1, 10.0, 64),
     ];
