@@ -106,8 +106,8 @@ impl Residency {
         self.tiles.change(index, Tile::mark_clean);
         self.io.saves += 1;
         self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
-        self.unread.remove(&index);
-        self.saved.insert(index);
+        self.unread.remove(index);
+        self.saved.insert(index, ());
         Ok(())
     }
 

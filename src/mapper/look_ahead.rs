@@ -87,7 +87,7 @@ impl Residency {
         self.has_read(index, read.file.bytes);
         self.io.prefetches += 1;
         let is_wanted = self.pending.contains(index) || self.has_room_to_spare();
-        if !is_wanted || self.coming.contains_key(&index) || self.is_near(index) {
+        if !is_wanted || self.coming.contains(index) || self.is_near(index) {
             return Ok(());
         }
         let fetched = Some(Fetched { table: read.table, is_dirty: false });

@@ -12,11 +12,10 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::scan::{ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
-use crate::space::{TileIndex, VoxelIndex};
+use crate::space::{TileIndex, TileTable, VoxelIndex};
 use crate::store::{InputRecord, TileStore};
 use crate::tile::{OctreeFactory, Table, Tile};
-use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::BTreeSet;
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// Which tiles are in memory, and the updates that wait for the others.
@@ -44,12 +43,12 @@ pub(super) struct Residency {
     pub(super) saver: TileSaver,
     pub(super) pending: Pending,
     /// What the scan that is being inserted has in files already; it counts when the scan is accepted.
-    pub(super) coming: FxHashMap<TileIndex, InFile>,
+    pub(super) coming: TileTable<InFile>,
     pub(super) ahead: LookAhead,
     /// Tiles that were on disk when the map was opened and were neither read nor written since, so that nobody knows whether
     /// they are whole. Updates do not wait for these, so that a damaged tile is found before a scan is accepted.
-    pub(super) unread: FxHashSet<TileIndex>,
-    pub(super) saved: BTreeSet<TileIndex>,
+    pub(super) unread: TileTable<()>,
+    pub(super) saved: TileTable<()>,
     /// Why a tile could not be saved beside the mapping; it is dirty still.
     pub(super) save_error: Option<Error>,
     /// Bytes of memory that are kept free for inserting scans: what the largest so far took.
@@ -85,7 +84,7 @@ pub(super) struct Fetched {
 impl Residency {
     pub(super) fn new(config: MapConfig, store: TileStore) -> Self {
         let plan = MemoryPlan::new(config.memory);
-        let unread = store.tiles().chain(store.strays()).collect();
+        let unread = store.tiles().chain(store.strays()).map(|tile| (tile, ())).collect();
         let inputs = store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone());
         Self {
             octrees: OctreeFactory::new(config.octree),
@@ -96,10 +95,10 @@ impl Residency {
             traffic: TileTraffic::new(&config),
             saver: TileSaver::new(&config),
             pending: Pending::default(),
-            coming: FxHashMap::default(),
+            coming: TileTable::default(),
             ahead: LookAhead::default(),
             unread,
-            saved: BTreeSet::new(),
+            saved: TileTable::default(),
             save_error: None,
             scan_bytes: plan.least_scan_bytes,
             io: IoCounts::default(),
@@ -131,7 +130,7 @@ impl Residency {
         for (tile, _) in &updates.tiles {
             let is_wanted = self.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
             // What is in its file of this scan must come after what waits, which is there too.
-            if is_wanted && !self.tiles.contains(*tile) && !self.coming.contains_key(tile) {
+            if is_wanted && !self.tiles.contains(*tile) && !self.coming.contains(*tile) {
                 self.bring_in(*tile, scan_number)?;
             }
         }
@@ -143,7 +142,7 @@ impl Residency {
     /// Takes the updates, those that are in files already first: into tiles in memory at once, for the others they
     /// wait. Cannot fail.
     pub(super) fn accept(&mut self, updates: ScanUpdates) {
-        for (index, in_file) in std::mem::take(&mut self.coming) {
+        for (index, in_file) in std::mem::take(&mut self.coming).iter() {
             self.pending.moved_to_file(index, in_file);
         }
         let mut resident = FxHashMap::default();
@@ -235,7 +234,7 @@ impl Residency {
         let cold = self.cold.iter().filter(|(index, _)| is_new(index)).count();
         let is_in_memory = |index| self.tiles.contains(index) || self.cold.contains(index);
         let waiting = self.pending.tiles().filter(|index| is_new(index) && !is_in_memory(*index)).count();
-        self.store.tiles().count() + resident + cold + waiting
+        self.store.count_tiles() + resident + cold + waiting
     }
 
     /// The tiles in memory, in order.
@@ -281,7 +280,7 @@ impl Residency {
 
     /// The tiles written since the last call.
     pub(super) fn take_saved(&mut self) -> Vec<TileIndex> {
-        std::mem::take(&mut self.saved).into_iter().collect()
+        std::mem::take(&mut self.saved).tiles().collect()
     }
 
     pub(super) fn sync_octrees(&mut self) {
@@ -297,17 +296,12 @@ impl Residency {
             cached_tiles: self.tiles.len() as u64,
             dirty_tiles: self.tiles.iter().filter(|tile| tile.is_dirty()).count() as u64,
             pending_tiles: self.pending.len() as u64,
-            pending_updates: self.pending.updates() as u64,
+            pending_updates: self.pending.updates(),
             pending_bytes: self.pending.bytes() as u64,
             pending_file_bytes: self.pending.file_bytes(),
             compact_tiles: self.cold.len() as u64,
             dirty_compact_tiles: self.cold.dirty() as u64,
-            disk_bytes: self
-                .store
-                .tiles()
-                .filter_map(|tile| self.store.stamp(tile))
-                .map(|stamp| stamp.table.bytes + stamp.octree.bytes)
-                .sum(),
+            disk_bytes: self.store.stamps().map(|stamp| stamp.table.bytes + stamp.octree.bytes).sum(),
             octrees: self.octrees.statistics(),
             io: self.io,
             memory: self.memory(),
@@ -328,7 +322,7 @@ impl Residency {
 
     /// Whether a tile is on disk and was not looked at yet.
     pub(super) fn is_unread(&self, index: TileIndex) -> bool {
-        self.unread.contains(&index)
+        self.unread.contains(index)
     }
 
     /// Puts a tile into memory with what waits for it, pushing out others first.
@@ -392,6 +386,6 @@ impl Residency {
     pub(super) fn has_read(&mut self, index: TileIndex, bytes: u64) {
         self.io.loads += 1;
         self.io.bytes_read += bytes;
-        self.unread.remove(&index);
+        self.unread.remove(index);
     }
 }

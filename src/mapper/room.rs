@@ -10,18 +10,14 @@ use crate::space::TileIndex;
 use crate::tile::Tile;
 use std::time::Instant;
 
-/// What a tile takes in the set of those that were not read yet.
-const UNREAD_BYTES_OF_TILE: usize = size_of::<TileIndex>() + 2;
-/// The same in the set of those saved.
-const SAVED_BYTES_OF_TILE: usize = 2 * size_of::<TileIndex>();
-/// What a new tile takes beside its voxels until it is flushed: its part of the scan, what waits for it, and what is known of it.
-const BYTES_OF_NEW_TILE: usize = 400;
+/// What a tile takes beside its voxels while a scan is inserted that makes it: its part of the scan, what waits for it, and what
+/// is known of it until it is flushed.
+const BYTES_OF_NEW_TILE: usize = 120;
 
 impl Residency {
     /// Bytes of memory of all that grows.
     pub(super) fn memory(&self) -> MemoryCounts {
-        let known_bytes =
-            UNREAD_BYTES_OF_TILE * self.unread.capacity() + SAVED_BYTES_OF_TILE * self.saved.len();
+        let known_bytes = self.unread.bytes() + self.saved.bytes();
         MemoryCounts {
             tiles: self.tiles.bytes() as u64,
             compact_tiles: self.cold.bytes() as u64,
@@ -38,9 +34,9 @@ impl Residency {
     ///
     /// [`Error::InvalidArgument`] with the limit that would do, if it takes more than half of it.
     pub(super) fn check_index(&self, updates: &ScanUpdates) -> Result<()> {
-        let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.coming.contains_key(*tile);
+        let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.coming.contains(**tile);
         let tiles = updates.tiles.iter().map(|(tile, _)| tile).filter(is_new).count();
-        let tiles = tiles + self.coming.keys().filter(|tile| !self.exists(**tile)).count();
+        let tiles = tiles + self.coming.tiles().filter(|tile| !self.exists(*tile)).count();
         let memory = self.memory();
         let index = memory.index as usize - self.store.commit_bytes() + BYTES_OF_NEW_TILE * tiles;
         if !self.plan.is_kept || index <= self.plan.bytes / 2 {
@@ -56,6 +52,14 @@ impl Residency {
             mib(3 * index),
         );
         Err(Error::argument("memory", reason))
+    }
+
+    /// How many tiles one scan may touch.
+    pub(super) fn most_tiles_of_scan(&self) -> usize {
+        match self.plan.is_kept {
+            true => (self.plan.bytes / 2).saturating_sub(self.memory().index as usize) / BYTES_OF_NEW_TILE,
+            false => usize::MAX,
+        }
     }
 
     /// Bytes that count towards the limit. The share of packed tiles counts as if it were full: the many small blocks that
@@ -179,8 +183,8 @@ impl Residency {
                 self.store.note_next(index, stamp);
                 self.io.saves += 1;
                 self.io.bytes_written += stamp.table.bytes + stamp.octree.bytes;
-                self.unread.remove(&index);
-                self.saved.insert(index);
+                self.unread.remove(index);
+                self.saved.insert(index, ());
             }
             Err(error) if is_here => self.save_error = Some(error),
             // It has changed since, and is written again.

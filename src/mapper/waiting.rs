@@ -19,7 +19,7 @@ impl Residency {
         let too_much = self.pending.bytes().saturating_sub(self.plan.pending_bytes);
         let heaviest = if too_much > 0 { self.pending.heaviest(too_much) } else { Vec::new() };
         for tile in heaviest {
-            if self.coming.contains_key(&tile) {
+            if self.coming.contains(tile) {
                 continue;
             }
             if self.is_cheaper_in_file(tile) {
@@ -30,7 +30,8 @@ impl Residency {
             }
         }
         // However little waits for each: what is known of it takes memory.
-        let too_many = self.pending.len().saturating_sub(self.plan.pending_bytes / 2 / Pending::SLOT_BYTES);
+        let too_many =
+            self.pending.files().saturating_sub(self.plan.pending_bytes / 2 / Pending::BYTES_OF_FILE);
         for tile in self.pending.longest_files(MOST_IN_FILE, too_many) {
             self.bring_in_waiting(tile, scan_number)?;
         }
@@ -39,7 +40,7 @@ impl Residency {
 
     fn bring_in_waiting(&mut self, tile: TileIndex, scan_number: u64) -> Result<()> {
         // It may have come in with another.
-        if self.pending.contains(tile) && !self.coming.contains_key(&tile) {
+        if self.pending.contains(tile) && !self.coming.contains(tile) {
             self.bring_in(tile, scan_number)?;
         }
         Ok(())
@@ -96,7 +97,7 @@ impl Residency {
     /// Takes back what a scan that was not accepted has put into files: it does not count, and its room may be what the
     /// next flush needs.
     pub(super) fn give_up_scan(&mut self) {
-        for index in std::mem::take(&mut self.coming).into_keys() {
+        for index in std::mem::take(&mut self.coming).tiles() {
             self.store.cut_waiting(index, self.pending.in_file(index).file);
         }
     }
@@ -117,7 +118,7 @@ impl Residency {
                 self.push_out(index, scan_number)?;
             }
             self.move_to_file(index)?;
-            let before = self.coming.get(&index).copied();
+            let before = self.coming.get(index);
             let before = before.unwrap_or_else(|| self.pending.in_file(index));
             let in_file = self.append(index, before, &updates)?;
             self.io.bytes_written += updates.as_bytes().len() as u64;
@@ -129,6 +130,6 @@ impl Residency {
     fn append(&self, index: TileIndex, before: InFile, updates: &PackedUpdates) -> Result<InFile> {
         let appended = self.store.append_waiting(index, before.file, updates.as_bytes());
         let file = appended.inspect_err(|_| self.store.cut_waiting(index, before.file))?;
-        Ok(InFile { file, updates: before.updates + updates.len() })
+        Ok(InFile { file, updates: before.updates + updates.len() as u64 })
     }
 }

@@ -126,6 +126,9 @@ impl<'a> Fan<'a> {
                         if batch.len() == BATCH {
                             collector.take(&self.origin, &batch, needs_intensity, parts);
                             batch.clear();
+                            if !self.goes_on(parts) {
+                                return false;
+                            }
                         }
                     }
                     collector.take(&self.origin, &batch, needs_intensity, parts);

@@ -12,6 +12,8 @@ pub(crate) type PutAside<'a> = dyn FnMut(Vec<(TileIndex, PackedUpdates)>) -> Res
 pub(crate) struct Overflow<'a> {
     /// Most bytes of updates that are kept; whenever there are more, they are put aside.
     pub(crate) most_bytes: usize,
+    /// Most tiles that a scan may touch; what is known of each while it is inserted takes memory.
+    pub(crate) most_tiles: usize,
     /// The map's folder, for errors.
     pub(crate) folder: &'a Path,
     /// Makes a file for what the rays have left so far.
@@ -21,6 +23,14 @@ pub(crate) struct Overflow<'a> {
 }
 
 impl Overflow<'_> {
+    pub(super) fn too_many_tiles(&self) -> Error {
+        let reason = format!(
+            "too few for a scan that touches more than {} tiles; go on with more memory, or build with larger tiles",
+            self.most_tiles
+        );
+        Error::argument("memory", reason)
+    }
+
     pub(super) fn error(&self, error: io::Error) -> Error {
         Error::io(self.folder, "keep the updates of a scan for a while in a temporary file in", error)
     }

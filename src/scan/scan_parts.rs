@@ -6,8 +6,7 @@ use super::stop::Stop;
 use super::tile_order::in_order_of_tiles;
 use super::updates::{BrickUpdate, ScanUpdates, TileUpdates};
 use super::{PackedUpdates, ScanReport};
-use crate::space::{Grid, TileIndex};
-use rustc_hash::FxHashMap;
+use crate::space::{Grid, TileIndex, TileTable, TileValue, put_number, take_number};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -27,9 +26,15 @@ struct Parts<'a> {
     log: PartLog<'a>,
     /// Number of updates, and the updates, packed: what a record is made of.
     record: Vec<u8>,
-    lists: FxHashMap<TileIndex, List>,
+    lists: TileTable<List>,
+    most_tiles: usize,
     /// Why a part could not be kept; there is no use in others then.
-    error: Option<io::Error>,
+    refusal: Option<Refusal>,
+}
+
+enum Refusal {
+    Disk(io::Error),
+    TooManyTiles,
 }
 
 /// The parts of a tile.
@@ -42,16 +47,42 @@ struct List {
     misses: u64,
 }
 
+impl Default for List {
+    fn default() -> Self {
+        Self { last: NONE, count: 0, hits: 0, misses: 0 }
+    }
+}
+
+impl TileValue for List {
+    fn pack(self, before: Self, out: &mut Vec<u8>) {
+        put_number(self.last.wrapping_sub(before.last) as i64, out);
+        put_number(self.count, out);
+        put_number(self.hits, out);
+        put_number(self.misses, out);
+    }
+
+    fn unpack(before: Self, input: &mut &[u8]) -> Self {
+        let last = before.last.wrapping_add(take_number::<i64>(input) as u64);
+        Self { last, count: take_number(input), hits: take_number(input), misses: take_number(input) }
+    }
+}
+
 /// Bricks that are made into updates at a time.
 const BRICKS_AT_A_TIME: usize = 4096;
 
 impl<'a> ScanParts<'a> {
     /// What comes to more than so many bytes goes to a file that is made then.
-    pub(super) fn new(grid: &'a Grid, most_bytes: usize, make_scratch: &'a MakeScratch<'a>) -> Self {
+    pub(super) fn new(
+        grid: &'a Grid,
+        most_bytes: usize,
+        most_tiles: usize,
+        make_scratch: &'a MakeScratch<'a>,
+    ) -> Self {
         let log = PartLog::new(most_bytes, make_scratch);
+        let (record, lists, refusal) = Default::default();
         Self {
             grid,
-            parts: Mutex::new(Parts { log, record: Vec::new(), lists: FxHashMap::default(), error: None }),
+            parts: Mutex::new(Parts { log, record, lists, most_tiles, refusal }),
             is_empty: AtomicBool::new(true),
             has_failed: AtomicBool::new(false),
         }
@@ -92,8 +123,8 @@ impl<'a> ScanParts<'a> {
         self.is_empty.store(false, Ordering::Relaxed);
         let mut parts = self.parts.lock().unwrap_or_else(PoisonError::into_inner);
         for (tile, updates, counts) in tiles {
-            if let Err(error) = parts.put(tile, &updates, counts) {
-                parts.error.get_or_insert(error);
+            if let Err(refusal) = parts.put(tile, &updates, counts) {
+                parts.refusal.get_or_insert(refusal);
                 self.has_failed.store(true, Ordering::Relaxed);
                 return;
             }
@@ -113,13 +144,14 @@ impl<'a> ScanParts<'a> {
         overflow: &mut Overflow<'_>,
     ) -> crate::error::Result<ScanUpdates> {
         let mut parts = self.parts.into_inner().unwrap_or_else(PoisonError::into_inner);
-        if let Some(error) = parts.error {
-            return Err(overflow.error(error));
+        match parts.refusal.take() {
+            Some(Refusal::Disk(error)) => return Err(overflow.error(error)),
+            Some(Refusal::TooManyTiles) => return Err(overflow.too_many_tiles()),
+            None => {}
         }
-        let mut lists: Vec<_> = std::mem::take(&mut parts.lists).into_iter().collect();
-        lists.sort_unstable_by_key(|&(tile, _)| tile);
+        let lists = std::mem::take(&mut parts.lists);
         let mut kept = Kept { tiles: Vec::new(), bytes: 0 };
-        for &(tile, list) in &lists {
+        for (tile, list) in lists.iter() {
             stop.check()?;
             let records = parts.records_of(&list).map_err(|error| overflow.error(error))?;
             let (hits, misses) = match counts_once && list.count > 1 {
@@ -149,8 +181,8 @@ impl<'a> ScanParts<'a> {
 }
 
 impl Parts<'_> {
-    fn put(&mut self, tile: TileIndex, updates: &TileUpdates, counts: (u64, u64)) -> io::Result<()> {
-        let list = self.lists.entry(tile).or_insert(List { last: NONE, count: 0, hits: 0, misses: 0 });
+    fn put(&mut self, tile: TileIndex, updates: &TileUpdates, counts: (u64, u64)) -> Result<(), Refusal> {
+        let mut list = self.lists.get(tile).unwrap_or_default();
         let packed;
         let packed = match updates {
             TileUpdates::Packed(packed) => packed,
@@ -162,11 +194,12 @@ impl Parts<'_> {
         self.record.clear();
         self.record.extend((packed.len() as u64).to_le_bytes());
         self.record.extend(packed.as_bytes());
-        list.last = self.log.append(list.last, &self.record)?;
+        list.last = self.log.append(list.last, &self.record).map_err(Refusal::Disk)?;
         list.count += 1;
         list.hits += counts.0;
         list.misses += counts.1;
-        Ok(())
+        self.lists.insert(tile, list);
+        if self.lists.len() > self.most_tiles { Err(Refusal::TooManyTiles) } else { Ok(()) }
     }
 
     /// Where the parts of a tile are, in the order in which they came.

@@ -94,7 +94,8 @@ impl Setting {
         };
         let make_scratch = &|| Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
         let folder = Path::new("map");
-        let overflow = Overflow { most_bytes, folder, make_scratch, put_aside: &mut put_aside };
+        let overflow =
+            Overflow { most_bytes, most_tiles: usize::MAX, folder, make_scratch, put_aside: &mut put_aside };
         let ScanUpdates { tiles, report } =
             tracer.trace_points(grid, model, rays, scan.origin, scan, *order, Some(overflow))?;
         tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
@@ -167,7 +168,8 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
         let Setting { grid, model, rays, order } = &setting;
         let make_scratch = &|| Err(io::Error::from(io::ErrorKind::StorageFull));
         let (folder, put_aside) = (Path::new("some_map"), &mut |_| Ok(()));
-        let overflow = Overflow { most_bytes: 1 << 16, folder, make_scratch, put_aside };
+        let overflow =
+            Overflow { most_bytes: 1 << 16, most_tiles: usize::MAX, folder, make_scratch, put_aside };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
         let traced = tracer.trace_points(grid, model, rays, scan.origin, &scan, *order, Some(overflow));
         assert!(traced.unwrap_err().to_string().contains("some_map"));

@@ -128,7 +128,7 @@ impl ScanTracer {
                 _ => fan.every_ray(&mut self.every_ray),
             };
         };
-        let parts = ScanParts::new(grid, overflow.most_bytes / 4, overflow.make_scratch);
+        let parts = ScanParts::new(grid, overflow.most_bytes / 4, overflow.most_tiles, overflow.make_scratch);
         let report = match (counts_once, in_order) {
             (true, _) => match fan.once_a_voxel_in_parts(&mut self.once, &self.limit, &parts)? {
                 OnceInParts::Whole(updates) => return Ok(updates),

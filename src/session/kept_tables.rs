@@ -74,7 +74,7 @@ fn seen_by_snapshots(
         let as_of_flush = snapshot.as_ref().map(|snapshot| snapshot.commits.flush_number).or(listed);
         for (&tile, flushes) in kept {
             match as_of_flush {
-                _ if snapshot.as_ref().is_some_and(|of| !of.commits.tiles.contains_key(&tile)) => {}
+                _ if snapshot.as_ref().is_some_and(|of| !of.commits.tiles.contains(tile)) => {}
                 Some(as_of_flush) => seen.extend(flushes.range(as_of_flush..).next().map(|&n| (tile, n))),
                 None => seen.extend(flushes.iter().map(|&n| (tile, n))),
             }

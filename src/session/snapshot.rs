@@ -141,8 +141,8 @@ enum Owner {
 
 impl Owners {
     fn count(&mut self, store: &TileStore, number: usize, snapshot: &Snapshot) -> Result<()> {
-        for (&tile, stamp) in &snapshot.commits.tiles {
-            if store.stamp(tile) == Some(*stamp) {
+        for (tile, stamp) in snapshot.commits.tiles.iter() {
+            if store.stamp(tile) == Some(stamp) {
                 continue; // It is the present one, under whatever names.
             }
             let kept = store.kept_tables(tile)?;

@@ -14,6 +14,7 @@ mod grid;
 mod key;
 mod morton;
 mod tile_index;
+mod tile_table;
 mod torus;
 
 pub use aabb::{Aabb, VoxelBox};
@@ -22,6 +23,8 @@ pub use grid::{Grid, GridError, LAST_VOXEL_INDEX, MAX_VOXELS_PER_TILE_EDGE};
 pub use key::VoxelKey;
 pub use morton::MortonCode;
 pub use tile_index::TileIndex;
+pub use tile_table::{TileTable, TileValue};
+pub(crate) use tile_table::{put_number, take_number, take_u32};
 pub use torus::Torus;
 
 /// Index of a finest voxel along x, y and z: `floor(coordinate / resolution)`.

@@ -1,20 +1,22 @@
 //! The writing half of [`TileStore`]: versions beside the committed ones, and the commit that puts them in place.
 
-use super::commit_log::{CommitLog, Flush};
-use super::layout::TileFile;
+use super::commit_log::CommitLog;
+use super::commit_record::{Flush, whole_map_bytes};
+use super::disk::Disk;
+use super::layout::{Layout, TileFile};
 use super::map_folder::{self, Lock};
 use super::metadata::{Bounds, Metadata};
 use super::tile_stamp::{FileStamp, TileStamp};
 use super::tile_store::TileStore;
 use super::tile_writer::TileWriter;
 use crate::error::{Error, Result};
-use crate::space::TileIndex;
-use rustc_hash::FxHashMap;
+use crate::space::{TileIndex, TileTable};
+use rustc_hash::FxHashSet;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Tiles whose files are synced at once.
-const TILES_SYNCED_AT_ONCE: usize = 4096;
+/// Tiles whose files are synced at once: their paths take several times the memory of what else is known of them.
+pub(super) const TILES_SYNCED_AT_ONCE: usize = 4096;
 
 /// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
 const COMPACT_LOG_BYTES: u64 = 2048;
@@ -62,7 +64,7 @@ impl TileStore {
             return Err(Error::argument("map", "a map of the seed's format must be adopted first"));
         }
         self.drop_next(tile);
-        if self.commits.tiles.contains_key(&tile) {
+        if self.commits.tiles.contains(tile) {
             self.removed.insert(tile);
         }
         Ok(())
@@ -71,7 +73,7 @@ impl TileStore {
     /// Forgets the next version of a tile, as if it had not been written.
     pub fn drop_next(&mut self, tile: TileIndex) {
         self.suspect.remove(&tile);
-        self.next.remove(&tile);
+        self.next.remove(tile);
     }
 
     /// The tiles whose next version must be written again before the next commit: the disk failed to sync it, and what
@@ -102,8 +104,6 @@ impl TileStore {
                 io::Error::other("an earlier sync failed"),
             ));
         }
-        let mut changed: Vec<_> = self.next.iter().map(|(&tile, &stamp)| (tile, stamp)).collect();
-        changed.sort_unstable_by_key(|&(tile, _)| tile);
         let mut removed: Vec<_> = self.removed.iter().copied().collect();
         removed.sort_unstable();
         let number = self.commits.flush_number + 1;
@@ -111,13 +111,13 @@ impl TileStore {
         let is_new = !self.is_list_logged
             || self.metadata.ext.is_none()
             || !self.metadata.is_same_but_for_progress(&metadata);
-        if !changed.is_empty() || !removed.is_empty() || is_new || scan_number != self.commits.scan_number {
-            self.sync_next(&changed)?;
+        if !self.next.is_empty() || !removed.is_empty() || is_new || scan_number != self.commits.scan_number {
+            self.sync_next()?;
             // As late as can be: what another writer commits must not be cut off.
             self.check_lock()?;
             let text = metadata.to_text();
             let metadata_text = is_new.then_some(&*text);
-            let flush = Flush { number, scan_number, changed: &changed, removed: &removed, metadata_text };
+            let flush = Flush { number, scan_number, changed: &self.next, removed: &removed, metadata_text };
             if let Err(error) = log.append(&*self.disk, &log_path, &flush) {
                 self.is_log_settled = false;
                 // At once if it goes: another process may come next, and would see a record that is not on the medium.
@@ -129,23 +129,23 @@ impl TileStore {
             self.is_list_logged = true;
             // Who opens the map only now is taken to see more than it does, for a while.
             let is_read = self.readers.are_there();
-            let is_born = |tile: &TileIndex| is_read && !self.commits.tiles.contains_key(tile);
-            for tile in changed.iter().map(|(tile, _)| *tile).filter(is_born) {
+            let changed = std::mem::take(&mut self.next);
+            let is_born = |tile: &TileIndex| is_read && !self.commits.tiles.contains(*tile);
+            for tile in changed.tiles().filter(is_born) {
                 self.readers.note_birth(tile, number);
             }
-            // Its memory, too: the next flush may be of few tiles.
-            self.next = FxHashMap::default();
             self.removed.clear();
             self.foreign.clear();
-            self.unrenamed.extend(changed.iter().map(|&(tile, _)| tile));
+            self.unrenamed.extend(changed.tiles().map(|tile| (tile, ())));
             self.unremoved.extend(&removed);
-            for tile in &removed {
+            for &tile in &removed {
                 self.commits.tiles.remove(tile);
             }
             self.commits.last_removed = removed;
             self.commits.flush_number = number;
             self.commits.scan_number = scan_number;
-            self.commits.tiles.extend(changed);
+            self.commits.tiles.extend(changed.iter());
+            self.commits.last_changed = TileTable::default();
             self.metadata = metadata;
         }
         if let Err(error) = self.tidy_up() {
@@ -173,39 +173,17 @@ impl TileStore {
         self.put_in_place()
     }
 
-    /// Some tiles at a time: their paths take several times the memory of what else is known of them.
-    fn sync_next(&mut self, changed: &[(TileIndex, TileStamp)]) -> Result<()> {
-        let last = changed.len().saturating_sub(1) / TILES_SYNCED_AT_ONCE;
-        if changed.is_empty() {
-            return self.sync_group(&[], true);
-        }
-        let groups = changed.chunks(TILES_SYNCED_AT_ONCE).enumerate();
-        groups
-            .map(|(number, group)| (group, number == last))
-            .try_for_each(|(group, is_last)| self.sync_group(group, is_last))
-    }
-
-    fn sync_group(&mut self, changed: &[(TileIndex, TileStamp)], is_last: bool) -> Result<()> {
-        let layout = &self.layout;
-        let files: Vec<_> = changed
-            .iter()
-            .flat_map(|&(tile, _)| layout.files().iter().map(move |&file| layout.next(tile, file)))
-            .collect();
-        let folders = changed.iter().map(|&(tile, _)| layout.tile_folder(tile));
-        // The map's own folder names the new tile folders.
-        let folders: Vec<_> = folders.chain(is_last.then(|| layout.folder().to_owned())).collect();
-        let [synced_files, synced_folders] = self.disk.sync_all(&files, &folders);
-        let per_tile = layout.files().len();
-        for (number, result) in synced_files.iter().enumerate() {
-            if result.is_err() {
-                self.suspect.insert(changed[number / per_tile].0);
+    fn sync_next(&mut self) -> Result<()> {
+        let Self { next, disk, layout, suspect, .. } = self;
+        let mut changed = next.tiles().peekable();
+        loop {
+            let group: Vec<_> = changed.by_ref().take(TILES_SYNCED_AT_ONCE).collect();
+            let is_last = changed.peek().is_none();
+            sync_group(&**disk, layout, &group, is_last, suspect)?;
+            if is_last {
+                return Ok(());
             }
         }
-        let files = files.iter().zip(synced_files);
-        for (path, result) in files.chain(folders.iter().zip(synced_folders)) {
-            result.map_err(|error| Error::io(path, "sync", error))?;
-        }
-        Ok(())
     }
 
     /// Puts the next version of a tile's octree in place by itself: it must be the one that the log names.
@@ -220,9 +198,9 @@ impl TileStore {
     /// Takes tiles out of the map: one commit, after which the log does not name them. Their folders stay.
     pub fn forget(&mut self, tiles: &[TileIndex]) -> Result<()> {
         self.settle()?;
-        for tile in tiles {
+        for &tile in tiles {
             self.commits.tiles.remove(tile);
-            self.foreign.remove(tile);
+            self.foreign.remove(&tile);
         }
         if self.log.is_some() {
             self.commits.flush_number += 1;
@@ -286,7 +264,7 @@ impl TileStore {
 
     pub(super) fn compact_log(&mut self) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
-        let whole_bytes = (self.commits.tiles.len() * (12 + TileStamp::BYTES)) as u64;
+        let whole_bytes = whole_map_bytes(self.commits.tiles.len());
         if log.bytes() < COMPACT_LOG_BYTES.max(2 * whole_bytes) { Ok(()) } else { self.replace_log() }
     }
 
@@ -310,4 +288,33 @@ impl TileStore {
     pub(super) fn sync_folder(&self, folder: &Path) -> Result<()> {
         self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
     }
+}
+
+/// Syncs the versions of some tiles, and notes of which tiles that failed. With the last of them goes the map's own folder,
+/// which names the new tile folders.
+fn sync_group(
+    disk: &dyn Disk,
+    layout: &Layout,
+    changed: &[TileIndex],
+    is_last: bool,
+    suspect: &mut FxHashSet<TileIndex>,
+) -> Result<()> {
+    let files: Vec<_> = changed
+        .iter()
+        .flat_map(|&tile| layout.files().iter().map(move |&file| layout.next(tile, file)))
+        .collect();
+    let folders = changed.iter().map(|&tile| layout.tile_folder(tile));
+    let folders: Vec<_> = folders.chain(is_last.then(|| layout.folder().to_owned())).collect();
+    let [synced_files, synced_folders] = disk.sync_all(&files, &folders);
+    let per_tile = layout.files().len();
+    for (number, result) in synced_files.iter().enumerate() {
+        if result.is_err() {
+            suspect.insert(changed[number / per_tile]);
+        }
+    }
+    let files = files.iter().zip(synced_files);
+    for (path, result) in files.chain(folders.iter().zip(synced_folders)) {
+        result.map_err(|error| Error::io(path, "sync", error))?;
+    }
+    Ok(())
 }

@@ -157,7 +157,7 @@ impl Metadata {
 
     /// The same as of a commit: its tiles' hull and its numbers.
     pub(super) fn as_of(&self, commits: &Commits) -> Self {
-        let mut metadata = Self { bounds: Bounds::of(commits.tiles.keys().copied()), ..self.clone() };
+        let mut metadata = Self { bounds: Bounds::of(commits.tiles.tiles()), ..self.clone() };
         if let Some(ext) = &mut metadata.ext {
             ext.empty = metadata.bounds.is_none();
             (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);

@@ -9,6 +9,7 @@
 //! `docs/durability.md`.
 
 mod commit_log;
+mod commit_record;
 mod disk;
 mod flush;
 mod fs_disk;
@@ -35,7 +36,8 @@ mod unfinished;
 mod waiting_file;
 
 pub use crate::scratch::Scratch;
-pub use commit_log::{CommitLog, Commits, Flush};
+pub use commit_log::{CommitLog, Commits};
+pub use commit_record::Flush;
 pub use disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
 pub use fs_disk::FsDisk;
 pub(crate) use input_record::MOST_INPUTS;

@@ -7,7 +7,7 @@ use super::snapshot_name::SnapshotName;
 use super::snapshots::{KeptTables, Snapshots};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result, is_of_medium};
-use crate::space::TileIndex;
+use crate::space::{TileIndex, TileTable};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::io;
@@ -20,9 +20,9 @@ const OWN_NEXT: [&str; 2] = ["metadata.json.next", "commits.log.next"];
 #[derive(Debug, Default)]
 pub(super) struct Leftovers {
     /// Committed versions that still have their `*.next` names.
-    pub unrenamed: BTreeSet<TileIndex>,
+    pub unrenamed: TileTable<()>,
     /// Tiles of the last commit that have their names, but perhaps not on the medium.
-    pub renamed: BTreeSet<TileIndex>,
+    pub renamed: TileTable<()>,
     /// Tile folders that hold files and are not in the log.
     pub strays: FxHashSet<TileIndex>,
     /// What the map's snapshots see.
@@ -44,7 +44,6 @@ pub(super) fn recover(
     map_id: [u8; 16],
     listed: Option<&SnapshotList>,
 ) -> Result<Leftovers> {
-    let changed: FxHashSet<TileIndex> = commits.last_changed.iter().copied().collect();
     let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
     let mut leftovers = Leftovers::default();
     let (mut kept, mut hollow) = (KeptTables::default(), Vec::new());
@@ -54,8 +53,8 @@ pub(super) fn recover(
             remove(disk, &path, &mut leftovers.removed)?;
         }
         let Some(tile) = tile_of_folder(&name) else { continue };
-        let stamp = commits.tiles.get(&tile);
-        let is_of_last_commit = changed.contains(&tile);
+        let stamp = commits.tiles.get(tile);
+        let is_of_last_commit = commits.last_changed.contains(tile);
         let (state, flushes) =
             look_at_tile(disk, layout, tile, stamp, is_of_last_commit, &mut leftovers.removed)?;
         if !flushes.is_empty() {
@@ -64,11 +63,11 @@ pub(super) fn recover(
         match state {
             // Its names may not be on the medium yet, if the writer was killed before it could see to that.
             State::Whole if is_of_last_commit => {
-                leftovers.renamed.insert(tile);
+                leftovers.renamed.insert(tile, ());
             }
             State::Whole | State::Unreadable => {}
             State::Unrenamed => {
-                leftovers.unrenamed.insert(tile);
+                leftovers.unrenamed.insert(tile, ());
             }
             // Made for a tile that was never committed, or of one that is no part of the map any more.
             State::Empty if stamp.is_none() => hollow.push(tile),
@@ -176,7 +175,7 @@ fn look_at_tile(
     disk: &dyn Disk,
     layout: &Layout,
     tile: TileIndex,
-    stamp: Option<&TileStamp>,
+    stamp: Option<TileStamp>,
     is_of_last_commit: bool,
     removed: &mut u64,
 ) -> Result<(State, BTreeSet<u64>)> {
@@ -232,7 +231,7 @@ fn look_without_names(
     disk: &dyn Disk,
     layout: &Layout,
     tile: TileIndex,
-    stamp: Option<&TileStamp>,
+    stamp: Option<TileStamp>,
     is_of_last_commit: bool,
 ) -> Result<State> {
     let Some(stamp) = stamp else { return Ok(State::Stray) };

@@ -1,6 +1,7 @@
 //! Snapshots of a [`TileStore`]: made, deleted, and opened like the map itself.
 
-use super::commit_log::{CommitLog, Commits, Flush};
+use super::commit_log::{CommitLog, Commits};
+use super::commit_record::Flush;
 use super::disk::{Disk, EntryKind};
 use super::layout::Layout;
 use super::layout::TileFile;
@@ -12,7 +13,7 @@ use super::snapshot_name::SnapshotName;
 use super::snapshots::Snapshots;
 use super::tile_store::{TileStore, id_from_hex};
 use crate::error::{Error, FormatError, Result};
-use crate::space::TileIndex;
+use crate::space::{TileIndex, TileTable};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -126,7 +127,7 @@ impl TileStore {
             return Err(error);
         }
         // Committed.
-        self.snapshots.share(self.commits.tiles.keys().copied());
+        self.snapshots.share(self.commits.tiles.tiles());
         self.unnamed_snapshot = Some(name.clone());
         self.tidy_snapshots();
         Ok(())
@@ -157,7 +158,13 @@ impl TileStore {
         let (number, scan_number) = (self.commits.flush_number + 1, self.commits.scan_number);
         let metadata = self.fill_in(self.metadata.clone(), number, scan_number);
         let text = metadata.to_text();
-        let flush = Flush { number, scan_number, changed: &[], removed: &[], metadata_text: Some(&text) };
+        let flush = Flush {
+            number,
+            scan_number,
+            changed: &TileTable::default(),
+            removed: &[],
+            metadata_text: Some(&text),
+        };
         let log_path = self.layout.commit_log();
         if let Err(error) = log.append(&*self.disk, &log_path, &flush) {
             self.listed = before;
@@ -288,7 +295,7 @@ impl TileStore {
             }
         }
         self.readers.release(&*self.disk, &self.layout, &self.snapshots);
-        for tile in before.pinned().keys().filter(|&tile| !self.commits.tiles.contains_key(tile)) {
+        for tile in before.pinned().keys().filter(|&tile| !self.commits.tiles.contains(*tile)) {
             // Of a removed tile: it goes if that was all that was in it.
             let _ = self.disk.remove_folder(&self.layout.tile_folder(*tile));
         }

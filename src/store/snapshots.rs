@@ -4,7 +4,7 @@ use super::layout::Layout;
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
 use crate::error::{Error, Result};
-use crate::space::TileIndex;
+use crate::space::{TileIndex, TileTable};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ pub(super) type KeptTables = FxHashMap<TileIndex, BTreeSet<u64>>;
 #[derive(Debug, Default)]
 pub(super) struct Snapshots {
     /// Tiles of which a snapshot sees the table in place.
-    shared: FxHashSet<TileIndex>,
+    shared: TileTable<()>,
     /// Kept tables that a snapshot sees.
     pinned: KeptTables,
     /// Whether there is a snapshot that cannot be read, and of which nothing is known: it may see anything.
@@ -83,7 +83,7 @@ impl Snapshots {
         match flush_number {
             Some(flush_number) => {
                 log::warn!("{error}; until then every table as of flush {flush_number} is kept");
-                let tiles: FxHashSet<_> = map.tiles.keys().chain(kept.keys()).copied().collect();
+                let tiles: FxHashSet<_> = map.tiles.tiles().chain(kept.keys().copied()).collect();
                 self.take_tiles(tiles.into_iter(), flush_number, kept);
             }
             None => {
@@ -103,26 +103,26 @@ impl Snapshots {
     }
 
     fn take(&mut self, commits: &Commits, kept: &KeptTables) {
-        self.take_tiles(commits.tiles.keys().copied(), commits.flush_number, kept);
+        self.take_tiles(commits.tiles.tiles(), commits.flush_number, kept);
     }
 
     fn take_tiles(&mut self, tiles: impl Iterator<Item = TileIndex>, as_of_flush: u64, kept: &KeptTables) {
         for tile in tiles {
             match seen_by(kept.get(&tile), as_of_flush) {
                 Some(flush_number) => self.pin(tile, flush_number),
-                None => drop(self.shared.insert(tile)),
+                None => self.shared.insert(tile, ()),
             }
         }
     }
 
     /// Notes that there is a snapshot of the map as it is.
     pub(super) fn share(&mut self, tiles: impl Iterator<Item = TileIndex>) {
-        self.shared.extend(tiles);
+        self.shared.extend(tiles.map(|tile| (tile, ())));
     }
 
     /// Whether a snapshot sees the table in place.
     pub(super) fn sees_present(&self, tile: TileIndex) -> bool {
-        self.see_all || self.shared.contains(&tile)
+        self.see_all || self.shared.contains(tile)
     }
 
     /// Whether a snapshot sees the table that was kept as of a flush.
@@ -137,7 +137,7 @@ impl Snapshots {
 
     /// Notes that what was kept of the table in place is durable: what takes its place is seen by no snapshot yet.
     pub(super) fn has_replaced(&mut self, tile: TileIndex) {
-        self.shared.remove(&tile);
+        self.shared.remove(tile);
     }
 
     /// Every kept table that a snapshot sees.
@@ -150,7 +150,7 @@ impl Snapshots {
         // A set of few numbers takes a leaf of its tree.
         const FLUSHES_BYTES: usize = 120;
         let slot = size_of::<TileIndex>() + 1;
-        self.shared.capacity() * 8 / 7 * slot
+        self.shared.bytes()
             + self.pinned.capacity() * 8 / 7 * (slot + size_of::<BTreeSet<u64>>())
             + self.pinned.len() * FLUSHES_BYTES
     }

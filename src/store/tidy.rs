@@ -1,6 +1,7 @@
 //! What comes after the commit: committed versions get their names, removed tiles lose theirs.
 
 use super::disk::EntryKind;
+use super::flush::TILES_SYNCED_AT_ONCE;
 use super::layout::TileFile;
 use super::quarantine::Quarantine;
 use super::tile_store::TileStore;
@@ -32,7 +33,7 @@ impl TileStore {
     /// Keeps the tables in place that the last commit replaces or removes, where a reader or a snapshot sees them. Those of
     /// snapshots have their new names durably before other tables can take the old ones.
     fn keep_replaced(&mut self) -> Result<()> {
-        let tiles: Vec<_> = self.unrenamed.iter().chain(&self.unremoved).copied().collect();
+        let tiles: Vec<_> = self.unrenamed.tiles().chain(self.unremoved.iter().copied()).collect();
         // Asked after the commit: who begins to read later sees it.
         if !tiles.is_empty() {
             self.readers.look();
@@ -70,7 +71,7 @@ impl TileStore {
     /// is renamed then is not there, and nothing happens.
     fn is_replaced_in_place(&self, tile: TileIndex) -> Result<bool> {
         let is_there = |path: &Path| Ok(self.kind(path)?.is_some());
-        match self.unrenamed.contains(&tile) {
+        match self.unrenamed.contains(tile) {
             // Otherwise it has been put in place.
             true => is_there(&self.layout.next(tile, TileFile::Table)),
             false => is_there(&self.layout.tile_folder(tile)),
@@ -78,12 +79,15 @@ impl TileStore {
     }
 
     fn finish_renames(&mut self) -> Result<()> {
-        while let Some(&tile) = self.unrenamed.first() {
-            for &file in self.layout.files() {
-                self.put_in_its_place(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
+        while !self.unrenamed.is_empty() {
+            let group: Vec<_> = self.unrenamed.tiles().take(TILES_SYNCED_AT_ONCE).collect();
+            for tile in group {
+                for &file in self.layout.files() {
+                    self.put_in_its_place(&self.layout.next(tile, file), &self.layout.current(tile, file))?;
+                }
+                self.unrenamed.remove(tile);
+                self.renamed.insert(tile, ());
             }
-            self.unrenamed.remove(&tile);
-            self.renamed.insert(tile);
         }
         self.sync_renamed()
     }
@@ -102,12 +106,14 @@ impl TileStore {
     }
 
     fn sync_renamed(&mut self) -> Result<()> {
-        let tiles: Vec<_> = self.renamed.iter().copied().collect();
-        let folders: Vec<_> = tiles.iter().map(|&tile| self.layout.tile_folder(tile)).collect();
-        let [_, synced] = self.disk.sync_all(&[], &folders);
-        for ((tile, folder), result) in tiles.iter().zip(&folders).zip(synced) {
-            result.map_err(|error| Error::io(folder, "sync", error))?;
-            self.renamed.remove(tile);
+        while !self.renamed.is_empty() {
+            let group: Vec<_> = self.renamed.tiles().take(TILES_SYNCED_AT_ONCE).collect();
+            let folders: Vec<_> = group.iter().map(|&tile| self.layout.tile_folder(tile)).collect();
+            let [_, synced] = self.disk.sync_all(&[], &folders);
+            for ((&tile, folder), result) in group.iter().zip(&folders).zip(synced) {
+                result.map_err(|error| Error::io(folder, "sync", error))?;
+                self.renamed.remove(tile);
+            }
         }
         Ok(())
     }

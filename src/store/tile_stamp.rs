@@ -1,8 +1,9 @@
 use super::layout::TileFile;
+use crate::space::{TileValue, put_number, take_number, take_u32};
 use std::io::{self, Read, Write};
 
 /// What the log knows of one version of a tile: enough to recognise its files and to count without reading them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileStamp {
     /// Number of the last scan that the map had taken when the version was written.
     pub scan_number: u64,
@@ -74,6 +75,28 @@ impl TileStamp {
             voxels: u64_at(32),
             occupied: u64_at(40),
         }
+    }
+}
+
+impl TileValue for TileStamp {
+    fn pack(self, before: Self, out: &mut Vec<u8>) {
+        put_number(self.scan_number.wrapping_sub(before.scan_number) as i64, out);
+        for file in [self.table, self.octree] {
+            put_number(file.bytes, out);
+            out.extend_from_slice(&file.crc.to_le_bytes());
+        }
+        put_number(self.voxels, out);
+        put_number(self.occupied, out);
+    }
+
+    fn unpack(before: Self, input: &mut &[u8]) -> Self {
+        let scan_number = before.scan_number.wrapping_add(take_number::<i64>(input) as u64);
+        let file = |input: &mut &[u8]| {
+            let bytes = take_number(input);
+            FileStamp { bytes, crc: take_u32(input) }
+        };
+        let (table, octree) = (file(input), file(input));
+        Self { scan_number, table, octree, voxels: take_number(input), occupied: take_number(input) }
     }
 }
 

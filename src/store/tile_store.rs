@@ -12,8 +12,8 @@ use super::snapshots::{Snapshots, seen_by};
 use super::tile_location::{StoredTile, TileLocation};
 use super::tile_stamp::TileStamp;
 use crate::error::{Error, FormatError, Result};
-use crate::space::TileIndex;
-use rustc_hash::{FxHashMap, FxHashSet};
+use crate::space::{TileIndex, TileTable};
+use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -36,15 +36,15 @@ pub struct TileStore {
     /// Flush number in the `metadata.json` on disk; `None` in the seed's format. A crash can leave it behind the log.
     pub(super) written_flush: Option<u64>,
     /// Versions written since the last commit.
-    pub(super) next: FxHashMap<TileIndex, TileStamp>,
+    pub(super) next: TileTable<TileStamp>,
     /// Versions of which a sync failed: the medium may hold anything, whatever later syncs say.
     pub(super) suspect: FxHashSet<TileIndex>,
     /// Tiles that the next commit takes out of the map.
     pub(super) removed: FxHashSet<TileIndex>,
     /// Committed versions that still have their `*.next` names.
-    pub(super) unrenamed: BTreeSet<TileIndex>,
+    pub(super) unrenamed: TileTable<()>,
     /// Tiles whose versions have their names, but perhaps not on the medium.
-    pub(super) renamed: BTreeSet<TileIndex>,
+    pub(super) renamed: TileTable<()>,
     /// Tiles that a commit took out of the map, with files that are still there or whose absence may not be durable.
     pub(super) unremoved: BTreeSet<TileIndex>,
     /// Tile folders that the log does not know: never read, never overwritten.
@@ -76,9 +76,9 @@ pub struct TileStore {
 
 struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Box<dyn DiskRead>);
 
-/// What a commit takes for each tile that it changes, beside the index: its place in the order, its part of the record, its
-/// name until it has that.
-const COMMIT_BYTES_OF_TILE: usize = size_of::<(TileIndex, TileStamp)>() + 12 + TileStamp::BYTES + 24;
+/// What a commit takes for each tile that it changes, beside the index: its place among those that the last record names and
+/// among those that wait for their names.
+const COMMIT_BYTES_OF_TILE: usize = 30;
 
 /// How often a reader begins to open a map again because a flush came in between.
 const OPEN_ATTEMPTS: usize = 100;
@@ -328,16 +328,30 @@ impl TileStore {
 
     /// The tiles that have a version on disk, in no particular order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
-        let uncommitted = self.next.keys().filter(|tile| !self.commits.tiles.contains_key(tile));
-        let committed = self.commits.tiles.keys().filter(|tile| !self.removed.contains(tile));
-        committed.chain(&self.foreign).chain(uncommitted).copied()
+        let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile));
+        let committed = self.commits.tiles.tiles().filter(|tile| !self.removed.contains(tile));
+        committed.chain(self.foreign.iter().copied()).chain(uncommitted)
     }
 
-    /// Bytes of memory of what is known of the tiles without reading them: some 200 a tile.
+    /// How many tiles have a version on disk.
+    pub fn count_tiles(&self) -> usize {
+        let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile)).count();
+        self.commits.tiles.len() - self.removed.len() + self.foreign.len() + uncommitted
+    }
+
+    /// What is known of the latest version of each tile, in no particular order.
+    pub fn stamps(&self) -> impl Iterator<Item = TileStamp> {
+        let is_latest = |tile: TileIndex| !self.removed.contains(&tile) && !self.next.contains(tile);
+        let committed = self.commits.tiles.iter().filter(move |(tile, _)| is_latest(*tile));
+        self.next.values().chain(committed.map(|(_, stamp)| stamp))
+    }
+
+    /// Bytes of memory of what is known of the tiles without reading them: some thirty a tile, and as many more for one with
+    /// a version that is not committed.
     pub fn index_bytes(&self) -> usize {
-        // A hash map fills up to 7 of 8 slots, and has as few as half as many entries.
-        let slot = size_of::<(TileIndex, TileStamp)>() + 1;
-        (self.commits.tiles.capacity() + self.next.capacity()) * 8 / 7 * slot
+        self.commits.tiles.bytes()
+            + self.commits.last_changed.bytes()
+            + self.next.bytes()
             + (self.foreign.capacity() + self.strays.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
             + self.snapshots.bytes()
     }
@@ -349,8 +363,8 @@ impl TileStore {
 
     /// What is known of the latest version of a tile on disk without reading it.
     pub fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
-        let committed = || self.commits.tiles.get(&tile).filter(|_| !self.removed.contains(&tile));
-        self.next.get(&tile).or_else(committed).copied()
+        let committed = || self.commits.tiles.get(tile).filter(|_| !self.removed.contains(&tile));
+        self.next.get(tile).or_else(committed)
     }
 
     /// Opens the latest version of a tile's table; `None` if the tile has none.
@@ -448,7 +462,7 @@ impl TileStore {
     }
 
     fn latest_path(&self, tile: TileIndex) -> PathBuf {
-        match self.next.contains_key(&tile) || self.unrenamed.contains(&tile) {
+        match self.next.contains(tile) || self.unrenamed.contains(tile) {
             true => self.layout.next(tile, TileFile::Table),
             false => self.layout.current(tile, TileFile::Table),
         }

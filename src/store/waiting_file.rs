@@ -1,7 +1,7 @@
 use super::tile_store::TileStore;
 use super::tile_writer::make_folder;
 use crate::error::{Error, FormatError, Result};
-use crate::space::TileIndex;
+use crate::space::{TileIndex, TileValue, put_number, take_number, take_u32};
 use std::io::{BufRead, BufReader, Read, Write};
 
 const BUFFER_BYTES: usize = 1 << 16;
@@ -13,6 +13,18 @@ pub struct WaitingFile {
     /// Length in bytes.
     pub bytes: u64,
     crc: u32,
+}
+
+impl TileValue for WaitingFile {
+    fn pack(self, _: Self, out: &mut Vec<u8>) {
+        put_number(self.bytes, out);
+        out.extend_from_slice(&self.crc.to_le_bytes());
+    }
+
+    fn unpack(_: Self, input: &mut &[u8]) -> Self {
+        let bytes = take_number(input);
+        Self { bytes, crc: take_u32(input) }
+    }
 }
 
 /// Updates that wait for a tile in a file of its folder, because memory is short. They are no part of the map on disk:

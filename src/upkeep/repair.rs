@@ -186,7 +186,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             self.counts.tiles_lost += 1;
         }
         if is_from_tiles {
-            self.settle_waiting(&commits.tiles.keys().copied().collect::<Vec<_>>(), &waiting)?;
+            self.settle_waiting(&commits.tiles.tiles().collect::<Vec<_>>(), &waiting)?;
         }
         let paths = [self.layout.commit_log(), self.layout.metadata()];
         if is_from_tiles {

@@ -108,7 +108,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             return Ok(());
         }
         for (tile, _) in &lost {
-            snapshot.commits.tiles.remove(tile);
+            snapshot.commits.tiles.remove(*tile);
             let kept = store.kept_tables(*tile)?;
             let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
             self.quarantine_if_damaged(store, config, *tile, flush_number)?;
@@ -147,7 +147,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             let flushes = store.kept_tables(tile)?;
             let is_seen = |snapshot: &Snapshot| {
                 let first = flushes.range(snapshot.commits.flush_number..).next();
-                snapshot.commits.tiles.contains_key(&tile) && first == Some(&flush_number)
+                snapshot.commits.tiles.contains(tile) && first == Some(&flush_number)
             };
             if flushes.contains(&flush_number) && !snapshots.iter().any(is_seen) {
                 let why = "only a snapshot that cannot be read may see it";

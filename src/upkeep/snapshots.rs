@@ -24,20 +24,18 @@ pub(super) fn lost_tiles(
     whole: &mut WholeTables,
 ) -> Result<Vec<(TileIndex, Error)>> {
     let past = store.at(snapshot);
-    let mut tiles: Vec<_> = snapshot.commits.tiles.iter().collect();
-    tiles.sort_unstable_by_key(|&(tile, _)| *tile);
     let mut lost = Vec::new();
-    for (&tile, stamp) in tiles {
+    for (tile, stamp) in snapshot.commits.tiles.iter() {
         let kept = past.kept_tables(tile)?.range(snapshot.commits.flush_number..).next().copied();
         let is_known = match kept {
-            Some(flush_number) => whole.get(&(tile, flush_number)) == Some(stamp),
-            None => store.stamp(tile) == Some(*stamp),
+            Some(flush_number) => whole.get(&(tile, flush_number)) == Some(&stamp),
+            None => store.stamp(tile) == Some(stamp),
         };
         if is_known {
             continue;
         }
         match tile_files::load_table(&past, &config.grid, tile) {
-            Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), *stamp))),
+            Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), stamp))),
             Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => {
                 lost.push((tile, error))
             }

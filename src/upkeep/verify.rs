@@ -345,7 +345,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         if now.as_ref().is_some_and(|now| now.last_removed.contains(&tile)) {
             let reason = "taken out of the map; its files go when the map is next opened for writing";
             self.report(Finding::note(folder, Some(tile), reason));
-        } else if now.is_none_or(|now| !now.tiles.contains_key(&tile)) {
+        } else if now.is_none_or(|now| !now.tiles.contains(tile)) {
             let path = self.layout.current(tile, TileFile::Table);
             self.damage(&path, Some(tile), "commits.log does not name this tile");
         }
@@ -355,7 +355,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     /// What the log says of a tile now.
     fn stamp_now(&self, tile: TileIndex) -> Option<TileStamp> {
         let (_, commits) = read_log(self.disk, &self.layout).ok()??;
-        commits.tiles.get(&tile).copied()
+        commits.tiles.get(tile)
     }
 
     /// What has a name; nothing, and a finding, where the medium does not tell.

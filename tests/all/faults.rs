@@ -1,5 +1,6 @@
 use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use crate::support::random_scans::{Random, random_scan};
+use crate::support::some_of;
 use std::path::PathBuf;
 use voxtile::{
     Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions,
@@ -218,7 +219,7 @@ fn fail_once_at_every_operation(oracle: &Oracle) {
     let faults = (0..operations).map(Fault::Fails);
     let faults = faults.chain((0..changes).map(Fault::LosesSync));
     let faults = faults.chain((0..changes).map(Fault::IsFull));
-    for fault in faults.chain((0..changes).map(Fault::IsReadOnly)) {
+    for fault in some_of(faults.chain((0..changes).map(Fault::IsReadOnly)), 5) {
         let disk = FaultyDisk::new(fault);
         let reached = live(&disk, oracle);
         assert!(reached.finished, "{fault:?}");
@@ -235,7 +236,7 @@ fn fail_once_at_every_operation(oracle: &Oracle) {
 fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_on() {
     for config in [config(), compact()] {
         let oracle = Oracle::of(config);
-        for operation in 0..undisturbed(&oracle).operations() {
+        for operation in some_of(0..undisturbed(&oracle).operations(), 4) {
             let disk = FaultyDisk::new(Fault::Breaks(operation));
             let mut reached = live(&disk, &oracle);
             disk.mend();
@@ -257,7 +258,7 @@ fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
 }
 
 fn crash_at_every_operation(oracle: &Oracle) {
-    for at in 0..undisturbed(oracle).changes() {
+    for at in some_of(0..undisturbed(oracle).changes(), 5) {
         let disk = FaultyDisk::new(Fault::Crashes(at));
         let reached = live(&disk, oracle);
         assert!(disk.has_crashed());
@@ -279,7 +280,7 @@ fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operat
 
 fn fail_and_crash_short_of_memory(oracle: &Oracle) {
     let changes = undisturbed(oracle).changes();
-    for at in 0..changes {
+    for at in some_of(0..changes, 5) {
         for fault in [Fault::Fails(2 * at), Fault::IsFull(at), Fault::Crashes(at)] {
             let disk = FaultyDisk::new(fault);
             let reached = live(&disk, oracle);
@@ -299,7 +300,7 @@ fn fail_and_crash_short_of_memory(oracle: &Oracle) {
 fn the_power_goes_some_time_after_the_process_was_killed_at_every_operation() {
     let oracle = Oracle::new();
     let changes = undisturbed(&oracle).changes();
-    for at in 0..changes {
+    for at in some_of(0..changes, 4) {
         let disk = FaultyDisk::new(Fault::Crashes(at));
         let before = live(&disk, &oracle);
         for again in [at % 17, 7 + at % 89] {
@@ -325,7 +326,7 @@ fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
 
 fn crash_again_while_opening(oracle: &Oracle) {
     let mut points = 0;
-    for at in 0..undisturbed(oracle).changes() {
+    for at in some_of(0..undisturbed(oracle).changes(), 12) {
         let disk = FaultyDisk::new(Fault::Crashes(at));
         let reached = live(&disk, oracle);
         for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
@@ -366,7 +367,7 @@ fn crash_again_while_opening(oracle: &Oracle) {
 fn a_flush_that_failed_leaves_nothing_behind_that_a_crash_could_bring_back() {
     let oracle = Oracle::new();
     let mut points = 0;
-    for at in 0..undisturbed(&oracle).changes() {
+    for at in some_of(0..undisturbed(&oracle).changes(), 8) {
         for later in [0, 1, 2, 3, 5, 8, 13, 21, 34] {
             let disk = FaultyDisk::new(Fault::LosesSync(at));
             let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(later)) else { break };
@@ -414,7 +415,7 @@ fn live_carelessly(disk: &FaultyDisk, oracle: &Oracle, then: Fault) -> Option<Re
 fn a_flush_that_failed_is_not_believed_by_the_next_process() {
     let oracle = Oracle::new();
     let mut points = 0;
-    for at in 0..undisturbed(&oracle).changes() {
+    for at in some_of(0..undisturbed(&oracle).changes(), 2) {
         for fault in [Fault::LosesSync(at), Fault::LosesSyncAndDies(at)] {
             let disk = FaultyDisk::new(fault);
             // The process ends where the flush fails.

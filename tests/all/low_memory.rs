@@ -82,7 +82,7 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
 /// A tile may be wanted, changed and flushed while an older version of it is still on its way to disk.
 #[test]
 fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
-    let scans = scans(24);
+    let scans = scans(12);
     for bytes in [100_000, 300_000] {
         let folder = TempDir::new().unwrap();
         let path = folder.path().join("map");

@@ -35,7 +35,7 @@ fn change(random: &mut Random, p: &mut LocalParameters) {
 
 #[test]
 fn after_every_update_the_map_is_the_naive_one_with_parameters_that_change() {
-    for seed in 0..24 {
+    for seed in 0..8 {
         let random = &mut Random(seed);
         let mut parameters = at_once(LocalParameters::local_mapping());
         let mut map = LocalMap::new(0.1, parameters).unwrap();
@@ -131,8 +131,8 @@ fn while_the_radius_changes_every_voxel_has_the_old_one_or_the_new_one() {
     let mut map = LocalMap::new(0.1, parameters).unwrap();
     let mut naive = ReferenceLocal::new(0.1, parameters);
     let mut was_between = false;
-    for update in 0..120 {
-        if update % 40 == 20 {
+    for update in 0..60 {
+        if update % 20 == 10 {
             let radius_m = if parameters.inflation_radius_m == 0.2 { 0.3 } else { 0.2 };
             parameters = parameters.with_inflation_radius(radius_m);
             map.set_parameters(parameters).unwrap();

@@ -1,0 +1,344 @@
+use super::TileIndex;
+use integer_encoding::VarInt;
+use rustc_hash::FxHashMap;
+use std::fmt;
+use std::iter::Peekable;
+
+/// What is known of each of many tiles, in order and in little memory: all but what changed lately is packed, some twenty
+/// bytes for a tile's stamp and five for its index alone.
+///
+/// ```text
+/// recent  hash map: tile -> value, or that the tile was taken out of the blocks
+/// blocks  sorted: first tile, bytes of up to 64 tiles: differences of indices and of values, as variable-length integers
+/// ```
+///
+/// Once a sixteenth of the tiles is recent, these are merged into the blocks that they lie in. So a change costs the packing
+/// of some sixteen tiles, and a look-up the unpacking of at most 64.
+#[derive(Clone)]
+pub struct TileTable<V> {
+    recent: FxHashMap<TileIndex, Option<V>>,
+    blocks: Vec<Block>,
+    block_bytes: usize,
+    tiles: usize,
+}
+
+/// What a [`TileTable`] can hold.
+pub trait TileValue: Copy + Default {
+    /// Appends the value, given the one before it.
+    fn pack(self, before: Self, out: &mut Vec<u8>);
+    /// Takes the value from the front, given the one before it.
+    fn unpack(before: Self, input: &mut &[u8]) -> Self;
+}
+
+#[derive(Clone)]
+struct Block {
+    first: TileIndex,
+    bytes: Box<[u8]>,
+}
+
+/// Most tiles of a block.
+const BLOCK_TILES: usize = 64;
+/// So many recent tiles are never too many.
+const LEAST_RECENT: usize = 1024;
+/// Most recent tiles, as a part of all.
+const RECENT_PART: usize = 16;
+/// What the allocator adds to each block.
+const ALLOCATION_BYTES: usize = 16;
+
+impl<V: TileValue> TileTable<V> {
+    /// Number of tiles.
+    pub fn len(&self) -> usize {
+        self.tiles
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.tiles == 0
+    }
+
+    /// Bytes of memory.
+    pub fn bytes(&self) -> usize {
+        // A hash map fills up to 7 of 8 slots, each with a byte of its own.
+        self.recent.capacity() * 8 / 7 * (size_of::<(TileIndex, Option<V>)>() + 1)
+            + self.blocks.capacity() * size_of::<Block>()
+            + self.block_bytes
+    }
+
+    /// What is known of a tile.
+    pub fn get(&self, tile: TileIndex) -> Option<V> {
+        match self.recent.get(&tile) {
+            Some(value) => *value,
+            None => self.packed(tile),
+        }
+    }
+
+    /// Whether a tile is there.
+    pub fn contains(&self, tile: TileIndex) -> bool {
+        self.get(tile).is_some()
+    }
+
+    /// Puts a tile in, in place of what was known of it.
+    pub fn insert(&mut self, tile: TileIndex, value: V) {
+        self.tiles += usize::from(!self.contains(tile));
+        self.recent.insert(tile, Some(value));
+        self.pack_if_due();
+    }
+
+    /// Takes a tile out; tells whether it was there.
+    pub fn remove(&mut self, tile: TileIndex) -> bool {
+        if !self.contains(tile) {
+            return false;
+        }
+        if self.tiles == 1 {
+            *self = Self::default(); // Its memory, too.
+            return true;
+        }
+        self.tiles -= 1;
+        match self.packed(tile) {
+            Some(_) => self.recent.insert(tile, None),
+            None => self.recent.remove(&tile),
+        };
+        self.pack_if_due();
+        true
+    }
+
+    /// All tiles, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (TileIndex, V)> {
+        let mut recent: Vec<_> = self.recent.iter().map(|(&tile, &value)| (tile, value)).collect();
+        recent.sort_unstable_by_key(|&(tile, _)| tile);
+        let packed = self.blocks.iter().flat_map(Block::iter);
+        Merged { packed: packed.peekable(), recent: recent.into_iter().peekable() }
+    }
+
+    /// All tiles without what is known of them, in order.
+    pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
+        self.iter().map(|(tile, _)| tile)
+    }
+
+    /// What is known of each tile, in their order.
+    pub fn values(&self) -> impl Iterator<Item = V> {
+        self.iter().map(|(_, value)| value)
+    }
+
+    fn packed(&self, tile: TileIndex) -> Option<V> {
+        let after = self.blocks.partition_point(|block| block.first <= tile);
+        let block = self.blocks.get(after.checked_sub(1)?)?;
+        let (found, value) = block.iter().find(|(other, _)| *other >= tile)?;
+        (found == tile).then_some(value)
+    }
+
+    fn pack_if_due(&mut self) {
+        if self.recent.len() > LEAST_RECENT.max(self.tiles / RECENT_PART) {
+            self.pack();
+        }
+    }
+
+    /// Merges recent tiles into the blocks that they lie in; the others stay as they are.
+    fn pack(&mut self) {
+        let mut recent: Vec<_> = std::mem::take(&mut self.recent).into_iter().collect();
+        recent.sort_unstable_by_key(|&(tile, _)| tile);
+        let mut recent = &recent[..];
+        let before = std::mem::take(&mut self.blocks);
+        let ends: Vec<_> = before.iter().skip(1).map(|block| block.first).collect();
+        let mut blocks = Vec::with_capacity(before.len());
+        let mut before = before.into_iter();
+        for number in 0..=ends.len() {
+            let end =
+                ends.get(number).map_or(recent.len(), |end| recent.partition_point(|(tile, _)| tile < end));
+            let changes;
+            (changes, recent) = recent.split_at(end);
+            match before.next() {
+                Some(block) if changes.is_empty() => blocks.push(block),
+                block => {
+                    let packed = block.iter().flat_map(Block::iter);
+                    let merged =
+                        Merged { packed: packed.peekable(), recent: changes.iter().copied().peekable() };
+                    let merged: Vec<(TileIndex, V)> = merged.collect();
+                    // Of equal size, so that the next few tiles do not split them again.
+                    let parts = merged.len().div_ceil(BLOCK_TILES).max(1);
+                    blocks.extend(merged.chunks(merged.len().div_ceil(parts).max(1)).map(Block::of));
+                }
+            }
+        }
+        self.block_bytes = blocks.iter().map(|block| block.bytes.len() + ALLOCATION_BYTES).sum();
+        self.blocks = blocks;
+    }
+}
+
+impl Block {
+    /// Packs tiles, which are in order and at least one.
+    fn of<V: TileValue>(tiles: &[(TileIndex, V)]) -> Self {
+        let first = tiles.first().map(|&(tile, _)| tile).unwrap_or_default();
+        let (mut bytes, mut before) = (Vec::new(), (first, V::default()));
+        for &(tile, value) in tiles {
+            for (axis, index) in tile.to_array().into_iter().enumerate() {
+                put_number(i64::from(index) - i64::from(before.0.to_array()[axis]), &mut bytes);
+            }
+            value.pack(before.1, &mut bytes);
+            before = (tile, value);
+        }
+        Self { first, bytes: bytes.into() }
+    }
+
+    fn iter<V: TileValue>(&self) -> impl Iterator<Item = (TileIndex, V)> {
+        let (mut input, mut before) = (&*self.bytes, (self.first, V::default()));
+        std::iter::from_fn(move || {
+            if input.is_empty() {
+                return None;
+            }
+            let index = before.0.to_array().map(|index| i64::from(index) + take_number::<i64>(&mut input));
+            let tile = TileIndex::from(index.map(|index| index as i32));
+            before = (tile, V::unpack(before.1, &mut input));
+            Some(before)
+        })
+    }
+}
+
+/// Appends a number as a variable-length integer; negative ones of small size are short too.
+pub fn put_number(number: impl VarInt, out: &mut Vec<u8>) {
+    let mut bytes = [0; 10];
+    let length = number.encode_var(&mut bytes);
+    out.extend_from_slice(&bytes[..length]);
+}
+
+/// Takes a number from the front. What is packed is our own memory, so that it is there.
+pub fn take_number<N: VarInt + Default>(input: &mut &[u8]) -> N {
+    let (number, length) = N::decode_var(input).unwrap_or_default();
+    *input = input.get(length..).unwrap_or_default();
+    number
+}
+
+/// Takes four bytes from the front, of a number that a variable length would not make shorter.
+pub fn take_u32(input: &mut &[u8]) -> u32 {
+    let (number, rest) =
+        input.split_first_chunk().map_or(([0; 4], &[][..]), |(number, rest)| (*number, rest));
+    *input = rest;
+    u32::from_le_bytes(number)
+}
+
+/// Two sequences of tiles in order as one, in which what is recent holds.
+struct Merged<P: Iterator, R: Iterator> {
+    packed: Peekable<P>,
+    recent: Peekable<R>,
+}
+
+impl<V, P, R> Iterator for Merged<P, R>
+where
+    P: Iterator<Item = (TileIndex, V)>,
+    R: Iterator<Item = (TileIndex, Option<V>)>,
+{
+    type Item = (TileIndex, V);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let Some(&(recent, _)) = self.recent.peek() else { return self.packed.next() };
+            if let Some(before) = self.packed.next_if(|(tile, _)| *tile < recent) {
+                return Some(before);
+            }
+            self.packed.next_if(|(tile, _)| *tile == recent);
+            if let Some((tile, Some(value))) = self.recent.next() {
+                return Some((tile, value));
+            }
+        }
+    }
+}
+
+impl TileValue for () {
+    fn pack(self, (): Self, _: &mut Vec<u8>) {}
+    fn unpack((): Self, _: &mut &[u8]) -> Self {}
+}
+
+impl<V> Default for TileTable<V> {
+    fn default() -> Self {
+        Self { recent: FxHashMap::default(), blocks: Vec::new(), block_bytes: 0, tiles: 0 }
+    }
+}
+
+impl<V: TileValue> Extend<(TileIndex, V)> for TileTable<V> {
+    fn extend<I: IntoIterator<Item = (TileIndex, V)>>(&mut self, tiles: I) {
+        tiles.into_iter().for_each(|(tile, value)| self.insert(tile, value));
+    }
+}
+
+impl<V: TileValue> FromIterator<(TileIndex, V)> for TileTable<V> {
+    fn from_iter<I: IntoIterator<Item = (TileIndex, V)>>(tiles: I) -> Self {
+        let mut table = Self::default();
+        table.extend(tiles);
+        table
+    }
+}
+
+impl<V: TileValue + PartialEq> PartialEq for TileTable<V> {
+    fn eq(&self, other: &Self) -> bool {
+        self.tiles == other.tiles && self.iter().eq(other.iter())
+    }
+}
+
+impl<V: TileValue + fmt::Debug> fmt::Debug for TileTable<V> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_map().entries(self.iter()).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{FileStamp, TileStamp};
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    fn stamp(seed: u64) -> TileStamp {
+        let (bytes, crc) = (18 * (seed % 5000) + 96, (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as u32);
+        let table = FileStamp { bytes, crc };
+        let octree = FileStamp { bytes: bytes / 30, crc: !crc };
+        TileStamp {
+            scan_number: seed % 977,
+            table,
+            octree,
+            voxels: seed % 5000,
+            occupied: seed % 300 % (seed % 5000 + 1),
+        }
+    }
+
+    /// Tiles near each other and at the ends of space.
+    fn index() -> impl Strategy<Value = TileIndex> {
+        let axis = prop_oneof![40 => -8..8_i32, 1 => Just(i32::MIN), 1 => Just(i32::MAX), 1 => any::<i32>()];
+        prop::array::uniform3(axis).prop_map(TileIndex::from)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        #[test]
+        fn it_is_a_map_whatever_comes_and_goes(
+            changes in prop::collection::vec((index(), prop::option::weighted(0.7, any::<u64>())), 0..6000),
+        ) {
+            let (mut table, mut naive) = (TileTable::default(), BTreeMap::new());
+            for (number, &(tile, value)) in changes.iter().enumerate() {
+                match value {
+                    Some(seed) => {
+                        table.insert(tile, stamp(seed));
+                        naive.insert(tile, stamp(seed));
+                    }
+                    None => prop_assert_eq!(table.remove(tile), naive.remove(&tile).is_some()),
+                }
+                if number % 997 == 0 {
+                    table.pack();
+                }
+                prop_assert_eq!(table.len(), naive.len());
+            }
+            for (tile, _) in changes {
+                prop_assert_eq!(table.get(tile), naive.get(&tile).copied());
+            }
+            prop_assert!(table.iter().eq(naive));
+        }
+    }
+
+    #[test]
+    fn a_tile_takes_some_thirty_bytes_and_its_index_ten() {
+        let tiles = || (0..100_000).map(|k| TileIndex::new(k / 2500, k / 10 % 250, k % 10));
+        let stamps: TileTable<_> = (0..).map(stamp).zip(tiles()).map(|(stamp, tile)| (tile, stamp)).collect();
+        assert!(stamps.bytes() < 40 * stamps.len(), "{} bytes a tile", stamps.bytes() / stamps.len());
+        let indices: TileTable<()> = tiles().map(|tile| (tile, ())).collect();
+        assert!(indices.bytes() < 10 * indices.len(), "{} bytes a tile", indices.bytes() / indices.len());
+    }
+}
