@@ -181,3 +181,56 @@ fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], Decod
     }
     Ok(map_id)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{FileStamp, FsDisk};
+    use std::fs;
+
+    fn stamp(number: u64) -> TileStamp {
+        let file = FileStamp { bytes: 100 + number, crc: number as u32 };
+        TileStamp { scan_number: number, table: file, octree: file, voxels: number, occupied: number / 2 }
+    }
+
+    /// Records that are longer than what is read and written at a time.
+    #[test]
+    fn a_log_cut_anywhere_ends_with_its_last_whole_record_and_a_wrong_byte_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("commits.log");
+        let tiles = |of: std::ops::Range<i32>| {
+            of.map(|k| (TileIndex::new(k % 50, k / 50, -k), stamp(k as u64))).collect::<TileTable<_>>()
+        };
+        let first = Commits { flush_number: 3, tiles: tiles(0..4000), ..Commits::default() };
+        let mut log = CommitLog::write_whole(&FsDisk, &path, [7; 16], &first, "").unwrap();
+        let end_of_first = log.bytes();
+        let changed = tiles(3000..5500);
+        let removed: Vec<_> = first.tiles.tiles().step_by(3).collect();
+        let flush =
+            Flush { number: 4, scan_number: 9, changed: &changed, removed: &removed, metadata_text: None };
+        log.append(&FsDisk, &path, &flush).unwrap();
+
+        let mut second = first.tiles.clone();
+        second.extend(changed.iter());
+        removed.iter().for_each(|tile| assert!(second.remove(*tile)));
+        let bytes = fs::read(&path).unwrap();
+        let read = |bytes: &[u8]| CommitLog::read(&mut &*bytes, bytes.len() as u64);
+        let (again, commits) = read(&bytes).unwrap();
+        assert_eq!((again, commits.flush_number, commits.torn.is_none()), (log, 4, true));
+        assert!(commits.tiles == second && commits.last_removed == removed);
+        assert!(commits.last_changed.tiles().eq(changed.tiles()));
+
+        for end in (end_of_first as usize..bytes.len()).step_by(7001) {
+            let (cut, commits) = read(&bytes[..end]).unwrap();
+            assert_eq!((cut.bytes(), commits.torn.is_some()), (end_of_first, end as u64 > end_of_first));
+            assert!(commits.tiles == first.tiles);
+        }
+        for at in (0..bytes.len()).step_by(6007).chain([33, 60, bytes.len() - 1]) {
+            let mut wrong = bytes.clone();
+            wrong[at] ^= 1;
+            let found = read(&wrong).map(|(_, commits)| commits.torn.is_some());
+            let is_last = at as u64 >= end_of_first;
+            assert!(if is_last { found.unwrap() } else { found.unwrap_or(true) }, "byte {at}");
+        }
+    }
+}

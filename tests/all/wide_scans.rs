@@ -5,7 +5,8 @@ use crate::support::random_scans::{Random, random_scan};
 use std::path::{Path, PathBuf};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
-    InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan,
+    InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper,
+    Questions, Scan,
 };
 
 /// From masts here and there: every ray goes far, through many tiles.
@@ -136,4 +137,27 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
         mapper.flush().unwrap();
     }
     assert!(refusals > POINTS as usize / 4, "{refusals} scans were refused");
+}
+
+/// What is known of a tile takes memory, too. A scan that touches more tiles than there is room to know of is refused as a
+/// whole, and is no reason to refuse the next one.
+#[test]
+fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let config = MapConfig::new(0.1, 0.2).unwrap();
+    let mut expected = InMemoryMapper::new(config.clone()).unwrap();
+    let bytes = MemoryLimit::least_bytes(&config.grid);
+    let mut mapper =
+        OutOfCoreTileMapper::create(folder.path().join("map"), config.with_memory_bytes(bytes)).unwrap();
+    let mut random = Random(3);
+    let near = [1, 2].map(|_| random_scan(&mut random, [0.0; 3], 20));
+    let wide = random_scan(&mut random, [0.0; 3], 800);
+    let wide = Scan { points: wide.points.iter().map(|point| point.map(|x| 40.0 * x)).collect(), ..wide };
+    for scan in near {
+        let refused = mapper.insert_scan(&wide).unwrap_err().to_string();
+        assert!(refused.contains("too few for a scan that touches more than"), "{refused}");
+        assert_eq!(mapper.insert_scan(&scan).unwrap(), expected.insert_scan(&scan).unwrap());
+        assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
+    }
+    assert_eq!(mapper.statistics().pending_file_bytes, 0);
 }
