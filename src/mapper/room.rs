@@ -1,5 +1,6 @@
 //! How room is made: resident tiles are brought into the compact form, and these go to disk, beside the mapping.
 
+use super::cold_tiles::ColdTile;
 use super::residency::Residency;
 use super::statistics::MemoryCounts;
 use super::tile_traffic::Saved;
@@ -148,11 +149,10 @@ impl Residency {
         Ok(())
     }
 
-    /// Sends a tile in the compact form to disk, if it is not on its way already.
+    /// Sends a tile in the compact form to disk, if it is not there as it is, nor on its way.
     pub(super) fn send_to_disk(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
-        let Some(tile) = self.cold.get(index).filter(|tile| !tile.is_leaving).cloned() else {
-            return Ok(());
-        };
+        let is_to_leave = |tile: &&ColdTile| tile.is_dirty && !tile.is_leaving;
+        let Some(tile) = self.cold.get(index).filter(is_to_leave).cloned() else { return Ok(()) };
         self.adopt()?;
         while !self.traffic.can_save() {
             self.wait_for_save()?;

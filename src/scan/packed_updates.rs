@@ -83,7 +83,7 @@ impl PackedUpdates {
     }
 
     /// The updates as bytes, which stay the same when more are appended.
-    pub(crate) fn as_bytes(&self) -> &[u8] {
+    pub fn as_bytes(&self) -> &[u8] {
         &self.bytes
     }
 
@@ -101,7 +101,7 @@ impl PackedUpdates {
     /// # Errors
     ///
     /// An `input` that cannot be read, or ends too soon.
-    pub(crate) fn unpack(input: impl BufRead, mut take: impl FnMut(TileUpdates)) -> io::Result<()> {
+    pub fn unpack(input: impl BufRead, mut take: impl FnMut(TileUpdates)) -> io::Result<()> {
         let mut input = Unpacker { input };
         while let Some(updates) = input.next()? {
             take(updates);

@@ -229,6 +229,8 @@ impl DiskWrite for File {
 /// Syncs many paths. A sync is waiting, not work: a file system that is asked for several at once writes them together.
 fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> Vec<io::Result<()>> {
     const AT_ONCE: usize = 16;
+    /// Enough for a call of the system: sixteen of the usual stacks would be 32 MiB of addresses at each flush.
+    const STACK_BYTES: usize = 128 << 10;
     if paths.len() < 2 {
         return paths.iter().map(|path| sync(path)).collect();
     }
@@ -244,7 +246,7 @@ fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> 
     thread::scope(|scope| {
         for _ in 1..AT_ONCE.min(paths.len()) {
             // Where no thread is to be had, this one does it all.
-            let _ = thread::Builder::new().spawn_scoped(scope, sync_next);
+            let _ = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, sync_next);
         }
         sync_next();
     });

@@ -61,7 +61,7 @@ impl Tile {
 
     /// The tile of a table that is looked at once. Its octree is a view of the bricks, whatever form the map's octrees
     /// have, and not summed up: the same answers, of which the coarse ones take longer.
-    pub(crate) fn in_passing(grid: &Grid, index: TileIndex, table: Table) -> Self {
+    pub fn in_passing(grid: &Grid, index: TileIndex, table: Table) -> Self {
         let octree = TileOctree::Bricks(BrickOctree::default());
         Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }
@@ -87,12 +87,12 @@ impl Tile {
     }
 
     /// Notes that the tile's content is to be written.
-    pub(crate) fn mark_dirty(&mut self) {
+    pub fn mark_dirty(&mut self) {
         self.is_dirty = true;
     }
 
     /// Notes that the tile's content is on disk.
-    pub(crate) fn mark_clean(&mut self) {
+    pub fn mark_clean(&mut self) {
         self.is_dirty = false;
     }
 
@@ -110,7 +110,7 @@ impl Tile {
 
     /// The evidence of a voxel that belongs to this tile.
     #[inline]
-    pub(crate) fn evidence_of_own(&self, voxel: VoxelIndex) -> Option<Evidence> {
+    pub fn evidence_of_own(&self, voxel: VoxelIndex) -> Option<Evidence> {
         self.table.get_key(VoxelKey::from_index(voxel))
     }
 

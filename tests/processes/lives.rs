@@ -1,3 +1,4 @@
+use crate::random::Random;
 use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting, voxtile};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,19 +8,6 @@ use std::time::{Duration, Instant};
 
 const SCANS: usize = 8;
 const ROUNDS: usize = 12;
-
-/// Numbers from a seed (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ z >> 31) % end
-    }
-}
 
 /// What a map may be by now: the number of scans in it, and of those in each snapshot.
 #[derive(Clone, Debug, Default)]

@@ -3,10 +3,14 @@
 //! The short form takes part in every test run. The long form:
 //!
 //! ```text
-//! VOXTILE_KILLS=1000 VOXTILE_READER_SECONDS=60 VOXTILE_LIVES_SECONDS=3600 cargo test --release --test processes
+//! VOXTILE_KILLS=1000 VOXTILE_LIMITS=1000 VOXTILE_READER_SECONDS=60 VOXTILE_LIVES_SECONDS=3600 \
+//!     cargo test --release --test processes
 //! ```
 #![cfg(unix)]
 
+/// Less and less room for addresses, until a process cannot even start.
+#[cfg(target_os = "linux")]
+mod addresses;
 /// Inputs that are added by one command, repeated until it succeeds.
 mod exactly_once;
 /// SIGKILL at random times, resumed until the end.
@@ -20,6 +24,7 @@ mod merged;
 /// The thread that writes octrees: one, asleep when idle, gone with its mapper.
 #[cfg(target_os = "linux")]
 mod octree_worker;
+mod random;
 /// Readers beside a writer see one flush whole.
 mod readers;
 /// A disk that is full or only for reading, and too many open files.

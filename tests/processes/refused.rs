@@ -1,4 +1,4 @@
-use crate::survey::{Scans, digest, folder_for_maps, is_whole};
+use crate::survey::{Scans, digest, folder_for_maps, is_whole, limited};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
@@ -100,10 +100,7 @@ fn too_many_open_files_lose_nothing() {
     let how = ["--resume", "--flush-every", "3"];
     for files in 4..12 {
         let build = scans.build(&map, &how);
-        let mut limited = Command::new("sh");
-        limited.args(["-c", "ulimit -n $0; exec \"$@\""]).arg(files.to_string());
-        limited.arg(build.get_program()).args(build.get_args());
-        let output = limited.stdout(Stdio::null()).output().unwrap();
+        let output = limited(&build, 'n', files).stdout(Stdio::null()).output().unwrap();
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(!message.contains("panicked"), "{message}");
         if map.join("metadata.json").exists() {

@@ -56,6 +56,16 @@ pub fn voxtile() -> Command {
     Command::new(env!("CARGO_BIN_EXE_voxtile"))
 }
 
+/// The same command, with a limit of the shell's (`ulimit`): files (`n`), KiB of addresses (`v`). What it aborts with stays
+/// short.
+pub fn limited(command: &Command, of: char, limit: u64) -> Command {
+    let mut limited = Command::new("sh");
+    limited.args(["-c", &format!("ulimit -c 0; ulimit -{of} $0 && exec \"$@\"")]).arg(limit.to_string());
+    limited.arg(command.get_program()).args(command.get_args());
+    limited.env("RUST_BACKTRACE", "0");
+    limited
+}
+
 /// Scan number and digest of a map, from a process of its own.
 pub fn digest(map: &Path) -> Result<(usize, String), String> {
     let output = voxtile().arg("digest").arg(map).arg("--json").output().unwrap();

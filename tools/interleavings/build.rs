@@ -4,12 +4,27 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 5] = [
+const SOURCES: [&str; 20] = [
     "tile/octree_statistics.rs",
     "tile/octree_worker.rs",
     "tile/shared_tree.rs",
     "tile/work_queue.rs",
+    "mapper/adoption.rs",
+    "mapper/cold_tiles.rs",
+    "mapper/flush.rs",
+    "mapper/look_ahead.rs",
+    "mapper/map_id.rs",
+    "mapper/pending.rs",
+    "mapper/residency.rs",
+    "mapper/resident_tiles.rs",
+    "mapper/room.rs",
     "mapper/side_worker.rs",
+    "mapper/stalls.rs",
+    "mapper/statistics.rs",
+    "mapper/tile_files.rs",
+    "mapper/tile_saver.rs",
+    "mapper/tile_traffic.rs",
+    "mapper/waiting.rs",
 ];
 
 fn main() {
@@ -20,6 +35,9 @@ fn main() {
         println!("cargo::rerun-if-changed={}", path.display());
         let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        // What is included cannot begin with a module's own documentation.
+        let code: String =
+            code.lines().filter(|line| !line.starts_with("//!")).flat_map(|line| [line, "\n"]).collect();
         let code = code.replace("std::sync", "shuttle::sync").replace("std::thread", "shuttle::thread");
         let name = path.file_name().expect("a source has a name");
         fs::write(Path::new(&out).join(name), code).expect("the folder can be written to");

@@ -7,13 +7,13 @@ use voxtile::share::{
 use voxtile::simulation::Random;
 use voxtile::space::{Grid, TileIndex, VoxelIndex};
 
-const EPOCH: u32 = 9;
+pub(super) const EPOCH: u32 = 9;
 
-fn grid() -> Grid {
+pub(super) fn grid() -> Grid {
     Grid::new(0.1, 10.0).unwrap()
 }
 
-fn config(seed: u64) -> ReceiverConfig {
+pub(super) fn config(seed: u64) -> ReceiverConfig {
     let mut config = ReceiverConfig::default();
     config.nonce_seed = seed;
     config
@@ -68,16 +68,17 @@ impl Hostile {
     fn packet(&mut self) -> Packet {
         let voxels = self.voxels();
         self.sequence += self.random.below(3);
-        match self.random.below(12) {
-            0..5 => {
+        // Whatever empties a layer is rare, so that layers fill up.
+        match self.random.below(60) {
+            0..44 => {
                 self.sequence += 1;
                 let is_in = self.random.chance(0.9);
                 let updates = voxels.into_iter().map(|voxel| Update { voxel, is_in }).collect();
                 Packet::Changes { header: self.header(), repaired: vec![], updates }
             }
-            5..8 => Packet::Content { header: self.header(), range: SetRange::ALL, voxels },
-            8..10 => Packet::Content { header: self.header(), range: self.range(), voxels: vec![] },
-            10 => {
+            44 => Packet::Content { header: self.header(), range: SetRange::ALL, voxels },
+            45..50 => Packet::Content { header: self.header(), range: self.range(), voxels: vec![] },
+            50..55 => {
                 let entry = |z| DigestEntry { last: TileIndex::new(50, 0, z), voxels: 1, digest: [1; 8] };
                 let first = TileIndex::new(i32::MIN, 0, 0);
                 Packet::Digests { header: self.header(), first, entries: (0..1000).map(entry).collect() }
@@ -91,17 +92,19 @@ impl Hostile {
 #[test]
 fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
     const MEMORY: usize = Receivers::<u8>::LEAST_BYTES;
-    for seed in 0..3 {
+    for seed in 0..2 {
         let mut receivers = Receivers::new(MEMORY).unwrap();
+        // But for what a packet may take.
+        let all = receivers.free_bytes();
         (0..3).for_each(|robot| receivers.insert(robot, config(seed + u64::from(robot)), None));
         let mut honest = Sender::new(grid(), 1, SenderConfig::default()).unwrap();
         let mut hostile = [1, 2]
             .map(|robot: u8| (robot, Hostile { random: Random::of(seed, &[robot.into()]), sequence: 1 }));
         let (mut now, mut fullest) = (Duration::ZERO, 0);
         let mut random = Random::of(seed, &[]);
-        for step in 0..200 {
+        for step in 0..130 {
             now += Duration::from_millis(100);
-            if step < 150 {
+            if step < 80 {
                 (0..200).for_each(|_| {
                     honest.put(std::array::from_fn(|_| random.below(400) as i32), true);
                 });
@@ -128,8 +131,7 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
                 }
             }
         }
-        // Not next to nothing.
-        assert!(fullest > MEMORY / 8, "{fullest} bytes at most");
+        assert!(fullest >= all / 10 * 9, "{fullest} of {all} bytes at most");
         let receiver = receivers.get(&0).unwrap();
         assert!(receiver.memory_bytes() <= receivers.part_bytes() && !receiver.is_over_limit());
         assert!(receiver.is_converged(), "{:?}", receiver.counts());

@@ -2,6 +2,8 @@
 
 /// Bytes of packets against plain ones, and hostile ones.
 mod codec;
+/// Memory that hostile robots fill, counted and measured.
+mod full_memory;
 /// Folding, unions, watches.
 mod layers;
 pub mod lossy_link;

@@ -1,13 +1,12 @@
 use super::effort::CompactEffort;
 use super::numbers::put_number;
 use std::io;
-use zstd::bulk::Compressor;
-use zstd::zstd_safe::compress_bound;
+use zstd::zstd_safe::{CCtx, CParameter, compress_bound, get_error_name};
 
 /// Packs columns.
 pub(super) struct Packer {
     /// One a level.
-    zstd: Vec<Compressor<'static>>,
+    zstd: Vec<CCtx<'static>>,
     /// The smallest form of a column so far, and another.
     packed: [Vec<u8>; 2],
 }
@@ -50,7 +49,7 @@ impl Packer {
             if other.len() < bound {
                 other.resize(bound, 0);
             }
-            let length = zstd.compress_to_buffer(column, &mut other[..bound])?;
+            let length = zstd.compress2(&mut other[..bound], column).map_err(refused)?;
             if length < least {
                 least = length;
                 std::mem::swap(best, other);
@@ -61,10 +60,21 @@ impl Packer {
 }
 
 /// A compressor that writes nothing that is known anyway.
-fn compressor(level: i32) -> io::Result<Compressor<'static>> {
-    let mut zstd = Compressor::new(level)?;
-    zstd.include_checksum(false)?;
-    zstd.include_contentsize(false)?;
-    zstd.include_dictid(false)?;
+fn compressor(level: i32) -> io::Result<CCtx<'static>> {
+    // `zstd::bulk` would panic.
+    let mut zstd = CCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
+    for parameter in [
+        CParameter::CompressionLevel(level),
+        CParameter::ChecksumFlag(false),
+        CParameter::ContentSizeFlag(false),
+        CParameter::DictIdFlag(false),
+    ] {
+        zstd.set_parameter(parameter).map_err(refused)?;
+    }
     Ok(zstd)
+}
+
+/// What zstd says, of which a lack of memory is the likeliest.
+fn refused(code: usize) -> io::Error {
+    io::Error::other(get_error_name(code))
 }

@@ -1,11 +1,11 @@
 use super::input::Input;
 use crate::error::{DecodeError, FormatError};
 use std::io::{self, Read};
-use zstd::bulk::Decompressor;
+use zstd::zstd_safe::{DCtx, get_error_name};
 
 /// Unpacks what a [`Packer`](super::packer::Packer) packed.
 pub(super) struct Unpacker {
-    zstd: Decompressor<'static>,
+    zstd: DCtx<'static>,
     packed: Vec<u8>,
 }
 
@@ -20,7 +20,9 @@ pub(super) struct Column<'a> {
 
 impl Unpacker {
     pub(super) fn new() -> io::Result<Self> {
-        Ok(Self { zstd: Decompressor::new()?, packed: Vec::new() })
+        // `zstd::bulk` would panic.
+        let zstd = DCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
+        Ok(Self { zstd, packed: Vec::new() })
     }
 
     /// Reads columns; none takes more memory than it may have bytes.
@@ -55,12 +57,12 @@ impl Unpacker {
         let offset = input.offset;
         self.packed.resize(packed_length, 0);
         input.read(&mut self.packed)?;
-        let unpacked = self.zstd.decompress_to_buffer(&self.packed, &mut column.bytes[..]);
+        let unpacked = self.zstd.decompress(&mut column.bytes[..], &self.packed);
         let wrong = |reason| Err(FormatError::at_offset(offset, format!("{}: {reason}", column.name)).into());
         match unpacked {
             Ok(length) if length == column.bytes.len() => Ok(()),
             Ok(length) => wrong(format!("{length} bytes where {} are announced", column.bytes.len())),
-            Err(error) => wrong(format!("cannot be unpacked: {error}")),
+            Err(code) => wrong(format!("cannot be unpacked: {}", get_error_name(code))),
         }
     }
 }

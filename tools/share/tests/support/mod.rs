@@ -1,6 +1,7 @@
 //! Real processes, and what they say.
 #![allow(dead_code)]
 
+use serde_json::Value;
 use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -68,7 +69,7 @@ pub fn publisher(robot: &str, scans: &Path, endpoint: &str) -> Process {
 pub fn set_of(publisher: &mut Process) -> (u64, String) {
     let mut line = String::new();
     BufReader::new(publisher.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
-    let line: serde_json::Value = serde_json::from_str(&line).unwrap();
+    let line: Value = serde_json::from_str(&line).unwrap();
     (line["voxels"].as_u64().unwrap(), line["digest"].as_str().unwrap().to_string())
 }
 
@@ -91,15 +92,21 @@ pub fn layers_of(subscriber: &mut Process) -> Vec<Layer> {
 
 /// Each layer of a subscriber, and whether it ends well.
 pub fn layers_and_success(subscriber: &mut Process) -> (Vec<Layer>, bool) {
+    let (summaries, is_success) = summaries_and_success(subscriber);
+    let layer = |summary: &Value| {
+        let text = |key: &str| summary[key].as_str().unwrap().to_string();
+        let (voxels, is_equal) = (&summary["voxels"], &summary["is_equal"]);
+        (text("robot"), voxels.as_u64().unwrap(), text("digest"), is_equal.as_bool().unwrap())
+    };
+    (summaries.iter().map(layer).collect(), is_success)
+}
+
+/// All that a subscriber says of each layer in the end, and whether it ends well.
+pub fn summaries_and_success(subscriber: &mut Process) -> (Vec<Value>, bool) {
     let mut out = String::new();
     subscriber.0.stdout.as_mut().unwrap().read_to_string(&mut out).unwrap();
     let is_success = subscriber.0.wait().unwrap().success();
-    let layer = |line: &str| {
-        let line: serde_json::Value = serde_json::from_str(line).unwrap();
-        let text = |key: &str| line[key].as_str().unwrap().to_string();
-        (text("robot"), line["voxels"].as_u64().unwrap(), text("digest"), line["is_equal"].as_bool().unwrap())
-    };
-    (out.lines().map(layer).collect(), is_success)
+    (out.lines().map(|line| serde_json::from_str(line).unwrap()).collect(), is_success)
 }
 
 pub fn run(args: &[&str]) -> Output {
