@@ -23,8 +23,8 @@ pub use grid::{Grid, GridError, LAST_VOXEL_INDEX, MAX_VOXELS_PER_TILE_EDGE};
 pub use key::VoxelKey;
 pub use morton::MortonCode;
 pub use tile_index::TileIndex;
-pub use tile_table::{TileTable, TileValue};
-pub(crate) use tile_table::{put_number, take_number, take_u32};
+pub(crate) use tile_table::take_u32;
+pub use tile_table::{TileTable, TileValue, put_number, take_number};
 pub use torus::Torus;
 
 /// Index of a finest voxel along x, y and z: `floor(coordinate / resolution)`.

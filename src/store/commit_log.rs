@@ -125,7 +125,7 @@ impl Commits {
         loop {
             match Next::read(input, bytes, file_bytes)? {
                 Next::Record(record, record_bytes) => {
-                    self.take(record, bytes)?;
+                    self.take(*record, bytes)?;
                     bytes += record_bytes;
                 }
                 Next::Torn(error) => {

@@ -34,7 +34,7 @@ pub(super) struct Record {
 /// What stands where a record may begin.
 pub(super) enum Next {
     /// A record and its length in bytes.
-    Record(Record, u64),
+    Record(Box<Record>, u64),
     End,
     /// Something that is no whole record, with nothing behind it.
     Torn(FormatError),
@@ -144,7 +144,7 @@ impl Next {
         }
         let (stamp, input) = payload.skip_rest()?;
         if read_u32(input)? == stamp.crc {
-            return Ok(Self::Record(record?, record_bytes));
+            return Ok(Self::Record(Box::new(record?), record_bytes));
         }
         let error = wrong("the record does not match its checksum");
         // A crash tears only the last record: its length can come to disk before its content.

@@ -40,7 +40,9 @@ mod sensor {
 }
 
 mod space {
-    pub(crate) use voxtile::space::{Grid, MortonCode, TileIndex, VoxelIndex};
+    pub(crate) use voxtile::space::{
+        Grid, MortonCode, TileIndex, TileTable, TileValue, VoxelIndex, put_number, take_number,
+    };
 }
 
 mod store {
