@@ -33,6 +33,9 @@ pub struct PointRoom {
 const RECORD_BYTES: usize = 28;
 /// Points that are read at a time.
 const POINTS_AT_A_TIME: usize = 1 << 14;
+/// Points in memory that are handed over at a time. Who takes them makes a copy of them in the world frame, of 6 MiB; and what
+/// rays spare each other is found in one chunk, which should be a whole scan of most sensors.
+const POINTS_HANDED_OVER: usize = 1 << 18;
 
 impl Default for PointRoom {
     fn default() -> Self {
@@ -174,9 +177,8 @@ impl PointStore {
             }
             next += count;
         }
-        // Some at a time here, too: who takes them may make something larger of each.
-        for first in in_memory.clone().step_by(POINTS_AT_A_TIME) {
-            let some = first..in_memory.end.min(first + POINTS_AT_A_TIME);
+        for first in in_memory.clone().step_by(POINTS_HANDED_OVER) {
+            let some = first..in_memory.end.min(first + POINTS_HANDED_OVER);
             let intensities = self.intensities.as_ref().map(|intensities| &intensities[some.clone()]);
             if !take(&self.points[some], intensities) {
                 return Ok(());

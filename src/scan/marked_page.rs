@@ -124,9 +124,7 @@ impl Marks {
     fn mark(&mut self, x: u32, y: u32, z: u32) {
         match self {
             Self::Columns(columns) => columns.mark(x, y, z),
-            Self::Bricks(bricks) => {
-                mark(bricks, part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z))
-            }
+            Self::Bricks(bricks) => mark_small(bricks, [x, y, z]),
         }
     }
 
@@ -178,6 +176,23 @@ fn local_of(place: usize) -> Local {
 fn place_of_brick(x: usize, y: usize, z: usize) -> usize {
     let [x, y, z] = [x, y, z].map(|k| 8 * k as u32);
     (part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z)) as usize / BRICK_VOXELS
+}
+
+// Not a part of the code that goes along rays: where memory suffices, every instruction there counts.
+#[cold]
+#[inline(never)]
+fn mark_small(bricks: &mut SparsePage<BrickMask>, [x, y, z]: Local) {
+    mark(bricks, part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z));
+}
+
+#[cold]
+#[inline(never)]
+fn pass_small<const A: usize, const B: usize, const C: usize>(
+    bricks: &mut SparsePage<BrickMask>,
+    stretch: &Stretch,
+    a: u32,
+) -> u32 {
+    stretch.pass::<A, B, C, _>(bricks, a)
 }
 
 #[inline]
@@ -293,7 +308,7 @@ impl Footprint for MarkedPage {
     ) -> u32 {
         match &mut self.passed {
             Marks::Columns(columns) => stretch.pass::<A, B, C, _>(columns, a),
-            Marks::Bricks(bricks) => stretch.pass::<A, B, C, _>(&mut **bricks, a),
+            Marks::Bricks(bricks) => pass_small::<A, B, C>(bricks, stretch, a),
         }
     }
 }
