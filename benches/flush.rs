@@ -1,13 +1,10 @@
 //! What does durability cost: how long does a flush take, and how much of it is waiting for the medium?
 
-#[path = "../tests/all/support/unsynced_disk.rs"]
-mod unsynced_disk;
-
 use criterion::{BatchSize, Criterion, SamplingMode, criterion_group, criterion_main};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use unsynced_disk::UnsyncedDisk;
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::Survey;
 use voxtile::store::{Disk, FsDisk};
 use voxtile::{MapConfig, MapView, Mapper, OutOfCoreTileMapper, Scan};

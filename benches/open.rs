@@ -1,12 +1,9 @@
 //! What does it cost to open a map of 100 000 tiles: how long does it take, and how much memory does a tile occupy?
 
-#[path = "../tests/all/support/unsynced_disk.rs"]
-mod unsynced_disk;
-
 use criterion::{BatchSize, Criterion, SamplingMode, criterion_group, criterion_main};
 use std::path::Path;
 use std::time::{Duration, Instant};
-use unsynced_disk::UnsyncedDisk;
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::scan::PointBatch;
 use voxtile::space::Point;
 use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper};

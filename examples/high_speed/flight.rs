@@ -1,8 +1,8 @@
 use super::PlannersMap;
 use super::forest::{Forest, GOAL, START};
-use super::planner::{distance_m, plan};
 use std::fmt;
 use std::time::Instant;
+use testkit::planner::{distance_m, plan};
 use voxtile::Result;
 use voxtile::local::{LocalView, Obstacle};
 use voxtile::space::Point;

@@ -11,7 +11,6 @@
 mod flight;
 mod forest;
 mod picture;
-mod planner;
 mod window;
 
 use flight::{Flight, fly};

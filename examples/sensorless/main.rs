@@ -10,12 +10,7 @@
 //! 3 m/s, not of drones, and they do not avoid each other: what it shows is that a shared map is enough to plan by.
 
 mod forest;
-#[path = "../../tests/all/sharing/lossy_link.rs"]
-#[allow(dead_code)]
-mod lossy_link;
 mod picture;
-#[path = "../high_speed/planner.rs"]
-mod planner;
 mod robots;
 
 use forest::Forest;

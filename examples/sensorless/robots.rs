@@ -1,8 +1,8 @@
 use crate::forest::{Forest, LENGTH_M};
-use crate::lossy_link::LossyLink;
-use crate::planner::{distance_m, is_free, plan};
 use crate::{RESOLUTION_M, STEP};
 use std::time::{Duration, Instant};
+use testkit::lossy_link::LossyLink;
+use testkit::planner::{distance_m, is_free, plan};
 use voxtile::local::{LocalMap, LocalParameters};
 use voxtile::share::{MapWatch, Receiver, ReceiverConfig, Sender, SenderConfig, VoxelSet};
 use voxtile::space::{Grid, Point};

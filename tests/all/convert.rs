@@ -1,7 +1,7 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use crate::support::random_scans::{Random, random_scan};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::session::{Part, convert, crop};
 use voxtile::space::Aabb;

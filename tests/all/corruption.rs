@@ -1,8 +1,8 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use crate::support::random_scans::{Random, random_scan};
 use crate::support::some_of;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
 use voxtile::space::TileIndex;
 use voxtile::store::{TileFile, tile_of_folder};
 use voxtile::upkeep::{Finding, Repair, Severity, Verification, repair_on, verify_on};

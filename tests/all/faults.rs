@@ -1,7 +1,7 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use crate::support::random_scans::{Random, random_scan};
 use crate::support::some_of;
 use std::path::PathBuf;
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
 use voxtile::{
     Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions,
     Result, Scan, Storage,

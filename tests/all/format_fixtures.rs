@@ -3,13 +3,13 @@
 //! `tests/data/files_1` is never written again. What a later version writes otherwise gets a folder of its own:
 //! `VOXTILE_NEW_FIXTURES=tests/data/files_2 cargo test --test all -- --ignored fixtures_of_this_version`.
 
-use crate::support::random_scans::{Random, random_scan};
 use serde_json::{Value, json};
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
 use voxtile::io::{ScanStreamWriter, open_scans};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::session::{Decay, Part, clear, decay};

@@ -1,8 +1,8 @@
 //! A limit in bytes: the layers between the tiles in use and the disk.
 
-use crate::support::unsynced_disk::UnsyncedDisk;
 use std::time::Duration;
 use tempfile::TempDir;
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::Survey;
 use voxtile::{InMemoryMapper, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan};
 

@@ -1,9 +1,9 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
 use crate::support::some_of;
 use std::collections::BTreeMap;
 use std::path::Path;
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use voxtile::session::{delete_snapshot_on, revert_on, snapshot_on, snapshots_on};
 use voxtile::space::TileIndex;
 use voxtile::store::{SnapshotName, TileStore, tile_of_folder};

@@ -1,7 +1,7 @@
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
-use crate::support::unsynced_disk::UnsyncedDisk;
 use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{InsertMode, MapConfig, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Questions, Storage};
 

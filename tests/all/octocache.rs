@@ -1,7 +1,7 @@
 //! What the OctoCache paper says of update order.
 
-use crate::support::random_scans::Random;
 use std::collections::BTreeSet;
+use testkit::random_scans::Random;
 use voxtile::space::MortonCode;
 
 /// A leaf of a small octree: its child numbers from the root down.

@@ -1,6 +1,6 @@
 //! OctoMap's `.bt` and `.ot` files: real maps, bytes written by hand, and bytes that are no map.
 
-use crate::support::shared_data;
+use crate::support::{fixtures, shared_data};
 use proptest::prelude::*;
 use std::path::PathBuf;
 use voxtile::DecodeError;
@@ -41,12 +41,13 @@ fn refusal(bytes: &[u8]) -> (u64, String) {
     }
 }
 
-fn real_maps() -> Vec<PathBuf> {
-    let Some(folder) = shared_data("octomap_maps") else { return Vec::new() };
+/// Maps that OctoMap wrote: small ones of our own (`tools/octomap_oracle/fixtures.cpp`), and large ones of others where they are.
+fn maps_of_octomap() -> Vec<PathBuf> {
     let is_map =
         |path: &PathBuf| path.extension().is_some_and(|extension| extension == "bt" || extension == "ot");
-    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    files.filter(is_map).collect()
+    let folders = [Some(fixtures("octomap_1")), shared_data("octomap_maps")];
+    let files = folders.into_iter().flatten().flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    files.map(|entry| entry.unwrap().path()).filter(is_map).collect()
 }
 
 /// The finest voxel of a key near the middle of OctoMap's range, and its value.
@@ -55,8 +56,8 @@ fn voxel(x: u16, y: u16, z: u16, value: f32) -> (MortonCode, f32) {
 }
 
 #[test]
-fn real_maps_are_read_to_the_last_node_and_written_back_to_the_byte() {
-    for path in real_maps() {
+fn maps_of_octomap_are_read_to_the_last_node_and_written_back_to_the_byte() {
+    for path in maps_of_octomap() {
         let bytes = std::fs::read(&path).unwrap();
         let mut rest = bytes.as_slice();
         let file = read(&mut rest).unwrap();
@@ -72,8 +73,8 @@ fn real_maps_are_read_to_the_last_node_and_written_back_to_the_byte() {
 }
 
 #[test]
-fn a_table_of_a_real_map_writes_the_bytes_of_its_tree() {
-    for path in real_maps() {
+fn a_table_of_a_map_of_octomap_writes_the_bytes_of_its_tree() {
+    for path in maps_of_octomap() {
         let file = read(std::fs::read(&path).unwrap().as_slice()).unwrap();
         if file.tree.expanded_leaf_count() > 20_000_000 {
             continue;
@@ -97,8 +98,8 @@ fn a_table_of_a_real_map_writes_the_bytes_of_its_tree() {
 }
 
 #[test]
-fn real_maps_are_normal_trees_that_grow_again_from_their_leaves() {
-    for path in real_maps() {
+fn maps_of_octomap_are_normal_trees_that_grow_again_from_their_leaves() {
+    for path in maps_of_octomap() {
         let bytes = std::fs::read(&path).unwrap();
         let tree = read(bytes.as_slice()).unwrap().tree;
         let mut normal = tree.clone();
@@ -115,7 +116,7 @@ fn real_maps_are_normal_trees_that_grow_again_from_their_leaves() {
 
 #[test]
 fn geb079_has_the_numbers_that_octomap_counts() {
-    let Some(path) = real_maps().into_iter().find(|path| path.ends_with("geb079.bt")) else { return };
+    let Some(path) = shared_data("octomap_maps").map(|folder| folder.join("geb079.bt")) else { return };
     let file = read_bt(std::fs::read(path).unwrap().as_slice()).unwrap();
     assert_eq!((file.tree.node_count(), file.tree.leaf_count()), (532_566, 428_144));
     assert_eq!(file.tree.count_voxels(0.0).occupied, 185_673);

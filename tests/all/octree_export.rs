@@ -1,7 +1,7 @@
-use crate::support::random_scans::{Random, random_scan};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
 use voxtile::mapper::{MapView, OutOfCoreTileMapper};
 use voxtile::octree::{
     BrickValues, BtPruning, Octree, OctreeFormat, OctreeStream, StreamOutcome, write_bt, write_ot,

@@ -1,9 +1,9 @@
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::voxels_of;
-use crate::support::unsynced_disk::UnsyncedDisk;
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::voxels_of;
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::query::{RayQuery, Shape, UnknownAs};
 use voxtile::scan::{PointBatch, RayWalk};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};

@@ -1,8 +1,8 @@
-use crate::support::random_scans::Random;
-use crate::support::shared_data;
+use crate::support::{fixtures, shared_data};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use testkit::random_scans::Random;
 use voxtile::io::{SensorScan, open_scans, parse_poses, read_pcd, read_poses};
 
 const HEADER: &str =
@@ -225,13 +225,14 @@ fn a_matrix_that_is_a_rotation_to_a_few_digits_gives_a_pose_that_does_not_scale(
 }
 
 #[test]
-fn the_real_sets_have_the_scans_and_points_that_their_notes_say() {
-    for (name, scans, points) in [
-        ("fastlio_hku_1", 314, 1_603_961),
-        ("mulran_riverside02_a", 75, 996_768),
-        ("balm_os0_hall", 36, 2_727_114),
+fn folders_of_other_programs_have_the_scans_and_points_that_their_notes_say() {
+    for (name, folder, scans, points) in [
+        ("scans_1", Some(fixtures("scans_1")), 6, 1800),
+        ("fastlio_hku_1", shared_data("fastlio_hku_1"), 314, 1_603_961),
+        ("mulran_riverside02_a", shared_data("mulran_riverside02_a"), 75, 996_768),
+        ("balm_os0_hall", shared_data("balm_os0_hall"), 36, 2_727_114),
     ] {
-        let Some(folder) = shared_data(name) else { continue };
+        let Some(folder) = folder else { continue };
         let read = all_scans(&folder);
         assert_eq!(read.len(), scans, "{name}");
         assert_eq!(read.iter().map(|scan| scan.points_in_sensor.len()).sum::<usize>(), points, "{name}");
@@ -245,10 +246,12 @@ fn the_real_sets_have_the_scans_and_points_that_their_notes_say() {
 }
 
 #[test]
-fn the_real_scan_graph_is_read_to_its_end() {
+fn scan_graphs_of_octomap_are_read_to_their_ends() {
+    let counts =
+        |path: PathBuf| all_scans(&path).iter().map(|scan| scan.points_in_sensor.len()).collect::<Vec<_>>();
+    assert_eq!(counts(fixtures("octomap_1").join("three_scans.graph")), [150; 3]);
     let Some(folder) = shared_data("octomap_maps") else { return };
-    let scans = all_scans(&folder.join("spherical_scan.graph"));
-    assert_eq!(scans.iter().map(|scan| scan.points_in_sensor.len()).collect::<Vec<_>>(), [10_201]);
+    assert_eq!(counts(folder.join("spherical_scan.graph")), [10_201]);
 }
 
 /// A graph of two scans, as OctoMap writes it.

@@ -1,6 +1,6 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use crate::support::random_scans::{Random, random_scan};
 use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
 use voxtile::session::{delete_snapshot_on, revert_on, snapshots_on};
 use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
 use voxtile::upkeep::{Severity, repair_on, verify_on};

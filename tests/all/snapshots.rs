@@ -1,12 +1,12 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk};
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::{ReferenceMap, Voxels, voxels_of};
-use crate::support::unsynced_disk::UnsyncedDisk;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
+use testkit::faulty_disk::{Fault, FaultyDisk};
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::session::{
     Diff, TileChange, TileDiff, delete_snapshot_on, diff, revert_on, snapshot_on, snapshots_on,
 };

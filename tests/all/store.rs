@@ -1,9 +1,9 @@
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::voxels_of;
-use crate::support::unsynced_disk::UnsyncedDisk;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::voxels_of;
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::{City, Drive, Lidar, Survey};
 use voxtile::space::TileIndex;
 use voxtile::upkeep::verify;

@@ -1,7 +1,7 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk};
-use crate::support::random_scans::{Random, random_scan};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk};
+use testkit::random_scans::{Random, random_scan};
 use voxtile::session::delete_snapshot_on;
 use voxtile::store::SnapshotName;
 use voxtile::upkeep::{Severity, repair_on, verify_on};

@@ -1,8 +1,8 @@
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::{ReferenceMap, voxels_of};
-use crate::support::unsynced_disk::UnsyncedDisk;
 use std::collections::{BTreeMap, BTreeSet};
 use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::{ReferenceMap, voxels_of};
+use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;

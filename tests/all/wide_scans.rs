@@ -1,8 +1,8 @@
 //! Scans whose updates alone are more than the memory that there is.
 
-use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use crate::support::random_scans::{Random, random_scan};
 use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper,

@@ -1,8 +1,8 @@
 mod edit;
 mod snapshot;
 
-use crate::byte_size::ByteSize;
 use crate::flush_schedule::FlushEvery;
+use bytesize::ByteSize;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};

@@ -73,7 +73,7 @@ fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig
         .with_octree(octree_config(&args.octree)?);
     config = match (args.cache_tiles, args.memory) {
         (Some(tiles), _) => config.with_cache_tiles(tiles),
-        (None, Some(memory)) => config.with_memory_bytes(memory.bytes()),
+        (None, Some(memory)) => config.with_memory_bytes(memory.as_u64() as usize),
         (None, None) => {
             let least = MemoryLimit::least_bytes(&config.grid);
             config.with_memory_bytes(least.max(DEFAULT_MEMORY_BYTES))

@@ -161,7 +161,7 @@ impl<'a> Export<'a> {
     fn octree(&self, format: OctreeFormat, reader: &MapReader) -> anyhow::Result<Exported> {
         let grid = reader.config().grid;
         let origin = self.origin(None, &grid, || None)?;
-        let (region, memory_bytes) = (self.region.as_ref(), self.args.memory.bytes());
+        let (region, memory_bytes) = (self.region.as_ref(), self.args.memory.as_u64() as usize);
         let export = OctreeExport { format, region, origin: origin.voxel, memory_bytes };
         let mut spool = scratch_for(&self.args.output)?;
         let voxels =

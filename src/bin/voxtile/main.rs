@@ -3,7 +3,6 @@
 mod args;
 mod build;
 mod build_config;
-mod byte_size;
 mod clear;
 mod convert;
 mod crop;

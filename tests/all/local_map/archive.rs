@@ -1,7 +1,7 @@
 use super::{assert_equal, at_once, crowded_scan, scan};
-use crate::support::random_scans::Random;
-use crate::support::reference_local::ReferenceLocal;
 use std::collections::BTreeSet;
+use testkit::random_scans::Random;
+use testkit::reference_local::ReferenceLocal;
 use voxtile::local::{LocalAnswer, LocalMap, LocalParameters, LocalState, WithLocalMap};
 use voxtile::space::VoxelIndex;
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Questions};

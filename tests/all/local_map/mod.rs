@@ -6,8 +6,8 @@ mod questions;
 mod random_lives;
 mod readers;
 
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_local::{ReferenceLocal, states_of};
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_local::{ReferenceLocal, states_of};
 use voxtile::Scan;
 use voxtile::local::{LocalMap, LocalParameters};
 use voxtile::space::Point;

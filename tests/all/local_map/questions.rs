@@ -1,7 +1,7 @@
 use super::{at_once, crowded_scan};
-use crate::support::random_scans::Random;
-use crate::support::reference_local::states_of;
 use std::collections::{BTreeMap, BTreeSet};
+use testkit::random_scans::Random;
+use testkit::reference_local::states_of;
 use voxtile::local::{LocalMap, LocalParameters, LocalState, Obstacle};
 use voxtile::query::Shape;
 use voxtile::scan::RayWalk;

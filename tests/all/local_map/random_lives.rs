@@ -1,8 +1,8 @@
 use super::{assert_equal, at_once, crowded_scan};
-use crate::support::random_scans::Random;
-use crate::support::reference_local::{ReferenceLocal, states_of};
-use crate::support::shared_data;
+use crate::support::{fixtures, shared_data};
 use std::collections::BTreeSet;
+use testkit::random_scans::Random;
+use testkit::reference_local::{ReferenceLocal, states_of};
 use voxtile::Scan;
 use voxtile::io::open_scans;
 use voxtile::local::{LocalMap, LocalParameters};
@@ -154,19 +154,19 @@ fn while_the_radius_changes_every_voxel_has_the_old_one_or_the_new_one() {
 
 #[test]
 fn real_scans_give_the_naive_map() {
-    for folder in ["fastlio_hku_1", "mulran_riverside02_a", "balm_os0_hall"] {
-        let Some(path) = shared_data(folder) else { continue };
+    let recorded = ["fastlio_hku_1", "mulran_riverside02_a", "balm_os0_hall"].map(shared_data);
+    for folder in recorded.into_iter().flatten().chain([fixtures("scans_1")]) {
         let parameters = at_once(LocalParameters::local_mapping().with_max_voxels(4000));
         let mut map = LocalMap::new(0.1, parameters).unwrap();
         let mut naive = ReferenceLocal::new(0.1, parameters);
-        let mut source = open_scans(&path, None).unwrap();
+        let mut source = open_scans(&folder, None).unwrap();
         for number in 0..6 {
             let mut scan = source.next_scan().unwrap().unwrap().into_scan();
             let every = scan.points.len() / 1500;
             scan.points = scan.points.into_iter().step_by(every.max(1)).collect();
             map.insert_scan(&scan).unwrap();
             naive.insert_scan(&scan);
-            assert_equal(&map, &naive, &format!("after scan {number} of {folder}"));
+            assert_equal(&map, &naive, &format!("after scan {number} of {}", folder.display()));
         }
     }
 }

@@ -1,8 +1,8 @@
 use super::{at_once, crowded_scan};
-use crate::support::random_scans::Random;
-use crate::support::reference_local::states_of;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
+use testkit::random_scans::Random;
+use testkit::reference_local::states_of;
 use voxtile::local::{LocalMap, LocalParameters, LocalState};
 
 #[test]

@@ -1,6 +1,6 @@
 use super::random_maps::{config, disk, open, path, random_voxels, read_map, write_map};
-use crate::support::random_scans::Random;
-use crate::support::reference_map::Voxels;
+use testkit::random_scans::Random;
+use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
 use voxtile::session::{Part, Prefer, clear_on, crop, merge};
 use voxtile::space::Aabb;

@@ -1,7 +1,7 @@
 use super::random_maps::{config, disk, path, random_voxels, read_map, write_map};
-use crate::support::faulty_disk::FaultyDisk;
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_map::{Voxels, voxels_of};
+use testkit::faulty_disk::FaultyDisk;
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::{Voxels, voxels_of};
 use voxtile::sensor::Evidence;
 use voxtile::session::{Decay, Decayed, decay_on, revert_on, snapshot_on};
 use voxtile::store::SnapshotName;

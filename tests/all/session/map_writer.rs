@@ -1,6 +1,6 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use crate::support::random_scans::{Random, random_scan};
 use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
 use voxtile::session::{MapWriter, WrittenMap};
 use voxtile::space::TileIndex;
 use voxtile::tile::Table;

@@ -1,8 +1,8 @@
 use super::random_maps::{config, disk, open, path, random_voxels, read_map, write_map};
-use crate::support::faulty_disk::FaultyDisk;
-use crate::support::random_scans::Random;
-use crate::support::reference_map::Voxels;
 use std::path::PathBuf;
+use testkit::faulty_disk::FaultyDisk;
+use testkit::random_scans::Random;
+use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::session::{Merged, Prefer};

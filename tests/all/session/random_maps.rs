@@ -1,8 +1,8 @@
-use crate::support::faulty_disk::{Fault, FaultyDisk};
-use crate::support::random_scans::Random;
-use crate::support::reference_map::{Voxels, voxels_of};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk};
+use testkit::random_scans::Random;
+use testkit::reference_map::{Voxels, voxels_of};
 use voxtile::sensor::{Evidence, Iwlo, SensorModel};
 use voxtile::session::MapWriter;
 use voxtile::space::VoxelKey;

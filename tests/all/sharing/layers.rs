@@ -1,7 +1,7 @@
-use crate::support::random_scans::{Random, random_scan};
-use crate::support::reference_local::states_of;
 use std::collections::BTreeSet;
 use std::time::Duration;
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_local::states_of;
 use voxtile::local::{LocalMap, LocalParameters, LocalState};
 use voxtile::query::UnknownAs;
 use voxtile::share::{

@@ -6,7 +6,6 @@ mod codec;
 mod full_memory;
 /// Folding, unions, watches.
 mod layers;
-pub mod lossy_link;
 /// Receivers under one limit of memory, and the work a packet makes.
 mod memory;
 /// Random lives of a sender and receivers over a bad link: equal sets at the end.

@@ -1,6 +1,6 @@
-use super::lossy_link::LossyLink;
 use std::collections::BTreeSet;
 use std::time::Duration;
+use testkit::lossy_link::LossyLink;
 use voxtile::share::{ExportPolicy, Receiver, ReceiverConfig, Sender, SenderConfig};
 use voxtile::simulation::Random;
 use voxtile::space::{Grid, VoxelIndex};

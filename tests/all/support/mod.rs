@@ -1,11 +1,5 @@
 //! What several subjects share.
 
-pub mod faulty_disk;
-pub mod random_scans;
-pub mod reference_local;
-pub mod reference_map;
-pub mod unsynced_disk;
-
 use std::path::{Path, PathBuf};
 
 /// One in so many of the moments at which something may go wrong, spread without a pattern; all of them where the environment
@@ -17,6 +11,11 @@ pub fn some_of<T>(moments: impl IntoIterator<Item = T>, one_in: u64) -> impl Ite
     let is_taken =
         move |number: u64| (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40).is_multiple_of(one_in);
     (0..).zip(moments).filter(move |(number, _)| is_taken(*number)).map(|(_, moment)| moment)
+}
+
+/// A folder of small files that are in the repository.
+pub fn fixtures(folder: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(folder)
 }
 
 /// A folder of the data that is too large for the repository: under `$VOXTILE_DATA`, by default `../shared/data`

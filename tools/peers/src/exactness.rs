@@ -1,15 +1,11 @@
-#[expect(dead_code, reason = "the tests of the mapper use all of it")]
-#[path = "../../../tests/all/support/reference_map.rs"]
-mod reference_map;
-
 use crate::contenders::{Contenders, Counting, Job};
 use crate::table::Row;
 use crate::workloads::{Files, Workload};
 use anyhow::{Context, Result};
 use peers::{VoxelRecord, read_voxels};
-use reference_map::{ReferenceMap, Voxels};
 use std::fs::File;
 use std::io::BufReader;
+use testkit::reference_map::{ReferenceMap, Voxels};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{InsertMode, MapConfig};
 use workload::ScanReader;

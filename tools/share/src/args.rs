@@ -1,5 +1,5 @@
-use crate::byte_size::ByteSize;
 use crate::robot_name::RobotName;
+use bytesize::ByteSize;
 use clap::{ArgGroup, Parser};
 use std::path::PathBuf;
 use std::time::Duration;

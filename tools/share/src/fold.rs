@@ -6,7 +6,7 @@ use voxtile::share::fold_layer;
 
 pub fn run(args: &Args, layer: &Path, map: &Path) -> anyhow::Result<()> {
     let layer = load_layer(layer, args.max_voxels)?;
-    let mut mapper = open_map(map, layer.grid(), args.memory.bytes())?;
+    let mut mapper = open_map(map, layer.grid(), args.memory.as_u64() as usize)?;
     let report = fold_layer(&layer, &mut mapper)?;
     mapper.flush()?;
     if args.json {

@@ -3,18 +3,11 @@
 //! All that is clever is in [`voxtile::share`]; here are the transport, the clock and the files.
 
 mod args;
-/// That of the command `voxtile`.
-#[path = "../../../src/bin/voxtile/byte_size.rs"]
-mod byte_size;
 mod files;
 mod fold;
 mod inbox;
 mod layer_store;
 mod link;
-/// That of the library's tests.
-#[path = "../../../tests/all/sharing/lossy_link.rs"]
-#[allow(dead_code, missing_docs)]
-mod lossy_link;
 mod measure;
 mod network_file;
 mod publish;

@@ -1,9 +1,9 @@
 use crate::args::{Args, seconds};
-use crate::lossy_link::LossyLink;
 use crate::publish::next;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use testkit::lossy_link::LossyLink;
 use voxtile::io::open_scans;
 use voxtile::share::codec::{CONTEXTS, Packet, count_contexts};
 use voxtile::share::{MapWatch, Receiver, ReceiverConfig, Sender};

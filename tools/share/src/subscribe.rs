@@ -52,7 +52,7 @@ pub fn run(args: &Args, map: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
         Err(Error::NoMap { .. } | Error::Io { .. }) => None,
         Err(error) => return Err(error.into()),
     };
-    let receivers = Receivers::new(args.memory.bytes())
+    let receivers = Receivers::new(args.memory.as_u64() as usize)
         .map_err(|error| Error::argument("--memory", error.to_string()))?;
     let region = args.region.as_deref().map(|region| box_of(region, grid)).transpose()?;
     let folder = layers_folder(map);
@@ -170,7 +170,7 @@ impl Subscriber<'_> {
     fn config(&self) -> ReceiverConfig {
         let mut config = ReceiverConfig::default();
         config.grid = self.grid;
-        config.memory_bytes = self.args.memory.bytes();
+        config.memory_bytes = self.args.memory.as_u64() as usize;
         config.max_voxels = self.args.max_voxels;
         config.max_tiles = self.args.max_tiles;
         config.region = self.region;
@@ -256,7 +256,9 @@ impl Subscriber<'_> {
             let is_saved = kept.is_none();
             if let Some(grid) = grid.as_ref().filter(|_| !args.keep_apart) {
                 let layer = kept.map_or_else(|| load_layer(store.path(), u64::MAX), Ok);
-                if let Err(error) = layer.and_then(|layer| fold(map, grid, &layer, args.memory.bytes())) {
+                if let Err(error) =
+                    layer.and_then(|layer| fold(map, grid, &layer, args.memory.as_u64() as usize))
+                {
                     reports.tell(&name, Kind::Fold, || format!("{error:#}; its layer is not folded"));
                 }
             }

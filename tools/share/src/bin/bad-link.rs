@@ -7,14 +7,10 @@
 //!
 //! Robots listen at CONNECT (several, with commas), subscribers connect to LISTEN.
 
-#[path = "../../../../tests/all/sharing/lossy_link.rs"]
-#[allow(dead_code, missing_docs)]
-mod lossy_link;
-
 use anyhow::{Context, anyhow};
-use lossy_link::LossyLink;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::{Duration, Instant};
+use testkit::lossy_link::LossyLink;
 use zenoh::pubsub::Subscriber;
 use zenoh::{Config, Session, Wait};
 

@@ -1,4 +1,4 @@
-use super::random_scans::Random;
+use crate::random_scans::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
