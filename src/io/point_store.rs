@@ -223,7 +223,7 @@ mod tests {
             {
                 let mut next = range.start;
                 let mut take = |points: &[Point], intensities: Option<&[f32]>| {
-                    assert!(points.len() <= POINTS_AT_A_TIME);
+                    assert!(points.len() <= POINTS_HANDED_OVER);
                     assert_eq!(intensities.is_some(), has_intensities);
                     for (at, point) in points.iter().enumerate() {
                         assert!(

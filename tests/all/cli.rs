@@ -266,7 +266,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
             "max range: 0 is not a length above the min range",
         ),
         (vec!["build", scans, "-o", new, "--cache-tiles", "0"], 2, "cache tiles: 0 is not at least 1"),
-        (vec!["build", scans, "-o", new, "--memory", "0"], 2, "--memory"),
+        (vec!["build", scans, "-o", new, "--memory", "0"], 2, "0 bytes are too few for tiles of 10 m"),
         (vec!["build", scans, "-o", new, "--memory", "1 mile"], 2, "--memory"),
         (vec!["build", scans, "-o", new, "--memory", "64MiB", "--cache-tiles", "3"], 2, "--cache-tiles"),
         (
