@@ -100,7 +100,7 @@ fn cases(setting: &Setting) -> Vec<HardScan> {
         limit_mib,
         per_ray: false,
     };
-    let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(12, 3) };
+    let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(12, 2) };
     let mut cases = vec![
         hard("long rays", fan([20_000, 1_500], [450.0, 300.0], 0.3, false), 0.1, 10.0, setting.size(512, 64)),
         hard(
