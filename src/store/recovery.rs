@@ -1,6 +1,6 @@
 use super::commit_log::Commits;
 use super::disk::{Disk, EntryKind};
-use super::layout::{Layout, WAITING, tile_of_folder};
+use super::layout::{Layout, SPILL, tile_of_folder};
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
 use super::snapshot_name::SnapshotName;
@@ -212,7 +212,7 @@ fn look_at_tile(
         remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
-    for name in names.extract_if(.., |name| name == WAITING) {
+    for name in names.extract_if(.., |name| name == SPILL) {
         remove(disk, &folder.join(name), removed)?;
     }
     let is_kept = |name: &mut String| layout.flush_of_kept(name).is_some();

@@ -1,10 +1,10 @@
-//! Tiles to their files. How they come back is `tile_files.rs`; these two are the one place that knows both tiles and
-//! store.
+//! Tiles to their files. How they come back is `load.rs`.
 
-use super::tile_files::map_parameters;
+use super::compact_tile::CompactTile;
+use super::parameters::map_parameters;
 use crate::config::{MapConfig, Storage};
 use crate::error::{Error, Result};
-use crate::space::TileIndex;
+use crate::space::{Grid, TileIndex};
 use crate::store::{FileStamp, TileFile, TileStamp, TileStore, TileWriter};
 use crate::tile::format::{CompactEffort, CompactWriter, Trailer, write_compact_file, write_table};
 use crate::tile::{Table, Tile};
@@ -18,14 +18,6 @@ pub(crate) struct TileSaver {
     parameters: String,
     /// Made with the first tile that has to be packed.
     packer: Option<CompactWriter>,
-}
-
-/// A table in the compact form, and what is known of it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PackedTable<'a> {
-    pub(crate) compact: &'a [u8],
-    pub(crate) voxels: u64,
-    pub(crate) occupied: u64,
 }
 
 impl TileSaver {
@@ -58,21 +50,36 @@ impl TileSaver {
             Storage::Compact => {
                 let compact = self.pack(table)?;
                 let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
-                let packed = PackedTable { compact: &compact, voxels, occupied };
-                self.write_packed(writer, index, packed, scan_number)
+                self.write_encoded(writer, index, &compact, [voxels, occupied], scan_number)
             }
         }
     }
 
-    /// [`TileSaver::write`] in a map with compact storage, of a table that is packed already.
-    pub(crate) fn write_packed(
+    /// [`TileSaver::write`] of a tile in the compact form.
+    pub(crate) fn write_compact(
+        &self,
+        writer: &TileWriter,
+        grid: &Grid,
+        index: TileIndex,
+        tile: &CompactTile,
+        scan_number: u64,
+    ) -> Result<TileStamp> {
+        match tile.occupied() {
+            Some(occupied) => {
+                self.write_encoded(writer, index, tile.bytes(), [tile.voxels(), occupied], scan_number)
+            }
+            None => self.write_seed(writer, index, &tile.decode(grid, index)?, scan_number),
+        }
+    }
+
+    fn write_encoded(
         &self,
         writer: &TileWriter,
         index: TileIndex,
-        packed: PackedTable<'_>,
+        compact: &[u8],
+        [voxels, occupied]: [u64; 2],
         scan_number: u64,
     ) -> Result<TileStamp> {
-        let PackedTable { compact, voxels, occupied } = packed;
         let front = self.trailer(writer, index, scan_number, FileStamp::default());
         let table = writer
             .write_next(index, TileFile::Table, |mut out| write_compact_file(compact, front, &mut out))?;
@@ -80,7 +87,7 @@ impl TileSaver {
     }
 
     /// [`TileSaver::write`] in a map with the seed's storage.
-    pub(crate) fn write_seed(
+    fn write_seed(
         &self,
         writer: &TileWriter,
         index: TileIndex,

@@ -1,5 +1,5 @@
+use super::load;
 use super::map_id::new_map_id;
-use super::tile_files;
 use super::tile_saver::TileSaver;
 use crate::config::MapConfig;
 use crate::error::Result;
@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 /// Gives a map of the seed's format, before its first change, an id, a log and trailers: every tile is written anew as it
 /// is, and committed with the metadata of that id. Until that is done it stays a map of the seed's format, with the same
 /// content. Nothing to do for other maps.
-pub(crate) fn adopt(
+pub(crate) fn upgrade(
     store: &mut TileStore,
     saver: &mut TileSaver,
     config: &MapConfig,
@@ -28,7 +28,7 @@ pub(crate) fn adopt(
         if store.stamp(index).is_some() {
             continue; // Written by an earlier attempt.
         }
-        if let Some(read) = tile_files::load_table(store, &config.grid, index)? {
+        if let Some(read) = load::load_table(store, &config.grid, index)? {
             let stamp = saver.write(&store.writer()?, index, &read.table, 0)?;
             store.note_next(index, stamp);
         }

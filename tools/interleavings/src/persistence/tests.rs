@@ -1,4 +1,4 @@
-use super::side_worker::SideWorker;
+use super::worker::Worker;
 use crate::in_many_orders;
 use shuttle::sync::Arc;
 use shuttle::sync::atomic::{AtomicUsize, Ordering};
@@ -8,7 +8,7 @@ use shuttle::thread;
 #[test]
 fn what_is_given_comes_back_once_and_in_order() {
     in_many_orders(|| {
-        let mut worker = SideWorker::new("doubling", |number: u32| 2 * number);
+        let mut worker = Worker::new("doubling", |number: u32| 2 * number);
         let mut came = Vec::new();
         for number in 0..4 {
             worker.give(number);
@@ -21,7 +21,7 @@ fn what_is_given_comes_back_once_and_in_order() {
             came.push(done);
         }
         assert_eq!(came, [0, 2, 4, 6]);
-        assert_eq!((worker.under_way(), worker.take()), (0, None));
+        assert_eq!((worker.in_flight(), worker.take()), (0, None));
     });
 }
 
@@ -33,7 +33,7 @@ fn an_owner_that_goes_away_leaves_nothing_running() {
         let count = Arc::new(AtomicUsize::new(0));
         let worker = || {
             let count = count.clone();
-            SideWorker::new("counting", move |by: usize| {
+            Worker::new("counting", move |by: usize| {
                 thread::yield_now();
                 count.fetch_add(by, Ordering::SeqCst)
             })

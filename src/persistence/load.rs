@@ -1,9 +1,9 @@
 //! Tiles from their files. How they get there is `tile_saver.rs`.
 
-use crate::config::{MapConfig, Storage};
+use crate::config::Storage;
 use crate::error::{Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
-use crate::store::{FileStamp, MapParameters, StoredTile, TileStamp, TileStore, hex};
+use crate::store::{FileStamp, StoredTile, TileStamp, TileStore, hex};
 use crate::tile::format::{DecodedTable, Trailer, read_compact_file, read_table};
 use crate::tile::{OctreeFactory, Table, Tile};
 
@@ -112,15 +112,5 @@ fn check(
             damaged(36, reason)
         }
         _ => Ok(()),
-    }
-}
-
-/// What makes a map the map it is.
-pub(crate) fn map_parameters(config: &MapConfig) -> MapParameters {
-    MapParameters {
-        resolution: config.grid.resolution_m(),
-        tile_size: config.grid.tile_size_m(),
-        sensor_model: config.sensor_model,
-        occupancy_threshold: config.occupancy_threshold,
     }
 }

@@ -2,17 +2,17 @@ use crate::config::MemoryLimit;
 
 /// How the memory that a mapper may use is shared out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct MemoryPlan {
+pub(in crate::mapper) struct MemoryPlan {
     /// Most tiles.
     pub(super) tiles: usize,
     /// Most bytes of all that grows.
     pub(super) bytes: usize,
     /// Most bytes of updates that wait for tiles on disk before those are fetched; one scan may come on top.
-    pub(super) pending_bytes: usize,
+    pub(super) buffer_bytes: usize,
     /// Most bytes of what is known of a scan while it is inserted.
-    pub(super) scan_bytes: usize,
+    pub(in crate::mapper) scan_bytes: usize,
     /// Most bytes of packed updates of a scan; what comes on top goes to files.
-    pub(super) updates_bytes: usize,
+    pub(in crate::mapper) updates_bytes: usize,
     /// Bytes that are kept free for inserting scans from the beginning.
     pub(super) least_scan_bytes: usize,
     /// Whether the bytes are a limit that is kept, so that what a scan takes counts, and a map that cannot keep to it is
@@ -21,22 +21,22 @@ pub(super) struct MemoryPlan {
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,
     /// Most bytes of tiles in the compact form while others have to go.
-    pub(super) cold_bytes: usize,
+    pub(super) compact_bytes: usize,
 }
 
 impl MemoryPlan {
-    pub(super) fn new(limit: MemoryLimit) -> Self {
+    pub(in crate::mapper) fn new(limit: MemoryLimit) -> Self {
         match limit {
             MemoryLimit::Tiles { tiles, pending_bytes } => Self {
                 tiles,
                 bytes: usize::MAX,
-                pending_bytes,
+                buffer_bytes: pending_bytes,
                 scan_bytes: usize::MAX,
                 updates_bytes: usize::MAX,
                 least_scan_bytes: 0,
                 is_kept: true,
                 spare_bytes: 0,
-                cold_bytes: 0,
+                compact_bytes: 0,
             },
             // Waiting updates are small beside their tiles, and the more wait the fewer reads and writes there are.
             MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
@@ -51,13 +51,13 @@ impl MemoryPlan {
         Self {
             tiles: usize::MAX,
             bytes,
-            pending_bytes: bytes / 4,
+            buffer_bytes: bytes / 4,
             scan_bytes: bytes / 4,
             updates_bytes: bytes / 8,
             least_scan_bytes: bytes / 8,
             is_kept: true,
             spare_bytes: bytes / 4,
-            cold_bytes: bytes / 8 * 3,
+            compact_bytes: bytes / 8 * 3,
         }
     }
 }

@@ -1,11 +1,10 @@
 //! Lives of the mapper's tiles in little memory: what is in use, packed, on its way to disk and from there.
 
-use super::flush::new_metadata;
-use super::map_id::new_map_id;
 use super::memory_disk::MemoryDisk;
-use super::residency::Residency;
+use super::tile_pager::TilePager;
 use crate::config::{MapConfig, Storage};
 use crate::in_many_orders;
+use crate::persistence::{new_map_id, new_metadata};
 use crate::space::TileIndex;
 use crate::store::{TileFile, TileStore};
 use crate::tile::{OctreeFactory, Tile};
@@ -21,7 +20,7 @@ const TILE_M: f64 = 4.0;
 
 /// The tiles of a map under way, and what they must be.
 struct Life {
-    residency: Residency,
+    pager: TilePager,
     disk: MemoryDisk,
     config: MapConfig,
     scan_number: u64,
@@ -47,9 +46,9 @@ impl Life {
         let (disk, config, map_id) = (MemoryDisk::new(), config(storage), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
         let store = TileStore::create(Arc::new(disk.clone()), Path::new("/map"), metadata, map_id).unwrap();
-        let residency = Residency::new(config.clone(), store);
+        let pager = TilePager::new(config.clone(), store);
         let (expected, flushed, touched) = Default::default();
-        Self { residency, disk, config, scan_number: 0, expected, flushed, touched, errors: 0 }
+        Self { pager, disk, config, scan_number: 0, expected, flushed, touched, errors: 0 }
     }
 
     /// A batch of points in some tiles: taken whole, or refused and nothing of it taken.
@@ -66,18 +65,18 @@ impl Life {
         let batch = PointBatch { points: &points, intensities: None, is_occupied: &is_occupied };
         let updates = batch.updates(&self.config.grid, &self.config.sensor_model).unwrap();
         updates.tiles.iter().for_each(|(index, _)| self.touch(*index));
-        let prepared = self.residency.prepare(&updates, 0, self.scan_number);
+        let prepared = self.pager.prepare(&updates, 0, self.scan_number);
         if prepared.is_err() {
             self.errors += 1;
             return;
         }
-        self.residency.look_ahead(&updates.tiles);
+        self.pager.prefetch(&updates.tiles);
         for (index, updates) in &updates.tiles {
             let empty = || Tile::empty(&self.config.grid, &OctreeFactory::default(), *index);
             let tile = self.expected.entry(*index).or_insert_with(empty);
             tile.apply(&self.config.sensor_model, updates);
         }
-        self.residency.accept(updates);
+        self.pager.accept(updates);
         self.scan_number += 1;
     }
 
@@ -85,7 +84,7 @@ impl Life {
     fn ask(&mut self) {
         let index = TileIndex::new(thread_rng().gen_range(0..TILES), 0, 0);
         self.touch(index);
-        match self.residency.tile(index, self.scan_number) {
+        match self.pager.tile(index, self.scan_number) {
             Ok(found) => {
                 assert_eq!(found.as_deref().map(voxels), self.expected.get(&index).map(voxels), "{index}");
             }
@@ -98,7 +97,7 @@ impl Life {
     }
 
     fn flush(&mut self, refuses: bool) {
-        match self.residency.flush(self.scan_number) {
+        match self.pager.flush(self.scan_number) {
             Ok(()) => self.flushed = self.expected.clone(),
             Err(error) => {
                 // What could not be saved before is saved now, and no older trouble is told of.
@@ -110,12 +109,12 @@ impl Life {
 
     /// Goes away in the middle of everything, and begins again with what was flushed.
     fn begin_again(self) -> Self {
-        let Self { residency, disk, config, flushed, touched, errors, .. } = self;
-        drop(residency);
+        let Self { pager, disk, config, flushed, touched, errors, .. } = self;
+        drop(pager);
         let store = TileStore::open(Arc::new(disk.clone()), Path::new("/map")).unwrap();
         let scan_number = store.commits().scan_number;
-        let residency = Residency::new(config.clone(), store);
-        Self { residency, disk, config, scan_number, expected: flushed.clone(), flushed, touched, errors }
+        let pager = TilePager::new(config.clone(), store);
+        Self { pager, disk, config, scan_number, expected: flushed.clone(), flushed, touched, errors }
     }
 
     fn run(&mut self, steps: usize) {
@@ -138,7 +137,7 @@ impl Life {
 
     /// Nothing goes to disk more often than it was changed or wanted.
     fn check_saves(&self) {
-        let layout = self.residency.store().layout();
+        let layout = self.pager.store().layout();
         for (index, touched) in &self.touched {
             let begun = self.disk.begun(&layout.next(*index, TileFile::Table));
             assert!(begun <= *touched, "{index} was begun {begun} times and touched {touched} times");
@@ -146,9 +145,9 @@ impl Life {
     }
 
     fn check_tiles(&mut self) {
-        assert_eq!(self.residency.tile_indices(), self.expected.keys().copied().collect::<Vec<_>>());
+        assert_eq!(self.pager.tile_indices(), self.expected.keys().copied().collect::<Vec<_>>());
         for (index, tile) in &self.expected {
-            let found = self.residency.tile_in_passing(*index).unwrap().unwrap();
+            let found = self.pager.tile_in_passing(*index).unwrap().unwrap();
             assert_eq!(voxels(&found), voxels(tile), "{index}");
         }
     }

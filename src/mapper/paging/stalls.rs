@@ -1,7 +1,7 @@
-use super::statistics::StallCounts;
+use crate::mapper::statistics::StallCounts;
 use hdrhistogram::Histogram;
 use std::fmt;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How long the mapping thread had to wait for the disk, each time.
 pub(super) struct Stalls {
@@ -18,14 +18,6 @@ impl Default for Stalls {
 }
 
 impl Stalls {
-    /// Does what waits for the disk, and notes how long that took.
-    pub(super) fn during<T>(&mut self, wait: impl FnOnce() -> T) -> T {
-        let since = Instant::now();
-        let answer = wait();
-        self.note(since.elapsed());
-        answer
-    }
-
     /// Notes a wait.
     pub(super) fn note(&mut self, time: Duration) {
         // Cannot fail: the histogram grows.
@@ -63,7 +55,5 @@ mod tests {
         for (found, expected) in [(p50_us, 500_000), (p99_us, 990_000), (worst_us, 1_000_000)] {
             assert!(found.abs_diff(expected) * 100 <= expected, "{found} us, {expected} expected");
         }
-        assert_eq!(stalls.during(|| 7), 7);
-        assert_eq!(stalls.counts().count, 1001);
     }
 }

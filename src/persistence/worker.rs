@@ -5,18 +5,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
-/// A thread that does one kind of work beside the one that maps, in the order in which it is given. It starts with the
-/// first job, sleeps when there is none, and ends with its owner: what was not begun by then is not done. Where the
-/// system gives no thread, the work is done when it is given.
+/// A background thread for one kind of job, done in the order given. The thread starts with the first job, sleeps while
+/// there is none, and ends with its owner; jobs not begun by then are dropped. Where the system refuses a thread, the
+/// caller's does the job at once.
 ///
-/// How much is under way at a time is for the owner to limit.
-pub(super) struct SideWorker<Job, Done> {
+/// The owner limits how many jobs are in flight.
+pub(crate) struct Worker<Job, Done> {
     name: &'static str,
     work: Arc<dyn Fn(Job) -> Done + Send + Sync>,
     thread: Option<Thread<Job, Done>>,
     has_no_thread: bool,
     done_here: VecDeque<Done>,
-    under_way: usize,
+    in_flight: usize,
 }
 
 struct Thread<Job, Done> {
@@ -26,20 +26,20 @@ struct Thread<Job, Done> {
     handle: Option<JoinHandle<()>>,
 }
 
-impl<Job: Send + 'static, Done: Send + 'static> SideWorker<Job, Done> {
-    pub(super) fn new(name: &'static str, work: impl Fn(Job) -> Done + Send + Sync + 'static) -> Self {
+impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
+    pub(crate) fn new(name: &'static str, work: impl Fn(Job) -> Done + Send + Sync + 'static) -> Self {
         let (work, done_here) = (Arc::new(work), VecDeque::new());
-        Self { name, work, thread: None, has_no_thread: false, done_here, under_way: 0 }
+        Self { name, work, thread: None, has_no_thread: false, done_here, in_flight: 0 }
     }
 
     /// How many jobs were given of which the result was not taken.
-    pub(super) fn under_way(&self) -> usize {
-        self.under_way
+    pub(crate) fn in_flight(&self) -> usize {
+        self.in_flight
     }
 
     /// Gives a job.
-    pub(super) fn give(&mut self, job: Job) {
-        self.under_way += 1;
+    pub(crate) fn give(&mut self, job: Job) {
+        self.in_flight += 1;
         if self.thread.is_none() && !self.has_no_thread {
             self.start();
         }
@@ -54,27 +54,27 @@ impl<Job: Send + 'static, Done: Send + 'static> SideWorker<Job, Done> {
     }
 
     /// A result, if there is one already.
-    pub(super) fn take(&mut self) -> Option<Done> {
+    pub(crate) fn take(&mut self) -> Option<Done> {
         let there = self.thread.as_ref().and_then(|thread| thread.done.try_recv().ok());
         let done = there.or_else(|| self.done_here.pop_front())?;
-        self.under_way -= 1;
+        self.in_flight -= 1;
         Some(done)
     }
 
     /// The next result, waited for; `None` if none will come.
-    pub(super) fn wait(&mut self) -> Option<Done> {
-        if self.under_way > self.done_here.len()
+    pub(crate) fn wait(&mut self) -> Option<Done> {
+        if self.in_flight > self.done_here.len()
             && let Some(thread) = &self.thread
         {
             match thread.done.recv() {
                 Ok(done) => {
-                    self.under_way -= 1;
+                    self.in_flight -= 1;
                     return Some(done);
                 }
                 Err(_) => {
                     // A thread that panicked took its jobs with it.
                     self.thread = None;
-                    self.under_way = self.done_here.len();
+                    self.in_flight = self.done_here.len();
                 }
             }
         }
@@ -116,10 +116,10 @@ impl<Job, Done> Drop for Thread<Job, Done> {
     }
 }
 
-impl<Job, Done> fmt::Debug for SideWorker<Job, Done> {
+impl<Job, Done> fmt::Debug for Worker<Job, Done> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, under_way, .. } = self;
-        f.debug_struct("SideWorker").field("name", name).field("under_way", under_way).finish_non_exhaustive()
+        let Self { name, in_flight, .. } = self;
+        f.debug_struct("Worker").field("name", name).field("in_flight", in_flight).finish_non_exhaustive()
     }
 }
 
@@ -131,29 +131,29 @@ mod tests {
 
     #[test]
     fn what_is_given_is_done_in_order() {
-        let mut worker = SideWorker::new("doubling", |number: u32| 2 * number);
+        let mut worker = Worker::new("doubling", |number: u32| 2 * number);
         assert_eq!(worker.wait(), None);
         (0..100).for_each(|number| worker.give(number));
-        assert_eq!(worker.under_way(), 100);
+        assert_eq!(worker.in_flight(), 100);
         let done: Vec<u32> = std::iter::from_fn(|| worker.wait()).collect();
         assert_eq!(done, (0..100).map(|number| 2 * number).collect::<Vec<_>>());
-        assert_eq!((worker.under_way(), worker.take()), (0, None));
+        assert_eq!((worker.in_flight(), worker.take()), (0, None));
     }
 
     #[test]
     fn without_a_thread_the_work_is_done_at_once() {
-        let mut worker = SideWorker::new("doubling", |number: u32| 2 * number);
+        let mut worker = Worker::new("doubling", |number: u32| 2 * number);
         worker.has_no_thread = true;
         (0..5).for_each(|number| worker.give(number));
         assert_eq!(worker.done_here, [0, 2, 4, 6, 8]);
-        assert_eq!((worker.take(), worker.wait(), worker.under_way()), (Some(0), Some(2), 3));
+        assert_eq!((worker.take(), worker.wait(), worker.in_flight()), (Some(0), Some(2), 3));
     }
 
     #[test]
     fn dropping_does_not_wait_for_what_was_not_begun() {
         let count = Arc::new(AtomicUsize::new(0));
         let counted = count.clone();
-        let mut worker = SideWorker::new("slow", move |()| {
+        let mut worker = Worker::new("slow", move |()| {
             counted.fetch_add(1, Ordering::Relaxed);
             thread::sleep(Duration::from_millis(20));
         });
@@ -164,10 +164,10 @@ mod tests {
 
     #[test]
     fn a_thread_that_is_gone_is_not_waited_for() {
-        let mut worker = SideWorker::new("failing", |fails: bool| assert!(!fails));
+        let mut worker = Worker::new("failing", |fails: bool| assert!(!fails));
         worker.give(true);
         while worker.wait().is_some() {}
-        assert_eq!(worker.under_way(), 0);
+        assert_eq!(worker.in_flight(), 0);
         worker.give(false);
         assert_eq!(worker.wait(), Some(()));
     }
