@@ -2,7 +2,6 @@
 
 use crate::config::MapConfig;
 use crate::error::{FormatError, Result};
-use crate::space::Grid;
 use crate::store::{Extension, InputRecord, MapParameters, Metadata, hex};
 use std::path::Path;
 
@@ -32,9 +31,8 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
 /// Parameters that no map can have; `path` is the file that says them.
 pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig> {
     let wrong = |error: String| FormatError::at_offset(0, error).in_map(path, None);
-    let grid =
-        Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
-    let mut config = MapConfig { grid, storage: metadata.storage(), ..MapConfig::default() };
+    let config = MapConfig::new(metadata.resolution_m, metadata.tile_size_m);
+    let mut config = config.map_err(|error| wrong(error.to_string()))?.with_storage(metadata.storage());
     if let Some(ext) = &metadata.ext {
         config.sensor_model = ext.sensor_model;
         config.occupancy_threshold = ext.occupancy_threshold;

@@ -36,7 +36,7 @@ mod scan {
 }
 
 mod sensor {
-    pub(crate) use voxtile::sensor::Evidence;
+    pub(crate) use voxtile::sensor::{Evidence, SensorModel};
 }
 
 mod space {
