@@ -1,25 +1,17 @@
 //! The writing half of [`TileStore`]: versions beside the committed ones, and the commit that puts them in place.
 
-use super::commit_log::CommitLog;
-use super::commit_record::{Flush, whole_map_bytes};
-use super::disk::Disk;
-use super::layout::{Layout, TileFile};
-use super::map_folder::{self, Lock};
-use super::metadata::{Bounds, Metadata};
+use super::checkpoint::TILES_SYNCED_AT_ONCE;
+use super::commit_record::Flush;
+use super::layout::TileFile;
+use super::map_files::MapFiles;
+use super::metadata::Metadata;
 use super::tile_stamp::{FileStamp, TileStamp};
 use super::tile_store::TileStore;
+use super::tile_versions::TileVersions;
 use super::tile_writer::TileWriter;
 use crate::error::{Error, Result};
-use crate::space::{TileIndex, TileTable};
-use rustc_hash::FxHashSet;
+use crate::space::TileIndex;
 use std::io::{self, Write};
-use std::path::Path;
-
-/// Tiles whose files are synced at once: their paths take several times the memory of what else is known of them.
-pub(super) const TILES_SYNCED_AT_ONCE: usize = 4096;
-
-/// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
-const COMPACT_LOG_BYTES: u64 = 2048;
 
 impl TileStore {
     /// Writes the next version of one of a tile's files; the committed version stays as it is.
@@ -41,14 +33,12 @@ impl TileStore {
         // A committed version may still be there under the name that is written to now.
         self.settle()?;
         let map_id = self.map_id().unwrap_or_default();
-        Ok(TileWriter { disk: self.disk.clone(), layout: self.layout.clone(), map_id })
+        Ok(TileWriter { files: self.files.clone(), map_id })
     }
 
     /// Notes that the next version of a tile is written, both files.
     pub fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
-        self.suspect.remove(&tile);
-        self.removed.remove(&tile);
-        self.next.insert(tile, stamp);
+        self.versions.note_next(tile, stamp);
     }
 
     /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not hold
@@ -60,28 +50,20 @@ impl TileStore {
     ///
     /// A map of the seed's format, which has no log that could name removed tiles.
     pub fn remove(&mut self, tile: TileIndex) -> Result<()> {
-        if self.log.is_none() {
-            return Err(Error::argument("map", "a map of the seed's format must be adopted first"));
-        }
-        self.drop_next(tile);
-        if self.commits.tiles.contains(tile) {
-            self.removed.insert(tile);
-        }
+        self.committer.logged_map_id()?;
+        self.versions.remove(tile);
         Ok(())
     }
 
     /// Forgets the next version of a tile, as if it had not been written.
     pub fn drop_next(&mut self, tile: TileIndex) {
-        self.suspect.remove(&tile);
-        self.next.remove(tile);
+        self.versions.drop_next(tile);
     }
 
     /// The tiles whose next version must be written again before the next commit: the disk failed to sync it, and what
     /// it says of these files from then on proves nothing.
     pub fn suspects(&self) -> Vec<TileIndex> {
-        let mut suspects: Vec<_> = self.suspect.iter().copied().collect();
-        suspects.sort_unstable();
-        suspects
+        self.versions.suspects()
     }
 
     /// Commits every version written and every tile removed since the last commit. When this returns they are durable, and
@@ -93,65 +75,50 @@ impl TileStore {
     pub fn commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<()> {
         self.settle()?;
         self.keep_for_late_readers();
-        let log_path = self.layout.commit_log();
-        let Some(mut log) = self.log else {
-            return Err(Error::argument("map", "a map of the seed's format must be adopted first"));
-        };
-        if let Some(&tile) = self.suspect.iter().next() {
-            return Err(Error::io(
-                &self.layout.tile_folder(tile),
-                "trust",
-                io::Error::other("an earlier sync failed"),
-            ));
+        self.committer.logged_map_id()?;
+        if let Some(&tile) = self.versions.suspects().first() {
+            let folder = self.layout().tile_folder(tile);
+            return Err(Error::io(&folder, "trust", io::Error::other("an earlier sync failed")));
         }
-        let mut removed: Vec<_> = self.removed.iter().copied().collect();
-        removed.sort_unstable();
-        let number = self.commits.flush_number + 1;
-        let metadata = self.fill_in(metadata, number, scan_number);
-        let is_new = !self.is_list_logged
-            || self.metadata.ext.is_none()
-            || !self.metadata.is_same_but_for_progress(&metadata);
-        if !self.next.is_empty() || !removed.is_empty() || is_new || scan_number != self.commits.scan_number {
-            self.sync_next()?;
+        let number = self.commits().flush_number + 1;
+        let metadata = self.committer.fill_in(metadata, &self.files, &self.versions, [number, scan_number]);
+        let is_new = self.committer.is_new(&metadata);
+        let removed = self.versions.removed();
+        let has_changed = !self.versions.next().is_empty() || !removed.is_empty();
+        if has_changed || is_new || scan_number != self.commits().scan_number {
+            sync_next(&self.files, &mut self.versions)?;
             // As late as can be: what another writer commits must not be cut off.
-            self.check_lock()?;
+            self.committer.check_lock()?;
             let text = metadata.to_text();
             let metadata_text = is_new.then_some(&*text);
-            let flush = Flush { number, scan_number, changed: &self.next, removed: &removed, metadata_text };
-            if let Err(error) = log.append(&*self.disk, &log_path, &flush) {
-                self.is_log_settled = false;
+            let changed = self.versions.next();
+            let flush = Flush { number, scan_number, changed, removed: &removed, metadata_text };
+            if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
                 // At once if it goes: another process may come next, and would see a record that is not on the medium.
                 let _ = self.settle();
-                return Err(Error::io(&log_path, "append to", error));
+                return Err(error);
             }
             // Committed.
-            self.log = Some(log);
-            self.is_list_logged = true;
-            // Who opens the map only now is taken to see more than it does, for a while.
-            let is_read = self.readers.are_there();
-            let changed = std::mem::take(&mut self.next);
-            let is_born = |tile: &TileIndex| is_read && !self.commits.tiles.contains(*tile);
-            for tile in changed.tiles().filter(is_born) {
-                self.readers.note_birth(tile, number);
-            }
-            self.removed.clear();
-            self.foreign.clear();
-            self.unrenamed.extend(changed.tiles().map(|tile| (tile, ())));
-            self.unremoved.extend(&removed);
-            for &tile in &removed {
-                self.commits.tiles.remove(tile);
-            }
-            self.commits.last_removed = removed;
-            self.commits.flush_number = number;
-            self.commits.scan_number = scan_number;
-            self.commits.tiles.extend(changed.iter());
-            self.commits.last_changed = TileTable::default();
-            self.metadata = metadata;
+            self.note_births(number);
+            let changed = self.versions.committed(number, scan_number);
+            self.checkpoint.add(changed.tiles(), &removed);
         }
         if let Err(error) = self.tidy_up() {
             log::warn!("flushed, but not tidied up: {error}");
         }
         Ok(())
+    }
+
+    /// Notes which tiles a commit brings into the map: who reads an earlier flush does not miss them. Who opens the map only
+    /// now is taken to see more than it does, for a while.
+    fn note_births(&mut self, number: u64) {
+        if !self.kept.readers().are_there() {
+            return;
+        }
+        let committed = &self.versions.commits().tiles;
+        for tile in self.versions.next().tiles().filter(|tile| !committed.contains(*tile)) {
+            self.kept.readers().note_birth(tile, number);
+        }
     }
 
     /// Brings the files to what the last commit says, without another one.
@@ -162,49 +129,42 @@ impl TileStore {
 
     /// Brings about what earlier calls left open, before anything that builds upon it is written.
     pub(super) fn settle(&mut self) -> Result<()> {
-        self.check_lock()?;
-        if let (false, Some(log)) = (self.is_log_settled, self.log) {
-            // A record that came to disk after all names files that must stay as they are until it is cut off.
-            let path = self.layout.commit_log();
-            log.cut(&*self.disk, &path).map_err(|error| Error::io(&path, "cut", error))?;
-            self.sync_folder(self.layout.folder())?;
-            self.is_log_settled = true;
-        }
-        self.put_in_place()
+        self.committer.check_lock()?;
+        self.committer.settle_log(&self.files)?;
+        self.run_checkpoint()
     }
 
-    fn sync_next(&mut self) -> Result<()> {
-        let Self { next, disk, layout, suspect, .. } = self;
-        let mut changed = next.tiles().peekable();
-        loop {
-            let group: Vec<_> = changed.by_ref().take(TILES_SYNCED_AT_ONCE).collect();
-            let is_last = changed.peek().is_none();
-            sync_group(&**disk, layout, &group, is_last, suspect)?;
-            if is_last {
-                return Ok(());
-            }
+    pub(super) fn run_checkpoint(&mut self) -> Result<()> {
+        self.checkpoint.run(&self.files, &mut self.versions, &mut self.kept)
+    }
+
+    /// What comes after a commit. What the disk refuses of it is made good later.
+    pub(super) fn tidy_up(&mut self) -> Result<()> {
+        // At once: who opens the map in between cannot tell the writer which flush it reads.
+        if self.committer.written_flush() != Some(self.commits().flush_number) {
+            self.write_metadata()?;
         }
+        self.run_checkpoint()?;
+        self.kept.release(&self.files);
+        self.committer.compact_log(&self.files, self.versions.commits())
     }
 
     /// Puts the next version of a tile's octree in place by itself: it must be the one that the log names.
     pub fn place_octree(&mut self, tile: TileIndex) -> Result<()> {
-        let (next, current) =
-            (self.layout.next(tile, TileFile::Octree), self.layout.current(tile, TileFile::Octree));
-        self.disk.sync_file(&next).map_err(|error| Error::io(&next, "sync", error))?;
-        self.rename(&next, &current)?;
-        self.sync_folder(&self.layout.tile_folder(tile))
+        let layout = self.layout();
+        let (next, current) = (layout.next(tile, TileFile::Octree), layout.current(tile, TileFile::Octree));
+        self.disk().sync_file(&next).map_err(|error| Error::io(&next, "sync", error))?;
+        self.files.rename(&next, &current)?;
+        self.files.sync_folder(&layout.tile_folder(tile))
     }
 
     /// Takes tiles out of the map: one commit, after which the log does not name them. Their folders stay.
     pub fn forget(&mut self, tiles: &[TileIndex]) -> Result<()> {
         self.settle()?;
-        for &tile in tiles {
-            self.commits.tiles.remove(tile);
-            self.foreign.remove(&tile);
-        }
-        if self.log.is_some() {
-            self.commits.flush_number += 1;
-            self.replace_log()?;
+        self.versions.forget(tiles);
+        if self.map_id().is_some() {
+            self.versions.committed_nothing(self.commits().flush_number + 1);
+            self.committer.replace_log(&self.files, self.versions.commits())?;
         }
         self.write_metadata()
     }
@@ -212,108 +172,66 @@ impl TileStore {
     /// Gives a map of the seed's format an id and a log, so that it can be written to. Its tiles count as unread
     /// until they have been written again.
     pub fn adopt(&mut self, map_id: [u8; 16]) -> Result<()> {
-        if self.log.is_none() {
-            let (disk, text) = (&*self.disk, self.metadata.to_text());
-            let log = map_folder::replace(disk, &self.layout.commit_log(), |next| {
-                CommitLog::write_whole(disk, next, map_id, &self.commits, &text)
-            })?;
-            self.log = Some(log);
-        }
-        Ok(())
-    }
-
-    /// Looks whether others are still kept from writing.
-    pub(super) fn check_lock(&self) -> Result<()> {
-        self.lock.as_ref().map_or(Ok(()), Lock::check)
+        self.committer.begin_log(&self.files, map_id, self.versions.commits())
     }
 
     /// Where `metadata.json` could not be replaced after the last commit, readers of it may have opened that commit.
     pub(super) fn keep_for_late_readers(&mut self) {
         if self.is_metadata_behind() {
-            self.readers.may_see(self.commits.flush_number);
+            let flush_number = self.commits().flush_number;
+            self.kept.readers().may_see(flush_number);
         }
     }
 
-    pub(super) fn fill_in(&self, mut metadata: Metadata, flush_number: u64, scan_number: u64) -> Metadata {
-        metadata.bounds = Bounds::of(self.tiles());
-        if let Some(ext) = &mut metadata.ext {
-            // A map keeps its storage and its snapshots, whatever the caller says.
-            ext.storage = self.layout.storage();
-            ext.snapshots = self.listed.clone();
-            ext.empty = metadata.bounds.is_none();
-            (ext.flush_number, ext.scan_number) = (flush_number, scan_number);
-        }
-        metadata
-    }
-
-    /// Replaces `metadata.json`: written beside, synced, renamed, the folder synced.
+    /// Replaces `metadata.json`, durably.
     pub(super) fn write_metadata(&mut self) -> Result<()> {
-        let (flush_number, scan_number) = (self.commits.flush_number, self.commits.scan_number);
-        self.metadata = self.fill_in(self.metadata.clone(), flush_number, scan_number);
-        let text = self.metadata.to_text();
-        let disk = &*self.disk;
-        let watch = map_folder::replace(disk, &self.layout.metadata(), |next| {
-            map_folder::write_text(disk, next, &text)?;
-            // Before anybody can read it: no reader goes unseen.
-            disk.watch(next)
-        })?;
-        self.written_flush = Some(flush_number);
-        self.readers.watch(flush_number, watch);
-        self.sync_folder(self.layout.folder())
-    }
-
-    pub(super) fn compact_log(&mut self) -> Result<()> {
-        let Some(log) = self.log else { return Ok(()) };
-        let whole_bytes = whole_map_bytes(self.commits.tiles.len());
-        if log.bytes() < COMPACT_LOG_BYTES.max(2 * whole_bytes) { Ok(()) } else { self.replace_log() }
-    }
-
-    /// Replaces the log by one record of the whole map.
-    pub(super) fn replace_log(&mut self) -> Result<()> {
-        let Some(log) = self.log else { return Ok(()) };
-        let mut metadata = self.metadata.clone();
-        if let Some(ext) = &mut metadata.ext {
-            ext.snapshots = self.listed.clone();
-        }
-        let (disk, text) = (&*self.disk, metadata.to_text());
-        let compacted = map_folder::replace(disk, &self.layout.commit_log(), |next| {
-            CommitLog::write_whole(disk, next, log.map_id(), &self.commits, &text)
-        })?;
-        self.log = Some(compacted);
-        self.is_list_logged = true;
-        // What is appended from now on is in this file only; every commit syncs the folder first.
-        self.sync_folder(self.layout.folder())
-    }
-
-    pub(super) fn sync_folder(&self, folder: &Path) -> Result<()> {
-        self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
+        let watch = self.committer.write_metadata(&self.files, &self.versions)?;
+        self.kept.watch(self.commits().flush_number, watch);
+        self.files.sync_map_folder()
     }
 }
 
-/// Syncs the versions of some tiles, and notes of which tiles that failed. With the last of them goes the map's own folder,
-/// which names the new tile folders.
+/// Syncs all versions that the next commit names.
+fn sync_next(files: &MapFiles, versions: &mut TileVersions) -> Result<()> {
+    let mut suspects = Vec::new();
+    let mut changed = versions.next().tiles().peekable();
+    let synced = loop {
+        let group: Vec<_> = changed.by_ref().take(TILES_SYNCED_AT_ONCE).collect();
+        let is_last = changed.peek().is_none();
+        let synced = sync_group(files, &group, is_last, &mut suspects);
+        if is_last || synced.is_err() {
+            break synced;
+        }
+    };
+    drop(changed);
+    suspects.into_iter().for_each(|tile| versions.suspect(tile));
+    synced
+}
+
+/// Syncs the versions of some tiles, and adds the tiles of which that failed to `suspects`. With the last of them goes the map's
+/// own folder, which names the new tile folders.
 fn sync_group(
-    disk: &dyn Disk,
-    layout: &Layout,
+    files: &MapFiles,
     changed: &[TileIndex],
     is_last: bool,
-    suspect: &mut FxHashSet<TileIndex>,
+    suspects: &mut Vec<TileIndex>,
 ) -> Result<()> {
-    let files: Vec<_> = changed
+    let layout = files.layout();
+    let paths: Vec<_> = changed
         .iter()
         .flat_map(|&tile| layout.files().iter().map(move |&file| layout.next(tile, file)))
         .collect();
     let folders = changed.iter().map(|&tile| layout.tile_folder(tile));
     let folders: Vec<_> = folders.chain(is_last.then(|| layout.folder().to_owned())).collect();
-    let [synced_files, synced_folders] = disk.sync_all(&files, &folders);
+    let [synced_files, synced_folders] = files.disk().sync_all(&paths, &folders);
     let per_tile = layout.files().len();
     for (number, result) in synced_files.iter().enumerate() {
         if result.is_err() {
-            suspect.insert(changed[number / per_tile]);
+            suspects.push(changed[number / per_tile]);
         }
     }
-    let files = files.iter().zip(synced_files);
-    for (path, result) in files.chain(folders.iter().zip(synced_folders)) {
+    let synced_files = paths.iter().zip(synced_files);
+    for (path, result) in synced_files.chain(folders.iter().zip(synced_folders)) {
         result.map_err(|error| Error::io(path, "sync", error))?;
     }
     Ok(())

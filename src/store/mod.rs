@@ -8,13 +8,17 @@
 //! ordinary tests. The protocol of a flush and what a crash leaves are in
 //! `docs/durability.md`.
 
+mod checkpoint;
 mod commit_log;
 mod commit_record;
+mod committer;
 mod disk;
 mod flush;
 mod fs_disk;
 mod input_record;
+mod kept_tables;
 mod layout;
+mod map_files;
 mod map_folder;
 mod metadata;
 mod place;
@@ -28,10 +32,10 @@ mod snapshot_name;
 mod snapshot_store;
 mod snapshots;
 mod spill_file;
-mod tidy;
 mod tile_location;
 mod tile_stamp;
 mod tile_store;
+mod tile_versions;
 mod tile_writer;
 mod unfinished;
 

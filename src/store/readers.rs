@@ -1,6 +1,6 @@
 use super::disk::{Disk, ReaderWatch};
 use super::layout::Layout;
-use super::snapshots::{KeptTables, Snapshots};
+use super::snapshots::{KeptFlushes, Snapshots};
 use crate::space::TileIndex;
 use rustc_hash::FxHashMap;
 use std::io;
@@ -15,7 +15,7 @@ pub(super) struct Readers {
     /// The `metadata.json` of past flushes and of the present one, in order.
     watched: Vec<Watched>,
     /// Tables that were kept for readers alone.
-    kept: KeptTables,
+    kept: KeptFlushes,
     /// Tiles that came into the map by a flush that came after one that is being read.
     born: FxHashMap<TileIndex, u64>,
 }

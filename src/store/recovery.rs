@@ -4,7 +4,7 @@ use super::layout::{Layout, SPILL, tile_of_folder};
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
 use super::snapshot_name::SnapshotName;
-use super::snapshots::{KeptTables, Snapshots};
+use super::snapshots::{KeptFlushes, Snapshots};
 use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result, is_of_medium};
 use crate::space::{TileIndex, TileTable};
@@ -46,7 +46,7 @@ pub(super) fn recover(
 ) -> Result<Leftovers> {
     let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
     let mut leftovers = Leftovers::default();
-    let (mut kept, mut hollow) = (KeptTables::default(), Vec::new());
+    let (mut kept, mut hollow) = (KeptFlushes::default(), Vec::new());
     for name in list(disk, layout.folder())? {
         let path = layout.folder().join(&name);
         if OWN_NEXT.contains(&&*name) {
@@ -152,7 +152,7 @@ pub(super) fn remove_uncommitted(
 fn remove_unseen(
     disk: &dyn Disk,
     layout: &Layout,
-    kept: &KeptTables,
+    kept: &KeptFlushes,
     leftovers: &mut Leftovers,
 ) -> Result<()> {
     for (&tile, flushes) in kept {

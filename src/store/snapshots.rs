@@ -9,7 +9,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 
 /// Tables that were kept when they were replaced: for each tile, the flushes that they were the last version of.
-pub(super) type KeptTables = FxHashMap<TileIndex, BTreeSet<u64>>;
+pub(super) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
 
 /// Which tables a map's snapshots see, so that its writer keeps them.
 ///
@@ -20,7 +20,7 @@ pub(super) struct Snapshots {
     /// Tiles of which a snapshot sees the table in place.
     shared: TileTable<()>,
     /// Kept tables that a snapshot sees.
-    pinned: KeptTables,
+    pinned: KeptFlushes,
     /// Whether there is a snapshot that cannot be read, and of which nothing is known: it may see anything.
     see_all: bool,
     /// The snapshots themselves.
@@ -42,7 +42,7 @@ impl Snapshots {
         map_id: [u8; 16],
         map: &Commits,
         listed: Option<&SnapshotList>,
-        kept: &KeptTables,
+        kept: &KeptFlushes,
     ) -> Result<Self> {
         let mut snapshots = Self::default();
         let names: Vec<_> = match (listed, Snapshot::list(disk, layout)) {
@@ -75,7 +75,7 @@ impl Snapshots {
         error: Error,
         flush_number: Option<u64>,
         map: &Commits,
-        kept: &KeptTables,
+        kept: &KeptFlushes,
     ) -> Result<()> {
         if !matches!(error, Error::Damaged { .. }) && !error.is_of_medium() {
             return Err(error);
@@ -102,11 +102,11 @@ impl Snapshots {
         &self.found
     }
 
-    fn take(&mut self, commits: &Commits, kept: &KeptTables) {
+    fn take(&mut self, commits: &Commits, kept: &KeptFlushes) {
         self.take_tiles(commits.tiles.tiles(), commits.flush_number, kept);
     }
 
-    fn take_tiles(&mut self, tiles: impl Iterator<Item = TileIndex>, as_of_flush: u64, kept: &KeptTables) {
+    fn take_tiles(&mut self, tiles: impl Iterator<Item = TileIndex>, as_of_flush: u64, kept: &KeptFlushes) {
         for tile in tiles {
             match seen_by(kept.get(&tile), as_of_flush) {
                 Some(flush_number) => self.pin(tile, flush_number),
@@ -141,7 +141,7 @@ impl Snapshots {
     }
 
     /// Every kept table that a snapshot sees.
-    pub(super) fn pinned(&self) -> &KeptTables {
+    pub(super) fn pinned(&self) -> &KeptFlushes {
         &self.pinned
     }
 

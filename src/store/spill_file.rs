@@ -36,12 +36,12 @@ impl TileStore {
     ///
     /// A disk that refuses.
     pub fn append_spill(&self, tile: TileIndex, file: SpillFile, updates: &[u8]) -> Result<SpillFile> {
-        let path = self.layout.spill(tile);
-        make_folder(&*self.disk, &self.layout.tile_folder(tile))?;
+        let path = self.layout().spill(tile);
+        make_folder(&**self.disk(), &self.layout().tile_folder(tile))?;
         let append = || {
             let mut out = match file.bytes {
-                0 => self.disk.create(&path)?,
-                bytes => self.disk.append(&path, bytes)?,
+                0 => self.disk().create(&path)?,
+                bytes => self.disk().append(&path, bytes)?,
             };
             out.write_all(updates)?;
             out.flush()
@@ -58,9 +58,9 @@ impl TileStore {
     ///
     /// A disk that refuses, and a file that is not what was written.
     pub fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
-        let path = self.layout.spill(tile);
+        let path = self.layout().spill(tile);
         let open = || {
-            let input = self.disk.open(&path).map_err(|error| Error::io(&path, "open", error))?;
+            let input = self.disk().open(&path).map_err(|error| Error::io(&path, "open", error))?;
             Ok(BufReader::with_capacity(BUFFER_BYTES, input).take(file.bytes))
         };
         let mut crc = crc32fast::Hasher::new();
@@ -89,16 +89,16 @@ impl TileStore {
         if file.bytes == 0 {
             return self.remove_spill(tile);
         }
-        let path = self.layout.spill(tile);
-        if let Err(error) = self.disk.append(&path, file.bytes) {
+        let path = self.layout().spill(tile);
+        if let Err(error) = self.disk().append(&path, file.bytes) {
             log::debug!("{}: not cut: {error}", path.display());
         }
     }
 
     /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no harm.
     pub fn remove_spill(&self, tile: TileIndex) {
-        let path = self.layout.spill(tile);
-        if let Err(error) = self.disk.remove_file(&path) {
+        let path = self.layout().spill(tile);
+        if let Err(error) = self.disk().remove_file(&path) {
             log::debug!("{}: not removed: {error}", path.display());
         }
     }

@@ -1,12 +1,12 @@
 use super::disk::{Disk, EntryKind};
-use super::layout::{Layout, TileFile};
+use super::layout::TileFile;
+use super::map_files::MapFiles;
 use super::tile_stamp::{FileStamp, Stamping};
 use crate::config::Storage;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use std::sync::Arc;
 
 /// Writes next versions of tiles, beside the committed ones. Another thread may do so while the map goes on.
 ///
@@ -14,8 +14,7 @@ use std::sync::Arc;
 /// the name that is written to. Not to be used any more once the map has committed.
 #[derive(Clone, Debug)]
 pub struct TileWriter {
-    pub(super) disk: Arc<dyn Disk>,
-    pub(super) layout: Layout,
+    pub(super) files: MapFiles,
     pub(super) map_id: [u8; 16],
 }
 
@@ -27,7 +26,7 @@ impl TileWriter {
 
     /// How the map's tiles are stored.
     pub fn storage(&self) -> Storage {
-        self.layout.storage()
+        self.files.layout().storage()
     }
 
     /// Writes the next version of one of a tile's files; the committed version stays as it is.
@@ -41,10 +40,10 @@ impl TileWriter {
         file: TileFile,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<FileStamp> {
-        make_folder(&*self.disk, &self.layout.tile_folder(tile))?;
-        let path = self.layout.next(tile, file);
+        make_folder(&**self.files.disk(), &self.files.layout().tile_folder(tile))?;
+        let path = self.files.layout().next(tile, file);
         let stamp_file = || {
-            let mut out = Stamping::new(BufWriter::with_capacity(1 << 16, self.disk.create(&path)?));
+            let mut out = Stamping::new(BufWriter::with_capacity(1 << 16, self.files.disk().create(&path)?));
             write(&mut out)?;
             out.flush()?;
             Ok(out.finish().0)
