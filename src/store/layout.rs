@@ -1,4 +1,4 @@
-use super::snapshot_name::SnapshotName;
+use super::snapshots::snapshot_name::SnapshotName;
 use crate::config::Storage;
 use crate::space::TileIndex;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 use super::metadata::Metadata;
-use super::tile_stamp::{MAX_NUMBER, Stamping, TileStamp};
 use crate::error::{DecodeError, FormatError};
 use crate::space::{TileIndex, TileTable};
+use crate::store::tiles::tile_stamp::{MAX_NUMBER, Stamping, TileStamp};
 use std::io::{self, Read, Write};
 
 /// A flush to be appended to a log.
@@ -21,18 +21,18 @@ pub struct Flush<'a> {
 
 /// A flush as a log has it.
 #[derive(Debug)]
-pub(super) struct Record {
+pub(in crate::store) struct Record {
     /// Whether there is nothing else in the map.
-    pub(super) is_whole_map: bool,
-    pub(super) flush_number: u64,
-    pub(super) scan_number: u64,
-    pub(super) changed: TileTable<TileStamp>,
-    pub(super) removed: Vec<TileIndex>,
-    pub(super) metadata: Option<Metadata>,
+    pub(in crate::store) is_whole_map: bool,
+    pub(in crate::store) flush_number: u64,
+    pub(in crate::store) scan_number: u64,
+    pub(in crate::store) changed: TileTable<TileStamp>,
+    pub(in crate::store) removed: Vec<TileIndex>,
+    pub(in crate::store) metadata: Option<Metadata>,
 }
 
 /// What stands where a record may begin.
-pub(super) enum Next {
+pub(in crate::store) enum Next {
     /// A record and its length in bytes.
     Record(Box<Record>, u64),
     End,
@@ -41,7 +41,7 @@ pub(super) enum Next {
 }
 
 /// Bytes before and behind the payload.
-pub(super) const LENGTHS_BYTES: u64 = 8;
+pub(in crate::store) const LENGTHS_BYTES: u64 = 8;
 const CRC_BYTES: u64 = 4;
 const PAYLOAD_HEADER_BYTES: usize = 24;
 const INDEX_BYTES: usize = 12;
@@ -53,13 +53,18 @@ const NAMES_REMOVED: u32 = 2;
 const CHUNK_BYTES: usize = 1 << 16;
 
 /// About the length of one record of a whole map of so many tiles.
-pub(super) fn whole_map_bytes(tiles: usize) -> u64 {
+pub(in crate::store) fn whole_map_bytes(tiles: usize) -> u64 {
     (tiles * TILE_BYTES) as u64
 }
 
 impl Flush<'_> {
     /// Writes `front`, then the record. Returns the length of the record in bytes.
-    pub(super) fn write(&self, is_whole_map: bool, front: &[u8], out: &mut dyn Write) -> io::Result<u64> {
+    pub(in crate::store) fn write(
+        &self,
+        is_whole_map: bool,
+        front: &[u8],
+        out: &mut dyn Write,
+    ) -> io::Result<u64> {
         let text = self.metadata_text.unwrap_or_default();
         let mut kind = if is_whole_map { WHOLE_MAP } else { 0 };
         let mut payload_bytes = PAYLOAD_HEADER_BYTES + self.changed.len() * TILE_BYTES + text.len();
@@ -121,7 +126,11 @@ impl Chunks<'_> {
 
 impl Next {
     /// Reads what stands at `offset` of a log of `file_bytes` bytes.
-    pub(super) fn read(input: &mut impl Read, offset: u64, file_bytes: u64) -> Result<Self, DecodeError> {
+    pub(in crate::store) fn read(
+        input: &mut impl Read,
+        offset: u64,
+        file_bytes: u64,
+    ) -> Result<Self, DecodeError> {
         let wrong = |reason| FormatError::at_offset(offset, reason);
         let remaining = file_bytes - offset;
         if remaining < LENGTHS_BYTES {
@@ -236,7 +245,7 @@ impl<R: Read> Payload<R> {
         Metadata::from_text(&text).map(Some).map_err(|_| unreadable().into())
     }
 
-    fn skip_rest(mut self) -> io::Result<(super::tile_stamp::FileStamp, R)> {
+    fn skip_rest(mut self) -> io::Result<(crate::store::tiles::tile_stamp::FileStamp, R)> {
         let skipped = io::copy(&mut (&mut self.input).take(self.left), &mut io::sink())?;
         if skipped < self.left {
             return Err(io::ErrorKind::UnexpectedEof.into());

@@ -1,4 +1,4 @@
-use super::tile_stamp::MAX_NUMBER;
+use crate::store::tiles::tile_stamp::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
 /// Most inputs that a map remembers; of more it forgets the earliest.
@@ -38,7 +38,7 @@ pub struct InputContent {
 
 impl InputRecord {
     /// Whether all numbers are small enough to be true.
-    pub(super) fn is_sound(&self) -> bool {
+    pub(in crate::store) fn is_sound(&self) -> bool {
         let content = self.content.as_ref();
         self.first_scan <= MAX_NUMBER && content.is_none_or(|content| content.scans <= MAX_NUMBER)
     }

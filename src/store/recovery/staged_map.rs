@@ -1,10 +1,10 @@
-use super::disk::{Disk, EntryKind};
-use super::layout::{Layout, tile_of_folder};
-use super::map_folder::{self, Lock};
-use super::metadata::Metadata;
-use super::place;
-use super::tile_store::TileStore;
 use crate::error::{Error, Result};
+use crate::store::commit::metadata::Metadata;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::{Layout, tile_of_folder};
+use crate::store::map_folder::{self, Lock};
+use crate::store::place;
+use crate::store::tile_store::TileStore;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

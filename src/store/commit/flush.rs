@@ -2,15 +2,15 @@
 
 use super::checkpoint::TILES_SYNCED_AT_ONCE;
 use super::commit_record::Flush;
-use super::layout::TileFile;
-use super::map_files::MapFiles;
 use super::metadata::Metadata;
-use super::tile_stamp::{FileStamp, TileStamp};
-use super::tile_store::TileStore;
-use super::tile_versions::TileVersions;
-use super::tile_writer::TileWriter;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
+use crate::store::layout::TileFile;
+use crate::store::map_files::MapFiles;
+use crate::store::tile_store::TileStore;
+use crate::store::tiles::tile_stamp::{FileStamp, TileStamp};
+use crate::store::tiles::tile_versions::TileVersions;
+use crate::store::tiles::tile_writer::TileWriter;
 use std::io::{self, Write};
 
 impl TileStore {
@@ -128,18 +128,18 @@ impl TileStore {
     }
 
     /// Brings about what earlier calls left open, before anything that builds upon it is written.
-    pub(super) fn settle(&mut self) -> Result<()> {
+    pub(in crate::store) fn settle(&mut self) -> Result<()> {
         self.committer.check_lock()?;
         self.committer.settle_log(&self.files)?;
         self.run_checkpoint()
     }
 
-    pub(super) fn run_checkpoint(&mut self) -> Result<()> {
+    pub(in crate::store) fn run_checkpoint(&mut self) -> Result<()> {
         self.checkpoint.run(&self.files, &mut self.versions, &mut self.kept)
     }
 
     /// What comes after a commit. What the disk refuses of it is made good later.
-    pub(super) fn tidy_up(&mut self) -> Result<()> {
+    pub(in crate::store) fn tidy_up(&mut self) -> Result<()> {
         // At once: who opens the map in between cannot tell the writer which flush it reads.
         if self.committer.written_flush() != Some(self.commits().flush_number) {
             self.write_metadata()?;
@@ -176,7 +176,7 @@ impl TileStore {
     }
 
     /// Where `metadata.json` could not be replaced after the last commit, readers of it may have opened that commit.
-    pub(super) fn keep_for_late_readers(&mut self) {
+    pub(in crate::store) fn keep_for_late_readers(&mut self) {
         if self.is_metadata_behind() {
             let flush_number = self.commits().flush_number;
             self.kept.readers().may_see(flush_number);
@@ -184,7 +184,7 @@ impl TileStore {
     }
 
     /// Replaces `metadata.json`, durably.
-    pub(super) fn write_metadata(&mut self) -> Result<()> {
+    pub(in crate::store) fn write_metadata(&mut self) -> Result<()> {
         let watch = self.committer.write_metadata(&self.files, &self.versions)?;
         self.kept.watch(self.commits().flush_number, watch);
         self.files.sync_map_folder()

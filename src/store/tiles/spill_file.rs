@@ -1,7 +1,7 @@
-use super::tile_store::TileStore;
 use super::tile_writer::make_folder;
 use crate::error::{Error, FormatError, Result};
 use crate::space::{TileIndex, TileValue, put_number, take_number, take_u32};
+use crate::store::tile_store::TileStore;
 use std::io::{BufRead, BufReader, Read, Write};
 
 const BUFFER_BYTES: usize = 1 << 16;

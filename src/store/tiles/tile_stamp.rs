@@ -1,5 +1,5 @@
-use super::layout::TileFile;
 use crate::space::{TileValue, put_number, take_number, take_u32};
+use crate::store::layout::TileFile;
 use std::io::{self, Read, Write};
 
 /// What the log knows of one version of a tile: enough to recognise its files and to count without reading them.
@@ -30,7 +30,7 @@ pub struct FileStamp {
 pub(crate) const MAX_NUMBER: u64 = 1 << 62;
 
 impl TileStamp {
-    pub(super) const BYTES: usize = 48;
+    pub(in crate::store) const BYTES: usize = 48;
 
     /// The stamp of one of the two files.
     pub const fn of(&self, file: TileFile) -> FileStamp {
@@ -40,7 +40,7 @@ impl TileStamp {
         }
     }
 
-    pub(super) fn to_bytes(self) -> [u8; Self::BYTES] {
+    pub(in crate::store) fn to_bytes(self) -> [u8; Self::BYTES] {
         let mut bytes = [0; Self::BYTES];
         bytes[0..8].copy_from_slice(&self.scan_number.to_le_bytes());
         bytes[8..16].copy_from_slice(&self.table.bytes.to_le_bytes());
@@ -53,7 +53,7 @@ impl TileStamp {
     }
 
     /// `None` for numbers that no tile has; sums over all tiles of a map fit those that a tile can have.
-    pub(super) fn from_bytes(bytes: &[u8; Self::BYTES]) -> Option<Self> {
+    pub(in crate::store) fn from_bytes(bytes: &[u8; Self::BYTES]) -> Option<Self> {
         const MAX_FILE_BYTES: u64 = 1 << 36;
         const MAX_VOXELS: u64 = 1 << 30;
         let stamp = Self::from_any_bytes(bytes);

@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 pub struct SnapshotList(BTreeMap<SnapshotName, Option<u64>>);
 
 /// More than a map has: the list is part of `metadata.json`.
-pub(super) const MOST_SNAPSHOTS: usize = 4096;
+pub(in crate::store) const MOST_SNAPSHOTS: usize = 4096;
 
 impl SnapshotList {
     /// A list of one.
-    pub(super) fn of(name: SnapshotName, flush_number: u64) -> Self {
+    pub(in crate::store) fn of(name: SnapshotName, flush_number: u64) -> Self {
         Self(BTreeMap::from([(name, Some(flush_number))]))
     }
 
@@ -23,7 +23,7 @@ impl SnapshotList {
     }
 
     /// Takes a name off the list; whether it was there.
-    pub(super) fn remove(&mut self, name: &SnapshotName) -> bool {
+    pub(in crate::store) fn remove(&mut self, name: &SnapshotName) -> bool {
         self.0.remove(name).is_some()
     }
 
@@ -53,7 +53,7 @@ impl SnapshotList {
     }
 
     /// Every flush that is named.
-    pub(super) fn flushes(&self) -> impl Iterator<Item = u64> {
+    pub(in crate::store) fn flushes(&self) -> impl Iterator<Item = u64> {
         self.0.values().copied().flatten()
     }
 }

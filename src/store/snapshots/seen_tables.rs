@@ -1,22 +1,22 @@
-use super::commit_log::Commits;
-use super::disk::Disk;
-use super::layout::Layout;
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
 use crate::error::{Error, Result};
 use crate::space::{TileIndex, TileTable};
+use crate::store::commit::commit_log::Commits;
+use crate::store::disk::Disk;
+use crate::store::layout::Layout;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 
 /// Tables that were kept when they were replaced: for each tile, the flushes that they were the last version of.
-pub(super) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
+pub(in crate::store) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
 
 /// Which tables a map's snapshots see, so that its writer keeps them.
 ///
 /// A snapshot of flush `n` sees of each of its tiles the table that was kept as of the first flush not before `n`, and if
 /// none was, the one in place: it is readers' rule, and needs nothing but names.
 #[derive(Debug, Default)]
-pub(super) struct Snapshots {
+pub(in crate::store) struct Snapshots {
     /// Tiles of which a snapshot sees the table in place.
     shared: TileTable<()>,
     /// Kept tables that a snapshot sees.
@@ -36,7 +36,7 @@ impl Snapshots {
     /// # Errors
     ///
     /// A disk that refuses more than one file.
-    pub(super) fn look(
+    pub(in crate::store) fn look(
         disk: &dyn Disk,
         layout: &Layout,
         map_id: [u8; 16],
@@ -98,7 +98,7 @@ impl Snapshots {
     }
 
     /// The snapshots that were found, and the flushes that they are of.
-    pub(super) fn found(&self) -> &SnapshotList {
+    pub(in crate::store) fn found(&self) -> &SnapshotList {
         &self.found
     }
 
@@ -116,37 +116,37 @@ impl Snapshots {
     }
 
     /// Notes that there is a snapshot of the map as it is.
-    pub(super) fn share(&mut self, tiles: impl Iterator<Item = TileIndex>) {
+    pub(in crate::store) fn share(&mut self, tiles: impl Iterator<Item = TileIndex>) {
         self.shared.extend(tiles.map(|tile| (tile, ())));
     }
 
     /// Whether a snapshot sees the table in place.
-    pub(super) fn sees_present(&self, tile: TileIndex) -> bool {
+    pub(in crate::store) fn sees_present(&self, tile: TileIndex) -> bool {
         self.see_all || self.shared.contains(tile)
     }
 
     /// Whether a snapshot sees the table that was kept as of a flush.
-    pub(super) fn sees_kept(&self, tile: TileIndex, flush_number: u64) -> bool {
+    pub(in crate::store) fn sees_kept(&self, tile: TileIndex, flush_number: u64) -> bool {
         self.pinned.get(&tile).is_some_and(|flushes| flushes.contains(&flush_number))
     }
 
     /// Notes that the table in place was kept as of a flush for the snapshots that see it.
-    pub(super) fn pin(&mut self, tile: TileIndex, flush_number: u64) {
+    pub(in crate::store) fn pin(&mut self, tile: TileIndex, flush_number: u64) {
         self.pinned.entry(tile).or_default().insert(flush_number);
     }
 
     /// Notes that what was kept of the table in place is durable: what takes its place is seen by no snapshot yet.
-    pub(super) fn has_replaced(&mut self, tile: TileIndex) {
+    pub(in crate::store) fn has_replaced(&mut self, tile: TileIndex) {
         self.shared.remove(tile);
     }
 
     /// Every kept table that a snapshot sees.
-    pub(super) fn pinned(&self) -> &KeptFlushes {
+    pub(in crate::store) fn pinned(&self) -> &KeptFlushes {
         &self.pinned
     }
 
     /// Bytes of memory, about.
-    pub(super) fn bytes(&self) -> usize {
+    pub(in crate::store) fn bytes(&self) -> usize {
         // A set of few numbers takes a leaf of its tree.
         const FLUSHES_BYTES: usize = 120;
         let slot = size_of::<TileIndex>() + 1;
@@ -157,6 +157,6 @@ impl Snapshots {
 }
 
 /// Which of a tile's kept tables a snapshot of a flush sees; `None` if the one in place.
-pub(super) fn seen_by(kept: Option<&BTreeSet<u64>>, flush_number: u64) -> Option<u64> {
+pub(in crate::store) fn seen_by(kept: Option<&BTreeSet<u64>>, flush_number: u64) -> Option<u64> {
     kept?.range(flush_number..).next().copied()
 }

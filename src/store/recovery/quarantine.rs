@@ -1,6 +1,6 @@
-use super::disk::{Disk, EntryKind};
-use super::layout::Layout;
 use crate::error::{Error, Result, is_of_medium};
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::Layout;
 use std::io;
 use std::path::{Path, PathBuf};
 

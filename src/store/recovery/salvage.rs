@@ -1,10 +1,10 @@
-use super::commit_log::{CommitLog, Commits};
-use super::disk::Disk;
-use super::layout::{Layout, TileFile, tile_of_folder};
-use super::map_folder;
-use super::metadata::Metadata;
 use crate::config::Storage;
 use crate::error::{DecodeError, Error, FormatError, Result, is_of_medium};
+use crate::store::commit::commit_log::{CommitLog, Commits};
+use crate::store::commit::metadata::Metadata;
+use crate::store::disk::Disk;
+use crate::store::layout::{Layout, TileFile, tile_of_folder};
+use crate::store::map_folder;
 use std::io;
 use std::path::Path;
 

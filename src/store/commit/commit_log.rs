@@ -1,9 +1,9 @@
 use super::commit_record::{Flush, Next, Record};
-use super::disk::Disk;
 use super::metadata::Metadata;
-use super::tile_stamp::TileStamp;
 use crate::error::{DecodeError, FormatError};
 use crate::space::{TileIndex, TileTable};
+use crate::store::disk::Disk;
+use crate::store::tiles::tile_stamp::TileStamp;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -50,7 +50,7 @@ const HEADER_BYTES: usize = 32;
 
 impl CommitLog {
     /// The log of a map of which nothing is written yet.
-    pub(super) fn of_map(map_id: [u8; 16]) -> Self {
+    pub(in crate::store) fn of_map(map_id: [u8; 16]) -> Self {
         Self { map_id, bytes: 0 }
     }
 

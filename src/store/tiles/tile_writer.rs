@@ -1,10 +1,10 @@
-use super::disk::{Disk, EntryKind};
-use super::layout::TileFile;
-use super::map_files::MapFiles;
 use super::tile_stamp::{FileStamp, Stamping};
 use crate::config::Storage;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::TileFile;
+use crate::store::map_files::MapFiles;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
@@ -14,8 +14,8 @@ use std::path::Path;
 /// the name that is written to. Not to be used any more once the map has committed.
 #[derive(Clone, Debug)]
 pub struct TileWriter {
-    pub(super) files: MapFiles,
-    pub(super) map_id: [u8; 16],
+    pub(in crate::store) files: MapFiles,
+    pub(in crate::store) map_id: [u8; 16],
 }
 
 impl TileWriter {
@@ -53,7 +53,7 @@ impl TileWriter {
 }
 
 /// Makes the folder of a tile if it is not there.
-pub(super) fn make_folder(disk: &dyn Disk, folder: &Path) -> Result<()> {
+pub(in crate::store) fn make_folder(disk: &dyn Disk, folder: &Path) -> Result<()> {
     match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
         Some(EntryKind::Folder) => Ok(()),
         None => disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error)),

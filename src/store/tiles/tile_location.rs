@@ -1,8 +1,8 @@
-use super::disk::{Disk, DiskRead, EntryKind};
 use super::tile_stamp::{Stamping, TileStamp};
 use crate::config::Storage;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
+use crate::store::disk::{Disk, DiskRead, EntryKind};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,13 +10,13 @@ use std::sync::Arc;
 /// Where a tile's table is, and what is known of it.
 #[derive(Clone, Debug)]
 pub struct TileLocation {
-    pub(super) disk: Arc<dyn Disk>,
-    pub(super) tile: TileIndex,
-    pub(super) folder: PathBuf,
-    pub(super) path: PathBuf,
-    pub(super) map_id: Option<[u8; 16]>,
-    pub(super) stamp: Option<TileStamp>,
-    pub(super) storage: Storage,
+    pub(in crate::store) disk: Arc<dyn Disk>,
+    pub(in crate::store) tile: TileIndex,
+    pub(in crate::store) folder: PathBuf,
+    pub(in crate::store) path: PathBuf,
+    pub(in crate::store) map_id: Option<[u8; 16]>,
+    pub(in crate::store) stamp: Option<TileStamp>,
+    pub(in crate::store) storage: Storage,
 }
 
 /// A tile's table as it is stored, ready to be read.

@@ -1,12 +1,12 @@
-use super::disk::EntryKind;
-use super::kept_tables::KeptTables;
-use super::layout::TileFile;
-use super::map_files::MapFiles;
-use super::quarantine::Quarantine;
-use super::snapshot_name::SnapshotName;
-use super::tile_versions::TileVersions;
 use crate::error::{Error, Result};
 use crate::space::{TileIndex, TileTable};
+use crate::store::disk::EntryKind;
+use crate::store::layout::TileFile;
+use crate::store::map_files::MapFiles;
+use crate::store::recovery::quarantine::Quarantine;
+use crate::store::snapshots::kept_tables::KeptTables;
+use crate::store::snapshots::snapshot_name::SnapshotName;
+use crate::store::tiles::tile_versions::TileVersions;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use std::path::Path;
 ///
 /// Until that is done and durable, nothing may be written under the names in question, which a crash could bring back.
 #[derive(Debug, Default)]
-pub(super) struct Checkpoint {
+pub(in crate::store) struct Checkpoint {
     /// Committed versions that still have their `*.next` names.
     unrenamed: TileTable<()>,
     /// Tiles whose versions have their names, but perhaps not on the medium.
@@ -28,11 +28,11 @@ pub(super) struct Checkpoint {
 }
 
 /// Tiles whose files are synced at once: their paths take several times the memory of what else is known of them.
-pub(super) const TILES_SYNCED_AT_ONCE: usize = 4096;
+pub(in crate::store) const TILES_SYNCED_AT_ONCE: usize = 4096;
 
 impl Checkpoint {
     /// What a writer that was killed left to do.
-    pub(super) fn of_leftovers(
+    pub(in crate::store) fn of_leftovers(
         unrenamed: TileTable<()>,
         renamed: TileTable<()>,
         removed: &[TileIndex],
@@ -42,28 +42,28 @@ impl Checkpoint {
     }
 
     /// Adds what a commit leaves to do.
-    pub(super) fn add(&mut self, changed: impl Iterator<Item = TileIndex>, removed: &[TileIndex]) {
+    pub(in crate::store) fn add(&mut self, changed: impl Iterator<Item = TileIndex>, removed: &[TileIndex]) {
         self.unrenamed.extend(changed.map(|tile| (tile, ())));
         self.unremoved.extend(removed);
     }
 
     /// Adds that a committed snapshot gets its name.
-    pub(super) fn name_snapshot(&mut self, name: &SnapshotName) {
+    pub(in crate::store) fn name_snapshot(&mut self, name: &SnapshotName) {
         self.unnamed_snapshot = Some(name.clone());
     }
 
     /// Adds that a deleted snapshot loses its file.
-    pub(super) fn remove_snapshot(&mut self, name: &SnapshotName) {
+    pub(in crate::store) fn remove_snapshot(&mut self, name: &SnapshotName) {
         self.deleted_snapshot = Some(name.clone());
     }
 
     /// Whether the committed version of a tile still has its `*.next` name.
-    pub(super) fn is_unrenamed(&self, tile: TileIndex) -> bool {
+    pub(in crate::store) fn is_unrenamed(&self, tile: TileIndex) -> bool {
         self.unrenamed.contains(tile)
     }
 
     /// Does what is left to do, durably. After an error calling again goes on.
-    pub(super) fn run(
+    pub(in crate::store) fn run(
         &mut self,
         files: &MapFiles,
         versions: &mut TileVersions,

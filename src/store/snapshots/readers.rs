@@ -1,7 +1,7 @@
-use super::disk::{Disk, ReaderWatch};
-use super::layout::Layout;
-use super::snapshots::{KeptFlushes, Snapshots};
+use super::seen_tables::{KeptFlushes, Snapshots};
 use crate::space::TileIndex;
+use crate::store::disk::{Disk, ReaderWatch};
+use crate::store::layout::Layout;
 use rustc_hash::FxHashMap;
 use std::io;
 
@@ -11,7 +11,7 @@ use std::io;
 /// A reader holds `metadata.json` open as it was when it opened the map. Every flush puts another file in its place,
 /// so the writer, which watches over all of these files, knows which flushes are being read.
 #[derive(Default)]
-pub(super) struct Readers {
+pub(in crate::store) struct Readers {
     /// The `metadata.json` of past flushes and of the present one, in order.
     watched: Vec<Watched>,
     /// Tables that were kept for readers alone.
@@ -29,29 +29,29 @@ struct Watched {
 
 impl Readers {
     /// Watches over the present `metadata.json`, which a flush has written.
-    pub(super) fn watch(&mut self, flush_number: u64, metadata: Box<dyn ReaderWatch>) {
+    pub(in crate::store) fn watch(&mut self, flush_number: u64, metadata: Box<dyn ReaderWatch>) {
         self.watched.push(Watched { first: flush_number, last: flush_number, watch: metadata });
     }
 
     /// Notes that the present `metadata.json` could not be replaced after a flush, so that who holds it may see that one.
-    pub(super) fn may_see(&mut self, flush_number: u64) {
+    pub(in crate::store) fn may_see(&mut self, flush_number: u64) {
         if let Some(present) = self.watched.last_mut() {
             present.last = present.last.max(flush_number);
         }
     }
 
     /// Notes that a flush brings a tile into the map: who reads an earlier one does not miss it.
-    pub(super) fn note_birth(&mut self, tile: TileIndex, flush_number: u64) {
+    pub(in crate::store) fn note_birth(&mut self, tile: TileIndex, flush_number: u64) {
         self.born.insert(tile, flush_number);
     }
 
     /// Whether anybody reads the map.
-    pub(super) fn are_there(&self) -> bool {
+    pub(in crate::store) fn are_there(&self) -> bool {
         self.watched.iter().any(|watched| watched.watch.has_readers())
     }
 
     /// Looks who is still there.
-    pub(super) fn look(&mut self) {
+    pub(in crate::store) fn look(&mut self) {
         let present = self.watched.last().map(|present| present.first);
         self.watched.retain(|watched| Some(watched.first) == present || watched.watch.has_readers());
         let oldest = self.watched.first().map_or(u64::MAX, |watched| watched.first);
@@ -60,7 +60,7 @@ impl Readers {
 
     /// Whether a reader sees the table in place that was the last version as of a flush, among those of that time or
     /// earlier.
-    pub(super) fn see(&self, tile: TileIndex, flush_number: u64, snapshots: &Snapshots) -> bool {
+    pub(in crate::store) fn see(&self, tile: TileIndex, flush_number: u64, snapshots: &Snapshots) -> bool {
         let flushes = [self.kept.get(&tile), snapshots.pinned().get(&tile)];
         let before = flushes.into_iter().flatten().filter_map(|kept| kept.range(..flush_number).next_back());
         // Who reads a flush up to that one sees an earlier table; so does who reads one from before the tile was there.
@@ -73,12 +73,12 @@ impl Readers {
     }
 
     /// Notes that a table as of a flush was kept.
-    pub(super) fn keep(&mut self, tile: TileIndex, flush_number: u64) {
+    pub(in crate::store) fn keep(&mut self, tile: TileIndex, flush_number: u64) {
         self.kept.entry(tile).or_default().insert(flush_number);
     }
 
     /// Removes the tables that no reader sees any more.
-    pub(super) fn release(&mut self, disk: &dyn Disk, layout: &Layout, snapshots: &Snapshots) {
+    pub(in crate::store) fn release(&mut self, disk: &dyn Disk, layout: &Layout, snapshots: &Snapshots) {
         self.look();
         let mut unseen = Vec::new();
         for (&tile, flushes) in &self.kept {

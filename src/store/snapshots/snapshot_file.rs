@@ -1,13 +1,13 @@
 //! The files in `snapshots/`: each a commit log of one record, the whole map as of a flush.
 
-use super::commit_log::{CommitLog, Commits};
-use super::disk::{Disk, EntryKind};
-use super::layout::Layout;
-use super::metadata::Metadata;
 use super::snapshot_list::SnapshotList;
 use super::snapshot_name::SnapshotName;
-use super::tile_store::hex;
 use crate::error::{Error, FormatError, Result};
+use crate::store::commit::commit_log::{CommitLog, Commits};
+use crate::store::commit::metadata::Metadata;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::Layout;
+use crate::store::tile_store::hex;
 use std::io;
 use std::path::Path;
 
@@ -48,7 +48,7 @@ impl Snapshot {
     /// # Errors
     ///
     /// Something else that has the name of the folder; a disk that refuses.
-    pub(super) fn has_folder(disk: &dyn Disk, layout: &Layout) -> Result<bool> {
+    pub(in crate::store) fn has_folder(disk: &dyn Disk, layout: &Layout) -> Result<bool> {
         let folder = layout.snapshots();
         match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
             Some(EntryKind::Folder) => Ok(true),
@@ -162,7 +162,7 @@ impl Snapshot {
     }
 
     /// Whether the file has the name that is in it.
-    pub(super) fn has_own_name(&self) -> bool {
+    pub(in crate::store) fn has_own_name(&self) -> bool {
         self.name_inside() == Some(&self.name)
     }
 }

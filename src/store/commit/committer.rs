@@ -1,16 +1,16 @@
 use super::commit_log::{CommitLog, Commits};
 use super::commit_record::{Flush, whole_map_bytes};
-use super::disk::ReaderWatch;
-use super::map_files::MapFiles;
-use super::map_folder::{self, Lock};
 use super::metadata::{Bounds, Metadata};
-use super::snapshot_list::SnapshotList;
-use super::tile_versions::TileVersions;
 use crate::error::{Error, Result};
+use crate::store::disk::ReaderWatch;
+use crate::store::map_files::MapFiles;
+use crate::store::map_folder::{self, Lock};
+use crate::store::snapshots::snapshot_list::SnapshotList;
+use crate::store::tiles::tile_versions::TileVersions;
 
 /// The map's own two files, `commits.log` and `metadata.json`, and the lock that lets only one process write them.
 #[derive(Debug)]
-pub(super) struct Committer {
+pub(in crate::store) struct Committer {
     /// `None` for a map of the seed's format, and for nothing else.
     log: Option<CommitLog>,
     /// Whether the log ends with its last commit. After a failed append its end is unknown.
@@ -30,7 +30,11 @@ pub(super) struct Committer {
 const COMPACT_LOG_BYTES: u64 = 2048;
 
 impl Committer {
-    pub(super) fn new(log: Option<CommitLog>, metadata: Metadata, written_flush: Option<u64>) -> Self {
+    pub(in crate::store) fn new(
+        log: Option<CommitLog>,
+        metadata: Metadata,
+        written_flush: Option<u64>,
+    ) -> Self {
         let listed = metadata.ext.as_ref().and_then(|ext| ext.snapshots.clone());
         let (is_log_settled, is_list_logged, lock) = (true, true, None);
         Self { log, is_log_settled, metadata, written_flush, listed, is_list_logged, lock }
@@ -38,23 +42,23 @@ impl Committer {
 
     /// Holds the lock from here on, so that the map may be written. `is_torn` tells whether the log ends with a record that
     /// is not whole.
-    pub(super) fn begin_writing(&mut self, lock: Lock, is_torn: bool) {
+    pub(in crate::store) fn begin_writing(&mut self, lock: Lock, is_torn: bool) {
         self.lock = Some(lock);
         self.is_log_settled = !is_torn;
     }
 
     /// Whether the map may be written.
-    pub(super) fn is_writer(&self) -> bool {
+    pub(in crate::store) fn is_writer(&self) -> bool {
         self.lock.is_some()
     }
 
     /// Checks that the lock still keeps others from writing.
-    pub(super) fn check_lock(&self) -> Result<()> {
+    pub(in crate::store) fn check_lock(&self) -> Result<()> {
         self.lock.as_ref().map_or(Ok(()), Lock::check)
     }
 
     /// The map's id; `None` for a map of the seed's format.
-    pub(super) fn map_id(&self) -> Option<[u8; 16]> {
+    pub(in crate::store) fn map_id(&self) -> Option<[u8; 16]> {
         self.log.map(|log| log.map_id())
     }
 
@@ -63,39 +67,39 @@ impl Committer {
     /// # Errors
     ///
     /// A map of the seed's format has none.
-    pub(super) fn logged_map_id(&self) -> Result<[u8; 16]> {
+    pub(in crate::store) fn logged_map_id(&self) -> Result<[u8; 16]> {
         let reason = "a map of the seed's format must be adopted first";
         self.map_id().ok_or_else(|| Error::argument("map", reason))
     }
 
     /// The metadata as last read or written.
-    pub(super) fn metadata(&self) -> &Metadata {
+    pub(in crate::store) fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
     /// Flush number in the `metadata.json` on disk.
-    pub(super) fn written_flush(&self) -> Option<u64> {
+    pub(in crate::store) fn written_flush(&self) -> Option<u64> {
         self.written_flush
     }
 
     /// Whether `metadata.json` is older than the log, which ends with this flush.
-    pub(super) fn is_metadata_behind(&self, flush_number: u64) -> bool {
+    pub(in crate::store) fn is_metadata_behind(&self, flush_number: u64) -> bool {
         self.log.is_some() && self.written_flush != Some(flush_number)
     }
 
     /// Which snapshots the map has, if anything says so.
-    pub(super) fn snapshots(&self) -> Option<&SnapshotList> {
+    pub(in crate::store) fn snapshots(&self) -> Option<&SnapshotList> {
         self.listed.as_ref()
     }
 
     /// Takes over which snapshots were found: the next commit lists them.
-    pub(super) fn adopt_snapshots(&mut self, found: SnapshotList) {
+    pub(in crate::store) fn adopt_snapshots(&mut self, found: SnapshotList) {
         self.listed = Some(found);
         self.is_list_logged = false;
     }
 
     /// Metadata with what the store knows better than its callers: bounds, numbers, storage and snapshots.
-    pub(super) fn fill_in(
+    pub(in crate::store) fn fill_in(
         &self,
         mut metadata: Metadata,
         files: &MapFiles,
@@ -113,14 +117,19 @@ impl Committer {
     }
 
     /// Whether a commit has to say what the metadata is.
-    pub(super) fn is_new(&self, metadata: &Metadata) -> bool {
+    pub(in crate::store) fn is_new(&self, metadata: &Metadata) -> bool {
         !self.is_list_logged
             || self.metadata.ext.is_none()
             || !self.metadata.is_same_but_for_progress(metadata)
     }
 
     /// Appends a record and syncs it: the commit. After an error the end of the log is unknown, until it is settled.
-    pub(super) fn append(&mut self, files: &MapFiles, flush: &Flush<'_>, metadata: &Metadata) -> Result<()> {
+    pub(in crate::store) fn append(
+        &mut self,
+        files: &MapFiles,
+        flush: &Flush<'_>,
+        metadata: &Metadata,
+    ) -> Result<()> {
         self.logged_map_id()?;
         let Some(mut log) = self.log else { return Ok(()) };
         let path = files.layout().commit_log();
@@ -135,7 +144,7 @@ impl Committer {
 
     /// Cuts off what a failed append may have left. A record that came to disk after all names files that must stay as they
     /// are until then.
-    pub(super) fn settle_log(&mut self, files: &MapFiles) -> Result<()> {
+    pub(in crate::store) fn settle_log(&mut self, files: &MapFiles) -> Result<()> {
         if let (false, Some(log)) = (self.is_log_settled, self.log) {
             let path = files.layout().commit_log();
             log.cut(&**files.disk(), &path).map_err(|error| Error::io(&path, "cut", error))?;
@@ -146,7 +155,12 @@ impl Committer {
     }
 
     /// Gives a map of the seed's format an id and a log.
-    pub(super) fn begin_log(&mut self, files: &MapFiles, map_id: [u8; 16], commits: &Commits) -> Result<()> {
+    pub(in crate::store) fn begin_log(
+        &mut self,
+        files: &MapFiles,
+        map_id: [u8; 16],
+        commits: &Commits,
+    ) -> Result<()> {
         if self.log.is_none() {
             let (disk, text) = (&**files.disk(), self.metadata.to_text());
             let log = map_folder::replace(disk, &files.layout().commit_log(), |next| {
@@ -158,7 +172,7 @@ impl Committer {
     }
 
     /// Replaces the log by one record of the whole map.
-    pub(super) fn replace_log(&mut self, files: &MapFiles, commits: &Commits) -> Result<()> {
+    pub(in crate::store) fn replace_log(&mut self, files: &MapFiles, commits: &Commits) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
         let mut metadata = self.metadata.clone();
         if let Some(ext) = &mut metadata.ext {
@@ -175,7 +189,7 @@ impl Committer {
     }
 
     /// Replaces the log by one record of the whole map, if that makes it much shorter.
-    pub(super) fn compact_log(&mut self, files: &MapFiles, commits: &Commits) -> Result<()> {
+    pub(in crate::store) fn compact_log(&mut self, files: &MapFiles, commits: &Commits) -> Result<()> {
         let Some(log) = self.log else { return Ok(()) };
         let whole_bytes = whole_map_bytes(commits.tiles.len());
         match log.bytes() < COMPACT_LOG_BYTES.max(2 * whole_bytes) {
@@ -186,7 +200,7 @@ impl Committer {
 
     /// Replaces `metadata.json`: written beside, synced, renamed. The caller syncs the folder, once it watches for readers of
     /// the new file by what is returned.
-    pub(super) fn write_metadata(
+    pub(in crate::store) fn write_metadata(
         &mut self,
         files: &MapFiles,
         versions: &TileVersions,
@@ -205,7 +219,7 @@ impl Committer {
 
     /// Commits which snapshots the map has, and nothing else. It is a flush of its own in the log, so that whatever ends the
     /// process is found like any other.
-    pub(super) fn append_snapshots(
+    pub(in crate::store) fn append_snapshots(
         &mut self,
         files: &MapFiles,
         versions: &TileVersions,

@@ -1,13 +1,13 @@
-use super::commit_log::Commits;
-use super::disk::{Disk, EntryKind};
-use super::layout::{Layout, SPILL, tile_of_folder};
-use super::snapshot_file::Snapshot;
-use super::snapshot_list::SnapshotList;
-use super::snapshot_name::SnapshotName;
-use super::snapshots::{KeptFlushes, Snapshots};
-use super::tile_stamp::{FileStamp, Stamping, TileStamp};
 use crate::error::{Error, Result, is_of_medium};
 use crate::space::{TileIndex, TileTable};
+use crate::store::commit::commit_log::Commits;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::{Layout, SPILL, tile_of_folder};
+use crate::store::snapshots::seen_tables::{KeptFlushes, Snapshots};
+use crate::store::snapshots::snapshot_file::Snapshot;
+use crate::store::snapshots::snapshot_list::SnapshotList;
+use crate::store::snapshots::snapshot_name::SnapshotName;
+use crate::store::tiles::tile_stamp::{FileStamp, Stamping, TileStamp};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::io;
@@ -18,7 +18,7 @@ const OWN_NEXT: [&str; 2] = ["metadata.json.next", "commits.log.next"];
 
 /// What a crash left behind that is not to be removed.
 #[derive(Debug, Default)]
-pub(super) struct Leftovers {
+pub(in crate::store) struct Leftovers {
     /// Committed versions that still have their `*.next` names.
     pub unrenamed: TileTable<()>,
     /// Tiles of the last commit that have their names, but perhaps not on the medium.
@@ -37,7 +37,7 @@ pub(super) struct Leftovers {
 /// Safe to repeat and to break off anywhere.
 ///
 /// A file or folder that the medium refuses to show is left as it is: reading its tile tells, and the others go on.
-pub(super) fn recover(
+pub(in crate::store) fn recover(
     disk: &dyn Disk,
     layout: &Layout,
     commits: &Commits,
@@ -130,7 +130,7 @@ fn settle_snapshots(
 }
 
 /// Removes what an attempt to give tiles of the seed's format their trailers left. Returns how many files.
-pub(super) fn remove_uncommitted(
+pub(in crate::store) fn remove_uncommitted(
     disk: &dyn Disk,
     layout: &Layout,
     tiles: &FxHashSet<TileIndex>,

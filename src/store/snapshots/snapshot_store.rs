@@ -1,18 +1,18 @@
 //! Snapshots of a [`TileStore`]: made, deleted, and opened like the map itself.
 
-use super::commit_log::{CommitLog, Commits};
-use super::disk::{Disk, EntryKind};
-use super::layout::Layout;
-use super::layout::TileFile;
-use super::map_folder;
-use super::metadata::Metadata;
+use super::seen_tables::Snapshots;
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::{MOST_SNAPSHOTS, SnapshotList};
 use super::snapshot_name::SnapshotName;
-use super::snapshots::Snapshots;
-use super::tile_store::{TileStore, id_from_hex};
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
+use crate::store::commit::commit_log::{CommitLog, Commits};
+use crate::store::commit::metadata::Metadata;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::Layout;
+use crate::store::layout::TileFile;
+use crate::store::map_folder;
+use crate::store::tile_store::{TileStore, id_from_hex};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;

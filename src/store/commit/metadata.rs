@@ -1,11 +1,11 @@
 use super::commit_log::Commits;
 use super::input_record::InputRecord;
-use super::snapshot_list::SnapshotList;
-use super::tile_stamp::MAX_NUMBER;
 use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;
 use crate::sensor::SensorModel;
 use crate::space::TileIndex;
+use crate::store::snapshots::snapshot_list::SnapshotList;
+use crate::store::tiles::tile_stamp::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
 /// What `metadata.json` says: the seed's keys, and voxtile's own in a last object `ext`.
@@ -156,7 +156,7 @@ impl Metadata {
     }
 
     /// The same as of a commit: its tiles' hull and its numbers.
-    pub(super) fn as_of(&self, commits: &Commits) -> Self {
+    pub(in crate::store) fn as_of(&self, commits: &Commits) -> Self {
         let mut metadata = Self { bounds: Bounds::of(commits.tiles.tiles()), ..self.clone() };
         if let Some(ext) = &mut metadata.ext {
             ext.empty = metadata.bounds.is_none();
@@ -166,7 +166,7 @@ impl Metadata {
     }
 
     /// Whether the two say the same but for what every flush brings: bounds and numbers.
-    pub(super) fn is_same_but_for_progress(&self, other: &Self) -> bool {
+    pub(in crate::store) fn is_same_but_for_progress(&self, other: &Self) -> bool {
         let without_progress = |metadata: &Self| {
             let mut metadata = Self { bounds: None, ..metadata.clone() };
             if let Some(ext) = &mut metadata.ext {

@@ -1,12 +1,12 @@
-use super::commit_log::Commits;
 use super::tile_stamp::TileStamp;
 use crate::space::{TileIndex, TileTable};
+use crate::store::commit::commit_log::Commits;
 use rustc_hash::FxHashSet;
 
 /// Which tiles a map has on disk and which version of each is the latest: the last commit, and what was written or removed
 /// since.
 #[derive(Debug, Default)]
-pub(super) struct TileVersions {
+pub(in crate::store) struct TileVersions {
     commits: Commits,
     /// Versions written since the last commit.
     next: TileTable<TileStamp>,
@@ -25,79 +25,79 @@ pub(super) struct TileVersions {
 const COMMIT_BYTES_OF_TILE: usize = 30;
 
 impl TileVersions {
-    pub(super) fn new(commits: Commits) -> Self {
+    pub(in crate::store) fn new(commits: Commits) -> Self {
         Self { commits, ..Self::default() }
     }
 
     /// The tiles of a map of the seed's format.
-    pub(super) fn of_foreign(foreign: FxHashSet<TileIndex>) -> Self {
+    pub(in crate::store) fn of_foreign(foreign: FxHashSet<TileIndex>) -> Self {
         Self { foreign, ..Self::default() }
     }
 
-    pub(super) fn set_strays(&mut self, strays: FxHashSet<TileIndex>) {
+    pub(in crate::store) fn set_strays(&mut self, strays: FxHashSet<TileIndex>) {
         self.strays = strays;
     }
 
     /// The last commit.
-    pub(super) fn commits(&self) -> &Commits {
+    pub(in crate::store) fn commits(&self) -> &Commits {
         &self.commits
     }
 
     /// What is known of the latest version of a tile.
-    pub(super) fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
+    pub(in crate::store) fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
         let committed = || self.commits.tiles.get(tile).filter(|_| !self.removed.contains(&tile));
         self.next.get(tile).or_else(committed)
     }
 
     /// What is known of the latest version of each tile, in no particular order.
-    pub(super) fn stamps(&self) -> impl Iterator<Item = TileStamp> {
+    pub(in crate::store) fn stamps(&self) -> impl Iterator<Item = TileStamp> {
         let is_latest = |tile: TileIndex| !self.removed.contains(&tile) && !self.next.contains(tile);
         let committed = self.commits.tiles.iter().filter(move |(tile, _)| is_latest(*tile));
         self.next.values().chain(committed.map(|(_, stamp)| stamp))
     }
 
     /// Whether the tile has a version on disk, committed or not.
-    pub(super) fn contains(&self, tile: TileIndex) -> bool {
+    pub(in crate::store) fn contains(&self, tile: TileIndex) -> bool {
         self.stamp(tile).is_some() || self.foreign.contains(&tile) || self.strays.contains(&tile)
     }
 
     /// The tiles that have a version on disk, in no particular order.
-    pub(super) fn tiles(&self) -> impl Iterator<Item = TileIndex> {
+    pub(in crate::store) fn tiles(&self) -> impl Iterator<Item = TileIndex> {
         let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile));
         let committed = self.commits.tiles.tiles().filter(|tile| !self.removed.contains(tile));
         committed.chain(self.foreign.iter().copied()).chain(uncommitted)
     }
 
     /// Number of tiles that have a version on disk.
-    pub(super) fn count(&self) -> usize {
+    pub(in crate::store) fn count(&self) -> usize {
         let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile)).count();
         self.commits.tiles.len() - self.removed.len() + self.foreign.len() + uncommitted
     }
 
     /// Whether the latest version of a tile is not committed.
-    pub(super) fn is_uncommitted(&self, tile: TileIndex) -> bool {
+    pub(in crate::store) fn is_uncommitted(&self, tile: TileIndex) -> bool {
         self.next.contains(tile)
     }
 
-    pub(super) fn is_foreign(&self, tile: TileIndex) -> bool {
+    pub(in crate::store) fn is_foreign(&self, tile: TileIndex) -> bool {
         self.foreign.contains(&tile)
     }
 
-    pub(super) fn foreign(&self) -> &FxHashSet<TileIndex> {
+    pub(in crate::store) fn foreign(&self) -> &FxHashSet<TileIndex> {
         &self.foreign
     }
 
-    pub(super) fn is_stray(&self, tile: TileIndex) -> bool {
+    pub(in crate::store) fn is_stray(&self, tile: TileIndex) -> bool {
         self.strays.contains(&tile)
     }
 
     /// The tile folders that the log does not name, in order.
-    pub(super) fn strays(&self) -> Vec<TileIndex> {
+    pub(in crate::store) fn strays(&self) -> Vec<TileIndex> {
         sorted(&self.strays)
     }
 
     /// Bytes of memory.
-    pub(super) fn bytes(&self) -> usize {
+    pub(in crate::store) fn bytes(&self) -> usize {
         self.commits.tiles.bytes()
             + self.commits.last_changed.bytes()
             + self.next.bytes()
@@ -105,27 +105,27 @@ impl TileVersions {
     }
 
     /// Bytes of memory that the next commit takes on top.
-    pub(super) fn commit_bytes(&self) -> usize {
+    pub(in crate::store) fn commit_bytes(&self) -> usize {
         self.next.len() * COMMIT_BYTES_OF_TILE
     }
 
     // What was written since the last commit.
 
     /// Notes that the next version of a tile is written.
-    pub(super) fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
+    pub(in crate::store) fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
         self.suspect.remove(&tile);
         self.removed.remove(&tile);
         self.next.insert(tile, stamp);
     }
 
     /// Forgets the next version of a tile, as if it had not been written.
-    pub(super) fn drop_next(&mut self, tile: TileIndex) {
+    pub(in crate::store) fn drop_next(&mut self, tile: TileIndex) {
         self.suspect.remove(&tile);
         self.next.remove(tile);
     }
 
     /// Notes that the next commit takes a tile out of the map.
-    pub(super) fn remove(&mut self, tile: TileIndex) {
+    pub(in crate::store) fn remove(&mut self, tile: TileIndex) {
         self.drop_next(tile);
         if self.commits.tiles.contains(tile) {
             self.removed.insert(tile);
@@ -133,29 +133,29 @@ impl TileVersions {
     }
 
     /// The versions written since the last commit.
-    pub(super) fn next(&self) -> &TileTable<TileStamp> {
+    pub(in crate::store) fn next(&self) -> &TileTable<TileStamp> {
         &self.next
     }
 
     /// The tiles that the next commit takes out of the map, in order.
-    pub(super) fn removed(&self) -> Vec<TileIndex> {
+    pub(in crate::store) fn removed(&self) -> Vec<TileIndex> {
         sorted(&self.removed)
     }
 
     /// Notes that the next version of a tile could not be synced.
-    pub(super) fn suspect(&mut self, tile: TileIndex) {
+    pub(in crate::store) fn suspect(&mut self, tile: TileIndex) {
         self.suspect.insert(tile);
     }
 
     /// The tiles whose next version could not be synced, in order.
-    pub(super) fn suspects(&self) -> Vec<TileIndex> {
+    pub(in crate::store) fn suspects(&self) -> Vec<TileIndex> {
         sorted(&self.suspect)
     }
 
     // What is committed.
 
     /// Notes that all that was written and removed is committed. Returns what was written.
-    pub(super) fn committed(&mut self, number: u64, scan_number: u64) -> TileTable<TileStamp> {
+    pub(in crate::store) fn committed(&mut self, number: u64, scan_number: u64) -> TileTable<TileStamp> {
         let changed = std::mem::take(&mut self.next);
         let removed = self.removed();
         self.removed.clear();
@@ -172,12 +172,12 @@ impl TileVersions {
     }
 
     /// Notes a commit that changes no tile.
-    pub(super) fn committed_nothing(&mut self, number: u64) {
+    pub(in crate::store) fn committed_nothing(&mut self, number: u64) {
         self.commits.flush_number = number;
     }
 
     /// Takes tiles out of the map, whatever the log says of them.
-    pub(super) fn forget(&mut self, tiles: &[TileIndex]) {
+    pub(in crate::store) fn forget(&mut self, tiles: &[TileIndex]) {
         for &tile in tiles {
             self.commits.tiles.remove(tile);
             self.foreign.remove(&tile);
@@ -185,7 +185,7 @@ impl TileVersions {
     }
 
     /// Notes that nothing is left of the tiles that the last commit removed.
-    pub(super) fn removals_are_durable(&mut self) {
+    pub(in crate::store) fn removals_are_durable(&mut self) {
         self.commits.last_removed.clear();
     }
 }
