@@ -60,23 +60,23 @@
 
 mod config;
 mod error;
+pub mod integrity;
 pub mod io;
 pub mod local;
 pub mod mapper;
 pub mod maths;
 pub mod octree;
+pub mod operations;
 mod persistence;
 pub mod query;
 pub mod scan;
 mod scratch;
 pub mod sensor;
-pub mod session;
 pub mod share;
 pub mod simulation;
 pub mod space;
 pub mod store;
 pub mod tile;
-pub mod upkeep;
 
 pub use config::{
     InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStamp, TileStore};
+use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStore, TileVersion};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
@@ -106,7 +106,7 @@ impl MapReader {
         let cache = self.cache.get_mut().unwrap_or_else(PoisonError::into_inner);
         let tiles: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
         for index in tiles {
-            if store.stamp(index).is_none() || store.stamp(index) != self.store.stamp(index) {
+            if store.version(index).is_none() || store.version(index) != self.store.version(index) {
                 cache.tiles.pop(&index);
             }
         }
@@ -158,8 +158,8 @@ impl MapReader {
     }
 
     /// What is known of a tile without reading it.
-    pub(crate) fn stamp(&self, index: TileIndex) -> Option<TileStamp> {
-        self.store.stamp(index)
+    pub(crate) fn version(&self, index: TileIndex) -> Option<TileVersion> {
+        self.store.version(index)
     }
 
     /// Number of the flush that this reader sees.
@@ -170,19 +170,20 @@ impl MapReader {
     /// Observed and occupied voxels of the whole map, from the log alone; `None` for a map of the seed's format.
     pub fn voxel_counts(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
-            let stamps = self.store.commits().tiles.values();
-            stamps
-                .fold((0, 0), |(voxels, occupied), stamp| (voxels + stamp.voxels, occupied + stamp.occupied))
+            let versions = self.store.commits().tiles.values();
+            versions.fold((0, 0), |(voxels, occupied), version| {
+                (voxels + version.voxels, occupied + version.occupied)
+            })
         })
     }
 
     /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the seed's format.
     pub fn disk_bytes(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
-            let stamps = self.store.commits().tiles.values();
-            stamps.fold((0, 0), |(table, octree), stamp| {
-                let octree_bytes = if self.snapshot().is_some() { 0 } else { stamp.octree.bytes };
-                (table + stamp.table.bytes, octree + octree_bytes)
+            let versions = self.store.commits().tiles.values();
+            versions.fold((0, 0), |(table, octree), version| {
+                let octree_bytes = if self.snapshot().is_some() { 0 } else { version.octree.bytes };
+                (table + version.table.bytes, octree + octree_bytes)
             })
         })
     }
@@ -270,7 +271,7 @@ impl MapView for MapReader {
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
-        self.store.stamp(index).map(|stamp| stamp.voxels)
+        self.store.version(index).map(|version| version.voxels)
     }
 
     fn statistics(&self) -> MapStatistics {

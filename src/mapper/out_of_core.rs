@@ -133,7 +133,7 @@ impl OutOfCoreTileMapper {
     }
 
     /// Flushes, and keeps the map as it is then under a name: a snapshot, which stays until it is deleted
-    /// ([`session::delete_snapshot`](crate::session::delete_snapshot)).
+    /// ([`operations::delete_snapshot`](crate::operations::delete_snapshot)).
     ///
     /// # Errors
     ///

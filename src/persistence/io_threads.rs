@@ -5,7 +5,7 @@ use super::worker::Worker;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::space::{Grid, TileIndex};
-use crate::store::{TileLocation, TileStamp, TileWriter};
+use crate::store::{TileLocation, TileVersion, TileWriter};
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 
@@ -36,7 +36,7 @@ struct Save {
 pub(crate) struct Saved {
     pub(crate) index: TileIndex,
     pub(crate) tile: CompactTile,
-    pub(crate) result: Result<TileStamp>,
+    pub(crate) result: Result<TileVersion>,
 }
 
 struct Load {

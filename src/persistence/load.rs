@@ -3,7 +3,7 @@
 use crate::config::Storage;
 use crate::error::{Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
-use crate::store::{FileStamp, StoredTile, TileStamp, TileStore, hex};
+use crate::store::{FileChecksum, StoredTile, TileStore, TileVersion, hex};
 use crate::tile::format::{DecodedTable, Trailer, read_compact_file, read_table};
 use crate::tile::{OctreeFactory, Table, Tile};
 
@@ -34,7 +34,7 @@ pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Re
         let Some(stored) = stored? else { return Ok(None) };
         let path = stored.path.clone();
         let table = read_stored_table(grid, index, stored)?;
-        if table.trailer.is_some() && store.map_id().is_none() && store.is_adopted_meanwhile()? {
+        if table.trailer.is_some() && store.map_id().is_none() && store.is_upgraded_meanwhile()? {
             let reason = "the file was written after the map was opened";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(index)));
         }
@@ -55,7 +55,7 @@ pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Re
 /// A table that was read from its file and belongs there.
 pub(crate) struct ReadTable {
     pub table: Table,
-    pub file: FileStamp,
+    pub file: FileChecksum,
     /// `None` in a map of the seed's format.
     pub trailer: Option<Trailer>,
 }
@@ -68,11 +68,11 @@ pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: Store
         Storage::Compact => read_compact_file(&mut stored.input, stored.bytes, &voxels),
     };
     let decoded = decoded.map_err(|error| error.in_map(&stored.path, Some(index)))?;
-    let StoredTile { path, input, map_id, stamp, storage, .. } = stored;
+    let StoredTile { path, input, map_id, version, storage, .. } = stored;
     let (file, _) = input.finish();
     let DecodedTable { table, trailer } = decoded;
     if let Some(map_id) = map_id {
-        check(map_id, index, storage, trailer.as_ref(), file, stamp)
+        check(map_id, index, storage, trailer.as_ref(), file, version)
             .map_err(|error| error.in_map(&path, Some(index)))?;
     }
     Ok(ReadTable { table, file, trailer })
@@ -84,8 +84,8 @@ fn check(
     index: TileIndex,
     storage: Storage,
     trailer: Option<&Trailer>,
-    file: FileStamp,
-    stamp: Option<TileStamp>,
+    file: FileChecksum,
+    version: Option<TileVersion>,
 ) -> std::result::Result<(), FormatError> {
     let Some(trailer) = trailer else {
         return Err(FormatError::at_offset(file.bytes, "the trailer after the last entry is missing"));
@@ -104,9 +104,9 @@ fn check(
     if trailer.tile != index {
         return damaged(24, format!("the file belongs to tile {}", trailer.tile));
     }
-    match stamp {
-        Some(stamp) if file != stamp.table => {
-            let (found, wanted) = (trailer.scan_number, stamp.scan_number);
+    match version {
+        Some(version) if file != version.table => {
+            let (found, wanted) = (trailer.scan_number, version.scan_number);
             let reason =
                 format!("the file is of scan {found}, commits.log names the version of scan {wanted}");
             damaged(36, reason)

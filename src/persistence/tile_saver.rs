@@ -5,7 +5,7 @@ use super::parameters::map_parameters;
 use crate::config::{MapConfig, Storage};
 use crate::error::{Error, Result};
 use crate::space::{Grid, TileIndex};
-use crate::store::{FileStamp, TileFile, TileStamp, TileStore, TileWriter};
+use crate::store::{FileChecksum, TileFile, TileStore, TileVersion, TileWriter};
 use crate::tile::format::{CompactEffort, CompactWriter, Trailer, write_compact_file, write_table};
 use crate::tile::{Table, Tile};
 
@@ -31,10 +31,15 @@ impl TileSaver {
     }
 
     /// Writes the next version of a tile's files.
-    pub(crate) fn save(&mut self, store: &mut TileStore, tile: &Tile, scan_number: u64) -> Result<TileStamp> {
-        let stamp = self.write(&store.writer()?, tile.index(), tile.table(), scan_number)?;
-        store.note_next(tile.index(), stamp);
-        Ok(stamp)
+    pub(crate) fn save(
+        &mut self,
+        store: &mut TileStore,
+        tile: &Tile,
+        scan_number: u64,
+    ) -> Result<TileVersion> {
+        let version = self.write(&store.writer()?, tile.index(), tile.table(), scan_number)?;
+        store.note_next(tile.index(), version);
+        Ok(version)
     }
 
     /// Writes the next version of a tile's files, of which the store is still to be told.
@@ -44,7 +49,7 @@ impl TileSaver {
         index: TileIndex,
         table: &Table,
         scan_number: u64,
-    ) -> Result<TileStamp> {
+    ) -> Result<TileVersion> {
         match writer.storage() {
             Storage::Seed => self.write_seed(writer, index, table, scan_number),
             Storage::Compact => {
@@ -63,7 +68,7 @@ impl TileSaver {
         index: TileIndex,
         tile: &CompactTile,
         scan_number: u64,
-    ) -> Result<TileStamp> {
+    ) -> Result<TileVersion> {
         match tile.occupied() {
             Some(occupied) => {
                 self.write_encoded(writer, index, tile.bytes(), [tile.voxels(), occupied], scan_number)
@@ -79,11 +84,11 @@ impl TileSaver {
         compact: &[u8],
         [voxels, occupied]: [u64; 2],
         scan_number: u64,
-    ) -> Result<TileStamp> {
-        let front = self.trailer(writer, index, scan_number, FileStamp::default());
+    ) -> Result<TileVersion> {
+        let front = self.trailer(writer, index, scan_number, FileChecksum::default());
         let table = writer
             .write_next(index, TileFile::Table, |mut out| write_compact_file(compact, front, &mut out))?;
-        Ok(TileStamp { scan_number, table, octree: FileStamp::default(), voxels, occupied })
+        Ok(TileVersion { scan_number, table, octree: FileChecksum::default(), voxels, occupied })
     }
 
     /// [`TileSaver::write`] in a map with the seed's storage.
@@ -93,7 +98,7 @@ impl TileSaver {
         index: TileIndex,
         table: &Table,
         scan_number: u64,
-    ) -> Result<TileStamp> {
+    ) -> Result<TileVersion> {
         let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
         let octree = writer.write_next(index, TileFile::Octree, |mut out| {
             table.write_bt(self.resolution_m, self.threshold as f32, &mut out)
@@ -101,10 +106,16 @@ impl TileSaver {
         let trailer = self.trailer(writer, index, scan_number, octree);
         let table = writer
             .write_next(index, TileFile::Table, |mut out| write_table(table, trailer, &mut out).map(drop))?;
-        Ok(TileStamp { scan_number, table, octree, voxels, occupied })
+        Ok(TileVersion { scan_number, table, octree, voxels, occupied })
     }
 
-    fn trailer(&self, writer: &TileWriter, tile: TileIndex, scan_number: u64, octree: FileStamp) -> Trailer {
+    fn trailer(
+        &self,
+        writer: &TileWriter,
+        tile: TileIndex,
+        scan_number: u64,
+        octree: FileChecksum,
+    ) -> Trailer {
         let (map_id, parameters) = (writer.map_id(), self.parameters.clone());
         let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
         Trailer { map_id, tile, scan_number, table_crc: 0, octree_crc, octree_bytes, parameters }

@@ -19,18 +19,18 @@ pub(crate) fn upgrade(
         return Ok(());
     }
     log::info!("{}: a map of the seed's format; its tiles get checksums", store.folder().display());
-    store.adopt(new_map_id())?;
+    store.upgrade(new_map_id())?;
     for index in store.suspects() {
         // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
         store.drop_next(index);
     }
     for index in store.tiles().collect::<BTreeSet<_>>() {
-        if store.stamp(index).is_some() {
+        if store.version(index).is_some() {
             continue; // Written by an earlier attempt.
         }
         if let Some(read) = load::load_table(store, &config.grid, index)? {
-            let stamp = saver.write(&store.writer()?, index, &read.table, 0)?;
-            store.note_next(index, stamp);
+            let version = saver.write(&store.writer()?, index, &read.table, 0)?;
+            store.note_next(index, version);
         }
     }
     store.commit(metadata(store.map_id().unwrap_or_default()), 0)

@@ -283,15 +283,15 @@ impl<V: TileValue + fmt::Debug> fmt::Debug for TileTable<V> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{FileStamp, TileStamp};
+    use crate::store::{FileChecksum, TileVersion};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    fn stamp(seed: u64) -> TileStamp {
+    fn stamp(seed: u64) -> TileVersion {
         let (bytes, crc) = (18 * (seed % 5000) + 96, (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as u32);
-        let table = FileStamp { bytes, crc };
-        let octree = FileStamp { bytes: bytes / 30, crc: !crc };
-        TileStamp {
+        let table = FileChecksum { bytes, crc };
+        let octree = FileChecksum { bytes: bytes / 30, crc: !crc };
+        TileVersion {
             scan_number: seed % 977,
             table,
             octree,

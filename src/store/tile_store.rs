@@ -12,7 +12,7 @@ use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
 use super::snapshots::snapshot_name::SnapshotName;
 use super::tiles::tile_location::{StoredTile, TileLocation};
-use super::tiles::tile_stamp::TileStamp;
+use super::tiles::tile_version::TileVersion;
 use super::tiles::tile_versions::TileVersions;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
@@ -118,7 +118,7 @@ impl TileStore {
             self.committer.adopt_snapshots(found.snapshots.found().clone());
         }
         self.kept.set_snapshots(found.snapshots);
-        self.versions.set_strays(found.strays);
+        self.versions.set_orphans(found.orphans);
         self.leftovers_removed = found.removed;
         let removed = &self.versions.commits().last_removed;
         self.checkpoint = Checkpoint::of_leftovers(found.unrenamed, found.renamed, removed);
@@ -255,7 +255,7 @@ impl TileStore {
     }
 
     /// Whether a map that was of the seed's format when it was opened has a log now: a writer has begun to change it.
-    pub fn is_adopted_meanwhile(&self) -> Result<bool> {
+    pub fn is_upgraded_meanwhile(&self) -> Result<bool> {
         if self.map_id().is_some() {
             return Ok(false);
         }
@@ -263,8 +263,8 @@ impl TileStore {
     }
 
     /// The tile folders that the log does not name, in order.
-    pub fn strays(&self) -> Vec<TileIndex> {
-        self.versions.strays()
+    pub fn orphans(&self) -> Vec<TileIndex> {
+        self.versions.orphans()
     }
 
     /// How many files that an earlier writer left behind were removed when the store was opened.
@@ -288,8 +288,8 @@ impl TileStore {
     }
 
     /// What is known of the latest version of each tile, in no particular order.
-    pub fn stamps(&self) -> impl Iterator<Item = TileStamp> {
-        self.versions.stamps()
+    pub fn versions(&self) -> impl Iterator<Item = TileVersion> {
+        self.versions.versions()
     }
 
     /// Bytes of memory of what is known of the tiles without reading them: some thirty a tile, and as many more for one with
@@ -304,8 +304,8 @@ impl TileStore {
     }
 
     /// What is known of the latest version of a tile on disk without reading it.
-    pub fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
-        self.versions.stamp(tile)
+    pub fn version(&self, tile: TileIndex) -> Option<TileVersion> {
+        self.versions.version(tile)
     }
 
     /// Opens the latest version of a tile's table; `None` if the tile has none.
@@ -370,26 +370,26 @@ impl TileStore {
     ///
     /// As for [`TileStore::open_table`].
     pub fn open_version(&self, tile: TileIndex, path: PathBuf) -> Result<Option<StoredTile>> {
-        if self.versions.is_stray(tile) {
+        if self.versions.is_orphan(tile) {
             let reason = "commits.log does not name this tile";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
-        let stamp = self.stamp(tile);
-        if stamp.is_none() && !self.versions.is_foreign(tile) {
+        let version = self.version(tile);
+        if version.is_none() && !self.versions.is_foreign(tile) {
             return Ok(None);
         }
-        self.location_at(tile, path, stamp).open().map(Some)
+        self.location_at(tile, path, version).open().map(Some)
     }
 
     /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before the
     /// next commit.
     pub fn location(&self, tile: TileIndex) -> Option<TileLocation> {
-        let stamp = self.stamp(tile)?;
-        Some(self.location_at(tile, self.latest_path(tile), Some(stamp)))
+        let version = self.version(tile)?;
+        Some(self.location_at(tile, self.latest_path(tile), Some(version)))
     }
 
-    fn location_at(&self, tile: TileIndex, path: PathBuf, stamp: Option<TileStamp>) -> TileLocation {
-        let map_id = stamp.and_then(|_| self.map_id());
+    fn location_at(&self, tile: TileIndex, path: PathBuf, version: Option<TileVersion>) -> TileLocation {
+        let map_id = version.and_then(|_| self.map_id());
         let folder = self.layout().tile_folder(tile);
         TileLocation {
             disk: self.disk().clone(),
@@ -397,7 +397,7 @@ impl TileStore {
             folder,
             path,
             map_id,
-            stamp,
+            version,
             storage: self.layout().storage(),
         }
     }

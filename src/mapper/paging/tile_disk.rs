@@ -5,7 +5,7 @@ use crate::mapper::statistics::{IoCounts, MapStatistics};
 use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
 use crate::scan::{PackedUpdates, TileUpdates};
 use crate::space::{TileIndex, TileTable};
-use crate::store::{InputRecord, Metadata, SnapshotName, SpillFile, TileStamp, TileStore, TileWriter};
+use crate::store::{InputRecord, Metadata, SnapshotName, SpillFile, TileStore, TileVersion, TileWriter};
 use crate::tile::{Table, Tile};
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ const BYTES_OF_VOXEL: usize = 6;
 
 impl TileDisk {
     pub(super) fn new(config: &MapConfig, store: TileStore) -> Self {
-        let unread = store.tiles().chain(store.strays()).map(|tile| (tile, ())).collect();
+        let unread = store.tiles().chain(store.orphans()).map(|tile| (tile, ())).collect();
         Self {
             config: config.clone(),
             store,
@@ -102,7 +102,7 @@ impl TileDisk {
     /// Begins to read a tile beside the mapper, if it is on disk.
     pub(super) fn prefetch(&mut self, index: TileIndex) {
         if let Some(location) = self.store.location(index) {
-            let voxels = self.store.stamp(index).map_or(0, |stamp| stamp.voxels) as usize;
+            let voxels = self.store.version(index).map_or(0, |version| version.voxels) as usize;
             self.threads.load(location, BYTES_OF_VOXEL.saturating_mul(voxels));
         }
     }
@@ -136,14 +136,14 @@ impl TileDisk {
     ///
     /// A disk that refuses.
     pub(super) fn write(&mut self, tile: &Tile, scan_number: u64) -> Result<()> {
-        let stamp = self.saver.save(&mut self.store, tile, scan_number)?;
-        self.note_written(tile.index(), stamp);
+        let version = self.saver.save(&mut self.store, tile, scan_number)?;
+        self.note_written(tile.index(), version);
         Ok(())
     }
 
-    fn note_written(&mut self, index: TileIndex, stamp: TileStamp) {
+    fn note_written(&mut self, index: TileIndex, version: TileVersion) {
         self.counts.saves += 1;
-        self.counts.bytes_written += stamp.table.bytes + stamp.octree.bytes;
+        self.counts.bytes_written += version.table.bytes + version.octree.bytes;
         self.unread.remove(index);
         self.written.insert(index, ());
     }
@@ -192,9 +192,9 @@ impl TileDisk {
     pub(super) fn note_saved(&mut self, saved: Saved, is_current: bool) {
         let Saved { index, result, .. } = saved;
         match result {
-            Ok(stamp) => {
-                self.store.note_next(index, stamp);
-                self.note_written(index, stamp);
+            Ok(version) => {
+                self.store.note_next(index, version);
+                self.note_written(index, version);
             }
             Err(error) if is_current => self.save_error = Some(error),
             Err(error) => log::debug!("an older version of tile {index} was not saved: {error}"),
@@ -316,8 +316,8 @@ impl TileDisk {
 
     /// Adds the disk's part of the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
-        let stamps = self.store.stamps();
-        statistics.disk_bytes = stamps.map(|stamp| stamp.table.bytes + stamp.octree.bytes).sum();
+        let versions = self.store.versions();
+        statistics.disk_bytes = versions.map(|version| version.table.bytes + version.octree.bytes).sum();
         statistics.stalls = self.stalls.counts();
         statistics.io = self.counts;
     }

@@ -187,7 +187,7 @@ impl TilePager {
         if !self.cache.has_compact_tier() || is_near {
             return false;
         }
-        let tile_bytes = self.store().stamp(tile).map_or(0, |stamp| stamp.table.bytes);
+        let tile_bytes = self.store().version(tile).map_or(0, |version| version.table.bytes);
         self.buffer.bytes_of(tile) < tile_bytes.max(LEAST_BYTES_TO_LOAD_FOR)
     }
 
@@ -297,7 +297,7 @@ impl TilePager {
         match self.cache.find(index) {
             Some(Cached::Resident(tile)) => Some(tile.table().len() as u64),
             Some(Cached::Compact(tile)) => Some(tile.voxels()),
-            None => self.store().stamp(index).map(|stamp| stamp.voxels),
+            None => self.store().version(index).map(|version| version.voxels),
         }
     }
 

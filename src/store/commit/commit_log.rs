@@ -3,7 +3,7 @@ use super::metadata::Metadata;
 use crate::error::{DecodeError, FormatError};
 use crate::space::{TileIndex, TileTable};
 use crate::store::disk::Disk;
-use crate::store::tiles::tile_stamp::TileStamp;
+use crate::store::tiles::tile_version::TileVersion;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use std::path::Path;
 /// header  32 bytes  magic "VXTCOMIT", version u32 1, map id 16 bytes, CRC-32 of these
 /// record            payload length u32, its complement u32, payload, CRC-32 of the payload
 /// payload           kind u32 (bit 0: whole map, else a change; bit 1: tiles were removed), tile count u32,
-///                   flush number u64, scan number u64, a tile: index 3 x i32, stamp 48 bytes;
+///                   flush number u64, scan number u64, a tile: index 3 x i32, version 48 bytes;
 ///                   where tiles were removed, their count u32 and the index of each, 3 x i32;
 ///                   then, where it changed, the text of metadata.json
 /// ```
@@ -32,7 +32,7 @@ pub struct Commits {
     /// Number of the last scan in the last flush; 0 before the first.
     pub scan_number: u64,
     /// Every tile of the map.
-    pub tiles: TileTable<TileStamp>,
+    pub tiles: TileTable<TileVersion>,
     /// The tiles that the last record names.
     pub last_changed: TileTable<()>,
     /// The tiles that the last record takes out of the map: their files may still be there.
@@ -185,12 +185,12 @@ fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], Decod
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{FileStamp, FsDisk};
+    use crate::store::{FileChecksum, FsDisk};
     use std::fs;
 
-    fn stamp(number: u64) -> TileStamp {
-        let file = FileStamp { bytes: 100 + number, crc: number as u32 };
-        TileStamp { scan_number: number, table: file, octree: file, voxels: number, occupied: number / 2 }
+    fn version(number: u64) -> TileVersion {
+        let file = FileChecksum { bytes: 100 + number, crc: number as u32 };
+        TileVersion { scan_number: number, table: file, octree: file, voxels: number, occupied: number / 2 }
     }
 
     /// Records that are longer than what is read and written at a time.
@@ -199,7 +199,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("commits.log");
         let tiles = |of: std::ops::Range<i32>| {
-            of.map(|k| (TileIndex::new(k % 50, k / 50, -k), stamp(k as u64))).collect::<TileTable<_>>()
+            of.map(|k| (TileIndex::new(k % 50, k / 50, -k), version(k as u64))).collect::<TileTable<_>>()
         };
         let first = Commits { flush_number: 3, tiles: tiles(0..4000), ..Commits::default() };
         let mut log = CommitLog::write_whole(&FsDisk, &path, [7; 16], &first, "").unwrap();

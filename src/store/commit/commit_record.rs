@@ -1,7 +1,7 @@
 use super::metadata::Metadata;
 use crate::error::{DecodeError, FormatError};
 use crate::space::{TileIndex, TileTable};
-use crate::store::tiles::tile_stamp::{MAX_NUMBER, Stamping, TileStamp};
+use crate::store::tiles::tile_version::{Checksumming, MAX_NUMBER, TileVersion};
 use std::io::{self, Read, Write};
 
 /// A flush to be appended to a log.
@@ -12,7 +12,7 @@ pub struct Flush<'a> {
     /// Number of the last scan in it.
     pub scan_number: u64,
     /// The tiles that changed.
-    pub changed: &'a TileTable<TileStamp>,
+    pub changed: &'a TileTable<TileVersion>,
     /// The tiles that are no part of the map any more.
     pub removed: &'a [TileIndex],
     /// The text of `metadata.json`, if more of it changed than every flush changes.
@@ -26,7 +26,7 @@ pub(in crate::store) struct Record {
     pub(in crate::store) is_whole_map: bool,
     pub(in crate::store) flush_number: u64,
     pub(in crate::store) scan_number: u64,
-    pub(in crate::store) changed: TileTable<TileStamp>,
+    pub(in crate::store) changed: TileTable<TileVersion>,
     pub(in crate::store) removed: Vec<TileIndex>,
     pub(in crate::store) metadata: Option<Metadata>,
 }
@@ -45,7 +45,7 @@ pub(in crate::store) const LENGTHS_BYTES: u64 = 8;
 const CRC_BYTES: u64 = 4;
 const PAYLOAD_HEADER_BYTES: usize = 24;
 const INDEX_BYTES: usize = 12;
-const TILE_BYTES: usize = INDEX_BYTES + TileStamp::BYTES;
+const TILE_BYTES: usize = INDEX_BYTES + TileVersion::BYTES;
 /// Bits of a record's kind.
 const WHOLE_MAP: u32 = 1;
 const NAMES_REMOVED: u32 = 2;
@@ -84,9 +84,9 @@ impl Flush<'_> {
         out.put(&changed.to_le_bytes())?;
         out.put(&self.number.to_le_bytes())?;
         out.put(&self.scan_number.to_le_bytes())?;
-        for (tile, stamp) in self.changed.iter() {
+        for (tile, version) in self.changed.iter() {
             out.put(&index_bytes(tile))?;
-            out.put(&stamp.to_bytes())?;
+            out.put(&version.to_bytes())?;
         }
         if !self.removed.is_empty() {
             out.put(&(self.removed.len() as u32).to_le_bytes())?;
@@ -146,13 +146,13 @@ impl Next {
             return Ok(Self::Torn(wrong("the record is longer than what is left of the file")));
         }
         let mut payload =
-            Payload { input: Stamping::new(input), left: u64::from(length), at: offset + LENGTHS_BYTES };
+            Payload { input: Checksumming::new(input), left: u64::from(length), at: offset + LENGTHS_BYTES };
         let record = Record::read(&mut payload);
         if let Err(error @ DecodeError::Io(_)) = record {
             return Err(error);
         }
-        let (stamp, input) = payload.skip_rest()?;
-        if read_u32(input)? == stamp.crc {
+        let (checksum, input) = payload.skip_rest()?;
+        if read_u32(input)? == checksum.crc {
             return Ok(Self::Record(Box::new(record?), record_bytes));
         }
         let error = wrong("the record does not match its checksum");
@@ -182,10 +182,10 @@ impl Record {
         let mut changed = TileTable::default();
         for _ in 0..tiles {
             let tile = index_from(payload.take()?);
-            let Some(stamp) = TileStamp::from_bytes(&payload.take()?) else {
+            let Some(version) = TileVersion::from_bytes(&payload.take()?) else {
                 return Err(payload.wrong(TILE_BYTES as u64, "numbers that no tile has"));
             };
-            changed.insert(tile, stamp);
+            changed.insert(tile, version);
         }
         let mut removed = Vec::new();
         if kind & NAMES_REMOVED != 0 {
@@ -209,7 +209,7 @@ impl Record {
 
 /// The payload of a record, piece by piece.
 struct Payload<R> {
-    input: Stamping<R>,
+    input: Checksumming<R>,
     left: u64,
     /// Offset in the file.
     at: u64,
@@ -245,7 +245,7 @@ impl<R: Read> Payload<R> {
         Metadata::from_text(&text).map(Some).map_err(|_| unreadable().into())
     }
 
-    fn skip_rest(mut self) -> io::Result<(crate::store::tiles::tile_stamp::FileStamp, R)> {
+    fn skip_rest(mut self) -> io::Result<(crate::store::tiles::tile_version::FileChecksum, R)> {
         let skipped = io::copy(&mut (&mut self.input).take(self.left), &mut io::sink())?;
         if skipped < self.left {
             return Err(io::ErrorKind::UnexpectedEof.into());

@@ -68,7 +68,7 @@ impl Committer {
     ///
     /// A map of the seed's format has none.
     pub(in crate::store) fn logged_map_id(&self) -> Result<[u8; 16]> {
-        let reason = "a map of the seed's format must be adopted first";
+        let reason = "a map of the seed's format must be upgraded first";
         self.map_id().ok_or_else(|| Error::argument("map", reason))
     }
 

@@ -8,7 +8,7 @@ use crate::space::TileIndex;
 use crate::store::layout::TileFile;
 use crate::store::map_files::MapFiles;
 use crate::store::tile_store::TileStore;
-use crate::store::tiles::tile_stamp::{FileStamp, TileStamp};
+use crate::store::tiles::tile_version::{FileChecksum, TileVersion};
 use crate::store::tiles::tile_versions::TileVersions;
 use crate::store::tiles::tile_writer::TileWriter;
 use std::io::{self, Write};
@@ -20,7 +20,7 @@ impl TileStore {
         tile: TileIndex,
         file: TileFile,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<FileStamp> {
+    ) -> Result<FileChecksum> {
         self.writer()?.write_next(tile, file, write)
     }
 
@@ -37,8 +37,8 @@ impl TileStore {
     }
 
     /// Notes that the next version of a tile is written, both files.
-    pub fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
-        self.versions.note_next(tile, stamp);
+    pub fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
+        self.versions.note_next(tile, version);
     }
 
     /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not hold
@@ -171,7 +171,7 @@ impl TileStore {
 
     /// Gives a map of the seed's format an id and a log, so that it can be written to. Its tiles count as unread
     /// until they have been written again.
-    pub fn adopt(&mut self, map_id: [u8; 16]) -> Result<()> {
+    pub fn upgrade(&mut self, map_id: [u8; 16]) -> Result<()> {
         self.committer.begin_log(&self.files, map_id, self.versions.commits())
     }
 

@@ -1,4 +1,4 @@
-use crate::store::tiles::tile_stamp::MAX_NUMBER;
+use crate::store::tiles::tile_version::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
 /// Most inputs that a map remembers; of more it forgets the earliest.

@@ -5,7 +5,7 @@ use crate::error::FormatError;
 use crate::sensor::SensorModel;
 use crate::space::TileIndex;
 use crate::store::snapshots::snapshot_list::SnapshotList;
-use crate::store::tiles::tile_stamp::MAX_NUMBER;
+use crate::store::tiles::tile_version::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
 /// What `metadata.json` says: the seed's keys, and voxtile's own in a last object `ext`.

@@ -7,7 +7,7 @@ use crate::store::snapshots::seen_tables::{KeptFlushes, Snapshots};
 use crate::store::snapshots::snapshot_file::Snapshot;
 use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::snapshots::snapshot_name::SnapshotName;
-use crate::store::tiles::tile_stamp::{FileStamp, Stamping, TileStamp};
+use crate::store::tiles::tile_version::{Checksumming, FileChecksum, TileVersion};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::io;
@@ -24,7 +24,7 @@ pub(in crate::store) struct Leftovers {
     /// Tiles of the last commit that have their names, but perhaps not on the medium.
     pub renamed: TileTable<()>,
     /// Tile folders that hold files and are not in the log.
-    pub strays: FxHashSet<TileIndex>,
+    pub orphans: FxHashSet<TileIndex>,
     /// What the map's snapshots see.
     pub snapshots: Snapshots,
     /// How many files were removed.
@@ -53,10 +53,10 @@ pub(in crate::store) fn recover(
             remove(disk, &path, &mut leftovers.removed)?;
         }
         let Some(tile) = tile_of_folder(&name) else { continue };
-        let stamp = commits.tiles.get(tile);
+        let version = commits.tiles.get(tile);
         let is_of_last_commit = commits.last_changed.contains(tile);
         let (state, flushes) =
-            look_at_tile(disk, layout, tile, stamp, is_of_last_commit, &mut leftovers.removed)?;
+            look_at_tile(disk, layout, tile, version, is_of_last_commit, &mut leftovers.removed)?;
         if !flushes.is_empty() {
             kept.insert(tile, flushes);
         }
@@ -70,12 +70,12 @@ pub(in crate::store) fn recover(
                 leftovers.unrenamed.insert(tile, ());
             }
             // Made for a tile that was never committed, or of one that is no part of the map any more.
-            State::Empty if stamp.is_none() => hollow.push(tile),
+            State::Empty if version.is_none() => hollow.push(tile),
             State::Empty => {}
             // The store goes on with its removal.
-            State::Stray if removed.contains(&tile) => {}
-            State::Stray => {
-                leftovers.strays.insert(tile);
+            State::Orphan if removed.contains(&tile) => {}
+            State::Orphan => {
+                leftovers.orphans.insert(tile);
             }
         }
     }
@@ -168,26 +168,29 @@ enum State {
     Unreadable,
     Unrenamed,
     Empty,
-    Stray,
+    Orphan,
 }
 
 fn look_at_tile(
     disk: &dyn Disk,
     layout: &Layout,
     tile: TileIndex,
-    stamp: Option<TileStamp>,
+    version: Option<TileVersion>,
     is_of_last_commit: bool,
     removed: &mut u64,
 ) -> Result<(State, BTreeSet<u64>)> {
     let folder = layout.tile_folder(tile);
     if kind(disk, &folder)? != Some(EntryKind::Folder) {
         // A file or a link with a tile's name: reading the tile, if there is one, tells.
-        return Ok((State::Stray, BTreeSet::new()));
+        return Ok((State::Orphan, BTreeSet::new()));
     }
     let mut names = match disk.list(&folder) {
         Err(error) if is_of_medium(&error) => {
             log::warn!("{}: cannot list: {error}; the tile cannot be read", folder.display());
-            return Ok((look_without_names(disk, layout, tile, stamp, is_of_last_commit)?, BTreeSet::new()));
+            return Ok((
+                look_without_names(disk, layout, tile, version, is_of_last_commit)?,
+                BTreeSet::new(),
+            ));
         }
         names => names.map_err(|error| Error::io(&folder, "list", error))?,
     };
@@ -196,7 +199,7 @@ fn look_at_tile(
         let next_name = file.next_name(layout.storage());
         let Some(at) = names.iter().position(|name| name == next_name) else { continue };
         let next = layout.next(tile, file);
-        if let Some(committed) = stamp.map(|stamp| stamp.of(file)) {
+        if let Some(committed) = version.map(|version| version.of(file)) {
             let waits = content_of(disk, &next, committed)?;
             if waits == Content::Committed || is_of_last_commit {
                 let in_place = content_of(disk, &layout.current(tile, file), committed)?;
@@ -217,9 +220,9 @@ fn look_at_tile(
     }
     let is_kept = |name: &mut String| layout.flush_of_kept(name).is_some();
     let kept = names.extract_if(.., is_kept).filter_map(|name| layout.flush_of_kept(&name)).collect();
-    let state = match stamp {
+    let state = match version {
         _ if names.is_empty() => State::Empty,
-        None => State::Stray,
+        None => State::Orphan,
         Some(_) if unrenamed => State::Unrenamed,
         Some(_) => State::Whole,
     };
@@ -231,12 +234,12 @@ fn look_without_names(
     disk: &dyn Disk,
     layout: &Layout,
     tile: TileIndex,
-    stamp: Option<TileStamp>,
+    version: Option<TileVersion>,
     is_of_last_commit: bool,
 ) -> Result<State> {
-    let Some(stamp) = stamp else { return Ok(State::Stray) };
+    let Some(version) = version else { return Ok(State::Orphan) };
     for &file in layout.files().iter().filter(|_| is_of_last_commit) {
-        let committed = stamp.of(file);
+        let committed = version.of(file);
         let waits = content_of(disk, &layout.next(tile, file), committed)?;
         let in_place = content_of(disk, &layout.current(tile, file), committed)?;
         if in_place != Content::Committed && waits.is_committed_beside(in_place) {
@@ -297,20 +300,20 @@ impl Content {
     }
 }
 
-fn content_of(disk: &dyn Disk, path: &Path, stamp: FileStamp) -> Result<Content> {
+fn content_of(disk: &dyn Disk, path: &Path, checksum: FileChecksum) -> Result<Content> {
     let is_none =
         |error: &io::Error| matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput);
     let input = match disk.open(path) {
-        Ok(input) if input.file_bytes() != stamp.bytes => return Ok(Content::Other),
+        Ok(input) if input.file_bytes() != checksum.bytes => return Ok(Content::Other),
         Ok(input) => input,
         Err(error) if is_none(&error) => return Ok(Content::Other),
         Err(error) if is_of_medium(&error) => return Ok(Content::Unreadable),
         Err(error) => return Err(Error::io(path, "open", error)),
     };
-    let mut input = Stamping::new(input);
+    let mut input = Checksumming::new(input);
     match io::copy(&mut input, &mut io::sink()) {
         Err(error) if is_of_medium(&error) => Ok(Content::Unreadable),
         Err(error) => Err(Error::io(path, "read", error)),
-        Ok(_) => Ok(if input.finish().0 == stamp { Content::Committed } else { Content::Other }),
+        Ok(_) => Ok(if input.finish().0 == checksum { Content::Committed } else { Content::Other }),
     }
 }

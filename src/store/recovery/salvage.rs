@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// What can still be read of the two files that say what a map is, when they cannot be read together.
 #[derive(Debug)]
-pub struct Remains {
+pub struct Salvage {
     /// `metadata.json`, or what is wrong with it.
     pub metadata: Result<Metadata>,
     /// What is wrong with `commits.log`, if anything is.
@@ -21,7 +21,7 @@ pub struct Remains {
     pub commits: Commits,
 }
 
-impl Remains {
+impl Salvage {
     /// Reads what can be read.
     ///
     /// # Errors

@@ -14,16 +14,16 @@ use std::sync::Arc;
 /// however the work ends; and the name, which comes at once or not at all, is the commit.
 ///
 /// What an interrupted attempt left is removed by the next one, and when this value is dropped before
-/// [`UnfinishedMap::finish`].
+/// [`StagedMap::finish`].
 #[derive(Debug)]
-pub struct UnfinishedMap {
+pub struct StagedMap {
     disk: Arc<dyn Disk>,
     folder: PathBuf,
     /// Holds the lock of the unfinished folder. `None` once the map has its name.
     store: Option<TileStore>,
 }
 
-impl UnfinishedMap {
+impl StagedMap {
     /// Begins a map that will be in `folder`, which does not exist yet or is empty.
     ///
     /// # Errors
@@ -32,7 +32,7 @@ impl UnfinishedMap {
     pub fn begin(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         place::check_place(&*disk, folder)?;
         check_is_free(&*disk, folder)?;
-        let unfinished = unfinished_folder(folder)?;
+        let unfinished = staging_folder(folder)?;
         remove_unfinished(&*disk, &unfinished)?;
         let store = TileStore::create(disk.clone(), &unfinished, metadata, map_id)?;
         Ok(Self { disk, folder: folder.to_owned(), store: Some(store) })
@@ -56,7 +56,7 @@ impl UnfinishedMap {
     /// can fail when the map has it.
     pub fn finish(mut self) -> Result<()> {
         check_is_free(&*self.disk, &self.folder)?;
-        let unfinished = unfinished_folder(&self.folder)?;
+        let unfinished = staging_folder(&self.folder)?;
         let is_there =
             self.disk.kind(&self.folder).map_err(|error| Error::io(&self.folder, "look at", error))?;
         if is_there.is_some() {
@@ -77,9 +77,9 @@ impl UnfinishedMap {
     }
 }
 
-impl Drop for UnfinishedMap {
+impl Drop for StagedMap {
     fn drop(&mut self) {
-        if let (Some(_lock), Ok(unfinished)) = (&self.store, unfinished_folder(&self.folder)) {
+        if let (Some(_lock), Ok(unfinished)) = (&self.store, staging_folder(&self.folder)) {
             // What stays after all is removed by the next attempt.
             let _ = remove_content(&*self.disk, &Layout::new(&unfinished), true);
             let _ = self.disk.remove_folder(&unfinished);
@@ -92,7 +92,7 @@ impl Drop for UnfinishedMap {
 /// # Errors
 ///
 /// A path without a name, such as `..`.
-pub fn unfinished_folder(folder: &Path) -> Result<PathBuf> {
+pub fn staging_folder(folder: &Path) -> Result<PathBuf> {
     match folder.file_name() {
         Some(_) => Ok(folder.with_added_extension("unfinished")),
         None => {

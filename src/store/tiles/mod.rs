@@ -2,6 +2,6 @@
 
 pub(super) mod spill_file;
 pub(super) mod tile_location;
-pub(super) mod tile_stamp;
+pub(super) mod tile_version;
 pub(super) mod tile_versions;
 pub(super) mod tile_writer;

@@ -1,4 +1,4 @@
-use super::tile_stamp::{Stamping, TileStamp};
+use super::tile_version::{Checksumming, TileVersion};
 use crate::config::Storage;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
@@ -15,7 +15,7 @@ pub struct TileLocation {
     pub(in crate::store) folder: PathBuf,
     pub(in crate::store) path: PathBuf,
     pub(in crate::store) map_id: Option<[u8; 16]>,
-    pub(in crate::store) stamp: Option<TileStamp>,
+    pub(in crate::store) version: Option<TileVersion>,
     pub(in crate::store) storage: Storage,
 }
 
@@ -23,14 +23,14 @@ pub struct TileLocation {
 pub struct StoredTile {
     /// Where it is.
     pub path: PathBuf,
-    /// The bytes; stamped as they pass.
-    pub input: Stamping<Box<dyn DiskRead>>,
+    /// The bytes; their checksum is computed as they pass.
+    pub input: Checksumming<Box<dyn DiskRead>>,
     /// Length of the file in bytes.
     pub bytes: u64,
     /// Id of the map that the file must name; `None` if it is of the seed's format.
     pub map_id: Option<[u8; 16]>,
     /// What the log says of the tile, if it does.
-    pub stamp: Option<TileStamp>,
+    pub version: Option<TileVersion>,
     /// Of which form it is.
     pub storage: Storage,
 }
@@ -47,7 +47,7 @@ impl TileLocation {
     ///
     /// A file or folder that is missing or none, and a disk that refuses.
     pub fn open(self) -> Result<StoredTile> {
-        let Self { disk, tile, folder, path, map_id, stamp, storage } = self;
+        let Self { disk, tile, folder, path, map_id, version, storage } = self;
         let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
             Some(EntryKind::Folder) => {}
@@ -59,7 +59,7 @@ impl TileLocation {
         match disk.open(&path) {
             Ok(input) => {
                 let bytes = input.file_bytes();
-                Ok(StoredTile { path, input: Stamping::new(input), bytes, map_id, stamp, storage })
+                Ok(StoredTile { path, input: Checksumming::new(input), bytes, map_id, version, storage })
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 damaged("the file is missing, and the map holds this tile")

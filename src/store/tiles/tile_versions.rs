@@ -1,4 +1,4 @@
-use super::tile_stamp::TileStamp;
+use super::tile_version::TileVersion;
 use crate::space::{TileIndex, TileTable};
 use crate::store::commit::commit_log::Commits;
 use rustc_hash::FxHashSet;
@@ -9,13 +9,13 @@ use rustc_hash::FxHashSet;
 pub(in crate::store) struct TileVersions {
     commits: Commits,
     /// Versions written since the last commit.
-    next: TileTable<TileStamp>,
+    next: TileTable<TileVersion>,
     /// Versions of which a sync failed: the medium may hold anything, whatever later syncs say.
     suspect: FxHashSet<TileIndex>,
     /// Tiles that the next commit takes out of the map.
     removed: FxHashSet<TileIndex>,
     /// Tile folders that the log does not know: never read, never overwritten.
-    strays: FxHashSet<TileIndex>,
+    orphans: FxHashSet<TileIndex>,
     /// Tiles of a map of the seed's format, which has no log.
     foreign: FxHashSet<TileIndex>,
 }
@@ -34,8 +34,8 @@ impl TileVersions {
         Self { foreign, ..Self::default() }
     }
 
-    pub(in crate::store) fn set_strays(&mut self, strays: FxHashSet<TileIndex>) {
-        self.strays = strays;
+    pub(in crate::store) fn set_orphans(&mut self, orphans: FxHashSet<TileIndex>) {
+        self.orphans = orphans;
     }
 
     /// The last commit.
@@ -44,21 +44,21 @@ impl TileVersions {
     }
 
     /// What is known of the latest version of a tile.
-    pub(in crate::store) fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
+    pub(in crate::store) fn version(&self, tile: TileIndex) -> Option<TileVersion> {
         let committed = || self.commits.tiles.get(tile).filter(|_| !self.removed.contains(&tile));
         self.next.get(tile).or_else(committed)
     }
 
     /// What is known of the latest version of each tile, in no particular order.
-    pub(in crate::store) fn stamps(&self) -> impl Iterator<Item = TileStamp> {
+    pub(in crate::store) fn versions(&self) -> impl Iterator<Item = TileVersion> {
         let is_latest = |tile: TileIndex| !self.removed.contains(&tile) && !self.next.contains(tile);
         let committed = self.commits.tiles.iter().filter(move |(tile, _)| is_latest(*tile));
-        self.next.values().chain(committed.map(|(_, stamp)| stamp))
+        self.next.values().chain(committed.map(|(_, version)| version))
     }
 
     /// Whether the tile has a version on disk, committed or not.
     pub(in crate::store) fn contains(&self, tile: TileIndex) -> bool {
-        self.stamp(tile).is_some() || self.foreign.contains(&tile) || self.strays.contains(&tile)
+        self.version(tile).is_some() || self.foreign.contains(&tile) || self.orphans.contains(&tile)
     }
 
     /// The tiles that have a version on disk, in no particular order.
@@ -87,13 +87,13 @@ impl TileVersions {
         &self.foreign
     }
 
-    pub(in crate::store) fn is_stray(&self, tile: TileIndex) -> bool {
-        self.strays.contains(&tile)
+    pub(in crate::store) fn is_orphan(&self, tile: TileIndex) -> bool {
+        self.orphans.contains(&tile)
     }
 
     /// The tile folders that the log does not name, in order.
-    pub(in crate::store) fn strays(&self) -> Vec<TileIndex> {
-        sorted(&self.strays)
+    pub(in crate::store) fn orphans(&self) -> Vec<TileIndex> {
+        sorted(&self.orphans)
     }
 
     /// Bytes of memory.
@@ -101,7 +101,7 @@ impl TileVersions {
         self.commits.tiles.bytes()
             + self.commits.last_changed.bytes()
             + self.next.bytes()
-            + (self.foreign.capacity() + self.strays.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
+            + (self.foreign.capacity() + self.orphans.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
     }
 
     /// Bytes of memory that the next commit takes on top.
@@ -112,10 +112,10 @@ impl TileVersions {
     // What was written since the last commit.
 
     /// Notes that the next version of a tile is written.
-    pub(in crate::store) fn note_next(&mut self, tile: TileIndex, stamp: TileStamp) {
+    pub(in crate::store) fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
         self.suspect.remove(&tile);
         self.removed.remove(&tile);
-        self.next.insert(tile, stamp);
+        self.next.insert(tile, version);
     }
 
     /// Forgets the next version of a tile, as if it had not been written.
@@ -133,7 +133,7 @@ impl TileVersions {
     }
 
     /// The versions written since the last commit.
-    pub(in crate::store) fn next(&self) -> &TileTable<TileStamp> {
+    pub(in crate::store) fn next(&self) -> &TileTable<TileVersion> {
         &self.next
     }
 
@@ -155,7 +155,7 @@ impl TileVersions {
     // What is committed.
 
     /// Notes that all that was written and removed is committed. Returns what was written.
-    pub(in crate::store) fn committed(&mut self, number: u64, scan_number: u64) -> TileTable<TileStamp> {
+    pub(in crate::store) fn committed(&mut self, number: u64, scan_number: u64) -> TileTable<TileVersion> {
         let changed = std::mem::take(&mut self.next);
         let removed = self.removed();
         self.removed.clear();

@@ -1,4 +1,4 @@
-use super::tile_stamp::{FileStamp, Stamping};
+use super::tile_version::{Checksumming, FileChecksum};
 use crate::config::Storage;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
@@ -39,16 +39,17 @@ impl TileWriter {
         tile: TileIndex,
         file: TileFile,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<FileStamp> {
+    ) -> Result<FileChecksum> {
         make_folder(&**self.files.disk(), &self.files.layout().tile_folder(tile))?;
         let path = self.files.layout().next(tile, file);
-        let stamp_file = || {
-            let mut out = Stamping::new(BufWriter::with_capacity(1 << 16, self.files.disk().create(&path)?));
+        let write_file = || {
+            let mut out =
+                Checksumming::new(BufWriter::with_capacity(1 << 16, self.files.disk().create(&path)?));
             write(&mut out)?;
             out.flush()?;
             Ok(out.finish().0)
         };
-        stamp_file().map_err(|error| Error::io(&path, "write", error))
+        write_file().map_err(|error| Error::io(&path, "write", error))
     }
 }
 

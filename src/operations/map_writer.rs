@@ -3,7 +3,7 @@ use crate::error::{Error, Result};
 use crate::persistence::TileSaver;
 use crate::persistence::{config_from, new_map_id, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk, Metadata, UnfinishedMap, id_from_hex};
+use crate::store::{Disk, FsDisk, Metadata, StagedMap, id_from_hex};
 use crate::tile::Table;
 use serde::Serialize;
 use std::path::Path;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// it; so does a writer that is dropped.
 #[derive(Debug)]
 pub struct MapWriter {
-    map: UnfinishedMap,
+    map: StagedMap,
     saver: TileSaver,
     config: MapConfig,
     metadata: Metadata,
@@ -81,7 +81,7 @@ impl MapWriter {
             return Err(Error::argument("metadata", reason));
         };
         let scan_number = ext.scan_number;
-        let map = UnfinishedMap::begin(disk, folder, metadata.clone(), map_id)?;
+        let map = StagedMap::begin(disk, folder, metadata.clone(), map_id)?;
         let (last, uncommitted, written) = Default::default();
         let saver = TileSaver::new(&config);
         Ok(Self { map, saver, config, metadata, scan_number, last, uncommitted, written })
@@ -115,14 +115,14 @@ impl MapWriter {
             return Ok(());
         }
         let store = self.map.store();
-        let stamp = self.saver.write(&store.writer()?, tile, table, scan_number)?;
-        store.note_next(tile, stamp);
+        let version = self.saver.write(&store.writer()?, tile, table, scan_number)?;
+        store.note_next(tile, version);
         self.last = Some(tile);
         self.written.tiles += 1;
-        self.written.voxels += stamp.voxels;
-        self.written.occupied += stamp.occupied;
-        self.written.table_bytes += stamp.table.bytes;
-        self.written.octree_bytes += stamp.octree.bytes;
+        self.written.voxels += version.voxels;
+        self.written.occupied += version.occupied;
+        self.written.table_bytes += version.table.bytes;
+        self.written.octree_bytes += version.octree.bytes;
         self.uncommitted += 1;
         if self.uncommitted == COMMIT_TILES { self.commit() } else { Ok(()) }
     }

@@ -2,7 +2,7 @@ use super::random_maps::{config, disk, open, path, random_voxels, read_map, writ
 use testkit::random_scans::Random;
 use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
-use voxtile::session::{Part, Prefer, clear_on, crop, merge};
+use voxtile::operations::{Part, Prefer, clear_on, crop, merge};
 use voxtile::space::Aabb;
 use voxtile::{Error, MapConfig, MapReader, Questions};
 

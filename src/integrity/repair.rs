@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::space::TileIndex;
-use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Quarantine, Remains, TileFile, TileStore, hex};
+use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Quarantine, Salvage, TileFile, TileStore, hex};
 use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
 use std::fmt;
@@ -174,7 +174,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     /// Writes `commits.log` and `metadata.json` anew from what is left of them and from the tiles.
     fn repair_index(&mut self) -> Result<()> {
         let _lock = Lock::take(self.disk, &self.layout)?;
-        let remains = Remains::read(self.disk, &self.layout)?;
+        let remains = Salvage::read(self.disk, &self.layout)?;
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
         let Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles }) = index else {
@@ -251,7 +251,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             let folder = self.layout.folder().to_owned();
             self.note(ActionKind::Removed, &folder, reason);
         }
-        for tile in store.strays() {
+        for tile in store.orphans() {
             self.quarantine_tile(tile, "commits.log does not name this tile")?;
         }
         let mut tiles: Vec<_> = store.tiles().collect();
@@ -319,7 +319,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if !matches!(self.kind(&path)?, None | Some(EntryKind::File(_))) {
             self.quarantine(&path, "no file")?;
         }
-        let expected = store.stamp(tile).map(|stamp| stamp.octree);
+        let expected = store.version(tile).map(|version| version.octree);
         let written = store.write_next(tile, TileFile::Octree, |out| write_octree(config, &table, out))?;
         if Some(written) == expected {
             store.place_octree(tile)?;

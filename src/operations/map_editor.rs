@@ -4,7 +4,7 @@ use crate::persistence::TileSaver;
 use crate::persistence::upgrade;
 use crate::persistence::{config_from, load, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{Disk, Extension, TileStamp, TileStore};
+use crate::store::{Disk, Extension, TileStore, TileVersion};
 use crate::tile::Table;
 use std::path::Path;
 use std::sync::Arc;
@@ -63,8 +63,8 @@ impl MapEditor {
     }
 
     /// What is known of a tile without reading it.
-    pub(super) fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
-        self.store.stamp(tile)
+    pub(super) fn version(&self, tile: TileIndex) -> Option<TileVersion> {
+        self.store.version(tile)
     }
 
     /// The table of a tile; an empty one where there is none.
@@ -79,8 +79,8 @@ impl MapEditor {
             return self.remove(tile);
         }
         self.begin_writing()?;
-        let stamp = self.saver.write(&self.store.writer()?, tile, table, self.scan_number())?;
-        self.store.note_next(tile, stamp);
+        let version = self.saver.write(&self.store.writer()?, tile, table, self.scan_number())?;
+        self.store.note_next(tile, version);
         Ok(())
     }
 

@@ -90,8 +90,8 @@ pub fn diff(
     let is_one_map = first.map_id().is_some() && first.map_id() == second.map_id();
     let mut diff = Diff::default();
     for (done, &tile) in (1..).zip(&tiles) {
-        let stamps = [first.stamp(tile), second.stamp(tile)];
-        if is_one_map && stamps[0].is_some() && stamps[0] == stamps[1] {
+        let versions = [first.version(tile), second.version(tile)];
+        if is_one_map && versions[0].is_some() && versions[0] == versions[1] {
             diff.tiles_equal += 1;
         } else {
             diff.tiles_read += 1;

@@ -2,10 +2,10 @@ use super::random_maps::{config, disk, path, random_voxels, read_map, write_map}
 use testkit::faulty_disk::FaultyDisk;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{Voxels, voxels_of};
+use voxtile::integrity::repair_on;
+use voxtile::operations::{Decay, Decayed, decay_on, revert_on, snapshot_on};
 use voxtile::sensor::Evidence;
-use voxtile::session::{Decay, Decayed, decay_on, revert_on, snapshot_on};
 use voxtile::store::SnapshotName;
-use voxtile::upkeep::repair_on;
 use voxtile::{
     Error, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions, Result,
 };

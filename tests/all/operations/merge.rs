@@ -4,8 +4,8 @@ use testkit::faulty_disk::FaultyDisk;
 use testkit::random_scans::Random;
 use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
+use voxtile::operations::{Merged, Prefer};
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
-use voxtile::session::{Merged, Prefer};
 use voxtile::{Error, MapConfig, MapReader, Result};
 
 /// The rule, voxel by voxel, with nothing clever.
@@ -49,7 +49,7 @@ fn naive(maps: &[Voxels], prefer: Option<Prefer>) -> Voxels {
 
 fn merge(disk: &FaultyDisk, maps: &[PathBuf], prefer: Option<Prefer>) -> Result<Merged> {
     let maps = maps.iter().map(|map| open(disk, map)).collect::<Result<Vec<_>>>()?;
-    voxtile::session::merge(&maps, path("merged"), prefer, |_, _| {})
+    voxtile::operations::merge(&maps, path("merged"), prefer, |_, _| {})
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::persistence::load::read_stored_table;
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileFile, TileStamp, TileStore};
+use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileFile, TileStore, TileVersion};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -93,7 +93,7 @@ fn revert_to(
         progress(done, tiles.len() as u64);
     }
     for tile in store.tiles().collect::<Vec<_>>() {
-        if past.stamp(tile).is_none() {
+        if past.version(tile).is_none() {
             store.remove(tile)?;
             reverted.tiles_removed += 1;
         }
@@ -115,8 +115,8 @@ fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
         let path = past.opened_snapshot().map(|name| past.layout().snapshot(name)).unwrap_or_default();
         return Err(FormatError::at_offset(0, reason).in_map(&path, None));
     }
-    for tile in store.strays() {
-        if past.stamp(tile).is_some() {
+    for tile in store.orphans() {
+        if past.version(tile).is_some() {
             let hint = "it is no part of the map as it is; `voxtile repair` moves it out of the way";
             return Err(Error::AlreadyExists { path: store.layout().tile_folder(tile), hint });
         }
@@ -140,7 +140,8 @@ impl<'a> Reverter<'a> {
 
     /// Makes the snapshot's version of a tile the next one; false if it is the present one.
     fn restore(&mut self, tile: TileIndex) -> Result<bool> {
-        let Some(stamp) = self.past.stamp(tile).filter(|_| self.past.stamp(tile) != self.store.stamp(tile))
+        let Some(version) =
+            self.past.version(tile).filter(|_| self.past.version(tile) != self.store.version(tile))
         else {
             return Ok(false);
         };
@@ -148,14 +149,14 @@ impl<'a> Reverter<'a> {
         let path = stored.path.clone();
         // Whole and the one that the snapshot names, or an error before anything has changed.
         let read = read_stored_table(&self.config.grid, tile, stored)?;
-        if self.has_octree_of(tile, &read.table, stamp)? {
+        if self.has_octree_of(tile, &read.table, version)? {
             self.store.link_next(tile, &path)?;
-            self.store.note_next(tile, stamp);
+            self.store.note_next(tile, version);
         } else {
             // The table names an octree that another version of the program derived: both are written anew.
-            let scan_number = read.trailer.map_or(stamp.scan_number, |trailer| trailer.scan_number);
-            let stamp = self.saver.write(&self.store.writer()?, tile, &read.table, scan_number)?;
-            self.store.note_next(tile, stamp);
+            let scan_number = read.trailer.map_or(version.scan_number, |trailer| trailer.scan_number);
+            let version = self.saver.write(&self.store.writer()?, tile, &read.table, scan_number)?;
+            self.store.note_next(tile, version);
         }
         Ok(true)
     }
@@ -165,7 +166,7 @@ impl<'a> Reverter<'a> {
         &mut self,
         tile: TileIndex,
         table: &crate::tile::Table,
-        stamp: TileStamp,
+        version: TileVersion,
     ) -> Result<bool> {
         if !self.store.layout().files().contains(&TileFile::Octree) {
             return Ok(true);
@@ -174,7 +175,7 @@ impl<'a> Reverter<'a> {
         let octree = self.store.write_next(tile, TileFile::Octree, |mut out| {
             table.write_bt(resolution_m, threshold as f32, &mut out)
         })?;
-        Ok(octree == stamp.octree)
+        Ok(octree == version.octree)
     }
 
     fn missing(&self, tile: TileIndex) -> Error {

@@ -4,12 +4,12 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::persistence::load;
 use crate::space::TileIndex;
-use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStamp, TileStore};
+use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStore, TileVersion};
 use std::collections::BTreeMap;
 
 /// Kept tables that have been looked at and are whole, and as which version: several snapshots may see one. A snapshot whose
 /// own is lost is led to one that it does not mean.
-pub(super) type WholeTables = BTreeMap<(TileIndex, u64), TileStamp>;
+pub(super) type WholeTables = BTreeMap<(TileIndex, u64), TileVersion>;
 
 /// The tiles of a snapshot whose tables cannot be read as the snapshot names them. Tables that are the map's own too are left
 /// to whoever looks at the map.
@@ -25,17 +25,17 @@ pub(super) fn lost_tiles(
 ) -> Result<Vec<(TileIndex, Error)>> {
     let past = store.at(snapshot);
     let mut lost = Vec::new();
-    for (tile, stamp) in snapshot.commits.tiles.iter() {
+    for (tile, version) in snapshot.commits.tiles.iter() {
         let kept = past.kept_tables(tile)?.range(snapshot.commits.flush_number..).next().copied();
         let is_known = match kept {
-            Some(flush_number) => whole.get(&(tile, flush_number)) == Some(&stamp),
-            None => store.stamp(tile) == Some(stamp),
+            Some(flush_number) => whole.get(&(tile, flush_number)) == Some(&version),
+            None => store.version(tile) == Some(version),
         };
         if is_known {
             continue;
         }
         match load::load_table(&past, &config.grid, tile) {
-            Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), stamp))),
+            Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), version))),
             Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => {
                 lost.push((tile, error))
             }

@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::session::{MapWriter, WrittenMap};
+use voxtile::operations::{MapWriter, WrittenMap};
 use voxtile::space::TileIndex;
 use voxtile::tile::Table;
 use voxtile::{Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Questions, Result};

@@ -4,13 +4,13 @@ use std::io::{self, Read, Write};
 
 /// What the log knows of one version of a tile: enough to recognise its files and to count without reading them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct TileStamp {
+pub struct TileVersion {
     /// Number of the last scan that the map had taken when the version was written.
     pub scan_number: u64,
     /// `iwlo_meta.bin`, whole.
-    pub table: FileStamp,
+    pub table: FileChecksum,
     /// `octree.bt`, whole.
-    pub octree: FileStamp,
+    pub octree: FileChecksum,
     /// Observed voxels.
     pub voxels: u64,
     /// Occupied voxels.
@@ -19,7 +19,7 @@ pub struct TileStamp {
 
 /// Length and checksum of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FileStamp {
+pub struct FileChecksum {
     /// Length in bytes.
     pub bytes: u64,
     /// CRC-32 of all bytes.
@@ -29,11 +29,11 @@ pub struct FileStamp {
 /// The highest number of a scan or flush that is read: nobody counts that far, and one more always fits.
 pub(crate) const MAX_NUMBER: u64 = 1 << 62;
 
-impl TileStamp {
+impl TileVersion {
     pub(in crate::store) const BYTES: usize = 48;
 
-    /// The stamp of one of the two files.
-    pub const fn of(&self, file: TileFile) -> FileStamp {
+    /// The checksum of one of the two files.
+    pub const fn of(&self, file: TileFile) -> FileChecksum {
         match file {
             TileFile::Table => self.table,
             TileFile::Octree => self.octree,
@@ -56,13 +56,13 @@ impl TileStamp {
     pub(in crate::store) fn from_bytes(bytes: &[u8; Self::BYTES]) -> Option<Self> {
         const MAX_FILE_BYTES: u64 = 1 << 36;
         const MAX_VOXELS: u64 = 1 << 30;
-        let stamp = Self::from_any_bytes(bytes);
-        let is_possible = stamp.scan_number <= MAX_NUMBER
-            && stamp.table.bytes <= MAX_FILE_BYTES
-            && stamp.octree.bytes <= MAX_FILE_BYTES
-            && stamp.occupied <= stamp.voxels
-            && stamp.voxels <= MAX_VOXELS;
-        is_possible.then_some(stamp)
+        let version = Self::from_any_bytes(bytes);
+        let is_possible = version.scan_number <= MAX_NUMBER
+            && version.table.bytes <= MAX_FILE_BYTES
+            && version.octree.bytes <= MAX_FILE_BYTES
+            && version.occupied <= version.voxels
+            && version.voxels <= MAX_VOXELS;
+        is_possible.then_some(version)
     }
 
     fn from_any_bytes(bytes: &[u8; Self::BYTES]) -> Self {
@@ -70,15 +70,15 @@ impl TileStamp {
         let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
         Self {
             scan_number: u64_at(0),
-            table: FileStamp { bytes: u64_at(8), crc: u32_at(16) },
-            octree: FileStamp { bytes: u64_at(20), crc: u32_at(28) },
+            table: FileChecksum { bytes: u64_at(8), crc: u32_at(16) },
+            octree: FileChecksum { bytes: u64_at(20), crc: u32_at(28) },
             voxels: u64_at(32),
             occupied: u64_at(40),
         }
     }
 }
 
-impl TileValue for TileStamp {
+impl TileValue for TileVersion {
     fn pack(self, before: Self, out: &mut Vec<u8>) {
         put_number(self.scan_number.wrapping_sub(before.scan_number) as i64, out);
         for file in [self.table, self.octree] {
@@ -93,29 +93,29 @@ impl TileValue for TileStamp {
         let scan_number = before.scan_number.wrapping_add(take_number::<i64>(input) as u64);
         let file = |input: &mut &[u8]| {
             let bytes = take_number(input);
-            FileStamp { bytes, crc: take_u32(input) }
+            FileChecksum { bytes, crc: take_u32(input) }
         };
         let (table, octree) = (file(input), file(input));
         Self { scan_number, table, octree, voxels: take_number(input), occupied: take_number(input) }
     }
 }
 
-/// A stream that stamps what passes through it.
-pub struct Stamping<S> {
+/// A stream that versions what passes through it.
+pub struct Checksumming<S> {
     stream: S,
     bytes: u64,
     crc: crc32fast::Hasher,
 }
 
-impl<S> Stamping<S> {
+impl<S> Checksumming<S> {
     /// Stamps what passes from here on.
     pub fn new(stream: S) -> Self {
         Self { stream, bytes: 0, crc: crc32fast::Hasher::new() }
     }
 
-    /// The stamp of all that passed, and the stream.
-    pub fn finish(self) -> (FileStamp, S) {
-        (FileStamp { bytes: self.bytes, crc: self.crc.finalize() }, self.stream)
+    /// The checksum of all that passed, and the stream.
+    pub fn finish(self) -> (FileChecksum, S) {
+        (FileChecksum { bytes: self.bytes, crc: self.crc.finalize() }, self.stream)
     }
 
     fn pass(&mut self, chunk: &[u8]) {
@@ -124,7 +124,7 @@ impl<S> Stamping<S> {
     }
 }
 
-impl<W: Write> Write for Stamping<W> {
+impl<W: Write> Write for Checksumming<W> {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         let written = self.stream.write(buffer)?;
         self.pass(&buffer[..written]);
@@ -136,7 +136,7 @@ impl<W: Write> Write for Stamping<W> {
     }
 }
 
-impl<R: Read> Read for Stamping<R> {
+impl<R: Read> Read for Checksumming<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.stream.read(buffer)?;
         self.pass(&buffer[..read]);

@@ -2,7 +2,7 @@ use super::random_maps::{open, path};
 use std::path::PathBuf;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::session::{self, Decay, Part, clear_on, decay_on};
+use voxtile::operations::{self, Decay, Part, clear_on, decay_on};
 use voxtile::space::Aabb;
 use voxtile::{Error, MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Result, Storage};
 

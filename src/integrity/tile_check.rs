@@ -2,7 +2,7 @@ use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::persistence::load::{self, ReadTable};
 use crate::space::TileIndex;
-use crate::store::{Disk, FileStamp, Stamping, TileFile, TileStamp, TileStore};
+use crate::store::{Checksumming, Disk, FileChecksum, TileFile, TileStore, TileVersion};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -34,8 +34,8 @@ pub(super) fn check_tile(
         Err(error) => return Err(error),
     };
     let has_octree = store.layout().files().contains(&TileFile::Octree);
-    let octree = match store.stamp(tile).filter(|_| has_octree) {
-        Some(stamp) => Some(check_octree(disk, store, tile, stamp)?),
+    let octree = match store.version(tile).filter(|_| has_octree) {
+        Some(version) => Some(check_octree(disk, store, tile, version)?),
         None => None,
     };
     Ok(TileCheck { table, octree })
@@ -45,11 +45,11 @@ fn check_octree(
     disk: &dyn Disk,
     store: &TileStore,
     tile: TileIndex,
-    stamp: TileStamp,
+    version: TileVersion,
 ) -> Result<std::result::Result<(), FormatError>> {
     let layout = store.layout();
     let current = layout.current(tile, TileFile::Octree);
-    let found = match stamp_of(disk, &current) {
+    let found = match checksum_of(disk, &current) {
         Err(Error::Io { action, cause, .. }) if is_of_medium(&cause) => {
             let reason = format!("cannot {action}: {cause}; it is derived from the table");
             return Ok(Err(FormatError::at_offset(0, reason)));
@@ -57,8 +57,9 @@ fn check_octree(
         found => found?,
     };
     // A writer beside this reader may have committed it without renaming it yet.
-    if found == Some(stamp.octree)
-        || stamp_of(disk, &layout.next(tile, TileFile::Octree)).is_ok_and(|next| next == Some(stamp.octree))
+    if found == Some(version.octree)
+        || checksum_of(disk, &layout.next(tile, TileFile::Octree))
+            .is_ok_and(|next| next == Some(version.octree))
     {
         return Ok(Ok(()));
     }
@@ -67,8 +68,8 @@ fn check_octree(
             FormatError::at_offset(0, "no regular file; it is derived from the table")
         }
         None => FormatError::at_offset(0, "the file is missing; it is derived from the table"),
-        Some(FileStamp { bytes, .. }) if bytes != stamp.octree.bytes => {
-            let wanted = stamp.octree.bytes;
+        Some(FileChecksum { bytes, .. }) if bytes != version.octree.bytes => {
+            let wanted = version.octree.bytes;
             FormatError::at_offset(bytes.min(wanted), format!("{bytes} bytes, and the log names {wanted}"))
         }
         Some(_) => FormatError::at_offset(0, "the file does not match its checksum in the log"),
@@ -82,7 +83,7 @@ pub(super) fn write_octree(config: &MapConfig, table: &ReadTable, out: &mut dyn 
 }
 
 /// Length and checksum of a file; `None` if there is none.
-pub(super) fn stamp_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileStamp>> {
+pub(super) fn checksum_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileChecksum>> {
     let input = match disk.open(path) {
         Ok(input) => input,
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
@@ -90,7 +91,7 @@ pub(super) fn stamp_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileStamp>
         }
         Err(error) => return Err(Error::io(path, "open", error)),
     };
-    let mut input = Stamping::new(input);
+    let mut input = Checksumming::new(input);
     io::copy(&mut input, &mut io::sink()).map_err(|error| Error::io(path, "read", error))?;
     Ok(Some(input.finish().0))
 }

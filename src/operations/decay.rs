@@ -123,8 +123,8 @@ pub fn decay_on(
         let tiles = editor.tiles();
         let mut decayed = Decayed { scans, factor, tiles: tiles.len() as u64, ..Decayed::default() };
         if scans == 0 && decay.forget_below == 0.0 && editor.ext().is_some() {
-            let stamps = tiles.iter().filter_map(|&tile| editor.stamp(tile));
-            decayed.voxels = stamps.map(|stamp| stamp.voxels).sum();
+            let versions = tiles.iter().filter_map(|&tile| editor.version(tile));
+            decayed.voxels = versions.map(|version| version.voxels).sum();
             return Ok(decayed);
         }
         for (done, &tile) in (0..).zip(&tiles) {

@@ -141,13 +141,13 @@ enum Owner {
 
 impl Owners {
     fn count(&mut self, store: &TileStore, number: usize, snapshot: &Snapshot) -> Result<()> {
-        for (tile, stamp) in snapshot.commits.tiles.iter() {
-            if store.stamp(tile) == Some(stamp) {
+        for (tile, version) in snapshot.commits.tiles.iter() {
+            if store.version(tile) == Some(version) {
                 continue; // It is the present one, under whatever names.
             }
             let kept = store.kept_tables(tile)?;
             let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
-            let one = Owner::One { snapshot: number, bytes: stamp.table.bytes };
+            let one = Owner::One { snapshot: number, bytes: version.table.bytes };
             self.0.entry((tile, flush_number)).and_modify(|owner| *owner = Owner::Several).or_insert(one);
         }
         Ok(())
@@ -156,14 +156,14 @@ impl Owners {
 
 impl SnapshotInfo {
     fn of(snapshot: &Snapshot) -> Self {
-        let stamps = || snapshot.commits.tiles.values();
+        let versions = || snapshot.commits.tiles.values();
         Self {
             name: snapshot.name.to_string(),
             flush_number: snapshot.commits.flush_number,
             scan_number: snapshot.commits.scan_number,
             tiles: snapshot.commits.tiles.len() as u64,
-            voxels: stamps().map(|stamp| stamp.voxels).sum(),
-            table_bytes: stamps().map(|stamp| stamp.table.bytes).sum(),
+            voxels: versions().map(|version| version.voxels).sum(),
+            table_bytes: versions().map(|version| version.table.bytes).sum(),
             own_bytes: snapshot.bytes,
             damage: None,
         }

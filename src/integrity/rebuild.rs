@@ -6,8 +6,8 @@ use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::persistence::load::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
-    Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Snapshot,
-    Stamping, StoredTile, TileFile, TileStamp, hex, id_from_hex, tile_of_folder,
+    Checksumming, Commits, Disk, Extension, FileChecksum, Layout, MAX_NUMBER, MapParameters, Metadata,
+    Salvage, Snapshot, StoredTile, TileFile, TileVersion, hex, id_from_hex, tile_of_folder,
 };
 use crate::tile::format::{Trailer, read_compact_front, read_trailer};
 use rustc_hash::FxHashMap;
@@ -34,7 +34,7 @@ pub(super) struct Index {
 pub(super) fn index_of(
     disk: &dyn Disk,
     layout: &Layout,
-    remains: &Remains,
+    remains: &Salvage,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Option<Index>> {
     if let Some((map_id, metadata)) = told_by_log(remains) {
@@ -51,7 +51,7 @@ pub(super) fn index_of(
 }
 
 /// Id and metadata of a log that leads to the last flush.
-fn told_by_log(remains: &Remains) -> Option<([u8; 16], Metadata)> {
+fn told_by_log(remains: &Salvage) -> Option<([u8; 16], Metadata)> {
     let map_id = remains.log_map_id?;
     let logged = remains.commits.metadata.clone().filter(|metadata| metadata.ext.is_some())?;
     let is_last = match &remains.metadata {
@@ -67,7 +67,7 @@ fn told_by_log(remains: &Remains) -> Option<([u8; 16], Metadata)> {
 fn index_from_tiles(
     disk: &dyn Disk,
     layout: &Layout,
-    remains: &Remains,
+    remains: &Salvage,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Index> {
     let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
@@ -157,15 +157,15 @@ impl Index {
                 return Ok(());
             }
         };
-        let stamp = stamp_from(&table, config);
-        if known_scan.is_none_or(|known| stamp.scan_number > known) {
+        let version = version_of(&table, config);
+        if known_scan.is_none_or(|known| version.scan_number > known) {
             // Nothing tells how many scans the tiles have in common: an input cannot be gone on with.
             if let Some(ext) = &mut self.metadata.ext {
                 ext.inputs.clear();
             }
         }
-        self.commits.scan_number = self.commits.scan_number.max(stamp.scan_number);
-        self.commits.tiles.insert(tile, stamp);
+        self.commits.scan_number = self.commits.scan_number.max(version.scan_number);
+        self.commits.tiles.insert(tile, version);
         Ok(())
     }
 }
@@ -194,23 +194,23 @@ pub(super) fn read_alone(
         Err(error) => return Err(Error::io(path, "open", error)),
     };
     let bytes = input.file_bytes();
-    let (path, input, map_id) = (path.to_owned(), Stamping::new(input), Some(map_id));
-    match read_stored_table(grid, tile, StoredTile { path, input, bytes, map_id, stamp: None, storage }) {
+    let (path, input, map_id) = (path.to_owned(), Checksumming::new(input), Some(map_id));
+    match read_stored_table(grid, tile, StoredTile { path, input, bytes, map_id, version: None, storage }) {
         Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => Ok(Some(Err(error))),
         Err(error) => Err(error),
         Ok(table) => Ok(Some(Ok(table))),
     }
 }
 
-fn stamp_from(table: &ReadTable, config: &MapConfig) -> TileStamp {
+fn version_of(table: &ReadTable, config: &MapConfig) -> TileVersion {
     let threshold = config.occupied_log_odds();
     let occupied = table.table.iter().filter(|(_, evidence)| evidence.log_odds >= threshold).count();
     let trailer = table.trailer.as_ref();
-    TileStamp {
+    TileVersion {
         // What a file says of itself is no reason to count from there if nobody counts that far.
         scan_number: trailer.map_or(0, |trailer| trailer.scan_number.min(MAX_NUMBER)),
         table: table.file,
-        octree: trailer.map_or(FileStamp::default(), |trailer| FileStamp {
+        octree: trailer.map_or(FileChecksum::default(), |trailer| FileChecksum {
             bytes: trailer.octree_bytes,
             crc: trailer.octree_crc,
         }),
@@ -251,7 +251,7 @@ impl Trailers {
 }
 
 /// Id and metadata, from the best that is left.
-fn identity(layout: &Layout, remains: &Remains, trailers: &Trailers) -> Result<([u8; 16], Metadata)> {
+fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<([u8; 16], Metadata)> {
     let written = remains.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
     let logged = remains.commits.metadata.as_ref().filter(|metadata| metadata.ext.is_some());
     let id_of = |metadata: &Metadata| metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id));

@@ -7,8 +7,8 @@ use crate::error::{Error, FormatError, Result};
 use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotList,
-    SnapshotName, TileFile, TileStamp, TileStore, read_log, tile_of_folder,
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage, SnapshotList,
+    SnapshotName, TileFile, TileStore, TileVersion, read_log, tile_of_folder,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -190,13 +190,13 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     /// Whether a writer has flushed a tile since the store was opened. It keeps tables for readers, not octrees; and a
     /// writer that was started since has not seen this reader.
     fn has_changed_since(&self, store: &TileStore, tile: TileIndex) -> bool {
-        let now = self.stamp_now(tile);
-        now.is_some() && now != store.stamp(tile)
+        let now = self.version_now(tile);
+        now.is_some() && now != store.version(tile)
     }
 
     /// Where metadata or log cannot be read, the tiles are checked against what else tells of them.
     fn index_from_remains(&mut self, disk: &Arc<dyn Disk>) -> Result<Option<TileStore>> {
-        let remains = Remains::read(self.disk, &self.layout)?;
+        let remains = Salvage::read(self.disk, &self.layout)?;
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         match rebuild::index_of(self.disk, &self.layout, &remains, &mut |_, _| ()) {
             Ok(Some(Index { map_id, metadata, commits, damaged, .. })) => {
@@ -318,7 +318,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             }
             return Ok(());
         }
-        let mut is_stray = false;
+        let mut is_orphan = false;
         for name in self.list(folder)? {
             let path = folder.join(&name);
             let kept = self.layout.flush_of_kept(&name);
@@ -334,10 +334,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             } else if self.layout.files().iter().all(|file| file.name(self.layout.storage()) != name) {
                 self.report(Finding::note(&path, Some(tile), "no part of a map"));
             } else {
-                is_stray |= !is_known;
+                is_orphan |= !is_known;
             }
         }
-        if !is_stray {
+        if !is_orphan {
             return Ok(());
         }
         // A writer may have added it, or begun to remove it, since the log was read.
@@ -353,7 +353,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     }
 
     /// What the log says of a tile now.
-    fn stamp_now(&self, tile: TileIndex) -> Option<TileStamp> {
+    fn version_now(&self, tile: TileIndex) -> Option<TileVersion> {
         let (_, commits) = read_log(self.disk, &self.layout).ok()??;
         commits.tiles.get(tile)
     }

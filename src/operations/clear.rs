@@ -72,9 +72,9 @@ fn clear_tile(
 ) -> Result<()> {
     let voxels = editor.config().grid.voxels_of_tile(tile);
     if part.share_of(&voxels) == Share::Everything
-        && let Some(stamp) = editor.stamp(tile)
+        && let Some(version) = editor.version(tile)
     {
-        cleared.voxels_cleared += stamp.voxels;
+        cleared.voxels_cleared += version.voxels;
         cleared.tiles_removed += 1;
         return editor.remove(tile);
     }
