@@ -30,11 +30,11 @@ fn region() -> Aabb {
 
 fn merge(disk: &FaultyDisk) -> Result<()> {
     let maps = [open(disk, &path("a"))?, open(disk, &path("b"))?];
-    session::merge(&maps, path("out"), None, |_, _| {}).map(drop)
+    operations::merge(&maps, path("out"), None, |_, _| {}).map(drop)
 }
 
 fn crop(disk: &FaultyDisk) -> Result<()> {
-    session::crop(&open(disk, &path("a"))?, &Part::Inside(region()), path("out"), |_, _| {}).map(drop)
+    operations::crop(&open(disk, &path("a"))?, &Part::Inside(region()), path("out"), |_, _| {}).map(drop)
 }
 
 fn clear(disk: &FaultyDisk) -> Result<()> {
