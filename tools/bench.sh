@@ -4,10 +4,10 @@
 #   tools/bench.sh                     lists them
 #   tools/bench.sh NAME [OPTIONS]      runs one; `all` runs all, with options that all of them have
 #
-# Options of all: --short (check only that everything works; docs/ stays as it is), --only PART (an unknown name lists the
-# parts), --runs N (figures are medians), --out FOLDER (where results go). `tools/bench.sh NAME --help` lists the others.
-# Recorded data comes from below ${VOXTILE_DATA:-../shared/data}; a set that is absent is skipped. A benchmark exits with 1
-# if something is wrong that does not depend on time, with 2 after an error.
+# Options of all: --short (check only that everything works; docs/ stays as it is), --only PART (an unknown name lists
+# the parts), --runs N (figures are medians), --out FOLDER (where results go). `tools/bench.sh NAME --help` lists the
+# others. Recorded data comes from below ${VOXTILE_DATA:-../shared/data}; a set that is absent is skipped. A benchmark
+# exits with 1 if something is wrong that does not depend on time, with 2 after an error.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${CARGO_TARGET_DIR:-target}

@@ -19,8 +19,8 @@ octomap_contenders() {
     fi
 }
 
-# Without contracted operations, like Debian's library: fused multiply-add visits slightly other voxels. OctoMap's headers
-# hold the ray walk and the insertion, so both are compiled here, not only in the library.
+# Without contracted operations, like Debian's library: fused multiply-add visits slightly other voxels. OctoMap's
+# headers hold the ray walk and the insertion, so both are compiled here, not only in the library.
 compile() { # program, options
     local program=$target/peers/$1
     shift

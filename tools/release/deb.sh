@@ -1,5 +1,7 @@
 # Debian packages from the tree of run.sh, which sources this file.
 
+maintainer="${DEBFULLNAME:-The voxtile developers} <${DEBEMAIL:-voxtile@localhost.localdomain}>"
+
 # deb NAME SUMMARY DESCRIPTION FILE...: the files, with those that policy asks for.
 deb() {
     local name=$1 summary=$2 description=$3 root=$work/deb-$1 documents file
@@ -14,23 +16,26 @@ deb() {
     [[ $name == voxtile-share ]] || rm -f "$root/usr/share/man/man1/voxtile-share.1"
     find "$root/usr/share/man" -type f -exec gzip --best --no-name {} +
     gzip --best --no-name <CHANGELOG.md >"$documents/changelog.gz"
-    { debian_copyright && cat "$tree/share/doc/voxtile/THIRD-PARTY-LICENSES"; } >"$documents/copyright"
-    echo "$name: statically-linked-binary usr/bin/$name" >"$root/usr/share/lintian/overrides/$name"
-    control "$name" "$summary" "$description" "$(du --summarize --kilobytes "$root/usr" | cut -f1)" \
+    debian_changelog "$name" | gzip --best --no-name >"$documents/changelog.Debian.gz"
+    gzip --best --no-name <"$tree/share/doc/voxtile/THIRD-PARTY-LICENSES" >"$documents/THIRD-PARTY-LICENSES.gz"
+    debian_copyright >"$documents/copyright"
+    # Static, on purpose.
+    echo "$name: shared-library-lacks-prerequisites [usr/bin/$name]" >"$root/usr/share/lintian/overrides/$name"
+    control "$name" "$summary" "$description" "$(du --summarize --block-size=1K "$root/usr" | cut -f1)" \
         >"$root/DEBIAN/control"
     (cd "$root" && find usr -type f -print0 | sort --zero-terminated | xargs --null md5sum >DEBIAN/md5sums)
     find "$root" -type d -exec chmod 755 {} + -o -type f -exec chmod 644 {} +
     chmod 755 "$root"/usr/bin/*
-    dpkg-deb --root-owner-group --build "$root" "$work/out/${name}_${version}_$arch.deb" >/dev/null
+    dpkg-deb --root-owner-group --build "$root" "$work/out/${name}_${version}-1_$arch.deb" >/dev/null
 }
 
 # control NAME SUMMARY DESCRIPTION KIB
 control() {
     cat <<CONTROL
 Package: $1
-Version: $version
+Version: $version-1
 Architecture: $arch
-Maintainer: ${DEBFULLNAME:-The voxtile developers} <${DEBEMAIL:-voxtile@localhost.localdomain}>
+Maintainer: $maintainer
 Installed-Size: $4
 Section: science
 Priority: optional
@@ -44,6 +49,16 @@ CONTROL
     fold --spaces --width 78 <<<"${3//$'\n'/ }" | sed 's/^/ /; s/ *$//'
 }
 
+debian_changelog() {
+    cat <<CHANGELOG
+$1 ($version-1) unstable; urgency=medium
+
+  * Version $version; changelog.gz has its changes.
+
+ -- $maintainer  $(date --utc --rfc-email --date="@$SOURCE_DATE_EPOCH")
+CHANGELOG
+}
+
 debian_copyright() {
     cat <<COPYRIGHT
 voxtile: $(sed -n 's/^Copyright/copyright/p' LICENSE-MIT).
@@ -53,8 +68,7 @@ It is licensed, at your option, under the Apache License 2.0 (on Debian systems 
 
 $(cat LICENSE-MIT)
 
-The binary holds these crates of others, and parts of the C library musl (MIT license, copyright 2005-2020 Rich Felker
-and others).
-
+The binary holds crates of others, whose licenses are in THIRD-PARTY-LICENSES.gz, and parts of the C library musl
+(MIT license, copyright 2005-2020 Rich Felker and others).
 COPYRIGHT
 }

@@ -2,8 +2,8 @@
 # Everything that a release hands out, in one folder:
 #
 #   voxtile-VERSION-TARGET.tar.gz     static binaries of voxtile and voxtile-share, man pages, completions, licenses
-#   voxtile_VERSION_ARCH.deb          the same as Debian packages
-#   voxtile-share_VERSION_ARCH.deb
+#   voxtile_VERSION-1_ARCH.deb        the same as Debian packages
+#   voxtile-share_VERSION-1_ARCH.deb
 #   voxtile-VERSION.crate             the sources of the library and of voxtile, built once more from this package
 #   SHA256SUMS
 #
@@ -11,8 +11,8 @@
 #
 # --out: the folder, new or made by an earlier run (target/release-VERSION). --dirty: also with changes that are not
 # committed. The binaries are for this machine's kind of CPU. Needs cargo, python3, dpkg-deb, and for static binaries
-# `rustup target add $(uname -m)-unknown-linux-musl` and Debian's musl-tools. DEBFULLNAME and DEBEMAIL name the maintainer
-# of the Debian packages. The same commit and toolchain make the same bytes, but for the .crate.
+# `rustup target add $(uname -m)-unknown-linux-musl` and Debian's musl-tools. DEBFULLNAME and DEBEMAIL name the
+# maintainer of the Debian packages. The same commit and toolchain make the same bytes.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

@@ -82,8 +82,8 @@ fn head(arguments: &Arguments) -> String {
     let Arguments { options, octomap_version, .. } = arguments;
     let real = if arguments.real { " --real" } else { "" };
     format!(
-        "Machine: {}. OctoMap {octomap_version}, g++ -O2 -DNDEBUG -ffp-contract=off; voxtile: cargo's release profile, no \
-         CPU of its own named.\nCommand: `{}{real}`. {} run(s).\n",
+        "Machine: {}. OctoMap {octomap_version}, g++ -O2 -DNDEBUG -ffp-contract=off; voxtile: cargo's release profile, \
+         no CPU of its own named.\nCommand: `{}{real}`. {} run(s).\n",
         report::processor(),
         options.command("peers", options.only.as_deref()),
         options.runs_or(3),

@@ -34,8 +34,8 @@ impl<'a> Bench<'a> {
         Ok(answer)
     }
 
-    /// Puts an answer into its section. To be called after each question, so that a long run that is stopped leaves what it
-    /// found.
+    /// Puts an answer into its section. To be called after each question, so that a long run that is stopped leaves
+    /// what it found.
     ///
     /// # Errors
     ///

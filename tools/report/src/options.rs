@@ -14,8 +14,8 @@ pub struct Options {
     /// Runs of each measurement; figures are their medians
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
-    /// Folder for the results [default: where the documents have them; with --short, the benchmark's own below cargo's target
-    /// folder]
+    /// Folder for the results [default: where the documents have them; with --short, the benchmark's own below cargo's
+    /// target folder]
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
     /// Folder of the recorded data sets; a set that is absent is skipped

@@ -1,4 +1,4 @@
-//! What the pages tell readers to type, typed: the tutorial from top to bottom, and the README's example with its answer.
+//! What the pages tell readers to type: the tutorial from top to bottom, and the README's example with its answer.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -69,8 +69,8 @@ fn the_tutorial_runs_from_top_to_bottom() {
 
     let folder = tempfile::tempdir().unwrap();
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
-    // An error of one command ends it, also on the left of a pipe. A command that is repeated until it succeeds does not
-    // hang it.
+    // An error of one command ends it, also on the left of a pipe. A command that is repeated until it succeeds does
+    // not hang it.
     let head = "trap 'echo \"docs/tutorial.md: the block at line $at fails: $BASH_COMMAND\" >&2' ERR\n";
     let run = Command::new("timeout")
         .args(["600", "bash", "-Eeuo", "pipefail", "-c", &format!("{head}{script}")])
