@@ -9,6 +9,9 @@ mod cli_edit;
 /// Files that are exported: whole or not there, where they say, and no stranger's.
 #[cfg(feature = "cli")]
 mod cli_export;
+/// Help, man pages and completion scripts.
+#[cfg(feature = "cli")]
+mod cli_help;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;

@@ -4,6 +4,7 @@ mod snapshot;
 use crate::flush_schedule::FlushEvery;
 use bytesize::ByteSize;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
@@ -14,7 +15,7 @@ use voxtile::Storage;
 ///
 /// Lengths are metres, coordinates are in the world frame.
 #[derive(Debug, Parser)]
-#[command(name = "voxtile", version, propagate_version = true)]
+#[command(name = "voxtile", version, propagate_version = true, max_term_width = 120)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
@@ -68,6 +69,10 @@ pub enum Command {
     Share(ShareArgs),
     /// Map a small made-up city and draw it: a first look, no data needed
     Demo(DemoArgs),
+    /// Print the completion script of a shell
+    Completions(CompletionsArgs),
+    /// Write the man pages into a folder
+    Man(ManArgs),
 }
 
 #[derive(Debug, Args)]
@@ -454,4 +459,17 @@ pub enum PresetName {
     Passive,
     /// The setups a to e of the paper
     Table,
+}
+
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// Shell that reads the script
+    pub shell: Shell,
+}
+
+#[derive(Debug, Args)]
+pub struct ManArgs {
+    /// Folder of the pages; made if it is absent
+    #[arg(short = 'o', long = "output", value_name = "FOLDER")]
+    pub output: PathBuf,
 }

@@ -4,6 +4,7 @@ mod args;
 mod build;
 mod build_config;
 mod clear;
+mod completions;
 mod convert;
 mod crop;
 mod decay;
@@ -17,6 +18,7 @@ mod info;
 mod intake;
 mod local;
 mod local_table;
+mod man;
 mod map_at;
 mod memory;
 mod merge;
@@ -86,6 +88,8 @@ fn main() -> ExitCode {
         Command::Local(args) => local::run(&args),
         Command::Share(args) => share::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
     };
     outcome.unwrap_or_else(|error| {
         if is_closed_pipe(&error) {

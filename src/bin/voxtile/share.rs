@@ -16,7 +16,7 @@ pub fn run(args: &ShareArgs) -> anyhow::Result<ExitCode> {
         }
         status => status.with_context(|| {
             let hint =
-                "put it beside voxtile or on the PATH (cargo build --release -p voxtile-share makes it)";
+                "put it beside voxtile or on the PATH (cargo install --path programs/share installs it)";
             format!("cannot run {}: {hint}", name())
         })?,
     };
@@ -35,12 +35,11 @@ Usage: voxtile share --publish <MAP_OR_SCANS> --robot <NAME> [OPTIONS]
        voxtile share --measure <SCANS>...
 
 The work is done by the program voxtile-share, which is not here: neither beside voxtile nor on the PATH. It comes
-separately, since its network library is six times as large as voxtile. To get it, in the sources of voxtile:
+separately, since its network library is six times as large as voxtile. To install it, in the sources of voxtile:
 
-    cargo build --release -p voxtile-share
+    cargo install --locked --path programs/share
 
-and put target/release/voxtile-share beside voxtile or into a folder of the PATH. Then this help lists all options.
-docs/sharing.md says what is shared, and how.";
+Then this help lists all options. docs/sharing.md says what is shared, and how.";
 
 fn asks_for_help(arguments: &[OsString]) -> bool {
     arguments.first().is_none_or(|first| first == "help")

@@ -28,12 +28,7 @@ impl Setting {
 
     /// The recorded drive along a river, where it is there; where not, a line says so.
     pub fn riverside(&self, tile_size_m: f64) -> Option<Case> {
-        let folder = self.data.join("mulran_riverside02_a");
-        if !folder.join("scans").is_dir() {
-            eprintln!("endurance: riverside is skipped: no folder {}", folder.display());
-            return None;
-        }
-        let input = Input::Recorded { folder };
+        let input = Input::Recorded { folder: report::recorded_set(&self.data, "mulran_riverside02_a")? };
         Some(Case { name: "riverside".into(), input, resolution_m: 0.1, tile_size_m, max_range_m: 100.0 })
     }
 

@@ -41,12 +41,8 @@ pub fn datasets(data: &Path) -> Vec<Dataset> {
         ("hall", 4, "balm_os0_hall"),
     ];
     for (name, some_scans, folder) in recorded {
-        let path = data.join(folder);
-        if path.join("scans").is_dir() {
-            datasets.push(Dataset { name, some_scans, source: Source::Recorded(path) });
-        } else {
-            eprintln!("octocache: {name} is skipped: no folder {}", path.display());
-        }
+        let recorded = report::recorded_set(data, folder);
+        datasets.extend(recorded.map(|path| Dataset { name, some_scans, source: Source::Recorded(path) }));
     }
     datasets
 }

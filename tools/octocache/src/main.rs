@@ -1,4 +1,4 @@
-//! The command `octocache`: puts the questions of the OctoCache paper to voxtile and writes tables and plots.
+//! The benchmark `octocache`: puts the questions of the OctoCache paper to voxtile and writes tables and plots.
 
 mod contender;
 mod dataset;
@@ -6,75 +6,38 @@ mod questions;
 mod setting;
 mod update_stream;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Parser;
-use clap::builder::PossibleValuesParser;
 use questions::QUESTIONS;
-use report::Page;
+use report::{Bench, Options};
 use setting::Setting;
-use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
 
 /// Puts the questions of the OctoCache paper to voxtile and writes tables and plots.
 #[derive(Debug, Parser)]
 #[command(name = "octocache", version)]
 struct Arguments {
-    /// Look only whether everything works: few scans, one run
-    #[arg(long)]
-    short: bool,
-    /// One question only
-    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(QUESTIONS.map(|question| question.name)))]
-    only: Option<String>,
-    /// Medians of so many runs
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
-    runs: u32,
-    /// Folder of the recorded data sets; one that is absent is skipped
-    #[arg(long, value_name = "FOLDER")]
-    data: PathBuf,
-    /// Page into which the figures go
-    #[arg(long, value_name = "FILE")]
-    page: PathBuf,
-    /// Where the page is written to, and beside it the folder of tables and plots [default: the page itself]
-    #[arg(long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    options: Options,
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("octocache: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    report::exit_code("octocache", run(&Arguments::parse().options).map(|()| true))
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    let page = Page::open(&arguments.page, arguments.output.as_deref())?;
+fn run(options: &Options) -> Result<()> {
+    let wanted = options.wanted(&QUESTIONS, |question| question.name.to_owned())?;
+    let bench = Bench::open("octocache", options)?;
     let setting = Setting {
-        datasets: dataset::datasets(&arguments.data),
-        is_short: arguments.short,
-        runs: if arguments.short { 1 } else { arguments.runs as usize },
+        datasets: dataset::datasets(&options.data),
+        is_short: options.short,
+        runs: options.runs_or(3) as usize,
     };
     // What other threads there are belongs to the engine: rays and tiles are worked on by this one.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()?;
-    let is_wanted = |name| arguments.only.as_ref().is_none_or(|only| only == name);
-    for question in QUESTIONS.iter().filter(|question| is_wanted(question.name)) {
-        eprint!("{}: ", question.name);
-        let begin = Instant::now();
-        let answer = pool.install(|| (question.answer)(&setting));
-        let answer = answer.with_context(|| question.name.to_owned())?;
-        // After every question, so that a long run that is stopped leaves what it found.
-        page.put(question.name, &answer, &command(arguments, question.name))?;
-        eprintln!("{:.0} s", begin.elapsed().as_secs_f64());
+    for question in wanted {
+        let answer = bench.ask(question.name, || pool.install(|| (question.answer)(&setting)))?;
+        bench.put(question.name, &answer)?;
     }
     Ok(())
-}
-
-/// What to type to measure a question again.
-fn command(arguments: &Arguments, question: &str) -> String {
-    let short = if arguments.short { " --short" } else { "" };
-    let runs = if arguments.short { String::new() } else { format!(" --runs {}", arguments.runs) };
-    format!("tools/octocache/run.sh{short}{runs} --only {question}")
 }

@@ -159,7 +159,7 @@ fn outcome<T: DeserializeOwned>(mut command: Command) -> Result<T> {
     let program = command.get_program().to_string_lossy().into_owned();
     let output = command
         .output()
-        .with_context(|| format!("{program}: cannot start it; tools/peers/run.sh builds it"))?;
+        .with_context(|| format!("{program}: cannot start it; tools/bench.sh peers builds it"))?;
     let said = String::from_utf8_lossy(&output.stderr);
     ensure!(output.status.success(), "{} ({}; {command:?})", said.trim(), output.status);
     serde_json::from_slice(&output.stdout)

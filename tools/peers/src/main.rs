@@ -1,8 +1,7 @@
-//! Compares voxtile with OctoMap on the same scans and prints one table. `tools/peers/run.sh` builds and starts it.
+//! Compares voxtile with OctoMap on the same scans and prints one table. `tools/bench.sh peers` builds and starts it.
 
 mod contenders;
 mod exactness;
-mod machine;
 mod measure;
 mod table;
 mod workloads;
@@ -10,26 +9,21 @@ mod workloads;
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use contenders::Contenders;
+use report::Options;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use workloads::Workload;
 
 /// Compares voxtile with OctoMap and prints a table in Markdown; exits with 1 if one of them maps wrongly.
 #[derive(Debug, Parser)]
 #[command(name = "peers", version)]
 struct Arguments {
-    /// A minute at most: few scans, one run, two workloads
-    #[arg(long)]
-    short: bool,
-    /// Runs of each contender; the table has medians [default: 3, or 1 with --short]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    runs: Option<u32>,
-    /// Take the real data sets too
+    #[command(flatten)]
+    options: Options,
+    /// Take the recorded data sets too
     #[arg(long)]
     real: bool,
-    /// Folder of the real data sets
-    #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
-    data: PathBuf,
     /// The contender of OctoMap
     #[arg(long, value_name = "PROGRAM")]
     octomap: PathBuf,
@@ -42,37 +36,29 @@ struct Arguments {
     /// The contender of voxtile
     #[arg(long, value_name = "PROGRAM")]
     voxtile: PathBuf,
-    /// Folder for streams and maps, on the disk that is to be compared on; emptied before and after
-    #[arg(long, value_name = "FOLDER")]
-    work: PathBuf,
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("peers: {error:#}");
-            ExitCode::from(2)
-        }
-    }
+    report::exit_code("peers", run(&Arguments::parse()))
 }
 
 /// Whether both contenders map as they should.
 fn run(arguments: &Arguments) -> Result<bool> {
-    let mut workloads = if arguments.short { workloads::short() } else { workloads::made_up() };
+    let Arguments { options, .. } = arguments;
+    let mut workloads = if options.short { workloads::short() } else { workloads::made_up() };
     if arguments.real {
-        workloads.extend(workloads::real(&arguments.data));
+        workloads.extend(workloads::real(&options.data));
     }
-    let runs = arguments.runs.unwrap_or(if arguments.short { 1 } else { 3 });
+    let workloads = options.wanted(workloads, Workload::part)?;
+    let runs = options.runs_or(3);
     let contenders = Contenders {
         octomap: arguments.octomap.clone(),
         octomap_native: arguments.octomap_native.clone(),
         voxtile: arguments.voxtile.clone(),
-        least_seconds: if arguments.short { 0.2 } else { 0.5 },
-        points: if arguments.short { 100_000 } else { 1_000_000 },
+        least_seconds: if options.short { 0.2 } else { 0.5 },
+        points: if options.short { 100_000 } else { 1_000_000 },
     };
-    let work = WorkFolder::create(&arguments.work)?;
+    let work = WorkFolder::create(&options.work("peers"))?;
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
     for workload in &workloads {
         let files = workload.write(work.path())?;
@@ -80,27 +66,34 @@ fn run(arguments: &Arguments) -> Result<bool> {
         rows.extend(exactness::rows(workload, &files, &contenders, &mut faults)?);
         work.clear()?;
     }
-    println!("{}", machine::description(&arguments.octomap_version)?);
-    println!("Command: `{}`. {runs} run(s).\n", command(arguments));
-    print!("{}", table::markdown(&rows));
+    let text = format!("{}\n{}", head(arguments), table::markdown(&rows));
+    print!("{text}");
+    if let Some(folder) = &options.out {
+        write(folder, &text)?;
+    }
     for fault in &faults {
         eprintln!("peers: {fault}");
     }
     Ok(faults.is_empty())
 }
 
-/// The command line that a user gave, as far as it decides what is compared.
-fn command(arguments: &Arguments) -> String {
-    let mut command = "tools/peers/run.sh".to_owned();
-    for (given, option) in [(arguments.short, " --short"), (arguments.real, " --real")] {
-        if given {
-            command.push_str(option);
-        }
-    }
-    if let Some(runs) = arguments.runs {
-        command.push_str(&format!(" --runs {runs}"));
-    }
-    command
+/// The machine, what was compiled how, and what to type to measure again.
+fn head(arguments: &Arguments) -> String {
+    let Arguments { options, octomap_version, .. } = arguments;
+    let real = if arguments.real { " --real" } else { "" };
+    format!(
+        "Machine: {}. OctoMap {octomap_version}, g++ -O2 -DNDEBUG -ffp-contract=off; voxtile: cargo's release profile, \
+         no CPU of its own named.\nCommand: `{}{real}`. {} run(s).\n",
+        report::processor(),
+        options.command("peers", options.only.as_deref()),
+        options.runs_or(3),
+    )
+}
+
+fn write(folder: &Path, text: &str) -> Result<()> {
+    let path = folder.join("peers.md");
+    let written = fs::create_dir_all(folder).and_then(|()| fs::write(&path, text));
+    written.with_context(|| format!("{}: cannot write", path.display()))
 }
 
 /// A folder that is removed in the end.
@@ -112,7 +105,7 @@ impl WorkFolder {
         let marker = path.join(".peers");
         ensure!(
             !path.exists() || marker.exists(),
-            "{}: there is something else already; name another folder with --work",
+            "{}: there is something else already; remove it, or name another target folder",
             path.display()
         );
         let folder = Self(path.to_owned());

@@ -113,11 +113,7 @@ pub fn real(data: &Path) -> Vec<Workload> {
     let sets = [("mulran_riverside02_a", 0.2, 60), ("fastlio_hku_1", 0.2, 200), ("balm_os0_hall", 0.1, 20)];
     let mut workloads = Vec::new();
     for (set, resolution_m, scans) in sets {
-        let folder = data.join(set);
-        if !folder.join("scans").is_dir() {
-            eprintln!("{set}: skipped, not in {}", data.display());
-            continue;
-        }
+        let Some(folder) = report::recorded_set(data, set) else { continue };
         workloads.push(Workload {
             name: format!("`{set}` {resolution_m} m"),
             source: Source::Real(folder),
@@ -132,6 +128,11 @@ pub fn real(data: &Path) -> Vec<Workload> {
 }
 
 impl Workload {
+    /// The name that `--only` takes: `street-0.2`.
+    pub fn part(&self) -> String {
+        self.name.trim_end_matches(" m").replace('`', "").replace(' ', "-")
+    }
+
     /// Writes the scans into a folder.
     pub fn write(&self, folder: &Path) -> Result<Files> {
         eprintln!("{}: writing {} scans", self.name, self.scans);

@@ -1,11 +1,13 @@
-//! What tools that measure voxtile have in common: clocks, samples, and a page into which tables and plots go.
+//! What benchmarks of voxtile have in common: options, clocks, samples, and a page into which tables and plots go.
 //!
 //! ```text
-//! Stopwatch -> Samples -> Table, Plot -> Answer -> a section of the Page, and files beside it
+//! Options -> Bench -> Stopwatch -> Samples -> Table, Plot -> Answer -> a section of the Page, and files beside it
 //! ```
 
 mod answer;
+mod bench;
 mod machine;
+mod options;
 mod page;
 pub mod plot;
 mod samples;
@@ -13,7 +15,9 @@ mod stopwatch;
 mod table;
 
 pub use answer::Answer;
-pub use machine::description as machine;
+pub use bench::{Bench, exit_code};
+pub use machine::{description as machine, processor};
+pub use options::{Options, recorded_set};
 pub use page::Page;
 pub use samples::Samples;
 pub use stopwatch::{Stopwatch, Took};

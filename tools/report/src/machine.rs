@@ -3,11 +3,16 @@ use std::thread;
 
 /// The machine, and how busy it was when asked.
 pub fn description() -> String {
+    format!("{}, {}", processor(), load())
+}
+
+/// The CPU and the number of its cores.
+pub fn processor() -> String {
     let cpus = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpus.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let model = model.map_or("unknown CPU", |(_, name)| name.trim());
     let cores = thread::available_parallelism().map_or(1, |cores| cores.get());
-    format!("{model}, {cores} core(s), {}", load())
+    format!("{model}, {cores} core(s)")
 }
 
 /// How many programs wanted a core during the last minute, on Linux.

@@ -18,3 +18,8 @@ pub mod reference_local;
 pub mod reference_map;
 #[allow(missing_docs)]
 pub mod unsynced_disk;
+
+/// The Rust code of the README, which compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+mod readme {}

@@ -1,6 +1,8 @@
 //! Real processes, and what they say.
 #![allow(dead_code)]
 
+pub mod bad_link;
+
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;

@@ -11,8 +11,8 @@ use voxtile::share::{ExportPolicy, SenderConfig};
 /// One publisher and one subscriber on one machine need no options but --publish and --subscribe; anything else is said
 /// with --listen and --connect. Lengths are metres, times seconds.
 #[derive(Debug, Parser)]
-#[command(name = "voxtile share", bin_name = "voxtile share", version)]
-#[command(group = ArgGroup::new("what").required(true).args(["publish", "subscribe", "fold", "measure"]))]
+#[command(name = "voxtile share", bin_name = "voxtile share", version, max_term_width = 120)]
+#[command(group = ArgGroup::new("what").required(true).args(["publish", "subscribe", "fold", "measure", "man"]))]
 pub struct Args {
     /// Share the occupied voxels of a map, or of scans while they are mapped (as for voxtile build)
     #[arg(long, value_name = "MAP_OR_SCANS")]
@@ -119,6 +119,9 @@ pub struct Args {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Print the man page
+    #[arg(long, hide = true)]
+    pub man: bool,
 }
 
 /// What is to be done.
@@ -127,6 +130,7 @@ pub enum Mode {
     Subscribe(PathBuf),
     Fold(PathBuf, PathBuf),
     Measure(Vec<PathBuf>),
+    Man,
 }
 
 impl Args {
@@ -135,6 +139,9 @@ impl Args {
             let missing = || Error::argument("-o", "name the map, existing or new, that layers go to");
             self.output.clone().ok_or_else(missing)
         };
+        if self.man {
+            return Ok(Mode::Man);
+        }
         if let Some(source) = &self.publish {
             if self.robot.len() != 1 {
                 return Err(Error::argument("--robot", "a publisher has one name").into());

@@ -3,10 +3,9 @@
 mod support;
 
 use std::time::Duration;
+use support::bad_link::BadLink;
 use support::{SHARE, endpoint, layers_of, publisher, run, scans, set_of, start, subscriber};
 use tempfile::TempDir;
-
-const BAD_LINK: &str = env!("CARGO_BIN_EXE_bad-link");
 
 #[test]
 fn two_processes_have_equal_sets_and_the_layer_is_folded_into_a_map() {
@@ -25,14 +24,21 @@ fn two_processes_have_equal_sets_and_the_layer_is_folded_into_a_map() {
 }
 
 #[test]
-fn five_processes_and_a_bad_link_that_is_cut() {
+fn four_processes_and_a_bad_link_that_is_cut() {
     let folder = TempDir::new().unwrap();
     let robots = [endpoint(), endpoint()];
     let link = endpoint();
     let mut publishers = [("a", 11, &robots[0]), ("b", 12, &robots[1])]
         .map(|(name, seed, endpoint)| publisher(name, &scans(folder.path(), seed, 60), endpoint));
-    let ends = robots.join(",");
-    let _link = start(BAD_LINK, &[&link, &ends, "5", "0.2", "0.1", "0.3", "1.5", "4"]);
+    let bad = BadLink {
+        seed: 5,
+        loss: 0.2,
+        repetition: 0.1,
+        max_delay: Duration::from_millis(300),
+        cut_from: Duration::from_millis(1500),
+        cut_for: Duration::from_secs(4),
+    };
+    bad.start(&link, &[&robots[0], &robots[1]]);
     let sets = publishers.each_mut().map(set_of);
     let maps = ["x", "y"].map(|name| folder.path().join(name));
     let subscribers =
@@ -53,7 +59,15 @@ fn killed_and_started_again_on_either_side() {
     let folder = TempDir::new().unwrap();
     let (robot, link, map) = (endpoint(), endpoint(), folder.path().join("map"));
     let scans = scans(folder.path(), 21, 60);
-    let _link = start(BAD_LINK, &[&link, &robot, "6", "0.1", "0.1", "0.1", "0", "0"]);
+    let bad = BadLink {
+        seed: 6,
+        loss: 0.1,
+        repetition: 0.1,
+        max_delay: Duration::from_millis(100),
+        cut_from: Duration::ZERO,
+        cut_for: Duration::ZERO,
+    };
+    bad.start(&link, &[&robot]);
     let first = publisher("r", &scans, &robot);
     let listening = subscriber(&map, &[&link], &["--for", "150"]);
     std::thread::sleep(Duration::from_secs(2));

@@ -16,7 +16,7 @@ mod robot_name;
 mod subscribe;
 
 use args::{Args, Mode};
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -38,7 +38,14 @@ fn run(args: &Args) -> anyhow::Result<()> {
         Mode::Subscribe(output) => subscribe::run(args, &output, &*stop_signal()?),
         Mode::Fold(layer, output) => fold::run(args, &layer, &output),
         Mode::Measure(scans) => measure::run(args, &scans),
+        Mode::Man => print_man_page(),
     }
+}
+
+fn print_man_page() -> anyhow::Result<()> {
+    // Found as `man voxtile-share`, like the pages of the other commands.
+    let command = Args::command().name("voxtile-share");
+    Ok(clap_mangen::Man::new(command).render(&mut std::io::stdout().lock())?)
 }
 
 /// Set by the first Ctrl-C or SIGTERM; a second one ends the process at once.

@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# The benchmarks, one driver for all:
+#
+#   tools/bench.sh                     lists them
+#   tools/bench.sh NAME [OPTIONS]      runs one; `all` runs all, with options that all of them have
+#
+# Options of all: --short (check only that everything works; docs/ stays as it is), --only PART (an unknown name lists
+# the parts), --runs N (figures are medians), --out FOLDER (where results go). `tools/bench.sh NAME --help` lists the
+# others. Recorded data comes from below ${VOXTILE_DATA:-../shared/data}; a set that is absent is skipped. A benchmark
+# exits with 1 if something is wrong that does not depend on time, with 2 after an error.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target=${CARGO_TARGET_DIR:-target}
+
+list() {
+    echo "benchmarks, to run with tools/bench.sh NAME:"
+    echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/endurance.md"
+    echo "  octocache  the questions of the OctoCache paper: docs/octocache.md"
+    echo "  peers      speed, memory and exactness beside OctoMap: a table on standard output"
+}
+
+run() { # package, arguments
+    local name=$1
+    shift
+    "$target/release/$name" --data "${VOXTILE_DATA:-../shared/data}" --target "$target" "$@"
+}
+
+endurance() {
+    cargo build --release --quiet --locked --package voxtile --package endurance
+    run endurance "$@"
+}
+
+octocache() {
+    cargo build --release --quiet --locked --package octocache
+    run octocache "$@"
+}
+
+peers() {
+    local version contenders
+    . tools/peers/octomap.sh
+    cargo build --release --quiet --locked --package peers
+    octomap_contenders "$@"
+    run peers "${contenders[@]}" --octomap-version "$version" "$@"
+}
+
+name=${1:-}
+shift || true
+case $name in
+"") list ;;
+endurance | octocache | peers) "$name" "$@" ;;
+all)
+    failed=()
+    for name in endurance octocache peers; do
+        # A process of its own: `set -e` stops it at the first error.
+        tools/bench.sh "$name" "$@" || failed+=("$name")
+    done
+    [[ ${#failed[@]} -eq 0 ]] || { echo "bench: failed: ${failed[*]}" >&2 && exit 1; }
+    ;;
+*)
+    echo "bench: there is no benchmark $name" >&2
+    list >&2
+    exit 2
+    ;;
+esac

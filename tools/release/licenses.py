@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""Prints the licenses of all crates that a binary holds: licenses.py TARGET PACKAGE...
+
+Most licenses want their text beside the binary. Crates with the same text are listed together above it.
+"""
+
+import json
+import pathlib
+import subprocess
+import sys
+
+TEXTS = ("LICENSE", "LICENCE", "COPYING", "COPYRIGHT", "NOTICE", "UNLICENSE")
+GLIBC = """The binaries hold parts of the GNU C library (LGPL-2.1-or-later). The source crate of this release and
+`tools/release/run.sh` make them anew with another version of that library.
+"""
+
+
+def cargo(*arguments):
+    return subprocess.run(["cargo", *arguments], check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def crates(target, packages):
+    """Names and versions of the crates of others that the packages link."""
+    selection = [word for package in packages for word in ("--package", package)]
+    edges = ["--edges", "normal", "--target", target, "--prefix", "none", "--format", "{p}"]
+    for line in set(cargo("tree", "--locked", *selection, *edges).splitlines()):
+        words = line.split()
+        # A path behind the version: a crate of this repository.
+        if len(words) >= 2 and not any(word.startswith("(/") for word in words):
+            yield words[0], words[1].removeprefix("v")
+
+
+def texts(folder):
+    """The text of each file of a crate that states its license."""
+    paths = sorted(path for path in folder.iterdir() if path.name.upper().startswith(TEXTS) and path.is_file())
+    return [path.read_text(encoding="utf-8", errors="replace").strip("\r\n") for path in paths]
+
+
+def section(names, text):
+    return "\n".join(["=" * 80, *names, "=" * 80, "", text, ""])
+
+
+def main(target, *packages):
+    metadata = json.loads(cargo("metadata", "--locked", "--format-version", "1"))
+    known = {(package["name"], package["version"]): package for package in metadata["packages"]}
+    # By the words alone: the same license comes with other line breaks.
+    named, without = {}, []
+    for crate in sorted(set(crates(target, packages))):
+        package = known[crate]
+        name = f"{crate[0]} {crate[1]} ({package['license'].strip()})"
+        found = texts(pathlib.Path(package["manifest_path"]).parent)
+        for text in found:
+            named.setdefault(" ".join(text.split()), (text, []))[1].append(name)
+        if not found:
+            without.append(name)
+    if target.endswith("-gnu"):
+        print(GLIBC)
+    for text, names in sorted(named.values(), key=lambda entry: entry[1]):
+        print(section(names, text))
+    if without:
+        print(section(without, "These crates come without a text of their license; it is named in brackets."))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Unpacks an archive of tools/release/run.sh elsewhere and works with its binaries, as their users do: try.sh ARCHIVE
+set -euo pipefail
+archive=$(realpath "$1")
+place=$(mktemp -d)
+trap 'rm -rf "$place"' EXIT
+cd "$place"
+tar --extract --gzip --strip-components 1 --file "$archive"
+
+for program in voxtile voxtile-share; do
+    # Nothing to load, so that it runs on every Linux of this kind of CPU.
+    if readelf --program-headers "bin/$program" | grep -q INTERP; then
+        echo "release: $program is not static" >&2
+        exit 1
+    fi
+    echo "$program: $(stat --format=%s "bin/$program") bytes, $("bin/$program" --version)"
+done
+
+# No repository, no cargo, no library of this machine: a root of its own, where that is allowed.
+run() { env --ignore-environment PATH="$place/bin" "$@"; }
+if unshare --map-root-user true 2>/dev/null; then
+    mkdir tmp
+    run() { unshare --map-root-user env --ignore-environment chroot "$place" "/bin/$1" "${@:2}"; }
+fi
+run voxtile demo --out demo --length 20 >/dev/null
+run voxtile verify demo/map_tiles
+run voxtile export demo/map_tiles -o map.bt >/dev/null
+run voxtile export demo/map_tiles -o map.ply >/dev/null
+run voxtile share --help >/dev/null
+test -s demo/map.png && test -s map.bt && test -s map.ply
+for scan in 0 1 2; do
+    printf 'VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA ascii\n' \
+        >"$scan.pcd"
+    printf '4 %d 0\n4 %d.5 0\n5 %d 1\n' $scan $scan $scan >>"$scan.pcd"
+done
+run voxtile build . -o map --poses identity >/dev/null
+run voxtile digest map
+man --warnings --local-file share/man/man1/voxtile-build.1 >/dev/null 2>&1 || ! command -v man >/dev/null
+bash -n share/bash-completion/completions/voxtile
+echo "release: the binaries map, verify and export"

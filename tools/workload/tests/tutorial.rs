@@ -1,0 +1,107 @@
+//! What the pages tell readers to type: the tutorial from top to bottom, and the README's example with its answer.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Begins the comment before a block that readers run and the test does not; the rest of the comment says why.
+const SKIP: &str = "<!-- not run by the test: ";
+
+/// A fenced block of a page.
+struct Block {
+    /// Of its first line, counted from 1.
+    line: usize,
+    language: String,
+    text: String,
+    /// Why it is not run, where the page says so.
+    skipped: Option<String>,
+}
+
+fn page(path: &str) -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)).unwrap()
+}
+
+fn blocks(page: &str) -> Vec<Block> {
+    let mut blocks: Vec<Block> = Vec::new();
+    let (mut is_inside, mut before) = (false, "");
+    for (number, line) in page.lines().enumerate() {
+        match line.strip_prefix("```") {
+            Some(language) if !is_inside => {
+                let reason = before.strip_prefix(SKIP).and_then(|rest| rest.strip_suffix(" -->"));
+                let (language, skipped) = (language.to_owned(), reason.map(str::to_owned));
+                blocks.push(Block { line: number + 2, language, text: String::new(), skipped });
+                is_inside = true;
+            }
+            Some(_) => is_inside = false,
+            None if is_inside => blocks.last_mut().unwrap().text += &format!("{line}\n"),
+            None => {}
+        }
+        before = line;
+    }
+    blocks
+}
+
+/// The folder of `voxtile`, which `cargo test --workspace` makes too. `None`, after saying so, where it is not there.
+fn programs() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_BIN_EXE_workload")).parent().unwrap();
+    if folder.join("voxtile").is_file() {
+        return Some(folder.to_owned());
+    }
+    println!("skipped: there is no voxtile in {}; cargo test --workspace makes it", folder.display());
+    None
+}
+
+#[test]
+fn the_tutorial_runs_from_top_to_bottom() {
+    let Some(programs) = programs() else { return };
+    let tutorial = page("docs/tutorial.md");
+    let mut script = String::new();
+    for Block { line, language, text, skipped } in blocks(&tutorial) {
+        match skipped {
+            None if language == "sh" => script += &format!("at={line}\n{text}"),
+            reason => {
+                let reason = reason.unwrap_or(format!("a block of {language}"));
+                println!("docs/tutorial.md:{line}: skipped: {reason}");
+            }
+        }
+    }
+    assert!(script.contains("voxtile build") && script.contains("voxtile revert"), "{script}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
+    // An error of one command ends it, also on the left of a pipe. A command that is repeated until it succeeds does
+    // not hang it.
+    let head = "trap 'echo \"docs/tutorial.md: the block at line $at fails: $BASH_COMMAND\" >&2' ERR\n";
+    let run = Command::new("timeout")
+        .args(["600", "bash", "-Eeuo", "pipefail", "-c", &format!("{head}{script}")])
+        .current_dir(folder.path())
+        .env("PATH", path)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{}: {said}", run.status);
+    // What the page says that there is afterwards.
+    for file in ["voxtile_demo/map.png", "walls.ply", "city.bt", "moved.bt.origin.json"] {
+        assert!(folder.path().join("tutorial").join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn the_readmes_example_answers_as_printed() {
+    let Some(programs) = programs() else { return };
+    let readme = page("README.md");
+    let examples: Vec<Block> =
+        blocks(&readme).into_iter().filter(|block| block.language == "console").collect();
+    assert!(!examples.is_empty());
+    for Block { line, text, .. } in examples {
+        let (command, answer) = text.split_once('\n').unwrap();
+        let command = command.strip_prefix("$ voxtile ").unwrap();
+        let run = Command::new(programs.join("voxtile"))
+            .args(command.split(' '))
+            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
+            .output()
+            .unwrap();
+        assert!(run.status.success(), "README.md:{line}");
+        assert_eq!(String::from_utf8_lossy(&run.stdout), answer, "README.md:{line}");
+    }
+}
