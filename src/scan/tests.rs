@@ -1,6 +1,6 @@
 //! Scans in little memory: the same updates as with any.
 
-use super::tile_order::brick_code;
+use super::updates::brick_code;
 use super::{Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::Result;

@@ -1,9 +1,8 @@
 //! The table against the simplest thing that could be right, a map from voxels to evidence; its view as an octree and
 //! its files against those of the pointer tree.
 
-use super::brick_octree::BrickOctree;
-use super::palette::Palette;
-use super::table::Table;
+use super::octree::BrickOctree;
+use super::table::{Palette, Table};
 use crate::octree::{Octree, write_bt};
 use crate::scan::BrickUpdate;
 use crate::sensor::{Evidence, Iwlo, Observation, SensorModel};

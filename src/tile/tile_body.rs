@@ -1,8 +1,7 @@
 use super::OctreeFactory;
-use super::brick_octree::BrickOctree;
+use super::octocache::VoxelCacheCounts;
+use super::octree::{BrickOctree, TileOctree};
 use super::table::Table;
-use super::tile_octree::TileOctree;
-use super::voxel_cache::VoxelCacheCounts;
 use crate::octree::Octree;
 use crate::scan::TileUpdates;
 use crate::sensor::{Evidence, SensorModel};

@@ -1,7 +1,6 @@
 use crate::sensor::Evidence;
 use crate::tile::Table;
-use crate::tile::brick::{Brick, Storage};
-use crate::tile::palette::{Palette, StateId};
+use crate::tile::table::{Brick, Palette, StateId, Storage};
 use rustc_hash::FxHashMap;
 
 /// How many voxels of a table are in a state.

@@ -2,7 +2,7 @@ use super::census::{Census, StateKey};
 use super::symbol::{MOST_STATES, RARE, Symbols};
 use crate::sensor::Evidence;
 use crate::tile::Table;
-use crate::tile::palette::{Palette, StateId};
+use crate::tile::table::{Palette, StateId};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 

@@ -5,10 +5,7 @@ use super::packer::Packer;
 use super::symbol::RARE;
 use crate::sensor::Evidence;
 use crate::space::BrickCode;
-use crate::tile::brick::{Brick, Storage};
-use crate::tile::cells::CELL_VOXELS;
-use crate::tile::packed::Packed;
-use crate::tile::palette::{Palette, StateId};
+use crate::tile::table::{Brick, CELL_VOXELS, Packed, Palette, StateId, Storage};
 use std::io;
 
 /// A group ends with the brick that brings it to so many voxels.

@@ -5,8 +5,7 @@ use super::symbol::Symbols;
 use crate::error::FormatError;
 use crate::space::{BrickCode, VoxelBox};
 use crate::tile::Table;
-use crate::tile::brick::Storage;
-use crate::tile::palette::Palette;
+use crate::tile::table::{Palette, Storage};
 
 /// Puts a table together from groups of bricks.
 pub(super) struct GroupReader<'a> {

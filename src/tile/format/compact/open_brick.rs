@@ -3,10 +3,7 @@ use super::group_columns::Rest;
 use super::symbol::{RARE, Symbols};
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, VoxelBox, mask_of_box, places};
-use crate::tile::brick::{Brick, Storage};
-use crate::tile::cells::{CELL_VOXELS, Cells};
-use crate::tile::packed::Packed;
-use crate::tile::palette::{Full, Palette, StateId, UNKNOWN};
+use crate::tile::table::{Brick, CELL_VOXELS, Cells, Full, Packed, Palette, StateId, Storage, UNKNOWN};
 
 /// A brick whose voxels are being read.
 pub(super) struct OpenBrick {

@@ -9,7 +9,7 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
 use crate::tile::Table;
 use crate::tile::format::entry::fault_of;
-use crate::tile::palette::Palette;
+use crate::tile::table::Palette;
 use std::io::{self, Read};
 
 /// Reads tables in their compact form. What it works with is kept from one table to the next: 0.4 MB, and up to 1.5 MB

@@ -6,8 +6,7 @@ use crate::sensor::Evidence;
 use crate::simulation::Random;
 use crate::space::{BrickCode, MortonCode, VoxelBox, VoxelKey};
 use crate::tile::Table;
-use crate::tile::brick::Storage;
-use crate::tile::palette::Palette;
+use crate::tile::table::{Palette, Storage};
 use std::collections::BTreeMap;
 
 type Voxels = BTreeMap<MortonCode, Evidence>;

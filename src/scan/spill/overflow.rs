@@ -1,0 +1,37 @@
+use super::part_log::MakeScratch;
+use crate::error::{Error, Result};
+use crate::scan::PackedUpdates;
+use crate::space::TileIndex;
+use std::io;
+use std::path::Path;
+
+/// Takes a part of the updates of a scan, by tile.
+pub(crate) type PutAside<'a> = dyn FnMut(Vec<(TileIndex, PackedUpdates)>) -> Result<()> + 'a;
+
+/// Where what is known of a scan goes that memory has no room for.
+pub(crate) struct Overflow<'a> {
+    /// Most bytes of updates that are kept; whenever there are more, they are put aside.
+    pub(crate) most_bytes: usize,
+    /// Most tiles that a scan may touch; what is known of each while it is inserted takes memory.
+    pub(crate) most_tiles: usize,
+    /// The map's folder, for errors.
+    pub(crate) folder: &'a Path,
+    /// Makes a file for what the rays have left so far.
+    pub(crate) make_scratch: &'a MakeScratch<'a>,
+    /// Takes updates that are complete.
+    pub(crate) put_aside: &'a mut PutAside<'a>,
+}
+
+impl Overflow<'_> {
+    pub(crate) fn too_many_tiles(&self) -> Error {
+        let reason = format!(
+            "too few for a scan that touches more than {} tiles; go on with more memory, or build with larger tiles",
+            self.most_tiles
+        );
+        Error::argument("memory", reason)
+    }
+
+    pub(crate) fn error(&self, error: io::Error) -> Error {
+        Error::io(self.folder, "keep the updates of a scan for a while in a temporary file in", error)
+    }
+}
