@@ -17,7 +17,7 @@ pub struct PointBatch<'a> {
 }
 
 impl PointBatch<'_> {
-    /// The updates, one an entry, grouped by tile.
+    /// The updates, one per entry, grouped by tile.
     ///
     /// # Errors
     ///

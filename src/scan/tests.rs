@@ -1,4 +1,4 @@
-//! Scans in little memory: the same updates as with any.
+//! Scans under a memory limit give the same updates as without.
 
 use super::updates::brick_code;
 use super::{Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder};
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::path::Path;
 
-/// What is said about each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
+/// The updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
 /// brick and place in it.
 type Said = BTreeMap<(TileIndex, u64, usize), Vec<Option<u32>>>;
 
@@ -155,7 +155,7 @@ fn long_rays_keep_to_their_memory() {
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
         let (said, report, times) = setting.in_parts(&mut tracer, &scan, bytes / 16).unwrap();
         assert!(times > 0);
-        // What is kept from scan to scan; numbers of pages and head starts are 1 MiB and some.
+        // The memory kept from scan to scan; page numbers and marked prefixes are 1 MiB and some.
         assert!(tracer.bytes() < bytes + (2 << 20), "{}", tracer.bytes());
         assert!((said, report) == setting.whole(&scan));
     }

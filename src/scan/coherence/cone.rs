@@ -2,22 +2,22 @@ use crate::scan::pages::Local;
 use crate::scan::ray::{RayOrigin, SlabRay, voxel};
 use crate::space::{Point, VoxelIndex};
 
-/// Sides of a cube around the sensor: two an axis, first the lower.
+/// Sides of a cube around the sensor: two per axis, the lower first.
 pub(crate) const SIDES: usize = 6;
 
-/// Cells along the edge of a side: 16 voxels from the sensor a cell is a voxel wide.
+/// Cells along the edge of a side: at 16 voxels from the sensor a cell is one voxel wide.
 pub(crate) const CELLS: usize = 32;
 
 /// Cells of a side.
-pub(crate) const CELLS_OF_SIDE: usize = CELLS * CELLS;
+pub(crate) const CELLS_PER_SIDE: usize = CELLS * CELLS;
 
 /// Width of a cell at a distance of 1.
 const CELL: f64 = 2.0 / CELLS as f64;
 
-/// How far a ray may be from where exact arithmetic has it, in voxels: far more than rounding makes it.
+/// Tolerance in voxels, far above the rounding error of a ray.
 const MARGIN: f64 = 1e-6;
 
-/// The directions from a sensor through a square of cells of a side of a cube around it.
+/// The directions from a sensor through a square of cells on one side of a cube around it.
 pub(crate) struct Cone {
     /// The sensor relative to the lowest voxel of the window, along `B` and `C`.
     origin: [f64; 2],
@@ -31,7 +31,7 @@ pub(crate) struct Cone {
     is_up: bool,
 }
 
-/// Number of the cell through which a ray goes, over all sides; `None` for a ray too short to have a direction.
+/// Number of the cell through which a ray passes, over all sides; `None` for a ray too short to have a direction.
 #[inline]
 pub(crate) fn cell_of(ray: &SlabRay) -> Option<usize> {
     let [x, y, z] = ray.direction;
@@ -48,8 +48,8 @@ pub(crate) fn cell_of(ray: &SlabRay) -> Option<usize> {
 }
 
 impl Cone {
-    /// The cone of a square of cells, by its lowest cell along `B` and `C` and its edge in cells, of a side across axis `A`;
-    /// `base` is the lowest voxel of the window.
+    /// The cone of a square of cells on a side across axis `A`. The square is given by its lowest cell along `B` and
+    /// `C` and by its edge in cells; `base` is the lowest voxel of the window.
     pub(crate) fn new<const A: usize, const B: usize, const C: usize>(
         origin: &RayOrigin,
         base: VoxelIndex,
@@ -71,7 +71,7 @@ impl Cone {
         }
     }
 
-    /// The lowest and the highest of the voxels that rays of the cone can visit in a slab, counted from the sensor's.
+    /// The lowest and the highest voxel that rays of the cone can cross in a slab, counted from the sensor's slab.
     #[inline]
     pub(crate) fn in_slab<const A: usize, const B: usize, const C: usize>(
         &self,
@@ -83,7 +83,7 @@ impl Cone {
             let (least, most) = (self.slope[k], self.slope[k] + self.width);
             let low = least * if least < 0.0 { far } else { near };
             let high = most * if most < 0.0 { near } else { far };
-            // Below the window is 0, and no ray that ends in the window gets there.
+            // Below the window the index is 0; no ray that ends in the window gets there.
             let index = |at: f64| at as i32 as u32;
             (index(self.origin[k] + low - MARGIN), index(self.origin[k] + high + MARGIN))
         };

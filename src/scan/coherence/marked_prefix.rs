@@ -1,46 +1,46 @@
-use super::cone::{CELLS, CELLS_OF_SIDE, Cone, SIDES, cell_of};
+use super::cone::{CELLS, CELLS_PER_SIDE, Cone, SIDES, cell_of};
 use crate::scan::pages::{MarkedPage, PageMap};
 use crate::scan::ray::{RayOrigin, SlabRay};
 
-/// How much of a ray need not be walked, because rays of nearly the same direction have marked it already.
+/// How many slabs at the start of a ray are marked already, by rays of nearly the same direction.
 ///
-/// The directions from the sensor are cut into cones. Of each cone it is known how many slabs, counted from the
-/// sensor's, are marked wherever a ray of the cone can get to; such a ray begins after them, or is marked altogether.
-/// Where rays are dense, that is nearly all of most of them. What is marked in the end does not depend on it.
+/// The directions from the sensor are divided into cones. For each cone, the first slabs in which every voxel that a
+/// ray of the cone can reach is marked are its marked prefix. A ray of the cone starts behind the prefix, or is skipped
+/// if it ends within. Where rays are dense, most rays are skipped or nearly so. The resulting marks are the same.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct HeadStarts {
+pub(crate) struct MarkedPrefixes {
     /// By cell, as [`cell_of`] counts them.
-    cones: Vec<HeadStart>,
+    cones: Vec<MarkedPrefix>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct HeadStart {
-    /// Slabs that are marked wherever a ray of the cone can get to.
+struct MarkedPrefix {
+    /// Slabs in which every voxel that a ray of the cone can reach is marked.
     slabs: u16,
-    /// The slab of the farthest end of a ray so far, counted from 0: what lies beyond is not asked for.
+    /// The last slab of the longest ray so far, counted from 0; no slab beyond it is examined.
     farthest: u16,
 }
 
-impl HeadStart {
-    /// Whether a ray has come that is longer than the sensor's slab.
-    fn is_asked(&self) -> bool {
+impl MarkedPrefix {
+    /// Whether a ray longer than the sensor's slab has asked for the prefix.
+    fn is_used(&self) -> bool {
         self.farthest > 0
     }
 }
 
-impl HeadStarts {
+impl MarkedPrefixes {
     /// Forgets everything; the memory is kept.
     pub(crate) fn clear(&mut self) {
         self.cones.clear();
-        self.cones.resize(SIDES * CELLS_OF_SIDE, HeadStart::default());
+        self.cones.resize(SIDES * CELLS_PER_SIDE, MarkedPrefix::default());
     }
 
     /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        self.cones.capacity() * size_of::<HeadStart>()
+        self.cones.capacity() * size_of::<MarkedPrefix>()
     }
 
-    /// In how many slabs from the sensor on all that the ray passes is marked; `None` if that is all of it.
+    /// Number of slabs from the sensor on whose voxels along the ray are all marked; `None` if that is the whole ray.
     #[inline]
     pub(crate) fn of(&mut self, ray: &SlabRay) -> Option<u32> {
         let Some(cell) = cell_of(ray) else { return Some(0) };
@@ -50,10 +50,10 @@ impl HeadStarts {
         (last >= cone.slabs).then_some(cone.slabs.into())
     }
 
-    /// Learns from the marks that there are now, by squares of cells of these edges, powers of two: large ones are few and
-    /// soon tell of what is near the sensor, small ones go on from there.
+    /// Extends the prefixes by the present marks, in squares of cells with these edges (powers of two). Large squares
+    /// are few and quickly cover what is near the sensor; small ones go on from there.
     pub(crate) fn extend(&mut self, pages: &PageMap<MarkedPage>, origin: &RayOrigin, edges: &[usize]) {
-        for (side, cones) in self.cones.chunks_mut(CELLS_OF_SIDE).enumerate() {
+        for (side, cones) in self.cones.chunks_mut(CELLS_PER_SIDE).enumerate() {
             for &edge in edges {
                 match side / 2 {
                     0 => extend_side::<0, 1, 2>(cones, side, pages, origin, edge),
@@ -66,7 +66,7 @@ impl HeadStarts {
 }
 
 fn extend_side<const A: usize, const B: usize, const C: usize>(
-    cones: &mut [HeadStart],
+    cones: &mut [MarkedPrefix],
     side: usize,
     pages: &PageMap<MarkedPage>,
     origin: &RayOrigin,
@@ -78,7 +78,7 @@ fn extend_side<const A: usize, const B: usize, const C: usize>(
         let rows = (corner[0]..corner[0] + edge).map(|b| b * CELLS + corner[1]);
         let of_square = rows.flat_map(|first| first..first + edge);
         let (mut slabs, mut farthest) = (u16::MAX, 0);
-        for cone in of_square.clone().map(|cell| cones[cell]).filter(HeadStart::is_asked) {
+        for cone in of_square.clone().map(|cell| cones[cell]).filter(MarkedPrefix::is_used) {
             slabs = slabs.min(cone.slabs);
             farthest = farthest.max(cone.farthest);
         }
@@ -90,9 +90,9 @@ fn extend_side<const A: usize, const B: usize, const C: usize>(
         while slabs <= farthest && is_marked(slabs) {
             slabs += 1;
         }
-        // Of the others it is not known what is marked before.
+        // For unused cones it is unknown whether the slabs before are marked.
         for cell in of_square {
-            if cones[cell].is_asked() {
+            if cones[cell].is_used() {
                 cones[cell].slabs = cones[cell].slabs.max(slabs);
             }
         }

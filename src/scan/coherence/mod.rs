@@ -8,5 +8,5 @@ mod cone;
 mod marked_prefix;
 mod sampling;
 
-pub(crate) use marked_prefix::HeadStarts;
-pub(crate) use sampling::{one_round, rounds};
+pub(crate) use marked_prefix::MarkedPrefixes;
+pub(crate) use sampling::{sampling_passes, single_pass};

@@ -2,14 +2,13 @@ use super::footprint::Footprint;
 use super::sparse_page::{BrickContent, SparsePage, part_of_place};
 use crate::space::BRICK_VOXELS;
 
-/// How many rays pass each voxel of a page; since the voxel was last hit.
+/// For each voxel of a page, the number of rays that passed it since it was last hit.
 pub(crate) type CountedPage = SparsePage<Counts>;
 
-/// The count of each voxel of a brick, in Morton order. A ray passes a voxel once at most: the counts of up to 65 535
-/// rays fit.
+/// The count of each voxel of a brick, in Morton order. A ray passes a voxel at most once, so 65 535 rays fit.
 pub(crate) type Counts = [u16; BRICK_VOXELS];
 
-/// At most so many rays are counted in a page.
+/// Most rays that a page can count.
 pub(crate) const MAX_RAYS: usize = u16::MAX as usize;
 
 impl BrickContent for Counts {
@@ -25,7 +24,7 @@ impl CountedPage {
 }
 
 impl Footprint for CountedPage {
-    /// The part of the voxel's place that its indices along the slab make.
+    /// The part of the voxel's place that comes from its indices along the slab.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {

@@ -1,9 +1,9 @@
 use crate::scan::ray::Stretch;
 
-/// What rays leave in a page of voxels.
+/// What rays write to a page of voxels.
 ///
-/// A page is looked at as slabs, one voxel thick, along an axis `A`; `B` and `C` are the other axes, the lower first.
-/// A voxel is given by its slab and by a [`Footprint::Cell`] of the slab. Of indices only the lowest six bits count.
+/// A page is divided into slabs, one voxel thick, along an axis `A`; `B` and `C` are the other axes, the lower first. A
+/// voxel is given by its slab and by its [`Footprint::Cell`] in the slab. Only the lowest six bits of an index count.
 pub(crate) trait Footprint: Default {
     /// A voxel of a slab.
     type Cell: Copy;
@@ -11,12 +11,12 @@ pub(crate) trait Footprint: Default {
     /// Bytes of memory on the heap.
     fn heap_bytes(&self) -> usize;
 
-    /// A page without rays that takes little memory while few rays come.
+    /// An empty page that takes little memory while few rays cross it.
     fn sparse() -> Self {
         Self::default()
     }
 
-    /// A page without rays in the memory of this one; `None` if that is not worth keeping.
+    /// This page, emptied, with its memory kept; `None` if that is not worth it.
     fn cleared(self) -> Option<Self> {
         None
     }
@@ -27,10 +27,10 @@ pub(crate) trait Footprint: Default {
     /// A ray passes a voxel.
     fn pass<const A: usize>(&mut self, slab: u32, cell: Self::Cell);
 
-    /// A ray comes into a slab by one voxel and goes out by another, or by the same.
+    /// A ray enters a slab by one voxel and leaves it by another, or by the same.
     fn pass_through<const A: usize>(&mut self, slab: u32, entry: Self::Cell, exit: Self::Cell);
 
-    /// A ray passes the slabs of a stretch from slab `a` on; returns in how many that is certain.
+    /// A ray passes the slabs of a stretch from slab `a` on. Returns the number of slabs for which that is certain.
     #[inline]
     fn pass_stretch<const A: usize, const B: usize, const C: usize>(
         &mut self,

@@ -4,11 +4,11 @@ use super::window::{Local, PAGE_EDGE};
 use crate::scan::ray::Stretch;
 use crate::space::{BRICK_VOXELS, BrickMask, VoxelIndex};
 
-/// Which voxels of a page the rays of a scan pass or end in.
+/// The voxels of a page that the rays of a scan pass or end in.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MarkedPage {
     passed: Marks,
-    /// Of few pages, beside a ground or a wall.
+    /// Few pages have hits: those beside ground and walls.
     hits: Option<Marks>,
 }
 
@@ -17,14 +17,14 @@ pub(crate) struct MarkedPage {
 enum Marks {
     /// Fast.
     Columns(Columns),
-    /// Small: where memory is short.
+    /// Small, for when memory is short.
     Bricks(Box<SparsePage<BrickMask>>),
 }
 
 /// The marks of one brick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MarkedBrick {
-    /// The brick's voxels' indices over 8.
+    /// The voxels' indices divided by 8.
     pub(crate) index: VoxelIndex,
     /// Voxels in which rays end.
     pub(crate) hits: BrickMask,
@@ -32,8 +32,8 @@ pub(crate) struct MarkedBrick {
     pub(crate) passed: BrickMask,
 }
 
-/// A word for every column of 64 voxels along z, columns in the order of x and then y: a voxel is marked by one
-/// operation on one word, found without a table.
+/// One word per column of 64 voxels along z, columns in the order of x and then y. Marking a voxel is one operation on
+/// one word, found without a table.
 #[derive(Clone, Debug)]
 struct Columns(Box<[u64; COLUMNS]>);
 
@@ -55,7 +55,7 @@ impl Columns {
         self.0.iter_mut().zip(other.0.iter()).for_each(|(column, other)| *column |= other);
     }
 
-    /// The bits of the columns through the bricks at `(x, y)`, in bricks: byte `k` is not 0 if brick `k` has marks.
+    /// The union of the columns through the bricks at `(x, y)`, in bricks: byte `k` is not 0 if brick `k` has marks.
     fn union(&self, x: usize, y: usize) -> u64 {
         let row = |x: usize| self.0[64 * x + 8 * y..][..8].iter().fold(0, |union, column| union | column);
         (8 * x..8 * x + 8).fold(0, |union, x| union | row(x))
@@ -63,7 +63,7 @@ impl Columns {
 
     /// The mask of one brick in Morton order.
     fn brick(&self, x: usize, y: usize, z: usize) -> BrickMask {
-        /// Where a column's bits are in a word of a mask: four of them, by their value.
+        /// For each value of four bits of a column, where these bits are in a word of a mask.
         const SPREAD: [u64; 16] = spread();
         let mut mask = [0; 8];
         for dx in 0..8 {
@@ -178,7 +178,7 @@ fn place_of_brick(x: usize, y: usize, z: usize) -> usize {
     (part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z)) as usize / BRICK_VOXELS
 }
 
-// Not a part of the code that goes along rays: where memory suffices, every instruction there counts.
+// Outlined: it is used only when memory is short, and every instruction of the inner loop counts.
 #[cold]
 #[inline(never)]
 fn mark_small(bricks: &mut SparsePage<BrickMask>, [x, y, z]: Local) {
@@ -207,7 +207,8 @@ impl MarkedPage {
         hits.mark(x as u32, y as u32, z as u32);
     }
 
-    /// Whether all voxels of the page from `low` to `high` are passed or hit, as far as is easily told.
+    /// Whether all voxels of the page from `low` to `high` are passed or hit; may be false where this is costly to
+    /// tell.
     #[inline]
     pub(crate) fn are_marked(&self, low: Local, high: Local) -> bool {
         let Marks::Columns(passed) = &self.passed else { return false };
@@ -246,7 +247,7 @@ impl MarkedPage {
         (0..8).flat_map(|x| (0..8).map(move |y| (x, y))).map(in_column).sum()
     }
 
-    /// The bricks with marks; `page` is the page's index, its voxels' indices over 64.
+    /// The bricks with marks; `page` is the page's index: its voxels' indices divided by 64.
     pub(crate) fn bricks(&self, page: VoxelIndex) -> Vec<MarkedBrick> {
         let mut bricks = Vec::new();
         for (x, y) in (0..8).flat_map(|x| (0..8).map(move |y| (x, y))) {
@@ -299,7 +300,7 @@ impl Footprint for MarkedPage {
         self.pass::<A>(slab, exit);
     }
 
-    // The form of the marks is asked for once a stretch, not once a voxel.
+    // The form of the marks is matched once per stretch, not once per voxel.
     #[inline]
     fn pass_stretch<const A: usize, const B: usize, const C: usize>(
         &mut self,
@@ -342,7 +343,7 @@ impl Footprint for Columns {
 }
 
 impl Footprint for SparsePage<BrickMask> {
-    /// The part of the voxel's place that its indices along the slab make.
+    /// The part of the voxel's place that comes from its indices along the slab.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {

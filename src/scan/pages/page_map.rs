@@ -4,41 +4,41 @@ use super::window::{Local, PAGE_EDGE, Window};
 use crate::space::VoxelIndex;
 use rustc_hash::FxHashMap;
 
-/// Pages of voxels in which the rays of a scan leave something.
+/// The pages that the rays of a scan write to.
 ///
-/// Inside the window around the sensor, where nearly all are, a page is found by a look-up in a table; outside, in a
-/// hash map.
+/// Inside the window around the sensor, where nearly all pages are, a page is found by one look-up in a table; outside,
+/// in a hash map.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PageMap<F> {
     window: Window,
-    /// Number, plus one, of each page of the window; 0 for none.
+    /// Number of each page of the window, plus one; 0 if there is none.
     directory: Vec<u32>,
     /// Number of each page outside the window.
     far: FxHashMap<VoxelIndex, u32>,
     pages: Vec<F>,
-    /// Index of each page: its voxels' indices over 64.
+    /// Index of each page: its voxels' indices divided by 64.
     indices: Vec<VoxelIndex>,
-    /// Cleared pages of earlier scans.
+    /// Emptied pages of earlier scans, for reuse.
     spare: Vec<F>,
-    /// So many pages, the first that rays come to, may be fast; those after them are small.
-    most_fast: usize,
+    /// The first so many pages may be fast; later ones are small.
+    max_fast: usize,
 }
 
 impl<F: Footprint> PageMap<F> {
-    /// Forgets all pages, and begins anew with another window, in which so many pages may be fast; the memory is kept.
-    pub(crate) fn clear(&mut self, window: Window, most_fast: usize) {
+    /// Removes all pages and sets another window, in which up to `max_fast` pages may be fast; the memory is kept.
+    pub(crate) fn clear(&mut self, window: Window, max_fast: usize) {
         self.window = window;
-        self.most_fast = most_fast;
+        self.max_fast = max_fast;
         self.directory.clear();
         self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
         self.far.clear();
-        // No more than the last scan had: a scan with stray rays far away leaves nothing for good.
+        // At most as many as the last scan had, so a scan with stray rays far away costs no memory for good.
         self.spare.clear();
         self.spare.extend(self.pages.drain(..).filter_map(F::cleared));
         self.indices.clear();
     }
 
-    /// Takes the pages from this number on out, with their indices.
+    /// Removes the pages from this number on and returns them with their indices.
     pub(crate) fn take_from(&mut self, first: usize) -> Vec<(VoxelIndex, F)> {
         let first = first.min(self.pages.len());
         for &index in &self.indices[first..] {
@@ -51,9 +51,9 @@ impl<F: Footprint> PageMap<F> {
         self.indices.drain(first..).zip(self.pages.drain(first..)).collect()
     }
 
-    /// Number of the first page that is small.
+    /// Number of the first small page.
     pub(crate) fn first_small(&self) -> usize {
-        self.most_fast.min(self.pages.len())
+        self.max_fast.min(self.pages.len())
     }
 
     /// Bytes of memory on the heap.
@@ -104,12 +104,12 @@ impl<F: Footprint> PageMap<F> {
         &self.pages
     }
 
-    /// The pages, by number, to change.
+    /// The pages, by number, mutably.
     pub(crate) fn pages_mut(&mut self) -> &mut [F] {
         &mut self.pages
     }
 
-    /// Index of each page, by number: its voxels' indices over 64.
+    /// Index of each page, by number: its voxels' indices divided by 64.
     pub(crate) fn indices(&self) -> &[VoxelIndex] {
         &self.indices
     }
@@ -124,7 +124,7 @@ impl<F: Footprint> PageMap<F> {
     }
 
     fn push(&mut self, index: VoxelIndex) -> usize {
-        let new = || if self.pages.len() < self.most_fast { F::default() } else { F::sparse() };
+        let new = || if self.pages.len() < self.max_fast { F::default() } else { F::sparse() };
         let page = self.spare.pop().unwrap_or_else(new);
         self.pages.push(page);
         self.indices.push(index);

@@ -3,18 +3,19 @@ use crate::space::{Point, VoxelIndex};
 /// Voxels along the edge of a page of 8 x 8 x 8 bricks.
 pub(crate) const PAGE_EDGE: i64 = 64;
 
-/// A window reaches at most so many voxels and a page from the sensor, along each axis and to both sides: the first with
-/// which it has no more than [`MOST_PAGES`], or the last. What a stray ray high up takes away, it takes away far out.
+/// Candidate reaches of a window in voxels, to both sides of the sensor along each axis. The largest is taken with
+/// which the window has at most [`MAX_PAGES`], or else the smallest: a stray ray high up makes the window narrower,
+/// which costs time only.
 const REACHES: [i64; 3] = [8128, 4032, 1984];
 
-/// As many as the smallest reach makes, to all sides: 1 MiB of numbers.
-const MOST_PAGES: u64 = 63 * 63 * 63;
+/// The pages of a window with the smallest reach to all sides: 1 MiB of page numbers.
+const MAX_PAGES: u64 = 63 * 63 * 63;
 
 /// A voxel relative to the lowest of a window.
 pub(crate) type Local = [u32; 3];
 
-/// A box of voxels around a sensor, whole pages along every axis, in which the rays of a scan are marked without
-/// looking bricks up in a hash map. Rays that leave it are walked the slow way.
+/// A box of whole pages around a sensor, in which the rays of a scan are marked without a hash map. Outside, rays are
+/// walked voxel by voxel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Window {
     base: VoxelIndex,
@@ -25,16 +26,15 @@ impl Window {
     /// The window around `center` for points with these bounds, both in units of voxels.
     pub(crate) fn around(center: VoxelIndex, bounds: (Point, Point)) -> Self {
         let windows = REACHES.map(|reach| Self::reaching(reach, center, bounds));
-        let is_small = |window: &&Self| {
-            window.pages.iter().map(|&pages| u64::from(pages)).product::<u64>() <= MOST_PAGES
-        };
+        let is_small =
+            |window: &&Self| window.pages.iter().map(|&pages| u64::from(pages)).product::<u64>() <= MAX_PAGES;
         *windows.iter().find(is_small).unwrap_or(&windows[REACHES.len() - 1])
     }
 
     fn reaching(reach: i64, center: VoxelIndex, bounds: (Point, Point)) -> Self {
         let page = |axis: usize, coordinate: f64| {
             let center = i64::from(center[axis]);
-            // Saturates; NaN, which no bound is, would be 0.
+            // Saturates. NaN would become 0, but no bound is NaN.
             let voxel = (coordinate.floor() as i64).clamp(center - reach, center + reach);
             voxel
                 .clamp(i64::from(i32::MIN) + PAGE_EDGE, i64::from(i32::MAX) - PAGE_EDGE)

@@ -11,27 +11,27 @@ use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// Collects what consecutive rays of a scan say about voxels, where every ray counts.
+/// Collects the updates of consecutive rays, where every ray counts.
 ///
-/// A voxel's updates are kept as runs: so many misses, then a hit. That is their order, and all of it: what rays say
-/// about other voxels in between makes no difference.
+/// A voxel's updates are kept as runs: a number of misses, then a hit. That preserves their order, and the order
+/// between voxels does not matter.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct EveryRayCollector {
+pub(crate) struct PerRayCollector {
     pages: PageMap<CountedPage>,
-    /// The runs that a hit has ended, in order.
+    /// The runs that ended with a hit, in order.
     ended: Vec<EndedRun>,
-    /// What rays leave outside the window, where memory is limited; otherwise pages have that, too.
+    /// Updates outside the window, where memory is limited; otherwise pages have these, too.
     far: Option<FarRuns>,
-    most_bytes: usize,
+    max_bytes: usize,
     allowance: Allowance,
 }
 
-/// What a ray may leave for each slab that it passes, in bytes: three eighths of a brick of 1 KiB, and three 64ths of a page.
-const BYTES_OF_SLAB: usize = 448;
-/// The same beside its slabs: the page and the brick that it ends in.
-const BYTES_OF_RAY: usize = 4 << 10;
+/// Most bytes that a ray adds per slab: three eighths of a brick of 1 KiB, and three 64ths of a page.
+const BYTES_PER_SLAB: usize = 448;
+/// Most bytes that a ray adds beside its slabs: the page and the brick that it ends in.
+const BYTES_PER_RAY: usize = 4 << 10;
 
-/// Misses and then a hit.
+/// Misses, then a hit.
 #[derive(Clone, Copy, Debug)]
 struct EndedRun {
     page: u32,
@@ -41,28 +41,28 @@ struct EndedRun {
     intensity: f32,
 }
 
-/// A brick in which rays left something.
+/// A brick with counts or hits.
 struct Brick<'a> {
     counts: &'a Counts,
-    /// The runs that ended in it, in order.
+    /// The runs that ended in it with a hit, in order.
     ended: &'a [Run],
 }
 
-impl EveryRayCollector {
-    /// Forgets everything, and begins anew with another window; the memory is kept. With a limit, what lies outside the
-    /// window is kept by tiles of `grid`.
+impl PerRayCollector {
+    /// Clears the collector and sets another window; the memory is kept. With a limit, updates outside the window are
+    /// kept by tiles of `grid`.
     pub(crate) fn clear(&mut self, window: Window, limit: Option<(&CollectorLimit, &Grid)>) {
         self.pages.clear(window, usize::MAX);
         self.ended.clear();
         self.far = limit.map(|(_, grid)| FarRuns::new(*grid));
-        self.most_bytes = limit.map_or(usize::MAX, |(limit, _)| limit.small_bytes);
-        self.allowance.grant(self.most_bytes);
+        self.max_bytes = limit.map_or(usize::MAX, |(limit, _)| limit.small_bytes);
+        self.allowance.grant(self.max_bytes);
     }
 
-    /// Whether another ray may leave more than there is room for. The first always has room.
+    /// Whether another ray may exceed the limit. The first ray never does.
     #[inline]
     pub(crate) fn is_full_for(&mut self, ray: &SlabRay) -> bool {
-        let new_bytes = BYTES_OF_RAY + BYTES_OF_SLAB * ray.slabs() as usize;
+        let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs() as usize;
         self.allowance.is_spent_by(new_bytes) && self.look_whether_full(new_bytes)
     }
 
@@ -72,10 +72,10 @@ impl EveryRayCollector {
             self.pages.pages().iter().map(|page| size_of::<CountedPage>() + page.heap_bytes()).sum();
         let far = self.far.as_ref().map_or(0, FarRuns::bytes);
         let bytes = pages + far + self.ended.len() * size_of::<EndedRun>();
-        let left = self.most_bytes.saturating_sub(bytes);
-        // Otherwise it would be looked at again at once.
+        let left = self.max_bytes.saturating_sub(bytes);
+        // Otherwise the next ray would measure again.
         self.allowance.grant(left);
-        bytes > 0 && left < new_bytes.max(self.most_bytes / 8)
+        bytes > 0 && left < new_bytes.max(self.max_bytes / 8)
     }
 
     /// Bytes of memory on the heap.
@@ -84,7 +84,7 @@ impl EveryRayCollector {
         self.pages.bytes() + self.ended.capacity() * size_of::<EndedRun>() + far
     }
 
-    /// A ray passes all voxels before its last. At most [`MAX_RAYS`](crate::scan::pages::MAX_RAYS) of them.
+    /// A ray passes all voxels before its last. Takes at most [`MAX_RAYS`](crate::scan::pages::MAX_RAYS) rays.
     pub(crate) fn pass(&mut self, ray: &SlabRay) {
         let Self { pages, far: Some(far), .. } = self else {
             let mut far = Vec::new();
@@ -98,7 +98,7 @@ impl EveryRayCollector {
         ray.pass(pages, 0, false, |voxel| far.pass(voxel));
     }
 
-    /// A ray ends in a voxel, with an intensity if it matters.
+    /// A ray ends in a voxel, with an intensity if the sensor model needs one.
     pub(crate) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
         if let Some(far) = &mut self.far
             && self.pages.window().local(voxel).is_none()
@@ -112,7 +112,7 @@ impl EveryRayCollector {
 
     /// Number of hits and of misses.
     fn hits_and_misses(&self) -> (u64, u64) {
-        // At most 2^16 times 2^9.
+        // Fits: at most 2^16 times 2^9.
         let of_brick =
             |counts: &Counts| u64::from(counts.iter().map(|&misses| u32::from(misses)).sum::<u32>());
         let passed = self.pages.pages().iter().flat_map(CountedPage::bricks).map(of_brick);
@@ -120,7 +120,7 @@ impl EveryRayCollector {
         (self.ended.len() as u64, passed.sum::<u64>() + ended.sum::<u64>())
     }
 
-    /// The updates by tile, each brick cut at the borders of the tiles.
+    /// The updates by tile. Bricks across a tile border are split.
     fn runs_by_tile(&self, grid: &Grid) -> Vec<(TileIndex, Vec<BrickRuns>)> {
         let (bricks, indices) = self.bricks();
         let ended = self.ended_by_brick(&bricks);
@@ -137,7 +137,7 @@ impl EveryRayCollector {
         bricks_by_tile(grid, &indices).into_par_iter().map(runs_of_tile).collect()
     }
 
-    /// The bricks of all pages, page by page, and their indices: their voxels' over 8.
+    /// The bricks of all pages, page by page, and their indices: their voxels' indices divided by 8.
     fn bricks(&self) -> (Vec<&Counts>, Vec<VoxelIndex>) {
         let bricks: Vec<&Counts> = self.pages.pages().iter().flat_map(CountedPage::bricks).collect();
         let mut indices = Vec::with_capacity(bricks.len());
@@ -149,7 +149,7 @@ impl EveryRayCollector {
         (bricks, indices)
     }
 
-    /// The runs that hits have ended by brick, in one pass to count them and another to put each into its place.
+    /// The runs that ended with a hit, by brick: a counting sort in two passes.
     fn ended_by_brick(&self, bricks: &[&Counts]) -> EndedByBrick {
         let mut first_of_page = Vec::with_capacity(self.pages.pages().len());
         let mut first = 0;
@@ -166,7 +166,7 @@ impl EveryRayCollector {
         (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
         let mut runs = vec![NO_RUN; self.ended.len()];
         for run in &self.ended {
-            // What begins as the start of the brick's runs becomes their end.
+            // The start of the brick's runs advances to their end.
             let next = &mut ends[brick_of(run)];
             runs[*next as usize] = run.run();
             *next += 1;
@@ -175,10 +175,10 @@ impl EveryRayCollector {
     }
 }
 
-/// The runs that hits have ended, brick by brick; those of a brick in the order of the rays.
+/// The runs that ended with a hit, brick by brick; those of a brick in the order of the rays.
 struct EndedByBrick {
     runs: Vec<Run>,
-    /// Where those of each brick end.
+    /// Where each brick's runs end.
     ends: Vec<u32>,
 }
 
@@ -209,22 +209,22 @@ impl Brick<'_> {
         }
         let mut runs: Vec<Run> = Vec::with_capacity(self.ended.len() + count);
         runs.extend(self.ended.iter().filter(|run| is_in(part, run.place)));
-        // Stable, here and below: a voxel's runs stay in order, and what passed it after its last hit comes last.
+        // Both sorts are stable: a voxel's runs stay in order, and the misses after its last hit come last.
         runs.sort_by_key(|run| run.place);
         runs.extend_from_slice(passed);
         runs.sort_by_key(|run| run.place);
         runs.into()
     }
 
-    /// The misses since each voxel's last hit, if any, into `runs`; returns how many voxels have some.
+    /// Writes the misses since each voxel's last hit, if any, to `runs`; returns the number of voxels with some.
     fn passed(&self, part: &BrickMask, runs: &mut [Run; BRICK_VOXELS]) -> usize {
         let mut count = 0;
-        // Most voxels were not passed: eight at a time are passed over.
+        // Most voxels were not passed, so eight at a time are skipped.
         for (chunk, first) in self.counts.chunks_exact(8).zip((0..).step_by(8)) {
             if chunk.iter().fold(0, |any, misses| any | misses) == 0 {
                 continue;
             }
-            // Without a branch: which of the eight were passed cannot be guessed.
+            // Without a branch: it would be unpredictable.
             for (&misses, place) in chunk.iter().zip(first..) {
                 runs[count] = Run { place, misses, hit: None };
                 count += usize::from(misses > 0 && is_in(part, place));
@@ -238,27 +238,27 @@ fn is_in(mask: &BrickMask, place: u16) -> bool {
     mask[usize::from(place) / 64] >> (place % 64) & 1 == 1
 }
 
-/// Gives in the updates of several collectors, the first of which saw the first rays.
-pub(crate) fn put_in_order(grid: &Grid, collectors: &mut [EveryRayCollector], parts: &ScanParts<'_>) {
+/// Moves the updates of several collectors to `parts`; the first collector saw the first rays.
+pub(crate) fn drain_in_order(grid: &Grid, collectors: &mut [PerRayCollector], parts: &ScanParts<'_>) {
     for collector in collectors {
         for (tile, bricks) in collector.runs_by_tile(grid) {
             let runs = || bricks.iter().flat_map(|brick| &brick.runs);
             let hits = runs().filter(|run| run.hit.is_some()).count() as u64;
             let misses = runs().map(|run| u64::from(run.misses)).sum();
             if hits + misses > 0 {
-                parts.put(std::iter::once((tile, TileUpdates::Runs(bricks), (hits, misses))));
+                parts.add(std::iter::once((tile, TileUpdates::Runs(bricks), (hits, misses))));
             }
         }
         if let Some(far) = &mut collector.far {
-            parts.put(far.take());
+            parts.add(far.take());
         }
     }
 }
 
-/// The updates of several collectors, the first of which saw the first rays.
+/// The updates of several collectors; the first collector saw the first rays.
 pub(crate) fn updates_in_order(
     grid: &Grid,
-    collectors: &mut [EveryRayCollector],
+    collectors: &mut [PerRayCollector],
     mut report: ScanReport,
 ) -> ScanUpdates {
     let mut tiles: FxHashMap<TileIndex, Vec<BrickRuns>> = FxHashMap::default();
@@ -273,7 +273,7 @@ pub(crate) fn updates_in_order(
         }
     }
     let in_order = |(tile, mut bricks): (TileIndex, Vec<BrickRuns>)| {
-        // Stable: of the same brick, the runs of earlier rays come first.
+        // Stable: for the same brick, runs of earlier rays come first.
         bricks.sort_by_key(|runs| runs.brick);
         (tile, TileUpdates::Runs(bricks))
     };

@@ -2,12 +2,12 @@ use crate::scan::PackedUpdates;
 use crate::scan::updates::{BrickRuns, Run, TileUpdates, brick_code};
 use crate::space::{BRICK_EDGE, Grid, TileIndex, VoxelIndex, place_of_voxel};
 
-/// What consecutive rays say about voxels outside the window, where every ray counts: packed, tile after tile as each ray
-/// comes to them.
+/// Updates of consecutive rays outside the window, where every ray counts: packed, tile after tile as each ray reaches
+/// them.
 #[derive(Clone, Debug)]
 pub(crate) struct FarRuns {
     grid: Grid,
-    /// The tile that a ray is in, and what it has said about it.
+    /// The tile that the present ray is in, and its updates there.
     tile: Option<TileIndex>,
     bricks: Vec<BrickOfRay>,
     hits: u64,
@@ -22,7 +22,7 @@ struct BrickOfRay {
     runs: Vec<Run>,
 }
 
-/// What a ray has said about a tile: with the number of hits and misses.
+/// The updates of a ray in one tile, with the numbers of hits and misses.
 type Done = (TileIndex, PackedUpdates, (u64, u64));
 
 impl FarRuns {
@@ -41,7 +41,7 @@ impl FarRuns {
     pub(crate) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
         self.push(voxel, Run { place: place_of_voxel(voxel) as u16, misses: 0, hit: Some(intensity) });
         self.hits += 1;
-        // The next ray may come to the same voxels again.
+        // The next ray may cross the same voxels again.
         self.end_tile();
     }
 
@@ -74,7 +74,7 @@ impl FarRuns {
         self.done.push((tile, packed, counts));
     }
 
-    /// All of it, which is forgotten.
+    /// Removes and returns all updates.
     pub(crate) fn take(&mut self) -> impl Iterator<Item = (TileIndex, TileUpdates, (u64, u64))> + use<> {
         self.end_tile();
         self.bytes = 0;

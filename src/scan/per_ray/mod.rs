@@ -7,5 +7,5 @@ mod collector;
 mod far_runs;
 mod ordered;
 
-pub(crate) use collector::{EveryRayCollector, put_in_order, updates_in_order};
+pub(crate) use collector::{PerRayCollector, drain_in_order, updates_in_order};
 pub(crate) use ordered::OrderedCollector;

@@ -5,7 +5,7 @@ use crate::sensor::Observation;
 use crate::space::{Grid, TileIndex, VoxelIndex};
 use rustc_hash::FxHashMap;
 
-/// Collects updates of voxels in the order in which they count, a list a tile.
+/// Collects updates of voxels in the order in which they count, one list per tile.
 pub(crate) struct OrderedCollector<'a> {
     grid: &'a Grid,
     keep_intensities: bool,
@@ -17,10 +17,10 @@ pub(crate) struct OrderedCollector<'a> {
     misses: u64,
 }
 
-/// What an update takes, in a list that may be half empty; more with an intensity.
-const BYTES_OF_UPDATE: usize = 16;
-/// What a tile takes beside its updates.
-const BYTES_OF_TILE: usize = 256;
+/// Bytes of an update in a list that may be half empty; more with an intensity.
+const BYTES_PER_UPDATE: usize = 16;
+/// Bytes of a tile beside its updates.
+const BYTES_PER_TILE: usize = 256;
 
 impl<'a> OrderedCollector<'a> {
     pub(crate) fn new(grid: &'a Grid, keep_intensities: bool) -> Self {
@@ -53,16 +53,16 @@ impl<'a> OrderedCollector<'a> {
         updates.push(offset_in(*min), observation, self.keep_intensities);
     }
 
-    /// Bytes of memory, at most.
+    /// Upper bound of the bytes of memory.
     pub(crate) fn bytes(&self) -> usize {
-        BYTES_OF_UPDATE * (self.hits + self.misses) as usize + BYTES_OF_TILE * self.lists.len()
+        BYTES_PER_UPDATE * (self.hits + self.misses) as usize + BYTES_PER_TILE * self.lists.len()
     }
 
-    /// Gives in what was collected, which is forgotten.
-    pub(crate) fn put_in(&mut self, parts: &ScanParts<'_>) {
+    /// Moves all updates to `parts`.
+    pub(crate) fn drain_to(&mut self, parts: &ScanParts<'_>) {
         self.slots.clear();
         (self.hits, self.misses) = (0, 0);
-        parts.put(self.lists.drain(..).map(|(tile, _, updates)| {
+        parts.add(self.lists.drain(..).map(|(tile, _, updates)| {
             let counts = updates.hits_and_misses();
             (tile, TileUpdates::Ordered(updates), counts)
         }));

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 /// The largest intensity of every hit voxel; empty for sensor models that need none.
 pub(crate) type Intensities = FxHashMap<VoxelIndex, f32>;
 
-/// The updates of marked bricks, each cut at the borders of the tiles; those of a tile in Morton order.
+/// The updates of marked bricks by tile, in Morton order. Bricks across a tile border are split.
 pub(crate) fn updates_by_tile(
     grid: &Grid,
     bricks: &[MarkedBrick],
@@ -69,9 +69,9 @@ pub(crate) fn hits_and_misses(bricks: &[BrickUpdate]) -> (u64, u64) {
         .fold((0, 0), |(hits, misses), brick| (hits + ones(&brick.hits), misses + ones(&brick.misses)))
 }
 
-/// What two parts of one scan say about a tile, together: each voxel once, a hit over any miss, and of its hits the
-/// largest intensity. Both are in Morton order, each brick once; so is the result.
-pub(crate) fn united(a: Vec<BrickUpdate>, b: Vec<BrickUpdate>) -> Vec<BrickUpdate> {
+/// Merges two parts of one scan for a tile: each voxel once, a hit over any miss, and the largest intensity of its
+/// hits. Both parts are in Morton order with each brick once; so is the result.
+pub(crate) fn merge_bricks(a: Vec<BrickUpdate>, b: Vec<BrickUpdate>) -> Vec<BrickUpdate> {
     let mut all = Vec::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.into_iter().peekable(), b.into_iter().peekable());
     while let (Some(first), Some(second)) = (a.peek(), b.peek()) {
@@ -79,7 +79,7 @@ pub(crate) fn united(a: Vec<BrickUpdate>, b: Vec<BrickUpdate>) -> Vec<BrickUpdat
         let first = if order.is_le() { a.next() } else { None };
         let second = if order.is_ge() { b.next() } else { None };
         all.extend(match (first, second) {
-            (Some(first), Some(second)) => Some(united_brick(&first, &second)),
+            (Some(first), Some(second)) => Some(merge_brick(&first, &second)),
             (first, second) => first.or(second),
         });
     }
@@ -87,7 +87,7 @@ pub(crate) fn united(a: Vec<BrickUpdate>, b: Vec<BrickUpdate>) -> Vec<BrickUpdat
     all
 }
 
-fn united_brick(a: &BrickUpdate, b: &BrickUpdate) -> BrickUpdate {
+fn merge_brick(a: &BrickUpdate, b: &BrickUpdate) -> BrickUpdate {
     let hits: BrickMask = std::array::from_fn(|word| a.hits[word] | b.hits[word]);
     let misses = std::array::from_fn(|word| (a.misses[word] | b.misses[word]) & !hits[word]);
     let has_intensities = !(a.intensities.is_empty() && b.intensities.is_empty());
@@ -109,7 +109,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    /// For each voxel, what the scan says: nothing (a miss) or a hit's intensity.
+    /// For each voxel a miss (`None`) or a hit's intensity.
     type Naive = BTreeMap<(u64, usize), Option<f32>>;
 
     fn naive(parts: &[&[BrickUpdate]]) -> Naive {
@@ -147,7 +147,7 @@ mod tests {
         #[test]
         fn parts_together_say_what_the_whole_scan_says(a in part(), b in part()) {
             let expected = naive(&[&a, &b]);
-            let united = united(a, b);
+            let united = merge_bricks(a, b);
             prop_assert!(united.is_sorted_by(|a, b| a.brick < b.brick));
             prop_assert_eq!(naive(&[&united]), expected);
         }

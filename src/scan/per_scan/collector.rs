@@ -1,7 +1,7 @@
 use super::bricks::{Intensities, hits_and_misses, updates_by_tile};
 use super::far_bricks::FarBricks;
 use crate::scan::ScanReport;
-use crate::scan::coherence::HeadStarts;
+use crate::scan::coherence::MarkedPrefixes;
 use crate::scan::pages::{Footprint, MarkedBrick, MarkedPage, PAGE_EDGE, PageMap, Window};
 use crate::scan::ray::{RayEnd, RayOrigin, SlabRay};
 use crate::scan::spill::ScanParts;
@@ -10,44 +10,44 @@ use crate::scan::updates::{ScanUpdates, TileUpdates, in_order_of_tiles};
 use crate::space::{Grid, VoxelIndex};
 use rayon::prelude::*;
 
-/// Most rays that are taken at a time.
+/// Most rays per call of [`PerScanCollector::take`].
 pub(crate) const BATCH: usize = 256;
 
-/// Collects what one scan says about voxels, each once: a hit over any miss, and of its hits the largest intensity.
+/// Collects the updates of one scan, one per voxel: a hit over any miss, and the largest intensity of its hits.
 ///
-/// Where memory is short, only the pages that rays come to first are fast, and what lies in others goes to
-/// [`ScanParts`] whenever there is too much of it.
+/// If memory is short, only the first pages are fast; the marks in others are drained to [`ScanParts`] when they exceed
+/// the limit.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct OnceCollector {
+pub(crate) struct PerScanCollector {
     pages: PageMap<MarkedPage>,
-    head_starts: HeadStarts,
+    prefixes: MarkedPrefixes,
     /// Bricks outside the window.
     far: FarBricks,
     intensities: Intensities,
-    most_small_bytes: usize,
+    max_small_bytes: usize,
     allowance: Allowance,
 }
 
-/// What a ray may leave for each slab that it passes, in bytes: three eighths of a brick of 64 bytes in a list that may be
-/// half empty, and three 64ths of a page.
-const BYTES_OF_SLAB: usize = 128;
-/// The same beside its slabs: the page and the brick that it ends in.
-const BYTES_OF_RAY: usize = 4 << 10;
+/// Most bytes that a ray adds per slab: three eighths of a brick of 64 bytes in a list that may be half empty, and
+/// three 64ths of a page.
+const BYTES_PER_SLAB: usize = 128;
+/// Most bytes that a ray adds beside its slabs: the page and the brick that it ends in.
+const BYTES_PER_RAY: usize = 4 << 10;
 
-impl OnceCollector {
-    /// Forgets everything, and begins anew with another window; the memory is kept.
+impl PerScanCollector {
+    /// Clears the collector and sets another window; the memory is kept.
     pub(crate) fn clear(&mut self, window: Window, limit: &CollectorLimit) {
         self.pages.clear(window, limit.fast_pages);
-        self.head_starts.clear();
+        self.prefixes.clear();
         self.far.clear();
         self.intensities.clear();
-        self.most_small_bytes = limit.small_bytes;
+        self.max_small_bytes = limit.small_bytes;
         self.allowance.grant(limit.small_bytes);
     }
 
     /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        self.pages.bytes() + self.head_starts.bytes() + self.far.bytes() + self.intensities_bytes()
+        self.pages.bytes() + self.prefixes.bytes() + self.far.bytes() + self.intensities_bytes()
     }
 
     fn intensities_bytes(&self) -> usize {
@@ -64,8 +64,8 @@ impl OnceCollector {
         self.pages.pages().iter().map(MarkedPage::count_bricks).sum::<usize>() + self.far.len()
     }
 
-    /// Takes some rays from one origin, at most [`BATCH`]: their hits, and the voxels before their last. What there is no
-    /// room for goes to `parts`, if there is a limit.
+    /// Takes at most [`BATCH`] rays from one origin: their hits, and the voxels before their last. What exceeds the
+    /// limit, if there is one, goes to `parts`.
     pub(crate) fn take(
         &mut self,
         origin: &RayOrigin,
@@ -78,10 +78,10 @@ impl OnceCollector {
                 self.hit(end.voxel, needs_intensity.then_some(intensity));
             }
         }
-        // The rays that are left to walk, without a branch: it would often be guessed wrong.
+        // Selects the rays that are left to walk, without a branch: it would be unpredictable.
         let (mut left, mut count) = ([(0, 0); BATCH], 0);
         for (number, &end) in ends.iter().enumerate() {
-            let slabs = self.head_starts.of(&SlabRay::new(origin, end));
+            let slabs = self.prefixes.of(&SlabRay::new(origin, end));
             left[count % BATCH] = (number, slabs.unwrap_or(0));
             count += usize::from(slabs.is_some());
         }
@@ -90,26 +90,26 @@ impl OnceCollector {
             let ray = SlabRay::new(origin, end);
             if let Some(parts) = parts {
                 let new_bytes =
-                    BYTES_OF_RAY + BYTES_OF_SLAB * (ray.slabs() - slabs.min(ray.slabs())) as usize;
+                    BYTES_PER_RAY + BYTES_PER_SLAB * (ray.slabs() - slabs.min(ray.slabs())) as usize;
                 if self.allowance.is_spent_by(new_bytes) {
                     self.keep_to_limit(new_bytes, parts);
                 }
             }
-            let Self { pages, far, intensities, most_small_bytes, .. } = self;
+            let Self { pages, far, intensities, max_small_bytes, .. } = self;
             ray.pass(pages, slabs, end.hit.is_some(), |voxel| {
                 far.pass(voxel);
                 if let Some(parts) = parts
-                    && far.bytes() > *most_small_bytes / 2
+                    && far.bytes() > *max_small_bytes / 2
                 {
-                    parts.put_marked(far.take().into_iter(), intensities);
+                    parts.add_marked(far.take().into_iter(), intensities);
                 }
             });
         }
     }
 
-    /// Spares the rays to come what those so far have marked; see [`HeadStarts::extend`] for `edges`.
-    pub(crate) fn share(&mut self, origin: &RayOrigin, edges: &[usize]) {
-        self.head_starts.extend(&self.pages, origin, edges);
+    /// Lets later rays skip what is marked so far; see [`MarkedPrefixes::extend`] for `edges`.
+    pub(crate) fn extend_prefixes(&mut self, origin: &RayOrigin, edges: &[usize]) {
+        self.prefixes.extend(&self.pages, origin, edges);
     }
 
     fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
@@ -122,7 +122,7 @@ impl OnceCollector {
         }
     }
 
-    /// Makes room for so many bytes, if there is none: the marks of small pages go to `parts`, and if need be all.
+    /// Makes room for so many bytes: drains the small pages to `parts`, and if need be all pages.
     #[cold]
     fn keep_to_limit(&mut self, new_bytes: usize, parts: &ScanParts<'_>) {
         let first_small = self.pages.first_small();
@@ -131,35 +131,34 @@ impl OnceCollector {
             .map(|page| size_of::<MarkedPage>() + page.heap_bytes())
             .sum();
         let bytes = pages_bytes + self.far.bytes() + self.intensities_bytes();
-        // Otherwise it would be looked at again at once.
-        let least = new_bytes.max(self.most_small_bytes / 8);
-        if bytes + least <= self.most_small_bytes {
-            return self.allowance.grant(self.most_small_bytes - bytes);
+        // Otherwise the next ray would measure again.
+        let least = new_bytes.max(self.max_small_bytes / 8);
+        if bytes + least <= self.max_small_bytes {
+            return self.allowance.grant(self.max_small_bytes - bytes);
         }
-        let first = if self.intensities_bytes() > self.most_small_bytes / 4 { 0 } else { first_small };
-        self.put_in_parts(first, parts);
-        self.allowance.grant(self.most_small_bytes - self.intensities_bytes().min(self.most_small_bytes));
+        let first = if self.intensities_bytes() > self.max_small_bytes / 4 { 0 } else { first_small };
+        self.drain_from(first, parts);
+        self.allowance.grant(self.max_small_bytes - self.intensities_bytes().min(self.max_small_bytes));
     }
 
-    /// Gives in the marks of the pages from this number on, and all outside the window. What head starts know to be marked
-    /// stays so.
-    fn put_in_parts(&mut self, first: usize, parts: &ScanParts<'_>) {
+    /// Drains the pages from this number on, and all marks outside the window. Marked prefixes stay valid.
+    fn drain_from(&mut self, first: usize, parts: &ScanParts<'_>) {
         let mut pages = self.pages.take_from(first);
         pages.sort_unstable_by_key(|(index, _)| *index);
         let bricks = pages.iter().flat_map(|(index, page)| page.bricks(*index));
-        parts.put_marked(bricks, &self.intensities);
-        parts.put_marked(self.far.take().into_iter(), &self.intensities);
+        parts.add_marked(bricks, &self.intensities);
+        parts.add_marked(self.far.take().into_iter(), &self.intensities);
         if first == 0 {
             self.intensities = Intensities::default();
         }
     }
 
-    /// Gives in everything.
+    /// Drains everything.
     pub(crate) fn finish(&mut self, parts: &ScanParts<'_>) {
-        self.put_in_parts(0, parts);
+        self.drain_from(0, parts);
     }
 
-    /// Adds what another collector with the same window has seen.
+    /// Adds the marks of another collector with the same window.
     pub(crate) fn absorb(&mut self, other: &Self) {
         for (page, index) in other.pages.pages().iter().zip(other.pages.indices()) {
             let number = self.pages.number_of(index.map(|k| k * PAGE_EDGE as i32));
@@ -171,7 +170,7 @@ impl OnceCollector {
         }
     }
 
-    /// The updates, each brick cut at the borders of the tiles.
+    /// The updates. Bricks across a tile border are split.
     pub(crate) fn updates(&mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
         let pages = self.pages.pages().par_iter().zip(self.pages.indices());
         let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
@@ -206,7 +205,7 @@ mod tests {
     }
 
     /// Ends of rays in all directions of a part of a sphere, near and far as over a rough surface.
-    fn fan(origin: Point, rays: usize, reach: f64, roughness: f64, opening: f64) -> Vec<RayEnd> {
+    fn ends_of_rays(origin: Point, rays: usize, reach: f64, roughness: f64, opening: f64) -> Vec<RayEnd> {
         let ray = |k: usize| {
             let (azimuth, up) =
                 (k as f64 * 2.399_963, opening * (2.0 * (k as f64 + 0.5) / rays as f64 - 1.0));
@@ -234,7 +233,7 @@ mod tests {
         [hits, missed]
     }
 
-    fn collected(collector: &OnceCollector) -> Marks {
+    fn collected(collector: &PerScanCollector) -> Marks {
         let mut marks = Marks::default();
         for (page, index) in collector.pages.pages().iter().zip(collector.pages.indices()) {
             for brick in page.bricks(*index) {
@@ -258,9 +257,9 @@ mod tests {
     #[test]
     fn rays_to_the_far_end_of_the_window_leave_the_marks_of_whole_rays() {
         let origin = [12.3, -45.6, 7.75];
-        let ends = fan(origin, 80, 5_000.0, 0.25, 0.005);
+        let ends = ends_of_rays(origin, 80, 5_000.0, 0.25, 0.005);
         let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
-        let mut collector = OnceCollector::default();
+        let mut collector = PerScanCollector::default();
         let far = 8_000.0;
         let bounds = (origin.point.map(|x| x - far), origin.point.map(|x| x + far));
         let [(low_x, high_x), (low_y, high_y)] = [0, 1].map(|k| (bounds.0[k], bounds.1[k]));
@@ -285,9 +284,9 @@ mod tests {
         ) {
             let origin: Point =
                 std::array::from_fn(|k| if is_on_border[k] { origin[k].floor() } else { origin[k] });
-            let ends = fan(origin, 6000, reach, roughness, opening);
+            let ends = ends_of_rays(origin, 6000, reach, roughness, opening);
             let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
-            let mut collector = OnceCollector::default();
+            let mut collector = PerScanCollector::default();
             let window = Window::around(origin.voxel, (
                 origin.point.map(|x| x - 2.0 * reach),
                 origin.point.map(|x| x + 2.0 * reach),
@@ -298,10 +297,10 @@ mod tests {
                 let part: Vec<RayEnd> = ends.iter().skip(round).step_by(8).copied().collect();
                 shared += part
                     .iter()
-                    .filter(|end| collector.head_starts.of(&SlabRay::new(origin, **end)) != Some(0))
+                    .filter(|end| collector.prefixes.of(&SlabRay::new(origin, **end)) != Some(0))
                     .count();
                 part.chunks(BATCH).for_each(|batch| collector.take(origin, batch, false, None));
-                collector.share(origin, &[8, 4, 2, 1]);
+                collector.extend_prefixes(origin, &[8, 4, 2, 1]);
             }
             prop_assert_eq!(collected(&collector), walked(origin, &ends));
             prop_assert!(shared > 100, "only {} rays were spared something", shared);

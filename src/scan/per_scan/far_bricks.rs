@@ -2,11 +2,11 @@ use crate::scan::pages::MarkedBrick;
 use crate::space::{BRICK_EDGE, VoxelIndex, place_of_voxel};
 use rustc_hash::FxHashMap;
 
-/// Marks outside the window, brick by brick: a page for each would be large for the few voxels of a stray ray.
+/// Marks outside the window, brick by brick: a page for the few voxels of a stray ray would be too large.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FarBricks {
     bricks: FxHashMap<VoxelIndex, MarkedBrick>,
-    /// The brick that a ray is in; not in `bricks` yet.
+    /// The brick that the present ray is in; not in `bricks` yet.
     latest: Option<MarkedBrick>,
 }
 
@@ -57,13 +57,13 @@ impl FarBricks {
         self.bricks.values().chain(&self.latest)
     }
 
-    /// The bricks, each once, which are forgotten.
+    /// Removes and returns the bricks, each once.
     pub(crate) fn take(&mut self) -> Vec<MarkedBrick> {
         self.put_latest_in();
         std::mem::take(&mut self.bricks).into_values().collect()
     }
 
-    /// Forgets everything.
+    /// Removes all bricks.
     pub(crate) fn clear(&mut self) {
         self.bricks.clear();
         self.latest = None;
@@ -74,7 +74,7 @@ impl FarBricks {
         self.iter().next().is_none()
     }
 
-    /// Number of bricks; the one that the last ray was in may count twice.
+    /// Number of bricks; the last ray's brick may count twice.
     pub(crate) fn len(&self) -> usize {
         self.bricks.len() + usize::from(self.latest.is_some())
     }

@@ -6,5 +6,5 @@ mod bricks;
 mod collector;
 mod far_bricks;
 
-pub(crate) use bricks::{Intensities, hits_and_misses, united, updates_by_tile};
-pub(crate) use collector::{BATCH, OnceCollector};
+pub(crate) use bricks::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
+pub(crate) use collector::{BATCH, PerScanCollector};

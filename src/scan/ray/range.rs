@@ -2,44 +2,44 @@ use crate::config::RayConfig;
 use crate::scan::SkippedPoints;
 use crate::space::Point;
 
-/// What the range rules make of a point.
+/// Outcome of the range rule for a point.
 pub(crate) enum Ranged {
     /// A ray to the point, which is a hit.
     Hit(Point),
-    /// A ray to the place where the max range cuts it; nothing is hit.
+    /// A ray to where the max range cuts it; nothing is hit.
     Cut(Point),
-    /// The point counts for nothing.
+    /// The point is ignored.
     Skipped,
 }
 
-/// The range rules for points seen from one origin.
+/// The range rule for points seen from one origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RangeRule {
     /// In metres.
     origin: Point,
     min_range_m: f64,
     max_range_m: Option<f64>,
-    /// Between these squared distances a point is a hit for certain.
+    /// Squared distances between which a point is certainly a hit.
     certain_m2: [f64; 2],
 }
 
 impl RangeRule {
-    /// The rules of `rays` for points seen from `origin`, in metres and finite.
+    /// The rule of `rays` for points seen from `origin`, in metres and finite.
     pub(crate) fn new(rays: &RayConfig, origin: Point) -> Self {
         let RayConfig { min_range_m, max_range_m, .. } = *rays;
-        // Far more than squares and square roots are rounded by.
+        // Far above the rounding error of squares and square roots.
         const MARGIN: f64 = 1e-12;
         let nearest = min_range_m * min_range_m * (1.0 + MARGIN);
         let farthest = max_range_m.map_or(f64::MAX, |max_m| (max_m * max_m * (1.0 - MARGIN)).min(f64::MAX));
         Self { origin, min_range_m, max_range_m, certain_m2: [nearest, farthest] }
     }
 
-    /// Applies the rules to a point, in metres.
+    /// Applies the rule to a point in metres.
     #[inline]
     pub(crate) fn apply(&self, point: Point, skipped: &mut SkippedPoints) -> Ranged {
         let [dx, dy, dz]: Point = std::array::from_fn(|k| point[k] - self.origin[k]);
         let squared = dx * dx + dy * dy + dz * dz;
-        // False, too, for all that is not finite, and for the origin.
+        // Also false for non-finite points and for the origin.
         match squared > self.certain_m2[0] && squared < self.certain_m2[1] {
             true => Ranged::Hit(point),
             false => self.apply_exactly(point, skipped),
@@ -82,7 +82,7 @@ impl RangeRule {
 mod tests {
     use super::*;
 
-    /// What becomes of a point at so many metres.
+    /// Outcome for a point at `x` metres.
     fn at(rule: &RangeRule, x: f64) -> &'static str {
         match rule.apply([x, 0.0, 0.0], &mut SkippedPoints::default()) {
             Ranged::Hit(point) if point == [x, 0.0, 0.0] => "hit",

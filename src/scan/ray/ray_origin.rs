@@ -1,12 +1,12 @@
 use crate::space::{Point, VoxelIndex};
 
-/// Where the rays of a scan begin, in units of voxels, world frame.
+/// Where the rays of a scan start, in units of voxels, world frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayOrigin {
     pub(crate) point: Point,
     /// The voxel of the point.
     pub(crate) voxel: VoxelIndex,
-    /// Whether the point lies on a border between voxels: rays downward leave its voxel at once.
+    /// Whether the point lies on a border between voxels: rays toward lower indices leave its voxel at once.
     pub(crate) is_on_border: bool,
     /// The same along each axis.
     pub(crate) is_on_border_along: [bool; 3],

@@ -5,7 +5,7 @@ use super::slab_path::SlabPath;
 use crate::scan::pages::{Footprint, Local, PageMap};
 use crate::space::{Point, VoxelIndex};
 
-/// A ray from a scan's origin, in the terms of [`RayWalk`]: units of voxels, world frame.
+/// A ray from a scan's origin, in units of voxels, world frame; see [`RayWalk`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SlabRay<'a> {
     pub(crate) origin: &'a RayOrigin,
@@ -13,14 +13,14 @@ pub(crate) struct SlabRay<'a> {
     pub(crate) last: VoxelIndex,
     /// From the origin to the end.
     pub(crate) direction: Point,
-    /// The axis of the longest part: slabs lie across it.
+    /// The axis of the largest component; slabs lie across it.
     pub(crate) axis: usize,
-    /// One over the longest part; infinite for next to nothing.
+    /// One over the largest component; infinite if that is almost 0.
     pub(crate) per_slab: f64,
 }
 
-/// Of a ray, at most so many slabs are walked by the closed form; then all that are left are.
-const MOST_WALKED: u32 = 4;
+/// At most so many slabs of a ray are walked by the closed form one at a time; after that, the rest of the ray is.
+const MAX_WALKED: u32 = 4;
 
 impl<'a> SlabRay<'a> {
     /// The ray from `origin` to `end`.
@@ -38,7 +38,7 @@ impl<'a> SlabRay<'a> {
         Self { origin, end, last, direction, axis, per_slab: 1.0 / longest }
     }
 
-    /// How many slabs there are after the origin's.
+    /// Number of slabs after the origin's.
     #[inline]
     pub(crate) fn slabs(&self) -> u32 {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| self.last[k].abs_diff(self.origin.voxel[k]));
@@ -50,16 +50,16 @@ impl<'a> SlabRay<'a> {
         }
     }
 
-    /// The exact walk of the ray, one voxel after the other.
+    /// The exact walk of the ray, voxel by voxel.
     pub(crate) fn walk(&self) -> RayWalk {
         RayWalk::between(self.origin.point, self.origin.voxel, self.end, self.last)
     }
 
-    /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last; those outside the window
-    /// of the pages are left to `pass_far`.
+    /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last. Voxels outside the
+    /// pages' window go to `pass_far`.
     ///
-    /// The first `skipped` slabs, counted from the origin's, may be left out, and if `may_pass_last`, the last voxel may be
-    /// passed.
+    /// The first `skipped` slabs, counted from the origin's, may be left out. With `may_pass_last` the last voxel may
+    /// be passed, too.
     #[inline]
     pub(crate) fn pass<F: Footprint>(
         &self,
@@ -78,7 +78,7 @@ impl<'a> SlabRay<'a> {
         }
     }
 
-    /// The same by the closed form, for the voxels from `from` on.
+    /// The same by the closed form, from voxel `from` on.
     #[cold]
     fn pass_exactly<F: Footprint>(
         &self,
@@ -93,15 +93,15 @@ impl<'a> SlabRay<'a> {
     }
 
     /// Passes the voxels from the first on, in order, as far as they can be told without the closed form. The error is
-    /// the first that cannot.
+    /// the first voxel that cannot.
     ///
-    /// The walk goes in slabs, one voxel thick, along the axis of the ray's longest part. Where the ray crosses from
-    /// slab to slab is a sum of fixed-point numbers, and the voxels it meets in a slab are the one it comes in by, the
-    /// one it goes out by and, if these differ along both other axes, the one between them. That this is what the
-    /// closed form says is certain as long as no crossing is next to a border, and no two are next to each other. Few
-    /// slabs where they are, such as the first of a sensor beside a border, are walked by the closed form.
+    /// The walk goes in slabs, one voxel thick, along the axis of the ray's largest component. The crossing from slab
+    /// to slab is a sum of fixed-point numbers. In a slab the ray crosses the entry voxel, the exit voxel and, if these
+    /// differ along both other axes, the one between them. This agrees with the closed form as long as no crossing is
+    /// next to a border and no two are next to each other. A few slabs where this fails, such as the first of a sensor
+    /// beside a border, are walked by the closed form.
     ///
-    /// `A` is the axis of the longest part, `B` and `C` are the others, the lower first.
+    /// `A` is the axis of the largest component, `B` and `C` are the others, the lower first.
     fn pass_slabs<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
         pages: &mut PageMap<F>,
@@ -123,13 +123,13 @@ impl<'a> SlabRay<'a> {
         if slabs > 0 {
             let is_up = last[A] > a;
             let path = SlabPath::along::<A, B, C>(self, base, a, is_up);
-            // Leaving a border may have been a slab.
+            // Leaving a border may have counted as a slab.
             let mut done =
                 skipped.saturating_sub(a.abs_diff((self.origin.voxel[A] - base[A]) as u32)).min(slabs);
             if done > 0 {
                 let crossing = path.after(done - 1);
                 if crossing.is_near_border() {
-                    // Nothing must be left out.
+                    // No voxel may be left out.
                     done = 0;
                 } else {
                     (b, c) = crossing.voxel();
@@ -150,12 +150,12 @@ impl<'a> SlabRay<'a> {
                 if done == slabs || leaves_page && !stretch.leaves_sideways {
                     continue;
                 }
-                // The ray leaves the page in the midst of a slab, or where it leaves the slab is not certain.
+                // The ray leaves the page within a slab, or it is not certain where it leaves the slab.
                 let crossing = path.after(done);
                 let certain = leaves_page.then(|| Self::pass_slab::<A, B, C, F>(pages, &crossing, [a, b, c]));
                 let exit = certain.flatten().or_else(|| {
                     walked += 1;
-                    (walked <= MOST_WALKED).then(|| self.walk_slab::<A, B, C, F>(pages, [a, b, c]))?
+                    (walked <= MAX_WALKED).then(|| self.walk_slab::<A, B, C, F>(pages, [a, b, c]))?
                 });
                 let Some((exit_b, exit_c)) = exit else { return unknown(a, b, c) };
                 (b, c, done) = (exit_b, exit_c, done + 1);
@@ -183,8 +183,8 @@ impl<'a> SlabRay<'a> {
         Ok(())
     }
 
-    /// Passes the voxels of a slab, from `[a, b, c]` on, whatever their pages. Returns where the ray comes into the next
-    /// slab by this crossing; `None` if nothing was passed, as that is not certain.
+    /// Passes the voxels of a slab, from `[a, b, c]` on, in any page. Returns where the ray enters the next slab by
+    /// this crossing; `None`, with nothing passed, if that is not certain.
     #[inline]
     fn pass_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
         pages: &mut PageMap<F>,
@@ -204,8 +204,8 @@ impl<'a> SlabRay<'a> {
         Some(exit)
     }
 
-    /// Passes the voxels of a slab, from `[a, b, c]` on, by the closed form. Returns where the ray comes into the next
-    /// slab; `None` if nothing was passed, as the ray does not get there.
+    /// Passes the voxels of a slab, from `[a, b, c]` on, by the closed form. Returns where the ray enters the next
+    /// slab; `None`, with nothing passed, if it ends before.
     #[cold]
     fn walk_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
@@ -215,7 +215,7 @@ impl<'a> SlabRay<'a> {
         let base = pages.window().base();
         let first = voxel::<A, B, C>(a, b, c);
         let mut walk = self.walk().resumed_at(std::array::from_fn(|k| base[k] + first[k] as i32));
-        // A ray crosses a border along `B` and one along `C` in a slab at most, but for the rounding of their times.
+        // Except for rounding, a ray crosses at most one border along `B` and one along `C` in a slab.
         let mut voxels = [first; 5];
         for passed in 1..=voxels.len() {
             walk.advance();
@@ -231,14 +231,14 @@ impl<'a> SlabRay<'a> {
         None
     }
 
-    /// The crossings at time 0: an origin on a border between voxels belongs to the upper one, and a ray downward
-    /// leaves it at once, the lowest axis first. Returns the voxel after them.
+    /// The crossings at time 0. An origin on a border between voxels belongs to the upper voxel, and a ray toward lower
+    /// indices leaves it at once, the lowest axis first. Returns the voxel after these crossings.
     fn leave_borders<F: Footprint>(&self, pages: &mut PageMap<F>) -> Result<Local, VoxelIndex> {
         let origin = self.origin;
         let mut voxel = pages.window().local(origin.voxel).ok_or(origin.voxel)?;
         let is_left: [bool; 3] =
             std::array::from_fn(|k| origin.is_on_border_along[k] && self.last[k] < origin.voxel[k]);
-        // The closed form has no number for a crossing of a ray that hardly moves.
+        // The closed form is undefined for a crossing of a ray that hardly moves.
         if (0..3).any(|k| is_left[k] && self.direction[k] > -f64::MIN_POSITIVE) {
             return Err(origin.voxel);
         }
@@ -251,8 +251,8 @@ impl<'a> SlabRay<'a> {
         Ok(voxel)
     }
 
-    /// Whether the border below voxel `b` along `B` is crossed before the border below voxel `c` along `C`, by the
-    /// closed form; of equal times the lower axis is first, and `B` is lower.
+    /// Whether, by the closed form, the border below voxel `b` along `B` is crossed before the one below voxel `c`
+    /// along `C`. At equal times the lower axis is first, and `B` is lower.
     fn crosses_first<const B: usize, const C: usize>(&self, base: VoxelIndex, b: u32, c: u32) -> bool {
         let time = |axis: usize, border: u32| {
             let inv_direction = 1.0 / self.direction[axis];
@@ -315,8 +315,8 @@ mod tests {
         passed.is_err()
     }
 
-    /// Passes along the rays from one origin, and compares with the exact walk; returns how many rays the slabs could
-    /// not tell all of.
+    /// Passes along the rays from one origin, and compares with the exact walk. Returns the number of rays for which
+    /// the slabs alone did not suffice.
     fn check(origin: Point, ends: &[Point]) -> usize {
         let bounds = ends.iter().fold((origin, origin), |(low, high), end| {
             (std::array::from_fn(|k| low[k].min(end[k])), std::array::from_fn(|k| high[k].max(end[k])))

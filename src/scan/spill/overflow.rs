@@ -5,18 +5,18 @@ use crate::space::TileIndex;
 use std::io;
 use std::path::Path;
 
-/// Takes a part of the updates of a scan, by tile.
+/// Takes a part of the updates of a scan, by tile, and stores it outside memory.
 pub(crate) type PutAside<'a> = dyn FnMut(Vec<(TileIndex, PackedUpdates)>) -> Result<()> + 'a;
 
-/// Where what is known of a scan goes that memory has no room for.
+/// Where the updates of a scan go that exceed the memory limit.
 pub(crate) struct Overflow<'a> {
-    /// Most bytes of updates that are kept; whenever there are more, they are put aside.
+    /// Most bytes of updates in memory; whenever there are more, they are put aside.
     pub(crate) most_bytes: usize,
-    /// Most tiles that a scan may touch; what is known of each while it is inserted takes memory.
+    /// Most tiles that a scan may touch: each takes memory while the scan is inserted.
     pub(crate) most_tiles: usize,
     /// The map's folder, for errors.
     pub(crate) folder: &'a Path,
-    /// Makes a file for what the rays have left so far.
+    /// Makes a temporary file for the parts of the scan.
     pub(crate) make_scratch: &'a MakeScratch<'a>,
     /// Takes updates that are complete.
     pub(crate) put_aside: &'a mut PutAside<'a>,

@@ -1,39 +1,39 @@
 use crate::scratch::Scratch;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
-/// Makes the file that a [`PartLog`] goes to where memory is short.
+/// Makes the file to which a [`PartLog`] spills.
 pub(crate) type MakeScratch<'a> = dyn Fn() -> io::Result<Box<dyn Scratch>> + Sync + 'a;
 
-/// Records in the order in which they came, the last of them in memory, the others in a file if they are too many. Each
-/// leads to an earlier one, so that of any number of lists only the last record need be known.
+/// An append-only log of records: the tail is in memory, the rest in a file if it is too large. Each record links to
+/// the previous record of its list, so a list is given by its last record.
 pub(crate) struct PartLog<'a> {
     tail: Vec<u8>,
-    most_tail_bytes: usize,
+    max_tail_bytes: usize,
     /// Where the tail begins.
     tail_at: u64,
     make_file: &'a MakeScratch<'a>,
     file: Option<Box<dyn Scratch>>,
 }
 
-/// Before the first record of a list.
+/// The link of the first record of a list.
 pub(crate) const NONE: u64 = u64::MAX;
 
 const HEADER_BYTES: usize = 12;
 
 impl<'a> PartLog<'a> {
-    pub(crate) fn new(most_tail_bytes: usize, make_file: &'a MakeScratch<'a>) -> Self {
-        Self { tail: Vec::new(), most_tail_bytes, tail_at: 0, make_file, file: None }
+    pub(crate) fn new(max_tail_bytes: usize, make_file: &'a MakeScratch<'a>) -> Self {
+        Self { tail: Vec::new(), max_tail_bytes, tail_at: 0, make_file, file: None }
     }
 
-    /// Appends a record behind another of its list, and returns where it is.
+    /// Appends a record to the list that ends with `before`, and returns its position.
     ///
     /// # Errors
     ///
-    /// No file to be had.
+    /// The file cannot be made or written to.
     pub(crate) fn append(&mut self, before: u64, record: &[u8]) -> io::Result<u64> {
         let length = u32::try_from(record.len())
             .map_err(|_| io::Error::other("more than 4 GiB of updates of one tile at a time"))?;
-        if !self.tail.is_empty() && self.tail.len() + HEADER_BYTES + record.len() > self.most_tail_bytes {
+        if !self.tail.is_empty() && self.tail.len() + HEADER_BYTES + record.len() > self.max_tail_bytes {
             self.write_tail()?;
         }
         let at = self.tail_at + self.tail.len() as u64;
@@ -55,7 +55,7 @@ impl<'a> PartLog<'a> {
         Ok(())
     }
 
-    /// Where the record before that at a place is.
+    /// Position of the previous record of the list.
     ///
     /// # Errors
     ///
@@ -64,7 +64,7 @@ impl<'a> PartLog<'a> {
         Ok(self.header(at)?.0)
     }
 
-    /// The record at a place into `record`.
+    /// Reads the record at a position into `record`.
     ///
     /// # Errors
     ///
@@ -73,7 +73,7 @@ impl<'a> PartLog<'a> {
         let (_, length) = self.header(at)?;
         record.clear();
         match (&mut self.file, at.checked_sub(self.tail_at)) {
-            // Behind its header.
+            // After its header.
             (Some(file), None) => file.take(length as u64).read_to_end(record).map(drop)?,
             (_, at) => {
                 let first = at.unwrap_or_default() as usize + HEADER_BYTES;
@@ -115,10 +115,10 @@ mod tests {
         #[test]
         fn every_list_comes_back_in_order_wherever_it_lies(
             records in prop::collection::vec((0..4_usize, prop::collection::vec(any::<u8>(), 0..40)), 0..60),
-            most_tail_bytes in 0..300_usize,
+            max_tail_bytes in 0..300_usize,
         ) {
             let make = || Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
-            let mut log = PartLog::new(most_tail_bytes, &make);
+            let mut log = PartLog::new(max_tail_bytes, &make);
             let mut last = [NONE; 4];
             for (list, record) in &records {
                 last[*list] = log.append(last[*list], record).unwrap();

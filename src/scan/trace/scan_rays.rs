@@ -3,10 +3,10 @@ use super::trace_limit::{CollectorLimit, TraceLimit};
 use crate::config::RayConfig;
 use crate::error::Result;
 use crate::scan::ScanReport;
-use crate::scan::coherence::{one_round, rounds};
+use crate::scan::coherence::{sampling_passes, single_pass};
 use crate::scan::pages::{MAX_RAYS, Window};
-use crate::scan::per_ray::{EveryRayCollector, OrderedCollector, put_in_order, updates_in_order};
-use crate::scan::per_scan::{BATCH, OnceCollector};
+use crate::scan::per_ray::{OrderedCollector, PerRayCollector, drain_in_order, updates_in_order};
+use crate::scan::per_scan::{BATCH, PerScanCollector};
 use crate::scan::ray::{MAX_RAY_STEPS, RangeRule, Ranged, RayEnd, RayOrigin, SlabRay};
 use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::ScanParts;
@@ -17,14 +17,14 @@ use crate::space::{Grid, Point};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Rays that a thread walks at least: fewer are not worth a thread's own marks.
-const LEAST_RAYS_A_THREAD: usize = 4096;
+/// Fewest rays per thread: fewer do not pay for a thread's own pages.
+const MIN_RAYS_PER_THREAD: usize = 4096;
 
-/// Rays that a collector takes at first where memory is limited, until it is known what they leave.
+/// Rays that a collector takes at first under a memory limit, before their size is known.
 const FIRST_RAYS: usize = 1024;
 
 /// The rays of a scan, from one origin.
-pub(crate) struct Fan<'a> {
+pub(crate) struct ScanRays<'a> {
     grid: &'a Grid,
     model: &'a SensorModel,
     rays: &'a RayConfig,
@@ -36,15 +36,15 @@ pub(crate) struct Fan<'a> {
     stop: &'a Stop,
 }
 
-/// What became of a scan of which each voxel counts once.
-pub(crate) enum OnceInParts {
-    /// There was room for its updates.
+/// The outcome of an insertion per scan under a memory limit.
+pub(crate) enum PerScanUpdates {
+    /// All updates fit into memory.
     Whole(ScanUpdates),
-    /// There was none: all were given in; this is what became of the points.
+    /// They did not fit: all went to the parts. The report is about the points.
     InParts(ScanReport),
 }
 
-impl<'a> Fan<'a> {
+impl<'a> ScanRays<'a> {
     pub(crate) fn new(
         grid: &'a Grid,
         model: &'a SensorModel,
@@ -57,65 +57,67 @@ impl<'a> Fan<'a> {
         let origin = RayOrigin::new(grid.to_voxel_units(origin_m), voxel);
         let range = RangeRule::new(rays, origin_m);
         let window = Window::default();
-        let mut fan = Self { grid, model, rays, points, origin_m, origin, window, range, stop };
-        fan.window = Window::around(voxel, fan.bounds()?);
-        Ok(fan)
+        let mut scan_rays = Self { grid, model, rays, points, origin_m, origin, window, range, stop };
+        scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
+        Ok(scan_rays)
     }
 
-    /// One update a voxel, a hit over any miss. Which voxels these are does not depend on the order of the rays, so
-    /// each thread walks some of them.
-    pub(crate) fn once_a_voxel(&self, collectors: &mut Vec<OnceCollector>) -> Result<ScanUpdates> {
+    /// Insertion per scan: one update per voxel, a hit over any miss. The result does not depend on the order of the
+    /// rays, so each thread walks some of them.
+    pub(crate) fn per_scan(&self, collectors: &mut Vec<PerScanCollector>) -> Result<ScanUpdates> {
         let (collectors, report) =
-            self.collect_once(collectors, self.threads(), &CollectorLimit::NONE, None)?;
-        Ok(self.united(collectors, report))
+            self.collect_per_scan(collectors, self.threads(), &CollectorLimit::NONE, None)?;
+        Ok(self.merge(collectors, report))
     }
 
-    /// The same within a limit of memory: the updates, if there is room for them; otherwise all of them go to `parts`.
-    pub(crate) fn once_a_voxel_in_parts(
+    /// The same under a memory limit: the updates if they fit, otherwise all of them go to `parts`.
+    pub(crate) fn per_scan_in_parts(
         &self,
-        collectors: &mut Vec<OnceCollector>,
+        collectors: &mut Vec<PerScanCollector>,
         limit: &TraceLimit,
         parts: &ScanParts<'_>,
-    ) -> Result<OnceInParts> {
+    ) -> Result<PerScanUpdates> {
         let threads = limit.collectors(self.threads());
         let (collectors, report) =
-            self.collect_once(collectors, threads, &limit.of_collector(threads), Some(parts))?;
+            self.collect_per_scan(collectors, threads, &limit.of_collector(threads), Some(parts))?;
         if parts.is_empty() && limit.has_room_for(collectors) {
-            return Ok(OnceInParts::Whole(self.united(collectors, report)));
+            return Ok(PerScanUpdates::Whole(self.merge(collectors, report)));
         }
         collectors.par_iter_mut().for_each(|collector| collector.finish(parts));
-        Ok(OnceInParts::InParts(report))
+        Ok(PerScanUpdates::InParts(report))
     }
 
-    fn united(&self, collectors: &mut [OnceCollector], report: ScanReport) -> ScanUpdates {
+    fn merge(&self, collectors: &mut [PerScanCollector], report: ScanReport) -> ScanUpdates {
         let (first, others) = collectors.split_at_mut(1);
         others.iter().for_each(|other| first[0].absorb(other));
         first[0].updates(self.grid, report)
     }
 
-    fn collect_once<'c>(
+    fn collect_per_scan<'c>(
         &self,
-        collectors: &'c mut Vec<OnceCollector>,
+        collectors: &'c mut Vec<PerScanCollector>,
         threads: usize,
         limit: &CollectorLimit,
         parts: Option<&ScanParts<'_>>,
-    ) -> Result<(&'c mut [OnceCollector], ScanReport)> {
+    ) -> Result<(&'c mut [PerScanCollector], ScanReport)> {
         let needs_intensity = self.model.needs_intensity();
         self.collect(collectors, threads, |collector, range| {
             collector.clear(self.window, limit);
             let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
             let mut batch = Vec::with_capacity(BATCH);
-            let (mut seen, mut worth_sharing) = (0, 0);
+            let (mut seen, mut extend_at) = (0, 0);
             self.points.for_each_chunk(range, &mut |points, intensities| {
-                // What chunk after chunk adds is less and less, and to look takes as long each time.
-                let shares = seen >= worth_sharing;
-                if shares {
-                    worth_sharing = 2 * (seen + points.len());
+                // Each chunk adds less to the prefixes, and extending them takes as long each time.
+                let extends = seen >= extend_at;
+                if extends {
+                    extend_at = 2 * (seen + points.len());
                 }
                 seen += points.len();
-                for round in if shares { rounds(0..points.len()) } else { one_round(0..points.len()) } {
-                    collector.share(&self.origin, round.shared_squares);
-                    for number in round.points() {
+                for pass in
+                    if extends { sampling_passes(0..points.len()) } else { single_pass(0..points.len()) }
+                {
+                    collector.extend_prefixes(&self.origin, pass.squares);
+                    for number in pass.points() {
                         batch.extend(self.ray(points[number], intensity(intensities, number), &mut report));
                         if batch.len() == BATCH {
                             collector.take(&self.origin, &batch, needs_intensity, parts);
@@ -134,8 +136,8 @@ impl<'a> Fan<'a> {
         })
     }
 
-    /// Every ray counts: its misses from the sensor outward, then its hit, in the order of the points.
-    pub(crate) fn every_ray(&self, collectors: &mut Vec<EveryRayCollector>) -> Result<ScanUpdates> {
+    /// Insertion per ray: its misses from the sensor outward, then its hit, in the order of the points.
+    pub(crate) fn per_ray(&self, collectors: &mut Vec<PerRayCollector>) -> Result<ScanUpdates> {
         let parts = self.threads().max(self.points.len().div_ceil(MAX_RAYS));
         let (collectors, report) = self.collect(collectors, parts, |collector, range| {
             collector.clear(self.window, None);
@@ -146,11 +148,11 @@ impl<'a> Fan<'a> {
         Ok(updates_in_order(self.grid, collectors, report))
     }
 
-    /// The same within a limit of memory: so many rays at a time as there is room for. A part is given in when all rays
-    /// before it are.
-    pub(crate) fn every_ray_in_parts(
+    /// The same under a memory limit: as many rays at a time as fit. A part is added after the parts of all earlier
+    /// rays.
+    pub(crate) fn per_ray_in_parts(
         &self,
-        collectors: &mut Vec<EveryRayCollector>,
+        collectors: &mut Vec<PerRayCollector>,
         limit: &TraceLimit,
         parts: &ScanParts<'_>,
     ) -> Result<ScanReport> {
@@ -165,10 +167,10 @@ impl<'a> Fan<'a> {
             let reports = self.collect_each(collectors, some.clone(), threads, |collector, range| {
                 collector.clear(self.window, Some((&each, self.grid)));
                 let mut report = ScanReport::default();
-                self.take_rays(collector, range, EveryRayCollector::is_full_for, &mut report)?;
+                self.take_rays(collector, range, PerRayCollector::is_full_for, &mut report)?;
                 Ok(report)
             })?;
-            // What comes after a collector that was full is taken again.
+            // Rays behind a collector that was full are taken again.
             let mut used = 0;
             for (part, of_part) in reports.into_iter().enumerate() {
                 let wanted = part_of(&some, part, threads);
@@ -179,7 +181,7 @@ impl<'a> Fan<'a> {
                     break;
                 }
             }
-            put_in_order(self.grid, &mut collectors[..used], parts);
+            drain_in_order(self.grid, &mut collectors[..used], parts);
             at_a_time = match next < some.end {
                 true => ((next - some.start) / threads).max(1),
                 false => at_a_time.saturating_mul(2),
@@ -191,9 +193,9 @@ impl<'a> Fan<'a> {
     /// Takes the rays to the points of a range until the collector is full.
     fn take_rays(
         &self,
-        collector: &mut EveryRayCollector,
+        collector: &mut PerRayCollector,
         range: Range<usize>,
-        is_full_for: impl Fn(&mut EveryRayCollector, &SlabRay<'_>) -> bool,
+        is_full_for: impl Fn(&mut PerRayCollector, &SlabRay<'_>) -> bool,
         report: &mut ScanReport,
     ) -> Result<()> {
         self.points.for_each_chunk(range, &mut |points, intensities| {
@@ -215,27 +217,27 @@ impl<'a> Fan<'a> {
         })
     }
 
-    /// Every ray counts, with every update for itself.
-    pub(crate) fn every_ray_in_order(&self) -> Result<ScanUpdates> {
+    /// Insertion per ray, as a list of all updates.
+    pub(crate) fn per_ray_in_order(&self) -> Result<ScanUpdates> {
         let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
         let report = self.in_order(&mut collector, |_| ())?;
         Ok(collector.into_updates(report))
     }
 
-    /// The same within a limit of memory.
-    pub(crate) fn every_ray_in_order_in_parts(
+    /// The same under a memory limit.
+    pub(crate) fn per_ray_in_order_in_parts(
         &self,
         limit: &TraceLimit,
         parts: &ScanParts<'_>,
     ) -> Result<ScanReport> {
         let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
-        let most_bytes = limit.of_collector(1).small_bytes;
+        let max_bytes = limit.of_collector(1).small_bytes;
         let report = self.in_order(&mut collector, |collector| {
-            if collector.bytes() > most_bytes {
-                collector.put_in(parts);
+            if collector.bytes() > max_bytes {
+                collector.drain_to(parts);
             }
         })?;
-        collector.put_in(parts);
+        collector.drain_to(parts);
         Ok(report)
     }
 
@@ -263,16 +265,16 @@ impl<'a> Fan<'a> {
         Ok(report)
     }
 
-    /// In how many parts the points are taken, each with a collector of its own.
+    /// Into how many parts the points are divided, each with its own collector.
     fn threads(&self) -> usize {
-        rayon::current_num_threads().min(self.points.len() / LEAST_RAYS_A_THREAD).max(1)
+        rayon::current_num_threads().min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
     }
 
     fn goes_on(&self, parts: Option<&ScanParts<'_>>) -> bool {
         !self.stop.is_set() && !parts.is_some_and(ScanParts::has_failed)
     }
 
-    /// Gives each part of the points a collector, in order.
+    /// Collects each part of the points with its own collector, in order.
     fn collect<'c, C: Default + Send>(
         &self,
         collectors: &'c mut Vec<C>,
@@ -299,7 +301,7 @@ impl<'a> Fan<'a> {
         collectors.map(|(part, collector)| collect(collector, part_of(&points, part, parts))).collect()
     }
 
-    /// Bounds of the points, cut at the max range, in units of voxels; whatever is not finite is left out.
+    /// Bounds of the points, cut at the max range, in units of voxels, without the points that are not finite.
     fn bounds(&self) -> Result<(Point, Point)> {
         let (mut low, mut high) = (self.origin_m, self.origin_m);
         self.points.for_each_chunk(0..self.points.len(), &mut |points, _| {
@@ -320,7 +322,7 @@ impl<'a> Fan<'a> {
         Ok((self.grid.to_voxel_units(low), self.grid.to_voxel_units(high)))
     }
 
-    /// Where the ray to a point ends; `None` if it does not count.
+    /// Where the ray to a point ends; `None` if the point is skipped.
     #[inline]
     fn ray(&self, point: Point, intensity: f32, report: &mut ScanReport) -> Option<RayEnd> {
         if self.stop.is_set() {
@@ -353,7 +355,7 @@ impl<'a> Fan<'a> {
     }
 }
 
-/// The points of one of so many parts of a range.
+/// The points of part `part` of `parts` equal parts of a range.
 fn part_of(points: &Range<usize>, part: usize, parts: usize) -> Range<usize> {
     let at = |part| points.start + points.len() * part / parts;
     at(part)..at(part + 1)

@@ -1,9 +1,9 @@
-use super::scan_rays::{Fan, OnceInParts};
+use super::scan_rays::{PerScanUpdates, ScanRays};
 use super::trace_limit::TraceLimit;
 use crate::config::{InsertMode, RayConfig};
 use crate::error::{Error, Result};
-use crate::scan::per_ray::EveryRayCollector;
-use crate::scan::per_scan::OnceCollector;
+use crate::scan::per_ray::PerRayCollector;
+use crate::scan::per_scan::PerScanCollector;
 use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::{Overflow, ScanParts};
 use crate::scan::stop::Stop;
@@ -11,28 +11,28 @@ use crate::scan::{Scan, ScanUpdates};
 use crate::sensor::SensorModel;
 use crate::space::{Grid, Point, VoxelIndex};
 
-/// Finds out what scans say about voxels; from scan to scan it keeps the memory that this takes.
+/// Computes the updates of scans. It keeps its memory from scan to scan.
 #[derive(Clone, Debug, Default)]
 pub struct ScanTracer {
-    /// One for every thread that takes part.
-    once: Vec<OnceCollector>,
-    /// One for every part of the rays.
-    every_ray: Vec<EveryRayCollector>,
+    /// One per thread.
+    per_scan: Vec<PerScanCollector>,
+    /// One per part of the rays.
+    per_ray: Vec<PerRayCollector>,
     limit: TraceLimit,
     stop: Stop,
 }
 
-/// The order in which the updates of a tile are wanted where every ray counts.
+/// The order of a tile's updates in insertion per ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum UpdateOrder {
-    /// Those of each voxel in order.
+    /// The updates of each voxel are in order.
     OfVoxels,
-    /// All in the order in which the rays make them, one by one.
+    /// All updates are in the order of the rays, one by one.
     OfRays,
 }
 
 impl ScanTracer {
-    /// Whether a scan can be traced at all; takes no time.
+    /// Checks that a scan can be traced, without tracing it.
     ///
     /// # Errors
     ///
@@ -42,7 +42,7 @@ impl ScanTracer {
         Self::check_points(grid, model, scan.origin, scan)
     }
 
-    /// The same for points wherever they lie, seen from `origin` in metres, world frame.
+    /// The same for any source of points, seen from `origin` in metres, world frame.
     ///
     /// # Errors
     ///
@@ -59,9 +59,9 @@ impl ScanTracer {
         origin_voxel(grid, origin).map(drop)
     }
 
-    /// What a scan says about voxels: its rays walked, and the updates grouped by tile.
+    /// Walks the rays of a scan; returns the updates, grouped by tile.
     ///
-    /// Points that cannot count are skipped and reported.
+    /// Points that are not usable are skipped and reported.
     ///
     /// # Errors
     ///
@@ -77,8 +77,8 @@ impl ScanTracer {
         self.trace_points(grid, model, rays, scan.origin, scan, UpdateOrder::OfVoxels, None)
     }
 
-    /// The same, but where every ray counts the updates of a tile come one by one, in the order in which the rays
-    /// make them: for whom the order of different voxels matters too.
+    /// The same, but in insertion per ray a tile's updates are in the order of the rays, one by one: for octrees whose
+    /// cache depends on the order of different voxels.
     ///
     /// # Errors
     ///
@@ -94,12 +94,12 @@ impl ScanTracer {
         self.trace_points(grid, model, rays, scan.origin, scan, UpdateOrder::OfRays, None)
     }
 
-    /// The same for points wherever they lie, and with `overflow` for a map that is short of memory: what there is no room
-    /// for is put aside, and the rest is returned. The report is about all.
+    /// The same for any source of points. With `overflow`, updates that exceed the memory limit are put aside and the
+    /// rest is returned. The report covers both.
     ///
     /// # Errors
     ///
-    /// As for [`ScanTracer::trace`], points that cannot be had, and those of putting aside.
+    /// As for [`ScanTracer::trace`], points that cannot be read, and those of putting aside.
     #[expect(
         clippy::too_many_arguments,
         reason = "what a map is, what a scan is, and where there is no room, where to"
@@ -117,54 +117,53 @@ impl ScanTracer {
         if model.needs_intensity() && !points.has_intensities() {
             return Err(no_intensities());
         }
-        let fan = Fan::new(grid, model, rays, origin, points, &self.stop)?;
-        let counts_once = rays.insert_mode == InsertMode::PerScan;
-        let in_order = !counts_once && order == UpdateOrder::OfRays;
+        let scan_rays = ScanRays::new(grid, model, rays, origin, points, &self.stop)?;
+        let is_per_scan = rays.insert_mode == InsertMode::PerScan;
+        let in_order = !is_per_scan && order == UpdateOrder::OfRays;
         let Some(mut overflow) = overflow else {
-            return match (counts_once, in_order) {
-                (true, _) => fan.once_a_voxel(&mut self.once),
-                (_, true) => fan.every_ray_in_order(),
-                _ => fan.every_ray(&mut self.every_ray),
+            return match (is_per_scan, in_order) {
+                (true, _) => scan_rays.per_scan(&mut self.per_scan),
+                (_, true) => scan_rays.per_ray_in_order(),
+                _ => scan_rays.per_ray(&mut self.per_ray),
             };
         };
         let parts = ScanParts::new(grid, overflow.most_bytes / 4, overflow.most_tiles, overflow.make_scratch);
-        let report = match (counts_once, in_order) {
-            (true, _) => match fan.once_a_voxel_in_parts(&mut self.once, &self.limit, &parts)? {
-                OnceInParts::Whole(updates) => return Ok(updates),
-                OnceInParts::InParts(report) => report,
+        let report = match (is_per_scan, in_order) {
+            (true, _) => match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
+                PerScanUpdates::Whole(updates) => return Ok(updates),
+                PerScanUpdates::InParts(report) => report,
             },
-            (_, true) => fan.every_ray_in_order_in_parts(&self.limit, &parts)?,
-            _ => fan.every_ray_in_parts(&mut self.every_ray, &self.limit, &parts)?,
+            (_, true) => scan_rays.per_ray_in_order_in_parts(&self.limit, &parts)?,
+            _ => scan_rays.per_ray_in_parts(&mut self.per_ray, &self.limit, &parts)?,
         };
-        parts.into_updates(report, counts_once, &self.stop, &mut overflow)
+        parts.into_updates(report, is_per_scan, &self.stop, &mut overflow)
     }
 
-    /// A tracer that keeps to so many bytes where it can put aside what there is no room for.
+    /// A tracer that takes at most `bytes` of memory when it is given an [`Overflow`].
     pub(crate) fn with_memory_bytes(bytes: usize) -> Self {
         Self { limit: TraceLimit::new(bytes), ..Self::default() }
     }
 
-    /// From when this is set on, rays of a scan are left out, so that the trace comes to its end: its updates are then
-    /// good for nothing.
+    /// Sets the stop request. Once it is set, the remaining rays are left out and the updates are incomplete.
     pub(crate) fn stop_with(&mut self, stop: Stop) {
         self.stop = stop;
     }
 
-    /// Whether the last trace was to be given up.
+    /// The stop request.
     pub(crate) fn stop(&self) -> &Stop {
         &self.stop
     }
 
     /// Bytes of memory that are kept.
     pub fn bytes(&self) -> usize {
-        let once = self.once.iter().map(|collector| size_of::<OnceCollector>() + collector.bytes());
-        let every_ray =
-            self.every_ray.iter().map(|collector| size_of::<EveryRayCollector>() + collector.bytes());
-        once.sum::<usize>() + every_ray.sum::<usize>()
+        let per_scan =
+            self.per_scan.iter().map(|collector| size_of::<PerScanCollector>() + collector.bytes());
+        let per_ray = self.per_ray.iter().map(|collector| size_of::<PerRayCollector>() + collector.bytes());
+        per_scan.sum::<usize>() + per_ray.sum::<usize>()
     }
 }
 
-/// Intensities, if any, must be as many as the points; a model that needs them must have them.
+/// Checks that there is one intensity per point, or none if the model needs none.
 pub(crate) fn check_intensities(
     model: &SensorModel,
     points: usize,
@@ -185,7 +184,7 @@ fn no_intensities() -> Error {
     Error::argument("intensities", reason)
 }
 
-/// The voxel that a scan is taken from.
+/// The voxel of the sensor.
 pub(crate) fn origin_voxel(grid: &Grid, origin: Point) -> Result<VoxelIndex> {
     grid.voxel_of(origin).ok_or_else(|| {
         let reason = format!("{origin:?} m is not finite or too far away for a voxel index");

@@ -2,10 +2,9 @@ use super::tile_updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdat
 use crate::space::{BrickCode, BrickMask};
 use std::io::{self, BufRead};
 
-/// Updates of one tile from any number of scans, in order and packed: a fourth to a tenth of the memory that they take
-/// ready for use.
+/// Updates of one tile from any number of scans, in order and packed: a fourth to a tenth of the unpacked size.
 ///
-/// Numbers are kept in seven bits a byte, and of masks only the bytes that are not 0.
+/// Numbers take seven bits per byte; of masks only the bytes that are not 0 are stored.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedUpdates {
     bytes: Vec<u8>,
@@ -17,7 +16,7 @@ const RUNS: u8 = 1;
 const ORDERED: u8 = 2;
 
 impl PackedUpdates {
-    /// Appends what one scan says.
+    /// Appends the updates of one scan.
     pub fn push(&mut self, updates: &TileUpdates) {
         self.updates += updates.len();
         if let TileUpdates::Packed(packed) = updates {
@@ -59,35 +58,35 @@ impl PackedUpdates {
         }
     }
 
-    /// What one scan says.
+    /// The packed updates of one scan.
     pub(crate) fn of(updates: &TileUpdates) -> Self {
         let mut packed = Self::default();
         packed.push(updates);
         packed
     }
 
-    /// What [`PackedUpdates::as_bytes`] of that many updates gave, and nothing else.
+    /// The inverse of [`PackedUpdates::as_bytes`]; `updates` is their number. Takes no other bytes.
     pub(crate) fn from_parts(bytes: Vec<u8>, updates: usize) -> Self {
         Self { bytes, updates }
     }
 
-    /// Appends what others say after these.
+    /// Appends later updates.
     pub(crate) fn append(&mut self, others: &Self) {
         self.bytes.extend_from_slice(&others.bytes);
         self.updates += others.updates;
     }
 
-    /// Gives back memory that is not needed.
+    /// Releases unused memory.
     pub(crate) fn shrink(&mut self) {
         self.bytes.shrink_to_fit();
     }
 
-    /// The updates as bytes, which stay the same when more are appended.
+    /// The updates as bytes. Appending leaves earlier bytes unchanged.
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// What each of the scans says, in order.
+    /// The updates of each scan, in order.
     pub fn iter(&self) -> impl Iterator<Item = TileUpdates> {
         let mut input = Unpacker { input: &*self.bytes };
         std::iter::from_fn(move || {
@@ -96,7 +95,7 @@ impl PackedUpdates {
         })
     }
 
-    /// Hands over what each of the scans says, in order, from bytes that [`PackedUpdates::as_bytes`] gave.
+    /// Passes the updates of each scan to `take`, in order, from the bytes of [`PackedUpdates::as_bytes`].
     ///
     /// # Errors
     ///
@@ -134,7 +133,7 @@ impl Packer<'_> {
         self.bytes.push(byte);
     }
 
-    /// Seven bits a byte, the lowest first; the eighth says that there are more.
+    /// Seven bits per byte, the lowest first; the eighth bit is set if more bytes follow.
     fn number(&mut self, mut number: u64) {
         while number >= 0x80 {
             self.byte(number as u8 | 0x80);
@@ -147,13 +146,13 @@ impl Packer<'_> {
         self.bytes.extend(number.to_le_bytes());
     }
 
-    /// A brick's code, as the difference to the last one: bricks come in order.
+    /// A brick's code, as the difference from the previous one: bricks are in order.
     fn brick(&mut self, BrickCode(code): BrickCode, last: &mut u64) {
         self.number(code.wrapping_sub(*last));
         *last = code;
     }
 
-    /// Which words are not 0, and of each of them which bytes are not 0, and these.
+    /// Which words are not 0; for each of these, which bytes are not 0, and these bytes.
     fn mask(&mut self, mask: &BrickMask) {
         self.byte(set_of(mask.map(|word| word != 0)));
         for word in mask.iter().filter(|word| **word != 0) {
@@ -177,16 +176,16 @@ fn set_of(are_in: [bool; 8]) -> u8 {
     (0..8).fold(0, |set, k| set | u8::from(are_in[k]) << k)
 }
 
-/// Reads what [`Packer`] wrote, and nothing else.
+/// Reads what [`Packer`] wrote.
 struct Unpacker<R> {
     input: R,
 }
 
-/// Most room that is made at once for what a number announces.
-const MOST_RESERVED: usize = 1 << 12;
+/// Most items that are reserved at once for a count in the input.
+const MAX_RESERVED: usize = 1 << 12;
 
 impl<R: BufRead> Unpacker<R> {
-    /// What one scan says; `None` at the end.
+    /// The updates of one scan; `None` at the end.
     fn next(&mut self) -> io::Result<Option<TileUpdates>> {
         if self.input.fill_buf()?.is_empty() {
             return Ok(None);
@@ -247,10 +246,10 @@ impl<R: BufRead> Unpacker<R> {
         Ok(u64::from_le_bytes(bytes))
     }
 
-    /// As many things as a number before them says. The list grows with what comes.
+    /// A list behind its length. It grows as items are read, so a wrong length reserves no memory.
     fn many<T>(&mut self, mut one: impl FnMut(&mut Self) -> io::Result<T>) -> io::Result<Vec<T>> {
         let count = self.number()? as usize;
-        let mut all = Vec::with_capacity(count.min(MOST_RESERVED));
+        let mut all = Vec::with_capacity(count.min(MAX_RESERVED));
         for _ in 0..count {
             all.push(one(self)?);
         }

@@ -3,8 +3,8 @@ use crate::scan::ScanReport;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, mask_of_box};
 use rustc_hash::FxHashMap;
 
-/// For each tile the numbers of the bricks that reach into it, in Morton order. `indices` are the bricks': their
-/// voxels' indices over 8.
+/// For each tile the numbers of the bricks that overlap it, in Morton order. `indices` are the bricks': their voxels'
+/// indices divided by 8.
 pub(crate) fn bricks_by_tile(grid: &Grid, indices: &[VoxelIndex]) -> Vec<(TileIndex, Vec<u32>)> {
     let mut tiles: FxHashMap<TileIndex, Vec<(BrickCode, u32)>> = FxHashMap::default();
     for (number, &index) in indices.iter().enumerate() {
@@ -20,7 +20,7 @@ pub(crate) fn bricks_by_tile(grid: &Grid, indices: &[VoxelIndex]) -> Vec<(TileIn
     tiles.into_iter().map(in_order).collect()
 }
 
-/// Code of a brick with this index.
+/// Code of the brick with this index.
 pub(crate) fn brick_code(index: VoxelIndex) -> BrickCode {
     BrickCode::of_voxel(index.map(|k| k * BRICK_EDGE))
 }
@@ -32,7 +32,7 @@ pub(crate) fn part_in_tile(grid: &Grid, tile: TileIndex, brick: VoxelIndex) -> B
     mask_of_box(local(voxels.min), local(voxels.end))
 }
 
-/// The tiles that a brick reaches into.
+/// The tiles that a brick overlaps.
 fn tiles_of_brick(grid: &Grid, brick: VoxelIndex) -> impl Iterator<Item = TileIndex> {
     let min = brick.map(|k| k * BRICK_EDGE);
     let first = grid.tile_of_voxel(min).to_array();
@@ -42,7 +42,7 @@ fn tiles_of_brick(grid: &Grid, brick: VoxelIndex) -> impl Iterator<Item = TileIn
     })
 }
 
-/// In Morton order of the tiles' lowest voxels; far apart, where the codes repeat, by index.
+/// Sorts tiles in Morton order of their lowest voxels; far apart, where the codes repeat, by index.
 pub(crate) fn in_order_of_tiles(
     grid: &Grid,
     mut tiles: Vec<(TileIndex, TileUpdates)>,

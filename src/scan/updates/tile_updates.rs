@@ -2,12 +2,12 @@ use crate::scan::{PackedUpdates, ScanReport};
 use crate::sensor::Observation;
 use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, places};
 
-/// Everything one accepted call says about voxels, grouped by tile in Morton order of the tiles.
+/// All updates of one accepted call, grouped by tile in Morton order of the tiles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScanUpdates {
     /// The updates of each tile.
     pub tiles: Vec<(TileIndex, TileUpdates)>,
-    /// What became of the points.
+    /// What happened to the points.
     pub report: ScanReport,
 }
 
@@ -18,14 +18,14 @@ impl ScanUpdates {
     }
 }
 
-/// What one call says about the voxels of one tile, in a form that can be kept and applied later.
+/// The updates of one call for one tile, in a form that can be stored and applied later.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TileUpdates {
-    /// At most one update a voxel: masks a brick, in Morton order.
+    /// At most one update per voxel: masks per brick, in Morton order.
     Once(Vec<BrickUpdate>),
-    /// Any number of updates a voxel, those of a voxel in order: runs a brick, in Morton order.
+    /// Any number of updates per voxel, those of a voxel in order: runs per brick, in Morton order.
     Runs(Vec<BrickRuns>),
-    /// Any number of updates a voxel, all in order.
+    /// Any number of updates per voxel, all in order.
     Ordered(OrderedUpdates),
     /// Any of these, packed.
     Packed(PackedUpdates),
@@ -44,7 +44,7 @@ pub struct BrickUpdate {
     pub intensities: Box<[f32]>,
 }
 
-/// Updates of voxels of one brick, any number a voxel.
+/// Updates of voxels of one brick, any number per voxel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrickRuns {
     /// Which brick.
@@ -58,9 +58,9 @@ pub struct BrickRuns {
 pub struct Run {
     /// The voxel's place in its brick's Morton order.
     pub place: u16,
-    /// How many misses come first.
+    /// Number of misses before the hit.
     pub misses: u16,
-    /// The hit after them, if any: its intensity, which matters to some sensor models.
+    /// The hit after them, if any: its intensity, which some sensor models use.
     pub hit: Option<f32>,
 }
 
@@ -103,7 +103,7 @@ impl OrderedUpdates {
         }
     }
 
-    /// The packed voxels and the intensities, as [`OrderedUpdates::from_parts`] takes them.
+    /// The packed voxels and the intensities, as for [`OrderedUpdates::from_parts`].
     pub(crate) fn parts(&self) -> (&[u32], &[f32]) {
         (&self.voxels, &self.intensities)
     }
