@@ -4,41 +4,41 @@ use std::ops::AddAssign;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The work that was done for the pointer trees of a mapper since it was opened, tiles that have left memory
-/// included. All zero where octrees are views of the bricks.
+/// Work on the pointer trees of a mapper since it was opened, including tiles no longer in memory. All zero if octrees
+/// are views of the bricks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct OctreeStatistics {
-    /// What the voxel caches have seen.
+    /// Counts of the voxel caches.
     pub voxel_cache: VoxelCacheCounts,
     /// Updates of voxels written to the trees.
     pub voxels_written: u64,
-    /// What went through the queue to the thread that writes the trees.
+    /// Counts of the queue to the thread that writes the trees.
     pub queue: OctreeQueueCounts,
     /// Time spent in each stage.
     pub times: OctreeTimes,
 }
 
-/// What went through the queue between mapping and the thread that writes the trees. A batch is what leaves one
-/// tile's voxel cache after one scan.
+/// Counts of the queue between mapping and the thread that writes the trees. A batch is what one tile's voxel cache
+/// evicts after one scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct OctreeQueueCounts {
-    /// Batches put in.
+    /// Batches enqueued.
     pub batches_in: u64,
-    /// Voxels put in.
+    /// Voxels enqueued.
     pub voxels_in: u64,
-    /// Batches taken out. What was meanwhile written by a sync, or left memory with its tile, comes out too.
+    /// Batches dequeued, including those that a sync wrote meanwhile or that left memory with their tile.
     pub batches_out: u64,
-    /// Voxels taken out, likewise.
+    /// Voxels dequeued, likewise.
     pub voxels_out: u64,
     /// Most batches in the queue at once, the one being written included.
     pub peak_batches: u64,
     /// Most voxels in the queue at once, likewise.
     pub peak_voxels: u64,
-    /// Voxels from which on the queue takes no more until there is room; a single batch may be larger.
+    /// Voxels from which on the queue is full; a single batch may be larger.
     pub limit_voxels: u64,
-    /// Batches that had to wait for room.
+    /// Batches that waited for room in the queue.
     pub waits: u64,
 }
 
@@ -48,19 +48,19 @@ pub struct OctreeQueueCounts {
 pub struct OctreeTimes {
     /// Updating tables.
     pub table_update_ns: u64,
-    /// Putting updates into voxel caches.
+    /// Inserting updates into voxel caches.
     pub cache_insertion_ns: u64,
-    /// Taking out of voxel caches what is to leave them, in Morton order.
+    /// Evicting from voxel caches, in Morton order.
     pub eviction_ns: u64,
-    /// Handing batches to the queue, the wait for room included.
+    /// Enqueueing batches, including the wait for room.
     pub enqueue_ns: u64,
     /// Waiting for room in the queue.
     pub enqueue_wait_ns: u64,
     /// Writing the trees, in whichever thread.
     pub octree_update_ns: u64,
-    /// Writing the trees in the thread that is there for it.
+    /// Writing the trees in the worker thread.
     pub worker_update_ns: u64,
-    /// Waiting of that thread for work; a wait counts when it is over.
+    /// Idle time of the worker thread; a wait counts when it is over.
     pub worker_wait_ns: u64,
 }
 
@@ -77,12 +77,12 @@ impl AddAssign for OctreeTimes {
     }
 }
 
-/// Statistics to which several threads add, a few times a tile and scan.
+/// Statistics to which several threads add, a few times per tile and scan.
 #[derive(Debug, Default)]
 pub(crate) struct OctreeLedger(Mutex<OctreeStatistics>);
 
 impl OctreeLedger {
-    /// What was added so far.
+    /// The sum so far.
     pub(crate) fn sum(&self) -> OctreeStatistics {
         *self.lock()
     }
@@ -122,7 +122,7 @@ impl Stopwatch {
     }
 }
 
-/// A duration as statistics keep it; 64 bits are 584 years.
+/// A duration in nanoseconds; 64 bits are 584 years.
 pub(crate) fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

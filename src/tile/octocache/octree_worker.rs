@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread::{Builder, JoinHandle};
 
-/// The thread that writes the pointer trees of a mapper. It sleeps while there is nothing to write, and ends with this
-/// value, after what is left in the queue.
+/// The thread that writes the pointer trees of a mapper. It sleeps while there is nothing to write. Dropping this value
+/// ends it, once the queue is empty.
 #[derive(Debug)]
 pub(crate) struct OctreeWorker {
     queue: Arc<WorkQueue>,
@@ -14,11 +14,11 @@ pub(crate) struct OctreeWorker {
 }
 
 impl OctreeWorker {
-    /// Starts the thread, behind a queue with room for so many voxels.
+    /// Starts the thread, with a queue of so many voxels.
     ///
     /// # Errors
     ///
-    /// The system gives no thread.
+    /// The system cannot start a thread.
     pub(crate) fn start(limit_voxels: u64, ledger: Arc<OctreeLedger>) -> io::Result<Self> {
         let queue = Arc::new(WorkQueue::new(limit_voxels));
         let thread = Builder::new().name("voxtile-octrees".to_owned()).spawn({
@@ -46,7 +46,7 @@ impl Drop for OctreeWorker {
 fn work(queue: &WorkQueue, ledger: &OctreeLedger) {
     let do_job = |job: Job, worker_wait_ns| {
         ledger.add_times(OctreeTimes { worker_wait_ns, ..OctreeTimes::default() });
-        // A tree that is not written to its end counts as broken and is derived anew (`SharedTree`).
+        // A half-written tree counts as broken and is derived anew (`SharedTree`).
         if catch_unwind(AssertUnwindSafe(job)).is_err() {
             log::error!("an octree could not be updated; it is derived from its table at the next sync");
         }

@@ -12,8 +12,8 @@ use crate::tile::table::Table;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// OctoMap's pointer tree of a tile, behind a voxel cache or not. What is asked of it is answered as if every update
-/// had gone straight into the tree.
+/// OctoMap's pointer tree of a tile, behind a voxel cache or not. Queries are answered as if every update had gone
+/// straight into the tree.
 #[derive(Debug)]
 pub(crate) struct PointerOctree {
     cache: Option<VoxelCache>,
@@ -21,10 +21,10 @@ pub(crate) struct PointerOctree {
     writer: TreeWriter,
 }
 
-/// Who writes the trees of a map, and where that is counted.
+/// The writer of a map's trees, and its counts.
 #[derive(Clone, Debug)]
 pub(crate) struct TreeWriter {
-    /// To the thread that writes trees; `None` where mapping does that itself.
+    /// To the thread that writes trees; `None` if the mapping threads do.
     pub(crate) queue: Option<Arc<WorkQueue>>,
     pub(crate) ledger: Arc<OctreeLedger>,
 }
@@ -35,7 +35,7 @@ impl PointerOctree {
         Self { cache, tree: Arc::new(SharedTree::new(tree_of(table))), writer }
     }
 
-    /// Applies updates to the table, and tells cache or tree of every single one, in order; `first` is the tile's
+    /// Applies updates to the table and passes each of them to the cache or the tree, in order; `first` is the tile's
     /// lowest voxel.
     pub(crate) fn apply(
         &mut self,
@@ -58,18 +58,18 @@ impl PointerOctree {
         }
     }
 
-    /// Lets the tree take what has left the cache, here or in its thread.
+    /// Writes evicted voxels to the tree, here or in its thread.
     fn write(&self, evicted: Batch) {
         let mut watch = Stopwatch::start();
         let voxels = evicted.len();
-        // From here on questions find it, and nothing that happens to the job can lose it.
+        // From here on queries find the batch, whatever happens to the job.
         self.tree.send(evicted);
         let Some(queue) = &self.writer.queue else {
             write_in_flight(&self.tree, &self.writer.ledger, false);
             return;
         };
         let job = {
-            // A tile that leaves memory takes with it what nobody needs any longer.
+            // Weak: an evicted tile takes its batches along.
             let (tree, ledger) = (Arc::downgrade(&self.tree), self.writer.ledger.clone());
             move || {
                 if let Some(tree) = tree.upgrade() {
@@ -86,7 +86,7 @@ impl PointerOctree {
                     ..OctreeTimes::default()
                 });
             }
-            // The thread has ended, as it does with its mapper, and this tile lives on.
+            // The thread has ended with its mapper, but this tile lives on.
             Err(_) => {
                 write_in_flight(&self.tree, &self.writer.ledger, false);
             }
@@ -97,21 +97,21 @@ impl PointerOctree {
     /// unknown.
     pub(crate) fn max_under(&self, table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
         let (first, span) = (code.ancestor(depth), MortonCode::span(depth));
-        let max = self.tree.try_ask(|tree, in_flight| {
+        let max = self.tree.try_read(|tree, in_flight| {
             let cached = self.cache.as_ref().map(|cache| cache.under(first, span)).unwrap_or_default();
             tree.max_with_overrides(first, depth, &newest_under(first, span, in_flight, cached))
         });
-        // A question does not wait for a tree that is being written: the table knows the answer too.
+        // A query does not wait for a tree that is being written: the table has the answer too.
         max.unwrap_or_else(|| max_in_table(table, code, depth))
     }
 
-    /// Whether the tree has taken all updates.
+    /// Whether the tree contains all updates.
     pub(crate) fn is_synced(&self) -> bool {
         self.cache.as_ref().is_none_or(VoxelCache::is_empty)
-            && self.tree.try_ask(|_, in_flight| in_flight.is_empty()).unwrap_or(false)
+            && self.tree.try_read(|_, in_flight| in_flight.is_empty()).unwrap_or(false)
     }
 
-    /// Lets the tree take all that is in the cache and in flight, without waiting for the turn of that in the queue.
+    /// Writes the cache and all batches in flight to the tree, without waiting for the queue.
     pub(crate) fn sync(&mut self, table: &Table) {
         if self.is_synced() {
             return;
@@ -130,21 +130,21 @@ impl PointerOctree {
 
     /// A copy of the tree, up to date.
     pub(crate) fn tree(&self, table: &Table) -> Octree {
-        let tree = self.is_synced().then(|| self.tree.ask(Octree::clone)).flatten();
+        let tree = self.is_synced().then(|| self.tree.read(Octree::clone)).flatten();
         tree.unwrap_or_else(|| tree_of(table))
     }
 
-    /// What the cache has seen, if there is one.
+    /// Counts of the cache, if there is one.
     pub(crate) fn cache_counts(&self) -> VoxelCacheCounts {
         self.cache.as_ref().map(VoxelCache::counts).unwrap_or_default()
     }
 
-    /// Nodes of the tree, without what waits in the cache or is in flight.
+    /// Nodes of the tree, without the cache and the batches in flight.
     pub(crate) fn node_count(&self) -> u64 {
         self.tree.node_count()
     }
 
-    /// Bytes of memory on the heap: of the tree; of the cache and what is in flight.
+    /// Bytes of memory on the heap: of the tree; of the cache and the batches in flight.
     pub(crate) fn bytes(&self) -> (usize, usize) {
         let cache = self.cache.as_ref().map_or(0, VoxelCache::bytes);
         (size_of::<SharedTree>() + self.tree.bytes(), cache + self.tree.in_flight_bytes())
@@ -168,7 +168,7 @@ fn tree_of(table: &Table) -> Octree {
     Octree::from_sorted(table.iter().map(|(code, evidence)| (code, evidence.log_odds as f32)))
 }
 
-/// Returns whether the tree is whole, and so up to date now.
+/// Writes all batches in flight. Returns whether the tree is intact, and so up to date.
 fn write_in_flight(tree: &SharedTree, ledger: &OctreeLedger, is_worker: bool) -> bool {
     let mut watch = Stopwatch::start();
     let written = tree.write_all();
@@ -191,7 +191,7 @@ fn newest_under(first: MortonCode, span: u64, in_flight: &VecDeque<Batch>, cache
         let position = |code: MortonCode| batch.partition_point(|&(other, _)| other < code);
         newest.extend_from_slice(&batch[position(first)..position(end)]);
     }
-    // Stable: of the same voxel the newest comes first, and stays.
+    // Stable: for the same voxel the newest value comes first, and stays.
     newest.sort_by_key(|&(code, _)| code);
     newest.dedup_by_key(|&mut (code, _)| code);
     newest

@@ -7,18 +7,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockW
 /// Voxels and their new log-odds, in strictly ascending Morton order.
 pub(crate) type Batch = Vec<(MortonCode, f32)>;
 
-/// A pointer tree that one thread may write while others ask it, and the batches that are on their way into it.
+/// A pointer tree that one thread writes while others read it, and the batches in flight to it.
 ///
-/// Batches stay with the tree, whoever writes them: what is in flight can be asked, can be written by whoever needs the
-/// tree to be up to date, and goes when the tree goes.
+/// Batches belong to the tree, whoever writes them: queries read them, a sync writes them, and they are dropped with
+/// the tree.
 #[derive(Debug)]
 pub(crate) struct SharedTree {
-    /// `None` while it is being written, and after a panic in that: then it must be derived from the table.
+    /// `None` while it is being written, and after a panic in a write: then it must be derived from the table.
     tree: RwLock<Option<Octree>>,
-    /// The oldest first. Whoever takes one out of them for a whole tree holds the lock of the tree for writing, so that
-    /// whoever holds it for reading finds every update in one of the two. Locked after the tree, never before.
+    /// The oldest first. Removing a batch from an intact tree needs the tree's write lock, so a holder of the read lock
+    /// finds every update in one of the two. Lock order: the tree, then this.
     in_flight: Mutex<VecDeque<Batch>>,
-    /// Nodes and bytes of the tree as of its last change, so that counting waits for nobody.
+    /// Nodes and bytes of the tree as of its last change, readable without a lock.
     nodes: AtomicU64,
     bytes: AtomicUsize,
 }
@@ -29,12 +29,12 @@ impl SharedTree {
         Self { tree: RwLock::new(Some(tree)), in_flight: Mutex::default(), nodes, bytes }
     }
 
-    /// Appends to what is in flight.
+    /// Appends a batch to those in flight.
     pub(crate) fn send(&self, batch: Batch) {
         self.in_flight().push_back(batch);
     }
 
-    /// Writes all that is in flight and returns its voxels; `None` if the tree is broken.
+    /// Writes all batches in flight and returns their voxels; `None` if the tree is broken.
     pub(crate) fn write_all(&self) -> Option<usize> {
         let written = self.change(|tree| {
             let mut voxels = 0;
@@ -45,13 +45,13 @@ impl SharedTree {
             voxels
         });
         if written.is_none() {
-            // The table has it, from which the tree will be derived.
+            // The table has these updates, and the tree will be derived from it.
             self.in_flight().clear();
         }
         written
     }
 
-    /// Changes the tree, if it is whole. After a panic in `change` it is not.
+    /// Changes the tree, if it is intact. A panic in `change` breaks it.
     pub(crate) fn change<T>(&self, change: impl FnOnce(&mut Octree) -> T) -> Option<T> {
         let mut place = self.write_lock();
         let mut tree = place.take()?;
@@ -60,30 +60,30 @@ impl SharedTree {
         Some(outcome)
     }
 
-    /// Puts a tree in place of the one that is there, which everything in flight is part of.
+    /// Replaces the tree by one that includes everything in flight.
     pub(crate) fn replace(&self, tree: Octree) {
         let mut place = self.write_lock();
         self.in_flight().clear();
         self.put(&mut place, tree);
     }
 
-    /// What `ask` says of the tree and of what is in flight, the oldest first. `None`, at once, if the tree is being
-    /// written or is broken.
-    pub(crate) fn try_ask<T>(&self, ask: impl FnOnce(&Octree, &VecDeque<Batch>) -> T) -> Option<T> {
+    /// Reads the tree and the batches in flight, the oldest first. Returns `None` at once if the tree is being written
+    /// or broken.
+    pub(crate) fn try_read<T>(&self, read: impl FnOnce(&Octree, &VecDeque<Batch>) -> T) -> Option<T> {
         let place = match self.tree.try_read() {
             Ok(place) => place,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return None,
         };
-        place.as_ref().map(|tree| ask(tree, &self.in_flight()))
+        place.as_ref().map(|tree| read(tree, &self.in_flight()))
     }
 
-    /// What `ask` says of the tree; `None` if it is broken. Waits while it is being written.
-    pub(crate) fn ask<T>(&self, ask: impl FnOnce(&Octree) -> T) -> Option<T> {
-        self.read_lock().as_ref().map(ask)
+    /// Reads the tree; `None` if it is broken. Waits while it is being written.
+    pub(crate) fn read<T>(&self, read: impl FnOnce(&Octree) -> T) -> Option<T> {
+        self.read_lock().as_ref().map(read)
     }
 
-    /// Nodes of the tree, without what is in flight.
+    /// Nodes of the tree, without batches in flight.
     pub(crate) fn node_count(&self) -> u64 {
         self.nodes.load(Ordering::Relaxed)
     }
@@ -93,7 +93,7 @@ impl SharedTree {
         self.bytes.load(Ordering::Relaxed)
     }
 
-    /// Bytes of memory of what is in flight.
+    /// Bytes of memory of the batches in flight.
     pub(crate) fn in_flight_bytes(&self) -> usize {
         let in_flight = self.in_flight();
         let voxels: usize = in_flight.iter().map(Batch::capacity).sum();
@@ -110,7 +110,7 @@ impl SharedTree {
         self.in_flight().pop_front()
     }
 
-    // Poison says nothing here: a tree that a panic has left half written is not in its place.
+    // Poison is ignored: a panic leaves no half-written tree in this place.
     fn read_lock(&self) -> RwLockReadGuard<'_, Option<Octree>> {
         self.tree.read().unwrap_or_else(PoisonError::into_inner)
     }
@@ -125,7 +125,7 @@ impl SharedTree {
 }
 
 impl Clone for SharedTree {
-    /// A tree of its own, with what was in flight to the other.
+    /// A copy of the tree, with the batches in flight to the original.
     fn clone(&self) -> Self {
         let place = self.read_lock();
         let in_flight = self.in_flight().clone();

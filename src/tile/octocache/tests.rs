@@ -1,4 +1,4 @@
-//! Pointer octrees whose trees are written by another thread, held where it would hurt most.
+//! Pointer octrees whose trees are written by another thread, stopped at the worst moments.
 
 use super::shared_tree::SharedTree;
 use crate::config::{MapConfig, OctreeConfig, VoxelCacheConfig, VoxelCacheMode};
@@ -24,7 +24,7 @@ fn empty_tile(octrees: &OctreeFactory) -> Tile {
     Tile::empty(&MapConfig::default().grid, octrees, TILE)
 }
 
-/// Keeps the worker from going on until the sender is used or dropped, and returns when it has begun to wait.
+/// Blocks the worker until the sender is used or dropped; returns once it is blocked.
 fn hold(octrees: &OctreeFactory) -> Sender<()> {
     let ((release, released), (begin, begun)): ((_, Receiver<()>), _) = (channel(), channel());
     let job = move || {
@@ -36,7 +36,7 @@ fn hold(octrees: &OctreeFactory) -> Sender<()> {
     release
 }
 
-/// Lets the worker do all that was put in so far.
+/// Waits until the worker has done all jobs so far.
 fn wait_for_worker(octrees: &OctreeFactory) {
     let is_done = |counts: OctreeQueueCounts| counts.batches_in == counts.batches_out;
     while !is_done(octrees.worker().queue().counts()) {
@@ -77,7 +77,7 @@ fn tree_of(tile: &Tile) -> Arc<SharedTree> {
 }
 
 fn batches_in_flight(tile: &Tile) -> usize {
-    tree_of(tile).try_ask(|_, in_flight| in_flight.len()).expect("a tree that nobody writes")
+    tree_of(tile).try_read(|_, in_flight| in_flight.len()).expect("a tree that nobody writes")
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn questions_do_not_wait_for_a_tree_that_is_being_written() {
     wait_for_worker(&octrees);
     let tree = tree_of(&tile);
     tree.change(|_| {
-        // The tree is locked, by this very thread: whoever waited for it would wait for ever.
+        // This thread holds the tree's lock, so waiting for it would deadlock.
         update(&mut tile, 100..300, false);
         assert_answers(&tile);
         assert!(!tile.is_octree_synced());
@@ -135,7 +135,7 @@ fn a_panic_while_a_tree_is_written_loses_nothing() {
     };
     assert!(octrees.worker().queue().push(0, Box::new(job)).is_ok());
     wait_for_worker(&octrees);
-    // The worker lives, and everything is answered.
+    // The worker lives, and all queries are answered.
     assert_answers(&tile);
     update(&mut tile, 100..300, false);
     wait_for_worker(&octrees);
@@ -146,7 +146,7 @@ fn a_panic_while_a_tree_is_written_loses_nothing() {
     tile.sync_octree();
     assert!(tile.is_octree_synced());
     assert_answers(&tile);
-    assert_eq!(tree_of(&tile).ask(|tree| tree.node_count()), Some(tile.octree().node_count()));
+    assert_eq!(tree_of(&tile).read(|tree| tree.node_count()), Some(tile.octree().node_count()));
 }
 
 #[test]
@@ -201,7 +201,7 @@ fn the_queue_never_holds_more_than_its_limit_and_who_puts_in_too_much_waits() {
                 })
             })
             .collect();
-        // All four come to wait, as they must: two batches fill the queue.
+        // All four must wait: two batches fill the queue.
         while octrees.worker().queue().counts().waits < 4 {
             thread::sleep(Duration::from_millis(1));
         }
@@ -264,7 +264,7 @@ fn an_end_while_the_queue_is_full_writes_what_is_there_and_leaves_no_thread() {
     });
     drop(octrees);
     opening.join().unwrap();
-    // Whoever waited for room when the queue was closed has written for itself.
+    // Threads that waited for room when the queue was closed write for themselves.
     let mut late = waiting.join().unwrap();
     for tile in [&mut tile, &mut late] {
         assert_eq!(batches_in_flight(tile), 0);

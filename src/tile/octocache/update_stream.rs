@@ -6,14 +6,14 @@ use crate::sensor::SensorModel;
 use crate::space::{MortonCode, VoxelIndex};
 use crate::tile::table::Table;
 
-/// The updates of one scan on their way from the table to the voxel cache, or to the tree where there is no cache:
-/// every single one, in order, each with the log-odds that it led to.
+/// Passes the updates of one scan from the table to the voxel cache, or to the tree if there is no cache: every single
+/// one, in order, each with its resulting log-odds.
 ///
-/// They go in portions, so that each stage can be measured without that taking time.
+/// They go in chunks, so that timing each stage costs little.
 pub(crate) struct UpdateStream<'a> {
     cache: Option<&'a mut VoxelCache>,
     tree: &'a SharedTree,
-    portion: Batch,
+    chunk: Batch,
     watch: Stopwatch,
     /// Time spent in each stage.
     pub(crate) times: OctreeTimes,
@@ -22,12 +22,12 @@ pub(crate) struct UpdateStream<'a> {
 }
 
 /// Updates at a time: 16 KiB.
-const PORTION: usize = 1024;
+const CHUNK: usize = 1024;
 
 impl<'a> UpdateStream<'a> {
     pub(crate) fn into(cache: Option<&'a mut VoxelCache>, tree: &'a SharedTree) -> Self {
-        let portion = Vec::with_capacity(PORTION);
-        Self { cache, tree, portion, watch: Stopwatch::start(), times: OctreeTimes::default(), written: 0 }
+        let chunk = Vec::with_capacity(CHUNK);
+        Self { cache, tree, chunk, watch: Stopwatch::start(), times: OctreeTimes::default(), written: 0 }
     }
 
     /// Applies updates to the table and passes them on; `first` is the tile's lowest voxel.
@@ -47,7 +47,7 @@ impl<'a> UpdateStream<'a> {
                     }
                 }
             }
-            // The order of rays is lost here, and with it what a voxel was in between: a run is one update.
+            // Runs do not keep the order of rays or intermediate log-odds, so a run is one update.
             TileUpdates::Runs(bricks) => {
                 for update in bricks {
                     table.update_runs(model, std::slice::from_ref(update));
@@ -72,8 +72,8 @@ impl<'a> UpdateStream<'a> {
     }
 
     fn push(&mut self, code: MortonCode, log_odds: f64) {
-        self.portion.push((code, log_odds as f32));
-        if self.portion.len() == PORTION {
+        self.chunk.push((code, log_odds as f32));
+        if self.chunk.len() == CHUNK {
             self.pass_on();
         }
     }
@@ -82,17 +82,17 @@ impl<'a> UpdateStream<'a> {
         self.times.table_update_ns += self.watch.lap_ns();
         match &mut self.cache {
             Some(cache) => {
-                self.portion.iter().for_each(|&(code, log_odds)| cache.put(code, log_odds));
+                self.chunk.iter().for_each(|&(code, log_odds)| cache.put(code, log_odds));
                 self.times.cache_insertion_ns += self.watch.lap_ns();
             }
             None => {
                 self.tree.change(|tree| {
-                    self.portion.iter().for_each(|&(code, log_odds)| tree.set(code, log_odds));
+                    self.chunk.iter().for_each(|&(code, log_odds)| tree.set(code, log_odds));
                 });
-                self.written += self.portion.len();
+                self.written += self.chunk.len();
                 self.times.octree_update_ns += self.watch.lap_ns();
             }
         }
-        self.portion.clear();
+        self.chunk.clear();
     }
 }

@@ -2,12 +2,12 @@ use crate::space::MortonCode;
 use serde::Serialize;
 use std::ops::{AddAssign, Sub};
 
-/// The cache of OctoCache (Chen et al., ASPLOS 2025, sections 4.1 to 4.3): it takes every update of a voxel and
-/// passes on to the octree only what leaves it.
+/// The cache of OctoCache (Chen et al., ASPLOS 2025, sections 4.1 to 4.3): it absorbs the updates of voxels, and only
+/// evicted voxels reach the octree.
 ///
-/// A voxel's bucket is its Morton code modulo the number of buckets. A cell holds the *accumulated* log-odds, so
-/// the cache answers for its voxels alone. During a scan buckets may grow; after it each keeps its `tau` latest
-/// cells, and the earliest leave in Morton order.
+/// A voxel's bucket is its Morton code modulo the number of buckets. A cell holds the *accumulated* log-odds, so the
+/// cache answers for its voxels alone. During a scan buckets may grow; after it each keeps its `tau` latest cells, and
+/// the earliest are evicted in Morton order.
 #[derive(Clone, Debug)]
 pub struct VoxelCache {
     tau: usize,
@@ -18,13 +18,13 @@ pub struct VoxelCache {
     cell_bytes: usize,
     /// Buckets with more than `tau` cells.
     overfull: Vec<u32>,
-    /// Number of the present scan, and the distinct voxels that it put in.
+    /// Number of the present scan, and the distinct voxels that it inserted.
     scan: u32,
     voxels_of_scan: usize,
     counts: VoxelCacheCounts,
 }
 
-/// What a voxel cache has seen.
+/// Counts of a voxel cache.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct VoxelCacheCounts {
@@ -32,9 +32,9 @@ pub struct VoxelCacheCounts {
     pub hits: u64,
     /// Updates of voxels that were not.
     pub misses: u64,
-    /// Voxels passed on to the octree because their buckets were full.
+    /// Voxels evicted to the octree because their buckets were full.
     pub evictions: u64,
-    /// Voxels passed on because the octree was brought up to date.
+    /// Voxels moved to the octree by a sync.
     pub drained: u64,
 }
 
@@ -49,16 +49,16 @@ impl VoxelCacheCounts {
 struct Cell {
     code: MortonCode,
     log_odds: f32,
-    /// The scan that put the voxel in or changed it last.
+    /// The scan that inserted or changed the voxel last.
     scan: u32,
 }
 
-/// Cells of a cache that fits itself, as a multiple of the voxels of a scan; the paper's section 5.2 takes 3 to 4.
+/// Cells of a self-sizing cache, as a multiple of the voxels of a scan; the paper's section 5.2 uses 3 to 4.
 const CELLS_PER_SCAN_VOXEL: usize = 3;
 
 impl VoxelCache {
-    /// A cache whose buckets keep `tau` voxels between scans; `buckets` must be a power of two, `None` fits their
-    /// number to the scans.
+    /// A cache whose buckets keep `tau` voxels between scans. `buckets` must be a power of two; `None` sizes it by the
+    /// scans.
     pub fn new(tau: usize, buckets: Option<usize>) -> Self {
         Self {
             tau,
@@ -73,7 +73,7 @@ impl VoxelCache {
         }
     }
 
-    /// What the cache has seen.
+    /// Counts of the cache.
     pub fn counts(&self) -> VoxelCacheCounts {
         self.counts
     }
@@ -95,7 +95,7 @@ impl VoxelCache {
             + self.overfull.capacity() * size_of::<u32>()
     }
 
-    /// Takes the accumulated log-odds of an updated voxel.
+    /// Inserts the accumulated log-odds of an updated voxel.
     pub fn put(&mut self, code: MortonCode, log_odds: f32) {
         let number = code.0 as usize & (self.buckets.len() - 1);
         let bucket = &mut self.buckets[number];
@@ -114,7 +114,7 @@ impl VoxelCache {
             self.cell_bytes += (bucket.capacity() - capacity) * size_of::<Cell>();
             self.len += 1;
         }
-        // While the scan runs, too: buckets that hold a whole first scan would be slow to search.
+        // Also during a scan: buckets that hold a whole first scan would be slow to search.
         if self.fits_itself && self.voxels_of_scan * CELLS_PER_SCAN_VOXEL > self.buckets.len() * self.tau {
             self.grow(self.buckets.len() * 2);
         }
@@ -140,7 +140,7 @@ impl VoxelCache {
         voxels
     }
 
-    /// Ends a scan: leaves at most `tau` voxels a bucket and returns the others in Morton order.
+    /// Ends a scan: keeps at most `tau` voxels per bucket and returns the others in Morton order.
     pub fn evict(&mut self) -> Vec<(MortonCode, f32)> {
         (self.scan, self.voxels_of_scan) = (self.scan.wrapping_add(1), 0);
         let mut evicted = Vec::new();
@@ -169,7 +169,7 @@ impl VoxelCache {
         evicted
     }
 
-    /// Spreads the cells over more buckets; within a bucket they keep the order in which they came.
+    /// Spreads the cells over more buckets; within a bucket they keep their order.
     fn grow(&mut self, buckets: usize) {
         let old = std::mem::replace(&mut self.buckets, empty_buckets(buckets));
         for cell in old.iter().flatten() {
@@ -184,7 +184,7 @@ impl VoxelCache {
 impl Sub for VoxelCacheCounts {
     type Output = Self;
 
-    /// What came after `before`.
+    /// The counts since `before`.
     fn sub(self, before: Self) -> Self {
         Self {
             hits: self.hits - before.hits,

@@ -4,21 +4,21 @@ use std::fmt;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// A bounded queue of work on voxels for one thread. Who puts in too much waits, and so does who finds nothing; both
-/// sleep meanwhile.
+/// A bounded queue of jobs on voxels for one thread. A sender sleeps while the queue is full, the thread while it is
+/// empty.
 pub(crate) struct WorkQueue {
     state: Mutex<State>,
     has_work: Condvar,
     has_room: Condvar,
 }
 
-/// A piece of work.
+/// A job.
 pub(crate) type Job = Box<dyn FnOnce() + Send>;
 
 #[derive(Default)]
 struct State {
     jobs: VecDeque<(Job, u64)>,
-    /// Voxels of the jobs, the one being done included.
+    /// Voxels of the jobs, including the one being done.
     voxels: u64,
     is_busy: bool,
     is_closed: bool,
@@ -26,7 +26,7 @@ struct State {
 }
 
 impl WorkQueue {
-    /// A queue that takes no more once it holds `limit_voxels`.
+    /// A queue that is full once it holds `limit_voxels`.
     pub(crate) fn new(limit_voxels: u64) -> Self {
         let counts = OctreeQueueCounts { limit_voxels, ..OctreeQueueCounts::default() };
         Self {
@@ -40,8 +40,8 @@ impl WorkQueue {
         self.lock().counts
     }
 
-    /// Puts in a job of so many voxels, when there is room for it or nothing else is there. Returns how long that
-    /// took to come, in nanoseconds; the job itself if the queue is closed.
+    /// Enqueues a job of so many voxels, once there is room for it or the queue is empty. Returns the wait in
+    /// nanoseconds, or the job if the queue is closed.
     pub(crate) fn push(&self, voxels: usize, job: Job) -> Result<u64, Job> {
         let voxels = voxels as u64;
         let mut state = self.lock();
@@ -68,8 +68,8 @@ impl WorkQueue {
         Ok(wait_ns)
     }
 
-    /// Waits for a job and does it, with how long the wait was, in nanoseconds. Returns whether there was one: a
-    /// closed queue has none any more once it is empty.
+    /// Waits for a job and does it; `do_job` is given the wait in nanoseconds. Returns `false` once the queue is closed
+    /// and empty.
     pub(crate) fn do_next(&self, do_job: impl FnOnce(Job, u64)) -> bool {
         let since = Instant::now();
         let is_idle = |state: &mut State| state.jobs.is_empty() && !state.is_closed;
@@ -84,12 +84,12 @@ impl WorkQueue {
         state.counts.batches_out += 1;
         state.counts.voxels_out += voxels;
         drop(state);
-        // All: there may be room for a small job where the one that has waited longest is large.
+        // All: there may be room for a small job while the one that has waited longest is large.
         self.has_room.notify_all();
         true
     }
 
-    /// Takes nothing in any more; what is there can still be done.
+    /// Closes the queue: nothing more is enqueued, and what is queued can still be done.
     pub(crate) fn close(&self) {
         self.lock().is_closed = true;
         self.has_work.notify_all();

@@ -3,13 +3,13 @@ use crate::tile::table::{Table, larger};
 
 /// OctoMap's octree as a view of a table's bricks.
 ///
-/// From depth 13 (a brick) downwards a node is a run of a brick's voxels. Above, the nodes are kept here, level by
-/// level; [`BrickOctree::sync`] brings them up to date, and until then questions go to the bricks.
+/// From depth 13 (a brick) downward a node is a run of a brick's voxels. The nodes above are stored here, level by
+/// level. [`BrickOctree::sync`] brings them up to date; until then queries read the bricks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BrickOctree {
     /// The nodes of depth 12, then those of depth 11 and so on to the root, each level in Morton order.
     nodes: Vec<Node>,
-    /// Where each level ends, that of depth 12 first.
+    /// Where each level ends, depth 12 first.
     ends: [u32; LEVELS],
     node_count: u64,
     is_synced: bool,
@@ -17,10 +17,10 @@ pub(crate) struct BrickOctree {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// The upper bits of its voxels' codes: three for each depth.
+    /// The upper bits of its voxels' codes: three per level.
     prefix: u64,
     max: f32,
-    /// Children that are leaves with the value of the first.
+    /// Number of children that are leaves with the value of the first.
     like_first: u8,
 }
 
@@ -36,7 +36,7 @@ impl BrickOctree {
         self.is_synced
     }
 
-    /// Notes that the table has changed.
+    /// Marks the octree as stale.
     pub(crate) fn note_change(&mut self) {
         self.is_synced = false;
     }
@@ -69,7 +69,7 @@ impl BrickOctree {
             for number in begin..self.nodes.len() {
                 let Node { prefix, max, like_first } = self.nodes[number];
                 let is_leaf = like_first == 8;
-                // A leaf's children are no nodes.
+                // A leaf's children do not count as nodes.
                 self.node_count += 1;
                 self.node_count -= if is_leaf { 8 } else { 0 };
                 if level + 1 < LEVELS {
@@ -80,7 +80,7 @@ impl BrickOctree {
         self.is_synced = true;
     }
 
-    /// Adds a child to its parent, the latest of the level that begins at `begin`, or else a new one.
+    /// Adds a child to its parent: the last node of the level that starts at `begin`, or a new one.
     fn add_child(&mut self, begin: usize, child: u64, max: f32, is_leaf: bool) {
         match self.nodes[begin..].last_mut() {
             Some(parent) if parent.prefix == child >> 3 => {

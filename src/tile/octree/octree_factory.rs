@@ -6,8 +6,7 @@ use crate::tile::octocache::{OctreeLedger, OctreeWorker, PointerOctree, TreeWrit
 use crate::tile::table::Table;
 use std::sync::Arc;
 
-/// Makes the octrees of the tiles of one map, and keeps what these have in common: the thread that writes them, where
-/// there is one, and the counts.
+/// Makes the octrees of a map's tiles, and owns what they share: the worker thread, if there is one, and the counts.
 ///
 /// The default makes views of the tables' bricks.
 #[derive(Debug, Default)]
@@ -17,14 +16,14 @@ pub struct OctreeFactory {
     worker: Option<OctreeWorker>,
 }
 
-/// Voxels that may be on their way to the worker: 4 MiB.
+/// Capacity of the worker's queue in voxels: 4 MiB.
 const QUEUE_VOXELS: u64 = 1 << 18;
 
 impl OctreeFactory {
     /// A factory of octrees of this form.
     ///
-    /// With [`VoxelCacheMode::Parallel`] it starts a thread, which ends with the factory. Where the system gives no
-    /// thread, octrees are written by the threads that map.
+    /// With [`VoxelCacheMode::Parallel`] it starts a thread, which ends with the factory. If the system cannot start a
+    /// thread, the mapping threads write the octrees.
     pub fn new(config: OctreeConfig) -> Self {
         Self::with_queue(config, QUEUE_VOXELS)
     }
@@ -41,7 +40,7 @@ impl OctreeFactory {
         Self { config, ledger, worker }
     }
 
-    /// The work done for all octrees made here, those that are gone included.
+    /// Work on all octrees made here, including those that are gone.
     pub fn statistics(&self) -> OctreeStatistics {
         let queue = self.worker.as_ref().map(|worker| worker.queue().counts()).unwrap_or_default();
         OctreeStatistics { queue, ..self.ledger.sum() }

@@ -6,7 +6,7 @@ use crate::space::{MortonCode, VoxelIndex};
 use crate::tile::octocache::{PointerOctree, VoxelCacheCounts};
 use crate::tile::table::Table;
 
-/// The octree of a tile, in the form that was chosen. Both forms give the same answers.
+/// The octree of a tile in the configured form. Both forms give the same answers.
 #[derive(Clone, Debug)]
 pub(crate) enum TileOctree {
     Bricks(BrickOctree),
@@ -14,7 +14,7 @@ pub(crate) enum TileOctree {
 }
 
 impl TileOctree {
-    /// Applies updates to the table, and learns of them; `first` is the tile's lowest voxel.
+    /// Applies updates to the table and to the octree; `first` is the tile's lowest voxel.
     pub(crate) fn apply(
         &mut self,
         table: &mut Table,
@@ -40,7 +40,7 @@ impl TileOctree {
         }
     }
 
-    /// Whether the octree has taken all updates.
+    /// Whether the octree contains all updates.
     pub(crate) fn is_synced(&self) -> bool {
         match self {
             Self::Bricks(octree) => octree.is_synced(),
@@ -48,7 +48,7 @@ impl TileOctree {
         }
     }
 
-    /// Lets the octree take what it has not taken yet.
+    /// Brings the octree up to date.
     pub(crate) fn sync(&mut self, table: &mut Table) {
         match self {
             Self::Bricks(octree) => octree.sync(table),
@@ -86,7 +86,7 @@ impl TileOctree {
         }
     }
 
-    /// What the voxel cache has seen, if there is one.
+    /// Counts of the voxel cache, if there is one.
     pub(crate) fn cache_counts(&self) -> VoxelCacheCounts {
         match self {
             Self::Bricks(_) => VoxelCacheCounts::default(),

@@ -17,17 +17,18 @@ pub(crate) struct Brick {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Storage {
-    /// The number of each voxel's state in the tile's palette; that of unknown voxels where nothing was observed.
+    /// The number of each voxel's state in the tile's palette; [`UNKNOWN`](super::palette::UNKNOWN) where nothing was
+    /// observed.
     Interned(Cells<StateId>),
-    /// The evidence itself, for histories too many for a palette; anything where nothing was observed.
+    /// The evidence itself, if there are too many states for a palette; arbitrary where nothing was observed.
     Plain(Cells<Packed>),
 }
 
 impl Brick {
-    /// In place of a brick that is not there.
-    pub(crate) const NOTHING: &Self = &Self::new(BrickCode(0));
+    /// Stands for an absent brick.
+    pub(crate) const ABSENT_BRICK: &Self = &Self::new(BrickCode(0));
 
-    /// A brick in which nothing was observed yet.
+    /// A brick without observed voxels.
     pub(crate) const fn new(code: BrickCode) -> Self {
         Self::with(code, [0; 8], Storage::Interned(Cells::empty()))
     }
@@ -67,7 +68,7 @@ impl Brick {
         places(self.observed).filter_map(|place| Some((place, self.get(place, palette)?)))
     }
 
-    /// Visits what [`Brick::iter`] gives, a cell at a time.
+    /// Visits the items of [`Brick::iter`], a cell at a time.
     pub(crate) fn for_each(&self, palette: &Palette, mut visit: impl FnMut(usize, Evidence)) {
         match &self.evidence {
             Storage::Interned(cells) => {
@@ -79,7 +80,7 @@ impl Brick {
         }
     }
 
-    /// Lets the brick hold its evidence itself, without the palette.
+    /// Makes the brick hold its evidence itself, without the palette.
     pub(crate) fn make_plain(&mut self, palette: &Palette) {
         if let Storage::Interned(cells) = &self.evidence {
             self.evidence = Storage::Plain(cells.map(|state| palette.evidence(state).into()));
@@ -109,7 +110,7 @@ impl Brick {
         if self.summary.is_stale { self.max_of(0, 512, palette) } else { Some(self.summary.max) }
     }
 
-    /// What an octree has under the brick, and the largest value. A voxel of at least the threshold is occupied.
+    /// The nodes of an octree under the brick, and the largest value. Voxels of at least the threshold are occupied.
     pub(crate) fn nodes(&self, threshold: Option<f32>, palette: &Palette) -> (BrickNodes, f32) {
         const NONE: f32 = f32::NEG_INFINITY;
         match &self.evidence {
@@ -128,7 +129,7 @@ impl Brick {
         }
     }
 
-    /// What an octree needs to know of the brick, as of the last [`Brick::sum_up`].
+    /// The summary of the brick, as of the last [`Brick::sum_up`].
     pub(crate) fn summary(&self) -> Summary {
         self.summary
     }
@@ -154,14 +155,14 @@ impl Brick {
         }
     }
 
-    /// Notes the states that the brick's voxels are in.
+    /// Marks the states that the brick's voxels are in.
     pub(crate) fn mark_states(&self, in_use: &mut [bool]) {
         if let Storage::Interned(cells) = &self.evidence {
             cells.all().iter().flatten().for_each(|&state| in_use[usize::from(state)] = true);
         }
     }
 
-    /// Follows the palette's states to their new numbers.
+    /// Renumbers the states after a change of the palette.
     pub(crate) fn renumber_states(&mut self, numbers: &[StateId]) {
         if let Storage::Interned(cells) = &mut self.evidence {
             cells.all_mut().iter_mut().flatten().for_each(|state| *state = numbers[usize::from(*state)]);

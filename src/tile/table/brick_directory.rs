@@ -1,11 +1,11 @@
 use crate::space::{BrickCode, MortonCode, Torus, VoxelKey};
 
-/// Finds the bricks of a tile: by blocks of 4 x 4 x 4 bricks, of which a tile has few.
+/// Finds the bricks of a tile, by blocks of 4 x 4 x 4 bricks, of which a tile has few.
 #[derive(Clone, Debug)]
 pub(crate) struct BrickDirectory {
     blocks: Torus,
-    /// The number of each brick of a block, in Morton order, from 1, or 0. The first block is that of all blocks that
-    /// are not there.
+    /// The number of each brick of a block, in Morton order, counted from 1; 0 if it is absent. The first block stands
+    /// for all absent blocks.
     numbers: Vec<[u32; BLOCK_BRICKS]>,
 }
 
@@ -17,7 +17,7 @@ impl Default for BrickDirectory {
     }
 }
 
-/// Where a voxel is: its block, which of the block's bricks, and the place in that.
+/// Where a voxel is: its block, the brick in the block, and the place in the brick.
 #[derive(Clone, Copy)]
 pub(crate) struct Address {
     block: [i32; 3],
@@ -28,7 +28,7 @@ pub(crate) struct Address {
 impl Address {
     #[inline]
     pub(crate) fn of_key(key: VoxelKey) -> Self {
-        // Of the lowest five bits: the lower three are the place in a brick, the others are the brick's in its block.
+        // Of the lowest five bits, the lower three are the place in a brick, the others the brick in its block.
         let part = |k: usize| SPREAD[usize::from(key.0[k] & 31)] << k;
         let code = usize::from(part(0) | part(1) | part(2));
         Self { block: key.0.map(|k| i32::from(k >> 5)), brick: code >> 9, place: code & 511 }
@@ -67,11 +67,11 @@ impl BrickDirectory {
     /// The number of the brick at an address, or 0.
     #[inline]
     pub(crate) fn get(&self, at: Address) -> u32 {
-        // Without a branch: whether there is something cannot be guessed.
+        // Without a branch: presence is unpredictable.
         self.numbers[self.blocks.get(at.block) as usize][at.brick]
     }
 
-    /// Where the number of the brick at an address is kept.
+    /// The entry for the brick at an address.
     pub(crate) fn entry(&mut self, at: Address) -> &mut u32 {
         let mut block = self.blocks.get(at.block);
         if block == Torus::NONE {

@@ -10,9 +10,9 @@ use std::ops::Range;
 
 /// The exact evidence of every observed voxel of a tile: the truth, from which all else is derived.
 ///
-/// Laid out in bricks of 8 x 8 x 8 voxels, in which a voxel is the number of its state in the tile's palette: four
-/// to five bytes an observed voxel, all things counted. Where a palette holds too few of the states (intensities
-/// that never repeat), bricks keep the evidence itself.
+/// It consists of bricks of 8 x 8 x 8 voxels, in which a voxel is the number of its state in the tile's palette: four
+/// to five bytes per observed voxel in total. If there are too many states for a palette (intensities that never
+/// repeat), bricks hold the evidence itself.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     /// In order of their first update.
@@ -22,9 +22,9 @@ pub struct Table {
     order: Vec<u32>,
     pub(crate) palette: Palette,
     pub(crate) len: usize,
-    /// Bytes of the bricks' cells; all else is added in [`Table::bytes`].
+    /// Bytes of the bricks' cells; [`Table::bytes`] adds the rest.
     pub(crate) cell_bytes: usize,
-    /// Bricks made plain since the palette's states were last looked through.
+    /// Bricks that stopped using the palette since its last clean-up.
     pub(crate) made_plain: usize,
 }
 
@@ -175,7 +175,7 @@ impl Table {
 
     #[inline]
     fn at(&self, at: Address) -> Option<Evidence> {
-        self.brick_at(at).unwrap_or(Brick::NOTHING).get(at.place, &self.palette)
+        self.brick_at(at).unwrap_or(Brick::ABSENT_BRICK).get(at.place, &self.palette)
     }
 
     #[inline]
@@ -193,7 +193,7 @@ impl Table {
         Self { palette, ..Self::default() }
     }
 
-    /// What [`Table::bytes`] must be, counted anew.
+    /// The value of [`Table::bytes`], counted anew.
     #[cfg(test)]
     pub(crate) fn counted_bytes(&self) -> usize {
         self.bytes() - self.cell_bytes + self.bricks.iter().map(Brick::heap_bytes).sum::<usize>()

@@ -7,11 +7,11 @@ use crate::scan::{BrickUpdate, Run};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickMask, places};
 
-/// What is left to do of an update of a brick.
+/// The part of a brick's update that is not applied yet.
 pub(crate) struct Rest<'a> {
     hits: BrickMask,
     misses: BrickMask,
-    /// Of the hits that are left, in order; empty for sensor models that need none.
+    /// Intensities of the remaining hits, in order; empty for sensor models that need none.
     intensities: &'a [f32],
 }
 
@@ -32,15 +32,15 @@ impl<'a> Rest<'a> {
         }
     }
 
-    /// The words in which something is left, bit `k` for word `k`.
+    /// The words with remaining updates, bit `k` for word `k`.
     fn words(&self) -> u8 {
         (0..8).fold(0, |words, word| words | u8::from(self.hits[word] | self.misses[word] != 0) << word)
     }
 }
 
 impl Brick {
-    /// Applies an update, and returns how many voxels are observed for the first time. If the palette takes no
-    /// more states, what is left stays in `rest`: it is to be applied again once there is room, or the brick plain.
+    /// Applies an update. Returns how many voxels are observed for the first time. If the palette is full, the
+    /// remainder stays in `rest`; the caller makes room, or makes the brick plain, and tries again.
     pub(crate) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
         self.summary.is_stale = true;
         match &mut self.evidence {
@@ -49,8 +49,8 @@ impl Brick {
         }
     }
 
-    /// Applies one update of one voxel whose cell is there, if the palette has room for it. Returns whether the
-    /// voxel is observed for the first time, `None` if nothing was done.
+    /// Applies one update of one voxel whose cell exists. Returns whether the voxel is observed for the first time;
+    /// `None`, with nothing done, if the palette is full.
     #[inline]
     pub(crate) fn update_one(
         &mut self,
@@ -64,8 +64,8 @@ impl Brick {
         })
     }
 
-    /// Applies runs of updates of voxels. Returns how many voxels are observed for the first time, and how many of the
-    /// runs are done: all of them, unless the palette takes no more states or the brick does without.
+    /// Applies runs. Returns how many voxels are observed for the first time, and how many of the runs are done: all of
+    /// them, unless the palette is full or the brick does not use it.
     pub(crate) fn update_runs(
         &mut self,
         runs: &[Run],
@@ -88,7 +88,7 @@ impl Brick {
             });
             let Ok(after) = after else { return (new, done) };
             *state = after;
-            // An update leads to no voxel that was never observed, and no run is empty.
+            // No update leads to the unknown state, and no run is empty.
             self.observed[word] |= u64::from(after != UNKNOWN) << bit;
             new += usize::from(before == UNKNOWN && after != UNKNOWN);
         }
@@ -110,8 +110,8 @@ impl Brick {
         Some(is_new)
     }
 
-    /// Sets voxels that were not observed yet, in Morton order, and returns how many were set before the palette
-    /// took no more states.
+    /// Inserts voxels that were not observed yet, in Morton order. Returns how many were inserted before the palette
+    /// was full.
     pub(crate) fn insert(&mut self, voxels: &[(usize, Evidence)], palette: &mut Palette) -> usize {
         self.summary.is_stale = true;
         let words = voxels.iter().fold(0, |words, (place, _)| words | 1 << (place / 64));
@@ -139,7 +139,7 @@ impl Brick {
     }
 }
 
-/// Whether both are the same to the bit.
+/// Whether both are equal to the bit.
 #[inline]
 fn is_same(a: Evidence, b: Evidence) -> bool {
     a.log_odds.to_bits() == b.log_odds.to_bits() && a.observation_count == b.observation_count
@@ -161,7 +161,7 @@ fn update_interned(
         let (mut misses, mut hits) = (rest.misses[word], rest.hits[word]);
         let touched = misses | hits;
         let mut result = Ok(());
-        // A voxel never observed needs no case of its own: its state has its steps like any other.
+        // An unobserved voxel needs no case of its own: its state has steps like any other.
         while misses != 0 {
             let state = &mut cell[misses.trailing_zeros() as usize];
             match palette.after_miss(*state) {

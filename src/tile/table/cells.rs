@@ -3,12 +3,12 @@ use crate::space::BrickMask;
 /// Voxels of a cell: one word of a brick's mask.
 pub(crate) const CELL_VOXELS: usize = 64;
 
-/// A value for every voxel of a brick, in cells of 4 x 4 x 4: a cell takes memory once one of its voxels is set.
+/// A value for every voxel of a brick, in cells of 4 x 4 x 4. A cell takes memory once one of its voxels is set.
 ///
-/// Finer packing would save a third of the memory on a street, and every update would have to count bits.
+/// Smaller cells would save a third of the memory on a street, but every update would have to count bits.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells<T> {
-    /// Where the cell of each word of a mask lies, or [`ABSENT`].
+    /// The cell of each word of a mask, or [`ABSENT`].
     places: [u8; 8],
     cells: Vec<[T; CELL_VOXELS]>,
 }
@@ -20,7 +20,7 @@ impl<T: Copy> Cells<T> {
         Self { places: [ABSENT; 8], cells: Vec::new() }
     }
 
-    /// The cells of the words of a mask that are not 0, in their order, filled with `value`.
+    /// Cells for the non-zero words of a mask, in their order, filled with `value`.
     pub(crate) fn of_words(mask: &BrickMask, value: T) -> Self {
         let mut places = [ABSENT; 8];
         let mut count = 0;
@@ -48,11 +48,11 @@ impl<T: Copy> Cells<T> {
         self.cells.get_mut(usize::from(self.places[word]))
     }
 
-    /// Makes the cells of the given words (bit `k` for word `k`) that are not there yet, filled with `value`.
+    /// Makes the missing cells of the given words (bit `k` for word `k`), filled with `value`.
     pub(crate) fn make(&mut self, words: u8, value: T) {
         let missing = (0..8).filter(|&word| words >> word & 1 == 1 && self.places[word] == ABSENT);
         let missing: Vec<usize> = missing.collect();
-        // No slack: eight times at most in a brick's life.
+        // No slack: this happens at most eight times in a brick's life.
         self.cells.reserve_exact(missing.len());
         for word in missing {
             self.places[word] = self.cells.len() as u8;
@@ -60,7 +60,7 @@ impl<T: Copy> Cells<T> {
         }
     }
 
-    /// Visits the values of a mask whose cells are there, in Morton order: place and value.
+    /// Visits the values of a mask whose cells exist, in Morton order: place and value.
     #[inline]
     pub(crate) fn for_each(&self, mask: BrickMask, mut visit: impl FnMut(usize, T)) {
         for (word, mut bits) in mask.into_iter().enumerate() {

@@ -1,9 +1,9 @@
 use super::palette::StateId;
 
-/// Where runs of misses lead, as far as it was found out lately: of many misses the states on the way are seldom met
-/// again, but runs of equally many are, since the voxels beside each other are passed by equally many rays.
+/// Caches where runs of misses lead. The states within a run are seldom met again, but runs of equal length are:
+/// equally many rays pass neighbouring voxels.
 ///
-/// It holds as long as the states keep their numbers.
+/// Valid as long as the states keep their numbers.
 pub(crate) struct MissRuns(Vec<Entry>);
 
 #[derive(Clone, Copy)]
@@ -13,7 +13,7 @@ struct Entry {
     after: StateId,
 }
 
-/// No run has no misses.
+/// Matches no run: a run has at least one miss.
 const NONE: Entry = Entry { before: 0, misses: 0, after: 0 };
 const ENTRIES: usize = 1 << 11;
 
@@ -22,7 +22,7 @@ impl MissRuns {
         Self(vec![NONE; ENTRIES])
     }
 
-    /// Forgets all.
+    /// Clears the cache.
     pub(crate) fn clear(&mut self) {
         self.0.fill(NONE);
     }
@@ -40,7 +40,7 @@ impl MissRuns {
     }
 }
 
-/// Different for the runs of different lengths from one state.
+/// Differs for runs of different lengths from one state.
 #[inline]
 fn place(before: StateId, misses: u16) -> usize {
     usize::from(before.wrapping_mul(0x9e35) ^ misses) % ENTRIES

@@ -1,6 +1,6 @@
 use crate::sensor::Evidence;
 
-/// Evidence without the padding that it has in memory.
+/// Evidence without padding: 12 bytes instead of 16.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Packed {
     log_odds_bits: [u32; 2],

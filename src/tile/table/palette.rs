@@ -5,18 +5,18 @@ use crate::sensor::{Evidence, Observation, SensorModel};
 /// Number of a state in a [`Palette`].
 pub(crate) type StateId = u16;
 
-/// The state of a voxel that was never observed. As a *next* state it means that the step was not taken yet: no
-/// update leads back to it.
+/// The state of an unobserved voxel. As a *next* state it means that the step is not computed yet: no update leads back
+/// to it.
 pub(crate) const UNKNOWN: StateId = 0;
 
-/// The distinct states of evidence of a tile's voxels, each kept once, with the steps between them.
+/// The distinct states of evidence of a tile's voxels, each stored once, with the steps between them.
 ///
 /// Voxels with the same history have the same evidence, and few histories are common: a tile of a million voxels has
 /// some hundreds of states. A step (state, observation) -> state is a pure function, so it is computed once and
 /// looked up from then on: an update is one read and one write of two bytes.
 ///
-/// The number of states is limited. The limit follows what is in use, so that states which no voxel is in any
-/// longer do not pile up: at the limit the owner is to [`retain`](Palette::retain) those in use.
+/// The number of states is limited. The limit follows the number in use, so that unused states do not pile up: at the
+/// limit the owner calls [`retain`](Palette::retain) with the states in use.
 #[derive(Clone, Debug)]
 pub(crate) struct Palette {
     model: SensorModel,
@@ -24,22 +24,22 @@ pub(crate) struct Palette {
     next: Vec<Next>,
     /// The log-odds as `f32`, as the octree has them; negative infinity for unknown voxels.
     values: Vec<f32>,
-    /// Hash table of the states by evidence, open addressing, [`UNKNOWN`] where nothing is.
+    /// Hash table of the states by evidence, with open addressing; [`UNKNOWN`] marks a free slot.
     slots: Vec<StateId>,
-    /// Most states before some are to be dropped; at most `most`.
+    /// Most states before unused ones are dropped; at most `most`.
     limit: usize,
     most: usize,
     renumberings: u64,
 }
 
-/// Where an observation leads, or [`UNKNOWN`].
+/// The state after an observation, or [`UNKNOWN`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Next {
     miss: StateId,
     hit: StateId,
 }
 
-/// No further state can be taken.
+/// The palette is full.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Full;
 
@@ -53,7 +53,7 @@ impl Default for Palette {
 }
 
 impl Palette {
-    /// A palette that takes `limit` states at first and never more than `most`; both powers of two.
+    /// A palette of `limit` states at first and at most `most`; both powers of two.
     pub(crate) fn limited(limit: usize, most: usize) -> Self {
         Self {
             model: SensorModel::default(),
@@ -67,22 +67,22 @@ impl Palette {
         }
     }
 
-    /// A palette with room for all states that one can take, until [`limit_by_use`](Self::limit_by_use).
+    /// A palette with the largest limit, until [`limit_by_use`](Self::limit_by_use).
     pub(crate) fn with_all_room() -> Self {
         Self::limited(MOST_STATES, MOST_STATES)
     }
 
-    /// Sets the limit to what it would be, had the states come one by one.
+    /// Sets the limit that would result if the states had come one by one.
     pub(crate) fn limit_by_use(&mut self) {
         self.limit = (2 * self.len()).next_power_of_two().clamp(FIRST_LIMIT, self.most);
     }
 
-    /// The sensor model by which steps are taken.
+    /// The sensor model that computes steps.
     pub(crate) fn model(&self) -> &SensorModel {
         &self.model
     }
 
-    /// Takes another sensor model, if it is another: steps known so far are forgotten.
+    /// Sets the sensor model. If it differs, known steps are dropped.
     pub(crate) fn use_model(&mut self, model: &SensorModel) {
         if self.model != *model {
             self.model = *model;
@@ -90,7 +90,7 @@ impl Palette {
         }
     }
 
-    /// Number of states, the one of unknown voxels included.
+    /// Number of states, including the unknown state.
     pub(crate) fn len(&self) -> usize {
         self.evidence.len()
     }
@@ -115,7 +115,7 @@ impl Palette {
         states.map(|state| self.values[usize::from(state)])
     }
 
-    /// By number, whether a state is one of an observed voxel and satisfies `holds`.
+    /// For each state number, whether the state is of an observed voxel and satisfies `holds`.
     pub(crate) fn states_with(&self, holds: impl Fn(Evidence) -> bool) -> Vec<bool> {
         let mut states: Vec<bool> = self.evidence.iter().map(|&evidence| holds(evidence)).collect();
         states[usize::from(UNKNOWN)] = false;
@@ -168,14 +168,14 @@ impl Palette {
     fn first_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {
         let hit = Observation::Hit(intensity);
         let after = self.intern(self.model.update(Some(self.evidence(before)), hit))?;
-        // Where the intensity counts, the next hit leads elsewhere.
+        // If the intensity counts, the next hit leads to another state.
         if !self.model.needs_intensity() {
             self.next[usize::from(before)].hit = after;
         }
         Ok(after)
     }
 
-    /// The state of some evidence, if it is known.
+    /// The state of this evidence, if it has one.
     pub(crate) fn find(&self, evidence: Evidence) -> Option<StateId> {
         if self.slots.is_empty() {
             return None;
@@ -190,7 +190,7 @@ impl Palette {
         }
     }
 
-    /// The state of some evidence, a new one if need be.
+    /// The state of this evidence, made if need be.
     pub(crate) fn intern(&mut self, evidence: Evidence) -> Result<StateId, Full> {
         if 4 * self.len() >= 3 * self.slots.len() {
             self.rehash();
@@ -214,8 +214,8 @@ impl Palette {
         Ok(state)
     }
 
-    /// Keeps the states that are in use and gives the number of each after that; of the others it is
-    /// [`UNKNOWN`]. Where most are in use, the limit rises as far as it may.
+    /// Drops unused states. Returns the new number of each state, [`UNKNOWN`] for dropped ones. If most states are in
+    /// use, the limit rises.
     pub(crate) fn retain(&mut self, in_use: &[bool]) -> Vec<StateId> {
         let mut kept = 0;
         let number = |(state, &in_use): (usize, &bool)| {
@@ -240,7 +240,7 @@ impl Palette {
         numbers
     }
 
-    /// How often states got other numbers.
+    /// How often states were renumbered.
     pub(crate) fn renumberings(&self) -> u64 {
         self.renumberings
     }
@@ -255,7 +255,7 @@ impl Palette {
         self.limit < self.most
     }
 
-    /// Makes the hash table anew, half full at most.
+    /// Rebuilds the hash table, at most half full.
     fn rehash(&mut self) {
         self.slots = vec![UNKNOWN; (2 * self.len()).next_power_of_two().max(16)];
         for state in 1..self.len() {
@@ -275,7 +275,7 @@ impl Palette {
     }
 }
 
-/// Whether both are the same to the bit.
+/// Whether both are equal to the bit.
 fn is_same(a: Evidence, b: Evidence) -> bool {
     a.log_odds.to_bits() == b.log_odds.to_bits() && a.observation_count == b.observation_count
 }

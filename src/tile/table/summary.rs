@@ -1,13 +1,13 @@
 use crate::octree::BrickNodes;
 
-/// What an octree needs to know of a brick: eight bytes, computed anew after the brick has changed.
+/// What an octree needs of a brick, in eight bytes; computed anew after the brick has changed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Summary {
     /// Largest log-odds.
     pub(crate) max: f32,
-    /// Nodes of OctoMap's tree, the brick's own at depth 13 included.
+    /// Nodes of OctoMap's tree, including the brick's own at depth 13.
     pub(crate) nodes: u16,
-    /// Whether these are one leaf: all 512 voxels are known and have one value.
+    /// Whether the brick is one leaf: all 512 voxels are known and have one value.
     pub(crate) is_leaf: bool,
     /// Whether the brick has changed since.
     pub(crate) is_stale: bool,

@@ -20,7 +20,7 @@ impl Table {
         }
     }
 
-    /// Applies what one scan says about one brick.
+    /// Applies the update of one brick, in insertion per scan.
     pub fn update_brick(&mut self, model: &SensorModel, update: &BrickUpdate) {
         self.palette.use_model(model);
         let mut rest = Rest::of(update);
@@ -30,7 +30,7 @@ impl Table {
         }
     }
 
-    /// Applies what the rays of a scan say about bricks, where every ray counts.
+    /// Applies runs of updates of bricks, in insertion per ray.
     pub fn update_runs(&mut self, model: &SensorModel, bricks: &[BrickRuns]) {
         self.palette.use_model(model);
         let mut known = MissRuns::new();
@@ -76,7 +76,7 @@ impl Table {
         self.update_each(model, first, updates, |_, _, _| {});
     }
 
-    /// The same, and after each update its voxel's log-odds are told.
+    /// The same; `visit` is given each update's voxel and resulting log-odds.
     pub(crate) fn update_in_order_and_tell(
         &mut self,
         model: &SensorModel,
@@ -92,7 +92,7 @@ impl Table {
         });
     }
 
-    /// Applies updates of single voxels in their order; after each, `visit` is given the brick's number and the place.
+    /// Applies updates of single voxels in their order; `visit` is given the brick's number and the place after each.
     fn update_each(
         &mut self,
         model: &SensorModel,
@@ -102,7 +102,7 @@ impl Table {
     ) {
         self.palette.use_model(model);
         let first = VoxelKey::from_index(first).0;
-        // Rays fan out through the same few bricks again and again: those near each other have each their entry.
+        // Rays return to the same few bricks again and again; nearby bricks have different entries.
         let mut recent = [(u64::MAX, 0); 512];
         for (offset, observation) in updates.iter() {
             let key: [u16; 3] = std::array::from_fn(|k| first[k].wrapping_add(offset[k] as u16));
@@ -127,7 +127,7 @@ impl Table {
         }
     }
 
-    /// Sets voxels of a brick, in Morton order, none of which was observed before: place and evidence.
+    /// Inserts voxels of a brick, in Morton order, none of which was observed before: place and evidence.
     pub fn insert(&mut self, brick: BrickCode, mut voxels: &[(usize, Evidence)]) {
         if voxels.is_empty() {
             return;
@@ -147,7 +147,7 @@ impl Table {
         }
     }
 
-    /// Adds a brick of which nothing is there yet, its states numbered as in the table's palette.
+    /// Adds a brick that is absent so far, with the palette's state numbers.
     pub(crate) fn add_brick(&mut self, brick: Brick) {
         let number = self.number_of(brick.code());
         self.len += brick.observed.iter().map(|word| word.count_ones() as usize).sum::<usize>();
@@ -155,12 +155,12 @@ impl Table {
         self.bricks[number] = brick;
     }
 
-    /// The number of a brick, which is made if it is not there.
+    /// The number of a brick, made if it is absent.
     fn number_of(&mut self, code: BrickCode) -> usize {
         let number = self.directory.entry(Address::of_brick(code));
         if *number == 0 {
             if self.bricks.len() == self.bricks.capacity() {
-                // Less slack than a vector gives by itself.
+                // Less slack than the default growth of a vector.
                 self.bricks.reserve_exact((self.bricks.len() / 4).max(4));
             }
             self.bricks.push(Brick::new(code));
@@ -183,12 +183,12 @@ impl Table {
         }
     }
 
-    /// Sees to it that a brick can take states that the full palette does not have: drops states no longer in use,
-    /// or else lets the brick do without the palette.
+    /// Makes room for a brick's new states when the palette is full: drops unused states, or else makes the brick
+    /// plain.
     #[cold]
     fn make_room_for(&mut self, number: usize) {
-        // At its largest, the palette is looked through again only when enough bricks have left it, so that the
-        // effort stays in proportion.
+        // At the largest limit, unused states are searched for only after enough bricks became plain, so that the cost
+        // stays proportional.
         if self.palette.can_grow() || self.made_plain * 8 >= self.bricks.len() {
             let mut in_use = vec![false; self.palette.len()];
             self.bricks.iter().for_each(|brick| brick.mark_states(&mut in_use));

@@ -3,26 +3,26 @@ use crate::tile::Table;
 use crate::tile::table::{Brick, Palette, StateId, Storage};
 use rustc_hash::FxHashMap;
 
-/// How many voxels of a table are in a state.
+/// Counts the voxels of a table per state.
 pub(super) struct Census {
     /// By number in the table's palette.
     pub(super) interned: Vec<u32>,
-    /// Of the states that the palette does not have.
+    /// For states that are not in the palette.
     pub(super) others: FxHashMap<StateKey, u32>,
-    /// Further states to be counted.
+    /// How many more states are counted.
     room: usize,
 }
 
-/// A state, to the bit.
+/// A state's bits.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct StateKey {
     pub(super) log_odds_bits: u64,
     pub(super) observation_count: i32,
 }
 
-/// Most states that are counted, the first ones in Morton order: what a palette can hold, so that only a table with
-/// bricks that do without it has more.
-const MOST_COUNTED: usize = (1 << 16) - 1;
+/// Most states that are counted, the first in Morton order: as many as a palette holds. Only a table with plain bricks
+/// can have more.
+const MAX_COUNTED: usize = (1 << 16) - 1;
 
 impl From<Evidence> for StateKey {
     fn from(evidence: Evidence) -> Self {
@@ -39,7 +39,7 @@ impl From<StateKey> for Evidence {
 impl Census {
     pub(super) fn of(table: &Table) -> Self {
         let interned = vec![0; table.palette.len()];
-        let mut census = Self { interned, others: FxHashMap::default(), room: MOST_COUNTED };
+        let mut census = Self { interned, others: FxHashMap::default(), room: MAX_COUNTED };
         if table.bricks.iter().all(|brick| matches!(brick.evidence, Storage::Interned(_))) {
             // All are counted, so the order does not matter.
             let mut counts = vec![[0; LANES]; table.palette.len()];
@@ -82,7 +82,7 @@ impl Census {
     }
 }
 
-/// Neighbors are often in one state, and a count that was just written must not be waited for.
+/// Neighbours are often in one state; several lanes avoid waiting for a count just written.
 const LANES: usize = 4;
 
 fn count_all(brick: &Brick, counts: &mut [[u32; LANES]]) {

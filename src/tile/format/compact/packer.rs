@@ -3,16 +3,16 @@ use super::numbers::put_number;
 use std::io;
 use zstd::zstd_safe::{CCtx, CParameter, compress_bound, get_error_name};
 
-/// Packs columns.
+/// Compresses columns.
 pub(super) struct Packer {
-    /// One a level.
+    /// One per level.
     zstd: Vec<CCtx<'static>>,
-    /// The smallest form of a column so far, and another.
+    /// The smallest form of a column so far, and the one being tried.
     packed: [Vec<u8>; 2],
 }
 
-/// A column of fewer bytes is not packed.
-const LEAST_BYTES: usize = 24;
+/// Shorter columns are not compressed.
+const MIN_BYTES: usize = 24;
 
 impl Packer {
     pub(super) fn new(effort: CompactEffort) -> io::Result<Self> {
@@ -20,8 +20,8 @@ impl Packer {
         Ok(Self { zstd: zstd?, packed: Default::default() })
     }
 
-    /// Appends columns: first of each its length and that of what is written of it, then these. A column that does not
-    /// become smaller is written as it is.
+    /// Appends columns: first each column's length and written length, then their bytes. A column that does not become
+    /// smaller is written as it is.
     pub(super) fn put_columns<const N: usize>(
         &mut self,
         columns: [&[u8]; N],
@@ -39,7 +39,7 @@ impl Packer {
     }
 
     fn pack<'a>(&'a mut self, column: &'a [u8]) -> io::Result<&'a [u8]> {
-        if column.len() < LEAST_BYTES {
+        if column.len() < MIN_BYTES {
             return Ok(column);
         }
         let bound = compress_bound(column.len());
@@ -59,7 +59,7 @@ impl Packer {
     }
 }
 
-/// A compressor that writes nothing that is known anyway.
+/// A compressor that omits headers and checksums.
 fn compressor(level: i32) -> io::Result<CCtx<'static>> {
     // `zstd::bulk` would panic.
     let mut zstd = CCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
@@ -74,7 +74,7 @@ fn compressor(level: i32) -> io::Result<CCtx<'static>> {
     Ok(zstd)
 }
 
-/// What zstd says, of which a lack of memory is the likeliest.
+/// An error of zstd, most likely a lack of memory.
 fn refused(code: usize) -> io::Error {
     io::Error::other(get_error_name(code))
 }

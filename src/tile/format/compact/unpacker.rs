@@ -3,18 +3,18 @@ use crate::error::{DecodeError, FormatError};
 use std::io::{self, Read};
 use zstd::zstd_safe::{DCtx, get_error_name};
 
-/// Unpacks what a [`Packer`](super::packer::Packer) packed.
+/// Decompresses the columns of a [`Packer`](super::packer::Packer).
 pub(super) struct Unpacker {
     zstd: DCtx<'static>,
     packed: Vec<u8>,
 }
 
-/// A column that is to be read.
+/// A column to read.
 pub(super) struct Column<'a> {
     pub(super) name: &'static str,
-    /// Most bytes that it may have.
+    /// Most bytes of the column.
     pub(super) most: usize,
-    /// Takes its bytes.
+    /// Receives its bytes.
     pub(super) bytes: &'a mut Vec<u8>,
 }
 
@@ -25,7 +25,7 @@ impl Unpacker {
         Ok(Self { zstd, packed: Vec::new() })
     }
 
-    /// Reads columns; none takes more memory than it may have bytes.
+    /// Reads columns; none takes more memory than its limit.
     pub(super) fn take_columns<const N: usize>(
         &mut self,
         columns: [Column<'_>; N],

@@ -8,8 +8,8 @@ use crate::tile::Table;
 use std::fmt;
 use std::io::{self, Write};
 
-/// Writes tables in their compact form. What it works with is kept from one table to the next: 0.7 MB, or 1.7 MB for
-/// [`CompactEffort::Small`], and up to 3 MB more once there was a table of which hardly two voxels were in one state.
+/// Writes tables in compact form. Its buffers are kept from table to table: 0.7 MB, or 1.7 MB for
+/// [`CompactEffort::Small`], and up to 3 MB more after a table in which hardly two voxels were in one state.
 pub struct CompactWriter {
     packer: Packer,
     group: Group,
@@ -26,10 +26,10 @@ impl CompactWriter {
         Ok(Self { packer: Packer::new(effort)?, group: Group::default(), part: Vec::new() })
     }
 
-    /// Streams a table in its compact form, and returns the number of bytes.
+    /// Streams a table in compact form. Returns the number of bytes.
     ///
-    /// Equal tables give equal bytes, whatever way they came about. While it is written, a table takes up to 80 bytes
-    /// a state of its palette more; where some bricks do without the palette, up to 12 MB.
+    /// Equal tables give equal bytes. Writing takes up to 80 bytes of memory per state of the palette, and up to 12 MB
+    /// if some bricks do not use the palette.
     ///
     /// # Errors
     ///
@@ -46,7 +46,7 @@ impl CompactWriter {
             part.clear();
             written
         };
-        // A table that could not be written may have left something behind.
+        // A failed write may have left something behind.
         part.clear();
         group.begin();
         part.extend_from_slice(&header(table, &codebook));
@@ -90,7 +90,7 @@ fn header(table: &Table, codebook: &Codebook) -> [u8; HEADER_BYTES] {
     header[0..4].copy_from_slice(&MAGIC.to_le_bytes());
     header[4..8].copy_from_slice(&VERSION.to_le_bytes());
     header[8..16].copy_from_slice(&(table.len() as u64).to_le_bytes());
-    // A tile has 2^21.1 bricks at most.
+    // A tile has at most 2^21.1 bricks.
     header[16..20].copy_from_slice(&(table.bricks.len() as u32).to_le_bytes());
     header[20..24].copy_from_slice(&(codebook.states.len() as u32).to_le_bytes());
     header

@@ -68,7 +68,7 @@ const VOXEL: MortonCode = MortonCode(77);
 
 /// What the tree and what is in flight say of the voxel together; nothing while the tree is being written.
 fn value_of(tree: &SharedTree) -> Option<f32> {
-    tree.try_ask(|tree, in_flight| {
+    tree.try_read(|tree, in_flight| {
         let latest = in_flight.iter().flatten().rfind(|(code, _)| *code == VOXEL);
         latest.map(|(_, value)| *value).or_else(|| tree.get(VOXEL, 16)).unwrap_or(0.0)
     })
@@ -108,7 +108,7 @@ fn no_update_of_a_tree_is_lost_or_seen_out_of_order() {
         asks.join().unwrap();
         drop(worker);
         assert_eq!(value_of(&tree), Some(3.0));
-        assert_eq!((tree.in_flight_bytes() > 0, tree.ask(Octree::leaf_count)), (true, Some(4)));
+        assert_eq!((tree.in_flight_bytes() > 0, tree.read(Octree::leaf_count)), (true, Some(4)));
     });
 }
 
