@@ -1,50 +1,51 @@
 use super::answers::after;
 use super::codec::{Ask, DigestEntry};
-use super::parts::Parts;
+use super::interval_set::IntervalSet;
 use super::set::VoxelSet;
 use super::set_range::SetRange;
 use crate::space::TileIndex;
 use std::time::Duration;
 
-/// What a receiver still has to ask for, to have a set whole: digests of tiles, and the voxels where they differ.
+/// Anti-entropy: what a receiver still has to request until its layer equals the set. It requests digests of tiles, and
+/// the voxels where these differ.
 #[derive(Clone, Debug, Default)]
-pub(super) struct CatchUp {
-    digests: Parts,
-    content: Parts,
-    last_ask: Option<Asked>,
+pub(super) struct AntiEntropy {
+    digests: IntervalSet,
+    content: IntervalSet,
+    outstanding: Option<Outstanding>,
 }
 
 #[derive(Clone, Debug)]
-struct Asked {
+struct Outstanding {
     at: Duration,
-    /// When the last answer came.
-    heard_at: Duration,
-    /// Answers since.
+    /// When the last answer arrived.
+    answered_at: Duration,
+    /// Answers so far.
     packets: usize,
-    /// What is left of what was asked for.
-    rest: Parts,
+    /// The requested ranges that are not answered yet.
+    rest: IntervalSet,
 }
 
-/// Parts that one ask for voxels lists.
-const PARTS_PER_ASK: usize = 20;
-/// Answers after which the next ask goes out; a sender answers with as many by default.
-const PACKETS_PER_ASK: usize = 16;
+/// Most ranges in one request for voxels.
+const RANGES_PER_REQUEST: usize = 20;
+/// Number of answers after which the next request is sent; a sender's default limit per request.
+const PACKETS_PER_REQUEST: usize = 16;
 
-impl CatchUp {
-    /// Bytes of memory, at most.
-    pub(super) const MOST_BYTES: usize = 3 * Parts::MOST_BYTES;
+impl AntiEntropy {
+    /// Upper bound of the bytes of memory.
+    pub(super) const MAX_BYTES: usize = 3 * IntervalSet::MAX_BYTES;
 
     pub(super) fn is_done(&self) -> bool {
         self.digests.is_empty() && self.content.is_empty()
     }
 
-    /// Begins with everything.
+    /// Starts with the whole set.
     pub(super) fn begin(&mut self, layer: &VoxelSet) {
         *self = Self::default();
         if layer.is_empty() { &mut self.content } else { &mut self.digests }.put(SetRange::ALL);
     }
 
-    /// Takes digests; returns the parts of which the sender has no voxels.
+    /// Takes digests; returns the ranges in which the sender has no voxels.
     pub(super) fn take_digests(
         &mut self,
         first: TileIndex,
@@ -53,8 +54,8 @@ impl CatchUp {
         now: Duration,
     ) -> Vec<SetRange> {
         let Some(last) = entries.last() else { return Vec::new() };
-        let is_asked = self.heard(SetRange::of_tiles(first, last.last), now);
-        if !is_asked {
+        let was_requested = self.mark_received(SetRange::of_tiles(first, last.last), now);
+        if !was_requested {
             return Vec::new();
         }
         let mut begin = first;
@@ -81,28 +82,28 @@ impl CatchUp {
         empty
     }
 
-    /// Has a part fetched.
-    pub(super) fn want_content(&mut self, range: SetRange) {
+    /// Adds a range to be requested.
+    pub(super) fn request_content(&mut self, range: SetRange) {
         self.content.put(range);
     }
 
-    /// Ticks off a part whose voxels came.
+    /// Removes a range whose voxels have arrived.
     pub(super) fn take_content(&mut self, range: SetRange, now: Duration) {
-        self.heard(range, now);
+        self.mark_received(range, now);
     }
 
-    /// Ticks off; whether any of it was asked for.
-    fn heard(&mut self, range: SetRange, now: Duration) -> bool {
-        let was_asked = self.digests.remove(range) | self.content.remove(range);
-        if let Some(asked) = &mut self.last_ask {
-            asked.rest.remove(range);
-            asked.heard_at = now;
-            asked.packets += 1;
+    /// Removes a range that was answered; returns whether any of it was requested.
+    fn mark_received(&mut self, range: SetRange, now: Duration) -> bool {
+        let was_requested = self.digests.remove(range) | self.content.remove(range);
+        if let Some(request) = &mut self.outstanding {
+            request.rest.remove(range);
+            request.answered_at = now;
+            request.packets += 1;
         }
-        was_asked
+        was_requested
     }
 
-    /// The next ask, if it is time for one: after the answers to the one before, or when these do not come any more.
+    /// The next request, if it is due: after the answers to the previous one, or when these stop coming.
     pub(super) fn poll(
         &mut self,
         epoch: u32,
@@ -110,30 +111,31 @@ impl CatchUp {
         interval: Duration,
         patience: Duration,
     ) -> Option<Ask> {
-        if let Some(asked) = &self.last_ask {
-            let is_answered = asked.rest.is_empty() || asked.packets >= PACKETS_PER_ASK;
-            let is_over = is_answered || now >= asked.heard_at + patience;
-            if !is_over || now < asked.at + interval {
+        if let Some(request) = &self.outstanding {
+            let is_answered = request.rest.is_empty() || request.packets >= PACKETS_PER_REQUEST;
+            let is_over = is_answered || now >= request.answered_at + patience;
+            if !is_over || now < request.at + interval {
                 return None;
             }
         }
-        // Before there is no room for what further digests say.
+        // Digests are not requested while there may be no room for the ranges that differ.
         let digests = if self.content.is_half_full() { None } else { self.digests.iter().next() };
         let (ask, rest) = if let Some(range) = digests {
             (Ask::Digests { epoch, range }, vec![range])
         } else if !self.content.is_empty() {
-            let ranges: Vec<SetRange> = self.content.iter().take(PARTS_PER_ASK).collect();
+            let ranges: Vec<SetRange> = self.content.iter().take(RANGES_PER_REQUEST).collect();
             (Ask::Content { epoch, ranges: ranges.clone() }, ranges)
         } else {
-            self.last_ask = None;
+            self.outstanding = None;
             return None;
         };
-        self.last_ask = Some(Asked { at: now, heard_at: now, packets: 0, rest: rest.into_iter().collect() });
+        self.outstanding =
+            Some(Outstanding { at: now, answered_at: now, packets: 0, rest: rest.into_iter().collect() });
         Some(ask)
     }
 }
 
-/// Voxels that are as soon sent as looked at more closely.
+/// Up to so many voxels, content costs as little as further digests.
 const FEW_VOXELS: u64 = 256;
 
 fn is_single(layer: &VoxelSet, range: SetRange) -> bool {

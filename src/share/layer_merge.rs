@@ -6,29 +6,29 @@ use crate::query::Questions;
 use crate::scan::PointBatch;
 use crate::space::Point;
 
-/// What folding a layer into an archive has done.
+/// Counts of a layer merged into an archive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct FoldReport {
     /// Voxels of the layer.
     pub voxels: u64,
-    /// Of these, voxels that are occupied in the archive already, and stay as they are.
+    /// Of these, voxels that are already occupied in the archive; they are left unchanged.
     pub known: u64,
-    /// Voxels that got a hit.
+    /// Voxels that received a hit.
     pub hits: u64,
 }
 
-/// Voxels of a batch: a tile may hold a billion.
+/// Voxels per batch: a tile may hold a billion.
 const VOXELS_AT_A_TIME: usize = 1 << 16;
 
-/// Folds a layer into an archive: every voxel of the layer that is not occupied in the archive gets one hit, tile by tile
-/// in batches. So what the archive knows of its own scans weighs more, and folding the same layer again changes only what
-/// one hit has not made occupied.
+/// Merges a layer into an archive: every voxel of the layer that is not occupied in the archive gets one hit, in
+/// batches per tile. So the archive's own scans weigh more, and merging the same layer again changes only voxels that
+/// one hit did not make occupied.
 ///
 /// # Errors
 ///
-/// An archive with other voxels, or whose sensor model needs intensities; a tile that cannot be read or written. What was
-/// folded before an error stays.
+/// An archive with another grid, or whose sensor model needs intensities; a tile that cannot be read or written. What
+/// was merged before an error stays.
 pub fn fold_layer(layer: &VoxelSet, mapper: &mut impl Mapper) -> Result<FoldReport> {
     if mapper.config().grid.resolution_m().to_bits() != layer.grid().resolution_m().to_bits() {
         let reason = format!(

@@ -1,30 +1,31 @@
 use super::set_range::{SetPosition, SetRange};
 use std::collections::BTreeMap;
 
-/// Parts of a set that were replaced whole, and as of which packet: of parts one over the other, the latest.
+/// The versions of ranges of a set: for ranges that were replaced as a whole, the packet of that content. Where ranges
+/// overlap, the latest counts.
 #[derive(Clone, Debug, Default)]
-pub(super) struct PartStamps {
-    /// Disjoint parts by where they begin: where they end, and the packet.
+pub(super) struct RangeVersions {
+    /// Disjoint ranges by their first position: the last position, and the packet.
     parts: BTreeMap<SetPosition, (SetPosition, u64)>,
 }
 
-impl PartStamps {
+impl RangeVersions {
     pub(super) fn len(&self) -> usize {
         self.parts.len()
     }
 
-    /// The earliest packet that a part is as of.
+    /// The earliest version.
     pub(super) fn oldest(&self) -> Option<u64> {
         self.parts.values().map(|(_, as_of)| *as_of).min()
     }
 
-    /// Whether a place lies in a part that is as of a packet, or of a later one.
+    /// Whether a position has this version or a later one.
     pub(super) fn is_as_of(&self, position: SetPosition, sequence: u64) -> bool {
         let before = self.parts.range(..=position).next_back();
         before.is_some_and(|(_, (last, as_of))| position <= *last && *as_of >= sequence)
     }
 
-    /// What of a range does not lie in parts that are as of a packet, or of a later one.
+    /// The parts of a range without this version or a later one.
     pub(super) fn gaps(&self, range: SetRange, sequence: u64) -> Vec<SetRange> {
         let mut gaps = Vec::new();
         let mut begin = range.first;
@@ -44,35 +45,35 @@ impl PartStamps {
         gaps
     }
 
-    /// Notes that a range is as of a packet.
+    /// Sets the version of a range.
     pub(super) fn note(&mut self, range: SetRange, as_of: u64) {
         let gaps = self.gaps(range, as_of);
         let older: Vec<(SetRange, u64)> =
-            self.overlapping(range).filter(|(_, stamp)| *stamp < as_of).collect();
-        for (part, stamp) in older {
+            self.overlapping(range).filter(|(_, version)| *version < as_of).collect();
+        for (part, version) in older {
             self.parts.remove(&part.first);
             if part.first < range.first {
-                self.parts.insert(part.first, (range.first.before(), stamp));
+                self.parts.insert(part.first, (range.first.before(), version));
             }
             if range.last < part.last {
-                self.parts.insert(range.last.next(), (part.last, stamp));
+                self.parts.insert(range.last.next(), (part.last, version));
             }
         }
         gaps.into_iter().for_each(|gap| self.insert(gap, as_of));
     }
 
-    /// Inserts where there is nothing, as one with what adjoins and is as of the same packet.
+    /// Inserts a range where there is none, merged with adjacent ranges of the same version.
     fn insert(&mut self, mut part: SetRange, as_of: u64) {
         let before = self.parts.range(..part.first).next_back();
-        if let Some((&first, &(last, stamp))) = before
-            && stamp == as_of
+        if let Some((&first, &(last, version))) = before
+            && version == as_of
             && last == part.first.before()
         {
             part.first = first;
         }
         if part.last < SetRange::ALL.last
-            && let Some(&(last, stamp)) = self.parts.get(&part.last.next())
-            && stamp == as_of
+            && let Some(&(last, version)) = self.parts.get(&part.last.next())
+            && version == as_of
         {
             self.parts.remove(&part.last.next());
             part.last = last;
@@ -80,12 +81,12 @@ impl PartStamps {
         self.parts.insert(part.first, (part.last, as_of));
     }
 
-    /// Forgets parts that are as of a packet, or of earlier ones.
+    /// Removes ranges with this version or an earlier one.
     pub(super) fn forget_up_to(&mut self, sequence: u64) {
         self.parts.retain(|_, (_, as_of)| *as_of > sequence);
     }
 
-    /// The parts that reach into a range, in order.
+    /// The ranges that overlap a range, in order.
     fn overlapping(&self, range: SetRange) -> impl Iterator<Item = (SetRange, u64)> {
         let begin = match self.parts.range(..=range.first).next_back() {
             Some((&first, (last, _))) if *last >= range.first => first,
@@ -102,7 +103,7 @@ mod tests {
     use crate::simulation::Random;
     use crate::space::TileIndex;
 
-    /// Places of a small world: two tiles of 20 codes at the ends of what a tile has.
+    /// Positions of a small world: two tiles of 20 codes at the ends of a tile's codes.
     fn position(number: u64) -> SetPosition {
         let (tile, code) = (TileIndex::new(0, 0, (number / 20) as i32), number % 20);
         let code = if code < 10 { code } else { super::super::set_range::LAST_CODE - (19 - code) };
@@ -110,11 +111,11 @@ mod tests {
     }
 
     #[test]
-    fn every_place_has_the_latest_stamp_of_the_parts_over_it() {
+    fn every_position_has_the_latest_version_of_the_ranges_over_it() {
         for seed in 0..50 {
             let mut random = Random::of(seed, &[]);
-            let mut parts = PartStamps::default();
-            // Places between 9 and 10 of a tile count with 9: ranges begin and end at places that are there.
+            let mut parts = RangeVersions::default();
+            // Positions between 9 and 10 of a tile count as 9: ranges begin and end at existing positions.
             let mut plain = vec![None::<u64>; 40];
             for step in 0..60 {
                 let mut ends = [random.below(40), random.below(40)];
@@ -122,7 +123,7 @@ mod tests {
                 let as_of = 1 + random.below(8);
                 let range = SetRange { first: position(ends[0]), last: position(ends[1]) };
                 let wanted: Vec<bool> = (ends[0]..=ends[1])
-                    .map(|k| plain[k as usize].is_none_or(|stamp| stamp < as_of))
+                    .map(|k| plain[k as usize].is_none_or(|version| version < as_of))
                     .collect();
                 let gaps = parts.gaps(range, as_of);
                 for (k, wanted) in (ends[0]..=ends[1]).zip(wanted) {
@@ -135,11 +136,14 @@ mod tests {
                 if random.chance(0.1) {
                     let sequence = random.below(6);
                     parts.forget_up_to(sequence);
-                    plain.iter_mut().for_each(|stamp| *stamp = stamp.filter(|&stamp| stamp > sequence));
+                    plain
+                        .iter_mut()
+                        .for_each(|version| *version = version.filter(|&version| version > sequence));
                 }
-                for (k, stamp) in plain.iter().enumerate() {
-                    let is_as_of =
-                        |sequence| parts.is_as_of(position(k as u64), sequence) == (*stamp >= Some(sequence));
+                for (k, version) in plain.iter().enumerate() {
+                    let is_as_of = |sequence| {
+                        parts.is_as_of(position(k as u64), sequence) == (*version >= Some(sequence))
+                    };
                     assert!((1..10).all(is_as_of), "{seed} {step} {k}: {parts:?}");
                 }
                 assert_eq!(parts.oldest(), parts.parts.values().map(|part| part.1).min());
@@ -149,11 +153,11 @@ mod tests {
 
     #[test]
     fn parts_one_behind_the_other_are_one() {
-        let mut parts = PartStamps::default();
+        let mut parts = RangeVersions::default();
         for k in (0..10).rev().chain(12..19).chain(10..12).chain(20..30) {
             parts.note(SetRange { first: position(k), last: position(k) }, 7);
         }
-        // Between 9 and 10 there is much that was not noted; 19 was not.
+        // Between 9 and 10 there are positions without a version; 19 has none.
         assert_eq!(parts.len(), 3);
         parts.note(SetRange::ALL, 7);
         parts.note(SetRange::ALL, 8);

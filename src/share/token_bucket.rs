@@ -1,22 +1,22 @@
 use std::time::Duration;
 
-/// Bytes that answers may take.
+/// Limits the rate of answers: a token bucket that holds the bytes of one second.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Allowance {
+pub(super) struct TokenBucket {
     bytes: u64,
     at: Duration,
 }
 
-impl Allowance {
-    /// Takes bytes, if there are any left at this time.
-    pub(super) fn take(&mut self, bytes_per_s: u64, now: Duration) -> bool {
+impl TokenBucket {
+    /// Refills the bucket; returns whether it holds any bytes.
+    pub(super) fn refill(&mut self, bytes_per_s: u64, now: Duration) -> bool {
         let passed = now.saturating_sub(self.at).as_millis().min(1000) as u64;
         self.bytes = (self.bytes + bytes_per_s.saturating_mul(passed) / 1000).min(bytes_per_s);
         self.at = self.at.max(now);
         self.bytes > 0
     }
 
-    /// Notes what was taken.
+    /// Removes the bytes of an answer.
     pub(super) fn spend(&mut self, bytes: u64) {
         self.bytes = self.bytes.saturating_sub(bytes);
     }

@@ -1,53 +1,54 @@
-use super::part_stamps::PartStamps;
+use super::range_versions::RangeVersions;
 use super::set::position_of;
 use super::set_range::SetRange;
 use crate::space::{Grid, VoxelIndex};
 use std::collections::{HashMap, VecDeque};
 
-/// By which packet each voxel was last changed, for recent packets: what comes late must not undo what came before it.
+/// The version of each recently changed voxel: the packet that changed it last. A late packet must not undo a later
+/// one.
 ///
-/// What is older than the oldest stamp is not to be taken any more.
+/// Packets older than the oldest version kept are refused.
 #[derive(Clone, Debug)]
-pub(super) struct Stamps {
-    /// Hashed with a seed, since the voxels are others' choice.
+pub(super) struct VoxelVersions {
+    /// Hashed with a seed, because others choose the voxels.
     last: HashMap<VoxelIndex, u64>,
-    /// Packets and their voxels, in the order in which they came.
+    /// Packets and their voxels, in the order of arrival.
     noted: VecDeque<(u64, VoxelIndex)>,
     max_voxels: usize,
-    /// The latest packet of them.
+    /// The latest of these packets.
     newest: u64,
-    /// Parts of the set that were replaced whole, and as of which packet.
-    parts: PartStamps,
-    /// Packets up to this one are not taken.
+    /// Versions of ranges that were replaced as a whole.
+    parts: RangeVersions,
+    /// Packets up to this one are refused.
     forgotten: u64,
 }
 
-/// Voxels of packets that are remembered, at most: a minute of a dense lidar.
+/// Most versions of voxels: a minute of a dense lidar.
 const MAX_VOXELS: usize = 1 << 18;
-/// And at least: those of a packet.
+/// Fewest versions of voxels: those of a packet.
 const MIN_VOXELS: usize = 1 << 12;
-/// Parts that are remembered.
+/// Most versions of ranges.
 const MAX_PARTS: usize = 4096;
 
-/// Bytes that a voxel takes at most: in a table that was just doubled, and in a queue that was.
-const BYTES_A_VOXEL: usize =
+/// Most bytes per voxel: in a table and a queue that just doubled.
+const BYTES_PER_VOXEL: usize =
     (size_of::<(VoxelIndex, u64)>() + 1) * 16 / 7 + 2 * size_of::<(u64, VoxelIndex)>();
-/// Bytes of all parts, at most: 11 in a node, five at least.
+/// Upper bound of the bytes of all ranges: a node has room for 11 and holds at least five.
 const BYTES_OF_PARTS: usize = MAX_PARTS / 5 * 11 * 2 * size_of::<SetRange>();
 
-impl Stamps {
-    /// Of a stream from a packet on, which remembers as much as so many bytes take.
+impl VoxelVersions {
+    /// The versions of a stream after packet `forgotten`, in at most so many bytes.
     pub(super) fn new(forgotten: u64, bytes: usize) -> Self {
-        let (last, noted, parts) = (HashMap::new(), VecDeque::new(), PartStamps::default());
+        let (last, noted, parts) = (HashMap::new(), VecDeque::new(), RangeVersions::default());
         Self { last, noted, max_voxels: voxels_of(bytes), newest: forgotten, parts, forgotten }
     }
 
-    /// Bytes of memory, at most, of stamps that were given so many.
-    pub(super) fn most_bytes(bytes: usize) -> usize {
-        voxels_of(bytes) * BYTES_A_VOXEL + BYTES_OF_PARTS
+    /// Upper bound of the bytes of memory for a limit of `bytes`.
+    pub(super) fn max_bytes(bytes: usize) -> usize {
+        voxels_of(bytes) * BYTES_PER_VOXEL + BYTES_OF_PARTS
     }
 
-    /// Goes on with other room.
+    /// Changes the limit.
     pub(super) fn set_bytes(&mut self, bytes: usize) {
         let before = std::mem::replace(&mut self.max_voxels, voxels_of(bytes));
         if self.max_voxels < before {
@@ -61,41 +62,41 @@ impl Stamps {
         self.forgotten
     }
 
-    /// Whether a voxel is as a later packet than this one left it.
+    /// Whether a later packet has changed a voxel.
     pub(super) fn is_later(&self, grid: &Grid, voxel: VoxelIndex, sequence: u64) -> bool {
-        // A part holds the packet that it is as of.
+        // A range includes the packet of its version.
         self.was_changed_after(voxel, sequence) || self.parts.is_as_of(position_of(grid, voxel), sequence)
     }
 
-    /// Whether a later packet than this one changed a voxel by itself, not as one of a part.
+    /// Whether a later packet has changed a voxel by itself, not with a range.
     pub(super) fn was_changed_after(&self, voxel: VoxelIndex, sequence: u64) -> bool {
-        self.newest > sequence && self.last.get(&voxel).is_some_and(|&stamp| stamp > sequence)
+        self.newest > sequence && self.last.get(&voxel).is_some_and(|&version| version > sequence)
     }
 
-    /// What of a range was not replaced as of this packet or a later one.
+    /// The parts of a range that were not replaced as of this packet or a later one.
     pub(super) fn not_replaced(&self, range: SetRange, as_of: u64) -> Vec<SetRange> {
         self.parts.gaps(range, as_of)
     }
 
-    /// Notes the voxels of a packet.
+    /// Sets the version of a packet's voxels.
     pub(super) fn note(&mut self, sequence: u64, voxels: impl ExactSizeIterator<Item = VoxelIndex>) {
-        // First, so that there never are more.
+        // First, so that the limit is never exceeded.
         self.forget_all_but(self.max_voxels.saturating_sub(voxels.len()));
         self.newest = self.newest.max(sequence);
         for voxel in voxels {
             if self.noted.len() == self.max_voxels {
-                // A packet of more than all: as good as forgotten.
+                // A packet that exceeds the limit is treated as forgotten.
                 self.forget_all_but(0);
                 self.forget_up_to(sequence);
                 return;
             }
-            let stamp = self.last.entry(voxel).or_insert(sequence);
-            *stamp = sequence.max(*stamp);
+            let version = self.last.entry(voxel).or_insert(sequence);
+            *version = sequence.max(*version);
             self.noted.push_back((sequence, voxel));
         }
     }
 
-    /// Notes that a part of the set is as of a packet.
+    /// Sets the version of a range of the set.
     pub(super) fn note_part(&mut self, range: SetRange, as_of: u64) {
         self.parts.note(range, as_of);
         while self.parts.len() > MAX_PARTS
@@ -113,7 +114,7 @@ impl Stamps {
             }
             self.noted.pop_front();
             forgotten = forgotten.max(sequence);
-            if self.last.get(&voxel).is_some_and(|&stamp| stamp <= forgotten) {
+            if self.last.get(&voxel).is_some_and(|&version| version <= forgotten) {
                 self.last.remove(&voxel);
             }
         }
@@ -129,5 +130,5 @@ impl Stamps {
 }
 
 fn voxels_of(bytes: usize) -> usize {
-    (bytes / BYTES_A_VOXEL).clamp(MIN_VOXELS, MAX_VOXELS)
+    (bytes / BYTES_PER_VOXEL).clamp(MIN_VOXELS, MAX_VOXELS)
 }

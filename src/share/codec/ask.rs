@@ -3,17 +3,17 @@ use super::packet::{VERSION, put_range, read_range, seal, unseal};
 use crate::error::FormatError;
 use crate::share::set_range::SetRange;
 
-/// What a receiver asks a sender for.
+/// A request of a receiver to a sender.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ask {
-    /// Its status, with this number in it: only an answer to this ask has it.
+    /// Its status. Only an answer to this request repeats the nonce.
     Status {
         /// Any number but 0.
         nonce: u64,
     },
-    /// The voxels of packets that did not come, as they are now.
+    /// The present voxels of lost packets.
     Missing {
-        /// Whose packets.
+        /// The sender's epoch.
         epoch: u32,
         /// Their numbers, ascending.
         sequences: Vec<u64>,
@@ -39,11 +39,11 @@ const MISSING: u8 = 18;
 const DIGESTS: u8 = 19;
 const CONTENT: u8 = 20;
 
-/// Most packets or parts that one ask lists.
+/// Most packets or ranges in one request.
 pub const MAX_LISTED: usize = 64;
 
 impl Ask {
-    /// The bytes of the ask, at most 1200.
+    /// The bytes of the request, at most 1200.
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = vec![VERSION];
         match self {
@@ -75,7 +75,7 @@ impl Ask {
         bytes
     }
 
-    /// The ask of some bytes.
+    /// Decodes a request.
     ///
     /// # Errors
     ///
