@@ -5,9 +5,9 @@ use crate::query::{Nearest, Shape};
 use crate::scan::{MAX_RAY_STEPS, RayWalk};
 use crate::space::{Aabb, Point, VoxelBox, VoxelIndex};
 
-/// What planners ask.
+/// Queries of planners.
 impl LocalView {
-    /// The first obstacle that a segment between two points, in metres, visits; both ends count.
+    /// The first obstacle on a segment between two points in metres, including both ends.
     ///
     /// # Errors
     ///
@@ -34,7 +34,7 @@ impl LocalView {
         }
     }
 
-    /// The largest cell around a voxel in which there is nothing.
+    /// The largest empty cell around a voxel.
     fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox> {
         let cell = |shift: u32| {
             let min = voxel.map(|k| k >> shift << shift);
@@ -46,11 +46,11 @@ impl LocalView {
         if node.block(place(2)).is_none() { cell(2) } else { None }
     }
 
-    /// The first obstacle, in no stated order, that a body touches; `None` if the body is free of collision.
+    /// An obstacle that a body touches; `None` if the body is free of collision.
     ///
     /// # Errors
     ///
-    /// A body that is not finite, or of a negative radius.
+    /// A body that is not finite, or with a negative radius.
     pub fn collision(&self, body: &Shape, obstacle: Obstacle) -> Result<Option<VoxelIndex>> {
         let around = self.voxels_around(&body.bounds()?);
         let mut found = None;
@@ -63,19 +63,19 @@ impl LocalView {
         Ok(found)
     }
 
-    /// The obstacle whose center is nearest to a point and at most `radius_m` away; of equals the one with the lowest
-    /// index.
+    /// The obstacle whose center is nearest to a point and at most `radius_m` away; at equal distances the one with the
+    /// lowest index.
     ///
     /// # Errors
     ///
-    /// A point that is not finite, a radius that is no length.
+    /// A point that is not finite, an invalid radius.
     pub fn nearest(&self, point: Point, radius_m: f64, obstacle: Obstacle) -> Result<Option<Nearest>> {
         if !(radius_m >= 0.0 && point.iter().all(|x| x.is_finite())) {
             let reason = "needs a finite point and a distance of at least 0 m";
             return Err(Error::argument("nearest obstacle", reason));
         }
         let mut best: Option<Nearest> = None;
-        // Small balls first: what is nearest is found in the first that holds anything.
+        // Small balls first: the first that holds an obstacle holds the nearest.
         let mut reach_m = self.resolution_m() * 4.0;
         loop {
             let ball_m = reach_m.min(radius_m);
@@ -96,8 +96,7 @@ impl LocalView {
         }
     }
 
-    /// The centers, in metres, of the obstacles whose center is in the half-open box: a clipped window as points, in no
-    /// stated order.
+    /// The centers, in metres, of the obstacles whose center is in the half-open box, in no particular order.
     pub fn points_in(&self, window: &Aabb, obstacle: Obstacle) -> Vec<Point> {
         let mut points = Vec::new();
         self.for_each_obstacle_in(&self.voxels_around(window), obstacle, |voxel| {
@@ -119,7 +118,7 @@ impl LocalView {
         }
     }
 
-    /// Visits the obstacles of a box, until one visit says false.
+    /// Visits the obstacles of a box until `visit` returns false.
     fn for_each_obstacle_in(
         &self,
         voxels: &VoxelBox,

@@ -1,4 +1,4 @@
-//! What a map can be asked. Works on any [`MapView`](crate::mapper::MapView), tile by tile.
+//! Queries of maps. They work on any [`MapView`](crate::mapper::MapView), tile by tile.
 //!
 //! | question | answer |
 //! |---|---|

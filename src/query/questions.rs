@@ -9,18 +9,18 @@ use crate::space::{Aabb, Point, VoxelIndex};
 use crate::tile::Voxel;
 use std::io::{self, Read, Seek, Write};
 
-/// The questions; bring this trait into scope to ask any map.
+/// The queries of a map; bring this trait into scope to use them.
 ///
-/// Points are in metres in the world frame. Every question fails only if a tile cannot be read, or if one that it
-/// pushes out of memory cannot be written.
+/// Points are in metres in the world frame. A query fails only if a tile cannot be read, or if a tile that it evicts
+/// cannot be written.
 pub trait Questions: MapView + Sized {
-    /// What the map says of the voxel that holds a point; a point that is not finite is unknown.
+    /// The occupancy of the voxel that holds a point; unknown for a point that is not finite.
     #[inline]
     fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
         Ok(Occupancy::of(self.config(), self.voxel_at(point)?.map(|voxel| voxel.evidence)))
     }
 
-    /// What the map says of many points, in their order; each tile is fetched once.
+    /// The occupancy at many points, in their order; each tile is loaded once.
     fn occupancy_at_points(&self, points: &[Point]) -> Result<Vec<Occupancy>> {
         point::occupancy_at_points(self, points)
     }
@@ -31,9 +31,9 @@ pub trait Questions: MapView + Sized {
         point::voxel_at(self, point)
     }
 
-    /// What the map says of the octree node at `depth` that holds a point: from 1, half of OctoMap's space, to 15, two voxels
-    /// wide, the largest log-odds under the node as `f32`, OctoMap's precision. At 16 the node is the voxel, and the answer
-    /// is that of [`Questions::occupancy_at`], to the bit.
+    /// The occupancy of the octree node at `depth` that holds a point: the largest log-odds under the node as `f32`,
+    /// OctoMap's precision. Depth 1 is half of OctoMap's space, depth 15 two voxels wide. At depth 16 the node is the
+    /// voxel, and the answer is bit-identical to [`Questions::occupancy_at`].
     ///
     /// # Errors
     ///
@@ -58,14 +58,14 @@ pub trait Questions: MapView + Sized {
         region::for_each_occupied(self, min_probability, region, visit)
     }
 
-    /// The occupied voxels of the whole map; large maps are better visited with [`Questions::for_each_occupied`].
+    /// The occupied voxels of the whole map. For large maps use [`Questions::for_each_occupied`].
     fn all_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
         let mut voxels = Vec::new();
         self.for_each_occupied(min_probability, None, |voxel| voxels.push(voxel))?;
         Ok(voxels)
     }
 
-    /// The occupied voxels of the tiles in memory only; the answer depends on what is there.
+    /// The occupied voxels of tiles in memory only; the answer depends on the cache.
     fn cached_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
         region::cached_occupied_voxels(self, min_probability)
     }
@@ -75,7 +75,7 @@ pub trait Questions: MapView + Sized {
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, a direction of no length.
+    /// An origin without a voxel, a zero direction.
     fn cast_ray(&self, query: &RayQuery) -> Result<Option<RayHit>> {
         ray::cast_ray(self, query)
     }
@@ -85,8 +85,8 @@ pub trait Questions: MapView + Sized {
         queries.iter().map(|query| self.cast_ray(query)).collect()
     }
 
-    /// The first voxel, in no stated order, that a body touches and that is occupied (or unknown, if that is an
-    /// obstacle); `None` if the body is free of collision.
+    /// An occupied voxel that a body touches (or an unknown one, if that is an obstacle); `None` if the body is free of
+    /// collision.
     ///
     /// # Errors
     ///
@@ -95,36 +95,36 @@ pub trait Questions: MapView + Sized {
         collision::collision(self, body, unknown)
     }
 
-    /// The occupied voxel whose center is nearest to a point and at most `max_distance_m` away; of equals the one
-    /// with the lowest index.
+    /// The occupied voxel whose center is nearest to a point and at most `max_distance_m` away; at equal distances the
+    /// one with the lowest index.
     fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Nearest>> {
         nearest::nearest_occupied(self, point, max_distance_m)
     }
 
-    /// The digest of the map's content: equal for equal maps, whatever way they came about. See `docs/format.md`.
+    /// The digest of the map's content: equal for equal maps, however they were built. See `docs/format.md`.
     fn digest(&self) -> Result<blake3::Hash> {
         digest::digest(self)
     }
 
-    /// One octree of the whole map or of a region, as OctoMap has it, in memory. Maps that are larger are written by
+    /// One octree of the whole map or of a region, as in OctoMap, in memory. For larger maps use
     /// [`Questions::write_octree`].
     ///
     /// # Errors
     ///
-    /// Voxels outside OctoMap's key range of 65536 voxels an axis around the origin; more than `max_voxels`.
+    /// Voxels outside OctoMap's key range of 65536 voxels per axis around the origin; more than `max_voxels`.
     fn merged_octree(&self, region: Option<&Aabb>, max_voxels: u64) -> Result<Octree> {
         merged::merged_octree(self, region, max_voxels)
     }
 
-    /// Writes the `.bt` or `.ot` file of [`Questions::merged_octree`]'s tree without that tree, whatever its size; returns
-    /// the number of its voxels.
+    /// Writes the `.bt` or `.ot` file of [`Questions::merged_octree`]'s tree without building the tree, whatever its
+    /// size. Returns the number of its voxels.
     ///
-    /// The spool, an empty file or a [`Cursor`](std::io::Cursor), gets as many bytes as the file. Nothing goes to `out`
-    /// before all tiles were read.
+    /// The spool, an empty file or a [`Cursor`](std::io::Cursor), receives as many bytes as the file. `out` is written
+    /// only after all tiles were read.
     ///
     /// # Errors
     ///
-    /// Voxels outside OctoMap's key range, a spool or an `out` that refuses.
+    /// Voxels outside OctoMap's key range; errors of the spool or of `out`.
     fn write_octree<E: From<Error> + From<io::Error>>(
         &self,
         export: &OctreeExport<'_>,
