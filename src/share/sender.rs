@@ -198,7 +198,7 @@ impl Sender {
         let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(resent.iter().copied()).collect();
         self.counts.updates_again += resent.len() as u64;
         match self.config.policy {
-            // A frame of repairs only is not added to the ring, or it would be repaired again.
+            // A frame of repairs only holds nothing more, or the repair of a lost repair would grow each time.
             _ if !has_changes => {}
             ExportPolicy::LastFrame => {}
             ExportPolicy::Ring(frames) => voxels.extend(self.ring.last_frames(frames - 1)),
