@@ -1,4 +1,4 @@
-use super::codec::{Ask, DigestEntry, Packet};
+use super::codec::{DigestEntry, Packet, Request};
 use super::sender::{Outgoing, ReceiverId, Sender};
 use super::set_range::SetRange;
 use crate::error::FormatError;
@@ -19,21 +19,21 @@ impl Sender {
     pub fn answer(
         &mut self,
         from: ReceiverId,
-        ask: &[u8],
+        request: &[u8],
         now: Duration,
     ) -> Result<Vec<Outgoing>, FormatError> {
-        let ask = Ask::decode(ask)?;
+        let request = Request::decode(request)?;
         self.counts.asks += 1;
         if !self.token_bucket.refill(self.config.answer_bytes_per_s, now) {
             self.counts.refused_asks += 1;
             return Ok(Vec::new());
         }
         let epoch = self.header().epoch;
-        let packets = match ask {
-            Ask::Status { nonce } => vec![self.status(nonce)],
-            Ask::Missing { epoch: asked, sequences } if asked == epoch => self.repair(&sequences),
-            Ask::Digests { epoch: asked, range } if asked == epoch => self.digests(range),
-            Ask::Content { epoch: asked, ranges } if asked == epoch => self.content(&ranges),
+        let packets = match request {
+            Request::Status { nonce } => vec![self.status(nonce)],
+            Request::Missing { epoch: requested, sequences } if requested == epoch => self.repair(&sequences),
+            Request::Digests { epoch: requested, range } if requested == epoch => self.digests(range),
+            Request::Content { epoch: requested, ranges } if requested == epoch => self.content(&ranges),
             // The request is to an earlier life of the sender.
             _ => vec![self.status(0)],
         };

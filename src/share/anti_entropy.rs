@@ -1,5 +1,5 @@
 use super::answers::after;
-use super::codec::{Ask, DigestEntry};
+use super::codec::{DigestEntry, Request};
 use super::interval_set::IntervalSet;
 use super::set::VoxelSet;
 use super::set_range::SetRange;
@@ -110,7 +110,7 @@ impl AntiEntropy {
         now: Duration,
         interval: Duration,
         patience: Duration,
-    ) -> Option<Ask> {
+    ) -> Option<Request> {
         if let Some(request) = &self.outstanding {
             let is_answered = request.rest.is_empty() || request.packets >= PACKETS_PER_REQUEST;
             let is_over = is_answered || now >= request.answered_at + patience;
@@ -120,18 +120,18 @@ impl AntiEntropy {
         }
         // Digests are not requested while there may be no room for the ranges that differ.
         let digests = if self.content.is_half_full() { None } else { self.digests.iter().next() };
-        let (ask, rest) = if let Some(range) = digests {
-            (Ask::Digests { epoch, range }, vec![range])
+        let (request, rest) = if let Some(range) = digests {
+            (Request::Digests { epoch, range }, vec![range])
         } else if !self.content.is_empty() {
             let ranges: Vec<SetRange> = self.content.iter().take(RANGES_PER_REQUEST).collect();
-            (Ask::Content { epoch, ranges: ranges.clone() }, ranges)
+            (Request::Content { epoch, ranges: ranges.clone() }, ranges)
         } else {
             self.outstanding = None;
             return None;
         };
         self.outstanding =
             Some(Outstanding { at: now, answered_at: now, packets: 0, rest: rest.into_iter().collect() });
-        Some(ask)
+        Some(request)
     }
 }
 

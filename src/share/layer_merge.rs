@@ -9,7 +9,7 @@ use crate::space::Point;
 /// Counts of a layer merged into an archive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
-pub struct FoldReport {
+pub struct LayerMergeReport {
     /// Voxels of the layer.
     pub voxels: u64,
     /// Of these, voxels that are already occupied in the archive; they are left unchanged.
@@ -29,7 +29,7 @@ const VOXELS_AT_A_TIME: usize = 1 << 16;
 ///
 /// An archive with another grid, or whose sensor model needs intensities; a tile that cannot be read or written. What
 /// was merged before an error stays.
-pub fn fold_layer(layer: &VoxelSet, mapper: &mut impl Mapper) -> Result<FoldReport> {
+pub fn merge_layer(layer: &VoxelSet, mapper: &mut impl Mapper) -> Result<LayerMergeReport> {
     if mapper.config().grid.resolution_m().to_bits() != layer.grid().resolution_m().to_bits() {
         let reason = format!(
             "{} m in the map, {} m in the layer",
@@ -38,7 +38,7 @@ pub fn fold_layer(layer: &VoxelSet, mapper: &mut impl Mapper) -> Result<FoldRepo
         );
         return Err(Error::argument("resolution", reason));
     }
-    let mut report = FoldReport { voxels: layer.len(), ..FoldReport::default() };
+    let mut report = LayerMergeReport { voxels: layer.len(), ..LayerMergeReport::default() };
     let tiles = layer.tiles().map(|tile| layer.in_range(SetRange::of_tiles(tile, tile)));
     for mut voxels in tiles {
         loop {

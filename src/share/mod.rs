@@ -27,8 +27,8 @@
 //!     for packet in sender.poll(now) {
 //!         receiver.take(&packet.bytes, now)?;
 //!     }
-//!     for ask in receiver.poll(now) {
-//!         for packet in sender.answer(7, &ask, now)? {
+//!     for request in receiver.poll(now) {
+//!         for packet in sender.answer(7, &request, now)? {
 //!             receiver.take(&packet.bytes, now)?;
 //!         }
 //!     }
@@ -69,7 +69,7 @@ mod voxel_versions;
 mod watch;
 
 pub use layer_file::{read_layer, read_layer_within, write_layer};
-pub use layer_merge::{FoldReport, fold_layer};
+pub use layer_merge::{LayerMergeReport, merge_layer};
 pub use policy::ExportPolicy;
 pub use receiver::Receiver;
 pub use receiver_config::{ReceiverConfig, ReceiverCounts};

@@ -1,4 +1,4 @@
-use super::codec::Ask;
+use super::codec::Request;
 use std::time::Duration;
 
 /// Nonces that identify the answers to status requests.
@@ -18,7 +18,7 @@ impl Nonce {
     }
 
     /// A request for a status, if one is due.
-    pub(super) fn ask(&mut self, now: Duration) -> Option<Ask> {
+    pub(super) fn request(&mut self, now: Duration) -> Option<Request> {
         if now < self.next_at {
             return None;
         }
@@ -30,7 +30,7 @@ impl Nonce {
         bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
         let nonce = (bits ^ bits >> 31).max(1);
         self.waiting = Some((nonce, now));
-        Some(Ask::Status { nonce })
+        Some(Request::Status { nonce })
     }
 
     /// When the request with this nonce was sent.

@@ -1,5 +1,5 @@
 use super::anti_entropy::AntiEntropy;
-use super::codec::{Ask, DigestEntry, Header, MAX_LISTED, Packet, Status, Update};
+use super::codec::{DigestEntry, Header, MAX_LISTED, Packet, Request, Status, Update};
 use super::differences::Content;
 use super::layer_limits::LayerLimits;
 use super::nonce::Nonce;
@@ -27,7 +27,7 @@ pub struct Receiver {
     nonce: Nonce,
     /// Since when packets have come that need a status to explain them.
     unexplained_since: Option<Duration>,
-    ask_missing_at: Duration,
+    request_missing_at: Duration,
     /// The layer was equal to the sender's set as of this packet.
     equal_as_of: Option<u64>,
     pub(super) is_over_limit: bool,
@@ -69,7 +69,7 @@ impl Receiver {
             counts: ReceiverCounts::default(),
             nonce,
             unexplained_since: None,
-            ask_missing_at: Duration::ZERO,
+            request_missing_at: Duration::ZERO,
             equal_as_of: None,
             is_over_limit: false,
             to_compare: None,
@@ -301,29 +301,34 @@ impl Receiver {
         {
             self.compare(&status, false, now);
         }
-        if !self.config.asks {
+        if !self.config.sends_requests {
             return Vec::new();
         }
-        let mut asks = Vec::new();
+        let mut requests = Vec::new();
         let mut wants_status = self.unexplained_since.is_some() || self.stream.is_none();
         if let Some(stream) = &mut self.stream {
-            if now >= self.ask_missing_at {
+            if now >= self.request_missing_at {
                 let (sequences, is_hopeless) = stream.due(now, MAX_LISTED, RETRY);
                 wants_status |= is_hopeless;
                 if !sequences.is_empty() {
-                    self.ask_missing_at = now + self.config.ask_interval;
-                    asks.push(Ask::Missing { epoch: stream.epoch, sequences });
+                    self.request_missing_at = now + self.config.request_interval;
+                    requests.push(Request::Missing { epoch: stream.epoch, sequences });
                 }
             }
-            let patience = self.config.patience + self.config.ask_interval;
-            asks.extend(self.anti_entropy.poll(stream.epoch, now, self.config.ask_interval, patience));
+            let patience = self.config.patience + self.config.request_interval;
+            requests.extend(self.anti_entropy.poll(
+                stream.epoch,
+                now,
+                self.config.request_interval,
+                patience,
+            ));
         }
         if wants_status {
-            asks.extend(self.nonce.ask(now));
+            requests.extend(self.nonce.request(now));
         }
-        let asks: Vec<Vec<u8>> = asks.iter().map(Ask::encode).collect();
-        self.counts.asks += asks.len() as u64;
-        self.counts.ask_bytes += asks.iter().map(|ask| ask.len() as u64).sum::<u64>();
-        asks
+        let requests: Vec<Vec<u8>> = requests.iter().map(Request::encode).collect();
+        self.counts.asks += requests.len() as u64;
+        self.counts.ask_bytes += requests.iter().map(|request| request.len() as u64).sum::<u64>();
+        requests
     }
 }

@@ -18,12 +18,12 @@ pub struct ReceiverConfig {
     /// Voxels outside are refused; `None` for no limit. Default: none.
     pub region: Option<VoxelBox>,
     /// Whether to send requests. Without them a receiver only listens. Default: yes.
-    pub asks: bool,
+    pub sends_requests: bool,
     /// How long to wait for late packets. Default: 0.3 s.
     pub patience: Duration,
     /// Time between two requests of a kind. A request has at most 1200 bytes, so this limits their rate. Default: 0.2
     /// s.
-    pub ask_interval: Duration,
+    pub request_interval: Duration,
     /// Seed of the nonces that tell answers from old or forged packets; others should not be able to guess it.
     pub nonce_seed: u64,
 }
@@ -36,9 +36,9 @@ impl Default for ReceiverConfig {
             max_voxels: 1 << 26,
             max_tiles: 1 << 17,
             region: None,
-            asks: true,
+            sends_requests: true,
             patience: Duration::from_millis(300),
-            ask_interval: Duration::from_millis(200),
+            request_interval: Duration::from_millis(200),
             nonce_seed: 1,
         }
     }

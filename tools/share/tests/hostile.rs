@@ -16,7 +16,7 @@ use support::{
     summaries_and_success,
 };
 use tempfile::TempDir;
-use voxtile::share::codec::{Ask, Header, Packet, Status, Update};
+use voxtile::share::codec::{Header, Packet, Request, Status, Update};
 use voxtile::simulation::Random;
 use zenoh::{Config, Session, Wait};
 
@@ -37,7 +37,7 @@ fn open(listen: &str) -> Session {
 fn answer_asks(session: &Session, robot: &'static str, resolution_m: f64) -> zenoh::pubsub::Subscriber<()> {
     let answers = session.clone();
     let take = move |sample: zenoh::sample::Sample| {
-        let Ok(Ask::Status { nonce }) = Ask::decode(&sample.payload().to_bytes()) else { return };
+        let Ok(Request::Status { nonce }) = Request::decode(&sample.payload().to_bytes()) else { return };
         let status = Status {
             header: Header { epoch: 1, sequence: 0 },
             nonce,

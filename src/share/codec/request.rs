@@ -5,7 +5,7 @@ use crate::share::set_range::SetRange;
 
 /// A request of a receiver to a sender.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
+pub enum Request {
     /// Its status. Only an answer to this request repeats the nonce.
     Status {
         /// Any number but 0.
@@ -42,7 +42,7 @@ const CONTENT: u8 = 20;
 /// Most packets or ranges in one request.
 pub const MAX_LISTED: usize = 64;
 
-impl Ask {
+impl Request {
     /// The bytes of the request, at most 1200.
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = vec![VERSION];
@@ -89,7 +89,7 @@ impl Ask {
             return Ok(Self::Status { nonce });
         }
         let epoch = u32::from_le_bytes(reader.array()?);
-        let ask = match kind {
+        let request = match kind {
             MISSING => {
                 let (mut before, mut sequences) = (0_u64, Vec::new());
                 while !reader.rest().is_empty() && sequences.len() < MAX_LISTED {
@@ -109,6 +109,6 @@ impl Ask {
             other => return Err(reader.error(format!("there are no asks of kind {other}"))),
         };
         reader.end()?;
-        Ok(ask)
+        Ok(request)
     }
 }
