@@ -21,7 +21,7 @@ fn add(said: &mut Said, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
         said.entry((tile, brick, place)).or_default().push(hit.map(f32::to_bits));
     };
     match updates {
-        TileUpdates::Once(bricks) => {
+        TileUpdates::Masks(bricks) => {
             for brick in bricks {
                 assert!(brick.hits.iter().zip(&brick.misses).all(|(hits, misses)| hits & misses == 0));
                 for (place, observation) in places(brick.touched()).zip(brick.observations()) {

@@ -181,7 +181,7 @@ impl PerScanCollector {
             report.hits += hits;
             report.misses += misses;
         }
-        let tiles = tiles.into_iter().map(|(tile, bricks)| (tile, TileUpdates::Once(bricks))).collect();
+        let tiles = tiles.into_iter().map(|(tile, bricks)| (tile, TileUpdates::Masks(bricks))).collect();
         in_order_of_tiles(grid, tiles, report)
     }
 }

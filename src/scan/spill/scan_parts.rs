@@ -110,7 +110,7 @@ impl<'a> ScanParts<'a> {
             let tiles = updates_by_tile(self.grid, &some, intensities).into_iter();
             self.add(tiles.map(|(tile, bricks)| {
                 let counts = hits_and_misses(&bricks);
-                (tile, TileUpdates::Once(bricks), counts)
+                (tile, TileUpdates::Masks(bricks), counts)
             }));
         }
     }
@@ -158,7 +158,7 @@ impl<'a> ScanParts<'a> {
                 true => {
                     let bricks = parts.merged(&records).map_err(|error| overflow.error(error))?;
                     let counts = hits_and_misses(&bricks);
-                    output.push(tile, PackedUpdates::of(&TileUpdates::Once(bricks)), overflow)?;
+                    output.push(tile, PackedUpdates::of(&TileUpdates::Masks(bricks)), overflow)?;
                     counts
                 }
                 false => {
@@ -224,7 +224,7 @@ impl Parts<'_> {
         let mut all = Vec::new();
         for &at in records {
             for updates in self.read(at)?.iter() {
-                if let TileUpdates::Once(bricks) = updates {
+                if let TileUpdates::Masks(bricks) = updates {
                     all = merge_bricks(all, bricks);
                 }
             }

@@ -11,7 +11,7 @@ pub struct PackedUpdates {
     updates: usize,
 }
 
-const ONCE: u8 = 0;
+const MASKS: u8 = 0;
 const RUNS: u8 = 1;
 const ORDERED: u8 = 2;
 
@@ -24,8 +24,8 @@ impl PackedUpdates {
         }
         let out = &mut Packer { bytes: &mut self.bytes };
         match updates {
-            TileUpdates::Once(bricks) => {
-                out.byte(ONCE);
+            TileUpdates::Masks(bricks) => {
+                out.byte(MASKS);
                 out.number(bricks.len() as u64);
                 let mut last = 0;
                 for brick in bricks {
@@ -191,7 +191,7 @@ impl<R: BufRead> Unpacker<R> {
             return Ok(None);
         }
         Ok(Some(match self.byte()? {
-            ONCE => TileUpdates::Once(self.bricks(Self::brick_update)?),
+            MASKS => TileUpdates::Masks(self.bricks(Self::brick_update)?),
             RUNS => TileUpdates::Runs(self.bricks(Self::brick_runs)?),
             _ => {
                 let voxels = self.many(|input| Ok(u32::from_le_bytes(input.take()?)))?;
@@ -297,13 +297,13 @@ mod tests {
         prop::array::uniform8(word)
     }
 
-    fn once() -> impl Strategy<Value = TileUpdates> {
+    fn masks() -> impl Strategy<Value = TileUpdates> {
         let brick = (0..1_u64 << 39, mask(), mask(), any::<bool>()).prop_map(|(code, hits, misses, has)| {
             let count: u32 = hits.iter().map(|word| word.count_ones()).sum();
             let intensities = (0..if has { count } else { 0 }).map(|k| k as f32 * 0.5).collect();
             BrickUpdate { brick: BrickCode(code), hits, misses, intensities }
         });
-        prop::collection::vec(brick, 0..6).prop_map(TileUpdates::Once)
+        prop::collection::vec(brick, 0..6).prop_map(TileUpdates::Masks)
     }
 
     fn runs() -> impl Strategy<Value = TileUpdates> {
@@ -328,7 +328,7 @@ mod tests {
     proptest! {
         #[test]
         fn what_was_packed_comes_back_in_order(
-            all in prop::collection::vec(prop_oneof![once(), runs(), ordered()], 0..8),
+            all in prop::collection::vec(prop_oneof![masks(), runs(), ordered()], 0..8),
         ) {
             let mut packed = PackedUpdates::default();
             all.iter().for_each(|updates| packed.push(updates));

@@ -22,7 +22,7 @@ impl ScanUpdates {
 #[derive(Clone, Debug, PartialEq)]
 pub enum TileUpdates {
     /// At most one update per voxel: masks per brick, in Morton order.
-    Once(Vec<BrickUpdate>),
+    Masks(Vec<BrickUpdate>),
     /// Any number of updates per voxel, those of a voxel in order: runs per brick, in Morton order.
     Runs(Vec<BrickRuns>),
     /// Any number of updates per voxel, all in order.
@@ -166,7 +166,7 @@ impl TileUpdates {
     /// Number of updates.
     pub fn len(&self) -> usize {
         match self {
-            Self::Once(bricks) => bricks
+            Self::Masks(bricks) => bricks
                 .iter()
                 .flat_map(|brick| brick.hits.iter().chain(&brick.misses))
                 .map(|word| word.count_ones() as usize)
@@ -180,7 +180,7 @@ impl TileUpdates {
     /// Whether there is no update.
     pub fn is_empty(&self) -> bool {
         match self {
-            Self::Once(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),
+            Self::Masks(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),
             Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).all(Run::is_empty),
             Self::Ordered(updates) => updates.is_empty(),
             Self::Packed(updates) => updates.is_empty(),
@@ -190,7 +190,7 @@ impl TileUpdates {
     /// Bytes of memory that the updates occupy.
     pub fn bytes(&self) -> usize {
         let heap = match self {
-            Self::Once(bricks) => {
+            Self::Masks(bricks) => {
                 let intensities: usize = bricks.iter().map(|brick| size_of_val(&*brick.intensities)).sum();
                 bricks.capacity() * size_of::<BrickUpdate>() + intensities
             }

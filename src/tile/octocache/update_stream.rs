@@ -39,7 +39,7 @@ impl<'a> UpdateStream<'a> {
         updates: &TileUpdates,
     ) {
         match updates {
-            TileUpdates::Once(bricks) => {
+            TileUpdates::Masks(bricks) => {
                 for update in bricks {
                     table.update_brick(model, update);
                     for (code, evidence) in table.voxels_of_mask(update.brick, update.touched()) {

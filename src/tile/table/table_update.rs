@@ -11,7 +11,7 @@ impl Table {
     /// Applies updates of any form; `first` is the tile's lowest voxel.
     pub fn apply(&mut self, model: &SensorModel, first: VoxelIndex, updates: &TileUpdates) {
         match updates {
-            TileUpdates::Once(bricks) => bricks.iter().for_each(|brick| self.update_brick(model, brick)),
+            TileUpdates::Masks(bricks) => bricks.iter().for_each(|brick| self.update_brick(model, brick)),
             TileUpdates::Runs(bricks) => self.update_runs(model, bricks),
             TileUpdates::Ordered(updates) => self.update_in_order(model, first, updates),
             TileUpdates::Packed(packed) => {
