@@ -81,11 +81,11 @@ impl Setting {
         &self,
         tracer: &mut ScanTracer,
         scan: &Scan,
-        most_bytes: usize,
+        max_bytes: usize,
     ) -> Result<(Said, ScanReport, usize)> {
         let Self { grid, model, rays, order } = self;
         let (mut said, mut times) = (Said::new(), 0);
-        let mut put_aside = |part: Vec<(TileIndex, PackedUpdates)>| {
+        let mut spill = |part: Vec<(TileIndex, PackedUpdates)>| {
             times += 1;
             for (tile, updates) in part {
                 add(&mut said, grid, tile, &TileUpdates::Packed(updates));
@@ -94,8 +94,7 @@ impl Setting {
         };
         let make_scratch = &|| Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
         let folder = Path::new("map");
-        let overflow =
-            Overflow { most_bytes, most_tiles: usize::MAX, folder, make_scratch, put_aside: &mut put_aside };
+        let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =
             tracer.trace_points(grid, model, rays, scan.origin, scan, *order, Some(overflow))?;
         tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
@@ -167,9 +166,8 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
     for setting in settings(10.0) {
         let Setting { grid, model, rays, order } = &setting;
         let make_scratch = &|| Err(io::Error::from(io::ErrorKind::StorageFull));
-        let (folder, put_aside) = (Path::new("some_map"), &mut |_| Ok(()));
-        let overflow =
-            Overflow { most_bytes: 1 << 16, most_tiles: usize::MAX, folder, make_scratch, put_aside };
+        let (folder, spill) = (Path::new("some_map"), &mut |_| Ok(()));
+        let overflow = Overflow { max_bytes: 1 << 16, max_tiles: usize::MAX, folder, make_scratch, spill };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
         let traced = tracer.trace_points(grid, model, rays, scan.origin, &scan, *order, Some(overflow));
         assert!(traced.unwrap_err().to_string().contains("some_map"));
@@ -185,7 +183,7 @@ proptest! {
         ends in prop::collection::vec((prop::array::uniform3(-60.0..60.0_f64), 0.0..255_f32), 1..40),
         stray in any::<bool>(),
         tile_size_m in prop::sample::select(vec![10.0, 0.4, 3.7]),
-        most_bytes in prop::sample::select(vec![0_usize, 1 << 12, 1 << 16]),
+        max_bytes in prop::sample::select(vec![0_usize, 1 << 12, 1 << 16]),
     ) {
         let mut points: Vec<Point> =
             ends.iter().map(|(way, _)| std::array::from_fn(|k| origin[k] + way[k])).collect();
@@ -198,7 +196,7 @@ proptest! {
             let (said, report) = setting.whole(&scan);
             let mut tracer = ScanTracer::with_memory_bytes(1 << 16);
             for _ in 0..2 {
-                let parts = setting.in_parts(&mut tracer, &scan, most_bytes).unwrap();
+                let parts = setting.in_parts(&mut tracer, &scan, max_bytes).unwrap();
                 prop_assert_eq!(parts.1, report);
                 prop_assert!(parts.0 == said);
             }

@@ -27,7 +27,7 @@ struct Parts<'a> {
     /// The record being made: number of updates, then the packed updates.
     record: Vec<u8>,
     lists: TileTable<PartList>,
-    most_tiles: usize,
+    max_tiles: usize,
     /// The first failure; parts added after it are dropped.
     failure: Option<Failure>,
 }
@@ -71,18 +71,18 @@ impl TileValue for PartList {
 const BRICKS_AT_A_TIME: usize = 4096;
 
 impl<'a> ScanParts<'a> {
-    /// Parts of more than `most_bytes` go to a file that is made then.
+    /// Parts of more than `max_bytes` go to a file that is made then.
     pub(crate) fn new(
         grid: &'a Grid,
-        most_bytes: usize,
-        most_tiles: usize,
+        max_bytes: usize,
+        max_tiles: usize,
         make_scratch: &'a MakeScratch<'a>,
     ) -> Self {
-        let log = PartLog::new(most_bytes, make_scratch);
+        let log = PartLog::new(max_bytes, make_scratch);
         let (record, lists, failure) = Default::default();
         Self {
             grid,
-            parts: Mutex::new(Parts { log, record, lists, most_tiles, failure }),
+            parts: Mutex::new(Parts { log, record, lists, max_tiles, failure }),
             is_empty: AtomicBool::new(true),
             has_failed: AtomicBool::new(false),
         }
@@ -131,11 +131,11 @@ impl<'a> ScanParts<'a> {
         }
     }
 
-    /// The merged updates. `report` is about the points; updates that exceed the memory limit are put aside.
+    /// The merged updates. `report` is about the points; updates that exceed the memory limit are spilled.
     ///
     /// # Errors
     ///
-    /// Those of putting aside and of the log's file; [`Error::Stopped`](crate::error::Error::Stopped).
+    /// Errors of the spill and of the log's file; [`Error::Stopped`](crate::error::Error::Stopped).
     pub(crate) fn into_updates(
         self,
         mut report: ScanReport,
@@ -199,7 +199,7 @@ impl Parts<'_> {
         list.hits += counts.0;
         list.misses += counts.1;
         self.lists.insert(tile, list);
-        if self.lists.len() > self.most_tiles { Err(Failure::TooManyTiles) } else { Ok(()) }
+        if self.lists.len() > self.max_tiles { Err(Failure::TooManyTiles) } else { Ok(()) }
     }
 
     /// Positions of a tile's parts, the oldest first.
@@ -243,7 +243,7 @@ struct OutputBuffer {
 const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, PackedUpdates)>();
 
 impl OutputBuffer {
-    /// Appends the next updates of a tile. Above the limit, all are put aside.
+    /// Appends the next updates of a tile. Above the limit, all are spilled.
     fn push(
         &mut self,
         tile: TileIndex,
@@ -256,9 +256,9 @@ impl OutputBuffer {
             Some((last, before)) if *last == tile => before.append(&packed),
             _ => self.tiles.push((tile, packed)),
         }
-        if self.bytes > overflow.most_bytes {
+        if self.bytes > overflow.max_bytes {
             self.bytes = 0;
-            (overflow.put_aside)(std::mem::take(&mut self.tiles))?;
+            (overflow.spill)(std::mem::take(&mut self.tiles))?;
         }
         Ok(())
     }

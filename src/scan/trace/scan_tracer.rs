@@ -94,12 +94,12 @@ impl ScanTracer {
         self.trace_points(grid, model, rays, scan.origin, scan, UpdateOrder::OfRays, None)
     }
 
-    /// The same for any source of points. With `overflow`, updates that exceed the memory limit are put aside and the
+    /// The same for any source of points. With `overflow`, updates that exceed the memory limit are spilled and the
     /// rest is returned. The report covers both.
     ///
     /// # Errors
     ///
-    /// As for [`ScanTracer::trace`], points that cannot be read, and those of putting aside.
+    /// As for [`ScanTracer::trace`], points that cannot be read, and Errors of the spill.
     #[expect(
         clippy::too_many_arguments,
         reason = "what a map is, what a scan is, and where there is no room, where to"
@@ -127,7 +127,7 @@ impl ScanTracer {
                 _ => scan_rays.per_ray(&mut self.per_ray),
             };
         };
-        let parts = ScanParts::new(grid, overflow.most_bytes / 4, overflow.most_tiles, overflow.make_scratch);
+        let parts = ScanParts::new(grid, overflow.max_bytes / 4, overflow.max_tiles, overflow.make_scratch);
         let report = match (is_per_scan, in_order) {
             (true, _) => match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
                 PerScanUpdates::Whole(updates) => return Ok(updates),
