@@ -76,7 +76,7 @@ impl Setting {
         (said, updates.report)
     }
 
-    /// The same with so many bytes for marks, and for updates; also, how many times some were put aside.
+    /// The same with so many bytes for marks, and for updates; also, how often updates were spilled.
     fn in_parts(
         &self,
         tracer: &mut ScanTracer,

@@ -99,7 +99,7 @@ impl ScanTracer {
     ///
     /// # Errors
     ///
-    /// As for [`ScanTracer::trace`], points that cannot be read, and Errors of the spill.
+    /// As for [`ScanTracer::trace`], points that cannot be read, and errors of the spill.
     #[expect(
         clippy::too_many_arguments,
         reason = "what a map is, what a scan is, and where there is no room, where to"
