@@ -30,7 +30,7 @@ pub struct PointRoom {
 
 /// Bytes of a point in the file: the point, and the intensity, 0 if there is none. The bytes are native, as no other
 /// process reads them.
-const RECORD_BYTES: usize = 28;
+const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
 /// Points that are read at a time.
 const POINTS_AT_A_TIME: usize = 1 << 14;
 /// Points in memory that are passed at a time. The receiver copies them into the world frame, 6 MiB; and beam coherence
@@ -121,9 +121,9 @@ impl PointStore {
         for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
             bytes.clear();
             for (number, point) in (chunk * POINTS_AT_A_TIME..).zip(points) {
-                point.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
                 let intensity = self.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
-                bytes.extend(intensity.to_le_bytes());
+                bytes.extend_from_slice(bytemuck::bytes_of(point));
+                bytes.extend_from_slice(bytemuck::bytes_of(&intensity));
             }
             file.write_all(&bytes).map_err(cannot)?;
         }
@@ -168,9 +168,9 @@ impl PointStore {
             points.clear();
             intensities.clear();
             for record in bytes.chunks_exact(RECORD_BYTES) {
-                let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| record[8 * k + byte]));
-                points.push([number(0), number(1), number(2)]);
-                intensities.push(f32::from_le_bytes(std::array::from_fn(|byte| record[24 + byte])));
+                let (point, intensity) = record.split_at(size_of::<Point>());
+                points.push(bytemuck::pod_read_unaligned::<Point>(point));
+                intensities.push(bytemuck::pod_read_unaligned::<f32>(intensity));
             }
             if !take(&points, self.has_intensities().then_some(&*intensities)) {
                 return Ok(());
