@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct OutOfCoreTileMapper {
     config: MapConfig,
     scan_number: u64,
-    /// Questions take `&self` and may bring tiles in.
+    /// Queries take `&self` and may bring tiles in.
     residency: Mutex<Residency>,
     tracer: ScanTracer,
 }

@@ -2,7 +2,7 @@ use super::set::VoxelSet;
 use super::set_range::SetRange;
 use crate::error::{Error, Result};
 use crate::mapper::Mapper;
-use crate::query::Questions;
+use crate::query::Queries;
 use crate::scan::PointBatch;
 use crate::space::Point;
 

@@ -1,7 +1,7 @@
 use super::set::VoxelSet;
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::query::{Occupancy, Questions, Shape, UnknownAs, voxels_around};
+use crate::query::{Occupancy, Queries, Shape, UnknownAs, voxels_around};
 use crate::scan::{MAX_RAY_STEPS, RayWalk};
 use crate::space::{Grid, Point, VoxelIndex};
 

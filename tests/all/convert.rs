@@ -7,7 +7,7 @@ use voxtile::session::{Part, convert, crop};
 use voxtile::space::Aabb;
 use voxtile::upkeep::verify_on;
 use voxtile::{
-    Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Result, Scan, Storage,
+    Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Result, Scan, Storage,
 };
 
 const INPUT: &str = "random scans";

@@ -42,7 +42,7 @@ mod octocache;
 mod octomap_files;
 /// Octree files of maps beyond memory: those of the whole tree, to the byte.
 mod octree_export;
-/// Questions against brute force.
+/// Queries against brute force.
 mod questions;
 /// Scans from files, good and bad.
 mod readers;

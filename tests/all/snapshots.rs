@@ -12,7 +12,7 @@ use voxtile::session::{
 };
 use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileStore};
 use voxtile::upkeep::{Severity, repair_on, verify_on};
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan, Storage};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Scan, Storage};
 
 fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()

@@ -81,7 +81,7 @@ fn batches_in_flight(tile: &Tile) -> usize {
 }
 
 #[test]
-fn questions_see_what_is_in_flight_the_newest_first() {
+fn queries_see_what_is_in_flight_the_newest_first() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     let gate = hold(&octrees);
@@ -107,7 +107,7 @@ fn questions_see_what_is_in_flight_the_newest_first() {
 }
 
 #[test]
-fn questions_do_not_wait_for_a_tree_that_is_being_written() {
+fn queries_do_not_wait_for_a_tree_that_is_being_written() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     update(&mut tile, 0..200, true);

@@ -8,7 +8,7 @@ use voxtile::share::{
     LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, WithLayers, merge_layer, read_layer, write_layer,
 };
 use voxtile::space::VoxelIndex;
-use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Questions, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Queries, Scan};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 1.0).unwrap().with_range(0.0, 3.0)

@@ -13,7 +13,7 @@ use std::io::{self, Read, Seek, Write};
 ///
 /// Points are in metres in the world frame. A query fails only if a tile cannot be read, or if a tile that it evicts
 /// cannot be written.
-pub trait Questions: MapView + Sized {
+pub trait Queries: MapView + Sized {
     /// The occupancy of the voxel that holds a point; unknown for a point that is not finite.
     #[inline]
     fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
@@ -33,7 +33,7 @@ pub trait Questions: MapView + Sized {
 
     /// The occupancy of the octree node at `depth` that holds a point: the largest log-odds under the node as `f32`,
     /// OctoMap's precision. Depth 1 is half of OctoMap's space, depth 15 two voxels wide. At depth 16 the node is the
-    /// voxel, and the answer is bit-identical to [`Questions::occupancy_at`].
+    /// voxel, and the answer is bit-identical to [`Queries::occupancy_at`].
     ///
     /// # Errors
     ///
@@ -58,7 +58,7 @@ pub trait Questions: MapView + Sized {
         region::for_each_occupied(self, min_probability, region, visit)
     }
 
-    /// The occupied voxels of the whole map. For large maps use [`Questions::for_each_occupied`].
+    /// The occupied voxels of the whole map. For large maps use [`Queries::for_each_occupied`].
     fn all_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
         let mut voxels = Vec::new();
         self.for_each_occupied(min_probability, None, |voxel| voxels.push(voxel))?;
@@ -80,7 +80,7 @@ pub trait Questions: MapView + Sized {
         ray::cast_ray(self, query)
     }
 
-    /// [`Questions::cast_ray`] for many rays, in their order.
+    /// [`Queries::cast_ray`] for many rays, in their order.
     fn cast_rays(&self, queries: &[RayQuery]) -> Result<Vec<Option<RayHit>>> {
         queries.iter().map(|query| self.cast_ray(query)).collect()
     }
@@ -107,7 +107,7 @@ pub trait Questions: MapView + Sized {
     }
 
     /// One octree of the whole map or of a region, as in OctoMap, in memory. For larger maps use
-    /// [`Questions::write_octree`].
+    /// [`Queries::write_octree`].
     ///
     /// # Errors
     ///
@@ -116,7 +116,7 @@ pub trait Questions: MapView + Sized {
         merged::merged_octree(self, region, max_voxels)
     }
 
-    /// Writes the `.bt` or `.ot` file of [`Questions::merged_octree`]'s tree without building the tree, whatever its
+    /// Writes the `.bt` or `.ot` file of [`Queries::merged_octree`]'s tree without building the tree, whatever its
     /// size. Returns the number of its voxels.
     ///
     /// The spool, an empty file or a [`Cursor`](std::io::Cursor), receives as many bytes as the file. `out` is written
@@ -135,4 +135,4 @@ pub trait Questions: MapView + Sized {
     }
 }
 
-impl<V: MapView> Questions for V {}
+impl<V: MapView> Queries for V {}
