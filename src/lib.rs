@@ -65,6 +65,7 @@ pub mod local;
 pub mod mapper;
 pub mod maths;
 pub mod octree;
+mod persistence;
 pub mod query;
 pub mod scan;
 mod scratch;

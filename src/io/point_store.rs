@@ -210,7 +210,8 @@ mod tests {
     #[test]
     fn points_come_back_from_file_and_memory_in_order() {
         let folder = tempfile::TempDir::new().unwrap();
-        let count = 3 * POINTS_AT_A_TIME + 77;
+        // More than is handed over at a time, from memory and from the file.
+        let count = POINTS_HANDED_OVER + 3 * POINTS_AT_A_TIME + 77;
         for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
             let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));
             store.begin(has_intensities);

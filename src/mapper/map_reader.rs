@@ -1,9 +1,10 @@
 use super::statistics::IoCounts;
-use super::tile_files::{self, ReadTable};
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::MapConfig;
-use crate::error::{Error, FormatError, Result};
-use crate::space::{Grid, TileIndex};
+use crate::error::{Error, Result};
+use crate::persistence::config_from;
+use crate::persistence::load::{self, ReadTable};
+use crate::space::TileIndex;
 use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStamp, TileStore};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
@@ -193,12 +194,11 @@ impl MapReader {
 
     /// The table of a tile as it stands in its file, which is not kept in memory; `None` if the map has no such tile.
     pub(crate) fn read_table(&self, index: TileIndex) -> Result<Option<ReadTable>> {
-        tile_files::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
+        load::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
     }
 
     fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-        tile_files::load(&self.store, &self.config.grid, &self.octrees, index)
-            .map_err(|error| self.explain(error))
+        load::load(&self.store, &self.config.grid, &self.octrees, index).map_err(|error| self.explain(error))
     }
 
     /// A tile that does not match the log is damage, unless a writer has flushed since and did not see this reader.
@@ -264,7 +264,7 @@ impl MapView for MapReader {
         if let Some(tile) = cached {
             return Ok(Some(TileRef::shared(tile)));
         }
-        let loaded = tile_files::load_in_passing(&self.store, &self.config.grid, index);
+        let loaded = load::load_in_passing(&self.store, &self.config.grid, index);
         let loaded = loaded.map_err(|error| self.explain(error))?;
         Ok(loaded.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
     }
@@ -287,18 +287,4 @@ impl MapView for MapReader {
         cache.tiles.iter().for_each(|(_, tile)| statistics.cached += tile.counts());
         statistics
     }
-}
-
-/// The configuration in a map's metadata; a map of the seed's format has the default sensor model.
-pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig> {
-    let wrong = |error: String| FormatError::at_offset(0, error).in_map(path, None);
-    let grid =
-        Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
-    let mut config = MapConfig { grid, storage: metadata.storage(), ..MapConfig::default() };
-    if let Some(ext) = &metadata.ext {
-        config.sensor_model = ext.sensor_model;
-        config.occupancy_threshold = ext.occupancy_threshold;
-        config.rays = ext.rays;
-    }
-    config.validated().map_err(|error| wrong(error.to_string()))
 }

@@ -1,7 +1,8 @@
 use super::map_writer::{MapWriter, WrittenMap};
 use crate::config::Storage;
 use crate::error::Result;
-use crate::mapper::{MapReader, MapView, new_map_id, new_metadata};
+use crate::mapper::{MapReader, MapView};
+use crate::persistence::{new_map_id, new_metadata};
 use std::path::Path;
 
 /// Writes a map anew with another storage, or the same: a new map in `folder`, which does not exist yet or is empty, with

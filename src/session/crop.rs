@@ -2,7 +2,8 @@ use super::map_writer::{MapWriter, WrittenMap};
 use super::part::{Part, Share};
 use super::table_change::voxels_of_part;
 use crate::error::Result;
-use crate::mapper::{MapReader, MapView, new_map_id, new_metadata};
+use crate::mapper::{MapReader, MapView};
+use crate::persistence::{new_map_id, new_metadata};
 use crate::store::Metadata;
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 use crate::config::MapConfig;
 use crate::error::Result;
-use crate::mapper::adoption::adopt;
-use crate::mapper::tile_saver::TileSaver;
-use crate::mapper::{config_from, new_metadata, tile_files};
+use crate::persistence::TileSaver;
+use crate::persistence::upgrade;
+use crate::persistence::{config_from, load, new_metadata};
 use crate::space::TileIndex;
 use crate::store::{Disk, Extension, TileStamp, TileStore};
 use crate::tile::Table;
@@ -69,7 +69,7 @@ impl MapEditor {
 
     /// The table of a tile; an empty one where there is none.
     pub(super) fn table(&self, tile: TileIndex) -> Result<Table> {
-        let read = tile_files::load_table(&self.store, &self.config.grid, tile)?;
+        let read = load::load_table(&self.store, &self.config.grid, tile)?;
         Ok(read.map(|read| read.table).unwrap_or_default())
     }
 
@@ -104,6 +104,6 @@ impl MapEditor {
     fn begin_writing(&mut self) -> Result<()> {
         self.is_written_to = true;
         let Self { saver, config, store, .. } = self;
-        adopt(store, saver, config, |map_id| new_metadata(config, map_id, &[]))
+        upgrade(store, saver, config, |map_id| new_metadata(config, map_id, &[]))
     }
 }

@@ -1,7 +1,7 @@
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::mapper::tile_saver::TileSaver;
-use crate::mapper::{config_from, new_map_id, new_metadata};
+use crate::persistence::TileSaver;
+use crate::persistence::{config_from, new_map_id, new_metadata};
 use crate::space::TileIndex;
 use crate::store::{Disk, FsDisk, Metadata, UnfinishedMap, id_from_hex};
 use crate::tile::Table;

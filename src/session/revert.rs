@@ -1,9 +1,9 @@
 use super::snapshot::check_is_free;
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
-use crate::mapper::config_from;
-use crate::mapper::tile_files::read_stored_table;
-use crate::mapper::tile_saver::TileSaver;
+use crate::persistence::TileSaver;
+use crate::persistence::config_from;
+use crate::persistence::load::read_stored_table;
 use crate::space::TileIndex;
 use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileFile, TileStamp, TileStore};
 use serde::Serialize;

@@ -3,7 +3,7 @@
 use super::snapshots::last_known_flush;
 use crate::config::{MapConfig, Storage};
 use crate::error::{Error, FormatError, Result, is_of_medium};
-use crate::mapper::tile_files::{ReadTable, read_stored_table};
+use crate::persistence::load::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
     Commits, Disk, Extension, FileStamp, Layout, MAX_NUMBER, MapParameters, Metadata, Remains, Snapshot,
@@ -76,7 +76,7 @@ fn index_from_tiles(
     let trailers = Trailers::of(disk, layout, &tiles)?;
     let written = remains.metadata.as_ref().ok();
     let (map_id, metadata) = identity(layout, remains, &trailers)?;
-    let config = crate::mapper::config_from(&metadata, &layout.metadata())?;
+    let config = crate::persistence::config_from(&metadata, &layout.metadata())?;
     let known_scan = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.scan_number);
     let written_flush = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.flush_number);
     let known_flush = last_known_flush(disk, layout, map_id, &tiles);

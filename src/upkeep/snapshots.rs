@@ -2,7 +2,7 @@
 
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::mapper::tile_files;
+use crate::persistence::load;
 use crate::space::TileIndex;
 use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStamp, TileStore};
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ pub(super) fn lost_tiles(
         if is_known {
             continue;
         }
-        match tile_files::load_table(&past, &config.grid, tile) {
+        match load::load_table(&past, &config.grid, tile) {
             Ok(_) => drop(kept.map(|flush_number| whole.insert((tile, flush_number), stamp))),
             Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => {
                 lost.push((tile, error))

@@ -1,6 +1,6 @@
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result, is_of_medium};
-use crate::mapper::tile_files::{self, ReadTable};
+use crate::persistence::load::{self, ReadTable};
 use crate::space::TileIndex;
 use crate::store::{Disk, FileStamp, Stamping, TileFile, TileStamp, TileStore};
 use std::io::{self, Read, Write};
@@ -24,7 +24,7 @@ pub(super) fn check_tile(
     config: &MapConfig,
     tile: TileIndex,
 ) -> Result<TileCheck> {
-    let table = match tile_files::load_table(store, &config.grid, tile) {
+    let table = match load::load_table(store, &config.grid, tile) {
         Ok(Some(table)) => Ok(table),
         Ok(None) => {
             let path = store.layout().current(tile, TileFile::Table);

@@ -4,7 +4,7 @@ use super::snapshots::{WholeTables, lost_tiles};
 use super::tile_check::{check_tile, first_difference, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
-use crate::mapper::config_from;
+use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
     Disk, EntryKind, FsDisk, Layout, QUARANTINE, Remains, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotList,

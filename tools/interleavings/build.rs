@@ -4,27 +4,32 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 20] = [
+const SOURCES: [&str; 25] = [
     "tile/octocache/octree_statistics.rs",
     "tile/octocache/octree_worker.rs",
     "tile/octocache/shared_tree.rs",
     "tile/octocache/work_queue.rs",
-    "mapper/adoption.rs",
-    "mapper/cold_tiles.rs",
-    "mapper/flush.rs",
-    "mapper/look_ahead.rs",
-    "mapper/map_id.rs",
-    "mapper/pending.rs",
-    "mapper/residency.rs",
-    "mapper/resident_tiles.rs",
-    "mapper/room.rs",
-    "mapper/side_worker.rs",
-    "mapper/stalls.rs",
     "mapper/statistics.rs",
-    "mapper/tile_files.rs",
-    "mapper/tile_saver.rs",
-    "mapper/tile_traffic.rs",
-    "mapper/waiting.rs",
+    "mapper/paging/buffered_updates.rs",
+    "mapper/paging/compact_tiles.rs",
+    "mapper/paging/eviction.rs",
+    "mapper/paging/flush.rs",
+    "mapper/paging/prefetch.rs",
+    "mapper/paging/resident_tiles.rs",
+    "mapper/paging/stalls.rs",
+    "mapper/paging/tile_cache.rs",
+    "mapper/paging/tile_disk.rs",
+    "mapper/paging/tile_pager.rs",
+    "mapper/paging/tile_span.rs",
+    "mapper/paging/write_buffer.rs",
+    "persistence/compact_tile.rs",
+    "persistence/io_threads.rs",
+    "persistence/load.rs",
+    "persistence/map_id.rs",
+    "persistence/parameters.rs",
+    "persistence/tile_saver.rs",
+    "persistence/upgrade.rs",
+    "persistence/worker.rs",
 ];
 
 fn main() {
