@@ -117,7 +117,7 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
     modes.map(setting).into()
 }
 
-/// Rays all around, of which many are alike.
+/// Rays all around, many of them alike.
 fn dense(rays: u32, reach_m: f64) -> Scan {
     let origin = [0.03, -0.02, 0.05];
     let point = |k: u32| -> Point {

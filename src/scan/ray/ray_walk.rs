@@ -6,19 +6,18 @@ pub const MAX_RAY_STEPS: u64 = 1_000_000;
 /// The exact 6-connected walk of a ray through the voxels it meets (Amanatides and Woo, "A fast voxel
 /// traversal algorithm for ray tracing", Eurographics 1987), in closed form.
 ///
-/// In units of voxels, the time of an axis' k-th crossing is `(boundary_k - origin) * inv_direction`, computed
-/// anew each time and never accumulated; of equal times the lowest axis goes first. So whether a ray visits a
-/// voxel depends on that voxel and the ray alone, and every algorithm that keeps to the formula visits the same
-/// voxels.
+/// In units of voxels, the time of an axis' k-th crossing is `(boundary_k - origin) * inv_direction`, computed anew
+/// each time and never accumulated; at equal times the lowest axis goes first. So whether a ray visits a voxel depends
+/// on that voxel and the ray alone, and every algorithm that uses this formula visits the same voxels.
 #[derive(Clone, Debug)]
 pub struct RayWalk {
     origin: Point,
     inv_direction: Point,
     step: [i32; 3],
     voxel: VoxelIndex,
-    /// Time of the next crossing along each axis; infinite where none is left.
+    /// Time of the next crossing along each axis; infinite if there is none.
     next: Point,
-    /// Where each axis stops crossing.
+    /// The last voxel.
     last: VoxelIndex,
     /// Time at which the present voxel was entered.
     entry: f64,
@@ -33,8 +32,8 @@ impl RayWalk {
         Self::new(origin, start, direction, last)
     }
 
-    /// The walk from `origin`, in units of voxels and inside the voxel `start`, along `direction`, in units of
-    /// voxels a unit of time, without an end short of the limits of `i32`.
+    /// The walk from `origin`, in units of voxels and inside the voxel `start`, along `direction`, in voxels per unit
+    /// of time, up to the limits of `i32`.
     pub fn along(origin: Point, start: VoxelIndex, direction: Point) -> Self {
         let last = std::array::from_fn(|k| match direction[k] {
             d if d > 0.0 => i32::MAX - 1,
@@ -58,7 +57,7 @@ impl RayWalk {
         walk
     }
 
-    /// The same walk from a later voxel on, one that it visits.
+    /// The same walk, continued from a later voxel that it visits.
     pub(crate) fn resumed_at(mut self, voxel: VoxelIndex) -> Self {
         self.voxel = voxel;
         self.next = std::array::from_fn(|axis| self.crossing(axis, voxel[axis]));
@@ -80,7 +79,7 @@ impl RayWalk {
         self.entry
     }
 
-    /// Goes to the next voxel; at the last one it stays where it is.
+    /// Steps to the next voxel; stays at the last one.
     #[inline]
     pub fn advance(&mut self) {
         let axis = self.next_axis();
@@ -93,7 +92,7 @@ impl RayWalk {
 
     /// Visits every voxel from the present one up to, not including, the last.
     ///
-    /// The same steps as [`RayWalk::advance`] takes, with everything in registers: a scan takes millions of them.
+    /// The same steps as [`RayWalk::advance`], with everything in registers: a scan takes millions of them.
     #[inline]
     pub fn for_each_before_end(self, mut visit: impl FnMut(VoxelIndex)) {
         let [ox, oy, oz] = self.origin;
@@ -123,10 +122,10 @@ impl RayWalk {
         self.voxel == self.last
     }
 
-    /// Goes to the first voxel outside `region`, which holds the present voxel: where single steps would lead.
-    /// Stops at the last voxel if that comes first.
+    /// Jumps to the first voxel outside `region`, which holds the present voxel, as single steps would. Stops at the
+    /// last voxel if that comes first.
     pub fn leave(&mut self, region: &VoxelBox) {
-        // Along each axis, the last voxel inside the region; its crossing is the one that leaves.
+        // Along each axis, the last voxel inside the region; its crossing leaves the region.
         let border: VoxelIndex = std::array::from_fn(|k| match self.step[k] {
             1 => (region.end[k] - 1).min(self.last[k]),
             -1 => region.min[k].max(self.last[k]),
@@ -149,14 +148,14 @@ impl RayWalk {
         self.entry = exit;
     }
 
-    /// Goes to the first voxel inside `region`, where single steps would lead; the present one if it is inside. False, and
-    /// nowhere, if the ray from here on never meets the region.
+    /// Jumps to the first voxel inside `region`, as single steps would; stays if the present one is inside. Returns
+    /// `false`, without moving, if the rest of the ray never meets the region.
     pub fn enter(&mut self, region: &VoxelBox) -> bool {
         if region.is_empty() {
             return false;
         }
-        // Along each axis that is not inside yet, the crossing that brings it in. The last of these enters the region; of
-        // equal times the highest axis goes last.
+        // Along each axis that is not inside yet, the crossing that enters the region's range. The last of these enters
+        // the region; at equal times the highest axis goes last.
         let mut entry: Option<(f64, usize)> = None;
         for axis in 0..3 {
             let (voxel, first, last) = (self.voxel[axis], region.min[axis], region.end[axis] - 1);
@@ -177,7 +176,7 @@ impl RayWalk {
             true => region.end[axis] - 1,
             false => self.voxel_before(axis, self.last[axis], time, axis < entry_axis),
         });
-        // Along another axis the ray may have left the region's width by then.
+        // Along another axis the ray may have left the region's range by then.
         if !region.contains(voxel) {
             return false;
         }
@@ -187,9 +186,8 @@ impl RayWalk {
         true
     }
 
-    /// The voxel along `axis`, between the present one and `border`, that the ray is in when `exit` comes:
-    /// crossings before `exit` are done, and those at `exit` if `ties_first`. Times grow along the ray, so the
-    /// border between done and not done is found by bisection.
+    /// The voxel along `axis`, between the present one and `border`, at time `exit`: crossings before `exit` are done,
+    /// and those at `exit` if `ties_first`. Times ascend along the ray, so bisection finds the voxel.
     fn voxel_before(&self, axis: usize, border: i32, exit: f64, ties_first: bool) -> i32 {
         let done = |voxel: i32| {
             let time = self.crossing(axis, voxel);
@@ -224,7 +222,7 @@ impl RayWalk {
     }
 }
 
-/// The axis with the least time, the lowest of equals.
+/// The axis with the least time, the lowest at equal times.
 #[inline]
 fn earliest(times: Point) -> usize {
     let [x, y, z] = times;
@@ -283,7 +281,7 @@ mod tests {
             let visited = voxels(ray);
             prop_assert_eq!(visited.len(), steps + 1);
             for voxel in &visited {
-                // The slab test, with room for rounding.
+                // The slab test, with a margin for rounding.
                 let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
                 for k in 0..3 {
                     let d = to[k] - from[k];
