@@ -15,7 +15,7 @@ const OUT_BYTES: usize = 1 << 16;
 /// # Errors
 ///
 /// An input that cannot be read, an output that cannot be written.
-pub(super) fn unpack(input: &mut impl Read, len: u64, out: impl Write) -> io::Result<bool> {
+pub(super) fn decompress(input: &mut impl Read, len: u64, out: impl Write) -> io::Result<bool> {
     let mut output = Output { tail: Vec::with_capacity(WINDOW_BYTES + OUT_BYTES + 512), done: 0, out };
     let mut literal = [0; 32];
     while let Some(control) = next(input)? {
@@ -49,7 +49,7 @@ pub(super) fn unpack(input: &mut impl Read, len: u64, out: impl Write) -> io::Re
 
 /// Whether so many compressed bytes can become so many: LZF compresses at most 264 bytes into 3. Refuses claims that
 /// would only size an allocation.
-pub(super) fn can_be(packed: u64, unpacked: u64) -> bool {
+pub(super) fn is_possible(packed: u64, unpacked: u64) -> bool {
     unpacked / 128 <= packed
 }
 
@@ -88,7 +88,7 @@ mod tests {
 
     fn unpacked(packed: &[u8], len: u64) -> Option<Vec<u8>> {
         let mut out = Vec::new();
-        unpack(&mut &*packed, len, &mut out).unwrap().then_some(out)
+        decompress(&mut &*packed, len, &mut out).unwrap().then_some(out)
     }
 
     #[test]
@@ -101,7 +101,7 @@ mod tests {
         }
         assert_eq!(unpacked(&packed, 21), None);
         assert_eq!(unpacked(&[], u64::MAX), None);
-        assert!(!can_be(10, u64::MAX) && can_be(10, 880));
+        assert!(!is_possible(10, u64::MAX) && is_possible(10, 880));
     }
 
     #[test]

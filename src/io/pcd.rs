@@ -237,13 +237,13 @@ fn read_compressed(
     if wanted == 0 {
         return Ok(());
     }
-    if !lzf::can_be(packed, wanted) {
+    if !lzf::is_possible(packed, wanted) {
         return Err(wrong("the packed data is damaged".into()));
     }
     let mut fields = Fields::new(points.room(), wanted)?;
     let is_whole = match &mut fields {
-        Fields::InMemory(bytes) => lzf::unpack(&mut input.take(packed), wanted, bytes)?,
-        Fields::InFile(file) => lzf::unpack(&mut input.take(packed), wanted, file)?,
+        Fields::InMemory(bytes) => lzf::decompress(&mut input.take(packed), wanted, bytes)?,
+        Fields::InFile(file) => lzf::decompress(&mut input.take(packed), wanted, file)?,
     };
     if !is_whole {
         return Err(wrong("the packed data is damaged".into()));

@@ -1,7 +1,7 @@
 use super::cells::{CELL_VOXELS, Cells};
-use super::packed::Packed;
 use super::palette::{Palette, StateId};
 use super::summary::{Summary, larger};
+use super::unpadded_evidence::UnpaddedEvidence;
 use crate::octree::BrickNodes;
 use crate::sensor::Evidence;
 use crate::space::{BrickCode, BrickMask, places};
@@ -21,7 +21,7 @@ pub(crate) enum Storage {
     /// observed.
     Interned(Cells<StateId>),
     /// The evidence itself, if there are too many states for a palette; arbitrary where nothing was observed.
-    Plain(Cells<Packed>),
+    Plain(Cells<UnpaddedEvidence>),
 }
 
 impl Brick {
@@ -75,7 +75,7 @@ impl Brick {
                 cells.for_each(self.observed, |place, state| visit(place, palette.evidence(state)));
             }
             Storage::Plain(cells) => {
-                cells.for_each(self.observed, |place, packed| visit(place, packed.into()))
+                cells.for_each(self.observed, |place, evidence| visit(place, evidence.into()))
             }
         }
     }
@@ -100,7 +100,7 @@ impl Brick {
         };
         match &self.evidence {
             Storage::Interned(cells) => cells.for_each(mask, |_, state| take(palette.evidence(state))),
-            Storage::Plain(cells) => cells.for_each(mask, |_, packed| take(packed.into())),
+            Storage::Plain(cells) => cells.for_each(mask, |_, evidence| take(evidence.into())),
         }
         max
     }
@@ -121,8 +121,8 @@ impl Brick {
                 let mut values = [NONE; CELL_VOXELS];
                 let mut mask = [0; 8];
                 mask[word] = self.observed[word];
-                cells.for_each(mask, |place, packed| {
-                    values[place % 64] = Evidence::from(packed).log_odds as f32
+                cells.for_each(mask, |place, evidence| {
+                    values[place % 64] = Evidence::from(evidence).log_odds as f32
                 });
                 values
             }),
@@ -149,7 +149,7 @@ impl Brick {
             }
             Storage::Plain(cells) => {
                 let mut count = 0;
-                cells.for_each(self.observed, |_, packed| count += usize::from(holds(packed.into())));
+                cells.for_each(self.observed, |_, evidence| count += usize::from(holds(evidence.into())));
                 count
             }
         }

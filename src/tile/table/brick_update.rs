@@ -1,8 +1,8 @@
 use super::brick::{Brick, Storage};
 use super::cells::Cells;
 use super::miss_runs::MissRuns;
-use super::packed::Packed;
 use super::palette::{Full, Palette, StateId, UNKNOWN};
+use super::unpadded_evidence::UnpaddedEvidence;
 use crate::scan::{BrickUpdate, Run};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickMask, places};
@@ -117,7 +117,7 @@ impl Brick {
         let words = voxels.iter().fold(0, |words, (place, _)| words | 1 << (place / 64));
         match &mut self.evidence {
             Storage::Interned(cells) => cells.make(words, UNKNOWN),
-            Storage::Plain(cells) => cells.make(words, Packed::from(Evidence::PRIOR)),
+            Storage::Plain(cells) => cells.make(words, UnpaddedEvidence::from(Evidence::PRIOR)),
         }
         // Neighbors are often equal.
         let mut last = (Evidence::PRIOR, UNKNOWN);
@@ -200,12 +200,12 @@ fn update_interned(
 }
 
 fn update_plain(
-    cells: &mut Cells<Packed>,
+    cells: &mut Cells<UnpaddedEvidence>,
     observed: &mut BrickMask,
     rest: &mut Rest<'_>,
     model: &SensorModel,
 ) -> usize {
-    cells.make(rest.words(), Packed::from(Evidence::PRIOR));
+    cells.make(rest.words(), UnpaddedEvidence::from(Evidence::PRIOR));
     let mut new = 0;
     let mut intensities = rest.intensities.iter();
     for place in places(std::array::from_fn(|word| rest.hits[word] | rest.misses[word])) {
@@ -216,9 +216,9 @@ fn update_plain(
             Observation::Miss
         };
         let is_known = observed[word] >> bit & 1 == 1;
-        let packed = &mut cells.cell_mut(word).expect(MADE)[bit];
-        let before = is_known.then(|| Evidence::from(*packed));
-        *packed = model.update(before, observation).into();
+        let stored = &mut cells.cell_mut(word).expect(MADE)[bit];
+        let before = is_known.then(|| Evidence::from(*stored));
+        *stored = model.update(before, observation).into();
         observed[word] |= 1 << bit;
         new += usize::from(!is_known);
     }

@@ -13,14 +13,14 @@ mod brick_table;
 mod brick_update;
 mod cells;
 mod miss_runs;
-mod packed;
 mod palette;
 mod summary;
 mod table_update;
+mod unpadded_evidence;
 
 pub(crate) use brick::{Brick, Storage};
 pub use brick_table::Table;
 pub(crate) use cells::{CELL_VOXELS, Cells};
-pub(crate) use packed::Packed;
 pub(crate) use palette::{Full, Palette, StateId, UNKNOWN};
 pub(crate) use summary::larger;
+pub(crate) use unpadded_evidence::UnpaddedEvidence;

@@ -1,4 +1,4 @@
-use super::census::{Census, StateKey};
+use super::state_counts::{StateCounts, StateKey};
 use super::symbol::{MAX_STATES, RARE, Symbols};
 use crate::sensor::Evidence;
 use crate::tile::Table;
@@ -34,8 +34,8 @@ impl Common {
 
 impl Codebook {
     pub(super) fn of(table: &Table) -> Self {
-        let census = Census::of(table);
-        let mut commons = commons(&census, &table.palette);
+        let counts = StateCounts::of(table);
+        let mut commons = commons(&counts, &table.palette);
         commons.sort_unstable_by_key(|common| (Reverse(common.voxels), common.rank()));
         commons.truncate(MAX_STATES);
         let symbols = Symbols::of(commons.len());
@@ -44,7 +44,7 @@ impl Codebook {
         one_byte.sort_unstable_by_key(|common| common.rank());
         two_bytes.sort_unstable_by_key(|common| common.rank());
 
-        let mut interned = vec![u16::from(RARE); census.interned.len()];
+        let mut interned = vec![u16::from(RARE); counts.interned.len()];
         let mut others = FxHashMap::default();
         for (number, common) in commons.iter().enumerate() {
             match common.interned {
@@ -64,11 +64,11 @@ impl Codebook {
     }
 }
 
-fn commons(census: &Census, palette: &Palette) -> Vec<Common> {
-    let interned = census.interned.iter().enumerate().map(|(state, &voxels)| {
+fn commons(counts: &StateCounts, palette: &Palette) -> Vec<Common> {
+    let interned = counts.interned.iter().enumerate().map(|(state, &voxels)| {
         let state = state as StateId;
         Common { voxels, state: palette.evidence(state).into(), interned: Some(state) }
     });
-    let others = census.others.iter().map(|(&state, &voxels)| Common { voxels, state, interned: None });
+    let others = counts.others.iter().map(|(&state, &voxels)| Common { voxels, state, interned: None });
     interned.chain(others).filter(|common| common.voxels > 1).collect()
 }

@@ -1,11 +1,11 @@
 use super::codebook::Codebook;
+use super::column_writer::ColumnWriter;
 use super::columns::put_states;
 use super::numbers::put_number;
-use super::packer::Packer;
 use super::symbol::RARE;
 use crate::sensor::Evidence;
 use crate::space::BrickCode;
-use crate::tile::table::{Brick, CELL_VOXELS, Packed, Palette, StateId, Storage};
+use crate::tile::table::{Brick, CELL_VOXELS, Palette, StateId, Storage, UnpaddedEvidence};
 use std::io;
 
 /// A group ends with the brick that reaches this many voxels.
@@ -106,7 +106,7 @@ impl Group {
     fn push_plain(
         &mut self,
         mask: u64,
-        cell: &[Packed; CELL_VOXELS],
+        cell: &[UnpaddedEvidence; CELL_VOXELS],
         codebook: &Codebook,
         palette: &Palette,
     ) {
@@ -129,12 +129,12 @@ impl Group {
     }
 
     /// Appends the group's bytes and empties the group.
-    pub(super) fn end(&mut self, packer: &mut Packer, out: &mut Vec<u8>) -> io::Result<()> {
+    pub(super) fn end(&mut self, column_writer: &mut ColumnWriter, out: &mut Vec<u8>) -> io::Result<()> {
         let mut rares = Vec::new();
         put_states(self.rares.iter().copied(), &mut rares);
         let columns = [&self.steps, &self.words, &self.masks, &self.symbols, &self.seconds, &rares];
         put_number(self.bricks as u64, out);
-        packer.put_columns(columns.map(|column| &column[..]), out)?;
+        column_writer.put_columns(columns.map(|column| &column[..]), out)?;
         self.clear();
         Ok(())
     }

@@ -1,8 +1,8 @@
+use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
 use super::group::{GROUP_BRICKS, GROUP_VOXELS};
 use super::input::Input;
 use super::numbers::take_number;
-use super::unpacker::{Column, Unpacker};
 use crate::error::DecodeError;
 use crate::sensor::Evidence;
 use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
@@ -34,7 +34,7 @@ impl Columns {
     pub(super) fn read(
         &mut self,
         room: &Room,
-        unpacker: &mut Unpacker,
+        column_reader: &mut ColumnReader,
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
         /// Bytes of the largest step.
@@ -44,7 +44,7 @@ impl Columns {
         let voxels = room.voxels.min(GROUP_VOXELS + BRICK_VOXELS - 1).min(bricks * BRICK_VOXELS);
         self.bricks = bricks;
         let column = |name, most, bytes| Column { name, most, bytes };
-        unpacker.take_columns(
+        column_reader.take_columns(
             [
                 column("steps", bricks * STEP_BYTES, &mut self.steps),
                 column("words", bricks, &mut self.words),

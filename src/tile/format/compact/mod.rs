@@ -10,8 +10,9 @@
 //! Data are columns, each compressed by zstd if that makes it smaller. The bytes depend on the table's content alone:
 //! bricks in Morton order, states numbered by how many voxels are in them. The byte tables are in `docs/format.md`.
 
-mod census;
 mod codebook;
+mod column_reader;
+mod column_writer;
 mod columns;
 mod effort;
 mod group;
@@ -20,12 +21,11 @@ mod group_reader;
 mod input;
 mod numbers;
 mod open_brick;
-mod packer;
 mod reader;
+mod state_counts;
 mod symbol;
 #[cfg(test)]
 mod tests;
-mod unpacker;
 mod writer;
 
 pub use effort::CompactEffort;

@@ -3,7 +3,9 @@ use super::group_columns::Rest;
 use super::symbol::{RARE, Symbols};
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, VoxelBox, mask_of_box, places};
-use crate::tile::table::{Brick, CELL_VOXELS, Cells, Full, Packed, Palette, StateId, Storage, UNKNOWN};
+use crate::tile::table::{
+    Brick, CELL_VOXELS, Cells, Full, Palette, StateId, Storage, UNKNOWN, UnpaddedEvidence,
+};
 
 /// A brick whose voxels are being read.
 pub(super) struct OpenBrick {
@@ -85,8 +87,12 @@ impl OpenBrick {
     }
 
     /// The evidence of the voxels, if the palette is full.
-    pub(super) fn plain(&self, rest: &mut Rest<'_>, palette: &Palette) -> Result<Cells<Packed>, String> {
-        let mut cells = Cells::of_words(&self.observed, Packed::from(Evidence::PRIOR));
+    pub(super) fn plain(
+        &self,
+        rest: &mut Rest<'_>,
+        palette: &Palette,
+    ) -> Result<Cells<UnpaddedEvidence>, String> {
+        let mut cells = Cells::of_words(&self.observed, UnpaddedEvidence::from(Evidence::PRIOR));
         let masks = self.observed.iter().filter(|&&mask| mask != 0);
         for (cell, &mask) in cells.all_mut().iter_mut().zip(masks) {
             let symbols = rest.take_symbols(mask.count_ones() as usize)?;

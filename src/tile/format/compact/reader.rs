@@ -1,9 +1,9 @@
+use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
 use super::group_columns::Columns;
 use super::group_reader::GroupReader;
 use super::input::Input;
 use super::symbol::MAX_STATES;
-use super::unpacker::{Column, Unpacker};
 use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
@@ -15,7 +15,7 @@ use std::io::{self, Read};
 /// Reads tables in compact form. Its buffers are kept from table to table: 0.4 MB, and up to 1.5 MB more after a table
 /// in which hardly two voxels were in one state.
 pub struct CompactReader {
-    unpacker: Unpacker,
+    column_reader: ColumnReader,
     columns: Columns,
 }
 
@@ -26,7 +26,7 @@ impl CompactReader {
     ///
     /// Those of zstd.
     pub fn new() -> io::Result<Self> {
-        Ok(Self { unpacker: Unpacker::new()?, columns: Columns::default() })
+        Ok(Self { column_reader: ColumnReader::new()?, columns: Columns::default() })
     }
 
     /// Reads a table of `bytes` bytes that belongs to the tile of `voxels`. Damaged bytes cannot add voxels outside the
@@ -49,10 +49,10 @@ impl CompactReader {
         }
         let mut input = Input::new(input, bytes);
         let header = Header::read(&mut input, voxels)?;
-        let palette = read_codebook(header.states, &mut self.unpacker, &mut input)?;
+        let palette = read_codebook(header.states, &mut self.column_reader, &mut input)?;
         let mut groups = GroupReader::new(voxels, palette);
         while groups.bricks() < header.bricks {
-            self.columns.read(&groups.room(&header), &mut self.unpacker, &mut input)?;
+            self.columns.read(&groups.room(&header), &mut self.column_reader, &mut input)?;
             groups.add(&self.columns)?;
         }
         let table = groups.end();
@@ -118,14 +118,14 @@ fn voxels_in(voxels: &VoxelBox) -> u64 {
 /// The codebook as a palette: its states are numbered from 1.
 fn read_codebook(
     states: usize,
-    unpacker: &mut Unpacker,
+    column_reader: &mut ColumnReader,
     input: &mut Input<impl Read>,
 ) -> Result<Palette, DecodeError> {
     let offset = input.offset;
     let wrong = |reason: String| Err(FormatError::at_offset(offset, reason).into());
     let mut bytes = Vec::new();
     let column = Column { name: "codebook", most: states * STATE_BYTES, bytes: &mut bytes };
-    unpacker.take_columns([column], input)?;
+    column_reader.take_columns([column], input)?;
     if bytes.len() != states * STATE_BYTES {
         return wrong(format!("a codebook of {} bytes for {states} states", bytes.len()));
     }

@@ -1,8 +1,8 @@
 use super::codebook::Codebook;
+use super::column_writer::ColumnWriter;
 use super::columns::put_states;
 use super::effort::CompactEffort;
 use super::group::Group;
-use super::packer::Packer;
 use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::tile::Table;
 use std::fmt;
@@ -11,7 +11,7 @@ use std::io::{self, Write};
 /// Writes tables in compact form. Its buffers are kept from table to table: 0.7 MB, or 1.7 MB for
 /// [`CompactEffort::Small`], and up to 3 MB more after a table in which hardly two voxels were in one state.
 pub struct CompactWriter {
-    packer: Packer,
+    column_writer: ColumnWriter,
     group: Group,
     part: Vec<u8>,
 }
@@ -23,7 +23,7 @@ impl CompactWriter {
     ///
     /// Those of zstd.
     pub fn new(effort: CompactEffort) -> io::Result<Self> {
-        Ok(Self { packer: Packer::new(effort)?, group: Group::default(), part: Vec::new() })
+        Ok(Self { column_writer: ColumnWriter::new(effort)?, group: Group::default(), part: Vec::new() })
     }
 
     /// Streams a table in compact form. Returns the number of bytes.
@@ -35,7 +35,7 @@ impl CompactWriter {
     ///
     /// Those of `out` and of zstd.
     pub fn write(&mut self, table: &Table, out: &mut impl Write) -> io::Result<u64> {
-        let Self { packer, group, part } = self;
+        let Self { column_writer, group, part } = self;
         let codebook = Codebook::of(table);
         let mut crc = crc32fast::Hasher::new();
         let mut bytes = 0;
@@ -52,17 +52,17 @@ impl CompactWriter {
         part.extend_from_slice(&header(table, &codebook));
         let mut states = Vec::new();
         put_states(codebook.states.iter().copied(), &mut states);
-        packer.put_columns([&states], part)?;
+        column_writer.put_columns([&states], part)?;
         write(part)?;
         for brick in table.bricks_in_order() {
             group.push(brick, &codebook, &table.palette);
             if group.is_full() {
-                group.end(packer, part)?;
+                group.end(column_writer, part)?;
                 write(part)?;
             }
         }
         if !group.is_empty() {
-            group.end(packer, part)?;
+            group.end(column_writer, part)?;
             write(part)?;
         }
         out.write_all(&crc.finalize().to_le_bytes())?;

@@ -3,10 +3,10 @@ use crate::error::{DecodeError, FormatError};
 use std::io::{self, Read};
 use zstd::zstd_safe::{DCtx, get_error_name};
 
-/// Decompresses the columns of a [`Packer`](super::packer::Packer).
-pub(super) struct Unpacker {
+/// Decompresses the columns of a [`ColumnWriter`](super::column_writer::ColumnWriter).
+pub(super) struct ColumnReader {
     zstd: DCtx<'static>,
-    packed: Vec<u8>,
+    compressed: Vec<u8>,
 }
 
 /// A column to read.
@@ -18,11 +18,11 @@ pub(super) struct Column<'a> {
     pub(super) bytes: &'a mut Vec<u8>,
 }
 
-impl Unpacker {
+impl ColumnReader {
     pub(super) fn new() -> io::Result<Self> {
         // `zstd::bulk` would panic.
         let zstd = DCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
-        Ok(Self { zstd, packed: Vec::new() })
+        Ok(Self { zstd, compressed: Vec::new() })
     }
 
     /// Reads columns; none takes more memory than its limit.
@@ -31,16 +31,16 @@ impl Unpacker {
         columns: [Column<'_>; N],
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
-        let mut packed_lengths = [0; N];
+        let mut compressed_lengths = [0; N];
         let mut columns = columns;
-        for (column, packed_length) in columns.iter_mut().zip(&mut packed_lengths) {
+        for (column, compressed_length) in columns.iter_mut().zip(&mut compressed_lengths) {
             let length = input.number(column.name, column.most)?;
-            *packed_length = input.number(column.name, length)?;
+            *compressed_length = input.number(column.name, length)?;
             column.bytes.clear();
             column.bytes.resize(length, 0);
         }
-        for (column, packed_length) in columns.into_iter().zip(packed_lengths) {
-            self.take(column, packed_length, input)?;
+        for (column, compressed_length) in columns.into_iter().zip(compressed_lengths) {
+            self.take(column, compressed_length, input)?;
         }
         Ok(())
     }
@@ -48,18 +48,18 @@ impl Unpacker {
     fn take(
         &mut self,
         column: Column<'_>,
-        packed_length: usize,
+        compressed_length: usize,
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
-        if packed_length == column.bytes.len() {
+        if compressed_length == column.bytes.len() {
             return input.read(column.bytes);
         }
         let offset = input.offset;
-        self.packed.resize(packed_length, 0);
-        input.read(&mut self.packed)?;
-        let unpacked = self.zstd.decompress(&mut column.bytes[..], &self.packed);
+        self.compressed.resize(compressed_length, 0);
+        input.read(&mut self.compressed)?;
+        let decompressed = self.zstd.decompress(&mut column.bytes[..], &self.compressed);
         let wrong = |reason| Err(FormatError::at_offset(offset, format!("{}: {reason}", column.name)).into());
-        match unpacked {
+        match decompressed {
             Ok(length) if length == column.bytes.len() => Ok(()),
             Ok(length) => wrong(format!("{length} bytes where {} are announced", column.bytes.len())),
             Err(code) => wrong(format!("cannot be unpacked: {}", get_error_name(code))),

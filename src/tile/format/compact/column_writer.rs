@@ -4,20 +4,20 @@ use std::io;
 use zstd::zstd_safe::{CCtx, CParameter, compress_bound, get_error_name};
 
 /// Compresses columns.
-pub(super) struct Packer {
+pub(super) struct ColumnWriter {
     /// One per level.
     zstd: Vec<CCtx<'static>>,
     /// The smallest form of a column so far, and the one being tried.
-    packed: [Vec<u8>; 2],
+    compressed: [Vec<u8>; 2],
 }
 
 /// Shorter columns are not compressed.
 const MIN_BYTES: usize = 24;
 
-impl Packer {
+impl ColumnWriter {
     pub(super) fn new(effort: CompactEffort) -> io::Result<Self> {
         let zstd: io::Result<_> = effort.levels().iter().map(|&level| compressor(level)).collect();
-        Ok(Self { zstd: zstd?, packed: Default::default() })
+        Ok(Self { zstd: zstd?, compressed: Default::default() })
     }
 
     /// Appends columns: first each column's length and written length, then their bytes. A column that does not become
@@ -29,23 +29,23 @@ impl Packer {
     ) -> io::Result<()> {
         let mut written = Vec::new();
         for column in columns {
-            let packed = self.pack(column)?;
+            let compressed = self.compress(column)?;
             put_number(column.len() as u64, out);
-            put_number(packed.len() as u64, out);
-            written.extend_from_slice(packed);
+            put_number(compressed.len() as u64, out);
+            written.extend_from_slice(compressed);
         }
         out.extend_from_slice(&written);
         Ok(())
     }
 
-    fn pack<'a>(&'a mut self, column: &'a [u8]) -> io::Result<&'a [u8]> {
+    fn compress<'a>(&'a mut self, column: &'a [u8]) -> io::Result<&'a [u8]> {
         if column.len() < MIN_BYTES {
             return Ok(column);
         }
         let bound = compress_bound(column.len());
         let mut least = column.len();
         for zstd in &mut self.zstd {
-            let [best, other] = &mut self.packed;
+            let [best, other] = &mut self.compressed;
             if other.len() < bound {
                 other.resize(bound, 0);
             }
@@ -55,7 +55,7 @@ impl Packer {
                 std::mem::swap(best, other);
             }
         }
-        Ok(if least < column.len() { &self.packed[0][..least] } else { column })
+        Ok(if least < column.len() { &self.compressed[0][..least] } else { column })
     }
 }
 

@@ -4,7 +4,7 @@ use crate::tile::table::{Brick, Palette, StateId, Storage};
 use rustc_hash::FxHashMap;
 
 /// Counts the voxels of a table per state.
-pub(super) struct Census {
+pub(super) struct StateCounts {
     /// By number in the table's palette.
     pub(super) interned: Vec<u32>,
     /// For states that are not in the palette.
@@ -36,26 +36,26 @@ impl From<StateKey> for Evidence {
     }
 }
 
-impl Census {
+impl StateCounts {
     pub(super) fn of(table: &Table) -> Self {
         let interned = vec![0; table.palette.len()];
-        let mut census = Self { interned, others: FxHashMap::default(), room: MAX_COUNTED };
+        let mut all = Self { interned, others: FxHashMap::default(), room: MAX_COUNTED };
         if table.bricks.iter().all(|brick| matches!(brick.evidence, Storage::Interned(_))) {
             // All are counted, so the order does not matter.
             let mut counts = vec![[0; LANES]; table.palette.len()];
             table.bricks.iter().for_each(|brick| count_all(brick, &mut counts));
-            census.interned = counts.iter().map(|lanes| lanes.iter().sum()).collect();
+            all.interned = counts.iter().map(|lanes| lanes.iter().sum()).collect();
         } else {
-            table.bricks_in_order().for_each(|brick| census.count_first(brick, &table.palette));
+            table.bricks_in_order().for_each(|brick| all.count_first(brick, &table.palette));
         }
-        census
+        all
     }
 
     fn count_first(&mut self, brick: &Brick, palette: &Palette) {
         match &brick.evidence {
             Storage::Interned(cells) => cells.for_each(brick.observed, |_, state| self.count_interned(state)),
-            Storage::Plain(cells) => cells.for_each(brick.observed, |_, packed| {
-                let evidence = packed.into();
+            Storage::Plain(cells) => cells.for_each(brick.observed, |_, stored| {
+                let evidence = stored.into();
                 match palette.find(evidence) {
                     Some(state) => self.count_interned(state),
                     None => self.count_other(evidence),
