@@ -155,12 +155,12 @@ impl OutOfCoreTileMapper {
         let pager = self.pager.get_mut().unwrap_or_else(PoisonError::into_inner);
         let store = pager.store();
         let (disk, folder) = (store.disk().clone(), store.folder().to_owned());
-        let most_tiles = pager.most_tiles_of_scan();
+        let max_tiles = pager.most_tiles_of_scan();
         let make_scratch = &|| disk.scratch(&folder);
-        let put_aside = &mut |part| pager.stage(part, scan_number);
-        let most_bytes = plan.updates_bytes;
-        let overflow = Overflow { most_bytes, most_tiles, folder: &folder, make_scratch, put_aside };
-        let overflow = (most_bytes < usize::MAX).then_some(overflow);
+        let spill = &mut |part| pager.stage(part, scan_number);
+        let max_bytes = plan.updates_bytes;
+        let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
+        let overflow = (max_bytes < usize::MAX).then_some(overflow);
         let traced = trace(&mut self.tracer, &self.config, origin, points, overflow);
         let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
         let inserted = traced.and_then(|updates| self.accept(updates));

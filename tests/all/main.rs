@@ -47,7 +47,7 @@ mod octomap_files;
 mod octree_export;
 /// What is done with whole maps: made, merged, cropped, cleared, faded.
 mod operations;
-/// Questions against brute force.
+/// Queries against brute force.
 mod questions;
 /// Scans from files, good and bad.
 mod readers;

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::{env, fs};
 
 const SOURCES: [&str; 25] = [
-    "tile/octree_statistics.rs",
-    "tile/octree_worker.rs",
-    "tile/shared_tree.rs",
-    "tile/work_queue.rs",
+    "tile/octocache/octree_statistics.rs",
+    "tile/octocache/octree_worker.rs",
+    "tile/octocache/shared_tree.rs",
+    "tile/octocache/work_queue.rs",
     "mapper/statistics.rs",
     "mapper/paging/buffered_updates.rs",
     "mapper/paging/compact_tiles.rs",

@@ -43,7 +43,7 @@ fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     const TILE: usize = 2 << 10;
     const BRICK: usize = 384;
     TILE + match updates {
-        TileUpdates::Once(bricks) => BRICK * bricks.len(),
+        TileUpdates::Masks(bricks) => BRICK * bricks.len(),
         TileUpdates::Runs(bricks) => BRICK * bricks.len(),
         // A brick of few voxels takes some 25 bytes packed, and of many as many as they.
         TileUpdates::Packed(packed) => BRICK / 25 * packed.bytes(),

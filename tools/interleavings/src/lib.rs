@@ -59,20 +59,22 @@ mod tile {
     use voxtile::tile::VoxelCacheCounts;
     pub(crate) use voxtile::tile::{OctreeFactory, OctreeStatistics, Table, Tile, TileCounts, format};
 
-    mod octree_statistics {
-        source!("octree_statistics.rs");
+    mod octocache {
+        mod octree_statistics {
+            source!("octree_statistics.rs");
+        }
+        mod octree_worker {
+            source!("octree_worker.rs");
+        }
+        mod shared_tree {
+            source!("shared_tree.rs");
+        }
+        mod work_queue {
+            source!("work_queue.rs");
+        }
+        #[cfg(test)]
+        mod tests;
     }
-    mod octree_worker {
-        source!("octree_worker.rs");
-    }
-    mod shared_tree {
-        source!("shared_tree.rs");
-    }
-    mod work_queue {
-        source!("work_queue.rs");
-    }
-    #[cfg(test)]
-    mod tests;
 }
 
 mod persistence {
