@@ -28,7 +28,7 @@ pub struct MapConfig {
     pub octree: OctreeConfig,
     /// How much an out-of-core mapper keeps in memory. Default: 16 tiles, and 32 MiB of updates for others.
     pub memory: MemoryLimit,
-    /// How the tiles of a new map are stored. Default: the seed's files.
+    /// How the tiles of a new map are stored. Default: the original files.
     pub storage: Storage,
 }
 

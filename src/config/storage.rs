@@ -6,7 +6,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
-    /// The seed's two files a tile: `iwlo_meta.bin`, 18 bytes a voxel, which any program that knows the seed's format can
+    /// The original two files a tile: `iwlo_meta.bin`, 18 bytes a voxel, which any program that knows the original format can
     /// read, and beside it `octree.bt` for those that read OctoMap's.
     #[default]
     Seed,

@@ -26,7 +26,7 @@ pub(super) struct Index {
     pub is_from_tiles: bool,
 }
 
-/// Puts the index together. `None` for a map of the seed's format, which has none.
+/// Puts the index together. `None` for a map of the original format, which has none.
 ///
 /// # Errors
 ///

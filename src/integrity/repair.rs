@@ -178,8 +178,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
         let Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles }) = index else {
-            // Of the seed's format, but with a log that cannot be read: the log is no part of it.
-            return self.quarantine(&self.layout.commit_log(), "metadata.json is of the seed's format");
+            // Of the original format, but with a log that cannot be read: the log is no part of it.
+            return self.quarantine(&self.layout.commit_log(), "metadata.json is of the original format");
         };
         for (tile, error) in damaged {
             self.quarantine_tile(tile, &error.to_string())?;
@@ -271,12 +271,12 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         if !lost.is_empty() {
             if store.map_id().is_none() {
-                // The seed's own file, and perhaps with keys that voxtile does not know.
+                // The original own file, and perhaps with keys that voxtile does not know.
                 self.quarantine_copy(&self.layout.metadata(), "its bounds change")?;
             }
             store.forget(&lost)?;
         } else if store.commits().torn.is_some() || store.is_metadata_behind() {
-            store.tidy()?;
+            store.checkpoint()?;
             self.note(
                 ActionKind::Derived,
                 &self.layout.metadata(),

@@ -19,7 +19,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Verification {
-    /// Whether the map has the checksums that let damage be found; a map of the seed's own format has none.
+    /// Whether the map has the checksums that let damage be found; a map of the original format has none.
     pub verified: bool,
     /// Number of the flush that was looked at.
     pub flush_number: u64,
@@ -137,7 +137,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.counts.scan_number = store.commits().scan_number;
         if !self.counts.verified {
             let reason =
-                "a map of the seed's own format: no checksums, so only the form of its tables is checked";
+                "a map of the original format: no checksums, so only the form of its tables is checked";
             self.report(Finding::note(&self.layout.metadata(), None, reason));
         }
         if let Some(torn) = &store.commits().torn {

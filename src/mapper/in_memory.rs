@@ -75,7 +75,7 @@ impl MapView for InMemoryMapper {
         Ok(self.tiles.get(index).map(TileRef::borrowed))
     }
 
-    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
         self.tile(index)
     }
 

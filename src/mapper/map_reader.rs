@@ -137,7 +137,7 @@ impl MapReader {
         self.store.metadata()
     }
 
-    /// Whether the map has the checksums that let damage be found; a map of the seed's own format has none.
+    /// Whether the map has the checksums that let damage be found; a map of the original format has none.
     pub fn is_verified(&self) -> bool {
         self.store.map_id().is_some()
     }
@@ -152,7 +152,7 @@ impl MapReader {
         self.store.folder()
     }
 
-    /// The map's id; `None` for a map of the seed's format.
+    /// The map's id; `None` for a map of the original format.
     pub(crate) fn map_id(&self) -> Option<[u8; 16]> {
         self.store.map_id()
     }
@@ -167,7 +167,7 @@ impl MapReader {
         self.store.commits().flush_number
     }
 
-    /// Observed and occupied voxels of the whole map, from the log alone; `None` for a map of the seed's format.
+    /// Observed and occupied voxels of the whole map, from the log alone; `None` for a map of the original format.
     pub fn voxel_counts(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
             let versions = self.store.commits().tiles.values();
@@ -177,7 +177,7 @@ impl MapReader {
         })
     }
 
-    /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the seed's format.
+    /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the original format.
     pub fn disk_bytes(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
             let versions = self.store.commits().tiles.values();
@@ -260,12 +260,12 @@ impl MapView for MapReader {
         Ok(Some(TileRef::shared(tile)))
     }
 
-    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
         let cached = self.cache.lock().unwrap_or_else(PoisonError::into_inner).tiles.peek(&index).cloned();
         if let Some(tile) = cached {
             return Ok(Some(TileRef::shared(tile)));
         }
-        let loaded = load::load_in_passing(&self.store, &self.config.grid, index);
+        let loaded = load::load_uncached(&self.store, &self.config.grid, index);
         let loaded = loaded.map_err(|error| self.explain(error))?;
         Ok(loaded.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
     }

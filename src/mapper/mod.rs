@@ -1,4 +1,4 @@
-//! The front door: two mappers, one trait, one answer; and a reader beside them.
+//! Maps: two mappers behind one trait with equal answers, and a reader that works beside a writer.
 //!
 //! | | [`InMemoryMapper`] | [`OutOfCoreTileMapper`] | [`MapReader`] |
 //! |---|---|---|---|

@@ -17,7 +17,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[derive(Debug)]
 pub struct OutOfCoreTileMapper {
     config: MapConfig,
-    scan_number: u64,
     /// Queries take `&self` and may bring tiles in.
     pager: Mutex<TilePager>,
     tracer: ScanTracer,
@@ -61,10 +60,9 @@ impl OutOfCoreTileMapper {
     }
 
     fn new(config: MapConfig, store: TileStore) -> Self {
-        let scan_number = store.commits().scan_number;
         let scan_bytes = MemoryPlan::new(config.memory).scan_bytes;
         let pager = Mutex::new(TilePager::new(config.clone(), store));
-        Self { pager, config, tracer: ScanTracer::with_memory_bytes(scan_bytes), scan_number }
+        Self { pager, config, tracer: ScanTracer::with_memory_bytes(scan_bytes) }
     }
 
     /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
@@ -74,9 +72,8 @@ impl OutOfCoreTileMapper {
     ///
     /// As for [`Mapper::flush`].
     pub fn begin_input(&mut self, input: impl Into<InputRecord>) -> Result<()> {
-        let scan_number = self.scan_number;
-        let input = InputRecord { first_scan: scan_number, ..input.into() };
-        self.pager_mut().begin_input(input, scan_number)
+        let input = InputRecord { first_scan: self.scan_number(), ..input.into() };
+        self.pager_mut().begin_input(input)
     }
 
     /// Goes on with the input that the map was last built from, and returns how many of its scans are in the map: pass
@@ -87,7 +84,7 @@ impl OutOfCoreTileMapper {
     /// [`Error::Mismatch`] with what differs, if the map was built from another input or with other ranges or another
     /// insert mode; and as for [`Mapper::flush`].
     pub fn resume_input(&mut self, name: &str) -> Result<u64> {
-        let scan_number = self.scan_number;
+        let scan_number = self.scan_number();
         let found = match self.pager_mut().inputs().last() {
             Some(input) if input.content.is_none() && input.name == name => {
                 let done = scan_number - input.first_scan.min(scan_number);
@@ -150,14 +147,13 @@ impl OutOfCoreTileMapper {
     ///
     /// As for [`Mapper::insert_scan`], and points that cannot be read.
     pub fn insert_points(&mut self, origin: Point, points: &dyn ScanPoints) -> Result<ScanReport> {
-        let scan_number = self.scan_number;
         let plan = MemoryPlan::new(self.config.memory);
         let pager = self.pager.get_mut().unwrap_or_else(PoisonError::into_inner);
         let store = pager.store();
         let (disk, folder) = (store.disk().clone(), store.folder().to_owned());
         let max_tiles = pager.most_tiles_of_scan();
         let make_scratch = &|| disk.scratch(&folder);
-        let spill = &mut |part| pager.stage(part, scan_number);
+        let spill = &mut |part| pager.stage(part);
         let max_bytes = plan.updates_bytes;
         let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
         let overflow = (max_bytes < usize::MAX).then_some(overflow);
@@ -183,7 +179,7 @@ impl OutOfCoreTileMapper {
     /// Whether the map has updates that no flush has made durable.
     pub fn is_dirty(&self) -> bool {
         let pager = self.lock();
-        self.scan_number != pager.store().commits().scan_number
+        pager.scan_number() != pager.store().commits().scan_number
     }
 
     /// Number of the last scan in the last flush: what a crash cannot take away.
@@ -207,10 +203,9 @@ impl OutOfCoreTileMapper {
     ///
     /// A tile that cannot be read, or one pushed out that cannot be written.
     pub fn preload(&mut self, tiles: impl IntoIterator<Item = TileIndex>) -> Result<usize> {
-        let scan_number = self.scan_number;
         let mut count = 0;
         for tile in tiles {
-            count += usize::from(self.pager_mut().tile(tile, scan_number)?.is_some());
+            count += usize::from(self.pager_mut().tile(tile)?.is_some());
         }
         Ok(count)
     }
@@ -221,18 +216,16 @@ impl OutOfCoreTileMapper {
     ///
     /// [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false; a tile that cannot be read.
     pub fn reload(&mut self, tile: TileIndex, discard_changes: bool) -> Result<bool> {
-        let scan_number = self.scan_number;
-        self.pager_mut().reload(tile, discard_changes, scan_number)
+        self.pager_mut().reload(tile, discard_changes)
     }
 
     fn accept(&mut self, updates: ScanUpdates) -> Result<ScanReport> {
-        let (report, scan_number) = (updates.report, self.scan_number);
+        let report = updates.report;
         let scan_bytes = self.tracer.bytes() + updates.bytes();
         let pager = self.pager_mut();
-        pager.prepare(&updates, scan_bytes, scan_number)?;
+        pager.prepare(&updates, scan_bytes)?;
         pager.prefetch(&updates.tiles);
         pager.accept(updates);
-        self.scan_number += 1;
         Ok(report)
     }
 
@@ -252,7 +245,7 @@ impl MapView for OutOfCoreTileMapper {
     }
 
     fn scan_number(&self) -> u64 {
-        self.scan_number
+        self.lock().scan_number()
     }
 
     fn tile_indices(&self) -> Vec<TileIndex> {
@@ -264,15 +257,15 @@ impl MapView for OutOfCoreTileMapper {
     }
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        Ok(self.lock().tile(index, self.scan_number)?.map(TileRef::shared))
+        Ok(self.lock().tile(index)?.map(TileRef::shared))
     }
 
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
-        self.lock().evidence(voxel, self.scan_number)
+        self.lock().evidence(voxel)
     }
 
-    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        Ok(self.lock().tile_in_passing(index)?.map(TileRef::shared))
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        Ok(self.lock().tile_uncached(index)?.map(TileRef::shared))
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
@@ -280,7 +273,7 @@ impl MapView for OutOfCoreTileMapper {
     }
 
     fn statistics(&self) -> MapStatistics {
-        self.lock().statistics(self.scan_number)
+        self.lock().statistics()
     }
 }
 
@@ -296,8 +289,7 @@ impl Mapper for OutOfCoreTileMapper {
     }
 
     fn flush(&mut self) -> Result<()> {
-        let scan_number = self.scan_number;
-        self.pager_mut().flush(scan_number)
+        self.pager_mut().flush()
     }
 
     fn sync_octrees(&mut self) {

@@ -15,9 +15,9 @@ pub struct MapStatistics {
     pub dirty_tiles: u64,
     /// Sizes of the tiles in memory.
     pub cached: TileCounts,
-    /// Tiles on disk for which updates wait.
+    /// Tiles with buffered updates.
     pub pending_tiles: u64,
-    /// Updates of voxels that wait for their tiles.
+    /// Buffered updates of voxels.
     pub pending_updates: u64,
     /// Bytes of memory that these updates occupy.
     pub pending_bytes: u64,
@@ -47,7 +47,7 @@ pub struct MemoryCounts {
     pub tiles: u64,
     /// Tiles in the compact form.
     pub compact_tiles: u64,
-    /// Updates that wait for their tiles.
+    /// Buffered updates.
     pub pending: u64,
     /// Kept free for inserting scans: what the largest so far took.
     pub scan: u64,
@@ -96,6 +96,6 @@ pub struct IoCounts {
     pub hits: u64,
     /// Bytes read.
     pub bytes_read: u64,
-    /// Bytes written, waiting updates too.
+    /// Bytes written, spilled updates included.
     pub bytes_written: u64,
 }

@@ -36,7 +36,7 @@ pub trait MapView {
     /// # Errors
     ///
     /// A tile that cannot be read.
-    fn tile_in_passing(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
     /// The evidence of a voxel; `None` if it was never observed.
     ///
@@ -58,7 +58,7 @@ pub trait MapView {
     where
         Self: Sized,
     {
-        self.tile_indices().into_iter().filter_map(|index| self.tile_in_passing(index).transpose())
+        self.tile_indices().into_iter().filter_map(|index| self.tile_uncached(index).transpose())
     }
 }
 

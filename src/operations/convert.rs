@@ -10,7 +10,7 @@ use std::path::Path;
 ///
 /// It is the same map in another form: its id, its number of scans, each tile's, and the input that a build goes on with are
 /// kept, so that a build can be resumed on either, and a merge of both is warned of. Only flushes are counted anew; snapshots
-/// are not taken along. A map of the seed's own format, which has no id, gets one, as it would before its first change. `progress` is told the tiles done
+/// are not taken along. A map of the original format, which has no id, gets one, as it would before its first change. `progress` is told the tiles done
 /// and all.
 ///
 /// # Errors

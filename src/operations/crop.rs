@@ -29,7 +29,7 @@ pub fn crop(
     tiles.retain(|&tile| part.share_of(&grid.voxels_of_tile(tile)) != Share::Nothing);
     for (done, &tile) in (0..).zip(&tiles) {
         progress(done, tiles.len() as u64);
-        let Some(found) = map.tile_in_passing(tile)? else { continue };
+        let Some(found) = map.tile_uncached(tile)? else { continue };
         match part.share_of(&found.voxel_box()) {
             Share::Nothing => {}
             Share::Everything => writer.put(tile, found.table())?,

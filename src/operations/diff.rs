@@ -135,7 +135,7 @@ impl Diff {
 }
 
 fn tile_diff(first: &MapReader, second: &MapReader, index: TileIndex) -> Result<Option<TileDiff>> {
-    let [a, b] = [first.tile_in_passing(index)?, second.tile_in_passing(index)?];
+    let [a, b] = [first.tile_uncached(index)?, second.tile_uncached(index)?];
     let none = Table::default();
     let [a, b] = [&a, &b].map(|tile| tile.as_ref().map_or(&none, |tile| tile.table()));
     let voxels = VoxelDiff::of(first.config(), a, second.config(), b);

@@ -50,7 +50,7 @@ impl MapEditor {
         self.store.commits().scan_number
     }
 
-    /// What voxtile adds to the seed's metadata, if the map is voxtile's own.
+    /// What voxtile adds to the original metadata, if the map is voxtile's own.
     pub(super) fn ext(&self) -> Option<&Extension> {
         self.store.metadata().ext.as_ref()
     }
@@ -100,7 +100,7 @@ impl MapEditor {
         self.store.commit(metadata, self.scan_number())
     }
 
-    /// Before the first change a map of the seed's format becomes one of voxtile's own.
+    /// Before the first change a map of the original format becomes one of voxtile's own.
     fn begin_writing(&mut self) -> Result<()> {
         self.is_written_to = true;
         let Self { saver, config, store, .. } = self;

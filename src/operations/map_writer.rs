@@ -72,7 +72,7 @@ impl MapWriter {
     ///
     /// # Errors
     ///
-    /// As for [`MapWriter::create`], and metadata of the seed's format, which does not say it all.
+    /// As for [`MapWriter::create`], and metadata of the original format, which does not say it all.
     pub fn create_as(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata) -> Result<Self> {
         let config = config_from(&metadata, folder)?;
         let ext = metadata.ext.as_ref();
@@ -136,7 +136,7 @@ impl MapWriter {
     pub fn finish(mut self) -> Result<WrittenMap> {
         self.commit()?;
         // What a commit may leave to the next opening of the map is not left here: nobody else is to see it.
-        self.map.store().tidy()?;
+        self.map.store().checkpoint()?;
         self.map.finish()?;
         Ok(self.written)
     }

@@ -84,7 +84,7 @@ fn put_merged(
     maps: &[MapReader],
     tile: TileIndex,
 ) -> Result<()> {
-    let found = maps.iter().map(|map| map.tile_in_passing(tile));
+    let found = maps.iter().map(|map| map.tile_uncached(tile));
     let found: Vec<TileRef<'_>> = found.filter_map(Result::transpose).collect::<Result<_>>()?;
     let tables: Vec<&Table> = found.iter().map(|tile| tile.table()).collect();
     match tables[..] {
@@ -124,7 +124,7 @@ fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
     let (config, wanted) = (map.config(), first.config());
     let first = first.folder().display();
     let what = if !map.is_verified() {
-        "it is of the seed's format, which does not tell the sensor model".to_owned()
+        "it is of the original format, which does not tell the sensor model".to_owned()
     } else if config.sensor_model != wanted.sensor_model {
         format!("its sensor model is {}, that of {first} is {}", config.sensor_model, wanted.sensor_model)
     } else if config.occupancy_threshold != wanted.occupancy_threshold {

@@ -34,7 +34,7 @@ pub struct SnapshotInfo {
     pub damage: Option<String>,
 }
 
-/// Keeps the last flush of the map in `folder` under a name. A map of the seed's own format gets an id and checksums first, as
+/// Keeps the last flush of the map in `folder` under a name. A map of the original format gets an id and checksums first, as
 /// before any change.
 ///
 /// # Errors

@@ -1,6 +1,7 @@
-use crate::error::{Error, Result};
+use super::packer::Packer;
+use crate::error::Result;
 use crate::space::{Grid, TileIndex};
-use crate::tile::format::{CompactWriter, read_compact};
+use crate::tile::format::read_compact;
 use crate::tile::{Table, Tile};
 use std::sync::Arc;
 
@@ -21,17 +22,10 @@ impl CompactTile {
     /// # Errors
     ///
     /// A lack of memory.
-    pub(crate) fn encode(
-        writer: &mut CompactWriter,
-        tile: &Tile,
-        occupied_from: Option<f64>,
-    ) -> Result<Self> {
-        let (table, mut bytes) = (tile.table(), Vec::new());
-        writer
-            .write(table, &mut bytes)
-            .map_err(|error| Error::io("memory".as_ref(), "pack a tile in", error))?;
+    pub(crate) fn encode(packer: &mut Packer, tile: &Tile, occupied_from: Option<f64>) -> Result<Self> {
+        let table = tile.table();
         Ok(Self {
-            bytes: bytes.into(),
+            bytes: packer.pack(table)?.into(),
             voxels: table.len() as u64,
             occupied: occupied_from.map(|log_odds| table.count_from(log_odds) as u64),
             table_bytes: table.bytes(),
@@ -42,7 +36,7 @@ impl CompactTile {
     ///
     /// # Errors
     ///
-    /// None but for broken memory.
+    /// [`Damaged`](crate::Error::Damaged) if the bytes in memory changed.
     pub(crate) fn decode(&self, grid: &Grid, index: TileIndex) -> Result<Table> {
         read_compact(&mut &*self.bytes, self.bytes.len() as u64, &grid.voxels_of_tile(index))
             .map_err(|error| error.in_map("memory".as_ref(), Some(index)))

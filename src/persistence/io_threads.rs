@@ -9,7 +9,7 @@ use crate::store::{TileLocation, TileVersion, TileWriter};
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 
-/// Two threads beside the one that maps: one saves tiles, one loads them ahead of use.
+/// The two I/O threads of a mapper: one saves tiles, one loads them ahead of use.
 #[derive(Debug)]
 pub(crate) struct IoThreads {
     saver: Worker<Save, Saved>,

@@ -19,13 +19,9 @@ pub(crate) fn load(
 }
 
 /// [`load`] for a tile that is looked at once.
-pub(crate) fn load_in_passing(
-    store: &TileStore,
-    grid: &Grid,
-    index: TileIndex,
-) -> Result<Option<(Tile, u64)>> {
+pub(crate) fn load_uncached(store: &TileStore, grid: &Grid, index: TileIndex) -> Result<Option<(Tile, u64)>> {
     let Some(read) = load_table(store, grid, index)? else { return Ok(None) };
-    Ok(Some((Tile::in_passing(grid, index, read.table), read.file.bytes)))
+    Ok(Some((Tile::uncached(grid, index, read.table), read.file.bytes)))
 }
 
 /// Reads the latest version of a tile's table; `None` if there is none.
@@ -56,7 +52,7 @@ pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Re
 pub(crate) struct ReadTable {
     pub table: Table,
     pub file: FileChecksum,
-    /// `None` in a map of the seed's format.
+    /// `None` in a map of the original format.
     pub trailer: Option<Trailer>,
 }
 
@@ -78,7 +74,7 @@ pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: Store
     Ok(ReadTable { table, file, trailer })
 }
 
-/// Whether a file that is whole in itself is also the one that belongs here.
+/// Checks that an intact file belongs to this map and tile and is the version in the log.
 fn check(
     map_id: [u8; 16],
     index: TileIndex,

@@ -1,4 +1,4 @@
-//! What makes a map the map it is: the configuration, and what `metadata.json` keeps of it.
+//! A map's configuration, and what `metadata.json` keeps of it.
 
 use crate::config::MapConfig;
 use crate::error::{FormatError, Result};
@@ -24,7 +24,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
     Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }
 }
 
-/// The configuration in a map's metadata; a map of the seed's format has the default sensor model.
+/// The configuration in a map's metadata; a map of the original format has the default sensor model.
 ///
 /// # Errors
 ///

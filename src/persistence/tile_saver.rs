@@ -1,12 +1,13 @@
 //! Tiles to their files. How they come back is `load.rs`.
 
 use super::compact_tile::CompactTile;
+use super::packer::Packer;
 use super::parameters::map_parameters;
 use crate::config::{MapConfig, Storage};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::space::{Grid, TileIndex};
 use crate::store::{FileChecksum, TileFile, TileStore, TileVersion, TileWriter};
-use crate::tile::format::{CompactEffort, CompactWriter, Trailer, write_compact_file, write_table};
+use crate::tile::format::{Trailer, write_compact_file, write_table};
 use crate::tile::{Table, Tile};
 
 /// Writes the files of a map's tiles. What packing takes is kept from one tile to the next.
@@ -16,8 +17,7 @@ pub(crate) struct TileSaver {
     /// Log-odds from which a voxel counts as occupied.
     threshold: f64,
     parameters: String,
-    /// Made with the first tile that has to be packed.
-    packer: Option<CompactWriter>,
+    packer: Packer,
 }
 
 impl TileSaver {
@@ -26,7 +26,7 @@ impl TileSaver {
             resolution_m: config.grid.resolution_m(),
             threshold: config.occupied_log_odds(),
             parameters: map_parameters(config).to_text(),
-            packer: None,
+            packer: Packer::default(),
         }
     }
 
@@ -53,7 +53,7 @@ impl TileSaver {
         match writer.storage() {
             Storage::Seed => self.write_seed(writer, index, table, scan_number),
             Storage::Compact => {
-                let compact = self.pack(table)?;
+                let compact = self.packer.pack(table)?;
                 let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
                 self.write_encoded(writer, index, &compact, [voxels, occupied], scan_number)
             }
@@ -91,7 +91,7 @@ impl TileSaver {
         Ok(TileVersion { scan_number, table, octree: FileChecksum::default(), voxels, occupied })
     }
 
-    /// [`TileSaver::write`] in a map with the seed's storage.
+    /// [`TileSaver::write`] in a map with the original storage.
     fn write_seed(
         &self,
         writer: &TileWriter,
@@ -119,17 +119,5 @@ impl TileSaver {
         let (map_id, parameters) = (writer.map_id(), self.parameters.clone());
         let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
         Trailer { map_id, tile, scan_number, table_crc: 0, octree_crc, octree_bytes, parameters }
-    }
-
-    /// A table in the compact form.
-    fn pack(&mut self, table: &Table) -> Result<Vec<u8>> {
-        let failed = |error| Error::io("memory".as_ref(), "pack a tile in", error);
-        let packer = match &mut self.packer {
-            Some(packer) => packer,
-            none => none.insert(CompactWriter::new(CompactEffort::Fast).map_err(failed)?),
-        };
-        let mut compact = Vec::new();
-        packer.write(table, &mut compact).map_err(failed)?;
-        Ok(compact)
     }
 }

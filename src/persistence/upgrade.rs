@@ -6,9 +6,8 @@ use crate::error::Result;
 use crate::store::{Metadata, TileStore};
 use std::collections::BTreeSet;
 
-/// Gives a map of the seed's format, before its first change, an id, a log and trailers: every tile is written anew as it
-/// is, and committed with the metadata of that id. Until that is done it stays a map of the seed's format, with the same
-/// content. Nothing to do for other maps.
+/// Upgrades a map of the original format before its first change: gives it an id and a log, rewrites every tile with a
+/// trailer, and commits. Until that commit it stays in the original format. Does nothing for other maps.
 pub(crate) fn upgrade(
     store: &mut TileStore,
     saver: &mut TileSaver,
@@ -18,8 +17,8 @@ pub(crate) fn upgrade(
     if store.metadata().ext.is_some() {
         return Ok(());
     }
-    log::info!("{}: a map of the seed's format; its tiles get checksums", store.folder().display());
-    store.upgrade(new_map_id())?;
+    log::info!("{}: a map of the original format; its tiles get checksums", store.folder().display());
+    let map_id = store.upgrade(new_map_id())?;
     for index in store.suspects() {
         // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
         store.drop_next(index);
@@ -33,5 +32,5 @@ pub(crate) fn upgrade(
             store.note_next(index, version);
         }
     }
-    store.commit(metadata(store.map_id().unwrap_or_default()), 0)
+    store.commit(metadata(map_id), 0)
 }

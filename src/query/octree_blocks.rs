@@ -88,7 +88,7 @@ fn tiles_of(view: &impl MapView, region: Option<&Aabb>, shift: &OctreeShift) -> 
         let voxels = shift.of_box(&grid.voxels_of_tile(index));
         let in_reach = REACH.intersection(&voxels);
         if in_reach != voxels
-            && let Some(tile) = view.tile_in_passing(index)?
+            && let Some(tile) = view.tile_uncached(index)?
             && let Some(outside) = first_outside(view, &tile, region, shift)
         {
             return Err(out_of_reach(grid, outside, Some(&tiles)));
@@ -172,7 +172,7 @@ impl<V: MapView, F> Blocks<'_, V, F> {
         let node = first.brick()..MortonCode(first.0 + MortonCode::span(depth)).brick();
         let grid = &self.view.config().grid;
         for &index in tiles {
-            let Some(tile) = self.view.tile_in_passing(index)? else { continue };
+            let Some(tile) = self.view.tile_uncached(index)? else { continue };
             let table = tile.table();
             for brick in table.bricks() {
                 self.shift.add_brick(brick, &node, &mut self.values, |add| {

@@ -13,7 +13,7 @@ pub(super) fn for_each_voxel_in(
     let grid = view.config().grid;
     let voxels = voxels_around(&grid, region);
     for index in tiles_in(view, &voxels) {
-        if let Some(tile) = view.tile_in_passing(index)? {
+        if let Some(tile) = view.tile_uncached(index)? {
             let inside =
                 voxels_in(&tile, &voxels).filter(|voxel| region.contains(grid.center_m(voxel.index)));
             inside.for_each(&mut visit);
@@ -50,7 +50,7 @@ pub(super) fn cached_occupied_voxels(
     let threshold = min_log_odds(view.config(), min_probability);
     let mut voxels = Vec::new();
     for index in view.cached_tile_indices() {
-        if let Some(tile) = view.tile_in_passing(index)? {
+        if let Some(tile) = view.tile_uncached(index)? {
             voxels.extend(tile.voxels().filter(|voxel| voxel.evidence.log_odds >= threshold));
         }
     }

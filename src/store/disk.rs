@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-/// The one seam to the file system: every operation on a map's files, one method each.
+/// The interface to the file system: every operation on a map's files, one method each.
 ///
 /// [`FsDisk`](super::FsDisk) is the real one; tests put in disks that fail, fill up or crash.
 pub trait Disk: Debug + Send + Sync {
@@ -48,9 +48,7 @@ pub trait Disk: Debug + Send + Sync {
     /// The names in a folder, in no particular order; names that are not UTF-8 are left out.
     fn list(&self, path: &Path) -> io::Result<Vec<String>>;
     /// A file without a name on the same file system as a folder, which goes when it is dropped.
-    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
-        Ok(Box::new(tempfile::tempfile_in(folder)?))
-    }
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>>;
     /// What has a name, links not followed; `None` if nothing has.
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>>;
     /// The same place as an absolute path without links, as far as it is there.

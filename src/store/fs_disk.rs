@@ -1,4 +1,5 @@
 use super::disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
+use crate::scratch::Scratch;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FsDisk;
 
-/// How many milliseconds to wait for a lock that a writer holds for an instant.
+/// How often a lock is tried, one millisecond apart, before it counts as held.
 const LOCK_ATTEMPTS: usize = 100;
 
 struct FsRead {
@@ -104,6 +105,10 @@ impl Disk for FsDisk {
     fn list(&self, path: &Path) -> io::Result<Vec<String>> {
         let names = fs::read_dir(path)?.map(|entry| Ok(entry?.file_name().into_string().ok()));
         names.filter_map(io::Result::transpose).collect()
+    }
+
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
+        Ok(Box::new(tempfile::tempfile_in(folder)?))
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {

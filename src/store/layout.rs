@@ -49,7 +49,7 @@ impl TileFile {
 }
 
 impl Layout {
-    /// The layout of the map in `folder`, if its tiles are the seed's files.
+    /// The layout of the map in `folder`, if its tiles are the original files.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into(), storage: Storage::Seed }
     }
@@ -108,7 +108,7 @@ impl Layout {
     /// The flush number of a kept table's name; `None` for another name.
     pub fn flush_of_kept(&self, name: &str) -> Option<u64> {
         let number = name.strip_prefix(TileFile::Table.name(self.storage))?.strip_prefix(KEPT_SUFFIX)?;
-        // The one spelling: `007` is another name than what it would be looked for under.
+        // Only the canonical spelling: the store would look for 7, not for 007.
         number.parse().ok().filter(|flush_number: &u64| flush_number.to_string() == number)
     }
 

@@ -82,7 +82,7 @@ pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
     })
 }
 
-/// The folder that names a folder.
+/// The parent folder; `.` if the path has none.
 pub(super) fn parent_of(folder: &Path) -> &Path {
     match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -180,12 +180,12 @@ pub fn read_log(disk: &dyn Disk, layout: &Layout) -> Result<Option<(CommitLog, C
     }
 }
 
-/// The tiles of a map of the seed's format, which has no log.
+/// The tiles of a map of the original format, which has no log.
 pub(super) fn list_foreign_tiles(disk: &dyn Disk, layout: &Layout) -> Result<FxHashSet<TileIndex>> {
     let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
     let mut tiles = FxHashSet::default();
     for tile in names.iter().filter_map(|name| tile_of_folder(name)) {
-        // One that holds anything is a tile, also if its table is missing; an empty one waits for its first flush.
+        // A folder with any content is a tile, even without a table. An empty one belongs to a tile that was never flushed.
         let folder = layout.tile_folder(tile);
         match disk.list(&folder) {
             Ok(names) if names.is_empty() => {}

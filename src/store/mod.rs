@@ -1,13 +1,16 @@
-//! Named bytes on disk; knows no voxel.
+//! The files of a map: tiles, commit log, metadata, snapshots. Knows no voxel.
 //!
-//! ```text
-//! TileStore -> tiles (versions, locations), commit (log, metadata, checkpoint), snapshots, recovery
-//!           -> MapFiles, Layout (names) -> Disk -> the file system
-//! ```
+//! | module | content |
+//! |---|---|
+//! | `tile_store` | [`TileStore`]: opens maps and reads tiles; `commit/flush` and `snapshots/snapshot_store` extend it |
+//! | `tiles` | versions of tiles, locations, writers, spill files |
+//! | `commit` | the commit log, `metadata.json`, the steps after a commit |
+//! | `snapshots` | snapshots, and replaced tables kept for them and for readers |
+//! | `recovery` | crash recovery, damaged logs, quarantine, unfinished maps |
+//! | `layout`, `map_files` | file names; operations on them |
+//! | `disk`, `fs_disk` | [`Disk`], through which every file operation goes, and the file system |
 //!
-//! Every file operation of a map, syncs included, goes through [`Disk`], so that a failing disk and a crash are
-//! ordinary tests. The protocol of a flush and what a crash leaves are in
-//! `docs/durability.md`.
+//! Tests replace [`Disk`] to simulate failures and power cuts. `docs/durability.md` describes the protocol.
 
 mod commit;
 mod disk;

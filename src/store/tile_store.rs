@@ -134,8 +134,8 @@ impl TileStore {
             let store = Self::read(disk.clone(), layout.clone(), metadata)?;
             // Only if it still is the present one has the writer seen, at its next flush, that it is read.
             let now = map_folder::read_metadata(&*disk, &layout)?;
-            // Where the log is ahead of it, the writer does not know which flush is read: a moment later it does, unless it was
-            // killed.
+            // If the log is newer, the writer cannot tell which flush is read. Wait until it replaces metadata.json, unless it
+            // was killed.
             let is_known = !store.is_metadata_behind() || attempt + 1 >= OPEN_ATTEMPTS / 2;
             if now.ext.map(|ext| ext.flush_number) == store.committer.written_flush() && is_known {
                 return Ok(Self { shared_metadata: Some(SharedMetadata(shared)), ..store });
@@ -167,7 +167,7 @@ impl TileStore {
             (Some(_), None) => {
                 return damaged(0, "the file is missing".into());
             }
-            // Adopted, and ended before the metadata was replaced.
+            // The upgrade was committed, but metadata.json was not replaced.
             (None, Some((log, commits))) if commits.flush_number > 0 => (log, commits),
             (None, _) => {
                 let foreign = map_folder::list_foreign_tiles(&*disk, &layout)?;
@@ -239,7 +239,7 @@ impl TileStore {
         self.committer.metadata()
     }
 
-    /// The map's id; `None` for a map of the seed's format.
+    /// The map's id; `None` for a map of the original format.
     pub fn map_id(&self) -> Option<[u8; 16]> {
         self.committer.map_id()
     }
@@ -254,7 +254,7 @@ impl TileStore {
         self.committer.is_metadata_behind(self.commits().flush_number)
     }
 
-    /// Whether a map that was of the seed's format when it was opened has a log now: a writer has begun to change it.
+    /// Whether a map that was of the original format when it was opened has a log now: a writer has begun to change it.
     pub fn is_upgraded_meanwhile(&self) -> Result<bool> {
         if self.map_id().is_some() {
             return Ok(false);

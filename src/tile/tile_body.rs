@@ -60,7 +60,7 @@ impl Tile {
 
     /// A tile for a few queries. Its octree is a view of the bricks, whatever form the map's octrees have, and not
     /// synced: answers are the same, but coarse ones take longer.
-    pub fn in_passing(grid: &Grid, index: TileIndex, table: Table) -> Self {
+    pub fn uncached(grid: &Grid, index: TileIndex, table: Table) -> Self {
         let octree = TileOctree::Bricks(BrickOctree::default());
         Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }

@@ -200,7 +200,7 @@ fn a_damaged_tile_is_named_and_leaves_nothing_behind() {
     }
 }
 
-/// A map of the seed's own format has no checksums; what is made of it has.
+/// A map of the original format has no checksums; what is made of it has.
 #[test]
 fn a_map_of_the_seeds_own_format_gets_what_it_lacks() {
     let disk = FaultyDisk::new(Fault::None);

@@ -520,7 +520,7 @@ fn a_reload_that_fails_changes_nothing() {
     }
 }
 
-/// A map of the seed's own format, with the content of the first three scans.
+/// A map of the original format, with the content of the first three scans.
 fn foreign(oracle: &Oracle) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = create(&disk, oracle).unwrap();

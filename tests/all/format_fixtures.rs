@@ -197,7 +197,7 @@ fn write_compact(map: &Path, scans: &[Scan]) {
     mapper.flush().unwrap();
 }
 
-/// A map of the seed's own format: no log, no trailers, nothing of ours in the metadata.
+/// A map of the original format: no log, no trailers, nothing of ours in the metadata.
 fn write_seed(plain: &Path, map: &Path) {
     copy(plain, map);
     fs::remove_file(map.join("commits.log")).unwrap();

@@ -280,7 +280,7 @@ fn a_map_of_the_seeds_own_format_is_unverified_and_not_damaged() {
     assert!(output(&["repair", map]).contains("nothing to repair"));
 }
 
-/// Takes from a map all that is not the seed's.
+/// Takes from a map all that is not the original.
 fn strip(map: &Path) {
     fs::remove_file(map.join("commits.log")).unwrap();
     let metadata = r#"{"version": "1.0", "resolution": 0.2, "tile_size": 10.0, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;

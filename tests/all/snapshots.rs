@@ -223,7 +223,7 @@ fn wrong_names_and_other_refusals_say_what_to_do() {
     drop(writer);
 }
 
-/// A map of the seed's own format gets its checksums first.
+/// A map of the original format gets its checksums first.
 #[test]
 fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
     let (disk, map, digests) = small(Storage::Seed);

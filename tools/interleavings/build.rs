@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 25] = [
+const SOURCES: [&str; 26] = [
     "tile/octocache/octree_statistics.rs",
     "tile/octocache/octree_worker.rs",
     "tile/octocache/shared_tree.rs",
@@ -26,6 +26,7 @@ const SOURCES: [&str; 25] = [
     "persistence/io_threads.rs",
     "persistence/load.rs",
     "persistence/map_id.rs",
+    "persistence/packer.rs",
     "persistence/parameters.rs",
     "persistence/tile_saver.rs",
     "persistence/upgrade.rs",

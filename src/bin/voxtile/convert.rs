@@ -31,7 +31,7 @@ struct Form<'a> {
     #[serde(serialize_with = "crate::path_text::serialize")]
     map: &'a Path,
     storage: Storage,
-    /// `None` for a map of the seed's own format, which does not say.
+    /// `None` for a map of the original format, which does not say.
     table_bytes: Option<u64>,
     octree_bytes: Option<u64>,
 }

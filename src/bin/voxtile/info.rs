@@ -94,7 +94,7 @@ impl Info {
         let id = self
             .map_id
             .as_deref()
-            .unwrap_or("none: the seed's format, without checksums, cannot be verified");
+            .unwrap_or("none: the original format, without checksums, cannot be verified");
         writeln!(out, "map id       {id}")?;
         writeln!(out, "resolution   {} m, tiles of {} m", self.resolution_m, self.tile_size_m)?;
         let model = match self.sensor_model {

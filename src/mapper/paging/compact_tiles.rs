@@ -1,8 +1,7 @@
-use crate::error::{Error, Result};
-use crate::persistence::CompactTile;
+use crate::error::Result;
+use crate::persistence::{CompactTile, Packer};
 use crate::space::TileIndex;
 use crate::tile::Tile;
-use crate::tile::format::{CompactEffort, CompactWriter};
 use lru::LruCache;
 use std::collections::BTreeMap;
 
@@ -10,8 +9,7 @@ use std::collections::BTreeMap;
 #[derive(Debug)]
 pub(super) struct CompactTiles {
     tiles: LruCache<TileIndex, Entry>,
-    /// Made with the first tile and kept: making one takes longer than encoding a small tile.
-    writer: Option<CompactWriter>,
+    packer: Packer,
     bytes: usize,
     /// Dirty tiles that are not being saved, by number. Looking for one from the oldest tile on would pass all clean ones,
     /// again and again.
@@ -36,7 +34,7 @@ const SLOT_BYTES: usize = size_of::<(TileIndex, Entry)>() + 128;
 impl Default for CompactTiles {
     fn default() -> Self {
         let (tiles, to_save) = (LruCache::unbounded(), BTreeMap::new());
-        Self { tiles, writer: None, bytes: 0, to_save, dirty: 0, puts: 0 }
+        Self { tiles, packer: Packer::default(), bytes: 0, to_save, dirty: 0, puts: 0 }
     }
 }
 
@@ -78,14 +76,7 @@ impl CompactTiles {
     ///
     /// A lack of memory.
     pub(super) fn encode(&mut self, tile: &Tile, occupied_from: Option<f64>) -> Result<()> {
-        let writer = match &mut self.writer {
-            Some(writer) => writer,
-            none => {
-                let writer = CompactWriter::new(CompactEffort::Fast);
-                none.insert(writer.map_err(|error| Error::io("memory".as_ref(), "pack a tile in", error))?)
-            }
-        };
-        let compact = CompactTile::encode(writer, tile, occupied_from)?;
+        let compact = CompactTile::encode(&mut self.packer, tile, occupied_from)?;
         self.put(tile.index(), compact, tile.is_dirty());
         Ok(())
     }

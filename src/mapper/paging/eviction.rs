@@ -8,29 +8,27 @@ use crate::scan::ScanUpdates;
 use crate::space::TileIndex;
 use crate::tile::Tile;
 
-/// Bytes of memory that a new tile takes beside its voxels while the scan that makes it is inserted: its part of the scan, its
-/// buffered updates, and what is known of it until it is flushed.
+/// Bytes that a new tile takes besides its voxels while a scan creates it: scan parts, buffered updates and index.
 const BYTES_OF_NEW_TILE: usize = 120;
 
 impl TilePager {
-    /// Checks that what is known of the map's tiles leaves room to work in.
+    /// Checks that the index of tiles takes at most half of the limit.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] with the limit that would do, if it takes more than half of it.
+    /// [`Error::InvalidArgument`] with a sufficient limit.
     pub(super) fn check_index(&self, updates: &ScanUpdates) -> Result<()> {
         let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.buffer.is_staged(**tile);
         let tiles = updates.tiles.iter().map(|(tile, _)| tile).filter(is_new).count();
         let tiles = tiles + self.buffer.staged_tiles().filter(|tile| !self.exists(*tile)).count();
         let plan = self.cache.plan();
         let index = self.disk.index_bytes() + BYTES_OF_NEW_TILE * tiles;
-        if !plan.is_kept || index <= plan.bytes / 2 {
+        if !plan.is_enforced || index <= plan.bytes / 2 {
             return Ok(());
         }
         let mib = |bytes: usize| bytes.div_ceil(1 << 20);
         let reason = format!(
-            "{} MiB are too few for a map of {} tiles: to know which there are takes {} MiB; go on with at least {} MiB, or \
-             build with larger tiles",
+            "{} MiB are too few: the index of {} tiles takes {} MiB; use at least {} MiB, or larger tiles",
             mib(plan.bytes),
             self.count_tiles() + tiles,
             mib(index),
@@ -42,7 +40,7 @@ impl TilePager {
     /// How many tiles one scan may touch.
     pub(in crate::mapper) fn most_tiles_of_scan(&self) -> usize {
         let plan = self.cache.plan();
-        match plan.is_kept {
+        match plan.is_enforced {
             true => (plan.bytes / 2).saturating_sub(self.memory().index as usize) / BYTES_OF_NEW_TILE,
             false => usize::MAX,
         }
@@ -58,44 +56,44 @@ impl TilePager {
         self.cache.has_room_for(bytes, self.outside_bytes())
     }
 
-    /// Whether a tile may come in before it has to: not when others would soon have to go for it.
+    /// Whether there is room to load a tile ahead of use without evicting others soon.
     pub(super) fn has_room_to_spare(&self) -> bool {
         self.has_room_for(self.cache.plan().spare_bytes)
     }
 
     /// Evicts tiles until this one fits.
-    pub(super) fn make_room(&mut self, tile: &Tile, scan_number: u64) -> Result<()> {
-        self.make_room_for(tile.bytes(), self.cache.plan().tiles - 1, scan_number)
+    pub(super) fn make_room(&mut self, tile: &Tile) -> Result<()> {
+        self.make_room_for(tile.bytes(), self.cache.plan().tiles - 1)
     }
 
-    /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles that somebody holds stay; if all are
-    /// held, what comes next goes beyond the limit.
-    pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize, scan_number: u64) -> Result<()> {
+    /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles in use are not evicted; if all are in use,
+    /// the limit is exceeded.
+    pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize) -> Result<()> {
         while let Some(eviction) = self.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
             match eviction {
-                Eviction::Resident(index) => self.evict(index, scan_number)?,
-                Eviction::Compact(index) => self.evict_compact(index, scan_number)?,
+                Eviction::Resident(index) => self.evict(index)?,
+                Eviction::Compact(index) => self.evict_compact(index)?,
             }
         }
-        self.save_ahead(scan_number)
+        self.save_ahead()
     }
 
     /// Evicts a resident tile: into the compact form, or to disk where there is no such tier.
-    pub(super) fn evict(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+    pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
         if self.cache.has_compact_tier() {
             return self.cache.make_compact(index);
         }
         if self.cache.is_dirty(index) {
-            self.write(index, scan_number)?;
+            self.write(index)?;
         }
         self.cache.drop_resident(index);
         Ok(())
     }
 
     /// Drops a tile in the compact form, once it is on disk.
-    fn evict_compact(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+    fn evict_compact(&mut self, index: TileIndex) -> Result<()> {
         while self.cache.is_dirty(index) {
-            self.begin_save(index, scan_number)?;
+            self.begin_save(index)?;
             self.wait_for_save()?;
         }
         self.cache.drop_compact(index);
@@ -103,20 +101,20 @@ impl TilePager {
     }
 
     /// Saves tiles before they have to go, as many as may be in flight.
-    fn save_ahead(&mut self, scan_number: u64) -> Result<()> {
+    fn save_ahead(&mut self) -> Result<()> {
         if !self.cache.has_compact_tier() || self.disk.has_save_error() {
             return Ok(());
         }
         while self.disk.can_save()
             && let Some(index) = self.cache.next_to_save()
         {
-            self.begin_save(index, scan_number)?;
+            self.begin_save(index)?;
         }
         Ok(())
     }
 
     /// Begins to save a tile in the compact form, if it is dirty and not being saved.
-    pub(super) fn begin_save(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+    pub(super) fn begin_save(&mut self, index: TileIndex) -> Result<()> {
         if !self.cache.needs_save(index) {
             return Ok(());
         }
@@ -126,7 +124,7 @@ impl TilePager {
         }
         let writer = self.disk.writer()?;
         if let Some(tile) = self.cache.begin_save(index) {
-            self.disk.save(writer, index, tile, scan_number);
+            self.disk.save(writer, index, tile, self.scan_number);
         }
         Ok(())
     }
@@ -180,9 +178,9 @@ impl TilePager {
     }
 
     /// Waits until nothing is in flight, to disk or from there.
-    pub(super) fn end_io(&mut self, scan_number: u64) -> Result<()> {
-        self.end_prefetches(scan_number)?;
-        // A tile that was not saved is dirty still, and is saved again.
+    pub(super) fn end_io(&mut self) -> Result<()> {
+        self.end_prefetches()?;
+        // A tile that could not be saved stays dirty, and the flush saves it again; so this error is dropped.
         let _ = self.end_saves();
         Ok(())
     }

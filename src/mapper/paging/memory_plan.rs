@@ -7,17 +7,17 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) tiles: usize,
     /// Most bytes of all that grows.
     pub(super) bytes: usize,
-    /// Most bytes of updates that wait for tiles on disk before those are fetched; one scan may come on top.
+    /// Most bytes of buffered updates; those of one scan may come on top.
     pub(super) buffer_bytes: usize,
-    /// Most bytes of what is known of a scan while it is inserted.
+    /// Most bytes for tracing a scan.
     pub(in crate::mapper) scan_bytes: usize,
     /// Most bytes of packed updates of a scan; what comes on top goes to files.
     pub(in crate::mapper) updates_bytes: usize,
     /// Bytes that are kept free for inserting scans from the beginning.
     pub(super) least_scan_bytes: usize,
-    /// Whether the bytes are a limit that is kept, so that what a scan takes counts, and a map that cannot keep to it is
-    /// refused. Where tiles are counted, all of it holds.
-    pub(super) is_kept: bool,
+    /// Whether the limit is enforced: a scan's memory counts, and a map whose index does not fit is refused. False only for
+    /// [`MemoryLimit::Tight`], which tests use.
+    pub(super) is_enforced: bool,
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,
     /// Most bytes of tiles in the compact form while others have to go.
@@ -34,15 +34,15 @@ impl MemoryPlan {
                 scan_bytes: usize::MAX,
                 updates_bytes: usize::MAX,
                 least_scan_bytes: 0,
-                is_kept: true,
+                is_enforced: true,
                 spare_bytes: 0,
                 compact_bytes: 0,
             },
-            // Waiting updates are small beside their tiles, and the more wait the fewer reads and writes there are.
+            // Buffered updates are small beside their tiles; a larger buffer saves reads and writes.
             MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
-            // The marks of even a small scan take more than there is.
+            // For tests: the limit is below the least that works, so it is not enforced.
             MemoryLimit::Tight(bytes) => {
-                Self { least_scan_bytes: 0, is_kept: false, ..Self::shares_of(bytes) }
+                Self { least_scan_bytes: 0, is_enforced: false, ..Self::shares_of(bytes) }
             }
         }
     }
@@ -55,7 +55,7 @@ impl MemoryPlan {
             scan_bytes: bytes / 4,
             updates_bytes: bytes / 8,
             least_scan_bytes: bytes / 8,
-            is_kept: true,
+            is_enforced: true,
             spare_bytes: bytes / 4,
             compact_bytes: bytes / 8 * 3,
         }

@@ -1,4 +1,4 @@
-//! How an out-of-core map lives in little memory. Three owners, each with private state, and one that leads them.
+//! Keeps an out-of-core map within its memory limit. [`TilePager`] leads three owners with private state.
 //!
 //! ```text
 //! TilePager     accepts scans, answers for tiles, flushes
@@ -7,8 +7,8 @@
 //!   TileDisk      the store, the threads that save and load, what was read and written, how long the mapper waited
 //! ```
 //!
-//! A tile is in at most one tier of the cache. Resident tiles have no buffered updates: these are applied when the tile comes
-//! in. `eviction` moves tiles down, `prefetch` fetches tiles before they are needed, `flush` makes the map durable.
+//! A tile is resident, compact, or neither. A resident tile has no buffered updates: they are applied when it is loaded.
+//! `eviction` moves tiles towards the disk, `prefetch` loads tiles ahead of use, `flush` commits.
 
 mod buffered_updates;
 mod compact_tiles;

@@ -42,31 +42,31 @@ impl TilePager {
     }
 
     /// Takes note of saves and prefetches that have ended.
-    pub(super) fn take_prefetched(&mut self, scan_number: u64) -> Result<()> {
+    pub(super) fn take_finished_io(&mut self) -> Result<()> {
         self.take_saved();
         while let Some((index, table)) = self.disk.take_prefetched() {
-            self.put_prefetched(index, table, scan_number)?;
+            self.put_prefetched(index, table)?;
         }
         Ok(())
     }
 
-    fn put_prefetched(&mut self, index: TileIndex, table: Option<Table>, scan_number: u64) -> Result<()> {
+    fn put_prefetched(&mut self, index: TileIndex, table: Option<Table>) -> Result<()> {
         let Some(table) = table else { return Ok(()) };
         let is_wanted = self.buffer.contains(index) || self.has_room_to_spare();
         if !is_wanted || self.buffer.is_staged(index) || self.cache.contains(index) {
             return Ok(());
         }
         let tile = Arc::new(self.make_tile(index, table)?);
-        self.make_room(&tile, scan_number)?;
+        self.make_room(&tile)?;
         self.put(tile);
         Ok(())
     }
 
     /// Waits until a tile that is being prefetched is there.
-    pub(super) fn end_prefetch_of(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+    pub(super) fn end_prefetch_of(&mut self, index: TileIndex) -> Result<()> {
         while self.disk.is_prefetching(index) {
             match self.disk.stall(|disk| disk.wait_prefetched()) {
-                Some((index, table)) => self.put_prefetched(index, table, scan_number)?,
+                Some((index, table)) => self.put_prefetched(index, table)?,
                 None => break,
             }
         }
@@ -74,9 +74,9 @@ impl TilePager {
     }
 
     /// Waits until all prefetches have ended.
-    pub(super) fn end_prefetches(&mut self, scan_number: u64) -> Result<()> {
+    pub(super) fn end_prefetches(&mut self) -> Result<()> {
         while let Some((index, table)) = self.disk.wait_prefetched() {
-            self.put_prefetched(index, table, scan_number)?;
+            self.put_prefetched(index, table)?;
         }
         Ok(())
     }

@@ -19,7 +19,7 @@ pub(super) struct TileCache {
     /// Log-odds from which a voxel is occupied, where the map stores tiles in the compact form.
     occupied_from: Option<f64>,
     resident: ResidentTiles,
-    /// Dropped after the tiles: updates in flight to octrees go with these and are not applied any more.
+    /// Declared after the tiles, so dropped after them: the octree worker does not write trees that are going away.
     octrees: OctreeFactory,
     compact: CompactTiles,
     /// Bytes of memory that are kept free for inserting scans: what the largest so far took.
@@ -96,7 +96,7 @@ impl TileCache {
         indices
     }
 
-    /// Makes a tile of a table; it is not put in.
+    /// Makes a tile from a table, without putting it into the cache.
     pub(super) fn make_tile(&self, index: TileIndex, table: Table) -> Tile {
         Tile::from_table(&self.grid, &self.octrees, index, table)
     }
@@ -221,7 +221,7 @@ impl TileCache {
 
     /// Keeps memory free for scans as large as this one.
     pub(super) fn reserve_for_scan(&mut self, scan_bytes: usize) {
-        if self.plan.is_kept {
+        if self.plan.is_enforced {
             self.scan_bytes = self.scan_bytes.max(scan_bytes);
         }
     }
@@ -249,9 +249,8 @@ impl TileCache {
         }
     }
 
-    /// Bytes that count towards the limit. The compact tier counts as if it were full: resident tiles leave many small free
-    /// blocks to the allocator, which the large ones of compact tiles cannot use, so that these come on top of the most
-    /// that resident tiles ever took.
+    /// Bytes that count towards the limit. The compact tier counts as full: resident tiles leave small free blocks that its
+    /// large ones cannot use.
     fn limited_bytes(&self, outside: usize) -> usize {
         let compact = self.compact.bytes().max(self.plan.compact_bytes);
         self.resident.bytes() + compact + self.scan_bytes + outside

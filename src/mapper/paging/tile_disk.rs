@@ -47,7 +47,7 @@ impl TileDisk {
         }
     }
 
-    /// The store, to be asked.
+    /// The store, for reading.
     pub(super) fn store(&self) -> &TileStore {
         &self.store
     }
@@ -259,7 +259,7 @@ impl TileDisk {
 
     // Commits.
 
-    /// Makes a map of the seed's format, before its first change, one of voxtile's own.
+    /// Makes a map of the original format, before its first change, one of voxtile's own.
     ///
     /// # Errors
     ///
@@ -304,7 +304,7 @@ impl TileDisk {
         self.threads.bytes()
     }
 
-    /// Bytes of memory of what is known of each tile, without what a commit takes.
+    /// Bytes of the index of tiles, without what a commit takes.
     pub(super) fn index_bytes(&self) -> usize {
         self.store.index_bytes() + self.unread.bytes() + self.written.bytes()
     }

@@ -16,26 +16,28 @@ use std::sync::Arc;
 /// The tiles of an out-of-core map: which are in memory, and what is buffered for the others.
 ///
 /// This file accepts scans and answers for tiles. `eviction` makes room, `prefetch` fetches tiles ahead, `flush` makes the map
-/// durable. `scan_number` counts the scans in the map; it is written into every tile's file.
+/// durable.
 #[derive(Debug)]
 pub(in crate::mapper) struct TilePager {
     pub(super) config: MapConfig,
     pub(super) cache: TileCache,
     pub(super) buffer: WriteBuffer,
     pub(super) disk: TileDisk,
+    /// Number of scans in the map. Every tile file that is written records it.
+    pub(super) scan_number: u64,
     /// The tiles that the last scan touched.
     pub(super) last_span: Option<TileSpan>,
     /// What the map was built from and, last, is being built from; kept with it at the next flush.
     pub(super) inputs: Vec<InputRecord>,
 }
 
-/// By how many bytes an update may be expected to make a tile larger, or the write buffer.
+/// Expected growth of a tile or of the write buffer per update, in bytes.
 const BYTES_OF_UPDATE: usize = 4;
 
 /// A tile whose spill file is longer than this is brought in: applying so much is cheaper than keeping it.
 const MOST_SPILLED_BYTES: u64 = 1 << 20;
 
-/// Fewer bytes of updates are not worth reading and writing a tile for, however small that is.
+/// Below so many bytes of updates a tile is never read only to apply them.
 const LEAST_BYTES_TO_LOAD_FOR: u64 = 1 << 14;
 
 /// Bytes of memory that a new tile takes once it has these updates, about.
@@ -57,6 +59,7 @@ impl TilePager {
         Self {
             cache: TileCache::new(&config),
             buffer: WriteBuffer::default(),
+            scan_number: store.commits().scan_number,
             disk: TileDisk::new(&config, store),
             last_span: None,
             inputs,
@@ -64,36 +67,37 @@ impl TilePager {
         }
     }
 
-    /// The store, to be asked.
+    /// The store, for reading.
     pub(in crate::mapper) fn store(&self) -> &TileStore {
         self.disk.store()
     }
 
     // Scans.
 
+    /// Number of scans in the map.
+    pub(in crate::mapper) fn scan_number(&self) -> u64 {
+        self.scan_number
+    }
+
     /// Does all that may fail before the updates can be accepted. The map's content stays as it is.
     ///
     /// `scan_bytes` are the bytes of memory that inserting scans takes, with these updates.
-    pub(in crate::mapper) fn prepare(
-        &mut self,
-        updates: &ScanUpdates,
-        scan_bytes: usize,
-        scan_number: u64,
-    ) -> Result<()> {
+    pub(in crate::mapper) fn prepare(&mut self, updates: &ScanUpdates, scan_bytes: usize) -> Result<()> {
         self.cache.reserve_for_scan(scan_bytes);
         self.check_index(updates)?;
-        self.take_prefetched(scan_number)?;
-        self.drain_buffer(scan_number)?;
+        self.take_finished_io()?;
+        self.drain_buffer()?;
         for (tile, _) in &updates.tiles {
             let is_wanted = self.disk.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
-            // What is staged of this scan must come after what is buffered, which is in the same file.
+            // The spill file of a staged tile holds buffered updates, then those of this scan. Applying only the former would
+            // reorder them.
             if is_wanted && !self.cache.is_resident(*tile) && !self.buffer.is_staged(*tile) {
-                self.load(*tile, scan_number)?;
+                self.load(*tile)?;
             }
         }
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         // A tile that is made new by the updates is one tile more than there are.
-        self.make_room_for(BYTES_OF_UPDATE * all, self.cache.plan().tiles, scan_number)
+        self.make_room_for(BYTES_OF_UPDATE * all, self.cache.plan().tiles)
     }
 
     /// Accepts the updates, staged parts first: resident tiles take theirs at once, those of other tiles are buffered.
@@ -119,26 +123,23 @@ impl TilePager {
         }
         let model = &self.config.sensor_model;
         self.cache.change_all(resident, |tile, updates| tile.apply(model, &updates));
+        self.scan_number += 1;
     }
 
     /// Stages a part of a scan in files, until the scan is accepted or given up.
-    pub(in crate::mapper) fn stage(
-        &mut self,
-        part: Vec<(TileIndex, PackedUpdates)>,
-        scan_number: u64,
-    ) -> Result<()> {
+    pub(in crate::mapper) fn stage(&mut self, part: Vec<(TileIndex, PackedUpdates)>) -> Result<()> {
         self.upgrade()?;
         for (index, updates) in part {
             if self.disk.is_unread(index) {
-                self.load(index, scan_number)?;
+                self.load(index)?;
             }
             // Updates are buffered only for tiles that are not resident.
             if self.cache.is_resident(index) {
-                self.evict(index, scan_number)?;
+                self.evict(index)?;
             }
             self.buffer.stage(index, &updates, &mut self.disk)?;
         }
-        self.make_room_for(0, self.cache.plan().tiles, scan_number)
+        self.make_room_for(0, self.cache.plan().tiles)
     }
 
     /// Takes back what a scan that was not accepted has staged.
@@ -147,7 +148,7 @@ impl TilePager {
     }
 
     /// Shrinks the write buffer to its share of memory: updates are applied, or spilled where that is cheaper.
-    fn drain_buffer(&mut self, scan_number: u64) -> Result<()> {
+    fn drain_buffer(&mut self) -> Result<()> {
         let most_bytes = self.cache.plan().buffer_bytes;
         let excess = self.buffer.bytes().saturating_sub(most_bytes);
         let heaviest = if excess > 0 { self.buffer.heaviest(excess) } else { Vec::new() };
@@ -159,29 +160,29 @@ impl TilePager {
                 self.upgrade()?;
                 self.buffer.spill(tile, &mut self.disk)?;
             } else {
-                self.load_buffered(tile, scan_number)?;
+                self.load_buffered(tile)?;
             }
         }
-        // However short a file is: what is known of it takes memory.
+        // Even a short spill file has an entry in memory, so their number is limited.
         let most_files = most_bytes / 2 / WriteBuffer::BYTES_OF_FILE;
         let too_many = self.buffer.spill_files().saturating_sub(most_files);
         for tile in self.buffer.longest_files(MOST_SPILLED_BYTES, too_many) {
-            self.load_buffered(tile, scan_number)?;
+            self.load_buffered(tile)?;
         }
         Ok(())
     }
 
-    fn load_buffered(&mut self, tile: TileIndex, scan_number: u64) -> Result<()> {
+    fn load_buffered(&mut self, tile: TileIndex) -> Result<()> {
         // It may have come in with another.
         if self.buffer.contains(tile) && !self.buffer.is_staged(tile) {
-            self.load(tile, scan_number)?;
+            self.load(tile)?;
         }
         Ok(())
     }
 
-    /// Whether a tile's updates are better spilled than applied. A tile on disk is read and written for its updates; that these
-    /// are at least as many bytes as the tile keeps the bytes read and written in proportion to the updates, as in a
-    /// log-structured merge tree (O'Neil et al., 1996).
+    /// Whether spilling a tile's updates costs less than applying them. Applying reads and writes the tile, so it pays only
+    /// once the updates are as large as the tile. Disk traffic then stays proportional to the updates, as in a log-structured
+    /// merge tree (O'Neil et al., 1996).
     pub(super) fn is_spilling_cheaper(&self, tile: TileIndex) -> bool {
         let is_near = self.cache.contains(tile) || self.disk.is_prefetching(tile);
         if !self.cache.has_compact_tier() || is_near {
@@ -199,40 +200,32 @@ impl TilePager {
     }
 
     /// A tile, brought into memory; `None` if nothing was observed in it.
-    pub(in crate::mapper) fn tile(
-        &mut self,
-        index: TileIndex,
-        scan_number: u64,
-    ) -> Result<Option<Arc<Tile>>> {
+    pub(in crate::mapper) fn tile(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
         if let Some(tile) = self.cache.get(index) {
             return Ok(Some(tile.clone()));
         }
         if !self.exists(index) {
             return Ok(None);
         }
-        let tile = Arc::new(self.read(index, scan_number)?);
-        // A disk that takes no tile in exchange does not keep a query from being answered.
-        if self.make_room(&tile, scan_number).is_ok() {
+        let tile = Arc::new(self.read(index)?);
+        // If the disk refuses an eviction, the query is answered from a copy.
+        if self.make_room(&tile).is_ok() {
             self.put(tile.clone());
         }
         Ok(Some(tile))
     }
 
     /// The evidence of a voxel, whose tile is brought into memory.
-    pub(in crate::mapper) fn evidence(
-        &mut self,
-        voxel: VoxelIndex,
-        scan_number: u64,
-    ) -> Result<Option<Evidence>> {
+    pub(in crate::mapper) fn evidence(&mut self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let index = self.config.grid.tile_of_voxel(voxel);
         if let Some(tile) = self.cache.get(index) {
             return Ok(tile.evidence_of_own(voxel));
         }
-        Ok(self.tile(index, scan_number)?.and_then(|tile| tile.evidence_of_own(voxel)))
+        Ok(self.tile(index)?.and_then(|tile| tile.evidence_of_own(voxel)))
     }
 
     /// A tile as it is now, without bringing it into memory.
-    pub(in crate::mapper) fn tile_in_passing(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
+    pub(in crate::mapper) fn tile_uncached(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
         if let Some(tile) = self.cache.peek(index) {
             return Ok(Some(tile.clone()));
         }
@@ -240,31 +233,31 @@ impl TilePager {
             return Ok(None);
         }
         let (table, _) = self.fetch(index)?;
-        let mut tile = Tile::in_passing(&self.config.grid, index, table);
+        let mut tile = Tile::uncached(&self.config.grid, index, table);
         self.buffer.apply_to(&mut tile, &self.config.sensor_model, &mut self.disk)?;
         Ok(Some(Arc::new(tile)))
     }
 
     /// Brings a tile into memory, with its buffered updates.
-    pub(super) fn load(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+    pub(super) fn load(&mut self, index: TileIndex) -> Result<()> {
         // Read first: a tile that cannot be read evicts nothing.
-        let tile = Arc::new(self.read(index, scan_number)?);
+        let tile = Arc::new(self.read(index)?);
         if !self.cache.is_resident(index) {
-            self.make_room(&tile, scan_number)?;
+            self.make_room(&tile)?;
             self.put(tile);
         }
         Ok(())
     }
 
-    /// Puts a tile with its buffered updates applied into memory, where there is room for it.
+    /// Puts a tile into memory. Its buffered updates are applied already, so they are dropped. The caller has made room.
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
         self.buffer.forget(tile.index(), &self.disk);
         self.cache.put(tile);
     }
 
     /// A tile that is not resident, with its buffered updates applied.
-    pub(super) fn read(&mut self, index: TileIndex, scan_number: u64) -> Result<Tile> {
-        self.end_prefetch_of(index, scan_number)?;
+    pub(super) fn read(&mut self, index: TileIndex) -> Result<Tile> {
+        self.end_prefetch_of(index)?;
         if let Some(tile) = self.cache.peek(index) {
             return Ok(Tile::clone(tile)); // It has just arrived.
         }
@@ -334,23 +327,18 @@ impl TilePager {
     /// # Errors
     ///
     /// [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false; a tile that cannot be read.
-    pub(in crate::mapper) fn reload(
-        &mut self,
-        index: TileIndex,
-        discard_changes: bool,
-        scan_number: u64,
-    ) -> Result<bool> {
+    pub(in crate::mapper) fn reload(&mut self, index: TileIndex, discard_changes: bool) -> Result<bool> {
         if self.is_dirty(index) && !discard_changes {
             return Err(Error::UnsavedChanges { tile: index });
         }
-        self.end_io(scan_number)?;
+        self.end_io()?;
         // All that may fail comes before anything is let go.
         let table = self.disk.read(index)?;
         let tile = table.map(|table| self.cache.make_tile(index, table));
         if let Some(tile) = &tile
             && !self.cache.is_resident(index)
         {
-            self.make_room(tile, scan_number)?;
+            self.make_room(tile)?;
         }
         self.cache.discard(index);
         self.buffer.forget(index, &self.disk);
@@ -399,9 +387,9 @@ impl TilePager {
         }
     }
 
-    pub(in crate::mapper) fn statistics(&self, scan_number: u64) -> MapStatistics {
+    pub(in crate::mapper) fn statistics(&self) -> MapStatistics {
         let mut statistics = MapStatistics {
-            scan_number,
+            scan_number: self.scan_number,
             tiles: self.count_tiles() as u64,
             memory: self.memory(),
             ..MapStatistics::default()

@@ -82,7 +82,7 @@ impl Checkpoint {
         let tiles: Vec<_> = self.unrenamed.tiles().chain(self.unremoved.iter().copied()).collect();
         // Asked after the commit: who begins to read later sees it.
         if !tiles.is_empty() {
-            kept.readers().look();
+            kept.refresh_readers();
         }
         let mut pinned = Vec::new();
         for tile in tiles {
@@ -178,7 +178,7 @@ fn put_in_place(files: &MapFiles, next: &Path, current: &Path) -> Result<()> {
     let renamed = files.rename(next, current);
     if renamed.is_err() && !matches!(disk.kind(current), Err(_) | Ok(None | Some(EntryKind::File(_)))) {
         let to = Quarantine::new(disk, files.layout()).take(current)?;
-        log::warn!("{}: no file, and in the way of one; now {}", current.display(), to.display());
+        log::warn!("{}: not a regular file; moved to {}", current.display(), to.display());
         return files.rename(next, current);
     }
     renamed

@@ -174,7 +174,7 @@ impl Record {
         let [flush_number, scan_number] =
             [u64::from_le_bytes(payload.take()?), u64::from_le_bytes(payload.take()?)];
         if flush_number > MAX_NUMBER || scan_number > MAX_NUMBER {
-            return Err(payload.wrong(16, "flush or scan number is too high to be true"));
+            return Err(payload.wrong(16, "flush or scan number exceeds 2^62"));
         }
         if tiles * TILE_BYTES as u64 > payload.left {
             return Err(payload.wrong(20, "the number of tiles does not fit the record"));
@@ -183,7 +183,7 @@ impl Record {
         for _ in 0..tiles {
             let tile = index_from(payload.take()?);
             let Some(version) = TileVersion::from_bytes(&payload.take()?) else {
-                return Err(payload.wrong(TILE_BYTES as u64, "numbers that no tile has"));
+                return Err(payload.wrong(TILE_BYTES as u64, "tile sizes or counts out of range"));
             };
             changed.insert(tile, version);
         }

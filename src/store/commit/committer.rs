@@ -11,16 +11,16 @@ use crate::store::tiles::tile_versions::TileVersions;
 /// The map's own two files, `commits.log` and `metadata.json`, and the lock that lets only one process write them.
 #[derive(Debug)]
 pub(in crate::store) struct Committer {
-    /// `None` for a map of the seed's format, and for nothing else.
+    /// `None` for a map of the original format, and for nothing else.
     log: Option<CommitLog>,
     /// Whether the log ends with its last commit. After a failed append its end is unknown.
     is_log_settled: bool,
     metadata: Metadata,
-    /// Flush number in the `metadata.json` on disk; `None` in the seed's format. A crash can leave it behind the log.
+    /// Flush number in the `metadata.json` on disk; `None` in the original format. A crash can leave it behind the log.
     written_flush: Option<u64>,
     /// The map's snapshots; `None` where nothing says which there are.
     listed: Option<SnapshotList>,
-    /// Whether the log says so too.
+    /// Whether the log has the list of snapshots.
     is_list_logged: bool,
     /// Held while the store may write.
     lock: Option<Lock>,
@@ -57,7 +57,7 @@ impl Committer {
         self.lock.as_ref().map_or(Ok(()), Lock::check)
     }
 
-    /// The map's id; `None` for a map of the seed's format.
+    /// The map's id; `None` for a map of the original format.
     pub(in crate::store) fn map_id(&self) -> Option<[u8; 16]> {
         self.log.map(|log| log.map_id())
     }
@@ -66,10 +66,14 @@ impl Committer {
     ///
     /// # Errors
     ///
-    /// A map of the seed's format has none.
+    /// A map of the original format has none.
     pub(in crate::store) fn logged_map_id(&self) -> Result<[u8; 16]> {
-        let reason = "a map of the seed's format must be upgraded first";
-        self.map_id().ok_or_else(|| Error::argument("map", reason))
+        Ok(self.log()?.map_id())
+    }
+
+    fn log(&self) -> Result<CommitLog> {
+        let reason = "a map of the original format must be upgraded first";
+        self.log.ok_or_else(|| Error::argument("map", reason))
     }
 
     /// The metadata as last read or written.
@@ -130,8 +134,7 @@ impl Committer {
         flush: &Flush<'_>,
         metadata: &Metadata,
     ) -> Result<()> {
-        self.logged_map_id()?;
-        let Some(mut log) = self.log else { return Ok(()) };
+        let mut log = self.log()?;
         let path = files.layout().commit_log();
         if let Err(error) = log.append(&**files.disk(), &path, flush) {
             self.is_log_settled = false;
@@ -142,8 +145,8 @@ impl Committer {
         Ok(())
     }
 
-    /// Cuts off what a failed append may have left. A record that came to disk after all names files that must stay as they
-    /// are until then.
+    /// Truncates the log after a failed append. The failed record may still reach the disk, and it names `*.next` files that
+    /// must not change until it is gone.
     pub(in crate::store) fn settle_log(&mut self, files: &MapFiles) -> Result<()> {
         if let (false, Some(log)) = (self.is_log_settled, self.log) {
             let path = files.layout().commit_log();
@@ -154,7 +157,7 @@ impl Committer {
         Ok(())
     }
 
-    /// Gives a map of the seed's format an id and a log.
+    /// Gives a map of the original format an id and a log.
     pub(in crate::store) fn begin_log(
         &mut self,
         files: &MapFiles,
@@ -225,7 +228,6 @@ impl Committer {
         versions: &TileVersions,
         listed: SnapshotList,
     ) -> Result<u64> {
-        self.logged_map_id()?;
         let before = self.listed.replace(listed);
         let (number, scan_number) = (versions.commits().flush_number + 1, versions.commits().scan_number);
         let metadata = self.fill_in(self.metadata.clone(), files, versions, [number, scan_number]);

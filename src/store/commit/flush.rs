@@ -15,6 +15,10 @@ use std::io::{self, Write};
 
 impl TileStore {
     /// Writes the next version of one of a tile's files; the committed version stays as it is.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error; the earlier next version is lost then.
     pub fn write_next(
         &mut self,
         tile: TileIndex,
@@ -31,12 +35,12 @@ impl TileStore {
     /// A disk that refuses to finish what the last commit left to do.
     pub fn writer(&mut self) -> Result<TileWriter> {
         // A committed version may still be there under the name that is written to now.
-        self.settle()?;
-        let map_id = self.map_id().unwrap_or_default();
-        Ok(TileWriter { files: self.files.clone(), map_id })
+        self.finish_earlier_work()?;
+        let map_id = self.committer.logged_map_id()?;
+        Ok(TileWriter::new(self.files.clone(), map_id))
     }
 
-    /// Notes that the next version of a tile is written, both files.
+    /// Records that the next version of a tile is written, with all its files.
     pub fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
         self.versions.note_next(tile, version);
     }
@@ -48,7 +52,7 @@ impl TileStore {
     ///
     /// # Errors
     ///
-    /// A map of the seed's format, which has no log that could name removed tiles.
+    /// A map of the original format, which has no log that could name removed tiles.
     pub fn remove(&mut self, tile: TileIndex) -> Result<()> {
         self.committer.logged_map_id()?;
         self.versions.remove(tile);
@@ -72,8 +76,12 @@ impl TileStore {
     /// `metadata` gives the map's parameters; bounds and numbers are filled in here. After an error nothing is
     /// committed, and calling again tries again. What comes after the commit only tidies up: if the disk refuses that,
     /// it is logged as a warning and made good later.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error, [`Error::LockLost`], or a map of the original format.
     pub fn commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<()> {
-        self.settle()?;
+        self.finish_earlier_work()?;
         self.keep_for_late_readers();
         self.committer.logged_map_id()?;
         if let Some(&tile) = self.versions.suspects().first() {
@@ -95,40 +103,44 @@ impl TileStore {
             let flush = Flush { number, scan_number, changed, removed: &removed, metadata_text };
             if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
                 // At once if it goes: another process may come next, and would see a record that is not on the medium.
-                let _ = self.settle();
+                let _ = self.finish_earlier_work();
                 return Err(error);
             }
             // Committed.
-            self.note_births(number);
+            self.note_added(number);
             let changed = self.versions.committed(number, scan_number);
             self.checkpoint.add(changed.tiles(), &removed);
         }
-        if let Err(error) = self.tidy_up() {
+        if let Err(error) = self.finish_commit() {
             log::warn!("flushed, but not tidied up: {error}");
         }
         Ok(())
     }
 
-    /// Notes which tiles a commit brings into the map: who reads an earlier flush does not miss them. Who opens the map only
-    /// now is taken to see more than it does, for a while.
-    fn note_births(&mut self, number: u64) {
-        if !self.kept.readers().are_there() {
+    /// Records the tiles that a commit adds. A reader of an earlier flush does not see them, so their tables need not be kept
+    /// for it. A reader that opens the map meanwhile may cause a table to be kept in vain.
+    fn note_added(&mut self, number: u64) {
+        if !self.kept.has_readers() {
             return;
         }
         let committed = &self.versions.commits().tiles;
         for tile in self.versions.next().tiles().filter(|tile| !committed.contains(*tile)) {
-            self.kept.readers().note_birth(tile, number);
+            self.kept.note_added(tile, number);
         }
     }
 
     /// Brings the files to what the last commit says, without another one.
-    pub fn tidy(&mut self) -> Result<()> {
-        self.settle()?;
-        self.tidy_up()
+    ///
+    /// # Errors
+    ///
+    /// An I/O error, [`Error::LockLost`].
+    pub fn checkpoint(&mut self) -> Result<()> {
+        self.finish_earlier_work()?;
+        self.finish_commit()
     }
 
-    /// Brings about what earlier calls left open, before anything that builds upon it is written.
-    pub(in crate::store) fn settle(&mut self) -> Result<()> {
+    /// Completes the steps that an earlier call could not. Must come before any write.
+    pub(in crate::store) fn finish_earlier_work(&mut self) -> Result<()> {
         self.committer.check_lock()?;
         self.committer.settle_log(&self.files)?;
         self.run_checkpoint()
@@ -138,8 +150,9 @@ impl TileStore {
         self.checkpoint.run(&self.files, &mut self.versions, &mut self.kept)
     }
 
-    /// What comes after a commit. What the disk refuses of it is made good later.
-    pub(in crate::store) fn tidy_up(&mut self) -> Result<()> {
+    /// Does the steps after the commit record: `metadata.json`, renames, removals, log compaction. The next call completes what
+    /// the disk refuses.
+    pub(in crate::store) fn finish_commit(&mut self) -> Result<()> {
         // At once: who opens the map in between cannot tell the writer which flush it reads.
         if self.committer.written_flush() != Some(self.commits().flush_number) {
             self.write_metadata()?;
@@ -150,6 +163,10 @@ impl TileStore {
     }
 
     /// Puts the next version of a tile's octree in place by itself: it must be the one that the log names.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
     pub fn place_octree(&mut self, tile: TileIndex) -> Result<()> {
         let layout = self.layout();
         let (next, current) = (layout.next(tile, TileFile::Octree), layout.current(tile, TileFile::Octree));
@@ -159,8 +176,12 @@ impl TileStore {
     }
 
     /// Takes tiles out of the map: one commit, after which the log does not name them. Their folders stay.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error, [`Error::LockLost`].
     pub fn forget(&mut self, tiles: &[TileIndex]) -> Result<()> {
-        self.settle()?;
+        self.finish_earlier_work()?;
         self.versions.forget(tiles);
         if self.map_id().is_some() {
             self.versions.committed_nothing(self.commits().flush_number + 1);
@@ -169,17 +190,22 @@ impl TileStore {
         self.write_metadata()
     }
 
-    /// Gives a map of the seed's format an id and a log, so that it can be written to. Its tiles count as unread
-    /// until they have been written again.
-    pub fn upgrade(&mut self, map_id: [u8; 16]) -> Result<()> {
-        self.committer.begin_log(&self.files, map_id, self.versions.commits())
+    /// Gives a map of the original format an id and a log, so that it can be written to, and returns the id. Its tiles count
+    /// as unread until they have been written again. A map that has an id keeps it.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
+    pub fn upgrade(&mut self, map_id: [u8; 16]) -> Result<[u8; 16]> {
+        self.committer.begin_log(&self.files, map_id, self.versions.commits())?;
+        self.committer.logged_map_id()
     }
 
     /// Where `metadata.json` could not be replaced after the last commit, readers of it may have opened that commit.
     pub(in crate::store) fn keep_for_late_readers(&mut self) {
         if self.is_metadata_behind() {
             let flush_number = self.commits().flush_number;
-            self.kept.readers().may_see(flush_number);
+            self.kept.may_see(flush_number);
         }
     }
 

@@ -8,7 +8,7 @@ use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::tiles::tile_version::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
-/// What `metadata.json` says: the seed's keys, and voxtile's own in a last object `ext`.
+/// What `metadata.json` says: the original keys, and voxtile's own in a last object `ext`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metadata {
     /// Edge of a voxel in metres.
@@ -17,7 +17,7 @@ pub struct Metadata {
     pub tile_size_m: f64,
     /// The exact hull of the tiles; `None` for an empty map.
     pub bounds: Option<Bounds>,
-    /// voxtile's own; `None` for a map of the seed's format, which cannot be verified.
+    /// voxtile's own; `None` for a map of the original format, which cannot be verified.
     pub ext: Option<Extension>,
 }
 
@@ -30,7 +30,7 @@ pub struct Bounds {
     pub max: [i32; 3],
 }
 
-/// What voxtile adds to the seed's metadata.
+/// What voxtile adds to the original metadata.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extension {
     /// Whether the map has no tile, which zeros as bounds cannot say.
@@ -53,7 +53,7 @@ pub struct Extension {
     /// Number of the last scan in the map when its evidence last faded; 0 if it never has.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub decayed_scan: u64,
-    /// How the tiles are stored; maps of the seed's files do not say.
+    /// How the tiles are stored; maps of the original files do not say.
     #[serde(default, skip_serializing_if = "Storage::is_seed")]
     pub storage: Storage,
     /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions that did
@@ -62,7 +62,7 @@ pub struct Extension {
     pub snapshots: Option<SnapshotList>,
 }
 
-/// What makes a map the map it is. It stands in every tile, so that a map can be put together again from its tiles.
+/// The parameters of a map that never change. Every tile repeats them, so that repair can rebuild the metadata. It stands in every tile, so that a map can be put together again from its tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapParameters {
     /// Edge of a voxel in metres.
@@ -140,7 +140,7 @@ impl Bounds {
 }
 
 impl Metadata {
-    /// What makes the map the map it is; `None` for a map of the seed's format, which does not say it all.
+    /// What makes the map the map it is; `None` for a map of the original format, which does not say it all.
     pub fn parameters(&self) -> Option<MapParameters> {
         self.ext.as_ref().map(|ext| MapParameters {
             resolution: self.resolution_m,
@@ -177,7 +177,7 @@ impl Metadata {
         without_progress(self) == without_progress(other)
     }
 
-    /// The file's text. The seed's keys come first and in its order; lengths are plain decimals.
+    /// The file's text. The original keys come first and in its order; lengths are plain decimals.
     pub fn to_text(&self) -> String {
         let Bounds { min, max } = self.bounds.unwrap_or(Bounds { min: [0; 3], max: [0; 3] });
         let bounds = format!("\"bounds\": {{\n    \"min\": {min:?},\n    \"max\": {max:?}\n  }}");
@@ -209,7 +209,7 @@ impl Metadata {
                 format!("version {:?} is not known; this program reads {VERSION:?}", document.version);
             return Err(FormatError::at_offset(0, reason));
         }
-        // A checksum without `ext` is a damaged name of that key, not a file of the seed's.
+        // A checksum without `ext` is a damaged name of that key, not a file of the original.
         if document.ext.is_some() || text.contains("\"crc32\"") {
             check_crc(text)?;
         }
@@ -221,7 +221,7 @@ impl Metadata {
                 .all(|number| number <= MAX_NUMBER)
                 && ext.inputs.iter().all(InputRecord::is_sound))
         {
-            return Err(FormatError::at_offset(0, "flush or scan number is too high to be true"));
+            return Err(FormatError::at_offset(0, "flush or scan number exceeds 2^62"));
         }
         let is_empty = ext.as_ref().is_some_and(|ext| ext.empty);
         Ok(Self {

@@ -1,4 +1,4 @@
-//! The one commit point: versions written beside the committed ones, one synced record in `commits.log`, and what comes after.
+//! The commit: next versions of tiles, one synced record in `commits.log`, and the steps after it.
 
 pub(super) mod checkpoint;
 pub(super) mod commit_log;

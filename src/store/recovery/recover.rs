@@ -3,7 +3,7 @@ use crate::space::{TileIndex, TileTable};
 use crate::store::commit::commit_log::Commits;
 use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::{Layout, SPILL, tile_of_folder};
-use crate::store::snapshots::seen_tables::{KeptFlushes, Snapshots};
+use crate::store::snapshots::seen_tables::{KeptFlushes, SeenTables};
 use crate::store::snapshots::snapshot_file::Snapshot;
 use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::snapshots::snapshot_name::SnapshotName;
@@ -26,7 +26,7 @@ pub(in crate::store) struct Leftovers {
     /// Tile folders that hold files and are not in the log.
     pub orphans: FxHashSet<TileIndex>,
     /// What the map's snapshots see.
-    pub snapshots: Snapshots,
+    pub snapshots: SeenTables,
     /// How many files were removed.
     pub removed: u64,
 }
@@ -46,7 +46,7 @@ pub(in crate::store) fn recover(
 ) -> Result<Leftovers> {
     let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
     let mut leftovers = Leftovers::default();
-    let (mut kept, mut hollow) = (KeptFlushes::default(), Vec::new());
+    let (mut kept, mut empty_folders) = (KeptFlushes::default(), Vec::new());
     for name in list(disk, layout.folder())? {
         let path = layout.folder().join(&name);
         if OWN_NEXT.contains(&&*name) {
@@ -70,7 +70,7 @@ pub(in crate::store) fn recover(
                 leftovers.unrenamed.insert(tile, ());
             }
             // Made for a tile that was never committed, or of one that is no part of the map any more.
-            State::Empty if version.is_none() => hollow.push(tile),
+            State::Empty if version.is_none() => empty_folders.push(tile),
             State::Empty => {}
             // The store goes on with its removal.
             State::Orphan if removed.contains(&tile) => {}
@@ -80,9 +80,9 @@ pub(in crate::store) fn recover(
         }
     }
     settle_snapshots(disk, layout, map_id, listed, &mut leftovers.removed)?;
-    leftovers.snapshots = Snapshots::look(disk, layout, map_id, commits, listed, &kept)?;
+    leftovers.snapshots = SeenTables::read_all(disk, layout, map_id, commits, listed, &kept)?;
     remove_unseen(disk, layout, &kept, &mut leftovers)?;
-    for tile in hollow.into_iter().filter(|tile| !leftovers.snapshots.pinned().contains_key(tile)) {
+    for tile in empty_folders.into_iter().filter(|tile| !leftovers.snapshots.pinned().contains_key(tile)) {
         let path = layout.tile_folder(tile);
         tolerate(disk.remove_folder(&path), &path, "remove")?;
     }
@@ -129,7 +129,7 @@ fn settle_snapshots(
     tolerate(disk.sync_folder(&folder), &folder, "sync")
 }
 
-/// Removes what an attempt to give tiles of the seed's format their trailers left. Returns how many files.
+/// Removes what an attempt to give tiles of the original format their trailers left. Returns how many files.
 pub(in crate::store) fn remove_uncommitted(
     disk: &dyn Disk,
     layout: &Layout,
@@ -281,7 +281,7 @@ fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
     tolerate(disk.remove_file(path), path, "remove")
 }
 
-/// What a file has.
+/// Content of a file, compared with the log.
 #[derive(Clone, Copy, PartialEq)]
 enum Content {
     /// What the log says of it.
@@ -293,8 +293,8 @@ enum Content {
 }
 
 impl Content {
-    /// Whether a next version of the last commit is the committed one, beside what is in place and is not: also where it
-    /// cannot be read, for then nothing else can be what was committed.
+    /// Whether a `*.next` file is the committed version while the file in place is not. An unreadable one counts, since nothing
+    /// else can be.
     fn is_committed_beside(self, in_place: Self) -> bool {
         self == Self::Committed || self == Self::Unreadable && in_place == Self::Other
     }

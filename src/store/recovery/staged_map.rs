@@ -9,9 +9,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A new map until it is finished: it lies in a folder beside its place, `MAP.unfinished`, and gets its name as the very
-/// last. So nothing unfinished is ever found where the map will be, by voxtile or by any other reader of the format,
-/// however the work ends; and the name, which comes at once or not at all, is the commit.
+/// A new map in `MAP.unfinished` beside its final place. [`StagedMap::finish`] renames it, and the rename is the commit, so
+/// nobody finds an incomplete map.
 ///
 /// What an interrupted attempt left is removed by the next one, and when this value is dropped before
 /// [`StagedMap::finish`].

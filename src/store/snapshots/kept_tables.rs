@@ -1,5 +1,5 @@
 use super::readers::Readers;
-use super::seen_tables::Snapshots;
+use super::seen_tables::SeenTables;
 use crate::space::TileIndex;
 use crate::store::disk::{Disk, ReaderWatch};
 use crate::store::map_files::MapFiles;
@@ -8,22 +8,37 @@ use crate::store::map_files::MapFiles;
 #[derive(Debug, Default)]
 pub(in crate::store) struct KeptTables {
     readers: Readers,
-    snapshots: Snapshots,
+    snapshots: SeenTables,
 }
 
 impl KeptTables {
-    /// Who reads the map beside its writer.
-    pub(in crate::store) fn readers(&mut self) -> &mut Readers {
-        &mut self.readers
+    /// Looks which readers are still there.
+    pub(in crate::store) fn refresh_readers(&mut self) {
+        self.readers.look();
+    }
+
+    /// Whether anybody reads the map beside its writer.
+    pub(in crate::store) fn has_readers(&self) -> bool {
+        self.readers.are_there()
+    }
+
+    /// Records that a flush adds a tile: a reader of an earlier flush does not see it.
+    pub(in crate::store) fn note_added(&mut self, tile: TileIndex, flush_number: u64) {
+        self.readers.note_added(tile, flush_number);
+    }
+
+    /// Records that `metadata.json` could not be replaced after a flush: its readers may see that flush.
+    pub(in crate::store) fn may_see(&mut self, flush_number: u64) {
+        self.readers.may_see(flush_number);
     }
 
     /// What the snapshots see.
-    pub(in crate::store) fn snapshots(&self) -> &Snapshots {
+    pub(in crate::store) fn snapshots(&self) -> &SeenTables {
         &self.snapshots
     }
 
     /// Replaces what the snapshots see. What none of them sees any more stays for readers.
-    pub(in crate::store) fn set_snapshots(&mut self, snapshots: Snapshots) {
+    pub(in crate::store) fn set_snapshots(&mut self, snapshots: SeenTables) {
         let before = std::mem::replace(&mut self.snapshots, snapshots);
         for (&tile, flushes) in before.pinned() {
             for &flush_number in flushes.iter().filter(|&&n| !self.snapshots.sees_kept(tile, n)) {
@@ -64,7 +79,7 @@ impl KeptTables {
 
     /// Notes that the kept table of a tile is durable: no snapshot sees what takes its place.
     pub(in crate::store) fn is_durable(&mut self, tile: TileIndex) {
-        self.snapshots.has_replaced(tile);
+        self.snapshots.unshare(tile);
     }
 
     /// Removes the tables that nobody sees any more.

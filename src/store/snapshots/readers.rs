@@ -1,12 +1,11 @@
-use super::seen_tables::{KeptFlushes, Snapshots};
+use super::seen_tables::{KeptFlushes, SeenTables};
 use crate::space::TileIndex;
 use crate::store::disk::{Disk, ReaderWatch};
 use crate::store::layout::Layout;
 use rustc_hash::FxHashMap;
 use std::io;
 
-/// The readers of a map beside its writer, and the tables that are kept for them: of each tile the one version that each
-/// flush sees which is being read, however many there have been since.
+/// The readers of a map, and the replaced tables kept for them: for each tile, one version per flush that is being read.
 ///
 /// A reader holds `metadata.json` open as it was when it opened the map. Every flush puts another file in its place,
 /// so the writer, which watches over all of these files, knows which flushes are being read.
@@ -16,8 +15,8 @@ pub(in crate::store) struct Readers {
     watched: Vec<Watched>,
     /// Tables that were kept for readers alone.
     kept: KeptFlushes,
-    /// Tiles that came into the map by a flush that came after one that is being read.
-    born: FxHashMap<TileIndex, u64>,
+    /// Tiles that were added while an earlier flush was being read, with the flush that added them.
+    added: FxHashMap<TileIndex, u64>,
 }
 
 /// A `metadata.json`, and the flushes that those who hold it may see: its own, and where it fell behind the log, later ones.
@@ -40,9 +39,9 @@ impl Readers {
         }
     }
 
-    /// Notes that a flush brings a tile into the map: who reads an earlier one does not miss it.
-    pub(in crate::store) fn note_birth(&mut self, tile: TileIndex, flush_number: u64) {
-        self.born.insert(tile, flush_number);
+    /// Records that a flush adds a tile: a reader of an earlier flush does not see it.
+    pub(in crate::store) fn note_added(&mut self, tile: TileIndex, flush_number: u64) {
+        self.added.insert(tile, flush_number);
     }
 
     /// Whether anybody reads the map.
@@ -55,18 +54,17 @@ impl Readers {
         let present = self.watched.last().map(|present| present.first);
         self.watched.retain(|watched| Some(watched.first) == present || watched.watch.has_readers());
         let oldest = self.watched.first().map_or(u64::MAX, |watched| watched.first);
-        self.born.retain(|_, flush_number| *flush_number > oldest);
+        self.added.retain(|_, flush_number| *flush_number > oldest);
     }
 
-    /// Whether a reader sees the table in place that was the last version as of a flush, among those of that time or
-    /// earlier.
-    pub(in crate::store) fn see(&self, tile: TileIndex, flush_number: u64, snapshots: &Snapshots) -> bool {
+    /// Whether a reader sees the table in place, which was the last version as of this flush.
+    pub(in crate::store) fn see(&self, tile: TileIndex, flush_number: u64, snapshots: &SeenTables) -> bool {
         let flushes = [self.kept.get(&tile), snapshots.pinned().get(&tile)];
         let before = flushes.into_iter().flatten().filter_map(|kept| kept.range(..flush_number).next_back());
         // Who reads a flush up to that one sees an earlier table; so does who reads one from before the tile was there.
         let lowest = before.max().map_or(0, |&kept| kept + 1);
-        let born = self.born.get(&tile).copied().filter(|&born| born <= flush_number);
-        let lowest = lowest.max(born.unwrap_or(0));
+        let added = self.added.get(&tile).copied().filter(|&added| added <= flush_number);
+        let lowest = lowest.max(added.unwrap_or(0));
         self.watched.iter().any(|watched| {
             watched.first.max(lowest) <= watched.last.min(flush_number) && watched.watch.has_readers()
         })
@@ -78,7 +76,7 @@ impl Readers {
     }
 
     /// Removes the tables that no reader sees any more.
-    pub(in crate::store) fn release(&mut self, disk: &dyn Disk, layout: &Layout, snapshots: &Snapshots) {
+    pub(in crate::store) fn release(&mut self, disk: &dyn Disk, layout: &Layout, snapshots: &SeenTables) {
         self.look();
         let mut unseen = Vec::new();
         for (&tile, flushes) in &self.kept {

@@ -16,7 +16,7 @@ pub(in crate::store) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
 /// A snapshot of flush `n` sees of each of its tiles the table that was kept as of the first flush not before `n`, and if
 /// none was, the one in place: it is readers' rule, and needs nothing but names.
 #[derive(Debug, Default)]
-pub(in crate::store) struct Snapshots {
+pub(in crate::store) struct SeenTables {
     /// Tiles of which a snapshot sees the table in place.
     shared: TileTable<()>,
     /// Kept tables that a snapshot sees.
@@ -27,7 +27,7 @@ pub(in crate::store) struct Snapshots {
     found: SnapshotList,
 }
 
-impl Snapshots {
+impl SeenTables {
     /// Looks which of the kept tables the snapshots of a map see, and which snapshots there are. One is in memory at a time.
     ///
     /// A snapshot that is missing or cannot be read is no error: it counts as one that saw every tile as of its flush, and
@@ -36,7 +36,7 @@ impl Snapshots {
     /// # Errors
     ///
     /// A disk that refuses more than one file.
-    pub(in crate::store) fn look(
+    pub(in crate::store) fn read_all(
         disk: &dyn Disk,
         layout: &Layout,
         map_id: [u8; 16],
@@ -82,12 +82,14 @@ impl Snapshots {
         }
         match flush_number {
             Some(flush_number) => {
-                log::warn!("{error}; until then every table as of flush {flush_number} is kept");
+                log::warn!(
+                    "{error}; every table of flush {flush_number} is kept until the snapshot is repaired or deleted"
+                );
                 let tiles: FxHashSet<_> = map.tiles.tiles().chain(kept.keys().copied()).collect();
                 self.take_tiles(tiles.into_iter(), flush_number, kept);
             }
             None => {
-                log::warn!("{error}; until then every table is kept");
+                log::warn!("{error}; every table is kept until the snapshot is repaired or deleted");
                 self.see_all = true;
                 for (&tile, flushes) in kept {
                     self.pinned.entry(tile).or_default().extend(flushes);
@@ -136,7 +138,7 @@ impl Snapshots {
     }
 
     /// Notes that what was kept of the table in place is durable: what takes its place is seen by no snapshot yet.
-    pub(in crate::store) fn has_replaced(&mut self, tile: TileIndex) {
+    pub(in crate::store) fn unshare(&mut self, tile: TileIndex) {
         self.shared.remove(tile);
     }
 

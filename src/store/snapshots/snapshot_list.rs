@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 #[serde(transparent)]
 pub struct SnapshotList(BTreeMap<SnapshotName, Option<u64>>);
 
-/// More than a map has: the list is part of `metadata.json`.
+/// Most snapshots of a map: the list is part of `metadata.json`, which is read whole.
 pub(in crate::store) const MOST_SNAPSHOTS: usize = 4096;
 
 impl SnapshotList {

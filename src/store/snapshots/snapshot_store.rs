@@ -1,6 +1,6 @@
-//! Snapshots of a [`TileStore`]: made, deleted, and opened like the map itself.
+//! SeenTables of a [`TileStore`]: made, deleted, and opened like the map itself.
 
-use super::seen_tables::Snapshots;
+use super::seen_tables::SeenTables;
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::{MOST_SNAPSHOTS, SnapshotList};
 use super::snapshot_name::SnapshotName;
@@ -29,7 +29,7 @@ impl TileStore {
         let Some(map_id) = metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id)) else {
             let map = folder.display();
             let reason =
-                format!("{map} has none with the name {name}: a map of the seed's format has no snapshots");
+                format!("{map} has none with the name {name}: a map of the original format has no snapshots");
             return Err(Error::argument("snapshot", reason));
         };
         // The log may be ahead of the file; where it cannot be read, the file is what there is.
@@ -81,7 +81,7 @@ impl TileStore {
     ///
     /// As for [`Snapshot::read`].
     pub fn snapshot(&self, name: &SnapshotName) -> Result<Snapshot> {
-        let map_id = self.map_id().unwrap_or_default();
+        let map_id = self.committer.logged_map_id()?;
         Snapshot::read(&**self.disk(), self.layout(), name, map_id, self.committer.snapshots())
     }
 
@@ -91,10 +91,10 @@ impl TileStore {
     ///
     /// # Errors
     ///
-    /// [`Error::AlreadyExists`] if there is one of this name; a map of the seed's format, which must be adopted first; a
+    /// [`Error::AlreadyExists`] if there is one of this name; a map of the original format, which must be upgraded first; a
     /// disk that refuses.
     pub fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
-        self.settle()?;
+        self.finish_earlier_work()?;
         let map_id = self.committer.logged_map_id()?;
         let (folder, path) = (self.layout().snapshots(), self.layout().snapshot(name));
         let has_folder = Snapshot::has_folder(&**self.disk(), self.layout())?;
@@ -126,7 +126,7 @@ impl TileStore {
         // Committed.
         self.kept.share(self.versions.commits().tiles.tiles());
         self.checkpoint.name_snapshot(name);
-        self.tidy_snapshots();
+        self.finish_snapshot_commit();
         Ok(())
     }
 
@@ -151,7 +151,7 @@ impl TileStore {
         match self.committer.append_snapshots(&self.files, &self.versions, listed) {
             Ok(number) => self.versions.committed_nothing(number),
             Err(error) => {
-                let _ = self.settle();
+                let _ = self.finish_earlier_work();
                 return Err(error);
             }
         }
@@ -159,8 +159,8 @@ impl TileStore {
     }
 
     /// Puts the files of snapshots in order after a commit; what the disk refuses is made good by the next call.
-    fn tidy_snapshots(&mut self) {
-        if let Err(error) = self.tidy_up() {
+    fn finish_snapshot_commit(&mut self) {
+        if let Err(error) = self.finish_commit() {
             log::warn!("{}: committed, but not tidied up: {error}", self.folder().display());
         }
     }
@@ -195,7 +195,7 @@ impl TileStore {
     ///
     /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses.
     pub fn delete_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
-        self.settle()?;
+        self.finish_earlier_work()?;
         let path = self.layout().snapshot(name);
         let is_listed = self.committer.snapshots().is_some_and(|listed| listed.contains(name));
         match self.disk().kind(&path) {
@@ -215,7 +215,7 @@ impl TileStore {
             self.commit_snapshots(listed)?;
         }
         self.checkpoint.remove_snapshot(name);
-        self.tidy_snapshots();
+        self.finish_snapshot_commit();
         if let Err(error) = self.release_unseen() {
             log::warn!("deleted, but its tables stay until the map is opened again: {error}");
         }
@@ -228,7 +228,7 @@ impl TileStore {
     ///
     /// A disk that refuses.
     pub fn give_up_snapshots(&mut self, names: &[SnapshotName]) -> Result<()> {
-        self.settle()?;
+        self.finish_earlier_work()?;
         let mut listed = self.committer.snapshots().cloned().unwrap_or_default();
         let mut is_changed = false;
         for name in names {
@@ -236,7 +236,7 @@ impl TileStore {
         }
         if is_changed {
             self.commit_snapshots(listed)?;
-            self.tidy_snapshots();
+            self.finish_snapshot_commit();
             self.release_unseen()?;
         }
         Ok(())
@@ -248,7 +248,7 @@ impl TileStore {
         let (listed, pinned) = (self.committer.snapshots(), self.kept.snapshots().pinned());
         let tiles: Vec<_> = pinned.keys().copied().collect();
         let snapshots =
-            Snapshots::look(&**self.disk(), self.layout(), map_id, self.commits(), listed, pinned)?;
+            SeenTables::read_all(&**self.disk(), self.layout(), map_id, self.commits(), listed, pinned)?;
         self.kept.set_snapshots(snapshots);
         self.kept.release(&self.files);
         for tile in tiles.into_iter().filter(|tile| !self.commits().tiles.contains(*tile)) {
@@ -265,7 +265,7 @@ impl TileStore {
     ///
     /// A disk that refuses.
     pub fn link_next(&mut self, tile: TileIndex, table: &Path) -> Result<()> {
-        self.settle()?;
+        self.finish_earlier_work()?;
         if self.disk().link(table, &self.layout().next(tile, TileFile::Table)).is_ok() {
             return Ok(());
         }

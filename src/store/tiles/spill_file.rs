@@ -77,8 +77,8 @@ impl TileStore {
             input.consume(count);
         }
         if bytes != file.bytes || crc.finalize() != file.crc {
-            let reason = "the updates that wait here for their tile are not those written; \
-                          go on from the last flush";
+            let reason = "the buffered updates in this file do not match their checksum; \
+                          reopen the map to continue from the last flush";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
         open()

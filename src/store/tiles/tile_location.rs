@@ -27,11 +27,11 @@ pub struct StoredTile {
     pub input: Checksumming<Box<dyn DiskRead>>,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Id of the map that the file must name; `None` if it is of the seed's format.
+    /// Id of the map that the file must name; `None` if it is of the original format.
     pub map_id: Option<[u8; 16]>,
     /// What the log says of the tile, if it does.
     pub version: Option<TileVersion>,
-    /// Of which form it is.
+    /// Its storage form.
     pub storage: Storage,
 }
 
@@ -52,7 +52,7 @@ impl TileLocation {
         match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
             Some(EntryKind::Folder) => {}
             Some(_) => {
-                return damaged("what has the name of the tile's folder is none; links are not followed");
+                return damaged("the tile's folder is a file or a link, not a folder");
             }
             None => return damaged("the tile's folder is missing, and the map holds this tile"),
         }
@@ -65,7 +65,7 @@ impl TileLocation {
                 damaged("the file is missing, and the map holds this tile")
             }
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
-                damaged("no regular file; links inside a map are not followed")
+                damaged("not a regular file; links inside a map are not followed")
             }
             Err(error) => Err(Error::io(&path, "open", error)),
         }

@@ -7,9 +7,9 @@ use std::io::{self, Read, Write};
 pub struct TileVersion {
     /// Number of the last scan that the map had taken when the version was written.
     pub scan_number: u64,
-    /// `iwlo_meta.bin`, whole.
+    /// The table's file: `iwlo_meta.bin`, or `tile.vxt` with compact storage.
     pub table: FileChecksum,
-    /// `octree.bt`, whole.
+    /// `octree.bt`; zero with compact storage, which has none.
     pub octree: FileChecksum,
     /// Observed voxels.
     pub voxels: u64,
@@ -32,7 +32,7 @@ pub(crate) const MAX_NUMBER: u64 = 1 << 62;
 impl TileVersion {
     pub(in crate::store) const BYTES: usize = 48;
 
-    /// The checksum of one of the two files.
+    /// The checksum of one of the tile's files.
     pub const fn of(&self, file: TileFile) -> FileChecksum {
         match file {
             TileFile::Table => self.table,
@@ -100,7 +100,7 @@ impl TileValue for TileVersion {
     }
 }
 
-/// A stream that versions what passes through it.
+/// A stream that computes the checksum of the bytes that pass through it.
 pub struct Checksumming<S> {
     stream: S,
     bytes: u64,
@@ -108,7 +108,7 @@ pub struct Checksumming<S> {
 }
 
 impl<S> Checksumming<S> {
-    /// Stamps what passes from here on.
+    /// Starts at the current position of the stream.
     pub fn new(stream: S) -> Self {
         Self { stream, bytes: 0, crc: crc32fast::Hasher::new() }
     }

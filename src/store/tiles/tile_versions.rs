@@ -16,7 +16,7 @@ pub(in crate::store) struct TileVersions {
     removed: FxHashSet<TileIndex>,
     /// Tile folders that the log does not know: never read, never overwritten.
     orphans: FxHashSet<TileIndex>,
-    /// Tiles of a map of the seed's format, which has no log.
+    /// Tiles of a map of the original format, which has no log.
     foreign: FxHashSet<TileIndex>,
 }
 
@@ -29,7 +29,7 @@ impl TileVersions {
         Self { commits, ..Self::default() }
     }
 
-    /// The tiles of a map of the seed's format.
+    /// The tiles of a map of the original format.
     pub(in crate::store) fn of_foreign(foreign: FxHashSet<TileIndex>) -> Self {
         Self { foreign, ..Self::default() }
     }

@@ -14,12 +14,16 @@ use std::path::Path;
 /// the name that is written to. Not to be used any more once the map has committed.
 #[derive(Clone, Debug)]
 pub struct TileWriter {
-    pub(in crate::store) files: MapFiles,
-    pub(in crate::store) map_id: [u8; 16],
+    files: MapFiles,
+    map_id: [u8; 16],
 }
 
 impl TileWriter {
-    /// The map's id; zeros for a map of the seed's format.
+    pub(in crate::store) fn new(files: MapFiles, map_id: [u8; 16]) -> Self {
+        Self { files, map_id }
+    }
+
+    /// The map's id.
     pub fn map_id(&self) -> [u8; 16] {
         self.map_id
     }

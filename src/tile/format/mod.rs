@@ -27,7 +27,7 @@ pub use reader::{DecodedTable, read_table, read_trailer};
 pub use trailer::{TRAILER_BYTES, Trailer};
 pub use writer::{TableChecksums, write_table};
 
-/// "IWLO" as the seed's format writes it.
+/// "IWLO" as the original format writes it.
 const MAGIC: u32 = 0x4957_4C4F;
 const VERSION: u32 = 1;
 const HEADER_BYTES: u64 = 16;

@@ -21,7 +21,7 @@ pub(super) trait TakeEntries {
 pub struct DecodedTable {
     /// The exact table.
     pub table: Table,
-    /// The trailer; `None` for a file of the seed's own format, which cannot be verified.
+    /// The trailer; `None` for a file of the original format, which cannot be verified.
     pub trailer: Option<Trailer>,
 }
 
@@ -65,7 +65,7 @@ pub fn read_table(
     Ok(DecodedTable { table, trailer: Some(trailer) })
 }
 
-/// Reads only the trailer of an `iwlo_meta.bin`; `None` for a file of the seed's own format. The entries are skipped.
+/// Reads only the trailer of an `iwlo_meta.bin`; `None` for a file of the original format. The entries are skipped.
 ///
 /// # Errors
 ///

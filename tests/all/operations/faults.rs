@@ -66,7 +66,7 @@ fn check_from(start: &FaultyDisk, name: &str, work: Work) {
     let (before, after) = (digest(start, name, "before"), digest(&done, name, "after").unwrap());
     assert_ne!(before, Some(after));
     let (operations, changes) = (done.operations(), done.changes());
-    // A map of the seed's own format goes on being adopted the next time.
+    // A map of the original format goes on being adopted the next time.
     let is_own = start.files().contains_key(&path("a").join("commits.log"));
     println!("{name}: {operations} operations, {changes} of them changes");
     let settle = |disk: &FaultyDisk, returned: bool, what: &str| {
@@ -139,7 +139,7 @@ fn evidence_fades_whole_or_not_at_all_and_once() {
     check(Storage::Compact, "a", decay);
 }
 
-/// The same maps in the seed's own format.
+/// The same maps in the original format.
 fn foreign() -> FaultyDisk {
     let disk = two_maps(Storage::Seed);
     for name in ["a", "b"] {
@@ -166,5 +166,5 @@ fn maps_of_the_seeds_own_format_are_cut_and_cleared_too() {
     assert_eq!(digest(&disk, "out", "cropped"), digest(&disk, "a", "cleared outside"));
     disk.take(&path("out"));
     // `a` is voxtile's own by now, `b` is not.
-    assert!(merge(&disk).unwrap_err().to_string().contains("seed's format"));
+    assert!(merge(&disk).unwrap_err().to_string().contains("original format"));
 }

@@ -117,7 +117,7 @@ fn nobody_else_makes_the_same_map_meanwhile_and_tiles_come_in_order() {
     let disk = FaultyDisk::new(Fault::None);
     let mut writer = MapWriter::create_on(disk.shared(), &folder(), source.config()).unwrap();
     assert!(matches!(write(&disk, &source), Err(Error::Locked { .. })));
-    let tile = source.tile_in_passing(source.tile_indices()[1]).unwrap().unwrap();
+    let tile = source.tile_uncached(source.tile_indices()[1]).unwrap().unwrap();
     writer.put(tile.index(), tile.table()).unwrap();
     for wrong in [tile.index(), source.tile_indices()[0]] {
         assert!(matches!(writer.put(wrong, tile.table()), Err(Error::InvalidArgument { .. })));

@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch, Scratch};
 
 /// How fast a disk is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -178,6 +178,10 @@ impl Disk for MeteredDisk {
 
     fn list(&self, path: &Path) -> io::Result<Vec<String>> {
         FsDisk.list(path)
+    }
+
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
+        FsDisk.scratch(folder)
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {

@@ -90,6 +90,9 @@ mod persistence {
     mod map_id {
         source!("map_id.rs");
     }
+    mod packer {
+        source!("packer.rs");
+    }
     mod parameters {
         source!("parameters.rs");
     }
@@ -108,6 +111,7 @@ mod persistence {
     pub(crate) use compact_tile::CompactTile;
     pub(crate) use io_threads::{IoThreads, Loaded, Saved};
     pub(crate) use map_id::new_map_id;
+    pub(crate) use packer::Packer;
     pub(crate) use parameters::{config_from, new_metadata};
     pub(crate) use tile_saver::TileSaver;
     pub(crate) use upgrade::upgrade;

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
-use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch, Scratch};
 
 /// The file system without waiting for the medium: for tests that are not about crashes.
 #[derive(Debug)]
@@ -119,6 +119,10 @@ impl Disk for UnsyncedDisk {
 
     fn list(&self, path: &Path) -> io::Result<Vec<String>> {
         FsDisk.list(path)
+    }
+
+    fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
+        FsDisk.scratch(folder)
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {

@@ -14,15 +14,15 @@ use workload::SurveyName;
 
 /// What the slow disk moves in a second, reads and writes together.
 const SLOW_BYTES_PER_S: f64 = 40e6;
-/// Bytes of a map's files with the seed's storage by those with compact storage.
+/// Bytes of a map's files with the original storage by those with compact storage.
 const LEAST_SMALLER: f64 = 8.0;
 /// The limit beside none, in MiB: a fraction of each map.
 const LIMIT_MIB: usize = 64;
 const SHORT_LIMIT_MIB: usize = 24;
-/// Wall time with compact storage by that with the seed's: what repeated runs differ by is no loss.
+/// Wall time with compact storage by that with the original: what repeated runs differ by is no loss.
 const MOST_TIME: f64 = 1.05;
 
-/// Builds of one map that differ in storage alone, the seed's first.
+/// Builds of one map that differ in storage alone, the original first.
 struct Measured {
     case: Case,
     disk: &'static str,

@@ -23,7 +23,6 @@ struct Life {
     pager: TilePager,
     disk: MemoryDisk,
     config: MapConfig,
-    scan_number: u64,
     /// Every tile, in memory and beyond doubt.
     expected: BTreeMap<TileIndex, Tile>,
     /// The same as of the last flush.
@@ -48,7 +47,7 @@ impl Life {
         let store = TileStore::create(Arc::new(disk.clone()), Path::new("/map"), metadata, map_id).unwrap();
         let pager = TilePager::new(config.clone(), store);
         let (expected, flushed, touched) = Default::default();
-        Self { pager, disk, config, scan_number: 0, expected, flushed, touched, errors: 0 }
+        Self { pager, disk, config, expected, flushed, touched, errors: 0 }
     }
 
     /// A batch of points in some tiles: taken whole, or refused and nothing of it taken.
@@ -65,7 +64,7 @@ impl Life {
         let batch = PointBatch { points: &points, intensities: None, is_occupied: &is_occupied };
         let updates = batch.updates(&self.config.grid, &self.config.sensor_model).unwrap();
         updates.tiles.iter().for_each(|(index, _)| self.touch(*index));
-        let prepared = self.pager.prepare(&updates, 0, self.scan_number);
+        let prepared = self.pager.prepare(&updates, 0);
         if prepared.is_err() {
             self.errors += 1;
             return;
@@ -77,14 +76,13 @@ impl Life {
             tile.apply(&self.config.sensor_model, updates);
         }
         self.pager.accept(updates);
-        self.scan_number += 1;
     }
 
     /// Asks for a tile, wherever it is.
     fn ask(&mut self) {
         let index = TileIndex::new(thread_rng().gen_range(0..TILES), 0, 0);
         self.touch(index);
-        match self.pager.tile(index, self.scan_number) {
+        match self.pager.tile(index) {
             Ok(found) => {
                 assert_eq!(found.as_deref().map(voxels), self.expected.get(&index).map(voxels), "{index}");
             }
@@ -97,7 +95,7 @@ impl Life {
     }
 
     fn flush(&mut self, refuses: bool) {
-        match self.pager.flush(self.scan_number) {
+        match self.pager.flush() {
             Ok(()) => self.flushed = self.expected.clone(),
             Err(error) => {
                 // What could not be saved before is saved now, and no older trouble is told of.
@@ -112,9 +110,8 @@ impl Life {
         let Self { pager, disk, config, flushed, touched, errors, .. } = self;
         drop(pager);
         let store = TileStore::open(Arc::new(disk.clone()), Path::new("/map")).unwrap();
-        let scan_number = store.commits().scan_number;
         let pager = TilePager::new(config.clone(), store);
-        Self { pager, disk, config, scan_number, expected: flushed.clone(), flushed, touched, errors }
+        Self { pager, disk, config, expected: flushed.clone(), flushed, touched, errors }
     }
 
     fn run(&mut self, steps: usize) {
@@ -147,7 +144,7 @@ impl Life {
     fn check_tiles(&mut self) {
         assert_eq!(self.pager.tile_indices(), self.expected.keys().copied().collect::<Vec<_>>());
         for (index, tile) in &self.expected {
-            let found = self.pager.tile_in_passing(*index).unwrap().unwrap();
+            let found = self.pager.tile_uncached(*index).unwrap().unwrap();
             assert_eq!(voxels(&found), voxels(tile), "{index}");
         }
     }

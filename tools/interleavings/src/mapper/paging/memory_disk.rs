@@ -2,7 +2,7 @@ use shuttle::sync::{Arc, Mutex, MutexGuard};
 use std::collections::BTreeMap;
 use std::io::{self, Cursor, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
-use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 
 /// A disk in memory, each operation of which lets others go on; it refuses new files of tiles when it is told to.
 #[derive(Clone, Debug)]
@@ -175,6 +175,10 @@ impl Disk for MemoryDisk {
         let state = self.lock();
         let inside = state.names.keys().filter(|name| name.parent() == Some(path));
         Ok(inside.filter_map(|name| Some(name.file_name()?.to_str()?.to_owned())).collect())
+    }
+
+    fn scratch(&self, _: &Path) -> io::Result<Box<dyn Scratch>> {
+        Ok(Box::new(Cursor::new(Vec::new())))
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {

@@ -8,7 +8,7 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) bytes: usize,
     pub(super) buffer_bytes: usize,
     pub(super) least_scan_bytes: usize,
-    pub(super) is_kept: bool,
+    pub(super) is_enforced: bool,
     pub(super) spare_bytes: usize,
     pub(super) compact_bytes: usize,
 }
@@ -20,7 +20,7 @@ impl MemoryPlan {
             bytes: 26 << 10,
             buffer_bytes: 2 << 10,
             least_scan_bytes: 0,
-            is_kept: false,
+            is_enforced: false,
             spare_bytes: 2 << 10,
             compact_bytes: 1 << 10,
         }
