@@ -5,7 +5,7 @@
 //! flushed survives a crash, and the map is the same to the bit whatever the cache.
 //!
 //! ```
-//! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Scan};
+//! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Scan};
 //!
 //! # fn main() -> voxtile::Result<()> {
 //! # let folder = tempfile::tempdir().unwrap();
@@ -30,7 +30,7 @@
 //!      -> resident tiles: table, octree                    tile, octree, sensor
 //!      -> pending updates for tiles on disk                mapper
 //!      -> eviction and flush: bytes, one commit            tile::format, store
-//! questions <- tile by tile <- memory or disk              query
+//! queries <- tile by tile <- memory or disk                query
 //!
 //! Scan -> LocalMap -> views for planners                   local, beside an archive or alone
 //! occupied voxels -> Sender -> packets -> Receiver         share
@@ -60,27 +60,28 @@
 
 mod config;
 mod error;
+pub mod integrity;
 pub mod io;
 pub mod local;
 pub mod mapper;
 pub mod maths;
 pub mod octree;
+pub mod operations;
+mod persistence;
 pub mod query;
 pub mod scan;
 mod scratch;
 pub mod sensor;
-pub mod session;
 pub mod share;
 pub mod simulation;
 pub mod space;
 pub mod store;
 pub mod tile;
-pub mod upkeep;
 
 pub use config::{
     InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
 };
 pub use error::{DecodeError, Error, FormatError, Place, Result};
 pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
-pub use query::{Occupancy, Questions};
+pub use query::{Occupancy, Queries};
 pub use scan::Scan;

@@ -2,9 +2,9 @@ use std::cmp::Ordering;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Puts files in the order in which people count: `full2` before `full10`, and `9.5` before `10.25`.
+/// Sorts files in natural order: `full2` before `full10`, and `9.5` before `10.25`.
 ///
-/// Names of one length are taken as they are, letter by letter: their numbers are padded, perhaps hexadecimal.
+/// Names of equal length are compared letter by letter: their numbers are padded, perhaps hexadecimal.
 pub(super) fn sort_naturally(files: &mut [PathBuf]) {
     let length = |path: &PathBuf| path.file_name().unwrap_or_default().len();
     let is_padded = files.windows(2).all(|pair| length(&pair[0]) == length(&pair[1]));
@@ -20,12 +20,12 @@ pub(super) fn sort_naturally(files: &mut [PathBuf]) {
     });
 }
 
-/// The last part of a path, for people.
+/// The last part of a path, for messages.
 pub(super) fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// A file name that is a decimal number but for its extension: what stands before and behind its point.
+/// The digits before and after the point, if a file name without its extension is a decimal number.
 fn decimal(path: &Path) -> Option<(&str, &str)> {
     let stem = path.file_stem().and_then(OsStr::to_str)?;
     let (whole, part) = stem.split_once('.').unwrap_or((stem, ""));

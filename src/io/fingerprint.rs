@@ -3,7 +3,7 @@ use nalgebra::Isometry3;
 use std::fs::File;
 use std::path::Path;
 
-/// Tells one input from another: see [`ScanSource::fingerprint`](super::ScanSource::fingerprint).
+/// Identifies an input: see [`ScanSource::fingerprint`](super::ScanSource::fingerprint).
 #[derive(Default)]
 pub(super) struct Fingerprint {
     hasher: blake3::Hasher,

@@ -1,21 +1,21 @@
 use std::io::{self, Read, Write};
 
-/// What may be copied lies at most so many bytes back.
+/// Copies start at most so many bytes back.
 const WINDOW_BYTES: usize = 1 << 13;
 /// Bytes that are written at a time.
 const OUT_BYTES: usize = 1 << 16;
 
-/// Unpacks LZF, the compression of PCD's `binary_compressed`, to exactly `len` bytes; `false` if the input does not give
-/// that.
+/// Decompresses LZF, the compression of PCD's `binary_compressed`, to exactly `len` bytes; returns `false` if the input
+/// is damaged.
 ///
-/// The format: a control byte below 32 is followed by that many bytes plus one to copy; any other holds a length in
-/// its upper three bits (7: one more byte of length follows) and, in its lower five bits and the next byte, how far
-/// back to copy from.
+/// The format: a control byte below 32 is followed by that many literal bytes plus one. Any other control byte has a
+/// length in its upper three bits (7: another byte of length follows) and, in its lower five bits and the next byte,
+/// the distance to copy from.
 ///
 /// # Errors
 ///
 /// An input that cannot be read, an output that cannot be written.
-pub(super) fn unpack(input: &mut impl Read, len: u64, out: impl Write) -> io::Result<bool> {
+pub(super) fn decompress(input: &mut impl Read, len: u64, out: impl Write) -> io::Result<bool> {
     let mut output = Output { tail: Vec::with_capacity(WINDOW_BYTES + OUT_BYTES + 512), done: 0, out };
     let mut literal = [0; 32];
     while let Some(control) = next(input)? {
@@ -32,7 +32,7 @@ pub(super) fn unpack(input: &mut impl Read, len: u64, out: impl Write) -> io::Re
             let length = 2 + usize::from(control >> 5) + usize::from(more);
             let back = 1 + (usize::from(control & 31) << 8 | usize::from(low));
             let Some(start) = output.tail.len().checked_sub(back) else { return Ok(false) };
-            // Byte by byte: the copy may reach into what it writes.
+            // Byte by byte: the copy may overlap its output.
             (start..start + length).for_each(|at| output.tail.push(output.tail[at]));
         }
         if output.len() > len {
@@ -47,9 +47,9 @@ pub(super) fn unpack(input: &mut impl Read, len: u64, out: impl Write) -> io::Re
     Ok(is_whole)
 }
 
-/// Whether so many packed bytes can be as many unpacked: LZF packs at most 264 bytes into 3. A claim beyond that would only
-/// size an allocation.
-pub(super) fn can_be(packed: u64, unpacked: u64) -> bool {
+/// Whether so many compressed bytes can become so many: LZF compresses at most 264 bytes into 3. Refuses claims that
+/// would only size an allocation.
+pub(super) fn is_possible(packed: u64, unpacked: u64) -> bool {
     unpacked / 128 <= packed
 }
 
@@ -62,7 +62,7 @@ fn next(input: &mut impl Read) -> io::Result<Option<u8>> {
     }
 }
 
-/// What was unpacked: the last of it, from which may be copied, is kept.
+/// The output; its tail is kept, to copy from.
 struct Output<W> {
     tail: Vec<u8>,
     done: u64,
@@ -88,7 +88,7 @@ mod tests {
 
     fn unpacked(packed: &[u8], len: u64) -> Option<Vec<u8>> {
         let mut out = Vec::new();
-        unpack(&mut &*packed, len, &mut out).unwrap().then_some(out)
+        decompress(&mut &*packed, len, &mut out).unwrap().then_some(out)
     }
 
     #[test]
@@ -101,7 +101,7 @@ mod tests {
         }
         assert_eq!(unpacked(&packed, 21), None);
         assert_eq!(unpacked(&[], u64::MAX), None);
-        assert!(!can_be(10, u64::MAX) && can_be(10, 880));
+        assert!(!is_possible(10, u64::MAX) && is_possible(10, 880));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Other people's files, one format a file, and a stream of scans of our own; knows no mapper.
+//! Files of other programs, one format per file, and voxtile's scan stream. Knows no mapper.
 //!
 //! ```text
 //! folder of PCD + poses ┐                                  ┌ .ply .pcd .csv

@@ -19,12 +19,12 @@ pub struct PcdCloud {
     pub world_from_sensor: Isometry3<f64>,
 }
 
-/// Reads a PCD file (versions 0.5 to 0.7; `ascii`, `binary` or `binary_compressed`). What follows the last point is
-/// left unread: PCL pads its files.
+/// Reads a PCD file (versions 0.5 to 0.7; `ascii`, `binary` or `binary_compressed`). Bytes after the last point are
+/// ignored: PCL pads its files.
 ///
 /// # Errors
 ///
-/// A header that is not as it should be (with the line), points that are missing or are no numbers.
+/// An invalid header (with the line), points that are missing or not numbers.
 pub fn read_pcd(file: &[u8]) -> Result<PcdCloud, FormatError> {
     let mut points = PointStore::default();
     match read(Cursor::new(file), file.len() as u64, &mut points) {
@@ -57,7 +57,7 @@ pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::erro
 enum PcdError {
     Format(FormatError),
     Read(io::Error),
-    /// Its points have no room.
+    /// The points cannot be stored.
     Store(Error),
 }
 
@@ -118,7 +118,7 @@ impl Columns {
     }
 }
 
-/// A longer line is none of a PCD file.
+/// A longer line is an error.
 const MOST_LINE_BYTES: u64 = 1 << 20;
 
 fn read_ascii(
@@ -155,7 +155,7 @@ fn read_ascii(
                     format!("{} values; field {} is missing", words.len(), field.name),
                 )
             })?;
-            // A number of a four-byte field is one of its values, as in the binary encodings.
+            // A number of a four-byte field is rounded to it, as in the binary encodings.
             let parsed = match (field.kind, field.size) {
                 (b'F', 4) => word.parse::<f32>().map(f64::from),
                 _ => word.parse(),
@@ -173,7 +173,7 @@ fn read_ascii(
 /// Bytes that are read at a time.
 const BYTES_AT_A_TIME: usize = 1 << 16;
 
-/// Point after point.
+/// Points one after the other.
 fn read_binary(
     header: &Header,
     columns: &Columns,
@@ -206,7 +206,7 @@ fn read_binary(
     Ok(())
 }
 
-/// Packed size, unpacked size, then the packed fields one after the other.
+/// Compressed size, uncompressed size, then the compressed fields one after the other.
 fn read_compressed(
     header: &Header,
     columns: &Columns,
@@ -237,13 +237,13 @@ fn read_compressed(
     if wanted == 0 {
         return Ok(());
     }
-    if !lzf::can_be(packed, wanted) {
+    if !lzf::is_possible(packed, wanted) {
         return Err(wrong("the packed data is damaged".into()));
     }
     let mut fields = Fields::new(points.room(), wanted)?;
     let is_whole = match &mut fields {
-        Fields::InMemory(bytes) => lzf::unpack(&mut input.take(packed), wanted, bytes)?,
-        Fields::InFile(file) => lzf::unpack(&mut input.take(packed), wanted, file)?,
+        Fields::InMemory(bytes) => lzf::decompress(&mut input.take(packed), wanted, bytes)?,
+        Fields::InFile(file) => lzf::decompress(&mut input.take(packed), wanted, file)?,
     };
     if !is_whole {
         return Err(wrong("the packed data is damaged".into()));
@@ -265,7 +265,7 @@ fn read_compressed(
     Ok(())
 }
 
-/// Values field after field, as unpacked.
+/// The decompressed values, field after field.
 enum Fields {
     InMemory(Vec<u8>),
     InFile(File),
@@ -274,7 +274,7 @@ enum Fields {
 impl Fields {
     fn new(room: &PointRoom, bytes: u64) -> crate::error::Result<Self> {
         match usize::try_from(bytes) {
-            // It grows with what comes.
+            // It grows as data arrives.
             Ok(bytes) if !room.is_too_much(bytes) => Ok(Self::InMemory(Vec::new())),
             _ => room.file().map(Self::InFile),
         }
@@ -311,7 +311,7 @@ impl Fields {
 
 /// A little-endian number.
 fn number(kind: u8, bytes: &[u8]) -> f64 {
-    // Widened to eight bytes.
+    // Zero-extended to eight bytes.
     let mut wide = [0; 8];
     wide[..bytes.len()].copy_from_slice(bytes);
     let unsigned = u64::from_le_bytes(wide);

@@ -10,10 +10,10 @@ use nalgebra::Isometry3;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// PCD files in the natural order of their names, one scan each, and their poses.
+/// PCD files in natural order of their names, one scan each, with their poses.
 pub(super) struct PcdFolder {
     files: Vec<PathBuf>,
-    /// One a file; `None` takes each file's `VIEWPOINT`.
+    /// One per file; `None` takes each file's `VIEWPOINT`.
     poses: Option<Vec<Isometry3<f64>>>,
     pose_source: PoseSource,
     next: usize,
@@ -35,7 +35,7 @@ impl PcdFolder {
     }
 
     pub(super) fn open_file(path: &Path, poses: Option<&Path>) -> Result<Self> {
-        // The poses beside a single file are those of its whole folder.
+        // A pose file beside a single PCD file belongs to its whole folder.
         Self::new(vec![path.to_owned()], poses, None)
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3};
 
 type Result<T> = std::result::Result<T, FormatError>;
 
-/// How the points are written.
+/// Encoding of the points.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Encoding {
     Ascii,
@@ -25,7 +25,7 @@ pub(super) struct Field {
     pub(super) first_value: usize,
 }
 
-/// What comes before the points of a PCD file.
+/// The header of a PCD file.
 pub(super) struct Header {
     pub(super) fields: Vec<Field>,
     pub(super) points: usize,
@@ -36,7 +36,7 @@ pub(super) struct Header {
     pub(super) data_line: u64,
 }
 
-/// A longer header is none of a PCD file.
+/// A longer header is an error.
 pub(super) const MOST_HEADER_BYTES: usize = 1 << 16;
 
 const KEYS: [&str; 11] = [
@@ -54,11 +54,11 @@ const KEYS: [&str; 11] = [
 ];
 
 impl Header {
-    /// The header of what a file begins with.
+    /// Parses the header at the start of a file.
     ///
     /// # Errors
     ///
-    /// What is wrong, with the line.
+    /// An invalid header, with the line.
     pub(super) fn parse(file: &[u8]) -> Result<Self> {
         let mut entries: Vec<(String, Vec<String>, u64)> = Vec::new();
         let (mut at, mut line_number) = (0, 0);

@@ -2,22 +2,22 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// A longer header is none of a PCD file.
+/// A longer header is an error.
 const MOST_BYTES: u64 = 1 << 16;
 
-/// What a PCD file says of where the sensor was: x y z, and a quaternion w x y z.
+/// The `VIEWPOINT` of a PCD file: x y z, and a quaternion w x y z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Viewpoint([f64; 7]);
 
 impl Viewpoint {
-    /// Whether it says nothing: writers that do not know a pose write this one.
+    /// Whether it is the identity, which writers without a pose write.
     pub(super) fn is_identity(&self) -> bool {
         let [x, y, z, w, qx, qy, qz] = self.0;
         [x, y, z, qx, qy, qz].iter().all(|&number| number == 0.0) && w != 0.0
     }
 }
 
-/// The `VIEWPOINT` of a PCD file, found without reading its points; `None` where there is none that is one, or no file.
+/// The `VIEWPOINT` of a PCD file, without reading its points; `None` if there is no valid one, or no file.
 pub(super) fn viewpoint_of_file(path: &Path) -> Option<Viewpoint> {
     let mut header = Vec::new();
     File::open(path).ok()?.take(MOST_BYTES).read_to_end(&mut header).ok()?;

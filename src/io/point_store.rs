@@ -7,34 +7,34 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// The points of one scan in the sensor's frame, in metres: in memory as far as there is room, the others in a temporary
-/// file.
+/// The points of one scan in the sensor's frame, in metres: in memory up to a limit, the rest in a temporary file.
 ///
-/// The file has no name and goes when the store is dropped.
+/// The file is unnamed and is freed when the store is dropped.
 #[derive(Debug, Default)]
 pub struct PointStore {
-    /// The last points; all of them, where there is no file.
+    /// The last points; all of them if there is no file.
     points: Vec<Point>,
     intensities: Option<Vec<f32>>,
-    /// Points before these.
+    /// Number of points before these, in the file.
     filed: usize,
     file: Option<Mutex<File>>,
     room: PointRoom,
 }
 
-/// How many points of a scan may be in memory, and where the others go.
+/// How many points of a scan may be in memory, and where the rest goes.
 #[derive(Clone, Debug)]
 pub struct PointRoom {
     most_points: usize,
     folder: PathBuf,
 }
 
-/// Bytes of a point in the file: x y z as f64, and the intensity as f32, 0 if there is none.
-const RECORD_BYTES: usize = 28;
+/// Bytes of a point in the file: the point, and the intensity, 0 if there is none. The bytes are native, as no other
+/// process reads them.
+const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
 /// Points that are read at a time.
 const POINTS_AT_A_TIME: usize = 1 << 14;
-/// Points in memory that are handed over at a time. Who takes them makes a copy of them in the world frame, of 6 MiB; and what
-/// rays spare each other is found in one chunk, which should be a whole scan of most sensors.
+/// Points in memory that are passed at a time. The receiver copies them into the world frame, 6 MiB; and beam coherence
+/// works within one chunk, which should be a whole scan of most sensors.
 const POINTS_HANDED_OVER: usize = 1 << 18;
 
 impl Default for PointRoom {
@@ -44,17 +44,17 @@ impl Default for PointRoom {
 }
 
 impl PointRoom {
-    /// Room for as many points as make up so many bytes, and beyond that on the file system of a folder.
+    /// Room for the points of so many bytes; more go to a file in a folder.
     pub fn new(most_bytes: usize, folder: &Path) -> Self {
         Self { most_points: (most_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
     }
 
-    /// Whether so many bytes are more than the points in memory may take.
+    /// Whether so many bytes exceed the limit.
     pub(super) fn is_too_much(&self, bytes: usize) -> bool {
         bytes / RECORD_BYTES > self.most_points
     }
 
-    /// A file without a name, in this folder.
+    /// An unnamed file in this folder.
     pub(super) fn file(&self) -> Result<File> {
         tempfile::tempfile_in(&self.folder).map_err(|error| {
             Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
@@ -72,7 +72,7 @@ impl PointStore {
         Self { room, ..Self::default() }
     }
 
-    /// Forgets all points; the next come with intensities or without.
+    /// Removes all points; the next ones come with intensities or without.
     pub(super) fn begin(&mut self, has_intensities: bool) {
         self.points.clear();
         self.intensities = has_intensities.then(Vec::new);
@@ -83,7 +83,7 @@ impl PointStore {
         &self.room
     }
 
-    /// Makes room in memory for so many points that are sure to come.
+    /// Reserves memory for so many points.
     pub(super) fn reserve(&mut self, points: usize) {
         let points = points.min(self.room.most_points);
         self.points.reserve_exact(points);
@@ -92,7 +92,7 @@ impl PointStore {
         }
     }
 
-    /// Adds a point; the intensity counts where the scan has them.
+    /// Adds a point; the intensity is ignored if the scan has none.
     ///
     /// # Errors
     ///
@@ -121,9 +121,9 @@ impl PointStore {
         for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
             bytes.clear();
             for (number, point) in (chunk * POINTS_AT_A_TIME..).zip(points) {
-                point.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
                 let intensity = self.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
-                bytes.extend(intensity.to_le_bytes());
+                bytes.extend_from_slice(bytemuck::bytes_of(point));
+                bytes.extend_from_slice(bytemuck::bytes_of(&intensity));
             }
             file.write_all(&bytes).map_err(cannot)?;
         }
@@ -151,8 +151,8 @@ impl PointStore {
         self.intensities.is_some()
     }
 
-    /// Hands over the points of a range in order, some at a time, with their intensities if they have any. `take` says
-    /// whether to go on.
+    /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if they have any. `take`
+    /// returns whether to continue.
     ///
     /// # Errors
     ///
@@ -168,9 +168,9 @@ impl PointStore {
             points.clear();
             intensities.clear();
             for record in bytes.chunks_exact(RECORD_BYTES) {
-                let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| record[8 * k + byte]));
-                points.push([number(0), number(1), number(2)]);
-                intensities.push(f32::from_le_bytes(std::array::from_fn(|byte| record[24 + byte])));
+                let (point, intensity) = record.split_at(size_of::<Point>());
+                points.push(bytemuck::pod_read_unaligned::<Point>(point));
+                intensities.push(bytemuck::pod_read_unaligned::<f32>(intensity));
             }
             if !take(&points, self.has_intensities().then_some(&*intensities)) {
                 return Ok(());
@@ -197,7 +197,7 @@ impl PointStore {
         })
     }
 
-    /// Points and intensities, where all are in memory.
+    /// Points and intensities, if all are in memory.
     pub(super) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
         (self.points, self.intensities)
     }
@@ -210,7 +210,8 @@ mod tests {
     #[test]
     fn points_come_back_from_file_and_memory_in_order() {
         let folder = tempfile::TempDir::new().unwrap();
-        let count = 3 * POINTS_AT_A_TIME + 77;
+        // More than is handed over at a time, from memory and from the file.
+        let count = POINTS_HANDED_OVER + 3 * POINTS_AT_A_TIME + 77;
         for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
             let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));
             store.begin(has_intensities);

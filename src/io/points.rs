@@ -2,8 +2,8 @@ use crate::error::FormatError;
 use crate::space::Point;
 use std::io::{self, BufRead};
 
-/// Reads points, one a line: x y z in metres, separated by blanks or commas; more columns are ignored. Empty lines,
-/// lines that begin with `#` and a first line of words are skipped.
+/// Reads points, one per line: x y z in metres, separated by blanks or commas; more columns are ignored. Empty lines,
+/// lines that start with `#` and a first line of words are skipped.
 ///
 /// # Errors
 ///

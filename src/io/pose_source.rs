@@ -6,22 +6,22 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where the poses of scans come from.
+/// The source of the poses of scans.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PoseSource {
-    /// The input has one with each scan.
+    /// The input has a pose with each scan.
     Scans,
-    /// A file of poses, one a scan.
+    /// A pose file with one pose per scan.
     File(PathBuf),
     /// The `VIEWPOINT` of each PCD file.
     Viewpoint,
-    /// Nowhere: every scan is in the world frame.
+    /// None: every scan is in the world frame.
     Identity,
 }
 
-/// Names of pose files that are looked for.
+/// Names of pose files that are searched for.
 const POSE_FILES: [&str; 2] = ["poses_tum.txt", "poses_kitti.txt"];
-/// In place of the name of a file: every scan is in the world frame, and that is meant.
+/// Given instead of a pose file: every scan is in the world frame.
 const IDENTITY: &str = "identity";
 /// Most files that an error names.
 const MOST_NAMED: usize = 4;
@@ -37,12 +37,13 @@ impl fmt::Display for PoseSource {
     }
 }
 
-/// Finds the poses of PCD files: those that were asked for, or a file of poses in or beside their folder, or the
-/// `VIEWPOINT` in each. `folder` is `None` for a single file.
+/// Finds the poses of PCD files: the requested ones, or a pose file in or beside their folder, or the `VIEWPOINT` of
+/// each. `folder` is `None` for a single file.
 ///
 /// # Errors
 ///
-/// A file of poses that is none, or not one pose a scan in the order of time; more than one scan, and poses nowhere.
+/// An invalid pose file, poses that do not match the scans in number or order of time; more than one scan without any
+/// poses.
 pub(super) fn poses_of(
     files: &[PathBuf],
     asked_for: Option<&Path>,
@@ -95,7 +96,7 @@ fn pose_file_for(folder: &Path) -> Option<PathBuf> {
     places.iter().flat_map(|place| POSE_FILES.map(|name| place.join(name))).find(|path| path.is_file())
 }
 
-/// A few files in a folder or beside it that begin as a file of poses does.
+/// A few files in a folder or beside it that look like pose files.
 fn files_like_poses(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
     for place in [folder.to_owned(), folder.join("..")] {

@@ -4,16 +4,16 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Poses of a file, with their time stamps where it has any.
+/// The poses of a file, with their time stamps if it has any.
 pub(super) struct Poses {
     poses: Vec<Isometry3<f64>>,
-    /// Seconds, each with the number of its line; of a TUM file alone.
+    /// Seconds, each with its line number; TUM files only.
     stamps: Vec<(u64, f64)>,
 }
 
-/// The beginning of a file that is looked at to tell what it is.
+/// How much of a file is read to identify it.
 const GLANCE_BYTES: u64 = 1 << 14;
-/// Numbers in file names are compared with time stamps if both are beyond this many seconds: counts are not.
+/// Numbers in file names are compared with time stamps if both exceed this many seconds: counters do not.
 const LEAST_STAMP_S: f64 = 1e6;
 
 impl Poses {
@@ -29,7 +29,7 @@ impl Poses {
         })
     }
 
-    /// Whether these are the poses of these files: as many, and in the order of time as the files are in theirs.
+    /// Checks that these are the poses of these files: equal in number, and in the same order of time.
     ///
     /// # Errors
     ///
@@ -65,7 +65,7 @@ impl Poses {
         self.poses
     }
 
-    /// Where the names of files are time stamps, the first that does not belong to its pose, and by how many seconds.
+    /// If file names are time stamps, the first file whose name does not match its pose, and by how many seconds.
     fn first_beside_its_file<'f>(&self, files: &'f [PathBuf]) -> Option<(&'f PathBuf, f64)> {
         let stamps: Vec<f64> = self.stamps.iter().map(|&(_, stamp)| stamp).collect();
         let (first, last) = (*stamps.first()?, *stamps.last()?);
@@ -85,7 +85,7 @@ impl Poses {
     }
 }
 
-/// Whether a file is a text that begins as a file of poses does.
+/// Whether a file is a text that starts like a pose file.
 pub(super) fn looks_like_poses(path: &Path) -> bool {
     let is_text = path.extension().is_some_and(|extension| {
         ["txt", "tum", "kitti", "csv"].iter().any(|known| extension.eq_ignore_ascii_case(known))
@@ -99,26 +99,26 @@ pub(super) fn looks_like_poses(path: &Path) -> bool {
     first.is_some_and(|line| line.is_ok())
 }
 
-/// The number that the name of a file ends with.
+/// The number at the end of a file's name.
 fn number_in(path: &Path) -> Option<f64> {
     let stem = path.file_stem()?.to_str()?;
     let digits = stem.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '.').len();
     stem[digits..].trim_start_matches('.').parse().ok()
 }
 
-/// Reads poses, sensor to world, one a line; empty lines and those that begin with `#` are skipped.
+/// Reads poses, sensor to world, one per line; empty lines and lines that start with `#` are skipped.
 ///
 /// A line of 8 numbers is TUM's `t tx ty tz qx qy qz qw`, one of 12 is KITTI's row-major 3x4 matrix.
 ///
 /// # Errors
 ///
-/// A line of another kind, numbers that are not finite, a quaternion of no length, a matrix that is no rotation.
+/// An invalid line, numbers that are not finite, a zero quaternion, a matrix that is not a rotation.
 pub fn read_poses(path: &Path) -> Result<Vec<Isometry3<f64>>> {
     let text = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
     parse_poses(&String::from_utf8_lossy(&text)).map_err(|error| error.in_input(path))
 }
 
-/// The poses of a text, as [`read_poses`] reads them from a file.
+/// Parses the text of a pose file, see [`read_poses`].
 ///
 /// # Errors
 ///
@@ -134,7 +134,7 @@ struct StampedPose {
     world_from_sensor: Isometry3<f64>,
 }
 
-/// The poses of a text, each with the number of its line.
+/// The poses of a text, each with its line number.
 fn lines(text: &str) -> impl Iterator<Item = std::result::Result<(u64, StampedPose), FormatError>> {
     let lines =
         (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.trim().starts_with('#'));
@@ -150,7 +150,7 @@ fn parse(line: &str) -> std::result::Result<StampedPose, String> {
         .filter(|word| !word.is_empty())
         .map(|word| word.parse().map_err(|_| format!("`{word}` is not a number")))
         .collect::<std::result::Result<_, _>>()?;
-    // The time is good for a check; everything else must be finite.
+    // The time is only for checks; everything else must be finite.
     let stamp_s = (numbers.len() == 8).then(|| numbers[0]).filter(|stamp| stamp.is_finite());
     let pose = if numbers.len() == 8 { &numbers[1..] } else { &numbers[..] };
     if let Some(number) = pose.iter().find(|number| !number.is_finite()) {
@@ -178,7 +178,7 @@ fn parse(line: &str) -> std::result::Result<StampedPose, String> {
     }
 }
 
-/// The rotation of a quaternion of any length but 0, as far as its square is a number.
+/// The rotation of a quaternion, which is normalized; its squared length must be finite and not 0.
 pub(super) fn unit_quaternion(
     quaternion: Quaternion<f64>,
 ) -> std::result::Result<UnitQuaternion<f64>, String> {

@@ -2,8 +2,8 @@ use super::stored_scan::StoredScan;
 use crate::error::Result;
 use nalgebra::Isometry3;
 
-/// Tells a scan from others: its points and intensities, and apart from these its pose. How a file stored them, and what
-/// it is called, does not matter.
+/// Identifies a scan: a hash of its points and intensities, and another of its pose. Storage format and name do not
+/// matter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanMark {
     scan: [u8; MARK_BYTES],
@@ -11,10 +11,9 @@ pub struct ScanMark {
     has_points: bool,
 }
 
-/// Tells the beginning of an input from others, scan by scan: the marks of its scans, and apart from these of their poses,
-/// each chained to those before.
+/// Identifies the start of an input: hash chains over its scans and over their poses.
 ///
-/// What it takes does not grow with the scans, and whoever knows it can go on from it.
+/// Its size does not grow with the scans, and it can be continued.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanChain {
     scans: u64,
@@ -65,14 +64,14 @@ impl ScanMark {
         self.has_points
     }
 
-    /// What the scan is, without its pose, as 32 hexadecimal digits.
+    /// The hash of the scan without its pose, as 32 hexadecimal digits.
     pub fn scan_text(&self) -> String {
         to_text(&self.scan)
     }
 }
 
 impl ScanChain {
-    /// The chain as its texts tell it; `None` if they are not 32 hexadecimal digits each.
+    /// Parses a chain; `None` if the texts are not 32 hexadecimal digits each.
     pub fn from_texts(scans: u64, scan_chain: &str, pose_chain: &str) -> Option<Self> {
         Some(Self { scans, scan_chain: from_text(scan_chain)?, pose_chain: from_text(pose_chain)? })
     }
@@ -132,7 +131,7 @@ fn pose_mark(pose: &Isometry3<f64>) -> [u8; MARK_BYTES] {
     mark(&hasher)
 }
 
-/// The bits of a number; one spelling of what is no number.
+/// The bits of a number; all NaN are equal.
 fn bits(number: f64) -> u64 {
     if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() }
 }

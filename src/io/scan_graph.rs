@@ -7,14 +7,14 @@ use nalgebra::{Isometry3, Quaternion, Translation3};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Reads OctoMap's binary scan graph of `file_bytes` bytes, as `ScanGraph::writeBinary` writes it, scan by scan. Its
+/// Reads OctoMap's binary scan graph of `file_bytes` bytes, as written by `ScanGraph::writeBinary`, scan by scan. Its
 /// edges are not read.
 ///
-/// `path` names the stream in errors; it is opened for the fingerprint only. Reads are small: `input` should be buffered.
+/// `path` is for errors and for the fingerprint. Reads are small: `input` should be buffered.
 ///
 /// # Errors
 ///
-/// A stream that fails or ends before its first four bytes; what is wrong with a scan comes with that scan.
+/// A stream that fails or ends before its first four bytes; errors in a scan are returned with that scan.
 pub fn read_scan_graph<R: Read>(input: R, file_bytes: u64, path: &Path) -> Result<impl ScanSource + use<R>> {
     let path = path.to_owned();
     let mut graph = ScanGraph { path, input, offset: 0, file_bytes, nodes: 0, done: 0, is_past_error: false };
@@ -38,7 +38,7 @@ struct ScanGraph<R> {
     file_bytes: u64,
     nodes: u32,
     done: u32,
-    /// Whether the scan that was an error is behind us.
+    /// Whether the input is behind the scan that caused an error.
     is_past_error: bool,
 }
 
@@ -98,7 +98,7 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let [qw, qx, qy, qz] = self.vector()?;
         let id = u32::from_le_bytes(self.bytes()?);
         self.done += 1;
-        // What is wrong with a pose is no matter of where the next scan begins.
+        // An invalid pose does not affect where the next scan starts.
         self.is_past_error = true;
         if ![x, y, z, qw, qx, qy, qz].iter().all(|number| number.is_finite()) {
             return Err(FormatError::at_offset(at, "a pose that is not finite").in_input(&self.path));

@@ -7,11 +7,11 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-/// Reads OctoMap's scan log, a text: `NODE x y z roll pitch yaw` begins a scan, its points follow as `x y z`, in the
-/// frame of the node. Empty lines and those that begin with `#` or a blank are skipped, as OctoMap skips them.
+/// Reads OctoMap's scan log, a text: `NODE x y z roll pitch yaw` starts a scan, its points follow as `x y z`, in the
+/// frame of the node. Empty lines and those that start with `#` or a blank are skipped, as in OctoMap.
 ///
-/// Numbers are read as `f32`, as OctoMap does, so that log and graph give the same map. `path` names the stream in
-/// errors; it is opened for the fingerprint only.
+/// Numbers are read as `f32`, as in OctoMap, so that log and graph give the same map. `path` is for errors and for the
+/// fingerprint.
 pub fn read_scan_log<R: BufRead>(input: R, path: &Path) -> impl ScanSource + use<R> {
     ScanLog { path: path.to_owned(), input, line: 0, pose: None, done: 0 }
 }
@@ -20,12 +20,12 @@ struct ScanLog<R> {
     path: PathBuf,
     input: R,
     line: u64,
-    /// Pose of the scan whose points come next.
+    /// Pose of the scan whose points follow.
     pose: Option<Isometry3<f64>>,
     done: usize,
 }
 
-/// A longer line is none of a scan log.
+/// A longer line is an error.
 const MAX_LINE_BYTES: u64 = 1 << 16;
 
 impl<R: BufRead> ScanLog<R> {

@@ -8,16 +8,15 @@ use nalgebra::{Isometry3, Quaternion, Translation3};
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// Reads voxtile's scan stream, scan by scan, from a file or from a pipe: what a
-/// [`ScanStreamWriter`](super::ScanStreamWriter) wrote.
+/// Reads voxtile's scan stream, as written by a [`ScanStreamWriter`](super::ScanStreamWriter), scan by scan, from a
+/// file or a pipe.
 ///
-/// `path` names the stream in errors. Where `is_file` is set it is opened for the fingerprint; the fingerprint of a
-/// stream that comes but once is made of its label, and is an error where it has none. Reads are small: `input` should
-/// be buffered.
+/// `path` is for errors. With `is_file` the file is opened for the fingerprint; otherwise the fingerprint is the
+/// stream's label, and an error if it has none. Reads are small: `input` should be buffered.
 ///
 /// # Errors
 ///
-/// A stream that fails or does not begin as a scan stream does; what is wrong with a scan comes with that scan.
+/// A stream that fails or has another header; errors in a scan are returned with that scan.
 pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result<impl ScanSource + use<R>> {
     let mut stream = ScanStream {
         path: path.to_owned(),
@@ -41,11 +40,11 @@ struct ScanStream<R> {
     label: String,
     has_intensities: bool,
     done: u64,
-    /// Whether the scan that was an error is behind us: what was wrong with it is no matter of where it ends.
+    /// Whether the input is behind the scan that caused an error.
     is_past_error: bool,
 }
 
-/// Room made at once for the points of a scan: the count in a damaged stream may be any.
+/// Most points reserved at once: the count in a damaged stream may be any number.
 const MOST_RESERVED: usize = 1 << 16;
 
 impl<R: Read> ScanStream<R> {
@@ -89,7 +88,7 @@ impl<R: Read> ScanStream<R> {
         Ok(())
     }
 
-    /// The count that a scan begins with; `None` at the end of the stream.
+    /// The number of points at the start of a scan; `None` at the end of the stream.
     fn next_count(&mut self) -> Result<Option<u32>> {
         let mut first = [0];
         loop {
@@ -113,7 +112,7 @@ impl<R: Read> ScanStream<R> {
         Ok(numbers)
     }
 
-    /// The pose of the numbers that begin at an offset.
+    /// The pose from the numbers that start at an offset.
     fn pose(&self, numbers: [f64; 7], at: u64) -> Result<Isometry3<f64>> {
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(self.wrong(at, "a pose that is not finite"));

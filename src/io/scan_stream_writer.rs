@@ -10,10 +10,9 @@ pub(super) const FLAG_INTENSITIES: u32 = 1;
 /// The longest label, in bytes.
 pub(super) const MAX_LABEL_BYTES: u32 = 4096;
 
-/// Writes scans as voxtile's scan stream, to a file (`.scans`) or to `voxtile build -`. The bytes are in
-/// `docs/format.md`.
+/// Writes scans as voxtile's scan stream, to a file (`.scans`) or to `voxtile build -`. `docs/format.md` has the bytes.
 ///
-/// Points are kept in the sensor's frame as `f32`: far from the world's origin they are as exact as near it.
+/// Points are in the sensor's frame as `f32`, so they are equally exact far from the world's origin.
 #[derive(Debug)]
 pub struct ScanStreamWriter<W> {
     out: W,
@@ -23,14 +22,14 @@ pub struct ScanStreamWriter<W> {
 }
 
 impl<W: Write> ScanStreamWriter<W> {
-    /// Begins a stream, with an intensity for each point or without.
+    /// Starts a stream, with or without an intensity per point.
     ///
-    /// The label tells which scans these are: two streams with one label must be the same from the first scan on, so
-    /// that a build of one can be resumed with the other. An empty label promises nothing.
+    /// The label identifies the scans: two streams with one label must be equal from the first scan on, so that a build
+    /// of one can be resumed with the other. An empty label promises nothing.
     ///
     /// # Errors
     ///
-    /// A label of more than 4096 bytes, a stream that refuses.
+    /// A label of more than 4096 bytes; errors of the stream.
     pub fn new(mut out: W, label: &str, has_intensities: bool) -> io::Result<Self> {
         let length = u32::try_from(label.len()).ok().filter(|&length| length <= MAX_LABEL_BYTES);
         let length = length.ok_or_else(|| invalid("the label has more than 4096 bytes"))?;
@@ -46,14 +45,14 @@ impl<W: Write> ScanStreamWriter<W> {
     ///
     /// # Errors
     ///
-    /// More points than a `u32` counts, not one intensity a point where the stream has them, a stream that refuses.
+    /// More than 2^32 - 1 points, a wrong number of intensities; errors of the stream.
     pub fn write(&mut self, scan: &SensorScan) -> io::Result<()> {
         let SensorScan { points_in_sensor, intensities, world_from_sensor, .. } = scan;
         let intensities = intensities.as_deref();
         self.write_points(world_from_sensor, points_in_sensor.iter().copied(), intensities)
     }
 
-    /// Adds a scan that is in the world frame: its pose is its origin.
+    /// Adds a scan in the world frame: its pose is its origin.
     ///
     /// # Errors
     ///
@@ -89,11 +88,11 @@ impl<W: Write> ScanStreamWriter<W> {
         self.out.write_all(&self.scan)
     }
 
-    /// Hands everything on to what the stream leads to.
+    /// Flushes the stream.
     ///
     /// # Errors
     ///
-    /// A stream that refuses.
+    /// Errors of the stream.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }

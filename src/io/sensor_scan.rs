@@ -2,14 +2,14 @@ use crate::scan::Scan;
 use crate::space::Point;
 use nalgebra::Isometry3;
 
-/// One scan as a sensor gives it: points in its own frame, and where it was.
+/// A scan in the sensor's frame, and the sensor's pose.
 #[derive(Clone, Debug)]
 pub struct SensorScan {
-    /// What the scan is called in its source: a file name or a number.
+    /// Name of the scan in its source: a file name or a number.
     pub name: String,
     /// End points in metres, sensor frame.
     pub points_in_sensor: Vec<Point>,
-    /// Intensity of each point, when the source has it.
+    /// Intensity of each point, if the source has it.
     pub intensities: Option<Vec<f32>>,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Isometry3<f64>,

@@ -12,10 +12,10 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
-/// What is known of a scan beside its points.
+/// Name and pose of a scan.
 #[derive(Clone, Debug)]
 pub struct ScanHead {
-    /// What the scan is called in its source: a file name or a number.
+    /// Name of the scan in its source: a file name or a number.
     pub name: String,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Isometry3<f64>,
@@ -26,11 +26,11 @@ pub trait ScanSource {
     /// Number of scans, if known before they are read.
     fn len_hint(&self) -> Option<usize>;
 
-    /// The next scan, with its points in `points`, which forgets what it had; `None` after the last.
+    /// Reads the next scan; its points replace those in `points`. `None` after the last scan.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is not what it should be, with its path and offset or line.
+    /// A file that cannot be read or is invalid, with its path and offset or line.
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>>;
 
     /// The next scan in memory, however large it is.
@@ -47,7 +47,7 @@ pub trait ScanSource {
         }))
     }
 
-    /// The next scan, with as many of its points in memory as there is room for.
+    /// The next scan, with as many of its points in memory as `room` allows.
     ///
     /// # Errors
     ///
@@ -62,7 +62,7 @@ pub trait ScanSource {
         }))
     }
 
-    /// Passes over scans without building them; returns how many there were.
+    /// Skips scans; returns how many there were.
     ///
     /// # Errors
     ///
@@ -76,21 +76,21 @@ pub trait ScanSource {
         Ok(scans)
     }
 
-    /// After an error of [`ScanSource::next_scan`], goes past the scan that could not be read, so that the next call gives
-    /// the one behind it; `false` where nobody can tell where that begins.
+    /// After an error of [`ScanSource::next_scan`], moves past the bad scan, so that the next call returns the one
+    /// behind it; `false` if that is not possible.
     fn pass_unread(&mut self) -> bool {
         false
     }
 
-    /// Where the poses come from.
+    /// The source of the poses.
     fn pose_source(&self) -> PoseSource {
         PoseSource::Scans
     }
 
-    /// What tells this input from others, wherever it lies: number and size of its files, and a BLAKE3 over their
-    /// names, sizes and bytes and the poses. Reads every file once. Of a stream that can be read but once: its label.
+    /// Identifies this input, wherever it is stored: number and size of its files, and a BLAKE3 over their names, sizes
+    /// and bytes and the poses. Reads every file once. For a pipe: its label.
     ///
-    /// This is how maps of earlier versions know their input; a [`ScanChain`](super::ScanChain) tells scan by scan.
+    /// Maps of earlier versions identify their input by this; a [`ScanChain`](super::ScanChain) works scan by scan.
     ///
     /// # Errors
     ///
@@ -98,17 +98,17 @@ pub trait ScanSource {
     fn fingerprint(&self) -> Result<String>;
 }
 
-/// Opens scans by what the path is: a folder of PCD files (or one that holds it as `scans/`), one PCD file, an
-/// OctoMap scan graph (`.graph`) or scan log (`.log`), a scan stream of voxtile's (`.scans`).
+/// Opens scans by the kind of path: a folder of PCD files (or its parent, if it is named `scans/`), one PCD file, an
+/// OctoMap scan graph (`.graph`) or scan log (`.log`), a scan stream of voxtile (`.scans`).
 ///
-/// PCD files come in the natural order of their names (`scan2` before `scan10`). Their poses come from `poses`, or from
-/// `poses_tum.txt` or `poses_kitti.txt` in or beside the folder, or from the `VIEWPOINT` of each file;
-/// [`ScanSource::pose_source`] tells. `identity` as `poses` says that all scans are in the world frame.
+/// PCD files are in natural order of their names (`scan2` before `scan10`). Their poses come from `poses`, or from
+/// `poses_tum.txt` or `poses_kitti.txt` in or beside the folder, or from the `VIEWPOINT` of each file; see
+/// [`ScanSource::pose_source`]. `poses` may be `identity`: all scans are in the world frame.
 ///
 /// # Errors
 ///
-/// A path that is none of these, poses that do not match the files in number or order of time, more than one scan without
-/// any pose, a file that cannot be read.
+/// Any other path, poses that do not match the files in number or order of time, more than one scan without any pose, a
+/// file that cannot be read.
 pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource + Send>> {
     let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound => Error::argument(path.display().to_string(), "there is no such file or folder"),

@@ -5,12 +5,12 @@ use crate::space::Point;
 use nalgebra::Isometry3;
 use std::ops::Range;
 
-/// One scan as a sensor gives it, of any size: points in the sensor's frame, and where it was.
+/// A scan of any size in the sensor's frame, and the sensor's pose.
 ///
 /// As [`ScanPoints`] its points are in the world frame.
 #[derive(Debug)]
 pub struct StoredScan {
-    /// What the scan is called in its source: a file name or a number.
+    /// Name of the scan in its source: a file name or a number.
     pub name: String,
     /// End points in metres, sensor frame.
     pub points_in_sensor: PointStore,

@@ -2,10 +2,10 @@ use crate::space::Point;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// A voxel as it is exported.
+/// An exported voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelRecord {
-    /// Its center in metres, counted from the file's origin.
+    /// Its center in metres, relative to the file's origin.
     pub center_m: Point,
     /// Probability of being occupied.
     pub probability: f64,
@@ -15,7 +15,7 @@ pub struct VoxelRecord {
     pub observation_count: i32,
 }
 
-/// Which file voxels are written to.
+/// Format of an exported file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VoxelFormat {
     /// PLY, binary little-endian: x y z as double, probability float, log_odds double, observation_count int.
@@ -23,12 +23,12 @@ pub enum VoxelFormat {
     /// PCD 0.7, binary, as PCL reads it: x y z as F4, intensity F4 holds the probability, observation_count I4. A file's
     /// origin is its `VIEWPOINT`.
     Pcd,
-    /// Text with a line of names; every number reads back to the same bits.
+    /// Text with a header line; every number reads back to the same bits.
     Csv,
 }
 
 impl VoxelFormat {
-    /// The format that a path's extension names.
+    /// The format of a path's extension.
     pub fn of_path(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "ply" => Some(Self::Ply),
@@ -39,22 +39,22 @@ impl VoxelFormat {
     }
 }
 
-/// What a file of voxels says before the first of them.
+/// Header of an exported file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelFile {
-    /// Which file.
+    /// Its format.
     pub format: VoxelFormat,
-    /// Number of voxels: the headers of PLY and PCD name it.
+    /// Number of voxels, for the headers of PLY and PCD.
     pub voxels: u64,
     /// Edge of a voxel in metres.
     pub resolution_m: f64,
-    /// Where in the world the file's origin is, in metres: to be added to its coordinates. CSV does not tell it.
+    /// The file's origin in the world, in metres, to be added to its coordinates. CSV does not store it.
     pub origin_m: Point,
 }
 
 impl VoxelFile {
-    /// So many voxels from a PCD file's origin along an axis `f32` still tells where a center is to an eighth of a voxel, and
-    /// [`VoxelWriter::write`] takes no farther one.
+    /// Up to so many voxels from a PCD file's origin along an axis, `f32` resolves centers to an eighth of a voxel;
+    /// [`VoxelWriter::write`] refuses more distant ones.
     pub const PCD_REACH_VOXELS: i32 = 1 << 21;
 }
 
@@ -67,11 +67,11 @@ pub struct VoxelWriter<W> {
 }
 
 impl<W: Write> VoxelWriter<W> {
-    /// Begins a file.
+    /// Starts a file.
     ///
     /// # Errors
     ///
-    /// An `out` that refuses.
+    /// Errors of `out`.
     pub fn new(file: VoxelFile, mut out: W) -> io::Result<Self> {
         let VoxelFile { format, voxels, resolution_m, origin_m: [x, y, z] } = file;
         let is_moved = file.origin_m != [0.0; 3];
@@ -108,7 +108,7 @@ impl<W: Write> VoxelWriter<W> {
     ///
     /// # Errors
     ///
-    /// An `out` that refuses; in a PCD file, a center too far from the file's origin for `f32`.
+    /// Errors of `out`; in a PCD file, a center too far from the file's origin for `f32`.
     pub fn write(&mut self, voxel: &VoxelRecord) -> io::Result<()> {
         self.written += 1;
         let VoxelRecord { center_m, probability, log_odds, observation_count } = *voxel;
@@ -146,7 +146,7 @@ impl<W: Write> VoxelWriter<W> {
     ///
     /// # Errors
     ///
-    /// Another number of voxels than was announced: the file's header would be wrong.
+    /// A number of voxels that differs from the header's.
     pub fn finish(mut self) -> io::Result<W> {
         if self.written != self.file.voxels {
             let reason = format!("{} voxels announced, {} written", self.file.voxels, self.written);

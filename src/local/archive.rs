@@ -2,17 +2,17 @@ use super::map::{LocalMap, is_known_free};
 use super::place::place_of;
 use super::report::LocalReport;
 use super::view::{LocalState, LocalView};
-use super::voxels::{MOST_VOXELS, Voxel};
+use super::voxels::{MAX_NUMBERED, Voxel};
 use crate::error::{Error, Result};
 use crate::mapper::{MapView, Mapper};
-use crate::query::{Occupancy, Questions};
+use crate::query::{Occupancy, Queries};
 use crate::scan::{Scan, ScanReport};
 use crate::space::{Aabb, Point, VoxelIndex};
 
-/// What a local map and an archive say of a place together.
+/// The combined answer of a local map and an archive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalAnswer {
-    /// Occupied: in the local map, or in the archive where the local map has forgotten it.
+    /// Occupied in the local map, or in the archive if the local map has removed the voxel.
     Occupied,
     /// Near to an occupied voxel of the local map.
     Inflated,
@@ -23,7 +23,7 @@ pub enum LocalAnswer {
 }
 
 impl LocalView {
-    /// What the map says of a point, with free and unknown told apart by an archive.
+    /// The state of a point, with free and unknown distinguished by an archive.
     ///
     /// # Errors
     ///
@@ -42,16 +42,16 @@ impl LocalView {
 }
 
 impl LocalMap {
-    /// Takes voxels that are occupied in an archive and at most `radius_m` metres from `position`, where a robot has come
-    /// back to a known place; returns how many were new.
+    /// Copies voxels that are occupied in an archive and at most `radius_m` metres from `position`, when a robot
+    /// returns to a known place. Returns how many were new.
     ///
-    /// What scans have told the map stays as it is. The voxels of the archive count as older than all of that, the nearest
-    /// as the youngest of them, and no more come than there is room for.
+    /// Evidence from scans is kept. The archive's voxels count as older than all of it, the nearest as the youngest of
+    /// them, up to the limit on voxels.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read, an archive of another resolution, a position without a voxel, a radius that is no
-    /// length: the map stays as it was.
+    /// A tile that cannot be read, an archive of another resolution, a position without a voxel, an invalid radius: the
+    /// map is unchanged.
     pub fn prime(
         &mut self,
         archive: &(impl MapView + Sized),
@@ -68,7 +68,7 @@ impl LocalMap {
         self.take_over_parameters(&mut LocalReport::default());
         let mut new = 0;
         for (_, voxel, log_odds) in found {
-            if self.voxels.len() >= self.applied.max_voxels.unwrap_or(MOST_VOXELS).min(MOST_VOXELS) {
+            if self.voxels.len() >= self.applied.max_voxels.unwrap_or(MAX_NUMBERED).min(MAX_NUMBERED) {
                 break;
             }
             new += usize::from(self.add_oldest(voxel, log_odds));
@@ -98,7 +98,7 @@ impl LocalMap {
         Ok(found)
     }
 
-    /// Adds a voxel at the beginning of the history, unless it is there already or free by the map's own thresholds.
+    /// Adds a voxel at the start of the history, unless it is in the map already or free by the map's own thresholds.
     fn add_oldest(&mut self, voxel: VoxelIndex, log_odds: f64) -> bool {
         let limits = self.applied.log_odds;
         let log_odds = log_odds.clamp(limits.min, limits.max);
@@ -120,7 +120,7 @@ impl LocalMap {
     }
 }
 
-/// An archive and a local map that one call feeds.
+/// An archive and a local map that take the same scans.
 #[derive(Debug)]
 pub struct WithLocalMap<M> {
     archive: M,
@@ -128,23 +128,23 @@ pub struct WithLocalMap<M> {
 }
 
 impl<M: Mapper> WithLocalMap<M> {
-    /// Puts a local map beside an archive.
+    /// Combines a local map with an archive.
     ///
     /// # Errors
     ///
-    /// Voxels of different sizes.
+    /// Different resolutions.
     pub fn new(archive: M, local: LocalMap) -> Result<Self> {
         check_resolution(local.resolution_m(), &archive)?;
         Ok(Self { archive, local })
     }
 
-    /// Adds a scan to both.
+    /// Inserts a scan into both.
     ///
     /// # Errors
     ///
     /// As for [`Mapper::insert_scan`] and [`LocalMap::insert_scan`]; then both are as before the call.
     pub fn insert_scan(&mut self, scan: &Scan) -> Result<(ScanReport, LocalReport)> {
-        // All that the local map can refuse; then nothing but the archive can fail.
+        // First everything that can fail in the local map; after that only the archive can fail.
         self.local.check_scan(scan.origin, &scan.points)?;
         let report = self.archive.insert_scan(scan)?;
         Ok((report, self.local.insert_scan(scan)?))
@@ -162,7 +162,7 @@ impl<M: Mapper> WithLocalMap<M> {
         self.local.prime(&self.archive, position, radius_m)
     }
 
-    /// What the two say of a point together.
+    /// The combined answer for a point.
     ///
     /// # Errors
     ///
@@ -176,7 +176,7 @@ impl<M: Mapper> WithLocalMap<M> {
         &self.archive
     }
 
-    /// The archive, to flush it or to add to it alone.
+    /// The archive, mutably: to flush it or to update it alone.
     pub fn archive_mut(&mut self) -> &mut M {
         &mut self.archive
     }
@@ -186,12 +186,12 @@ impl<M: Mapper> WithLocalMap<M> {
         &self.local
     }
 
-    /// The local map, to change its parameters or to add to it alone.
+    /// The local map, mutably: to change its parameters or to update it alone.
     pub fn local_mut(&mut self) -> &mut LocalMap {
         &mut self.local
     }
 
-    /// The two for themselves.
+    /// The archive and the local map.
     pub fn into_parts(self) -> (M, LocalMap) {
         (self.archive, self.local)
     }

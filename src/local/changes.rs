@@ -3,20 +3,20 @@ use super::view::{BlockView, LocalState, LocalView, NodeView, PageView};
 use crate::space::VoxelIndex;
 use std::sync::Arc;
 
-/// A voxel that is not what it was.
+/// A voxel that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VoxelChange {
     /// Which voxel.
     pub voxel: VoxelIndex,
-    /// What it was.
+    /// Its state before.
     pub before: LocalState,
-    /// What it is.
+    /// Its state now.
     pub after: LocalState,
 }
 
 impl LocalView {
-    /// The voxels that differ from an earlier view of the same map, in no stated order. What the two share is not looked
-    /// at.
+    /// The voxels that differ from an earlier view of the same map, in no particular order. Parts that both views share
+    /// are skipped.
     pub fn changes_since(&self, earlier: &Self) -> Vec<VoxelChange> {
         let mut changes = Vec::new();
         for (index, page) in &self.pages {
@@ -63,7 +63,7 @@ fn compare_nodes(
 fn compare_blocks(index: VoxelIndex, before: BlockView, after: BlockView, changes: &mut Vec<VoxelChange>) {
     for place in ones((before.occupied ^ after.occupied) | (before.inflated ^ after.inflated)) {
         let (before, after) = (before.state(place), after.state(place));
-        // An occupied voxel may change from inflated to not inflated.
+        // Equal states: an occupied voxel's inflation may have changed.
         if before != after {
             changes.push(VoxelChange { voxel: cell_at(index, place), before, after });
         }

@@ -1,16 +1,16 @@
 use super::runs::Runs;
 
-/// By how many voxels each voxel of a block is inflated, and which voxels of the block inflate.
+/// For each voxel of a block, the number of voxels that inflate it, and which voxels of the block inflate others.
 ///
-/// Counts lie crosswise: plane `k` holds bit `k` of the counts of all 64 voxels. So one is added to those of a mask with the
-/// carries of all of them at once, and a block has as many planes as its largest count needed: two or three, mostly.
+/// Counts are stored as bit planes: plane `k` holds bit `k` of the counts of all 64 voxels. So adding one to all voxels
+/// of a mask is a carry over planes, and a block has as many planes as its largest count needs: mostly two or three.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Counts {
     /// By number of planes: the inflating voxels, then the planes.
-    runs: [Runs<u64>; MOST_PLANES + 1],
+    runs: [Runs<u64>; MAX_PLANES + 1],
 }
 
-/// Where the counts of a block are; no planes where nothing is inflated.
+/// Where the counts of a block are; no planes if nothing is inflated.
 // Next to each other in a block of 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(Rust, packed)]
@@ -19,8 +19,8 @@ pub(super) struct Tally {
     planes: u8,
 }
 
-/// More than 2^16 voxels inflate none: see `MAX_RADIUS_VOXELS`.
-const MOST_PLANES: usize = 16;
+/// At most 2^16 voxels inflate a voxel: see `MAX_RADIUS_VOXELS`.
+const MAX_PLANES: usize = 16;
 
 impl Tally {
     /// Whether no voxel is inflated.
@@ -43,7 +43,7 @@ impl Counts {
         self.runs[planes].get_mut(tally.run, planes + 1)
     }
 
-    /// The voxels that at least one inflates.
+    /// The voxels that at least one voxel inflates.
     #[inline]
     pub(super) fn inflated(&self, tally: Tally) -> u64 {
         if tally.is_empty() { 0 } else { self.words(tally)[1..].iter().fold(0, |any, plane| any | plane) }
@@ -55,7 +55,7 @@ impl Counts {
         if tally.is_empty() { 0 } else { self.words(tally)[0] }
     }
 
-    /// Sets the voxels that inflate others; what does so is inflated itself.
+    /// Sets the voxels that inflate others; these are inflated themselves.
     pub(super) fn set_inflating(&mut self, tally: Tally, mask: u64) {
         match tally.is_empty() {
             true => debug_assert_eq!(mask, 0),
@@ -63,7 +63,7 @@ impl Counts {
         }
     }
 
-    /// Adds one to the counts of a mask that is not empty; returns the voxels that were not inflated before.
+    /// Adds one to the counts of a non-empty mask; returns the voxels that were not inflated before.
     #[inline]
     pub(super) fn add(&mut self, tally: &mut Tally, mask: u64) -> u64 {
         if tally.is_empty() {
@@ -85,7 +85,7 @@ impl Counts {
     #[cold]
     fn grow(&mut self, tally: &mut Tally, highest: u64) {
         let (old, planes) = (*tally, usize::from(tally.planes));
-        let mut words = [0; MOST_PLANES + 2];
+        let mut words = [0; MAX_PLANES + 2];
         words[..=planes].copy_from_slice(self.words(old));
         words[planes + 1] = highest;
         self.runs[planes].give(old.run);
@@ -93,7 +93,7 @@ impl Counts {
         self.words_mut(*tally).copy_from_slice(&words[..planes + 2]);
     }
 
-    /// Takes one from the counts of a mask, none of which is 0; returns the voxels that are not inflated any more.
+    /// Subtracts one from the counts of a mask, none of which is 0; returns the voxels that are no longer inflated.
     #[inline]
     pub(super) fn subtract(&mut self, tally: &mut Tally, mask: u64) -> u64 {
         let (mut borrow, mut after) = (mask, 0);

@@ -9,17 +9,17 @@ use crate::maths::logit;
 use crate::scan::MAX_RAY_STEPS;
 use crate::space::{Grid, Point, VoxelIndex};
 
-/// What the present scan says (the paper's task buffers).
+/// The evidence of the present scan (the paper's task buffers).
 #[derive(Debug, Default)]
 pub(super) struct Frame {
-    /// Voxels with evidence, in the order in which it came.
+    /// Voxels with evidence, in order of arrival.
     touches: Vec<Touch>,
-    /// The numbers of the points that count.
+    /// The indices of the points that are used.
     counting: Vec<u32>,
     pages: PageTable,
 }
 
-/// What the present scan says of one voxel.
+/// The evidence of the present scan for one voxel.
 #[derive(Clone, Copy, Debug)]
 struct Touch {
     voxel: u32,
@@ -37,7 +37,7 @@ impl Frame {
             + self.pages.bytes()
     }
 
-    /// What the scan says of a voxel so far.
+    /// The scan's evidence for a voxel so far.
     #[inline]
     fn touch(&mut self, id: u32, voxel: &mut Voxel) -> &mut Touch {
         let number = voxel.touch().unwrap_or_else(|| {
@@ -52,7 +52,7 @@ impl Frame {
 
 /// The stages of an update up to the inflation.
 impl LocalMap {
-    /// Input update (Algorithm 1, lines 2 to 19): a hit for the voxel of each point that counts.
+    /// Input update (Algorithm 1, lines 2 to 19): a hit for the voxel of each point that is used.
     pub(super) fn take_hits(
         &mut self,
         origin: Point,
@@ -61,7 +61,7 @@ impl LocalMap {
         report: &mut LocalReport,
     ) {
         self.frame.counting.clear();
-        // Neighboring points are often in the same block.
+        // Neighbouring points are often in the same block.
         let mut last_block = None;
         for (number, &point) in points.iter().enumerate() {
             let Some(voxel) = self.voxel_that_counts(origin, start, point, report) else { continue };
@@ -89,7 +89,7 @@ impl LocalMap {
         touch.is_new |= known.is_none();
     }
 
-    /// The voxel of a point; `None`, and counted, if the point does not count.
+    /// The voxel of a point; `None`, and counted, if the point is skipped.
     fn voxel_that_counts(
         &self,
         origin: Point,
@@ -116,9 +116,9 @@ impl LocalMap {
         None
     }
 
-    /// Ray casting (Algorithm 1, line 20): a miss for each voxel in the map that a ray passes.
+    /// Ray casting (Algorithm 1, line 20): a miss for each voxel of the map that a ray passes.
     ///
-    /// After all hits, so that what is counted does not depend on the order of the points.
+    /// Runs after all hits, so that the counts do not depend on the order of the points.
     pub(super) fn take_misses(&mut self, origin: Point, start: VoxelIndex, points: &[Point]) {
         let Self { grid, tree, voxels, frame, .. } = self;
         let origin = grid.to_voxel_units(origin);
@@ -134,7 +134,7 @@ impl LocalMap {
         (frame.counting, frame.pages) = (counting, pages);
     }
 
-    /// Occupancy check (equations 2 and 3): one sum a voxel, then the clamp, then its state.
+    /// Occupancy check (equations 2 and 3): one sum per voxel, then the clamp, then its state.
     pub(super) fn check_occupancy(&mut self) {
         let LocalParameters { log_odds, occupied_log_odds, .. } = self.applied;
         for touch in &mut self.frame.touches {
@@ -151,8 +151,8 @@ impl LocalMap {
         }
     }
 
-    /// Sequential removal (Algorithm 3): what was updated goes to the end of the history, what is known to be free
-    /// leaves the map, and so does what is over the limit at the beginning of the history.
+    /// Sequential removal (Algorithm 3): updated voxels move to the end of the history; voxels known to be free, and
+    /// those over the limit at the start of the history, are removed.
     pub(super) fn manage_history(&mut self, report: &mut LocalReport) {
         let touches = std::mem::take(&mut self.frame.touches);
         report.updated = touches.len() as u64;
@@ -171,7 +171,7 @@ impl LocalMap {
         }
         self.frame.touches = touches;
         self.frame.touches.clear();
-        // What is new may push out as much; only a lowered limit is worked off in parts.
+        // New voxels may remove as many others; a lowered limit is applied in parts.
         let most = self.applied.work_per_update.saturating_add(report.new as usize);
         for _ in 0..most {
             let Some(oldest) = self.voxels.oldest().filter(|_| self.is_over_limit()) else { break };
@@ -181,7 +181,7 @@ impl LocalMap {
         }
     }
 
-    /// Removes a voxel that is not in the history from the occupancy map; its inflation goes with it.
+    /// Removes a voxel that is no longer in the history from the occupancy map, and with it its inflation.
     pub(super) fn remove(&mut self, id: u32) {
         let (block, place) = self.voxels.slab.get(id).home();
         self.tree.unstore(block, place);

@@ -8,23 +8,23 @@ use std::sync::Arc;
 
 /// Keeps the inflated set: the dilation of the occupied voxels in range.
 ///
-/// It is kept incrementally: a voxel that begins to inflate adds one to the counts of its stencil, one that ends takes it
-/// away again, whatever the reason.
+/// It is updated incrementally: a voxel that starts to inflate adds one to the counts of its stencil; one that stops
+/// subtracts it.
 #[derive(Clone, Debug)]
 pub(super) struct Inflation {
     pub(super) rules: Rules,
     /// Blocks whose occupied voxels have changed.
     waiting: Vec<u32>,
-    /// Blocks in which nothing may be left.
+    /// Blocks that may be empty now.
     emptied: Vec<u32>,
-    /// Numbers of the blocks around the present one, as its stencil counts them.
+    /// Numbers of the blocks around the present one, as its stencil numbers them.
     beside: Vec<u32>,
-    /// Index and number of the node in which one of them was found last.
+    /// Index and number of the node of the last of these.
     last_node: (VoxelIndex, u32),
     pages: Vec<u32>,
     /// Inflated voxels.
     pub(super) inflated: usize,
-    /// Voxels that began or ended to inflate others, since this was set to 0.
+    /// Voxels that started or stopped to inflate others since this was set to 0.
     pub(super) changes: usize,
 }
 
@@ -42,7 +42,7 @@ impl Inflation {
         }
     }
 
-    /// Gives a node the current rule; its voxels begin to inflate by it when [`Inflation::update`] comes.
+    /// Gives a node the current rule; it takes effect at the next [`Inflation::update`].
     pub(super) fn adopt(&mut self, tree: &mut Tree, node: u32) {
         let (old, new) = (tree.nodes.get(node).rule, self.rules.current());
         if old == new {
@@ -59,7 +59,7 @@ impl Inflation {
         tree.nodes.get_mut(node).rule = new;
     }
 
-    /// Notes that the occupied voxels of a block have changed.
+    /// Marks a block whose occupied voxels have changed.
     #[inline]
     pub(super) fn wait(&mut self, tree: &mut Tree, block: u32) {
         if !std::mem::replace(&mut tree.blocks.get_mut(block).is_waiting, true) {
@@ -67,14 +67,13 @@ impl Inflation {
         }
     }
 
-    /// Notes that a block may be empty.
+    /// Marks a block that may be empty.
     pub(super) fn may_be_empty(&mut self, block: u32) {
         self.emptied.push(block);
     }
 
-    /// Brings the inflated set up to date: for the blocks that changed, and for the voxels that came into or left the
-    /// range of the sensor, which is now at `position`. With `has_old_rules` some nodes may have another rule than the
-    /// current one.
+    /// Updates the inflated set for blocks that changed, and for voxels that entered or left the range of the sensor,
+    /// now at `position`. With `has_old_rules` some nodes may have another rule than the current one.
     pub(super) fn update(&mut self, tree: &mut Tree, grid: Grid, position: Point, has_old_rules: bool) {
         let mut waiting = std::mem::take(&mut self.waiting);
         for block in waiting.drain(..) {
@@ -130,7 +129,7 @@ impl Inflation {
             Relation::Outside if inflating == 0 => return,
             _ => {}
         }
-        // Blocks that the inflation adds meanwhile have nothing that inflates.
+        // Blocks added meanwhile contain nothing that inflates.
         for place in ones(tree.nodes.get(node).blocks.mask) {
             if let Some(block) = tree.nodes.get(node).blocks.get(&tree.lists, place) {
                 self.reconcile(tree, block, &ball, relation);
@@ -138,8 +137,7 @@ impl Inflation {
         }
     }
 
-    /// Lets those voxels of a block inflate others that should, and no others. `relation` is that of a cube that holds the
-    /// block.
+    /// Makes exactly the right voxels of a block inflate others. `relation` is that of a cube that holds the block.
     fn reconcile(&mut self, tree: &mut Tree, block: u32, ball: &Ball, relation: Relation) {
         let (occupied, inflating) = {
             let block = tree.blocks.get(block);
@@ -164,7 +162,7 @@ impl Inflation {
         }
     }
 
-    /// Lets voxels of a block begin and others end to inflate their stencil.
+    /// Starts and stops the inflation by voxels of a block.
     fn change(&mut self, tree: &mut Tree, block: u32, begin: u64, end: u64, stencil: &Stencil) {
         self.beside.clear();
         self.beside.resize(stencil.blocks(), NONE);
@@ -195,7 +193,7 @@ impl Inflation {
         }
         let offset = stencil.offset_of(number);
         let at: VoxelIndex = std::array::from_fn(|k| index[k] + offset[k]);
-        // Mostly it is in the node of the one before.
+        // Mostly it is in the same node as the last one.
         let (node_index, node) = self.last_node;
         let known = match node_index == at.map(|k| k >> 2) {
             true => tree.nodes.get(node).blocks.get(&tree.lists, place_of(at)),

@@ -6,22 +6,22 @@ use super::report::LocalReport;
 use super::sweep::Sweep;
 use super::tree::Tree;
 use super::view::LocalView;
-use super::voxels::{MOST_VOXELS, Voxels};
+use super::voxels::{MAX_NUMBERED, Voxels};
 use crate::error::{Error, Result};
 use crate::scan::Scan;
 use crate::space::{Grid, Point, VoxelIndex};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A map of the voxels that a planner needs now: occupied, or inflated by an occupied one.
+/// The voxels that a planner needs now: occupied, or inflated by an occupied one.
 ///
-/// One writer, which takes scans; any number of readers, each of which sees whole updates and waits for none.
+/// One writer inserts scans; any number of readers see whole updates and never wait.
 #[derive(Debug)]
 pub struct LocalMap {
     pub(super) grid: Grid,
-    /// What is asked for.
+    /// The requested parameters.
     parameters: LocalParameters,
-    /// What the last update worked with.
+    /// The parameters of the last update.
     pub(super) applied: LocalParameters,
     pub(super) tree: Tree,
     pub(super) voxels: Voxels,
@@ -35,7 +35,7 @@ pub struct LocalMap {
     view: Arc<LocalView>,
 }
 
-/// Voxel indices near the ends of `i32` have no neighbors to inflate.
+/// Voxel indices near the ends of `i32` have no neighbours to inflate.
 const MAX_INDEX: i32 = i32::MAX - (1 << 12);
 
 impl LocalMap {
@@ -43,7 +43,7 @@ impl LocalMap {
     ///
     /// # Errors
     ///
-    /// A resolution or a parameter that is wrong.
+    /// An invalid resolution or parameter.
     pub fn new(resolution_m: f64, parameters: LocalParameters) -> Result<Self> {
         let grid = Grid::new(resolution_m, resolution_m * 64.0)?;
         let parameters = parameters.validated(resolution_m)?;
@@ -70,37 +70,37 @@ impl LocalMap {
         self.grid.resolution_m()
     }
 
-    /// The parameters that the next update works with.
+    /// The parameters of the next update.
     pub fn parameters(&self) -> &LocalParameters {
         &self.parameters
     }
 
-    /// Takes other parameters, from the next update on. What they change in voxels that a scan does not touch is done a
-    /// part an update, nearest to the sensor first; see [`LocalParameters::work_per_update`] and
+    /// Sets parameters from the next update on. Their effect on voxels that a scan does not touch is spread over
+    /// several updates, nearest to the sensor first; see [`LocalParameters::work_per_update`] and
     /// [`LocalReport::is_settled`].
     ///
     /// # Errors
     ///
-    /// A parameter that is wrong: the map keeps those it has.
+    /// An invalid parameter: the map keeps its parameters.
     pub fn set_parameters(&mut self, parameters: LocalParameters) -> Result<()> {
         self.parameters = parameters.validated(self.resolution_m())?;
         Ok(())
     }
 
-    /// Takes a scan: hits at its points, misses on the rays to them.
+    /// Inserts a scan: hits at its points, misses on the rays to them.
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, more voxels and points than 67 million: the map stays as it was.
+    /// An origin without a voxel, more than 67 million voxels and points: the map is unchanged.
     pub fn insert_scan(&mut self, scan: &Scan) -> Result<LocalReport> {
         self.update(scan.origin, &scan.points, true)
     }
 
-    /// Takes points in metres, world frame, that another map sends: hits, and no rays. The robot is at `position`.
+    /// Inserts points in metres, world frame, from another map: hits without rays. The robot is at `position`.
     ///
     /// # Errors
     ///
-    /// A position without a voxel, more voxels and points than 67 million: the map stays as it was.
+    /// A position without a voxel, more than 67 million voxels and points: the map is unchanged.
     pub fn insert_relayed(&mut self, position: Point, points: &[Point]) -> Result<LocalReport> {
         self.update(position, points, false)
     }
@@ -135,7 +135,7 @@ impl LocalMap {
         report.is_settled = self.parameters == self.applied && self.sweep.is_done() && !self.is_over_limit();
     }
 
-    /// Whether there are more voxels than the limit: it was lowered, and they go a part an update.
+    /// Whether there are more voxels than the limit: it was lowered, and the excess is removed over several updates.
     pub(super) fn is_over_limit(&self) -> bool {
         self.applied.max_voxels.is_some_and(|limit| self.voxels.len() > limit)
     }
@@ -148,7 +148,7 @@ impl LocalMap {
         })
     }
 
-    /// The voxel of a scan's origin, if the map can take the scan; then nothing can fail any more.
+    /// The voxel of a scan's origin, if the map can take the scan; after this check nothing can fail.
     pub(super) fn check_scan(&self, origin: Point, points: &[Point]) -> Result<VoxelIndex> {
         check_room(self.voxels.len(), points.len())?;
         self.check_position(origin)
@@ -160,13 +160,13 @@ impl LocalMap {
         voxel.iter().all(|k| (-MAX_INDEX..=MAX_INDEX).contains(k)).then_some(voxel)
     }
 
-    /// Takes over parameters that were set since the last update, and does a part of what they change.
+    /// Applies parameters that were set since the last update, and does a part of the work that follows.
     pub(super) fn take_over_parameters(&mut self, report: &mut LocalReport) {
         if self.parameters != self.applied {
             let before = std::mem::replace(&mut self.applied, self.parameters);
             if !self.inflation.rules.has_room() {
-                // So many other ranges and radii have not come to all of the map yet that there is no number for one more:
-                // this one waits until they have.
+                // All rule numbers are in use by ranges and radii that are not applied everywhere yet; this one waits
+                // until they are.
                 self.applied.inflation_range_m = before.inflation_range_m;
                 self.applied.inflation_radius_m = before.inflation_radius_m;
             }
@@ -175,7 +175,7 @@ impl LocalMap {
         self.sweep_some(self.applied.work_per_update, report);
     }
 
-    /// Shows the map as it is to readers.
+    /// Publishes the map to readers.
     pub(super) fn publish(&mut self) {
         self.update_number += 1;
         let dirty = self.tree.take_dirty();
@@ -195,7 +195,7 @@ impl LocalMap {
         self.tree.page_ids().map(|page| self.tree.pages.get(page).occupied as usize).sum()
     }
 
-    /// The map after the last update, to be asked; it stays as it is.
+    /// The map after the last update; this view never changes.
     pub fn view(&self) -> &Arc<LocalView> {
         &self.view
     }
@@ -215,13 +215,12 @@ impl LocalMap {
         self.inflation.inflated
     }
 
-    /// Voxels that are in the occupancy or in the inflation map; looks at all of them.
+    /// Voxels in the occupancy or the inflation map; visits all of them.
     pub fn voxels(&self) -> usize {
         self.inflation.inflated + self.tree.stored_but_not_inflated()
     }
 
-    /// Each voxel with occupancy and its log-odds, in the order in which they will be removed: longest without an update
-    /// first.
+    /// Each voxel with occupancy and its log-odds, in the order of removal: the longest without an update first.
     pub fn history(&self) -> impl Iterator<Item = (VoxelIndex, f64)> + '_ {
         self.voxels.in_order().map(|voxel| {
             let (block, place) = voxel.home();
@@ -229,7 +228,7 @@ impl LocalMap {
         })
     }
 
-    /// Bytes of memory, what readers see included; some that are kept for the next update count too.
+    /// Bytes of memory, including what readers see and some buffers.
     pub fn bytes(&self) -> usize {
         self.tree.bytes()
             + self.voxels.slab.bytes()
@@ -240,7 +239,7 @@ impl LocalMap {
     }
 }
 
-/// Times stages that follow each other.
+/// Measures consecutive stages.
 struct Clock(Instant);
 
 impl Clock {
@@ -254,19 +253,19 @@ impl Clock {
     }
 }
 
-/// Whether as many points as these can be new voxels beside those that are there.
+/// Checks that so many points fit as new voxels beside those stored.
 fn check_room(stored: usize, points: usize) -> Result<()> {
-    if stored.saturating_add(points) <= MOST_VOXELS {
+    if stored.saturating_add(points) <= MAX_NUMBERED {
         return Ok(());
     }
     let reason = format!(
-        "{points} points beside {stored} voxels may be more than the {MOST_VOXELS} that a local map numbers; \
+        "{points} points beside {stored} voxels may be more than the {MAX_NUMBERED} that a local map numbers; \
          limit the map (`LocalParameters::max_voxels`) or split the scan"
     );
     Err(Error::argument("points of the scan", reason))
 }
 
-/// Whether a voxel of these log-odds leaves the map. What is occupied is not free, where the thresholds meet.
+/// Whether a voxel of these log-odds is removed. Where the thresholds meet, occupied wins.
 pub(super) fn is_known_free(parameters: &LocalParameters, log_odds: f64) -> bool {
     log_odds <= parameters.free_log_odds && log_odds < parameters.occupied_log_odds
 }
@@ -277,8 +276,8 @@ mod tests {
 
     #[test]
     fn scans_that_may_be_too_much_are_refused() {
-        assert!(check_room(0, MOST_VOXELS).is_ok() && check_room(MOST_VOXELS - 4000, 4000).is_ok());
-        let error = check_room(MOST_VOXELS - 4000, 4001).unwrap_err().to_string();
+        assert!(check_room(0, MAX_NUMBERED).is_ok() && check_room(MAX_NUMBERED - 4000, 4000).is_ok());
+        let error = check_room(MAX_NUMBERED - 4000, 4001).unwrap_err().to_string();
         assert!(error.contains("max_voxels") && error.contains("4001 points"), "{error}");
         assert!(check_room(1, usize::MAX).is_err());
     }

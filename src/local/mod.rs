@@ -1,9 +1,9 @@
 //! The local map: what a planner reads many times a second.
 //!
-//! It lives beside an archive ([`Mapper`](crate::mapper::Mapper)) and takes the same scans, or lives alone. Occupied voxels
-//! and those around them (inflation) are kept near the robot in space and time, in memory that a limit on voxels bounds.
-//! After La, Kang and Lee, "A robust, task-agnostic and fully-scalable voxel mapping system for large scale environments",
-//! sections IV and V; `docs/local_map.md` says what is the paper's, what is mended, and how fast it is.
+//! It takes the same scans as an archive ([`Mapper`](crate::mapper::Mapper)), or works alone. Occupied voxels and those
+//! around them (inflation) are kept near the robot in space and time, in memory bounded by a limit on voxels. After La,
+//! Kang and Lee, "A robust, task-agnostic and fully-scalable voxel mapping system for large scale environments",
+//! sections IV and V; `docs/local_map.md` says what is the paper's, what is corrected, and how fast it is.
 //!
 //! ```text
 //! Scan -> hits, misses -> occupancy -> history, removal -> inflation -> LocalView
@@ -34,7 +34,7 @@ mod map;
 mod page_table;
 mod parameters;
 mod place;
-mod questions;
+mod queries;
 mod range;
 mod ray_search;
 mod reader;

@@ -1,20 +1,20 @@
 use super::tree::{NONE, Tree};
 use crate::space::VoxelIndex;
 
-/// The pages that hold voxels with occupancy, found without a hash: made for the rays of one scan.
+/// Finds pages with occupied voxels without a hash map, for the rays of one scan.
 #[derive(Debug, Default)]
 pub(super) struct PageTable {
     min: VoxelIndex,
     size: [u32; 3],
-    /// The number of each page of the box; [`NONE`] where there is none.
+    /// The number of each page of the box; [`NONE`] if there is none.
     pages: Vec<u32>,
 }
 
-/// Pages that lie farther apart than this are looked up in the tree.
+/// A larger box of pages is not tabulated; pages are then looked up in the tree.
 const MOST: u64 = 1 << 18;
 
 impl PageTable {
-    /// Begins anew with the pages of a tree.
+    /// Rebuilds the table from a tree.
     pub(super) fn refill(&mut self, tree: &Tree) {
         let stored = || tree.page_ids().filter(|page| tree.pages.get(*page).stored != 0);
         let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);

@@ -3,7 +3,7 @@ use crate::maths::logit;
 use crate::sensor::LogOdds;
 use serde::Serialize;
 
-/// What a local map keeps and how it judges. All of it may change while the map runs, from the next update on.
+/// Parameters of a local map. All of them may change while the map runs, from the next update on.
 ///
 /// The names in brackets are the voxel mapping paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -17,7 +17,7 @@ pub struct LocalParameters {
     pub occupied_log_odds: f64,
     /// Log-odds up to which a voxel is known to be free, and removed (`l_free`). Default: logit(0.4).
     pub free_log_odds: f64,
-    /// Most voxels with occupancy (`n_lim`): beyond, those go whose last update is longest ago. `None` keeps all.
+    /// Most voxels with occupancy (`n_lim`): beyond it, those with the oldest updates are removed. `None` keeps all.
     pub max_voxels: Option<usize>,
     /// Points nearer to the sensor than this, in metres, are skipped. Default: 0.
     pub min_input_range_m: f64,
@@ -28,12 +28,12 @@ pub struct LocalParameters {
     /// Voxels whose center is at most this far from an occupied voxel's center, in metres, are inflated; 0 is the
     /// occupied voxel alone, the most is 24 voxels. Default: 0.2.
     pub inflation_radius_m: f64,
-    /// Most voxels that one update judges, inflates or removes anew because parameters changed; the rest waits for the
-    /// updates after it. At least 1. What scans change is not limited. Default: 20 000.
+    /// Most voxels that one update classifies, inflates or removes because parameters changed; the rest follows in
+    /// later updates. At least 1. Changes by scans are not limited. Default: 20 000.
     pub work_per_update: usize,
 }
 
-/// Largest inflation radius in voxels: its ball has 57 777, which 16 bits count.
+/// Largest inflation radius in voxels: its ball has 57 777 voxels, which 16 bits can count.
 pub(super) const MAX_RADIUS_VOXELS: f64 = 24.0;
 
 impl Default for LocalParameters {
@@ -43,7 +43,7 @@ impl Default for LocalParameters {
 }
 
 impl LocalParameters {
-    /// For a planner that reacts: what was seen last, near the robot.
+    /// For a reactive planner: what was seen last, near the robot.
     pub fn local_mapping() -> Self {
         Self {
             initial_probability: 0.5,
@@ -59,12 +59,12 @@ impl LocalParameters {
         }
     }
 
-    /// For navigation that maps on its way: everything that was seen, inflated near the robot.
+    /// For navigation while mapping: everything that was seen, inflated near the robot.
     pub fn autonomous_mapping() -> Self {
         Self { max_voxels: None, input_range_m: f64::INFINITY, ..Self::local_mapping() }
     }
 
-    /// For a robot that listens to others: far input, all of it inflated.
+    /// For a robot that receives maps of others: long input range, all of it inflated.
     pub fn passive_perception() -> Self {
         Self { input_range_m: f64::INFINITY, inflation_range_m: f64::INFINITY, ..Self::local_mapping() }
     }
@@ -84,11 +84,11 @@ impl LocalParameters {
         Self { inflation_radius_m, ..self }
     }
 
-    /// The parameters, or the first that is wrong for voxels of this size.
+    /// The parameters, if all are valid for this resolution.
     ///
     /// # Errors
     ///
-    /// A number that is none, a range below 0, thresholds outside the clamps or in the wrong order.
+    /// NaN, a negative range, thresholds outside the clamps or in the wrong order.
     pub fn validated(self, resolution_m: f64) -> Result<Self> {
         let wrong = |argument: &str, value: f64, right: &str| {
             Err(Error::argument(argument, format!("{value} is not {right}")))

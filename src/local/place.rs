@@ -1,6 +1,6 @@
 use crate::space::VoxelIndex;
 
-/// Which of the 4 x 4 x 4 cells of its parent a cell is, by the lowest two bits along each axis.
+/// The place of a cell among the 4 x 4 x 4 cells of its parent, from the lowest two bits of each index.
 #[inline]
 pub(super) fn place_of([x, y, z]: VoxelIndex) -> usize {
     (x & 3 | (y & 3) << 2 | (z & 3) << 4) as usize
@@ -23,8 +23,8 @@ pub(super) fn ones(mut mask: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Moves each place `p` of a mask to `p ^ flip`, where `flip` is made of 3 (x), 12 (y) and 48 (z): mirrors it along these
-/// axes.
+/// Moves each place `p` of a mask to `p ^ flip`, where `flip` combines 3 (x), 12 (y) and 48 (z): mirrors the mask along
+/// these axes.
 #[inline]
 pub(super) fn mirrored(mut mask: u64, flip: usize) -> u64 {
     let swap = |mask: u64, low: u64, by: u32| (mask >> by & low) | (mask & low) << by;
@@ -40,7 +40,7 @@ pub(super) fn mirrored(mut mask: u64, flip: usize) -> u64 {
     mask
 }
 
-/// The places in a box, given by the first and the last of 0 to 3 along each axis; none where the first is beyond the last.
+/// The places in a box, given by the first and the last of 0 to 3 along each axis; empty if a first exceeds its last.
 #[inline]
 pub(super) fn in_box(x: (usize, usize), y: (usize, usize), z: (usize, usize)) -> u64 {
     RANGES[0][x.0][x.1] & RANGES[1][y.0][y.1] & RANGES[2][z.0][z.1]

@@ -1,6 +1,6 @@
 use crate::space::{Grid, Point, VoxelIndex};
 
-/// A ball around the sensor, and which voxels' centers are in it.
+/// A ball around the sensor; contains the voxels whose centers are in it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
     pub(super) grid: Grid,
@@ -10,7 +10,7 @@ pub(super) struct Ball {
     pub(super) radius_m: f64,
 }
 
-/// Where a cube of voxels is.
+/// Position of a cube of voxels relative to a ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Relation {
     Inside,
@@ -28,10 +28,10 @@ impl Ball {
         x * x + y * y + z * z <= self.radius_m * self.radius_m
     }
 
-    /// Where the cube of `edge` voxels from `min` on is.
+    /// Position of the cube of `edge` voxels from `min` on.
     #[inline]
     pub(super) fn relation(&self, min: VoxelIndex, edge: i32) -> Relation {
-        // Far more than squares and sums are rounded by.
+        // Far above the rounding error of squares and sums.
         const MARGIN: f64 = 1e-9;
         let squared = self.radius_m * self.radius_m;
         let (mut nearest, mut farthest) = (0.0, 0.0);

@@ -5,12 +5,12 @@ use super::tree::{Node, Page, Tree};
 use crate::scan::RayWalk;
 use crate::space::{Point, VoxelIndex};
 
-/// Finds the voxels with occupancy that a ray visits, exactly those that [`RayWalk`] visits before its last voxel.
+/// Finds the voxels with occupancy on a ray: exactly those that [`RayWalk`] visits before its last voxel.
 ///
-/// A ray crosses borders in the order of their times, of equal times the lowest axis first. So it visits a voxel if and only
-/// if it crosses all borders into it before any border out of it, and so it is with larger cells, whose borders are borders
-/// between voxels with the same times to the bit. Nobody has to walk there: of the cells that hold something and that are
-/// near to the ray, each is asked for itself.
+/// A ray crosses borders in the order of their times, at equal times the lowest axis first. So it visits a voxel if and
+/// only if it crosses all borders into it before any border out of it. The same holds for larger cells, whose borders
+/// are voxel borders with bit-identical times. So no walk is needed: each non-empty cell near the ray is tested by
+/// itself.
 #[derive(Clone, Debug)]
 pub(super) struct RaySearch {
     origin: Point,
@@ -19,22 +19,22 @@ pub(super) struct RaySearch {
     step: [i32; 3],
     start: VoxelIndex,
     last: VoxelIndex,
-    /// A box in which the ray is: the voxels of its two ends, without a quarter of a voxel at their outer borders.
+    /// A box that contains the ray: the voxels of its two ends, less a quarter of a voxel at their outer borders.
     low: Point,
     high: Point,
-    /// The highest place of a cell along the axes on which the ray goes down, else 0: with it places count in the order in
-    /// which the ray comes to them.
+    /// The highest place along the axes on which the ray descends, else 0: places XORed with it are in the order of the
+    /// ray.
     flip: usize,
 }
 
-/// From when to when a ray is in a cell.
+/// The times at which a ray enters and leaves a cell.
 #[derive(Clone, Copy, Debug)]
 struct Stay {
     enter: f64,
     leave: f64,
 }
 
-/// Where the walk from page to page is.
+/// The position of the walk from page to page.
 struct Cursor {
     page: VoxelIndex,
     next: Point,
@@ -67,7 +67,7 @@ impl RaySearch {
         end: Point,
         mut visit: impl FnMut(u32),
     ) {
-        // A ray that hardly moves along an axis has no number for the times there.
+        // Times are undefined along an axis on which the ray hardly moves.
         let is_sound = |k: usize| self.step[k] == 0 || self.inv_direction[k].abs() < 1e30;
         if !(is_sound(0) && is_sound(1) && is_sound(2)) {
             return self.for_each_stored_by_steps(tree, end, visit);
@@ -117,8 +117,7 @@ impl RaySearch {
         });
     }
 
-    /// The block in which the ray ends, if it is in the node and holds nothing but the end: this spares most rays the way
-    /// down to it.
+    /// The block of the ray's end, if it is in the node and holds only the end: this saves most rays the descent to it.
     #[inline]
     fn block_of_end_alone(&self, tree: &Tree, node: &Node) -> u64 {
         let place = place_of(self.last.map(|k| k >> 2));
@@ -145,8 +144,8 @@ impl RaySearch {
         });
     }
 
-    /// Visits those cells of `2^SHIFT` voxels in a cell of four times that along an edge that are in the mask and that the ray
-    /// visits, in the order in which it comes to them. `stay` is that of the larger cell.
+    /// Visits the cells of `2^SHIFT` voxels that are in the mask and on the ray, in the ray's order. `stay` is the
+    /// ray's stay in their parent.
     #[inline]
     fn search<const SHIFT: u32>(
         &self,
@@ -158,7 +157,7 @@ impl RaySearch {
         if mask == 0 {
             return;
         }
-        // Without a branch a cell: nobody could guess it.
+        // Without a branch per cell: it would be unpredictable.
         let (mut near, mut visited) = (mask & self.near::<SHIFT>(parent, stay), 0_u64);
         while near != 0 {
             let place = near.trailing_zeros() as usize;
@@ -177,11 +176,11 @@ impl RaySearch {
         }
     }
 
-    /// The places in a cell, of cells of `2^SHIFT` voxels, that lie in a box around the ray's way through it, none outside the
-    /// box of its two ends.
+    /// The cells of `2^SHIFT` voxels of a parent that lie in a box around the ray's part in it, and in the box of the
+    /// ray's ends.
     #[inline]
     fn near<const SHIFT: u32>(&self, parent: VoxelIndex, stay: Stay) -> u64 {
-        // In voxels; rounding of times and positions is a thousandth of this or less.
+        // In voxels; the rounding error of times and positions is at most a thousandth of this.
         const MARGIN: f64 = 1e-3;
         let cells_per_voxel = 1.0 / f64::from(1 << SHIFT);
         let leave = if stay.leave < 1.0 { stay.leave } else { 1.0 };
@@ -201,11 +200,11 @@ impl RaySearch {
     fn visits<const SHIFT: u32>(&self, cell: VoxelIndex) -> bool {
         let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
         let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
-        // Of equal times the lowest axis goes first.
+        // At equal times the lowest axis goes first.
         (ex <= ly) & (ex <= lz) & (ey < lx) & (ey <= lz) & (ez < lx) & (ez < ly)
     }
 
-    /// From when to when the ray is in a cell of `2^SHIFT` voxels that it visits.
+    /// The times at which the ray enters and leaves a cell of `2^SHIFT` voxels that it visits.
     #[inline]
     fn stay_in<const SHIFT: u32>(&self, cell: VoxelIndex) -> Stay {
         let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
@@ -231,14 +230,14 @@ impl RaySearch {
         }
     }
 
-    /// Time at which the ray crosses a border between voxels, as [`RayWalk`] has it.
+    /// Time at which the ray crosses a voxel border, as in [`RayWalk`].
     #[inline]
     fn time(&self, axis: usize, border: i32) -> f64 {
         (f64::from(border) - self.origin[axis]) * self.inv_direction[axis]
     }
 }
 
-/// The axis with the least time, the lowest of equals, and that time.
+/// The axis with the least time, the lowest at equal times, and that time.
 #[inline]
 fn earliest([x, y, z]: Point) -> (usize, f64) {
     if x <= y && x <= z {
@@ -250,7 +249,7 @@ fn earliest([x, y, z]: Point) -> (usize, f64) {
     }
 }
 
-// One instruction each, where the library's must care for what is no number.
+// One instruction each; the library's versions handle NaN.
 #[inline]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
@@ -261,10 +260,10 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Which of the cells 0 to 3 a coordinate is in, or the nearest of them; on a border either of the two.
+/// Which of the cells 0 to 3 holds a coordinate, or is nearest to it; on a border either of the two.
 #[inline]
 fn cell_of(x: f64) -> usize {
-    // Where the lowest bits of the sum are the nearest integer.
+    // Added to a number, this leaves the nearest integer in the lowest bits.
     const INTEGERS: f64 = 6_755_399_441_055_744.0;
     let x = smaller(larger(x, 0.25), 3.75);
     (x - 0.5 + INTEGERS).to_bits() as usize & 3

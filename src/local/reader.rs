@@ -2,7 +2,7 @@ use super::changes::VoxelChange;
 use super::view::LocalView;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Where the writer puts each view. Both sides hold the lock for the time of copying a pointer.
+/// The published view. Writer and readers hold the lock only to copy a pointer.
 #[derive(Debug)]
 pub(super) struct Shared(Mutex<Arc<LocalView>>);
 
@@ -13,7 +13,7 @@ impl Shared {
 
     pub(super) fn set(&self, view: Arc<LocalView>) {
         let before = std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), view);
-        // Freeing what only the old view held takes time: not with the lock held.
+        // Dropped after the lock is released: freeing the old view takes time.
         drop(before);
     }
 
@@ -22,7 +22,7 @@ impl Shared {
     }
 }
 
-/// Reads a local map beside its writer, from any thread: it sees whole updates, and waits for none.
+/// Reads a local map from any thread: it sees whole updates and does not wait for the writer.
 #[derive(Clone, Debug)]
 pub struct LocalReader {
     shared: Arc<Shared>,
@@ -41,8 +41,8 @@ impl LocalReader {
         self.shared.get()
     }
 
-    /// The voxels that changed since the last call, in no stated order, and the map that they lead to; with the first call,
-    /// all that there is.
+    /// The voxels that changed since the last call, in no particular order, and the present view; at the first call,
+    /// all voxels.
     pub fn changes(&mut self) -> (Arc<LocalView>, Vec<VoxelChange>) {
         let view = self.view();
         let changes = view.changes_since(&self.seen);

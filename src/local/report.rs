@@ -2,27 +2,27 @@ use crate::scan::SkippedPoints;
 use serde::Serialize;
 use std::time::Duration;
 
-/// What one update did to a local map.
+/// Counts and times of one update of a local map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct LocalReport {
-    /// Points that came in.
+    /// Points received.
     pub points: u64,
     /// Points that were skipped, by cause.
     pub skipped: SkippedPoints,
     /// Points that were skipped because they are beyond the input range.
     pub beyond_input_range: u64,
-    /// Voxels that got evidence.
+    /// Voxels that received evidence.
     pub updated: u64,
     /// Of these, voxels that were not in the map before.
     pub new: u64,
     /// Voxels removed because they are known to be free.
     pub freed: u64,
-    /// Voxels removed because there were more than the limit.
+    /// Voxels removed because of the limit.
     pub forgotten: u64,
-    /// Voxels that began or ended to inflate others.
+    /// Voxels that started or stopped to inflate others.
     pub inflation_changes: u64,
-    /// Whether all voxels are judged and inflated by the present parameters.
+    /// Whether the present parameters are applied to all voxels.
     pub is_settled: bool,
     /// Time of each stage.
     pub times: StageTimes,
@@ -31,7 +31,7 @@ pub struct LocalReport {
 /// How long each stage of an update took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StageTimes {
-    /// Parameters that changed, taken over.
+    /// Applying changed parameters.
     pub parameters: Duration,
     /// Input: points to voxels, hits (Algorithm 1).
     pub input: Duration,
@@ -43,7 +43,7 @@ pub struct StageTimes {
     pub removal: Duration,
     /// Inflation (`t_inf`, Algorithm 2).
     pub inflation: Duration,
-    /// Showing the result to readers.
+    /// Publishing the result to readers.
     pub publishing: Duration,
 }
 

@@ -3,7 +3,7 @@ use super::stencil::Stencil;
 use crate::space::{Grid, Point};
 use std::sync::Arc;
 
-/// Who inflates whom: one rule, or, while parameters change, one a part of the map.
+/// Inflation rules: one, or several in parts of the map while parameters change.
 #[derive(Clone, Debug)]
 pub(super) struct Rules {
     /// By number.
@@ -11,7 +11,7 @@ pub(super) struct Rules {
     current: u8,
 }
 
-/// Which occupied voxels inflate which.
+/// Which occupied voxels inflate which voxels.
 #[derive(Clone, Debug)]
 struct Rule {
     range_m: f64,
@@ -24,18 +24,18 @@ impl Rules {
         Self { rules: vec![Some(Rule { range_m, stencil })], current: 0 }
     }
 
-    /// Number of the rule for what is new.
+    /// Number of the current rule.
     #[inline]
     pub(super) fn current(&self) -> u8 {
         self.current
     }
 
-    /// Whether there is a number for one more.
+    /// Whether another rule can be added.
     pub(super) fn has_room(&self) -> bool {
         self.rules.len() < 256 || self.rules.iter().any(Option::is_none)
     }
 
-    /// Makes another rule the current one; there must be room.
+    /// Adds a rule and makes it current; there must be room.
     pub(super) fn set(&mut self, range_m: f64, radius_m: f64, resolution_m: f64) {
         debug_assert!(self.has_room());
         let known = self.rules.iter().flatten().find(|rule| rule.stencil.radius_m() == radius_m);
@@ -49,7 +49,7 @@ impl Rules {
         self.current = number as u8;
     }
 
-    /// Forgets all but the current one, which every node has by now.
+    /// Removes all rules but the current one, which every node has by now.
     pub(super) fn forget_old(&mut self) {
         for (number, rule) in self.rules.iter_mut().enumerate() {
             if number != usize::from(self.current) {
@@ -62,7 +62,7 @@ impl Rules {
         self.get(number).stencil.clone()
     }
 
-    /// Where voxels inflate others by a rule, with the sensor at `center`.
+    /// The ball in which voxels inflate others by a rule, with the sensor at `center`.
     pub(super) fn ball(&self, number: u8, grid: Grid, center: Point) -> Ball {
         Ball { grid, center, radius_m: self.get(number).range_m }
     }

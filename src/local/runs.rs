@@ -1,4 +1,4 @@
-/// Runs of equally many values, by number: growing wastes an eighth at most.
+/// An allocator of runs of equal length, by number; growing wastes at most an eighth.
 #[derive(Clone, Debug)]
 pub(super) struct Runs<T> {
     values: Vec<T>,
@@ -12,11 +12,11 @@ impl<T> Default for Runs<T> {
 }
 
 impl<T: Copy + Default> Runs<T> {
-    /// A run of `len` values, whatever they are; returns its number.
+    /// Allocates a run of `len` values, uninitialised; returns its number.
     pub(super) fn take(&mut self, len: usize) -> u32 {
         self.free.pop().unwrap_or_else(|| {
             let used = self.values.len();
-            // Doubling would leave a third of it empty on average.
+            // Doubling would leave a third unused on average.
             if self.values.capacity() < used + len {
                 self.values.reserve_exact(used / 8 + 1024);
             }
@@ -25,7 +25,7 @@ impl<T: Copy + Default> Runs<T> {
         })
     }
 
-    /// Gives a run back.
+    /// Frees a run.
     pub(super) fn give(&mut self, run: u32) {
         self.free.push(run);
     }

@@ -1,4 +1,4 @@
-/// Values by number, in chunks: growing moves none of them, and wastes less than a chunk.
+/// Values by number, in chunks: growing moves none of them and wastes less than a chunk.
 #[derive(Clone, Debug)]
 pub(super) struct Slab<T> {
     chunks: Vec<Box<[T]>>,
@@ -15,7 +15,7 @@ impl<T> Default for Slab<T> {
 }
 
 impl<T: Clone + Default> Slab<T> {
-    /// Keeps a value and returns its number.
+    /// Stores a value and returns its number.
     pub(super) fn insert(&mut self, value: T) -> u32 {
         let id = self.free.pop().unwrap_or_else(|| {
             if self.len.is_multiple_of(CHUNK) {
@@ -28,7 +28,7 @@ impl<T: Clone + Default> Slab<T> {
         id
     }
 
-    /// Gives a number back; what is there is forgotten by whoever inserts next.
+    /// Frees a number; its value stays until the number is used again.
     pub(super) fn remove(&mut self, id: u32) {
         self.free.push(id);
     }

@@ -1,6 +1,6 @@
 use super::runs::Runs;
 
-/// Which of 64 places are taken, and the number that each holds: 4 bytes a number, in a list as long as needed.
+/// A map from 64 places to numbers: 4 bytes per number, in a list as long as needed.
 // Next to each other in a block of 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(Rust, packed(4))]
@@ -9,7 +9,7 @@ pub(super) struct Sparse64 {
     list: u32,
 }
 
-/// The lists of many [`Sparse64`], by capacity: 1, 2, 4 ... 64, the least that is enough.
+/// The lists of many [`Sparse64`], by capacity: 1, 2, 4 ... 64, the smallest that suffices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct IdLists {
     classes: [Runs<u32>; 7],
@@ -37,7 +37,7 @@ impl IdLists {
         self.classes[class].get_mut(list, 1 << class)
     }
 
-    /// Moves a list to another class, as much as there is room for; returns its number there.
+    /// Moves a list to another class, as much as fits; returns its number there.
     fn moved(&mut self, list: u32, from: usize, to: usize) -> u32 {
         let new = self.classes[to].take(1 << to);
         let len = 1 << from.min(to);
@@ -73,7 +73,7 @@ impl Sparse64 {
         if len == 0 { &[] } else { &lists.list(class_of(len), self.list)[..len] }
     }
 
-    /// Puts a number at a place that is not taken.
+    /// Inserts a number at a free place.
     pub(super) fn insert(&mut self, lists: &mut IdLists, place: usize, id: u32) {
         debug_assert!(self.mask >> place & 1 == 0);
         let len = self.len();
@@ -90,7 +90,7 @@ impl Sparse64 {
         self.mask |= 1 << place;
     }
 
-    /// Takes the number at a place that is taken away.
+    /// Removes the number at a place.
     pub(super) fn remove(&mut self, lists: &mut IdLists, place: usize) -> u32 {
         debug_assert!(self.mask >> place & 1 != 0);
         let (len, rank) = (self.len(), self.rank(place));

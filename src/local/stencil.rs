@@ -3,13 +3,13 @@ use crate::space::VoxelIndex;
 
 /// The voxels that an occupied voxel inflates: a ball on voxel centers, as masks of blocks of 4 x 4 x 4.
 ///
-/// One for all voxels: it takes the place of the paper's look-up table in every voxel.
+/// One for all voxels; it replaces the paper's look-up table in every voxel.
 #[derive(Clone, Debug)]
 pub(super) struct Stencil {
     radius_m: f64,
-    /// How many blocks it reaches beyond the voxel's own, along each axis and to both sides.
+    /// How many blocks it extends beyond the voxel's own, along each axis and to both sides.
     pub(super) reach: i32,
-    /// For each place of the voxel in its block: the blocks, as [`Stencil::number_of`] counts them, and their voxels.
+    /// For each place of the voxel in its block: the blocks, numbered by [`Stencil::number_of`], and their voxels.
     parts: Vec<Vec<(u32, u64)>>,
 }
 
@@ -39,12 +39,12 @@ impl Stencil {
         self.radius_m
     }
 
-    /// Blocks in the cube that it reaches.
+    /// Blocks in the cube around the stencil.
     pub(super) fn blocks(&self) -> usize {
         (2 * self.reach + 1).pow(3) as usize
     }
 
-    /// The blocks and their voxels that the voxel at a place of its block inflates.
+    /// The blocks, and their voxels, that the voxel at a place of its block inflates.
     #[inline]
     pub(super) fn of_place(&self, place: usize) -> &[(u32, u64)] {
         &self.parts[place]
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn balls_have_as_many_voxels_as_they_should() {
-        // 0.3 m is a little less than three voxels of 0.1 m in f64.
+        // 0.3 m is slightly less than three voxels of 0.1 m in f64.
         let sizes = [(0.0, 1), (0.1, 7), (0.2, 33), (0.3, 123), (0.25, 81), (0.4, 257), (2.4, 57_777)];
         for (radius_m, size) in sizes {
             let stencil = Stencil::new(radius_m, 0.1);

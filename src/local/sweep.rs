@@ -4,7 +4,7 @@ use super::report::LocalReport;
 use super::tree::Tree;
 use crate::space::{Point, VoxelIndex};
 
-/// The nodes that parameters which changed have not come to yet, the nearest to the sensor last.
+/// Applies changed parameters node by node: the nodes left, the nearest to the sensor last.
 #[derive(Debug, Default)]
 pub(super) struct Sweep {
     /// By index.
@@ -20,7 +20,7 @@ impl Sweep {
         self.nodes.capacity() * size_of::<VoxelIndex>()
     }
 
-    /// All nodes, in the order of their distance to a voxel.
+    /// All nodes, sorted by their distance to a voxel.
     fn of(tree: &Tree, from: VoxelIndex) -> Self {
         let from = from.map(|k| i64::from(k >> 4));
         let distance = |index: &VoxelIndex| {
@@ -34,7 +34,7 @@ impl Sweep {
 }
 
 impl LocalMap {
-    /// Begins to judge and inflate all voxels anew, where the parameters that changed ask for it.
+    /// Starts a sweep over all voxels, if the changed parameters need one.
     pub(super) fn begin_sweep(&mut self, before: &LocalParameters) {
         let LocalParameters { inflation_range_m, inflation_radius_m, .. } = self.applied;
         let states = |p: &LocalParameters| {
@@ -56,7 +56,7 @@ impl LocalMap {
         }
     }
 
-    /// Goes on with the sweep for about so many voxels, at least one node.
+    /// Continues the sweep for about `most` voxels, at least one node.
     pub(super) fn sweep_some(&mut self, most: usize, report: &mut LocalReport) {
         if self.sweep.is_done() {
             return;
@@ -76,7 +76,7 @@ impl LocalMap {
         }
     }
 
-    /// Judges the voxels of a node anew and gives it the present inflation rule; returns the work that this is, in voxels.
+    /// Classifies the voxels of a node anew and gives it the current inflation rule; returns the work in voxels.
     fn sweep_node(&mut self, node: u32, report: &mut LocalReport) -> usize {
         let LocalParameters { log_odds, occupied_log_odds, .. } = self.applied;
         let mut work = 0;
@@ -99,7 +99,7 @@ impl LocalMap {
         }
         let before = self.inflation.changes;
         self.inflation.adopt(&mut self.tree, node);
-        // What ended to inflate begins again with the other stencil.
+        // Voxels that stopped to inflate start again with the new stencil.
         work + 2 * (self.inflation.changes - before)
     }
 }

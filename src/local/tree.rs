@@ -8,8 +8,8 @@ use rustc_hash::FxHashMap;
 /// No number.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Where the voxels of a local map are: a hash map of pages of 64 voxels along an edge, in it nodes of 16, in these
-/// blocks of 4. What is empty is not there, and is skipped at the largest of these sizes.
+/// The voxels of a local map: a hash map of pages of 64 voxels along an edge, in these nodes of 16, in these blocks of
+/// 4. Empty ones do not exist and are skipped at the largest size.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     by_index: FxHashMap<VoxelIndex, u32>,
@@ -18,21 +18,21 @@ pub(super) struct Tree {
     pub(super) blocks: Slab<Block>,
     pub(super) lists: IdLists,
     pub(super) counts: Counts,
-    /// Index and number of the page in which a block was asked for last.
+    /// Index and number of the page of the last block.
     last_page: Option<(VoxelIndex, u32)>,
-    /// Pages, by index, with nodes that have changed since they were last shown to readers.
+    /// Pages, by index, with nodes that changed since the last publication.
     dirty: Vec<VoxelIndex>,
 }
 
 /// 64 x 64 x 64 voxels.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Page {
-    /// Index of a voxel over 64.
+    /// Index of a voxel, divided by 64.
     pub(super) index: VoxelIndex,
     pub(super) nodes: Sparse64,
     /// Nodes that hold voxels with occupancy.
     pub(super) stored: u64,
-    /// Nodes in which voxels have changed since they were last shown to readers.
+    /// Nodes in which voxels changed since the last publication.
     pub(super) dirty: u64,
     /// Occupied voxels.
     pub(super) occupied: u32,
@@ -45,7 +45,7 @@ pub(super) struct Page {
 pub(super) struct Node {
     pub(super) page: u32,
     pub(super) place: u8,
-    /// Number of the inflation rule that holds here.
+    /// Number of the inflation rule of the node.
     pub(super) rule: u8,
     /// Occupied voxels.
     pub(super) occupied: u16,
@@ -56,17 +56,17 @@ pub(super) struct Node {
     pub(super) stored: u64,
 }
 
-/// 4 x 4 x 4 voxels, each with what it is in the occupancy map and in the inflation map: half a cache line.
+/// 4 x 4 x 4 voxels, each with its occupancy and its inflation: half a cache line.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block {
     pub(super) node: u32,
     pub(super) place: u8,
-    /// Whether it waits to be inflated anew.
+    /// Whether it is queued to be inflated anew.
     pub(super) is_waiting: bool,
     /// The voxels with occupancy, and their numbers.
     pub(super) voxels: Sparse64,
     pub(super) occupied: u64,
-    /// The occupied voxels that inflate others now, and by how many each voxel is inflated.
+    /// The occupied voxels that inflate others now, and the counts of inflation.
     pub(super) tally: Tally,
 }
 
@@ -80,13 +80,13 @@ impl Tree {
         self.by_index.values().copied()
     }
 
-    /// Index of a voxel of the node over 16.
+    /// Index of a voxel of the node, divided by 16.
     pub(super) fn node_index(&self, node: u32) -> VoxelIndex {
         let Node { page, place, .. } = *self.nodes.get(node);
         cell_at(self.pages.get(page).index, place.into())
     }
 
-    /// Index of a voxel of the block over 4.
+    /// Index of a voxel of the block, divided by 4.
     pub(super) fn block_index(&self, block: u32) -> VoxelIndex {
         let Block { node, place, .. } = *self.blocks.get(block);
         cell_at(self.node_index(node), place.into())
@@ -105,7 +105,7 @@ impl Tree {
         self.nodes.get(node).blocks.get(&self.lists, place_of(index))
     }
 
-    /// The block with an index, made if it is not there; a new node gets the rule.
+    /// The block with an index, made if it does not exist; a new node gets the rule.
     pub(super) fn make_block(&mut self, index: VoxelIndex, rule: u8) -> u32 {
         let node_index = index.map(|k| k >> 2);
         let page_index = node_index.map(|k| k >> 2);
@@ -133,7 +133,7 @@ impl Tree {
 
     #[inline]
     fn make_page(&mut self, index: VoxelIndex) -> u32 {
-        // Mostly it is that of the block before.
+        // Mostly it is the page of the last block.
         if let Some((last, page)) = self.last_page
             && last == index
         {
@@ -148,7 +148,7 @@ impl Tree {
         page
     }
 
-    /// Puts a voxel with occupancy into a block.
+    /// Adds a voxel with occupancy to a block.
     pub(super) fn store(&mut self, block: u32, place: usize, voxel: u32) {
         let Block { node, place: in_node, voxels, .. } = self.blocks.get_mut(block);
         voxels.insert(&mut self.lists, place, voxel);
@@ -157,7 +157,7 @@ impl Tree {
         self.pages.get_mut(*page).stored |= 1 << *in_page;
     }
 
-    /// Takes a voxel with occupancy out of a block.
+    /// Removes a voxel with occupancy from a block.
     pub(super) fn unstore(&mut self, block: u32, place: usize) {
         let Block { node, place: in_node, voxels, .. } = self.blocks.get_mut(block);
         voxels.remove(&mut self.lists, place);
@@ -170,7 +170,7 @@ impl Tree {
         }
     }
 
-    /// Says whether a voxel is occupied; returns whether that is new.
+    /// Sets whether a voxel is occupied; returns whether that changed it.
     pub(super) fn set_occupied(&mut self, block: u32, place: usize, is_occupied: bool) -> bool {
         let Block { node, occupied, .. } = self.blocks.get_mut(block);
         let was_occupied = *occupied >> place & 1 != 0;
@@ -190,7 +190,7 @@ impl Tree {
         true
     }
 
-    /// Says which voxels of a block inflate others: `begin` do so from now on, `end` no more.
+    /// Changes which voxels of a block inflate others: `begin` start, `end` stop.
     pub(super) fn set_inflating(&mut self, block: u32, begin: u64, end: u64) {
         let Block { node, tally, .. } = *self.blocks.get(block);
         let inflating = (self.counts.inflating(tally) | begin) & !end;
@@ -203,7 +203,7 @@ impl Tree {
         page.inflating = page.inflating + begin - end;
     }
 
-    /// Notes that what readers see of a node has changed.
+    /// Marks a node as changed for readers.
     #[inline]
     pub(super) fn mark_dirty(&mut self, node: u32) {
         let Node { page, place, .. } = *self.nodes.get(node);
@@ -214,13 +214,13 @@ impl Tree {
         *dirty |= 1 << place;
     }
 
-    /// The pages, by index, that may have changed for readers since the last call; some may not be there any more, some
-    /// come twice.
+    /// The pages, by index, that may have changed for readers since the last call; some may not exist any more, some
+    /// may be listed twice.
     pub(super) fn take_dirty(&mut self) -> Vec<VoxelIndex> {
         std::mem::take(&mut self.dirty)
     }
 
-    /// Notes that readers see these pages as they are; keeps the memory for the next call of [`Tree::take_dirty`].
+    /// Marks these pages as published; keeps the memory for the next call of [`Tree::take_dirty`].
     pub(super) fn shown(&mut self, mut dirty: Vec<VoxelIndex>) {
         for index in dirty.drain(..) {
             if let Some(page) = self.page_at(index) {
@@ -230,9 +230,9 @@ impl Tree {
         self.dirty = dirty;
     }
 
-    /// Drops a block in which nothing is left, and its node and page if nothing is left in these.
+    /// Removes a block if it is empty, and its node and page if they are.
     ///
-    /// Readers must see the tree before anything is made again: what is new does not know what they saw in its place.
+    /// Publish the tree before anything new is made: a new node does not know what readers saw in its place.
     pub(super) fn drop_if_empty(&mut self, block: u32) {
         let Block { node, place, voxels, tally, .. } = self.blocks.get(block).clone();
         if voxels.mask != 0 || !tally.is_empty() {

@@ -4,9 +4,9 @@ use crate::space::{Grid, Point, VoxelIndex};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// What a local map is after one update. It never changes: a planner can ask it as long as it likes.
+/// A local map after one update. It never changes: a planner can query it as long as it likes.
 ///
-/// What did not change from one update to the next is shared between their views.
+/// Views share what did not change between their updates.
 #[derive(Clone, Debug)]
 pub struct LocalView {
     pub(super) grid: Grid,
@@ -15,7 +15,7 @@ pub struct LocalView {
     pub(super) stored: usize,
     pub(super) occupied: usize,
     pub(super) inflated: usize,
-    /// By index of a voxel over 64.
+    /// By index of a voxel, divided by 64.
     pub(super) pages: FxHashMap<VoxelIndex, Arc<PageView>>,
 }
 
@@ -23,7 +23,7 @@ pub struct LocalView {
 #[derive(Clone, Debug, Default)]
 pub(super) struct PageView {
     pub(super) mask: u64,
-    /// Of each node of the mask: which blocks there are, and the number of blocks before.
+    /// For each node of the mask: its blocks, and the number of blocks before.
     nodes: Box<[(u64, u32)]>,
     /// The blocks of all nodes.
     blocks: Box<[BlockView]>,
@@ -44,10 +44,10 @@ pub(super) struct BlockView {
     pub(super) inflated: u64,
 }
 
-/// What a local map says of a voxel.
+/// The state of a voxel in a local map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum LocalState {
-    /// Neither occupied nor inflated: free, or never seen; the local map does not tell these apart.
+    /// Neither occupied nor inflated: free or unknown; the local map does not distinguish these.
     None,
     /// Not occupied, but near to an occupied voxel.
     Inflated,
@@ -55,7 +55,7 @@ pub enum LocalState {
     Occupied,
 }
 
-/// Which voxels are obstacles for a question.
+/// Which voxels are obstacles for a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Obstacle {
     /// Occupied voxels alone.
@@ -133,7 +133,7 @@ impl<'a> NodeView<'a> {
     }
 }
 
-/// Puts together views of pages; kept from page to page for its memory.
+/// Builds views of pages; kept from page to page for its memory.
 #[derive(Default)]
 struct PageBuilder {
     nodes: Vec<(u64, u32)>,
@@ -141,7 +141,7 @@ struct PageBuilder {
 }
 
 impl PageBuilder {
-    /// The view of a page whose view was `before`; `None` if nothing in it is occupied or inflated.
+    /// The view of a page; `before` is its last view. `None` if nothing in it is occupied or inflated.
     fn build(&mut self, tree: &Tree, page: &Page, before: Option<&PageView>) -> Option<PageView> {
         self.nodes.clear();
         self.blocks.clear();
@@ -164,7 +164,7 @@ impl PageBuilder {
         (mask != 0).then_some(PageView { mask, nodes, blocks })
     }
 
-    /// Adds the blocks of a node that hold something to see; returns which these are.
+    /// Adds the visible blocks of a node; returns their mask.
     fn add_blocks_of(&mut self, tree: &Tree, node: u32) -> u64 {
         let mut mask = 0;
         let blocks = tree.nodes.get(node).blocks;
@@ -186,7 +186,7 @@ impl LocalView {
         Self { grid, update_number: 0, position: None, stored: 0, occupied: 0, inflated: 0, pages }
     }
 
-    /// Takes over the pages with these indices.
+    /// Replaces the pages with these indices.
     pub(super) fn replace_pages(&mut self, tree: &Tree, dirty: &[VoxelIndex]) {
         let mut builder = PageBuilder::default();
         for &index in dirty {
@@ -199,12 +199,12 @@ impl LocalView {
         }
     }
 
-    /// Number of the update that led to this; 0 before the first.
+    /// Number of the update; 0 before the first.
     pub fn update_number(&self) -> u64 {
         self.update_number
     }
 
-    /// Where the sensor was at that update, in metres; `None` before the first.
+    /// Position of the sensor at that update, in metres; `None` before the first.
     pub fn position(&self) -> Option<Point> {
         self.position
     }
@@ -224,12 +224,12 @@ impl LocalView {
         self.occupied
     }
 
-    /// Inflated voxels, occupied ones among them.
+    /// Inflated voxels, including occupied ones.
     pub fn inflated_voxels(&self) -> usize {
         self.inflated
     }
 
-    /// What the map says of a voxel.
+    /// The state of a voxel.
     pub fn state(&self, voxel: VoxelIndex) -> LocalState {
         let place = |shift: u32| place_of(voxel.map(|k| k >> shift));
         let page = self.pages.get(&voxel.map(|k| k >> 6));
@@ -237,12 +237,12 @@ impl LocalView {
         block.map_or(LocalState::None, |block| block.state(place(0)))
     }
 
-    /// What the map says of the voxel that holds a point; of what is no point, nothing.
+    /// The state of the voxel that holds a point; `None` if the point is not finite.
     pub fn state_at(&self, point: Point) -> LocalState {
         self.grid.voxel_of(point).map_or(LocalState::None, |voxel| self.state(voxel))
     }
 
-    /// Visits all voxels that are occupied or inflated, in no stated order.
+    /// Visits all voxels that are occupied or inflated, in no particular order.
     pub fn for_each(&self, mut visit: impl FnMut(VoxelIndex, LocalState)) {
         for (index, page) in &self.pages {
             for (place, node) in ones(page.mask).zip(page.nodes()) {
@@ -256,7 +256,7 @@ impl LocalView {
         }
     }
 
-    /// Bytes of memory on the heap, were none of it shared with other views.
+    /// Bytes of memory on the heap, without regard to sharing.
     pub(super) fn bytes(&self) -> usize {
         self.pages.capacity() * 8 / 7 * (size_of::<(VoxelIndex, Arc<PageView>)>() + 1)
             + self.pages.values().map(|page| page.bytes()).sum::<usize>()

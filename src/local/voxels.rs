@@ -1,24 +1,24 @@
 use super::slab::Slab;
 use super::tree::NONE;
 
-/// What is known of a voxel with occupancy, and its place in the history.
+/// A voxel with occupancy, and its place in the history.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Voxel {
     /// Sum of the evidence so far, clamped.
     pub(super) log_odds: f64,
     block: u32,
-    /// The voxel updated before it, in the history.
+    /// The voxel updated before it.
     older: u32,
     /// The voxel updated after it.
     newer: u32,
-    /// Its place in the block, and 64 times the number of what the present scan says of it.
+    /// Its place in the block, and 64 times the number of its evidence in the present scan.
     place_and_touch: u32,
 }
 
-/// Most voxels with occupancy that a map numbers, before a scan and with all of its points; each may be touched by a scan.
-pub(super) const MOST_VOXELS: usize = NO_TOUCH as usize;
+/// Most voxels with occupancy, including all points of a scan; each may have evidence in a scan.
+pub(super) const MAX_NUMBERED: usize = NO_TOUCH as usize;
 
-/// The number of nothing, in 26 bits.
+/// No number, in 26 bits.
 const NO_TOUCH: u32 = u32::MAX >> 6;
 
 impl Default for Voxel {
@@ -33,28 +33,28 @@ impl Voxel {
         Self { log_odds, block, older: NONE, newer: NONE, place_and_touch }
     }
 
-    /// Number of its block, and its place in that.
+    /// Number of its block, and its place in the block.
     #[inline]
     pub(super) fn home(&self) -> (u32, usize) {
         (self.block, (self.place_and_touch & 63) as usize)
     }
 
-    /// Number of what the present scan says of it.
+    /// Number of its evidence in the present scan.
     #[inline]
     pub(super) fn touch(&self) -> Option<u32> {
         let touch = self.place_and_touch >> 6;
         (touch != NO_TOUCH).then_some(touch)
     }
 
-    /// Sets what [`Voxel::touch`] returns; there are fewer than [`MOST_VOXELS`].
+    /// Sets the value of [`Voxel::touch`]; there are fewer than [`MAX_NUMBERED`].
     #[inline]
     pub(super) fn set_touch(&mut self, touch: Option<u32>) {
         self.place_and_touch = self.place_and_touch & 63 | touch.unwrap_or(NO_TOUCH) << 6;
     }
 }
 
-/// All voxels with occupancy, and the order in which they were updated last (the paper's history buffer): a list with
-/// links in both directions, so that a voxel moves to its end at once.
+/// All voxels with occupancy, in the order of their last updates (the paper's history buffer): a doubly linked list, so
+/// that a voxel moves to the end in constant time.
 #[derive(Clone, Debug)]
 pub(super) struct Voxels {
     pub(super) slab: Slab<Voxel>,
@@ -75,12 +75,12 @@ impl Voxels {
         self.len
     }
 
-    /// The voxel whose last update is longest ago.
+    /// The voxel with the oldest update.
     pub(super) fn oldest(&self) -> Option<u32> {
         (self.oldest != NONE).then_some(self.oldest)
     }
 
-    /// Puts a voxel that is not in the history at its end.
+    /// Appends a voxel that is not in the history.
     pub(super) fn push_newest(&mut self, id: u32) {
         let last = std::mem::replace(&mut self.newest, id);
         let voxel = self.slab.get_mut(id);
@@ -92,7 +92,7 @@ impl Voxels {
         self.len += 1;
     }
 
-    /// Puts a voxel that is not in the history at its beginning.
+    /// Prepends a voxel that is not in the history.
     pub(super) fn push_oldest(&mut self, id: u32) {
         let first = std::mem::replace(&mut self.oldest, id);
         let voxel = self.slab.get_mut(id);
@@ -104,7 +104,7 @@ impl Voxels {
         self.len += 1;
     }
 
-    /// Takes a voxel out of the history.
+    /// Removes a voxel from the history.
     pub(super) fn unlink(&mut self, id: u32) {
         let Voxel { older, newer, .. } = *self.slab.get(id);
         match older {

@@ -1,10 +1,11 @@
 use super::statistics::IoCounts;
-use super::tile_files::{self, ReadTable};
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::MapConfig;
-use crate::error::{Error, FormatError, Result};
-use crate::space::{Grid, TileIndex};
-use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStamp, TileStore};
+use crate::error::{Error, Result};
+use crate::persistence::config_from;
+use crate::persistence::load::{self, ReadTable};
+use crate::space::TileIndex;
+use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStore, TileVersion};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
@@ -105,7 +106,7 @@ impl MapReader {
         let cache = self.cache.get_mut().unwrap_or_else(PoisonError::into_inner);
         let tiles: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
         for index in tiles {
-            if store.stamp(index).is_none() || store.stamp(index) != self.store.stamp(index) {
+            if store.version(index).is_none() || store.version(index) != self.store.version(index) {
                 cache.tiles.pop(&index);
             }
         }
@@ -157,8 +158,8 @@ impl MapReader {
     }
 
     /// What is known of a tile without reading it.
-    pub(crate) fn stamp(&self, index: TileIndex) -> Option<TileStamp> {
-        self.store.stamp(index)
+    pub(crate) fn version(&self, index: TileIndex) -> Option<TileVersion> {
+        self.store.version(index)
     }
 
     /// Number of the flush that this reader sees.
@@ -169,19 +170,20 @@ impl MapReader {
     /// Observed and occupied voxels of the whole map, from the log alone; `None` for a map of the seed's format.
     pub fn voxel_counts(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
-            let stamps = self.store.commits().tiles.values();
-            stamps
-                .fold((0, 0), |(voxels, occupied), stamp| (voxels + stamp.voxels, occupied + stamp.occupied))
+            let versions = self.store.commits().tiles.values();
+            versions.fold((0, 0), |(voxels, occupied), version| {
+                (voxels + version.voxels, occupied + version.occupied)
+            })
         })
     }
 
     /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the seed's format.
     pub fn disk_bytes(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
-            let stamps = self.store.commits().tiles.values();
-            stamps.fold((0, 0), |(table, octree), stamp| {
-                let octree_bytes = if self.snapshot().is_some() { 0 } else { stamp.octree.bytes };
-                (table + stamp.table.bytes, octree + octree_bytes)
+            let versions = self.store.commits().tiles.values();
+            versions.fold((0, 0), |(table, octree), version| {
+                let octree_bytes = if self.snapshot().is_some() { 0 } else { version.octree.bytes };
+                (table + version.table.bytes, octree + octree_bytes)
             })
         })
     }
@@ -193,12 +195,11 @@ impl MapReader {
 
     /// The table of a tile as it stands in its file, which is not kept in memory; `None` if the map has no such tile.
     pub(crate) fn read_table(&self, index: TileIndex) -> Result<Option<ReadTable>> {
-        tile_files::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
+        load::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
     }
 
     fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-        tile_files::load(&self.store, &self.config.grid, &self.octrees, index)
-            .map_err(|error| self.explain(error))
+        load::load(&self.store, &self.config.grid, &self.octrees, index).map_err(|error| self.explain(error))
     }
 
     /// A tile that does not match the log is damage, unless a writer has flushed since and did not see this reader.
@@ -264,13 +265,13 @@ impl MapView for MapReader {
         if let Some(tile) = cached {
             return Ok(Some(TileRef::shared(tile)));
         }
-        let loaded = tile_files::load_in_passing(&self.store, &self.config.grid, index);
+        let loaded = load::load_in_passing(&self.store, &self.config.grid, index);
         let loaded = loaded.map_err(|error| self.explain(error))?;
         Ok(loaded.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
-        self.store.stamp(index).map(|stamp| stamp.voxels)
+        self.store.version(index).map(|version| version.voxels)
     }
 
     fn statistics(&self) -> MapStatistics {
@@ -287,18 +288,4 @@ impl MapView for MapReader {
         cache.tiles.iter().for_each(|(_, tile)| statistics.cached += tile.counts());
         statistics
     }
-}
-
-/// The configuration in a map's metadata; a map of the seed's format has the default sensor model.
-pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig> {
-    let wrong = |error: String| FormatError::at_offset(0, error).in_map(path, None);
-    let grid =
-        Grid::new(metadata.resolution_m, metadata.tile_size_m).map_err(|error| wrong(error.to_string()))?;
-    let mut config = MapConfig { grid, storage: metadata.storage(), ..MapConfig::default() };
-    if let Some(ext) = &metadata.ext {
-        config.sensor_model = ext.sensor_model;
-        config.occupancy_threshold = ext.occupancy_threshold;
-        config.rays = ext.rays;
-    }
-    config.validated().map_err(|error| wrong(error.to_string()))
 }

@@ -1,11 +1,9 @@
-use super::flush::new_metadata;
-use super::map_id::new_map_id;
-use super::memory_plan::MemoryPlan;
-use super::residency::Residency;
+use super::paging::{MemoryPlan, TilePager};
 use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
+use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{Overflow, PointBatch, Scan, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
 use crate::space::{Point, TileIndex, VoxelIndex};
@@ -20,8 +18,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct OutOfCoreTileMapper {
     config: MapConfig,
     scan_number: u64,
-    /// Questions take `&self` and may bring tiles in.
-    residency: Mutex<Residency>,
+    /// Queries take `&self` and may bring tiles in.
+    pager: Mutex<TilePager>,
     tracer: ScanTracer,
 }
 
@@ -65,8 +63,8 @@ impl OutOfCoreTileMapper {
     fn new(config: MapConfig, store: TileStore) -> Self {
         let scan_number = store.commits().scan_number;
         let scan_bytes = MemoryPlan::new(config.memory).scan_bytes;
-        let residency = Mutex::new(Residency::new(config.clone(), store));
-        Self { residency, config, tracer: ScanTracer::with_memory_bytes(scan_bytes), scan_number }
+        let pager = Mutex::new(TilePager::new(config.clone(), store));
+        Self { pager, config, tracer: ScanTracer::with_memory_bytes(scan_bytes), scan_number }
     }
 
     /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
@@ -78,7 +76,7 @@ impl OutOfCoreTileMapper {
     pub fn begin_input(&mut self, input: impl Into<InputRecord>) -> Result<()> {
         let scan_number = self.scan_number;
         let input = InputRecord { first_scan: scan_number, ..input.into() };
-        self.residency_mut().begin_input(input, scan_number)
+        self.pager_mut().begin_input(input, scan_number)
     }
 
     /// Goes on with the input that the map was last built from, and returns how many of its scans are in the map: pass
@@ -90,7 +88,7 @@ impl OutOfCoreTileMapper {
     /// insert mode; and as for [`Mapper::flush`].
     pub fn resume_input(&mut self, name: &str) -> Result<u64> {
         let scan_number = self.scan_number;
-        let found = match self.residency_mut().inputs.last() {
+        let found = match self.pager_mut().inputs().last() {
             Some(input) if input.content.is_none() && input.name == name => {
                 let done = scan_number - input.first_scan.min(scan_number);
                 self.check_rays()?;
@@ -109,13 +107,13 @@ impl OutOfCoreTileMapper {
 
     /// What the map was built from, the latest last.
     pub fn inputs(&self) -> Vec<InputRecord> {
-        self.lock().inputs.clone()
+        self.lock().inputs().to_vec()
     }
 
     /// Says what has been taken of the input that the map is being built from; the next flush keeps it. To be said after
     /// each scan, so that every flush has what belongs to it.
     pub fn note_input_content(&mut self, content: InputContent) {
-        if let Some(input) = self.residency_mut().inputs.last_mut() {
+        if let Some(input) = self.pager_mut().last_input_mut() {
             input.content = Some(content);
         }
     }
@@ -135,14 +133,14 @@ impl OutOfCoreTileMapper {
     }
 
     /// Flushes, and keeps the map as it is then under a name: a snapshot, which stays until it is deleted
-    /// ([`session::delete_snapshot`](crate::session::delete_snapshot)).
+    /// ([`operations::delete_snapshot`](crate::operations::delete_snapshot)).
     ///
     /// # Errors
     ///
     /// [`Error::AlreadyExists`] if there is one of this name; as for [`Mapper::flush`].
     pub fn snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.flush()?;
-        self.residency_mut().store.create_snapshot(name)
+        self.pager_mut().create_snapshot(name)
     }
 
     /// [`Mapper::insert_scan`] for points wherever they lie, seen from `origin` in metres, world frame: a scan may be larger
@@ -154,20 +152,20 @@ impl OutOfCoreTileMapper {
     pub fn insert_points(&mut self, origin: Point, points: &dyn ScanPoints) -> Result<ScanReport> {
         let scan_number = self.scan_number;
         let plan = MemoryPlan::new(self.config.memory);
-        let residency = self.residency.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let store = residency.store();
+        let pager = self.pager.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let store = pager.store();
         let (disk, folder) = (store.disk().clone(), store.folder().to_owned());
-        let most_tiles = residency.most_tiles_of_scan();
+        let max_tiles = pager.most_tiles_of_scan();
         let make_scratch = &|| disk.scratch(&folder);
-        let put_aside = &mut |part| residency.put_in_files(part, scan_number);
-        let most_bytes = plan.updates_bytes;
-        let overflow = Overflow { most_bytes, most_tiles, folder: &folder, make_scratch, put_aside };
-        let overflow = (most_bytes < usize::MAX).then_some(overflow);
+        let spill = &mut |part| pager.stage(part, scan_number);
+        let max_bytes = plan.updates_bytes;
+        let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
+        let overflow = (max_bytes < usize::MAX).then_some(overflow);
         let traced = trace(&mut self.tracer, &self.config, origin, points, overflow);
         let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
         let inserted = traced.and_then(|updates| self.accept(updates));
         if inserted.is_err() {
-            self.residency_mut().give_up_scan();
+            self.pager_mut().discard_staged();
         }
         inserted
     }
@@ -184,8 +182,8 @@ impl OutOfCoreTileMapper {
 
     /// Whether the map has updates that no flush has made durable.
     pub fn is_dirty(&self) -> bool {
-        let residency = self.lock();
-        self.scan_number != residency.store().commits().scan_number
+        let pager = self.lock();
+        self.scan_number != pager.store().commits().scan_number
     }
 
     /// Number of the last scan in the last flush: what a crash cannot take away.
@@ -200,7 +198,7 @@ impl OutOfCoreTileMapper {
 
     /// The tiles written, by eviction or flush, since the last call, in order; successful writes only.
     pub fn take_saved_tiles(&mut self) -> Vec<TileIndex> {
-        self.residency_mut().take_saved()
+        self.pager_mut().take_written()
     }
 
     /// Brings tiles into memory ahead of use; those that do not exist are left out. Returns how many came.
@@ -212,7 +210,7 @@ impl OutOfCoreTileMapper {
         let scan_number = self.scan_number;
         let mut count = 0;
         for tile in tiles {
-            count += usize::from(self.residency_mut().tile(tile, scan_number)?.is_some());
+            count += usize::from(self.pager_mut().tile(tile, scan_number)?.is_some());
         }
         Ok(count)
     }
@@ -224,27 +222,27 @@ impl OutOfCoreTileMapper {
     /// [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false; a tile that cannot be read.
     pub fn reload(&mut self, tile: TileIndex, discard_changes: bool) -> Result<bool> {
         let scan_number = self.scan_number;
-        self.residency_mut().reload(tile, discard_changes, scan_number)
+        self.pager_mut().reload(tile, discard_changes, scan_number)
     }
 
     fn accept(&mut self, updates: ScanUpdates) -> Result<ScanReport> {
         let (report, scan_number) = (updates.report, self.scan_number);
         let scan_bytes = self.tracer.bytes() + updates.bytes();
-        let residency = self.residency_mut();
-        residency.prepare(&updates, scan_bytes, scan_number)?;
-        residency.look_ahead(&updates.tiles);
-        residency.accept(updates);
+        let pager = self.pager_mut();
+        pager.prepare(&updates, scan_bytes, scan_number)?;
+        pager.prefetch(&updates.tiles);
+        pager.accept(updates);
         self.scan_number += 1;
         Ok(report)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Residency> {
-        // A panic in a question leaves no update half applied.
-        self.residency.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, TilePager> {
+        // A panic in a query leaves no update half applied.
+        self.pager.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn residency_mut(&mut self) -> &mut Residency {
-        self.residency.get_mut().unwrap_or_else(PoisonError::into_inner)
+    fn pager_mut(&mut self) -> &mut TilePager {
+        self.pager.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -299,11 +297,11 @@ impl Mapper for OutOfCoreTileMapper {
 
     fn flush(&mut self) -> Result<()> {
         let scan_number = self.scan_number;
-        self.residency_mut().flush(scan_number)
+        self.pager_mut().flush(scan_number)
     }
 
     fn sync_octrees(&mut self) {
-        self.residency_mut().sync_octrees();
+        self.pager_mut().sync_octrees();
     }
 }
 

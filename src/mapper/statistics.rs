@@ -92,7 +92,7 @@ pub struct IoCounts {
     pub packed: u64,
     /// Tiles that came back from the compact form.
     pub unpacked: u64,
-    /// Questions and updates that found their tile in memory.
+    /// Queries and updates that found their tile in memory.
     pub hits: u64,
     /// Bytes read.
     pub bytes_read: u64,

@@ -5,10 +5,10 @@ use crate::scan::{PointBatch, Scan, ScanReport};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, VoxelIndex};
 
-/// A map that can be asked. Every question of [`Questions`](crate::query::Questions) is answered through these few
+/// A map that can be asked. Every question of [`Queries`](crate::query::Queries) is answered through these few
 /// methods.
 ///
-/// Questions see whole scans, unsaved ones too.
+/// Queries see whole scans, unsaved ones too.
 pub trait MapView {
     /// How the map is made.
     fn config(&self) -> &MapConfig;

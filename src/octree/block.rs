@@ -1,7 +1,7 @@
-/// One node as its parent (or the tree, for the root) knows it.
+/// A node as stored in its parent (or in the tree, for the root).
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Node {
-    /// Nothing is known below.
+    /// No voxel below is known.
     Unknown,
     /// Every voxel below has this value.
     Leaf(f32),
@@ -17,7 +17,7 @@ impl Node {
         }
     }
 
-    /// Whether both are the same to the bit, so that nothing above changes if one takes the other's place.
+    /// Whether both are bit-identical, so that replacing one by the other changes nothing above.
     pub(super) fn is_same_as(self, other: Self) -> bool {
         match (self, other) {
             (Self::Unknown, Self::Unknown) => true,
@@ -34,9 +34,9 @@ impl Node {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BlockId(u32);
 
-/// A link that is no block: the child does not exist.
+/// A link without a block: the child does not exist.
 const UNKNOWN: u32 = u32::MAX;
-/// A link that is no block: the child is a leaf.
+/// A link without a block: the child is a leaf.
 const LEAF: u32 = u32::MAX - 1;
 
 /// The eight children of an inner node: 64 bytes, one cache line.
@@ -55,7 +55,7 @@ impl Block {
 
     pub(super) const EMPTY: Self = Self { values: [f32::NEG_INFINITY; 8], links: [UNKNOWN; 8] };
 
-    /// Eight leaves of one value: what an expanded leaf becomes.
+    /// Eight leaves of one value: an expanded leaf.
     pub(super) fn of_leaves(value: f32) -> Self {
         Self { values: [value; 8], links: [LEAF; 8] }
     }
@@ -85,11 +85,11 @@ impl Block {
     /// Largest value of the children.
     pub(super) fn max(&self) -> f32 {
         let [a, b, c, d, e, f, g, h] = self.values;
-        // In pairs: half as long a chain of comparisons as one after the other.
+        // In pairs: half the chain of comparisons.
         larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
     }
 
-    /// The value that all eight children share as leaves, if they do, to the bit.
+    /// The value of all eight children, if they are leaves of one bit-identical value.
     pub(super) fn uniform_leaves(&self) -> Option<f32> {
         let bits = self.values[0].to_bits();
         let uniform =
@@ -102,11 +102,11 @@ fn larger(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }
 
-/// All blocks of a tree, side by side; released ones are linked into a list and used again first.
+/// All blocks of a tree in one allocation; released blocks form a free list.
 #[derive(Clone)]
 pub(super) struct Arena {
     blocks: Vec<Block>,
-    /// Head of the list of released blocks; the next is in `links[0]`, [`UNKNOWN`] ends it.
+    /// Head of the free list; the next is in `links[0]`, [`UNKNOWN`] ends it.
     released: u32,
 }
 
@@ -125,7 +125,7 @@ impl Arena {
             return id;
         }
         let id = self.blocks.len();
-        // As many blocks would fill 256 GiB: memory ends before the numbers do.
+        // So many blocks would fill 256 GiB: memory runs out first.
         assert!(id < LEAF as usize, "an octree has at most {LEAF} blocks");
         self.blocks.push(block);
         BlockId(id as u32)

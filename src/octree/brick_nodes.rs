@@ -1,16 +1,16 @@
 use crate::space::{BrickCode, BrickMask};
 
-/// What a tree has under one node of 8 x 8 x 8 voxels (depth 13), as masks: byte `k` of a mask is the `k`-th node of
-/// 2 x 2 x 2 voxels (depth 15), word `k` the `k`-th node of 4 x 4 x 4 (depth 14).
+/// The nodes of a tree under one node of 8 x 8 x 8 voxels (depth 13), as masks: byte `k` of a mask is the `k`-th node
+/// of 2 x 2 x 2 voxels (depth 15), word `k` the `k`-th node of 4 x 4 x 4 (depth 14).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrickNodes {
     /// Which node.
     pub brick: BrickCode,
     /// The voxels that are known.
     pub known: BrickMask,
-    /// Those of them that count as occupied.
+    /// The known voxels that are occupied.
     pub occupied: BrickMask,
-    /// The nodes at depth 15 that are leaves: their eight voxels are known and have one value, to the bit.
+    /// The nodes at depth 15 that are leaves: their eight voxels are known and have one value to the bit.
     pub leaves_15: u64,
     /// The nodes at depth 14 that are leaves.
     pub leaves_14: u8,
@@ -19,8 +19,8 @@ pub struct BrickNodes {
 }
 
 impl BrickNodes {
-    /// What an octree has under a brick, and the largest of its values. A voxel of at least the threshold is occupied;
-    /// without one none is.
+    /// The nodes of an octree under a brick, and the largest value. Voxels of at least the threshold are occupied;
+    /// without a threshold none is.
     ///
     /// `values_of` gives the values of a word's 64 voxels, and negative infinity for those that are unknown.
     #[inline]
@@ -57,13 +57,13 @@ impl BrickNodes {
         (nodes, maxima.into_iter().fold(f32::NEG_INFINITY, larger))
     }
 
-    /// Number of nodes, the one at depth 13 included; 0 if no voxel is known.
+    /// Number of nodes, including the one at depth 13; 0 if no voxel is known.
     pub fn node_count(&self) -> u32 {
         let words = self.known.iter().filter(|&&word| word != 0).count() as u32;
         if words == 0 {
             return 0;
         }
-        // The lowest bit of each byte, moved by another place for each word, so that all are counted at once.
+        // The lowest bit of each byte, shifted by another amount for each word, so that one count suffices.
         let bytes = (0..8).fold(0, |bytes, word| bytes | nonzero_bytes(self.known[word]) << word);
         let voxels: u32 = self.known.iter().map(|word| word.count_ones()).sum();
         let pruned =

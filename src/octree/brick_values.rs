@@ -1,10 +1,10 @@
 use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
 use std::ops::Range;
 
-/// The values of many voxels, gathered in parts of bricks: what a block of an octree is encoded from.
+/// The values of many voxels, in parts of bricks: the input of an encoded block of an octree.
 ///
-/// Four bytes a voxel and 80 a part. The parts of one brick may come from several places: a brick on the border of two
-/// tiles has voxels of both.
+/// Takes four bytes per voxel and 80 per part. A brick may have several parts: one on the border of two tiles has
+/// voxels of both.
 #[derive(Debug, Default)]
 pub struct BrickValues {
     parts: Vec<Part>,
@@ -15,7 +15,7 @@ pub struct BrickValues {
 struct Part {
     brick: BrickCode,
     known: BrickMask,
-    /// Where its values begin: those of the known voxels, in Morton order.
+    /// Where its values start: those of the known voxels, in Morton order.
     first: u64,
 }
 
@@ -23,7 +23,7 @@ struct Part {
 #[derive(Debug)]
 pub(super) struct BrickContent {
     pub(super) known: BrickMask,
-    /// Negative infinity where nothing is known.
+    /// Negative infinity for unknown voxels.
     pub(super) values: [f32; BRICK_VOXELS],
 }
 
@@ -43,18 +43,18 @@ impl BrickValues {
         self.values.is_empty()
     }
 
-    /// Forgets the voxels and keeps the room.
+    /// Removes the voxels and keeps the memory.
     pub fn clear(&mut self) {
         self.parts.clear();
         self.values.clear();
     }
 
-    /// Begins the next part of a brick; [`BrickValues::add`] adds its voxels, and [`BrickValues::end`] ends it.
+    /// Starts the next part; [`BrickValues::add`] adds its voxels, and [`BrickValues::end`] ends it.
     pub fn begin(&mut self, brick: BrickCode) {
         self.parts.push(Part { brick, known: [0; 8], first: self.values.len() as u64 });
     }
 
-    /// Adds a voxel to the part that was begun last, at a place (0 to 511) after those added before.
+    /// Adds a voxel to the present part, at a place (0 to 511) after those added before.
     #[inline]
     pub fn add(&mut self, place: usize, value: f32) {
         if let Some(part) = self.parts.last_mut() {
@@ -63,16 +63,16 @@ impl BrickValues {
         }
     }
 
-    /// Ends a part; one without voxels is forgotten.
+    /// Ends a part; an empty one is dropped.
     pub fn end(&mut self) {
         if self.parts.last().is_some_and(|part| part.known == [0; 8]) {
             self.parts.pop();
         }
     }
 
-    /// Brings the bricks into Morton order, and returns the brick of each part.
+    /// Sorts the parts in Morton order of their bricks, and returns the brick of each part.
     pub(super) fn sorted(&mut self) -> Vec<BrickCode> {
-        // Stable, and quick where the parts come in a few ascending runs.
+        // Stable, and fast for a few ascending runs.
         self.parts.sort_by_key(|part| part.brick);
         self.parts.iter().map(|part| part.brick).collect()
     }
@@ -87,7 +87,7 @@ impl BrickValues {
         codes.zip(self.values.iter().copied())
     }
 
-    /// Lays out the voxels of parts of one brick.
+    /// Writes the voxels of the parts of one brick to `content`.
     pub(super) fn gather(&self, parts: Range<usize>, content: &mut BrickContent) {
         content.clear();
         for part in &self.parts[parts] {

@@ -18,9 +18,9 @@ pub struct Leaf {
 #[derive(Clone)]
 pub struct Leaves<'a> {
     tree: &'a Octree,
-    /// A leaf that has no block, being the whole of what was asked for.
+    /// A leaf without a block, if it is the whole answer.
     single: Option<Leaf>,
-    /// The blocks that are walked, from the outermost to the innermost.
+    /// The blocks on the present path, from the outermost to the innermost.
     path: Vec<Step>,
 }
 
@@ -53,7 +53,7 @@ impl<'a> Leaves<'a> {
     /// The leaves that do not end before `code`.
     pub(super) fn from(tree: &'a Octree, code: MortonCode) -> Self {
         let mut leaves = Self::under(tree, MortonCode(0), 0);
-        // On the way down to the voxel, all that lies before it is passed over.
+        // Skips all that lies before the voxel on the way down.
         while let Some(step) = leaves.path.last_mut() {
             let child = code.child_at(step.depth - 1);
             step.next_child = child;

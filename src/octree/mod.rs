@@ -5,8 +5,8 @@
 //! read, write  `.bt` (occupied / free) and `.ot` (all values), by bytes   codec, brick_nodes, brick_values
 //! ```
 //!
-//! A tree knows neither metres nor tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds
-//! one length, the resolution.
+//! A tree knows neither metres nor tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds the
+//! resolution.
 
 mod block;
 mod brick_nodes;

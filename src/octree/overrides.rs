@@ -4,12 +4,11 @@ use super::tree::{DEPTH, runs_by_child};
 use crate::space::MortonCode;
 
 impl Octree {
-    /// The value that [`Octree::get`] would give for the node at `depth` (0 to 16) that holds the voxel `node`, if
-    /// the voxels of `overrides` had been written before. The tree stays as it is.
+    /// The value that [`Octree::get`] would return for the node at `depth` (0 to 16) over the voxel `node` if
+    /// `overrides` were written first. The tree is unchanged.
     ///
-    /// `overrides` are codes, strictly ascending and below [`MortonCode::END`], each with its log-odds; those
-    /// outside the node do not count. For overrides in another order the answer means nothing. The walk goes
-    /// down only where overrides lie.
+    /// `overrides` are codes, strictly ascending and below [`MortonCode::END`], each with its log-odds; those outside
+    /// the node are ignored. In another order the result is unspecified. Only nodes with overrides are descended into.
     pub fn max_with_overrides(
         &self,
         node: MortonCode,
@@ -30,7 +29,7 @@ impl Octree {
         };
         let all_replaced = overrides.len() as u64 == MortonCode::span(depth);
         match node.value() {
-            // What stays is no higher than the node was.
+            // The remaining voxels are not above the node's old value.
             Some(value) if !all_replaced && highest < value => {}
             _ => return Some(highest),
         }

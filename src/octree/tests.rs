@@ -1,4 +1,4 @@
-//! The tree against the simplest thing that could be right: a map from voxels to values.
+//! The tree against a naive map from voxels to values.
 
 use super::{Leaf, Octree};
 use crate::space::MortonCode;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 type Model = BTreeMap<u64, f32>;
 type Voxel = (MortonCode, f32);
 
-/// Codes of a few clusters, small enough that all of a node's voxels often come together.
+/// Codes of a few clusters, small enough that nodes are often complete.
 fn any_code() -> impl Strategy<Value = u64> {
     let cluster = prop_oneof![Just(0), Just(0x1234_5678_9a00), Just(MortonCode::END - 512)];
     (cluster, prop_oneof![4 => 0..16_u64, 3 => 0..64_u64, 1 => 0..512_u64]).prop_map(|(base, low)| base + low)

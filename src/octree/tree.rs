@@ -13,11 +13,11 @@ pub(super) const DEPTH: u8 = 16;
 ///   again when one of them changes.
 /// - A voxel that was never set is unknown; it has no value.
 ///
-/// A tree that was [read from a file](super::read) is kept as it stood there, even where the file breaks the
-/// first two rules. [`Octree::normalize`] mends it, which is to be done before the tree is changed.
+/// A tree [read from a file](super::read) is kept as in the file, even if it breaks the first two rules. Call
+/// [`Octree::normalize`] before changing it.
 ///
-/// Values are any `f32` but NaN, which is neither refused nor given a sensible place among the maxima. Of a
-/// code only the lowest 48 bits count.
+/// Values are any `f32` but NaN, which is not refused but has no defined place among the maxima. Only the lowest 48
+/// bits of a code count.
 #[derive(Clone)]
 pub struct Octree {
     pub(super) root: Node,
@@ -27,7 +27,7 @@ pub struct Octree {
     voxels: u64,
 }
 
-/// How many finest voxels the leaves of a tree stand for, by state.
+/// Number of finest voxels that the leaves of a tree represent, by state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VoxelCounts {
     /// Voxels with log-odds at or above the threshold.
@@ -42,9 +42,9 @@ impl Octree {
         Self { root: Node::Unknown, arena: Arena::default(), nodes: 0, leaves: 0, voxels: 0 }
     }
 
-    /// The tree of these voxels, in time linear in their number where the codes ascend.
+    /// The tree of these voxels, in linear time if the codes ascend.
     ///
-    /// The same as setting them one by one, and as correct in any order.
+    /// Equal to setting them one by one, in any order.
     pub fn from_sorted(voxels: impl IntoIterator<Item = (MortonCode, f32)>) -> Self {
         const BATCH: usize = 4096;
         let mut tree = Self::new();
@@ -60,15 +60,15 @@ impl Octree {
         }
     }
 
-    /// Gives one voxel a value (log-odds).
+    /// Sets the value (log-odds) of one voxel.
     pub fn set(&mut self, code: MortonCode, value: f32) {
         self.root = self.write(self.root, 0, &[(code, value)]);
     }
 
-    /// Gives many voxels a value (log-odds) each; where a code comes twice, the later counts.
+    /// Sets the values (log-odds) of many voxels; of duplicates the last counts.
     ///
-    /// Cheap for strictly ascending codes: the path that they share is walked once, and a node is summed up
-    /// once for the whole batch. Other batches are written voxel by voxel.
+    /// Fast for strictly ascending codes: shared paths are walked once, and each node is summarized once per batch.
+    /// Other batches are written voxel by voxel.
     pub fn write_sorted(&mut self, voxels: &[(MortonCode, f32)]) {
         let Some((last, _)) = voxels.last() else { return };
         if last.0 < MortonCode::END && voxels.is_sorted_by(|a, b| a.0 < b.0) {
@@ -80,8 +80,8 @@ impl Octree {
         }
     }
 
-    /// Value (log-odds) of the node at `depth` (0, the root, to 16, the voxel) that holds the voxel `code`, or of
-    /// the leaf above it; `None` where nothing is known.
+    /// Value (log-odds) of the node at `depth` (0, the root, to 16, the voxel) over the voxel `code`, or of the leaf
+    /// above it; `None` if unknown.
     ///
     /// It is the maximum of all known voxels of the node. A depth beyond 16 counts as 16.
     pub fn get(&self, code: MortonCode, depth: u8) -> Option<f32> {
@@ -95,12 +95,12 @@ impl Octree {
 
     /// The leaves of the node at `depth` (0 to 16) that holds the voxel `code`, in Morton order.
     ///
-    /// Where the node lies inside a leaf, that part of the leaf is what comes.
+    /// If the node lies inside a leaf, that part of the leaf is returned.
     pub fn leaves_under(&self, code: MortonCode, depth: u8) -> Leaves<'_> {
         Leaves::under(self, code, depth)
     }
 
-    /// The leaves in Morton order, beginning with the one that holds the voxel `code` or else with the next.
+    /// The leaves in Morton order, from the one that holds the voxel `code`, or else from the next.
     pub fn leaves_from(&self, code: MortonCode) -> Leaves<'_> {
         Leaves::from(self, code)
     }
@@ -115,15 +115,14 @@ impl Octree {
         self.leaves
     }
 
-    /// Number of finest voxels that the leaves stand for, at most 2^48.
+    /// Number of finest voxels that the leaves represent, at most 2^48.
     ///
-    /// A few bytes of a file can stand for all of them: look here before the leaves of a foreign tree are taken
-    /// apart.
+    /// A few bytes of a file can represent all of them: check this before expanding the leaves of an untrusted tree.
     pub fn expanded_leaf_count(&self) -> u64 {
         self.voxels
     }
 
-    /// The finest voxels that the leaves stand for, split by a threshold (log-odds). Visits every leaf.
+    /// The finest voxels that the leaves represent, by a threshold (log-odds). Visits every leaf.
     pub fn count_voxels(&self, threshold_log_odds: f32) -> VoxelCounts {
         let mut counts = VoxelCounts::default();
         for leaf in self.leaves() {
@@ -139,18 +138,18 @@ impl Octree {
         self.nodes == 0
     }
 
-    /// Bytes of heap that the tree holds, the unused ones included.
+    /// Bytes of heap of the tree, including unused ones.
     pub fn bytes(&self) -> usize {
         self.arena.bytes()
     }
 
-    /// Forgets every voxel and returns the memory.
+    /// Removes every voxel and frees the memory.
     pub fn clear(&mut self) {
         *self = Self::new();
     }
 
-    /// Makes every inner node the maximum of its children and prunes whatever can be pruned, so that a tree that
-    /// was read from a file is as if its voxels had been set here.
+    /// Makes every inner node the maximum of its children and prunes what can be pruned, as if the voxels had been set
+    /// one by one.
     pub fn normalize(&mut self) {
         self.root = self.normalized(self.root);
     }
@@ -165,7 +164,7 @@ impl Octree {
         self.summed_up(block)
     }
 
-    /// Writes voxels, at least one and all below `node`, and returns what becomes of the node.
+    /// Writes voxels, at least one and all below `node`; returns the changed node.
     fn write(&mut self, node: Node, depth: u8, voxels: &[(MortonCode, f32)]) -> Node {
         if depth == DEPTH {
             if let Node::Unknown = node {
@@ -197,7 +196,7 @@ impl Octree {
         if changed { self.summed_up(block) } else { node }
     }
 
-    /// The node above a block: a leaf where the block can be pruned, which is done.
+    /// The node above a block: a leaf if the block can be pruned; then the block is released.
     fn summed_up(&mut self, block: BlockId) -> Node {
         match self.arena[block].uniform_leaves() {
             Some(value) => {
@@ -234,7 +233,7 @@ impl Octree {
     }
 }
 
-/// Cuts voxels in Morton order into those of each child of their common ancestor at `depth`.
+/// Splits voxels in Morton order by child of their common ancestor at `depth`.
 pub(super) fn runs_by_child(
     mut voxels: &[(MortonCode, f32)],
     depth: u8,

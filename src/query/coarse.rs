@@ -21,7 +21,7 @@ pub(super) fn occupancy_at_depth(view: &impl MapView, point: Point, depth: u8) -
     let node = voxels_of_node(voxel, depth);
     for index in tiles_in(view, &node) {
         let Some(tile) = view.tile(index)? else { continue };
-        // Any voxel of the node that lies in this tile names the node there.
+        // Any voxel of the node in this tile identifies the node.
         let inside = tile.voxel_box().intersection(&node).min;
         if let Some(log_odds) = tile.max_log_odds_under(inside, depth) {
             max = Some(max.map_or(log_odds, |max| max.max(log_odds)));
@@ -30,8 +30,8 @@ pub(super) fn occupancy_at_depth(view: &impl MapView, point: Point, depth: u8) -
     Ok(Occupancy::of_log_odds(config, max.map(f64::from)))
 }
 
-/// The voxels under the node at `depth` that holds a voxel. Nodes are aligned as keys are: to multiples of their
-/// size, counted from index -32768.
+/// The voxels under the node at `depth` that holds a voxel. Nodes are aligned like keys: to multiples of their size
+/// from index -32768.
 fn voxels_of_node(voxel: VoxelIndex, depth: u8) -> VoxelBox {
     let size = 1_i64 << (FINEST_DEPTH - depth);
     let min = voxel.map(|index| i64::from(index).div_euclid(size) * size);

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 
-/// A body, as solid; touching counts as collision.
+/// A solid body; touching counts as collision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A ball.
@@ -19,7 +19,7 @@ pub enum Shape {
     Box(Aabb),
 }
 
-/// Unknown space is searched voxel by voxel, up to this many.
+/// Unknown space is searched voxel by voxel, up to this number.
 const MAX_UNKNOWN_VOXELS: u64 = 1 << 28;
 
 pub(super) fn collision(view: &impl MapView, body: &Shape, unknown: UnknownAs) -> Result<Option<VoxelIndex>> {

@@ -1,6 +1,6 @@
-//! What a map can be asked. Works on any [`MapView`](crate::mapper::MapView), tile by tile.
+//! Queries of maps. They work on any [`MapView`](crate::mapper::MapView), tile by tile.
 //!
-//! | question | answer |
+//! | query | answer |
 //! |---|---|
 //! | a point, many points | [`Occupancy`]: unknown, free or occupied, with the probability |
 //! | a point at a coarse depth | the same, for the largest log-odds under that octree node |
@@ -21,7 +21,7 @@ mod octree_blocks;
 mod octree_reach;
 mod octree_shift;
 mod point;
-mod questions;
+mod queries;
 mod ray;
 mod region;
 mod tile_cursor;
@@ -30,6 +30,6 @@ pub use collision::Shape;
 pub use nearest::Nearest;
 pub use occupancy::{Occupancy, UnknownAs};
 pub use octree_blocks::OctreeExport;
-pub use questions::Questions;
+pub use queries::Queries;
 pub use ray::{RayHit, RayQuery};
 pub(crate) use region::voxels_around;

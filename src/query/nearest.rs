@@ -60,7 +60,7 @@ pub(super) fn nearest_occupied(
 
 fn distance_to_tile_m(grid: &crate::space::Grid, index: TileIndex, point: Point) -> f64 {
     let voxels = grid.voxels_of_tile(index);
-    // A voxel of room for the rounding between voxel borders and multiples of the resolution.
+    // A margin of a voxel for the rounding between voxel borders and multiples of the resolution.
     let bounds = Aabb {
         min: voxels.min.map(|k| (f64::from(k) - 1.0) * grid.resolution_m()),
         max: voxels.end.map(|k| (f64::from(k) + 1.0) * grid.resolution_m()),

@@ -2,7 +2,7 @@ use crate::config::MapConfig;
 use crate::maths::sigmoid;
 use crate::sensor::Evidence;
 
-/// What the map says of a place.
+/// The occupancy of a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Occupancy {
     /// Never observed, or outside the map.
@@ -13,7 +13,7 @@ pub enum Occupancy {
     Occupied(f64),
 }
 
-/// What unknown space counts as for a question.
+/// How a query treats unknown space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UnknownAs {
     /// It is passed through.
@@ -24,7 +24,8 @@ pub enum UnknownAs {
 }
 
 impl Occupancy {
-    /// The occupancy of a voxel's evidence; compared in log-odds, so that no rounding of a probability decides.
+    /// The occupancy of a voxel's evidence. It is compared in log-odds, so that the rounding of a probability does not
+    /// matter.
     #[inline]
     pub fn of(config: &MapConfig, evidence: Option<Evidence>) -> Self {
         Self::of_log_odds(config, evidence.map(|evidence| evidence.log_odds))

@@ -7,22 +7,22 @@ use crate::octree::{BrickValues, BtPruning, OctreeFormat, OctreeStream, StreamOu
 use crate::space::{Aabb, BRICK_EDGE, MortonCode, TileIndex, VoxelBox, VoxelIndex};
 use std::io::{self, Read, Seek, Write};
 
-/// What [`Questions::write_octree`](super::Questions::write_octree) writes.
+/// Parameters of [`Queries::write_octree`](super::Queries::write_octree).
 #[derive(Clone, Copy, Debug)]
 pub struct OctreeExport<'a> {
     /// `.bt` or `.ot`. In `.bt` a voxel is occupied from the map's occupancy threshold on.
     pub format: OctreeFormat,
     /// Only the voxels whose center is in this half-open box; `None` takes the whole map.
     pub region: Option<&'a Aabb>,
-    /// The map's voxel that becomes voxel 0 of the file, whose coordinates are those of the map less this voxel's lower
-    /// corner: so a map far from its origin comes into the reach of OctoMap's keys. `[0; 3]` shifts nothing.
+    /// The map's voxel that becomes voxel 0 of the file; the file's coordinates are those of the map minus this voxel's
+    /// lower corner. So a map far from its origin fits OctoMap's keys. `[0; 3]` shifts nothing.
     pub origin: VoxelIndex,
-    /// Memory in bytes for the part of the tree that is put together at a time; beside it there are one tile and a few
-    /// bytes for each part. With less memory tiles are read more often.
+    /// Memory in bytes for the part of the tree that is built at a time, beside one tile and a few bytes per part. With
+    /// less memory tiles are read more often.
     pub memory_bytes: usize,
 }
 
-/// The depth of bricks, which are not divided further.
+/// Depth of bricks, which are not divided further.
 const BRICK_DEPTH: u8 = 13;
 
 pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
@@ -39,7 +39,7 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
             OctreeFormat::Bt => OctreeStream::bt(config.occupied_log_odds() as f32, pruning, &mut *spool),
             OctreeFormat::Ot => OctreeStream::ot(&mut *spool),
         };
-        // Of the memory, the rest is for the bytes that the values become: up to six a voxel in `.ot`.
+        // The rest of the memory is for the encoded values: up to six bytes per voxel in `.ot`.
         let block_bytes = match export.format {
             OctreeFormat::Bt => export.memory_bytes / 3 * 2,
             OctreeFormat::Ot => export.memory_bytes / 3,
@@ -60,8 +60,8 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
     }
 }
 
-/// Visits the map's voxels as blocks of OctoMap's tree, in Morton order: first voxel, depth, and the values. A block
-/// has `block_bytes` of values at most, unless it is a single brick.
+/// Visits the map's voxels as blocks of OctoMap's tree, in Morton order: first voxel, depth, values. A block has at
+/// most `block_bytes` of values, unless it is a single brick.
 fn for_each_block<E: From<Error>>(
     view: &impl MapView,
     region: Option<&Aabb>,
@@ -75,7 +75,7 @@ fn for_each_block<E: From<Error>>(
     blocks.descend(MortonCode(0), 0, &tiles)
 }
 
-/// The tiles that may have voxels for the tree, once it is known that none is out of reach.
+/// The tiles that may have voxels for the tree; an error if any is out of reach.
 fn tiles_of(view: &impl MapView, region: Option<&Aabb>, shift: &OctreeShift) -> Result<Vec<TileIndex>> {
     let grid = &view.config().grid;
     let around = region.map(|region| voxels_around(grid, region));
@@ -122,8 +122,8 @@ struct Blocks<'a, V, F> {
 }
 
 impl<V: MapView, F> Blocks<'_, V, F> {
-    /// The node at `depth` whose first voxel is `first`, or its children if it is too large; `tiles` are those that
-    /// reach into it.
+    /// Visits the node at `depth` whose first voxel is `first`, or its children if it is too large; `tiles` are those
+    /// that overlap it.
     fn descend<E: From<Error>>(
         &mut self,
         first: MortonCode,
@@ -149,12 +149,12 @@ impl<V: MapView, F> Blocks<'_, V, F> {
         Ok(())
     }
 
-    /// The voxels of a tile where the octree has them.
+    /// The voxels of a tile in the octree's indices.
     fn voxels_of(&self, tile: TileIndex) -> VoxelBox {
         self.shift.of_box(&self.view.config().grid.voxels_of_tile(tile))
     }
 
-    /// Whether it is worth trying: by what the map knows of its tiles without reading them.
+    /// Whether the node may fit, by what the map knows of its tiles without reading them.
     fn may_fit(&self, first: MortonCode, depth: u8, tiles: &[TileIndex]) -> bool {
         let node = voxels_of_node(first, depth);
         let expected = tiles.iter().map(|&index| {
@@ -162,11 +162,11 @@ impl<V: MapView, F> Blocks<'_, V, F> {
             let share = volume(&tile.intersection(&node)) / volume(&tile);
             self.view.voxels_of_tile_hint(index).map_or(0.0, |voxels| voxels as f64 * share)
         });
-        // Values have four bytes, and parts of bricks some more.
+        // Values have four bytes; parts of bricks have some more.
         depth == BRICK_DEPTH || 4.0 * expected.sum::<f64>() <= self.block_bytes as f64
     }
 
-    /// Collects the voxels of a node; false, with some of them, if they are too many.
+    /// Collects the voxels of a node; returns false, with some of them, if they are too many.
     fn gather(&mut self, first: MortonCode, depth: u8, tiles: &[TileIndex]) -> Result<bool> {
         self.values.clear();
         let node = first.brick()..MortonCode(first.0 + MortonCode::span(depth)).brick();
@@ -195,7 +195,7 @@ impl<V: MapView, F> Blocks<'_, V, F> {
 /// The voxels of an octree node, by their indices.
 fn voxels_of_node(first: MortonCode, depth: u8) -> VoxelBox {
     let min = first.to_key().to_index_from(REACH.min);
-    // The root's edge of 65536 voxels is the longest.
+    // The longest edge is the root's, 65536 voxels.
     let edge = BRICK_EDGE << (BRICK_DEPTH - depth);
     VoxelBox { min, end: min.map(|k| k + edge) }
 }

@@ -1,13 +1,12 @@
-//! How far OctoMap's keys reach, and what to do about a map that lies farther away.
+//! The range of OctoMap's keys, and what to do about a map beyond it.
 
 use crate::error::Error;
 use crate::space::{Grid, Point, TileIndex, VoxelBox, VoxelIndex};
 
-/// The voxels that OctoMap's keys reach.
+/// The voxels in the range of OctoMap's keys.
 pub(super) const REACH: VoxelBox = VoxelBox { min: [-32768; 3], end: [32768; 3] };
 
-/// The error of a voxel that OctoMap has no key for; with the tiles of a file to be written, it says which origin of the file
-/// would help.
+/// The error for a voxel without an OctoMap key; given the tiles of a file to be written, it suggests an origin.
 pub(super) fn out_of_reach(grid: &Grid, voxel: VoxelIndex, tiles: Option<&[TileIndex]>) -> Error {
     let half_m = f64::from(REACH.end[0]) * grid.resolution_m();
     let (center, width_m) = (grid.center_m(voxel), 2.0 * half_m);
@@ -28,7 +27,7 @@ pub(super) fn out_of_reach(grid: &Grid, voxel: VoxelIndex, tiles: Option<&[TileI
     Error::argument("octree", reason)
 }
 
-/// A corner of a voxel in metres, as round as can be, around which all tiles are in reach; `None` if there is none.
+/// A voxel corner in metres, as round as possible, from which all tiles are in reach; `None` if there is none.
 fn origin_for(grid: &Grid, tiles: &[TileIndex]) -> Option<Point> {
     let boxes = || tiles.iter().map(|&tile| grid.voxels_of_tile(tile));
     let mut origin_m = [0.0; 3];
@@ -56,7 +55,7 @@ mod tests {
         let grid = Grid::new(0.1, 10.0).unwrap();
         let tiles = [TileIndex::new(50_000, 400_012, 1), TileIndex::new(50_200, 400_100, -2)];
         assert_eq!(origin_for(&grid, &tiles), Some([501_000.0, 4_001_000.0, 0.0]));
-        // Nearly as wide as the keys reach: only its very middle will do.
+        // Nearly as wide as the range of the keys: only the very middle works.
         let wide = [TileIndex::new(1_000, 0, 0), TileIndex::new(1_654, 0, 0)];
         assert_eq!(origin_for(&grid, &wide), Some([13_275.0, 0.0, 0.0]));
         let too_wide = [TileIndex::new(0, 0, 0), TileIndex::new(656, 0, 0)];

@@ -2,16 +2,16 @@ use crate::octree::BrickValues;
 use crate::space::{BRICK_EDGE, BrickCode, MortonCode, VoxelBox, VoxelIndex, VoxelKey, place_of_voxel};
 use std::ops::Range;
 
-/// The way of a map's voxels into an octree whose middle, where OctoMap's coordinates are 0, is at another voxel of the map.
+/// Moves a map's voxels into an octree whose origin is another voxel of the map.
 ///
-/// Indices are subtracted as whole numbers, so nothing is rounded.
+/// Indices are subtracted as integers, so nothing is rounded.
 #[derive(Debug)]
 pub(super) struct OctreeShift {
     /// The map's voxel that has index 0 in the octree.
     origin: VoxelIndex,
-    /// What is left of bricks: where in its brick the octree has the first voxel of one of the map's.
+    /// The offset within bricks: where in its brick the octree has the first voxel of a brick of the map.
     first: VoxelIndex,
-    /// Of one brick of the map, what falls into each of the eight bricks of the octree, by place.
+    /// The parts of one brick of the map in each of the eight bricks of the octree, by place.
     shares: [Vec<(u16, f32)>; 8],
 }
 
@@ -21,18 +21,18 @@ impl OctreeShift {
         Self { origin, first, shares: Default::default() }
     }
 
-    /// Where the octree has a box of the map's voxels. What lies beyond `i32` is cut off: no octree reaches there.
+    /// A box of the map's voxels in the octree's indices. What exceeds `i32` is cut off: no octree reaches there.
     pub(super) fn of_box(&self, voxels: &VoxelBox) -> VoxelBox {
         VoxelBox { min: self.of_voxel(voxels.min), end: self.of_voxel(voxels.end) }
     }
 
-    /// Where the octree has a voxel of the map.
+    /// A voxel of the map in the octree's indices.
     pub(super) fn of_voxel(&self, voxel: VoxelIndex) -> VoxelIndex {
         std::array::from_fn(|axis| voxel[axis].saturating_sub(self.origin[axis]))
     }
 
-    /// Adds the values of one of the map's bricks that lie in a range of the octree's. `visit` tells the brick's voxels:
-    /// place and value, ascending by place.
+    /// Adds the values of a brick of the map that lie in a range of the octree's bricks. `visit` yields the brick's
+    /// voxels: place and value, ascending by place.
     pub(super) fn add_brick(
         &mut self,
         brick: BrickCode,
@@ -70,14 +70,14 @@ impl OctreeShift {
         }
     }
 
-    /// Keys repeat every 65536 voxels, which changes nothing about differences of them.
+    /// Keys repeat every 65536 voxels; differences of keys are unaffected.
     fn of_key(&self, code: MortonCode) -> MortonCode {
         let VoxelKey(key) = code.to_key();
         VoxelKey(std::array::from_fn(|axis| key[axis].wrapping_sub(self.origin[axis] as u16))).morton()
     }
 }
 
-/// A voxel of the brick that lies one further along the axes that `share` has a bit for.
+/// A voxel of the next brick along the axes whose bits are set in `share`.
 fn neighbour(code: MortonCode, share: usize) -> MortonCode {
     let VoxelKey(key) = code.to_key();
     VoxelKey(std::array::from_fn(|axis| {
@@ -99,7 +99,7 @@ mod tests {
     fn every_voxel_comes_to_the_place_of_its_shifted_index() {
         for origin in [[0; 3], [8, -16, 65536], [1, -2, 7], [-63_781_373, 5, 2_000_000_001]] {
             for corner in [[0; 3], [40, -48, 8]] {
-                // Voxels near the octree's middle, wherever in the map that is.
+                // Voxels near the octree's origin, anywhere in the map.
                 let first: VoxelIndex = std::array::from_fn(|k| (origin[k] + corner[k]) & !(BRICK_EDGE - 1));
                 let mut shift = OctreeShift::by(origin);
                 let mut values = BrickValues::default();

@@ -52,14 +52,14 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
         start,
         grid.to_voxel_units(direction.map(|d| d / length)), // Times come out in metres.
     );
-    // Outside the box around all tiles all is unknown.
+    // Outside the box around all tiles everything is unknown.
     let hull = hull_of_map(view);
     let enters = hull.as_ref().is_some_and(|hull| match query.unknown {
         UnknownAs::Free => walk.enter(hull),
         UnknownAs::Obstacle => hull.contains(start),
     });
     let Some(hull) = hull.filter(|_| enters) else {
-        // Nothing to hit but the unknown at the origin.
+        // Only the unknown at the origin can be hit.
         let blocked = query.unknown == UnknownAs::Obstacle;
         let hit = RayHit { voxel: start, center_m: grid.center_m(start), distance_m: 0.0, probability: None };
         return Ok(blocked.then_some(hit));
@@ -92,7 +92,7 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
     Ok(None)
 }
 
-/// The same direction with a length that can be computed, where its squares would be too large or too small for that.
+/// The same direction, scaled if its squares would overflow or underflow.
 fn of_usable_size(direction: Point) -> Point {
     let longest = direction.iter().fold(0.0, |longest: f64, d| longest.max(d.abs()));
     let is_usable = (1e-100..1e100).contains(&longest) || !(longest.is_finite() && longest > 0.0);

@@ -57,7 +57,7 @@ pub(super) fn cached_occupied_voxels(
     Ok(voxels)
 }
 
-/// Log-odds of a smallest probability; 0 and below let every observed voxel pass, above 1 none.
+/// Log-odds of the smallest probability; at 0 and below every observed voxel passes, above 1 none.
 fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
     match min_probability {
         None => config.occupied_log_odds(),
@@ -67,7 +67,7 @@ fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
     }
 }
 
-/// The tiles of the map that reach into a box of voxels, in order.
+/// The tiles of the map that overlap a box of voxels, in order.
 pub(super) fn tiles_in(view: &impl MapView, voxels: &VoxelBox) -> Vec<TileIndex> {
     if voxels.is_empty() {
         return Vec::new();
@@ -87,7 +87,7 @@ pub(super) fn tiles_in(view: &impl MapView, voxels: &VoxelBox) -> Vec<TileIndex>
 /// The observed voxels of a tile that lie in a box, by brick.
 pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = Voxel> {
     let bricks = tile.table().bricks().filter(move |&brick| {
-        // A brick may reach beyond the tile: place it by a voxel that is inside.
+        // A brick may extend beyond the tile: place it by a voxel inside.
         let Some(voxel) = tile.voxels_of_brick(brick).next() else { return false };
         let min = voxel.index.map(|k| k & !(BRICK_EDGE - 1));
         (0..3).all(|k| min[k] < voxels.end[k] && voxels.min[k].saturating_sub(BRICK_EDGE) < min[k])
@@ -97,7 +97,7 @@ pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
 
 /// The voxels whose center may lie in a box, and a few around.
 pub(crate) fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
-    // Room for the few around; voxels have indices up to the ends.
+    // A margin for the few around; voxels have indices up to the ends.
     let to_index =
         |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN + 1), f64::from(i32::MAX - 2)) as i32;
     VoxelBox {

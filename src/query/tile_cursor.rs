@@ -3,7 +3,7 @@ use crate::mapper::{MapView, TileRef};
 use crate::space::{TileIndex, VoxelIndex};
 use crate::tile::Tile;
 
-/// Holds the last tile that was asked for, so that voxels that lie together fetch it once.
+/// Keeps the last tile, so that neighbouring voxels load it once.
 pub(super) struct TileCursor<'a, V> {
     view: &'a V,
     tile: Option<(TileIndex, Option<TileRef<'a>>)>,
@@ -18,7 +18,7 @@ impl<'a, V: MapView> TileCursor<'a, V> {
     pub(super) fn tile_of(&mut self, voxel: VoxelIndex) -> Result<Option<&Tile>> {
         let index = self.view.config().grid.tile_of_voxel(voxel);
         if self.tile.as_ref().is_none_or(|(current, _)| *current != index) {
-            // Let go of the one before first, so that it can be pushed out.
+            // Release the previous tile first, so that it can be evicted.
             self.tile = None;
             self.tile = Some((index, self.view.tile(index)?));
         }

@@ -1,11 +1,11 @@
 use serde::Serialize;
 use std::ops::AddAssign;
 
-/// What became of the points of a scan or batch. Reports of several add up with `+=`.
+/// What happened to the points of a scan or batch. Reports add up with `+=`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct ScanReport {
-    /// Points that came in.
+    /// Points received.
     pub points: u64,
     /// Points that were skipped, by cause.
     pub skipped: SkippedPoints,
@@ -15,7 +15,7 @@ pub struct ScanReport {
     pub hits: u64,
     /// Updates of voxels by misses.
     pub misses: u64,
-    /// Tiles that got updates, each counted once a scan.
+    /// Tiles that received updates, each counted once per scan.
     pub tiles_touched: u64,
 }
 
@@ -25,7 +25,7 @@ pub struct ScanReport {
 pub struct SkippedPoints {
     /// A coordinate is NaN or infinite.
     pub not_finite: u64,
-    /// So far away that no voxel index reaches it.
+    /// Too far away for a voxel index.
     pub out_of_range: u64,
     /// The sensor's own origin, which drivers use for "no return".
     pub no_return: u64,
@@ -43,7 +43,7 @@ impl SkippedPoints {
         self.by_cause().iter().map(|(_, count)| count).sum()
     }
 
-    /// Each cause in words, with its count.
+    /// Each cause as text, with its count.
     pub fn by_cause(&self) -> [(&'static str, u64); 6] {
         [
             ("not finite", self.not_finite),

@@ -3,10 +3,10 @@ use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
 
-/// Takes some points of a scan, in metres, with their intensities if they have any; says whether to go on.
+/// Takes a chunk of a scan's points, in metres, with their intensities if they have any. Returns whether to continue.
 pub type TakePoints<'a> = dyn FnMut(&[Point], Option<&[f32]>) -> bool + 'a;
 
-/// The points of a scan, wherever they lie: in memory, or in a file that is larger than that.
+/// The points of a scan, in memory or in a file larger than memory.
 pub trait ScanPoints: Sync {
     /// Number of points.
     fn len(&self) -> usize;
@@ -19,8 +19,8 @@ pub trait ScanPoints: Sync {
     /// Whether each point has an intensity.
     fn has_intensities(&self) -> bool;
 
-    /// Hands over the points of a range in order, some at a time: in metres, world frame, with their intensities if they
-    /// have any. `take` says whether to go on. Points may be asked for several times, by several threads.
+    /// Passes the points of a range to `take` in order, chunk by chunk: in metres, world frame, with their intensities
+    /// if they have any. `take` returns whether to continue. May be called several times and from several threads.
     ///
     /// # Errors
     ///

@@ -2,17 +2,17 @@ use crate::error::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A request to stop that reaches into the insertion of a scan. Clones are one request.
+/// A request to stop the insertion of a scan. Clones share the request.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Asks everything that knows this request to stop. It cannot be taken back.
+    /// Requests the stop. It cannot be withdrawn.
     pub fn set(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether to stop.
+    /// Whether a stop was requested.
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -22,7 +22,7 @@ impl Stop {
         self.0.clone()
     }
 
-    /// Goes on if nobody asked to stop.
+    /// Fails if a stop was requested.
     ///
     /// # Errors
     ///

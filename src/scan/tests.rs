@@ -1,6 +1,6 @@
-//! Scans in little memory: the same updates as with any.
+//! Scans under a memory limit give the same updates as without.
 
-use super::tile_order::brick_code;
+use super::updates::brick_code;
 use super::{Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::Result;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::path::Path;
 
-/// What is said about each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
+/// The updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
 /// brick and place in it.
 type Said = BTreeMap<(TileIndex, u64, usize), Vec<Option<u32>>>;
 
@@ -21,7 +21,7 @@ fn add(said: &mut Said, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
         said.entry((tile, brick, place)).or_default().push(hit.map(f32::to_bits));
     };
     match updates {
-        TileUpdates::Once(bricks) => {
+        TileUpdates::Masks(bricks) => {
             for brick in bricks {
                 assert!(brick.hits.iter().zip(&brick.misses).all(|(hits, misses)| hits & misses == 0));
                 for (place, observation) in places(brick.touched()).zip(brick.observations()) {
@@ -76,16 +76,16 @@ impl Setting {
         (said, updates.report)
     }
 
-    /// The same with so many bytes for marks, and for updates; also, how many times some were put aside.
+    /// The same with so many bytes for marks, and for updates; also, how often updates were spilled.
     fn in_parts(
         &self,
         tracer: &mut ScanTracer,
         scan: &Scan,
-        most_bytes: usize,
+        max_bytes: usize,
     ) -> Result<(Said, ScanReport, usize)> {
         let Self { grid, model, rays, order } = self;
         let (mut said, mut times) = (Said::new(), 0);
-        let mut put_aside = |part: Vec<(TileIndex, PackedUpdates)>| {
+        let mut spill = |part: Vec<(TileIndex, PackedUpdates)>| {
             times += 1;
             for (tile, updates) in part {
                 add(&mut said, grid, tile, &TileUpdates::Packed(updates));
@@ -94,8 +94,7 @@ impl Setting {
         };
         let make_scratch = &|| Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
         let folder = Path::new("map");
-        let overflow =
-            Overflow { most_bytes, most_tiles: usize::MAX, folder, make_scratch, put_aside: &mut put_aside };
+        let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =
             tracer.trace_points(grid, model, rays, scan.origin, scan, *order, Some(overflow))?;
         tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
@@ -118,7 +117,7 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
     modes.map(setting).into()
 }
 
-/// Rays all around, of which many are alike.
+/// Rays all around, many of them alike.
 fn dense(rays: u32, reach_m: f64) -> Scan {
     let origin = [0.03, -0.02, 0.05];
     let point = |k: u32| -> Point {
@@ -155,7 +154,7 @@ fn long_rays_keep_to_their_memory() {
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
         let (said, report, times) = setting.in_parts(&mut tracer, &scan, bytes / 16).unwrap();
         assert!(times > 0);
-        // What is kept from scan to scan; numbers of pages and head starts are 1 MiB and some.
+        // The memory kept from scan to scan; page numbers and marked prefixes are 1 MiB and some.
         assert!(tracer.bytes() < bytes + (2 << 20), "{}", tracer.bytes());
         assert!((said, report) == setting.whole(&scan));
     }
@@ -167,9 +166,8 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
     for setting in settings(10.0) {
         let Setting { grid, model, rays, order } = &setting;
         let make_scratch = &|| Err(io::Error::from(io::ErrorKind::StorageFull));
-        let (folder, put_aside) = (Path::new("some_map"), &mut |_| Ok(()));
-        let overflow =
-            Overflow { most_bytes: 1 << 16, most_tiles: usize::MAX, folder, make_scratch, put_aside };
+        let (folder, spill) = (Path::new("some_map"), &mut |_| Ok(()));
+        let overflow = Overflow { max_bytes: 1 << 16, max_tiles: usize::MAX, folder, make_scratch, spill };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
         let traced = tracer.trace_points(grid, model, rays, scan.origin, &scan, *order, Some(overflow));
         assert!(traced.unwrap_err().to_string().contains("some_map"));
@@ -185,7 +183,7 @@ proptest! {
         ends in prop::collection::vec((prop::array::uniform3(-60.0..60.0_f64), 0.0..255_f32), 1..40),
         stray in any::<bool>(),
         tile_size_m in prop::sample::select(vec![10.0, 0.4, 3.7]),
-        most_bytes in prop::sample::select(vec![0_usize, 1 << 12, 1 << 16]),
+        max_bytes in prop::sample::select(vec![0_usize, 1 << 12, 1 << 16]),
     ) {
         let mut points: Vec<Point> =
             ends.iter().map(|(way, _)| std::array::from_fn(|k| origin[k] + way[k])).collect();
@@ -198,7 +196,7 @@ proptest! {
             let (said, report) = setting.whole(&scan);
             let mut tracer = ScanTracer::with_memory_bytes(1 << 16);
             for _ in 0..2 {
-                let parts = setting.in_parts(&mut tracer, &scan, most_bytes).unwrap();
+                let parts = setting.in_parts(&mut tracer, &scan, max_bytes).unwrap();
                 prop_assert_eq!(parts.1, report);
                 prop_assert!(parts.0 == said);
             }

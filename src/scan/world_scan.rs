@@ -1,19 +1,19 @@
 use crate::space::Point;
 use nalgebra::Isometry3;
 
-/// One look of a sensor: where it was and what it hit, in the world frame.
+/// A scan: where the sensor was and what it hit, in the world frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scan {
-    /// Position of the sensor in metres, world frame: every ray begins here.
+    /// Position of the sensor in metres, world frame: every ray starts here.
     pub origin: Point,
-    /// End points in metres, world frame. A point equal to the origin is "no return" and is skipped.
+    /// End points in metres, world frame. A point equal to the origin means "no return" and is skipped.
     pub points: Vec<Point>,
-    /// Intensity of each point, when the sensor gives one.
+    /// Intensity of each point, if the sensor measures one.
     pub intensities: Option<Vec<f32>>,
 }
 
 impl Scan {
-    /// A scan from points in the sensor frame and the pose that takes them to the world: `world = R * p + t`.
+    /// A scan from points in the sensor frame and the pose that maps them to the world: `world = R * p + t`.
     ///
     /// The exact sensor-frame point (0, 0, 0), which drivers use for "no return", becomes the origin itself and
     /// is skipped on insertion.
@@ -25,7 +25,7 @@ impl Scan {
         let rotation = world_from_sensor.rotation.to_rotation_matrix();
         let r = rotation.matrix();
         let t = world_from_sensor.translation.vector;
-        // Spelled out, so that the order of the operations, and with it the last bit, is ours.
+        // Spelled out, so that the order of operations, and with it the last bit, does not depend on a library.
         let to_world = |p: &Point| {
             std::array::from_fn(|i| r[(i, 0)] * p[0] + r[(i, 1)] * p[1] + r[(i, 2)] * p[2] + t[i])
         };

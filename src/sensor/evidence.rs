@@ -1,16 +1,16 @@
-/// What is known of one observed voxel: the exact log-odds and how many updates made it.
+/// The evidence of one observed voxel: the exact log-odds and the number of updates.
 ///
-/// A voxel that was never observed has no `Evidence`; that is *unknown*, which is not log-odds 0.
+/// An unobserved voxel has no `Evidence`: it is *unknown*, which is not log-odds 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence {
     /// Logarithm of the odds that the voxel is occupied.
     pub log_odds: f64,
-    /// Number of applied updates, those at a clamp included; stays at `i32::MAX` once there.
+    /// Number of applied updates, including those at a clamp; saturates at `i32::MAX`.
     pub observation_count: i32,
 }
 
 impl Evidence {
-    /// Where the first update of a voxel starts from.
+    /// The state before the first update.
     pub(crate) const PRIOR: Self = Self { log_odds: 0.0, observation_count: 0 };
 
     /// Probability that the voxel is occupied, in [0, 1].

@@ -4,8 +4,8 @@ use crate::maths::sigmoid;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Intensity-weighted log-odds: a strong echo counts more than a weak one, a new voxel learns faster than an
-/// old one. For sonar, radar and lidar intensity.
+/// Intensity-weighted log-odds: a strong echo counts more than a weak one, and a new voxel learns faster than an old
+/// one. For sonar, radar and lidar intensity.
 ///
 /// With `n` the count before the update and `P = sigmoid(L)`:
 ///
@@ -19,7 +19,7 @@ use std::fmt;
 /// L = clamp(L + dL, min, max);          s = 1 where no condition holds
 /// ```
 ///
-/// A point with `w = 0` is no evidence: its voxel gets neither a hit nor a miss from it.
+/// A point with `w = 0` is not evidence: its voxel gets neither a hit nor a miss from it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Iwlo {
@@ -27,7 +27,7 @@ pub struct Iwlo {
     pub occupied: f64,
     /// Log-odds of a miss, negative.
     pub free: f64,
-    /// Steepness of the weight over the intensity; with 0.1 the intensity has next to no effect.
+    /// Steepness of the weight over the intensity; at 0.1 the intensity has almost no effect.
     pub sharpness: f64,
     /// How fast a voxel's updates lose weight with their number, per update.
     pub decay_rate: f64,
@@ -37,11 +37,11 @@ pub struct Iwlo {
     pub min: f64,
     /// Upper clamp in log-odds.
     pub max: f64,
-    /// Intensities up to this one are no evidence, in the sensor's own unit.
+    /// Intensities up to this one are not evidence, in the sensor's own unit.
     pub intensity_threshold: f64,
     /// Intensity of full weight, in the sensor's own unit.
     pub intensity_max: f64,
-    /// Whether updates against the present belief are damped.
+    /// Whether updates that contradict the present estimate are damped.
     pub adaptive: bool,
     /// Probability below which hits (and, mirrored, above which misses) are damped, in (0, 1].
     pub adaptive_probability: f64,
@@ -88,7 +88,7 @@ impl fmt::Display for Iwlo {
 }
 
 impl Iwlo {
-    /// The model, or what is wrong with it.
+    /// The model, if its parameters are valid.
     pub fn validated(self) -> Result<Self> {
         let Self { occupied, free, sharpness, decay_rate, min_alpha, min, max, .. } = self;
         let numbers = [
@@ -131,7 +131,7 @@ impl Iwlo {
         Ok(self)
     }
 
-    /// Weight of an intensity in [0, 1]; 0 is no evidence.
+    /// Weight of an intensity in [0, 1]; 0 is not evidence.
     #[inline]
     pub fn weight(&self, intensity: f32) -> f64 {
         let intensity = f64::from(intensity);

@@ -46,7 +46,7 @@ impl LogOdds {
         Self { hit: logit(hit), miss: logit(miss), min: logit(min), max: logit(max) }.validated()
     }
 
-    /// The model, or what is wrong with it.
+    /// The model, if its parameters are valid.
     pub fn validated(self) -> Result<Self> {
         let finite = [self.hit, self.miss, self.min, self.max].iter().all(|value| value.is_finite());
         if !(finite && self.hit > 0.0 && self.miss < 0.0 && self.min < self.max) {

@@ -1,4 +1,4 @@
-//! What one observation does to the evidence of a voxel. Knows no space.
+//! Sensor models: how one observation changes the evidence of a voxel. Knows no space.
 //!
 //! | model | for | hit | miss |
 //! |---|---|---|---|

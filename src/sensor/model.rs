@@ -3,7 +3,7 @@ use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How observations become evidence; chosen when a map is created and kept in its `metadata.json`.
+/// How observations become evidence; chosen when a map is created and stored in its `metadata.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -14,10 +14,10 @@ pub enum SensorModel {
     Iwlo(Iwlo),
 }
 
-/// What one ray says about one voxel.
+/// The observation of one voxel by one ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Observation {
-    /// The ray ended in the voxel; the intensity of its echo (ignored by models that need none).
+    /// The ray ended in the voxel, with the intensity of its echo (ignored by models that need none).
     Hit(f32),
     /// The ray passed through the voxel.
     Miss,
@@ -39,7 +39,7 @@ impl fmt::Display for SensorModel {
 }
 
 impl SensorModel {
-    /// The model, or what is wrong with it.
+    /// The model, if its parameters are valid.
     pub fn validated(self) -> Result<Self> {
         Ok(match self {
             Self::LogOdds(model) => Self::LogOdds(model.validated()?),
@@ -47,7 +47,7 @@ impl SensorModel {
         })
     }
 
-    /// The model's name, as commands and metadata spell it.
+    /// The model's name in commands and metadata.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::LogOdds(_) => "log-odds",
@@ -60,7 +60,7 @@ impl SensorModel {
         matches!(self, Self::Iwlo(_))
     }
 
-    /// Whether an observation is evidence at all; with [`Iwlo`] an echo of no weight is none.
+    /// Whether an observation is evidence; with [`Iwlo`] an echo of weight 0 is not.
     #[inline]
     pub fn is_evidence(&self, observation: Observation) -> bool {
         match (self, observation) {
@@ -69,7 +69,7 @@ impl SensorModel {
         }
     }
 
-    /// The evidence after an observation; `None` before is a voxel never observed.
+    /// The evidence after an observation; `before` is `None` for an unobserved voxel.
     ///
     /// The observation must be evidence by [`SensorModel::is_evidence`].
     #[inline]
@@ -83,7 +83,7 @@ impl SensorModel {
         }
     }
 
-    /// The evidence after so many misses in a row, to the bit.
+    /// The evidence after so many misses in a row, bit-identical to single updates.
     pub fn update_misses(&self, before: Evidence, misses: u16) -> Evidence {
         let min = match self {
             Self::LogOdds(model) => model.min,
@@ -91,7 +91,7 @@ impl SensorModel {
         };
         let mut evidence = before;
         for done in 0..misses {
-            // Once clamped, by a miss a voxel can only grow older.
+            // At the clamp a miss only increments the count.
             if done > 0 && evidence.log_odds.to_bits() == min.to_bits() {
                 let left = i32::from(misses - done);
                 let observation_count = evidence.observation_count.saturating_add(left);

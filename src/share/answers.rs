@@ -1,54 +1,54 @@
-use super::codec::{Ask, DigestEntry, Packet};
+use super::codec::{DigestEntry, Packet, Request};
 use super::sender::{Outgoing, ReceiverId, Sender};
 use super::set_range::SetRange;
 use crate::error::FormatError;
 use crate::space::{TileIndex, VoxelIndex};
 use std::time::Duration;
 
-/// Tiles of a range up to which each gets a digest of its own.
+/// Up to so many tiles of a range get one digest each.
 const MAX_SINGLE_TILES: usize = 1024;
 /// Digests for a range of more tiles.
 const GROUPS: usize = 64;
 
 impl Sender {
-    /// Answers what a receiver asks.
+    /// Answers a receiver's request.
     ///
     /// # Errors
     ///
-    /// Bytes that are no ask; nothing happens then.
+    /// Bytes that are not a request; the sender is unchanged then.
     pub fn answer(
         &mut self,
         from: ReceiverId,
-        ask: &[u8],
+        request: &[u8],
         now: Duration,
     ) -> Result<Vec<Outgoing>, FormatError> {
-        let ask = Ask::decode(ask)?;
+        let request = Request::decode(request)?;
         self.counts.asks += 1;
-        if !self.allowance.take(self.config.answer_bytes_per_s, now) {
+        if !self.token_bucket.refill(self.config.answer_bytes_per_s, now) {
             self.counts.refused_asks += 1;
             return Ok(Vec::new());
         }
         let epoch = self.header().epoch;
-        let packets = match ask {
-            Ask::Status { nonce } => vec![self.status(nonce)],
-            Ask::Missing { epoch: asked, sequences } if asked == epoch => self.repair(&sequences),
-            Ask::Digests { epoch: asked, range } if asked == epoch => self.digests(range),
-            Ask::Content { epoch: asked, ranges } if asked == epoch => self.content(&ranges),
-            // Of a life before this one.
+        let packets = match request {
+            Request::Status { nonce } => vec![self.status(nonce)],
+            Request::Missing { epoch: requested, sequences } if requested == epoch => self.repair(&sequences),
+            Request::Digests { epoch: requested, range } if requested == epoch => self.digests(range),
+            Request::Content { epoch: requested, ranges } if requested == epoch => self.content(&ranges),
+            // The request is to an earlier life of the sender.
             _ => vec![self.status(0)],
         };
         let bytes = packets.iter().map(|packet| packet.len() as u64).sum();
-        self.allowance.spend(bytes);
+        self.token_bucket.spend(bytes);
         self.counts.answer_bytes += bytes;
         Ok(packets.into_iter().map(|bytes| Outgoing { to: Some(from), bytes }).collect())
     }
 
-    /// Has the voxels of lost packets in the next frame. A status tells of packets that cannot be repaired.
+    /// Adds the voxels of lost packets to the next frame. Returns a status if packets cannot be repaired.
     fn repair(&mut self, sequences: &[u64]) -> Vec<Vec<u8>> {
         let mut is_known = true;
         for &sequence in sequences {
             match self.ring.get(sequence) {
-                Some(voxels) => self.pending.repair(sequence, voxels),
+                Some(voxels) => self.send_buffer.repair(sequence, voxels),
                 None => is_known = false,
             }
         }
@@ -63,7 +63,7 @@ impl Sender {
         let mut begin = first;
         let groups: Vec<&[TileIndex]> = tiles.chunks(group).collect();
         for (number, group) in groups.iter().enumerate() {
-            // The last entry reaches to the end, the others up to their last tile.
+            // The last entry extends to the end of the range, the others to their last tile.
             let end = group.last().filter(|_| number + 1 < groups.len()).copied().unwrap_or(last);
             entries.push(self.entry(begin, end));
             begin = after(end);
@@ -97,7 +97,7 @@ impl Sender {
                 if packets.len() >= self.config.packets_per_answer {
                     return packets;
                 }
-                // As many as may be in a packet, and one more to know whether there are more.
+                // As many as fit into a packet, and one more to tell whether there are more.
                 let most = super::codec::MAX_VOXELS_PER_PACKET + 1;
                 let voxels: Vec<VoxelIndex> = self.sent.in_range(range).take(most).collect();
                 let grid = *self.grid();
@@ -124,7 +124,7 @@ impl Sender {
     }
 }
 
-/// The tile behind one in the order of a set.
+/// The next tile in the order of a set.
 pub(super) fn after(tile: TileIndex) -> TileIndex {
     super::set_range::SetPosition { tile, code: super::set_range::LAST_CODE }.next().tile
 }

@@ -10,17 +10,17 @@ pub(super) type BrickPlace = (TileIndex, BrickCode);
 #[derive(Default)]
 pub(super) struct Content(BTreeMap<BrickPlace, BrickMask>);
 
-/// A brick that is not as in a set.
+/// A brick that differs from a set.
 pub(super) struct Difference {
     pub(super) place: BrickPlace,
-    /// What it should be.
+    /// The right voxels.
     pub(super) after: BrickMask,
-    /// Where it is not.
+    /// The voxels that differ.
     pub(super) differing: BrickMask,
 }
 
 impl Content {
-    /// Of voxels; `None` if one lies outside of the range.
+    /// The bricks of some voxels; `None` if one lies outside the range.
     pub(super) fn new(grid: &Grid, range: SetRange, voxels: &[VoxelIndex]) -> Option<Self> {
         let mut bricks = BTreeMap::new();
         for &voxel in voxels {
@@ -35,7 +35,7 @@ impl Content {
         Some(Self(bricks))
     }
 
-    /// Bricks of a range, from one on, that are not in a set as they are here: in order, at most so many.
+    /// The bricks of a range that differ from a set, from `first` on, in order, at most `most`.
     pub(super) fn differences(
         &self,
         set: &VoxelSet,
@@ -66,7 +66,7 @@ impl Content {
     }
 }
 
-/// The brick that holds a place.
+/// The brick that holds a position.
 pub(super) fn brick_at(position: SetPosition) -> BrickPlace {
     (position.tile, MortonCode(position.code).brick())
 }

@@ -10,14 +10,14 @@ const LABEL: &[u8; 16] = b"voxtile-layer-1\n";
 
 /// Most bytes of a packet of a layer.
 const MAX_PACKET_BYTES: usize = 60_000;
-/// Voxels of a packet: far fewer bytes than that.
+/// Voxels per packet: far fewer bytes than that.
 const VOXELS_PER_PACKET: usize = MAX_VOXELS_PER_PACKET / 4;
 
 /// Writes a layer: label, resolution and tile size, packets of content with their lengths, an empty one, and the digest.
 ///
 /// # Errors
 ///
-/// An `out` that refuses.
+/// Errors of `out`.
 pub fn write_layer(layer: &mut VoxelSet, out: &mut impl Write) -> io::Result<()> {
     out.write_all(LABEL)?;
     for length_m in [layer.grid().resolution_m(), layer.grid().tile_size_m()] {
@@ -35,7 +35,7 @@ pub fn write_layer(layer: &mut VoxelSet, out: &mut impl Write) -> io::Result<()>
     out.write_all(layer.digest().as_bytes())
 }
 
-/// Voxels in one packet, or in as many as it takes.
+/// Writes voxels in one packet, or in as many as they need.
 fn write_some(voxels: &[VoxelIndex], out: &mut impl Write) -> io::Result<()> {
     let header = Header { epoch: 0, sequence: 0 };
     let packet = Packet::Content { header, range: SetRange::ALL, voxels: voxels.to_vec() };
@@ -58,16 +58,16 @@ fn write_some(voxels: &[VoxelIndex], out: &mut impl Write) -> io::Result<()> {
 ///
 /// # Errors
 ///
-/// What [`write_layer`] does not write, a digest that is not that of the voxels, too many voxels, an `input` that refuses.
+/// Bytes that [`write_layer`] does not write, a wrong digest, too many voxels, errors of `input`.
 pub fn read_layer(input: &mut impl Read, max_voxels: u64) -> Result<VoxelSet, DecodeError> {
     read_layer_within(input, max_voxels, usize::MAX)
 }
 
-/// [`read_layer`] in at most so many bytes of memory, and a packet's more.
+/// [`read_layer`] with a memory limit; it may be exceeded by a packet's size.
 ///
 /// # Errors
 ///
-/// As for [`read_layer`], and a layer that takes more.
+/// As for [`read_layer`], and a layer that exceeds the limit.
 pub fn read_layer_within(
     input: &mut impl Read,
     max_voxels: u64,

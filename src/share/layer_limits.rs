@@ -2,7 +2,7 @@ use super::receiver_config::ReceiverConfig;
 use super::set::VoxelSet;
 use crate::space::{VoxelBox, VoxelIndex};
 
-/// How much a layer may hold, and where.
+/// Limits of a layer.
 #[derive(Clone, Debug)]
 pub(super) struct LayerLimits {
     region: Option<VoxelBox>,
@@ -18,7 +18,7 @@ impl LayerLimits {
         Self { region, max_voxels, max_tiles, bytes }
     }
 
-    /// Puts a voxel into a layer, or takes it out; `false` if that is beyond the limits.
+    /// Adds a voxel to a layer or removes it; `false` if that would exceed the limits.
     pub(super) fn put(&self, layer: &mut VoxelSet, voxel: VoxelIndex, is_in: bool) -> bool {
         let is_inside = || self.region.as_ref().is_none_or(|region| region.contains(voxel));
         let is_allowed =
@@ -32,7 +32,7 @@ impl LayerLimits {
     fn has_room_for(&self, layer: &VoxelSet, voxel: VoxelIndex) -> bool {
         let tile = layer.grid().tile_of_voxel(voxel);
         layer.len() < self.max_voxels
-            && layer.memory_bytes() + VoxelSet::MOST_BYTES_A_VOXEL <= self.bytes
+            && layer.memory_bytes() + VoxelSet::MAX_BYTES_PER_VOXEL <= self.bytes
             && (layer.tile_count() < self.max_tiles || layer.has_tile(tile))
     }
 }

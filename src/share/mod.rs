@@ -1,17 +1,17 @@
-//! Map sharing: what one robot finds occupied, at the others, exactly.
+//! Map sharing: the voxels that one robot finds occupied reach the others exactly.
 //!
-//! A sender has a set of voxels, those of its archive or local map that are occupied. A receiver keeps a layer for each
-//! robot it hears, and after whatever was lost, late, repeated or out of order the layer equals the sender's set.
-//! After La, Kang and Lee, "A robust, task-agnostic and fully-scalable voxel mapping system for large scale environments",
-//! section V-C, which sends newly occupied voxels and stops there; `docs/sharing.md` has the protocol and its bytes.
+//! A sender has a set of voxels: the occupied ones of its archive or local map. A receiver keeps a layer per robot.
+//! Packets may be lost, late, repeated or out of order; the layer converges to the sender's set. After La, Kang and
+//! Lee, "A robust, task-agnostic and fully-scalable voxel mapping system for large scale environments", section V-C,
+//! which sends newly occupied voxels and nothing more; `docs/sharing.md` has the protocol and its bytes.
 //!
 //! ```text
-//! mapper -> MapWatch -> Sender: pending, frames, ring -> packets -> Receiver -> VoxelSet (a layer) -> WithLayers, fold
+//! mapper -> MapWatch -> Sender: buffer, frames, ring -> packets -> Receiver -> VoxelSet (a layer) -> WithLayers, merge
 //!                              ^                                     |
-//!                              +---- asks: status, missing, digests, content <----+
+//!                              +---- requests: status, missing, digests, content <----+
 //! ```
 //!
-//! Nothing here knows a transport or a clock: packets are bytes, times are handed in.
+//! Nothing here knows a transport or a clock: packets are bytes, and the caller passes the time.
 //!
 //! ```
 //! use std::time::Duration;
@@ -27,8 +27,8 @@
 //!     for packet in sender.poll(now) {
 //!         receiver.take(&packet.bytes, now)?;
 //!     }
-//!     for ask in receiver.poll(now) {
-//!         for packet in sender.answer(7, &ask, now)? {
+//!     for request in receiver.poll(now) {
+//!         for packet in sender.answer(7, &request, now)? {
 //!             receiver.take(&packet.bytes, now)?;
 //!         }
 //!     }
@@ -39,37 +39,37 @@
 //! # }
 //! ```
 
-mod allowance;
 mod answers;
-mod catch_up;
+mod anti_entropy;
 pub mod codec;
 mod differences;
-mod fold;
+mod interval_set;
 mod layer_file;
 mod layer_limits;
+mod layer_merge;
 mod nonce;
-mod part_stamps;
-mod parts;
-mod pending;
 mod policy;
+mod range_versions;
 mod receiver;
 mod receiver_config;
 mod receiver_memory;
 mod receivers;
 mod replace;
 mod ring;
+mod send_buffer;
 mod sender;
 mod sender_config;
 mod set;
 mod set_memory;
 mod set_range;
-mod stamps;
 mod stream;
+mod token_bucket;
 mod union;
+mod voxel_versions;
 mod watch;
 
-pub use fold::{FoldReport, fold_layer};
 pub use layer_file::{read_layer, read_layer_within, write_layer};
+pub use layer_merge::{LayerMergeReport, merge_layer};
 pub use policy::ExportPolicy;
 pub use receiver::Receiver;
 pub use receiver_config::{ReceiverConfig, ReceiverCounts};

@@ -1,39 +1,39 @@
-use super::codec::Ask;
+use super::codec::Request;
 use std::time::Duration;
 
-/// Numbers that only an answer has.
+/// Nonces that identify the answers to status requests.
 #[derive(Clone, Debug)]
 pub(super) struct Nonce {
     state: u64,
-    /// The last one, while it was not answered, and when it was sent.
+    /// The last nonce while it is not answered, and when it was sent.
     waiting: Option<(u64, Duration)>,
     next_at: Duration,
 }
 
-/// Time between two questions for a status.
+/// Time between two requests for a status.
 const STATUS_INTERVAL: Duration = Duration::from_secs(1);
 impl Nonce {
     pub(super) fn new(seed: u64) -> Self {
         Self { state: seed, waiting: None, next_at: Duration::ZERO }
     }
 
-    /// An ask for a status, if it is time for one.
-    pub(super) fn ask(&mut self, now: Duration) -> Option<Ask> {
+    /// A request for a status, if one is due.
+    pub(super) fn request(&mut self, now: Duration) -> Option<Request> {
         if now < self.next_at {
             return None;
         }
         self.next_at = now + STATUS_INTERVAL;
-        // splitmix64: never twice the same in a receiver's life.
+        // splitmix64: never repeats in a receiver's life.
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.state;
         bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
         let nonce = (bits ^ bits >> 31).max(1);
         self.waiting = Some((nonce, now));
-        Some(Ask::Status { nonce })
+        Some(Request::Status { nonce })
     }
 
-    /// When the ask was sent that a number answers.
+    /// When the request with this nonce was sent.
     pub(super) fn take(&mut self, nonce: u64) -> Option<Duration> {
         let (_, at) = self.waiting.filter(|(waiting, _)| *waiting == nonce)?;
         self.waiting = None;

@@ -1,5 +1,5 @@
-use super::catch_up::CatchUp;
-use super::codec::{Ask, DigestEntry, Header, MAX_LISTED, Packet, Status, Update};
+use super::anti_entropy::AntiEntropy;
+use super::codec::{DigestEntry, Header, MAX_LISTED, Packet, Request, Status, Update};
 use super::differences::Content;
 use super::layer_limits::LayerLimits;
 use super::nonce::Nonce;
@@ -12,47 +12,47 @@ use crate::error::FormatError;
 use crate::space::{Grid, TileIndex};
 use std::time::Duration;
 
-/// Listens to one robot and keeps a layer: its set of voxels. Whoever has it calls [`Receiver::poll`] a few times a
-/// second.
+/// Receives the packets of one robot and keeps a layer: its set of voxels. The owner calls [`Receiver::poll`] a few
+/// times a second.
 #[derive(Clone, Debug)]
 pub struct Receiver {
     config: ReceiverConfig,
     pub(super) limits: LayerLimits,
     pub(super) layer: Option<VoxelSet>,
     pub(super) stream: Option<Stream>,
-    /// Bytes of memory for what is remembered of packets.
-    pub(super) stamp_bytes: usize,
-    catch_up: CatchUp,
+    /// Bytes of memory for the versions of voxels.
+    pub(super) version_bytes: usize,
+    anti_entropy: AntiEntropy,
     pub(super) counts: ReceiverCounts,
     nonce: Nonce,
-    /// Since when there is something that only the sender can explain.
-    puzzled_since: Option<Duration>,
-    ask_missing_at: Duration,
-    /// The layer was the sender's set as of this packet.
+    /// Since when packets have come that need a status to explain them.
+    unexplained_since: Option<Duration>,
+    request_missing_at: Duration,
+    /// The layer was equal to the sender's set as of this packet.
     equal_as_of: Option<u64>,
     pub(super) is_over_limit: bool,
-    /// A status that the layer is still to be compared with, and when there may be work for that.
+    /// A status to be compared with the layer, and the earliest time for that.
     to_compare: Option<Status>,
     compare_at: Duration,
-    /// The last one that was refused.
+    /// The last refused grid.
     refused_grid: Option<Grid>,
 }
 
-/// After so long without an answer a sender is believed, since there may be no way back to it.
+/// After so long without an answer a sender is believed: there may be no way back to it.
 const ONE_WAY: Duration = Duration::from_secs(5);
-/// First time between two asks for the same packet: its voxels come with a frame.
+/// Time before the first repeated request for a packet: its voxels come with a frame.
 const RETRY: Duration = Duration::from_millis(1500);
-/// Time between two comparisons of a layer, by voxel and by tile: some twenty times what a comparison takes.
-const COMPARE_NS_A_VOXEL: u64 = 100;
+/// Time between two comparisons, per voxel and per tile of the layer: some twenty times the cost of a comparison.
+const COMPARE_NS_PER_VOXEL: u64 = 100;
 const COMPARE_NS_A_TILE: u64 = 2000;
 
 impl Receiver {
-    /// A receiver that has heard nothing.
+    /// A receiver without a layer.
     pub fn new(config: ReceiverConfig) -> Self {
         Self::started(config, None)
     }
 
-    /// A receiver that goes on with the layer of an earlier one.
+    /// A receiver that continues with the layer of an earlier one.
     pub fn with_layer(config: ReceiverConfig, layer: VoxelSet) -> Self {
         Self::started(config, Some(layer))
     }
@@ -64,12 +64,12 @@ impl Receiver {
             config,
             layer,
             stream: None,
-            stamp_bytes: 0,
-            catch_up: CatchUp::default(),
+            version_bytes: 0,
+            anti_entropy: AntiEntropy::default(),
             counts: ReceiverCounts::default(),
             nonce,
-            puzzled_since: None,
-            ask_missing_at: Duration::ZERO,
+            unexplained_since: None,
+            request_missing_at: Duration::ZERO,
             equal_as_of: None,
             is_over_limit: false,
             to_compare: None,
@@ -82,7 +82,7 @@ impl Receiver {
         receiver
     }
 
-    /// The robot's voxels as far as they came; `None` before anything came.
+    /// The robot's voxels so far; `None` before any packet was accepted.
     pub fn layer(&self) -> Option<&VoxelSet> {
         self.layer.as_ref()
     }
@@ -92,25 +92,25 @@ impl Receiver {
         self.layer.as_mut()
     }
 
-    /// The layer, for whoever listens no more.
+    /// Ends the receiver and returns its layer.
     pub fn into_layer(self) -> Option<VoxelSet> {
         self.layer
     }
 
-    /// What was seen so far.
+    /// Counts so far.
     pub fn counts(&self) -> ReceiverCounts {
         self.counts
     }
 
-    /// Packets that were sent and did not come.
+    /// Number of lost packets.
     pub fn missing_packets(&self) -> usize {
         self.stream.as_ref().map_or(0, Stream::missing)
     }
 
-    /// Whether the layer was compared with the set of the sender, and equal, and nothing came since.
+    /// Whether the layer was found equal to the sender's set, and nothing came since.
     pub fn is_converged(&self) -> bool {
         let Some(stream) = &self.stream else { return false };
-        stream.is_complete() && self.equal_as_of == Some(stream.highest) && self.puzzled_since.is_none()
+        stream.is_complete() && self.equal_as_of == Some(stream.highest) && self.unexplained_since.is_none()
     }
 
     /// Epoch and number of the packet as of which the layer was last found equal to the sender's set.
@@ -118,7 +118,7 @@ impl Receiver {
         Some((self.stream.as_ref()?.epoch, self.equal_as_of?))
     }
 
-    /// Whether voxels were refused: the layer cannot become equal then, and is not compared any more.
+    /// Whether voxels were refused: then the layer cannot become equal and is not compared any more.
     pub fn is_over_limit(&self) -> bool {
         self.is_over_limit
     }
@@ -132,7 +132,7 @@ impl Receiver {
     ///
     /// # Errors
     ///
-    /// Bytes that are no packet; the layer stays as it was.
+    /// Bytes that are not a packet; the layer is unchanged.
     pub fn take(&mut self, bytes: &[u8], now: Duration) -> Result<(), FormatError> {
         self.counts.bytes += bytes.len() as u64;
         let taken = Packet::decode(bytes).and_then(|packet| self.take_packet(packet, now));
@@ -151,7 +151,7 @@ impl Receiver {
         }
         if !self.stream.as_ref().is_some_and(|stream| stream.can_be(epoch, sequence)) {
             self.counts.unconfirmed += 1;
-            self.puzzled_since.get_or_insert(now);
+            self.unexplained_since.get_or_insert(now);
             return Ok(());
         }
         match packet {
@@ -181,17 +181,17 @@ impl Receiver {
         }
         let grid = *layer.grid();
         for update in updates {
-            if !stream.stamps.is_later(&grid, update.voxel, sequence)
+            if !stream.versions.is_later(&grid, update.voxel, sequence)
                 && !self.limits.put(layer, update.voxel, update.is_in)
             {
                 self.counts.refused_voxels += 1;
                 self.is_over_limit = true;
             }
         }
-        stream.stamps.note(sequence, updates.iter().map(|update| update.voxel));
+        stream.versions.note(sequence, updates.iter().map(|update| update.voxel));
     }
 
-    /// Replaces a part of the layer, but for what came after the packet that the part is as of.
+    /// Replaces a range of the layer by a packet's content, except for voxels changed after that packet's version.
     fn take_content(
         &mut self,
         as_of: u64,
@@ -201,23 +201,23 @@ impl Receiver {
         now: Duration,
     ) {
         let Some(stream) = &mut self.stream else { return };
-        if as_of < stream.stamps.forgotten() {
+        if as_of < stream.versions.forgotten() {
             return;
         }
         stream.reach(as_of, now, self.config.patience);
         let Some(done) = self.replace(as_of, range, content, work) else { return };
         if let Some(stream) = &mut self.stream {
-            stream.stamps.note_part(done, as_of);
+            stream.versions.note_part(done, as_of);
         }
-        self.catch_up.take_content(done, now);
+        self.anti_entropy.take_content(done, now);
     }
 
     fn take_digests(&mut self, as_of: u64, first: TileIndex, entries: &[DigestEntry], now: Duration) {
         let Some(layer) = &mut self.layer else { return };
         let mut work = Work::of_a_packet();
-        for range in self.catch_up.take_digests(first, entries, layer, now) {
-            // Until it is done: there may not be work left for it.
-            self.catch_up.want_content(range);
+        for range in self.anti_entropy.take_digests(first, entries, layer, now) {
+            // Requested until it is done: the packet may exceed the work limit.
+            self.anti_entropy.request_content(range);
             self.take_content(as_of, range, &Content::default(), &mut work, now);
         }
     }
@@ -226,30 +226,30 @@ impl Receiver {
         let Header { epoch, sequence } = status.header;
         let asked_at = self.nonce.take(status.nonce);
         let Some(stream) = self.stream.as_mut().filter(|stream| stream.can_be(epoch, sequence)) else {
-            let is_one_way = self.puzzled_since.is_some_and(|since| now >= since + ONE_WAY);
+            let is_one_way = self.unexplained_since.is_some_and(|since| now >= since + ONE_WAY);
             self.counts.unconfirmed += 1;
-            self.puzzled_since.get_or_insert(now);
+            self.unexplained_since.get_or_insert(now);
             if asked_at.is_some() || (is_one_way && status.nonce == 0) {
                 self.adopt(status, now);
             }
             return;
         };
-        // Somebody has invented numbers, if the sender says later that it has not come to them.
+        // If the sender's status does not reach these numbers, someone forged them.
         if sequence < stream.highest && asked_at.is_some_and(|asked_at| stream.highest_at < asked_at) {
             self.adopt(status, now);
             return;
         }
         if asked_at.is_some() {
-            self.puzzled_since = None;
+            self.unexplained_since = None;
         }
         stream.reach(sequence, now, self.config.patience);
         let is_lost = stream.give_up_before(status.oldest);
         self.compare(status, is_lost, now);
     }
 
-    /// Begins anew with what a sender says of itself.
+    /// Starts anew with a sender's status.
     fn adopt(&mut self, status: &Status, now: Duration) {
-        // The voxels farthest away have a place, too.
+        // The farthest voxels must have coordinates, too.
         let has_places = |grid: &Grid| grid.center_m([i32::MIN; 3]).iter().all(|k| k.is_finite());
         let grid = Grid::new(status.resolution_m, status.tile_size_m).ok().filter(has_places);
         let Some(grid) = grid.filter(|grid| self.config.grid.is_none_or(|accepted| accepted == *grid)) else {
@@ -261,15 +261,15 @@ impl Receiver {
             self.layer = Some(VoxelSet::new(grid));
         }
         self.equal_as_of = None;
-        self.stream = Some(Stream::new(status.header.epoch, status.header.sequence, now, self.stamp_bytes));
-        self.catch_up = CatchUp::default();
-        self.puzzled_since = None;
+        self.stream = Some(Stream::new(status.header.epoch, status.header.sequence, now, self.version_bytes));
+        self.anti_entropy = AntiEntropy::default();
+        self.unexplained_since = None;
         self.to_compare = None;
         self.compare(status, false, now);
     }
 
-    /// Compares the layer with a status, once all packets before it are there; catches up if they differ. That takes work
-    /// by voxels and tiles, so that it may have to wait.
+    /// Compares the layer with a status once all packets before it are here; starts anti-entropy if they differ. The
+    /// cost grows with voxels and tiles, so the comparison may be delayed.
     fn compare(&mut self, status: &Status, is_lost: bool, now: Duration) {
         let (Some(stream), Some(layer)) = (&self.stream, &mut self.layer) else { return };
         let can_compare = stream.is_complete() && stream.highest == status.header.sequence;
@@ -277,53 +277,58 @@ impl Receiver {
         if can_compare && now < self.compare_at {
             self.to_compare = Some(*status);
         } else if can_compare {
-            let wait_ns = COMPARE_NS_A_VOXEL.saturating_mul(layer.len())
+            let wait_ns = COMPARE_NS_PER_VOXEL.saturating_mul(layer.len())
                 + COMPARE_NS_A_TILE.saturating_mul(layer.tile_count() as u64);
             self.compare_at = now + Duration::from_nanos(wait_ns);
             let is_equal = layer.len() == status.voxels && *layer.digest().as_bytes() == status.digest;
             self.equal_as_of = is_equal.then_some(stream.highest);
             differs |= !is_equal;
             if is_equal {
-                self.catch_up = CatchUp::default();
+                self.anti_entropy = AntiEntropy::default();
                 return;
             }
         }
-        if differs && self.catch_up.is_done() && !self.is_over_limit {
-            self.catch_up.begin(layer);
+        if differs && self.anti_entropy.is_done() && !self.is_over_limit {
+            self.anti_entropy.begin(layer);
             self.counts.catch_ups += 1;
         }
     }
 
-    /// Asks to be sent now, to the robot.
+    /// Requests to send to the robot now.
     pub fn poll(&mut self, now: Duration) -> Vec<Vec<u8>> {
         if now >= self.compare_at
             && let Some(status) = self.to_compare.take()
         {
             self.compare(&status, false, now);
         }
-        if !self.config.asks {
+        if !self.config.sends_requests {
             return Vec::new();
         }
-        let mut asks = Vec::new();
-        let mut wants_status = self.puzzled_since.is_some() || self.stream.is_none();
+        let mut requests = Vec::new();
+        let mut wants_status = self.unexplained_since.is_some() || self.stream.is_none();
         if let Some(stream) = &mut self.stream {
-            if now >= self.ask_missing_at {
-                let (sequences, is_in_vain) = stream.due(now, MAX_LISTED, RETRY);
-                wants_status |= is_in_vain;
+            if now >= self.request_missing_at {
+                let (sequences, is_hopeless) = stream.due(now, MAX_LISTED, RETRY);
+                wants_status |= is_hopeless;
                 if !sequences.is_empty() {
-                    self.ask_missing_at = now + self.config.ask_interval;
-                    asks.push(Ask::Missing { epoch: stream.epoch, sequences });
+                    self.request_missing_at = now + self.config.request_interval;
+                    requests.push(Request::Missing { epoch: stream.epoch, sequences });
                 }
             }
-            let patience = self.config.patience + self.config.ask_interval;
-            asks.extend(self.catch_up.poll(stream.epoch, now, self.config.ask_interval, patience));
+            let patience = self.config.patience + self.config.request_interval;
+            requests.extend(self.anti_entropy.poll(
+                stream.epoch,
+                now,
+                self.config.request_interval,
+                patience,
+            ));
         }
         if wants_status {
-            asks.extend(self.nonce.ask(now));
+            requests.extend(self.nonce.request(now));
         }
-        let asks: Vec<Vec<u8>> = asks.iter().map(Ask::encode).collect();
-        self.counts.asks += asks.len() as u64;
-        self.counts.ask_bytes += asks.iter().map(|ask| ask.len() as u64).sum::<u64>();
-        asks
+        let requests: Vec<Vec<u8>> = requests.iter().map(Request::encode).collect();
+        self.counts.asks += requests.len() as u64;
+        self.counts.ask_bytes += requests.iter().map(|request| request.len() as u64).sum::<u64>();
+        requests
     }
 }

@@ -5,11 +5,11 @@ use crate::error::{Error, FormatError, Result};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Receivers of several robots under one limit of memory.
+/// Receivers of several robots under one memory limit.
 ///
-/// Whoever needs memory gets it while there is some. Once there is none, everybody has a right to an equal part of the
-/// limit: a robot that has less may grow up to that part, and who has the most beyond it forgets as much, voxel by voxel
-/// from the end of its layer. So nobody can take from others what they have below their part.
+/// While memory is free, any receiver may take it. Once none is free, every robot is entitled to an equal share of the
+/// limit: a robot below its share may grow up to it, and the robot that exceeds its share most loses as many voxels,
+/// from the end of its layer. So nobody loses memory below the share.
 #[derive(Clone, Debug)]
 pub struct Receivers<K> {
     memory_bytes: usize,
@@ -25,14 +25,14 @@ impl<K> IntoIterator for Receivers<K> {
     }
 }
 
-/// What one packet can add, before anybody has to forget: voxels each alone in its tile.
-const PACKET_BYTES: usize = super::codec::MAX_VOXELS_PER_PACKET * VoxelSet::MOST_BYTES_A_VOXEL;
+/// What one packet can add before voxels are removed: voxels each alone in its tile.
+const PACKET_BYTES: usize = super::codec::MAX_VOXELS_PER_PACKET * VoxelSet::MAX_BYTES_PER_VOXEL;
 
 impl<K: Ord + Clone> Receivers<K> {
-    /// The least memory of receivers, in bytes.
+    /// Least memory limit, in bytes.
     pub const LEAST_BYTES: usize = 64 << 20;
 
-    /// No receivers yet, and a limit on what all of them take together.
+    /// No receivers yet, and a limit on their total memory.
     ///
     /// # Errors
     ///
@@ -45,26 +45,26 @@ impl<K: Ord + Clone> Receivers<K> {
         Ok(Self { memory_bytes, robots: BTreeMap::new() })
     }
 
-    /// Adds a receiver for a robot, with the layer of an earlier one if there is one. Its limit of memory is what the
-    /// others leave; where that is too little, who has most forgets. A robot that has not said what it is takes no part.
+    /// Adds a receiver for a robot, with the layer of an earlier one if there is one. Its limit is what the others
+    /// leave; if that is too little, the largest layers shrink. A robot has no share before its first status.
     pub fn insert(&mut self, robot: K, config: ReceiverConfig, layer: Option<VoxelSet>) {
         self.robots.insert(robot, Receiver::started(config, layer));
         self.share_out();
     }
 
-    /// Gives everybody the same part.
+    /// Gives every robot the same share.
     fn share_out(&mut self) {
         let part = self.part_bytes();
         self.robots.values_mut().for_each(|receiver| receiver.set_part_bytes(part));
         self.make_room();
     }
 
-    /// Robots that have said what they are, or have a layer.
+    /// Robots that have sent a status or have a layer.
     pub fn known(&self) -> usize {
         self.robots.values().filter(|receiver| receiver.layer().is_some()).count()
     }
 
-    /// Whether there is a part for one robot more.
+    /// Whether there is a share for one more robot.
     pub fn has_room(&self) -> bool {
         self.for_all() / (self.known() + 1) >= Receiver::LEAST_BYTES
     }
@@ -74,11 +74,11 @@ impl<K: Ord + Clone> Receivers<K> {
         self.robots.remove(robot)
     }
 
-    /// Takes the bytes of a packet of a robot; of one that was not added, or that there is no part for, nothing.
+    /// Takes the bytes of a robot's packet. Packets of robots that were not added, or that have no share, are ignored.
     ///
     /// # Errors
     ///
-    /// Bytes that are no packet; the layer stays as it was.
+    /// Bytes that are not a packet; the layer is unchanged.
     pub fn take(&mut self, robot: &K, bytes: &[u8], now: Duration) -> std::result::Result<(), FormatError> {
         let (all, part) = (self.memory_bytes(), self.part_bytes());
         let for_all = self.for_all();
@@ -99,7 +99,7 @@ impl<K: Ord + Clone> Receivers<K> {
         taken
     }
 
-    /// Has those forget that have most, beyond their part, until all is within the limit.
+    /// Shrinks the layers that exceed their share most, until the limit is kept.
     fn make_room(&mut self) {
         let part = self.part_bytes();
         loop {
@@ -116,17 +116,17 @@ impl<K: Ord + Clone> Receivers<K> {
         }
     }
 
-    /// Bytes of memory that all receivers take together, at most.
+    /// Upper bound of the bytes of memory of all receivers.
     pub fn memory_bytes(&self) -> usize {
         self.robots.values().map(Receiver::memory_bytes).sum()
     }
 
-    /// What every robot may have, whatever the others do.
+    /// The share of each robot, whatever the others do.
     pub fn part_bytes(&self) -> usize {
         self.for_all() / self.known().max(1)
     }
 
-    /// What nobody has of the memory, and no packet needs.
+    /// Free bytes, beyond what a packet may need.
     pub fn free_bytes(&self) -> usize {
         self.for_all().saturating_sub(self.memory_bytes())
     }
@@ -150,7 +150,7 @@ impl<K: Ord + Clone> Receivers<K> {
         self.robots.get(robot)
     }
 
-    /// The same, for what it asks and for digests of its layer.
+    /// The same, mutably, for its requests and for digests of its layer.
     pub fn get_mut(&mut self, robot: &K) -> Option<&mut Receiver> {
         self.robots.get_mut(robot)
     }
@@ -160,7 +160,7 @@ impl<K: Ord + Clone> Receivers<K> {
         self.robots.iter()
     }
 
-    /// The same, for what they ask and for digests of their layers.
+    /// The same, mutably, for their requests and for digests of their layers.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (&K, &mut Receiver)> {
         self.robots.iter_mut()
     }

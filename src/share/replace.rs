@@ -3,13 +3,12 @@ use super::receiver::Receiver;
 use super::set_range::{SetPosition, SetRange};
 use crate::space::{BrickCode, places};
 
-/// Voxels that one packet may change. Where more would go, the packet is taken as far as that; what is behind is asked
-/// for again.
+/// Most voxels that one packet may change. The rest of a larger packet is requested again.
 const MAX_CHANGES: usize = 1 << 20;
 /// Bricks that are compared at a time.
 const BRICKS_AT_A_TIME: usize = 1024;
 
-/// What a packet may still change, in voxels.
+/// How many voxels a packet may still change.
 pub(super) struct Work(usize);
 
 impl Work {
@@ -19,8 +18,8 @@ impl Work {
 }
 
 impl Receiver {
-    /// Replaces a part of the layer by what it holds as of a packet, but for what came after that. Returns the part that
-    /// there was work left for, if any.
+    /// Replaces a range of the layer by a packet's content, except for voxels with later versions. Returns the range
+    /// that exceeded the work limit, if any.
     pub(super) fn replace(
         &mut self,
         as_of: u64,
@@ -28,7 +27,7 @@ impl Receiver {
         content: &Content,
         work: &mut Work,
     ) -> Option<SetRange> {
-        let parts = self.stream.as_ref()?.stamps.not_replaced(range, as_of);
+        let parts = self.stream.as_ref()?.versions.not_replaced(range, as_of);
         for part in parts {
             let mut from = brick_at(part.first);
             loop {
@@ -60,7 +59,7 @@ impl Receiver {
             work.0 = work.0.saturating_sub(1);
             let voxel = brick.voxel(place).to_key().to_index_from(min);
             let is_in = difference.after[place / 64] >> (place % 64) & 1 == 1;
-            if !stream.stamps.was_changed_after(voxel, as_of) && !self.limits.put(layer, voxel, is_in) {
+            if !stream.versions.was_changed_after(voxel, as_of) && !self.limits.put(layer, voxel, is_in) {
                 self.counts.refused_voxels += 1;
                 self.is_over_limit = true;
             }

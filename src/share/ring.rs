@@ -1,12 +1,12 @@
 use crate::space::VoxelIndex;
 use std::collections::VecDeque;
 
-/// The voxels of recent packets and frames; the oldest leave when there are too many.
+/// The voxels of recent packets and frames in a ring buffer.
 #[derive(Clone, Debug)]
 pub(super) struct Ring {
-    /// Of packets numbered one after the other.
+    /// Packets with consecutive numbers.
     packets: VecDeque<Vec<VoxelIndex>>,
-    /// Number of the first packet; of the next one, if there is none.
+    /// Number of the first packet; of the next one if there is none.
     first: u64,
     /// The first packet of each frame, ascending.
     frames: VecDeque<u64>,
@@ -43,7 +43,7 @@ impl Ring {
             self.voxels -= self.packets.pop_front().map_or(0, |packet| packet.len());
             self.first += 1;
         }
-        // One that began before the ring is still known from there on.
+        // A frame that began before the ring is known from the ring's start on.
         while self.frames.get(1).is_some_and(|&second| second <= self.first) {
             self.frames.pop_front();
         }

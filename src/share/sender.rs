@@ -1,51 +1,51 @@
 use super::ExportPolicy;
-use super::allowance::Allowance;
 use super::codec::{Header, MAX_VOXELS_PER_PACKET, Packet, Status, Update};
-use super::pending::Pending;
 use super::ring::Ring;
+use super::send_buffer::SendBuffer;
 use super::sender_config::{SenderConfig, SenderCounts};
 use super::set::VoxelSet;
+use super::token_bucket::TokenBucket;
 use crate::error::{Error, Result};
 use crate::space::{BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, places};
 use std::time::Duration;
 
-/// Which receiver asks; any number that is its own.
+/// Identifies the receiver that sent a request; any number unique to it.
 pub type ReceiverId = u64;
 
-/// Bytes to be sent.
+/// A packet to be sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outgoing {
-    /// To one receiver, or to all.
+    /// The receiver; `None` for all.
     pub to: Option<ReceiverId>,
-    /// A packet.
+    /// The packet's bytes.
     pub bytes: Vec<u8>,
 }
 
-/// Shares a set of voxels. Bytes in, bytes out; whoever has it calls [`Sender::poll`] a few times a second.
+/// Shares a set of voxels. Bytes in, bytes out; the owner calls [`Sender::poll`] a few times a second.
 #[derive(Clone, Debug)]
 pub struct Sender {
     pub(super) config: SenderConfig,
     epoch: u32,
-    /// As it is now.
+    /// The present set.
     wanted: VoxelSet,
-    /// As receivers know it once they have everything.
+    /// The set as sent: what receivers have once they have every packet.
     pub(super) sent: VoxelSet,
-    pub(super) pending: Pending,
+    pub(super) send_buffer: SendBuffer,
     pub(super) ring: Ring,
     pub(super) counts: SenderCounts,
     next_status: Duration,
     /// As of the last status.
     status_sequence: Option<u64>,
-    /// Voxels that the last packet had room for.
-    voxels_a_packet: usize,
-    pub(super) allowance: Allowance,
+    /// How many voxels the last packet had room for.
+    voxels_per_packet: usize,
+    pub(super) token_bucket: TokenBucket,
 }
 
-/// Beyond so many waiting voxels a frame is sent before its time.
-const MAX_PENDING: usize = 1 << 18;
+/// With more changes in the buffer a frame is sent before its time.
+const MAX_BUFFERED: usize = 1 << 18;
 
 impl Sender {
-    /// A sender with an empty set. The epoch must be another one each time that a robot begins anew.
+    /// A sender with an empty set. The epoch must differ at each start of the robot.
     ///
     /// # Errors
     ///
@@ -54,7 +54,7 @@ impl Sender {
         Self::with_set(VoxelSet::new(grid), epoch, config)
     }
 
-    /// A sender of a set, which receivers ask for.
+    /// A sender of a given set, which receivers fetch by requests.
     ///
     /// # Errors
     ///
@@ -76,12 +76,12 @@ impl Sender {
             epoch,
             wanted: set.clone(),
             sent: set,
-            pending: Pending::default(),
+            send_buffer: SendBuffer::default(),
             counts: SenderCounts::default(),
             next_status: Duration::ZERO,
             status_sequence: None,
-            voxels_a_packet: 1000,
-            allowance: Allowance::default(),
+            voxels_per_packet: 1000,
+            token_bucket: TokenBucket::default(),
         })
     }
 
@@ -90,19 +90,19 @@ impl Sender {
         self.sent.grid()
     }
 
-    /// What was done so far.
+    /// Counts so far.
     pub fn counts(&self) -> SenderCounts {
         self.counts
     }
 
-    /// The set as sent: what receivers have once they have everything.
+    /// The set as sent: what receivers have once they have every packet.
     pub fn sent(&mut self) -> &mut VoxelSet {
         &mut self.sent
     }
 
-    /// Whether nothing waits for a frame.
+    /// Whether nothing is buffered for a frame.
     pub fn is_idle(&self) -> bool {
-        self.pending.is_empty()
+        self.send_buffer.is_empty()
     }
 
     /// Whether a voxel is in the set.
@@ -110,14 +110,14 @@ impl Sender {
         self.wanted.contains(voxel)
     }
 
-    /// Puts a voxel into the set or takes it out.
+    /// Adds a voxel to the set or removes it.
     pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) {
         if self.wanted.put(voxel, is_in) {
-            self.pending.put(voxel, is_in, self.sent.contains(voxel));
+            self.send_buffer.put(voxel, is_in, self.sent.contains(voxel));
         }
     }
 
-    /// Says which voxels of a brick of a tile are in the set.
+    /// Sets the voxels of a brick of a tile.
     pub fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
         let before = self.wanted.brick(tile, brick);
         if before == mask {
@@ -128,16 +128,16 @@ impl Sender {
         let has = |mask: &BrickMask, place: usize| mask[place / 64] >> (place % 64) & 1 == 1;
         for place in places(std::array::from_fn(|k| before[k] ^ mask[k])) {
             let voxel = brick.voxel(place).to_key().to_index_from(min);
-            self.pending.put(voxel, has(&mask, place), has(&sent, place));
+            self.send_buffer.put(voxel, has(&mask, place), has(&sent, place));
         }
         self.wanted.put_brick(tile, brick, mask);
     }
 
-    /// What is to be sent now: a frame when it is time, a status when it is time.
+    /// The packets to send now: a frame if it is due, a status if it is due.
     pub fn poll(&mut self, now: Duration) -> Vec<Outgoing> {
-        let waited = self.pending.waited(now);
-        let is_due =
-            !self.pending.is_empty() && (waited >= self.config.latency || self.pending.len() >= MAX_PENDING);
+        let waited = self.send_buffer.waited(now);
+        let is_due = !self.send_buffer.is_empty()
+            && (waited >= self.config.latency || self.send_buffer.len() >= MAX_BUFFERED);
         let mut out = if is_due { self.frame() } else { Vec::new() };
         let is_quiet = self.status_sequence == Some(self.last_sequence());
         if now >= self.next_status || (is_quiet && !out.is_empty()) {
@@ -151,16 +151,16 @@ impl Sender {
         out
     }
 
-    /// What waits, at once: before a sender ends.
+    /// Sends what is buffered at once: before a sender ends.
     pub fn flush(&mut self, now: Duration) -> Vec<Outgoing> {
-        let mut out = if self.pending.is_empty() { Vec::new() } else { self.frame() };
+        let mut out = if self.send_buffer.is_empty() { Vec::new() } else { self.frame() };
         self.next_status = now;
         out.extend(self.poll(now));
         out
     }
 
-    /// Epoch and number of the last packet of changes, 0 for none: what [`Receiver::equal_as_of`](super::Receiver::equal_as_of)
-    /// says once a receiver has everything.
+    /// Epoch and number of the last packet of changes, 0 for none: the value of
+    /// [`Receiver::equal_as_of`](super::Receiver::equal_as_of) once a receiver has everything.
     pub fn last_packet(&self) -> (u32, u64) {
         (self.epoch, self.last_sequence())
     }
@@ -185,20 +185,20 @@ impl Sender {
             voxels: self.sent.len(),
             digest: *self.sent.digest().as_bytes(),
         };
-        // A status has no voxels that could be too many.
+        // Cannot fail: a status has no voxels.
         Packet::Status(status).encode().unwrap_or_default()
     }
 
     fn frame(&mut self) -> Vec<Outgoing> {
-        let (changed, again, repaired) = self.pending.take();
+        let (changed, resent, repaired) = self.send_buffer.take();
         let has_changes = !changed.is_empty();
         for (&voxel, &is_in) in &changed {
             self.sent.put(voxel, is_in);
         }
-        let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(again.iter().copied()).collect();
-        self.counts.updates_again += again.len() as u64;
+        let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(resent.iter().copied()).collect();
+        self.counts.updates_again += resent.len() as u64;
         match self.config.policy {
-            // What only repairs must not grow into what is to be repaired again.
+            // A frame of repairs only holds nothing more, or the repair of a lost repair would grow each time.
             _ if !has_changes => {}
             ExportPolicy::LastFrame => {}
             ExportPolicy::Ring(frames) => voxels.extend(self.ring.last_frames(frames - 1)),
@@ -209,7 +209,7 @@ impl Sender {
         self.packets_of(voxels, &repaired)
     }
 
-    /// Packs voxels as they are now into as many packets as it takes, those that lie together into one.
+    /// Encodes the present state of voxels in as many packets as needed; voxels that are close together share a packet.
     fn packets_of(&mut self, mut voxels: Vec<VoxelIndex>, repaired: &[u64]) -> Vec<Outgoing> {
         voxels.sort_by_cached_key(|&voxel| along_curve(voxel));
         voxels.dedup();
@@ -236,19 +236,20 @@ impl Sender {
         out
     }
 
-    /// A packet of as many of some items, at least one, as fit into it.
+    /// A packet of as many items as fit into it, at least one.
     pub(super) fn fit<T>(&mut self, items: &[T], packet: impl Fn(&[T]) -> Packet) -> (Vec<u8>, usize) {
         let limit = self.config.max_packet_bytes;
-        let mut count = self.voxels_a_packet.clamp(1, MAX_VOXELS_PER_PACKET).min(items.len());
+        let mut count = self.voxels_per_packet.clamp(1, MAX_VOXELS_PER_PACKET).min(items.len());
         loop {
             match packet(&items[..count]).encode() {
                 Ok(bytes) if bytes.len() <= limit || count <= 1 => {
-                    // For the next one: about as many as would have filled this one.
-                    self.voxels_a_packet = (count * (limit - limit / 64) / bytes.len().max(limit / 8)).max(1);
+                    // For the next packet: about as many as would have filled this one.
+                    self.voxels_per_packet =
+                        (count * (limit - limit / 64) / bytes.len().max(limit / 8)).max(1);
                     return (bytes, count);
                 }
                 Ok(bytes) => count = (count * (limit - limit / 64) / bytes.len()).clamp(1, count - 1),
-                // Too far apart for one packet, which one voxel never is but at the very end of all indices.
+                // Too far apart for one packet; a single voxel is not, except at the very end of all indices.
                 Err(_) if count > 1 => count /= 2,
                 Err(_) => return (Vec::new(), 1),
             }
@@ -256,7 +257,7 @@ impl Sender {
     }
 }
 
-/// A place on the Morton curve through all voxel indices.
+/// The position on the Morton curve through all voxel indices.
 fn along_curve(voxel: VoxelIndex) -> (u64, u64) {
     let part = |shift: u32| {
         let [x, y, z] = voxel.map(|k| ((k as u32 ^ 1 << 31) >> shift) as u16);

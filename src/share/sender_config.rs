@@ -5,21 +5,21 @@ use std::time::Duration;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SenderConfig {
-    /// Which voxels a frame holds. Default: those that changed since the last one.
+    /// Which voxels a frame holds. Default: those that changed since the last frame.
     pub policy: ExportPolicy,
-    /// How long a change may wait for others before its frame is sent. Longer: fewer bytes, since voxels that lie together
-    /// are sent together, and what changes back is not sent. Default: 1 s.
+    /// How long a change may wait for its frame. Longer means fewer bytes: nearby voxels share a packet, and changes
+    /// that revert are not sent. Default: 1 s.
     pub latency: Duration,
     /// Most bytes of a packet, 256 to 60000. Default: 1200, which fits into a datagram nearly anywhere.
     pub max_packet_bytes: usize,
-    /// Time between two statuses, with which receivers find out what they lack; four times as long while nothing
-    /// changes. Default: 2 s.
+    /// Time between two statuses, by which receivers notice what they lack; four times as long while nothing changes.
+    /// Default: 2 s.
     pub status_interval: Duration,
-    /// Packets whose voxels are kept to be sent again, at least 1; a million voxels at most. Default: 1024.
+    /// Packets whose voxels are kept for repairs, at least 1; a million voxels at most. Default: 1024.
     pub ring_packets: usize,
-    /// Most packets that answer one ask. Default: 16.
+    /// Most packets in answer to one request. Default: 16.
     pub packets_per_answer: usize,
-    /// Most bytes a second that all answers take together; asks beyond it are not answered. Default: 256 KiB.
+    /// Most bytes per second of all answers together; requests beyond it are ignored. Default: 256 KiB.
     pub answer_bytes_per_s: u64,
 }
 
@@ -37,7 +37,7 @@ impl Default for SenderConfig {
     }
 }
 
-/// What a sender has done.
+/// Counts of a sender.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct SenderCounts {
@@ -53,10 +53,10 @@ pub struct SenderCounts {
     pub updates_again: u64,
     /// Bytes of statuses to all.
     pub status_bytes: u64,
-    /// Asks that came in.
+    /// Requests received.
     pub asks: u64,
     /// Bytes of answers.
     pub answer_bytes: u64,
-    /// Asks not answered, since there were too many.
+    /// Requests refused because there were too many.
     pub refused_asks: u64,
 }

@@ -5,7 +5,7 @@ use crate::space::{
 };
 use std::collections::BTreeMap;
 
-/// A set of voxels, tile by tile, with digests: what a sender shares, and what a receiver has of it.
+/// A set of voxels by tile, with digests: what a sender shares and a receiver mirrors.
 #[derive(Clone, Debug)]
 pub struct VoxelSet {
     grid: Grid,
@@ -20,7 +20,7 @@ pub struct VoxelSet {
 pub(super) struct TileVoxels {
     pub(super) bricks: BTreeMap<BrickCode, BrickMask>,
     len: u64,
-    /// Unless a voxel changed since it was computed.
+    /// `None` after a change.
     digest: Option<[u8; 32]>,
 }
 
@@ -68,7 +68,7 @@ impl VoxelSet {
             .is_some_and(|mask| has(mask, code.place_in_brick()))
     }
 
-    /// Puts a voxel in, or takes it out; whether that changed anything. No set holds an index above
+    /// Adds a voxel or removes it; returns whether that changed the set. No set holds an index above
     /// [`LAST_VOXEL_INDEX`].
     pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) -> bool {
         if voxel.iter().any(|&k| k > LAST_VOXEL_INDEX) {
@@ -149,8 +149,7 @@ impl VoxelSet {
         })
     }
 
-    /// The voxels in a box. Looks at the tiles along x that reach into it, and at what lies in those that do: at what is
-    /// there, however large the box is.
+    /// The voxels in a box. The cost depends on the tiles and voxels that exist, not on the size of the box.
     pub(super) fn in_box(&self, voxels: &VoxelBox) -> impl Iterator<Item = VoxelIndex> {
         let last = voxels.end.map(|end| end.saturating_sub(1));
         let (first, last) = (self.grid.tile_of_voxel(voxels.min), self.grid.tile_of_voxel(last));
@@ -170,12 +169,12 @@ impl VoxelSet {
         })
     }
 
-    /// Where a voxel is in the order of the set.
+    /// The position of a voxel in the order of the set.
     pub fn position_of(&self, voxel: VoxelIndex) -> SetPosition {
         position_of(&self.grid, voxel)
     }
 
-    /// BLAKE3 over the sorted Morton codes of a tile's voxels, six bytes each, little-endian; `None` for a tile without.
+    /// BLAKE3 over the sorted Morton codes of a tile's voxels, six bytes each, little-endian; `None` for an empty tile.
     pub fn digest_of_tile(&mut self, tile: TileIndex) -> Option<[u8; 32]> {
         self.tiles.get_mut(&tile).map(TileVoxels::digest)
     }
@@ -253,7 +252,7 @@ impl TileVoxels {
     fn digest(&mut self) -> [u8; 32] {
         *self.digest.get_or_insert_with(|| {
             let mut hasher = blake3::Hasher::new();
-            // Many bricks at a time: the hash is several times as fast on long runs of bytes.
+            // Many bricks at a time: the hash is several times faster on long inputs.
             let mut codes = Vec::with_capacity(CODES_AT_A_TIME + 6 * BRICK_VOXELS);
             for (brick, mask) in &self.bricks {
                 codes.extend(places(*mask).flat_map(|place| {

@@ -1,6 +1,6 @@
 use crate::space::TileIndex;
 
-/// A place in the order of a set: by tile (x, then y, then z), then by the Morton code of the voxel's key.
+/// A position in the order of a set: by tile (x, then y, then z), then by the Morton code of the voxel's key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SetPosition {
     /// Which tile.
@@ -9,12 +9,12 @@ pub struct SetPosition {
     pub code: u64,
 }
 
-/// Places from one to another, both included.
+/// The positions from a first to a last one, inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SetRange {
-    /// The first place.
+    /// The first position.
     pub first: SetPosition,
-    /// The last one, not before the first.
+    /// The last position, not before the first.
     pub last: SetPosition,
 }
 
@@ -22,7 +22,7 @@ pub struct SetRange {
 pub(super) const LAST_CODE: u64 = (1 << 48) - 1;
 
 impl SetPosition {
-    /// The place behind this one.
+    /// The next position.
     pub(super) fn next(self) -> Self {
         if self.code < LAST_CODE {
             return Self { code: self.code + 1, ..self };
@@ -36,7 +36,7 @@ impl SetPosition {
         Self { tile, code: 0 }
     }
 
-    /// The place before this one, which is not the first of all.
+    /// The previous position; there must be one.
     pub(super) fn before(self) -> Self {
         if self.code > 0 {
             return Self { code: self.code - 1, ..self };
@@ -58,7 +58,7 @@ impl SetRange {
         last: SetPosition { tile: TileIndex::new(i32::MAX, i32::MAX, i32::MAX), code: LAST_CODE },
     };
 
-    /// The places of tiles from one to another, both included.
+    /// The positions of the tiles from a first to a last one, inclusive.
     pub fn of_tiles(first: TileIndex, last: TileIndex) -> Self {
         Self {
             first: SetPosition { tile: first, code: 0 },
@@ -66,12 +66,12 @@ impl SetRange {
         }
     }
 
-    /// Whether a place lies in the range.
+    /// Whether a position lies in the range.
     pub fn contains(&self, position: SetPosition) -> bool {
         self.first <= position && position <= self.last
     }
 
-    /// Whether the range ends where it begins or later.
+    /// Whether the last position is not before the first.
     pub fn is_valid(&self) -> bool {
         self.first <= self.last && self.first.code <= LAST_CODE && self.last.code <= LAST_CODE
     }

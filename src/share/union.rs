@@ -1,11 +1,11 @@
 use super::set::VoxelSet;
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::query::{Occupancy, Questions, Shape, UnknownAs, voxels_around};
+use crate::query::{Occupancy, Queries, Shape, UnknownAs, voxels_around};
 use crate::scan::{MAX_RAY_STEPS, RayWalk};
 use crate::space::{Grid, Point, VoxelIndex};
 
-/// A robot's own map together with the layers of others: occupied is what is occupied in any of them.
+/// A robot's own map with the layers of others: occupied is what is occupied in any of them.
 #[derive(Clone, Copy, Debug)]
 pub struct WithLayers<'a, V> {
     map: &'a V,
@@ -17,7 +17,7 @@ impl<'a, V: MapView> WithLayers<'a, V> {
     ///
     /// # Errors
     ///
-    /// A layer with other voxels than the map's.
+    /// A layer with another grid than the map's.
     pub fn new(map: &'a V, layers: &'a [&'a VoxelSet]) -> Result<Self> {
         let own = map.config().grid.resolution_m();
         for layer in layers {
@@ -31,8 +31,7 @@ impl<'a, V: MapView> WithLayers<'a, V> {
         Ok(Self { map, layers })
     }
 
-    /// What is known of the voxel that holds a point. Of a voxel that only layers have, the probability is not known: it
-    /// counts as 1.
+    /// The occupancy of the voxel that holds a point. A voxel that only layers have counts as probability 1.
     ///
     /// # Errors
     ///
@@ -44,7 +43,7 @@ impl<'a, V: MapView> WithLayers<'a, V> {
         Ok(if is_in_layer && !own.is_occupied() { Occupancy::Occupied(1.0) } else { own })
     }
 
-    /// The first voxel on a segment that is occupied (or unknown, if that is an obstacle).
+    /// The first obstacle on a segment: an occupied voxel, or an unknown one if `unknown` says so.
     ///
     /// # Errors
     ///
@@ -70,11 +69,11 @@ impl<'a, V: MapView> WithLayers<'a, V> {
         }
     }
 
-    /// A voxel that a sphere touches and that is occupied (or unknown, if that is an obstacle).
+    /// An obstacle that a sphere touches: an occupied voxel, or an unknown one if `unknown` says so.
     ///
     /// # Errors
     ///
-    /// A sphere that is not finite, one too large where unknown is an obstacle, a tile of the map that cannot be read.
+    /// A sphere that is not finite or too large for unknown obstacles, a tile of the map that cannot be read.
     pub fn sphere_collision(
         &self,
         center: Point,
@@ -82,14 +81,14 @@ impl<'a, V: MapView> WithLayers<'a, V> {
         unknown: UnknownAs,
     ) -> Result<Option<VoxelIndex>> {
         let own = self.map.collision(&Shape::Sphere { center, radius_m }, unknown)?;
-        // The map may call unknown what a layer has; either is an obstacle.
+        // A voxel unknown to the map may be occupied in a layer; either is an obstacle.
         if own.is_some() {
             return Ok(own);
         }
         let (grid, body) = (self.grid(), Shape::Sphere { center, radius_m });
         let around = voxels_around(grid, &body.bounds()?);
         for layer in self.layers {
-            // The bricks that are there, not the voxels that there could be.
+            // Visits existing bricks, not all voxels of the sphere.
             let found = layer.in_box(&around).find(|&voxel| body.touches_voxel(grid, voxel));
             if found.is_some() {
                 return Ok(found);

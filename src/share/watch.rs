@@ -8,14 +8,14 @@ use crate::space::{BrickMask, Grid, TileIndex, VoxelIndex};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
-/// Tells a sender what of an archive is occupied: voxels whose probability is at least a threshold.
+/// Passes an archive's occupied voxels, those of at least a threshold probability, to a sender.
 #[derive(Clone, Copy, Debug)]
 pub struct MapWatch {
     threshold_log_odds: f64,
 }
 
 impl MapWatch {
-    /// Voxels of at least this probability.
+    /// A watch with this threshold.
     ///
     /// # Errors
     ///
@@ -27,7 +27,7 @@ impl MapWatch {
         Ok(Self { threshold_log_odds: logit(threshold) })
     }
 
-    /// Looks at the whole map: once, before the first scan.
+    /// Passes the whole map: once, before the first scan.
     ///
     /// # Errors
     ///
@@ -37,7 +37,7 @@ impl MapWatch {
         view.tile_indices().into_iter().try_for_each(|tile| self.take_tile(view, tile, sender))
     }
 
-    /// Looks at the tiles that a scan, which the map has just taken, may have changed.
+    /// Passes the tiles that the scan may have changed; the map has just taken it.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ fn tiles_around(grid: Grid, max_range_m: Option<f64>, scan: &Scan) -> Option<[Ti
     let (mut low, mut high) = (origin, origin);
     for point in scan.points.iter().filter(|point| grid.voxel_of(**point).is_some()) {
         for k in 0..3 {
-            // One voxel more: what is cut at the range is rounded.
+            // One voxel more: rays cut at the max range are rounded.
             let reach = range + grid.resolution_m();
             low[k] = low[k].min(point[k].max(origin[k] - reach));
             high[k] = high[k].max(point[k].min(origin[k] + reach));
@@ -95,24 +95,24 @@ fn tiles_around(grid: Grid, max_range_m: Option<f64>, scan: &Scan) -> Option<[Ti
     Some([grid.tile_of(low)?, grid.tile_of(high)?])
 }
 
-/// Tells a sender what of a local map is occupied. A voxel that the map forgets for its age stays in the set; one that rays
-/// have found free leaves it.
+/// Passes a local map's occupied voxels to a sender. A voxel that leaves the map by age stays in the set; one that rays
+/// found free leaves the set.
 #[derive(Clone, Debug)]
 pub struct LocalWatch {
     seen: Option<Arc<LocalView>>,
 }
 
 impl LocalWatch {
-    /// A watch that has seen nothing.
+    /// A watch before the first scan.
     pub fn new() -> Self {
         Self { seen: None }
     }
 
-    /// Looks at what a scan has changed, which the map has just taken.
+    /// Passes the changes of a scan that the map has just taken.
     ///
     /// # Errors
     ///
-    /// A sender whose voxels have another size.
+    /// A sender with another resolution.
     pub fn take_scan(
         &mut self,
         map: &LocalMap,
@@ -156,7 +156,7 @@ impl Default for LocalWatch {
     }
 }
 
-/// The voxels of a set on the rays of a scan; no ray passes what was forgotten for its age.
+/// The voxels of a set that rays of a scan pass; no ray passes voxels that left by age.
 fn passed_by_rays(grid: &Grid, scan: &Scan, mut wanted: FxHashSet<VoxelIndex>) -> FxHashSet<VoxelIndex> {
     let mut found = FxHashSet::default();
     let Some(start) = grid.voxel_of(scan.origin) else { return found };

@@ -17,7 +17,7 @@ impl fmt::Display for Aabb {
 }
 
 impl Aabb {
-    /// The box between two corners, in whichever order they come.
+    /// The box between two corners in any order.
     pub fn from_corners(a: Point, b: Point) -> Self {
         Self { min: std::array::from_fn(|k| a[k].min(b[k])), max: std::array::from_fn(|k| a[k].max(b[k])) }
     }

@@ -8,8 +8,8 @@ pub const BRICK_VOXELS: usize = 512;
 
 /// A brick: 8 x 8 x 8 voxels aligned to the octree, addressed by the upper 39 bits of their Morton code.
 ///
-/// Bricks follow the grid of keys, not the tiles: a brick on the border of two tiles exists in both, each with
-/// its own voxels.
+/// Bricks are aligned to keys, not to tiles: a brick on the border of two tiles exists in both, each with its own
+/// voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BrickCode(pub u64);
 
@@ -73,7 +73,7 @@ const fn below_masks() -> [[BrickMask; 9]; 3] {
     let mut masks = [[[0; 8]; 9]; 3];
     let mut code = 0;
     while code < BRICK_VOXELS {
-        // Not a place: all voxels, whatever their order.
+        // Not a place: the order of the voxels does not matter here.
         let voxel = [code as i32 & 7, code as i32 >> 3 & 7, code as i32 >> 6];
         let place = place_of_voxel(voxel);
         let mut axis = 0;

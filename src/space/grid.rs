@@ -5,13 +5,13 @@ use thiserror::Error;
 /// Most voxels along the edge of a tile.
 pub const MAX_VOXELS_PER_TILE_EDGE: u32 = 1024;
 
-/// The largest index of a voxel along an axis. The one behind it is the end of half-open boxes, and no point's voxel.
+/// The largest index of a voxel along an axis. The next one is only the end of half-open boxes.
 pub const LAST_VOXEL_INDEX: i32 = i32::MAX - 1;
 
-/// The two lengths that cut space: voxels of `resolution_m`, tiles of `tile_size_m`.
+/// The grid: voxels of `resolution_m`, tiles of `tile_size_m`.
 ///
-/// The voxel of a coordinate `x` is `floor(x * (1 / resolution))`, OctoMap's own arithmetic: a coordinate that
-/// is a multiple of the resolution may land in the lower neighbour, as it does there.
+/// The voxel of a coordinate `x` is `floor(x * (1 / resolution))`, OctoMap's arithmetic: a multiple of the resolution
+/// may fall into the lower neighbour, as in OctoMap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     resolution_m: f64,
@@ -22,7 +22,7 @@ pub struct Grid {
     tiles_per_voxel: i64,
 }
 
-/// Why two lengths do not make a grid.
+/// Why two lengths are not a valid grid.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum GridError {
@@ -109,7 +109,7 @@ impl Grid {
         point_m.map(|coordinate| coordinate * self.inv_resolution)
     }
 
-    /// The voxel that holds a point; `None` for a point that is not finite or whose index leaves `i32`.
+    /// The voxel that holds a point; `None` if the point is not finite or its index exceeds `i32`.
     #[inline]
     pub fn voxel_of(&self, point_m: Point) -> Option<VoxelIndex> {
         Self::voxel_of_units(self.to_voxel_units(point_m))
@@ -118,7 +118,7 @@ impl Grid {
     /// The voxel of a point in units of voxels; `None` as for [`Grid::voxel_of`].
     #[inline]
     pub(crate) fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
-        // False for NaN, too.
+        // Also false for NaN.
         let is_in_range = |x: f64| x >= f64::from(i32::MIN) && x < f64::from(i32::MAX);
         point.iter().all(|&x| is_in_range(x)).then(|| point.map(floor))
     }
@@ -126,8 +126,8 @@ impl Grid {
     /// The tile that holds a voxel.
     #[inline]
     pub fn tile_of_voxel(&self, voxel: VoxelIndex) -> TileIndex {
-        // Integer division is slow, so this is the upper half of a product. The middle of a voxel is at least 2^-11
-        // tiles from a border between tiles, and the quotient is off by less than 2^-32.
+        // The upper half of a product, because integer division is slow. The middle of a voxel is at least 2^-11 tiles
+        // from a tile border, and the quotient is off by less than 2^-32.
         let tile_of = |index: i32| {
             let middle = 2 * i64::from(index) + 1; // In half voxels, so the product is in units of 2^-64.
             ((i128::from(middle) * i128::from(self.tiles_per_voxel)) >> 64) as i32
@@ -135,7 +135,7 @@ impl Grid {
         TileIndex::from(voxel.map(tile_of))
     }
 
-    /// The tile that holds a point, decided from the point's voxel; `None` as for [`Grid::voxel_of`].
+    /// The tile of the point's voxel; `None` as for [`Grid::voxel_of`].
     #[inline]
     pub fn tile_of(&self, point_m: Point) -> Option<TileIndex> {
         self.voxel_of(point_m).map(|voxel| self.tile_of_voxel(voxel))
@@ -146,18 +146,18 @@ impl Grid {
         voxel.map(|index| (f64::from(index) + 0.5) * self.resolution_m)
     }
 
-    /// The lower border in metres of the voxels with this index along an axis, without the noise of the multiplication
-    /// (0.30000000000000004 is 0.3): to be shown and stored.
+    /// The lower border in metres of the voxels with this index along an axis, without rounding noise (0.3 instead of
+    /// 0.30000000000000004): for display and storage.
     pub fn corner_m(&self, index: i32) -> f64 {
         let corner_m = f64::from(index) * self.resolution_m;
         let readable_m = readable(corner_m);
-        // Of voxels of nanometres, digits would be lost.
+        // For voxels of nanometres digits would be lost.
         if (readable_m - corner_m).abs() < 1e-3 * self.resolution_m { readable_m } else { corner_m }
     }
 
     /// The voxels whose center is in a box.
     pub fn voxels_in(&self, region: &Aabb) -> VoxelBox {
-        // Centers ascend with their index, so the first one from a bound on is found by halving.
+        // Centers ascend with their index, so a binary search finds the first one from a bound on.
         let first_from = |bound_m: f64| {
             let (mut low, mut high) = (i64::from(i32::MIN), i64::from(i32::MAX));
             while low < high {
@@ -179,15 +179,14 @@ impl Grid {
     }
 }
 
-/// The floor of a number in the range of `i32`; not every processor has an instruction for it, nor for a conversion
-/// that saturates.
+/// The floor of a number in the range of `i32`, without instructions that not every processor has.
 #[inline]
 fn floor(number: f64) -> i32 {
-    // Added to a number in this range, it leaves the nearest whole number in the lowest bits.
+    // Added to a number in this range, this leaves the nearest integer in the lowest bits.
     const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
     let rounded = number + ROUND;
     let nearest = rounded.to_bits() as i32;
-    // What is above the range is rounded out of it, and comes back.
+    // A number that rounds up out of the range wraps back.
     nearest.wrapping_sub(i32::from(rounded - ROUND > number))
 }
 
@@ -195,7 +194,7 @@ fn clamp_to_i32(value: i64) -> i32 {
     value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }
 
-/// Rounds away the noise of a multiplication (0.30000000000000004 to 0.3) in a length shown to a person.
+/// Removes rounding noise (0.3 instead of 0.30000000000000004) from a length for display.
 fn readable(length_m: f64) -> f64 {
     format!("{length_m:.9}").parse().unwrap_or(length_m)
 }

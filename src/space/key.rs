@@ -2,19 +2,19 @@ use super::{MortonCode, VoxelIndex};
 
 /// The 16-bit key of a voxel along each axis, as OctoMap stores it: `(index + 32768) mod 65536`.
 ///
-/// Inside OctoMap's range (indices -32768 to 32767) this *is* OctoMap's key. Beyond it the key repeats every
-/// 65536 voxels and the tile that holds the voxel tells which repetition is meant.
+/// Inside OctoMap's range (indices -32768 to 32767) this *is* OctoMap's key. Beyond it the key repeats every 65536
+/// voxels; the voxel's tile resolves the ambiguity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct VoxelKey(pub [u16; 3]);
 
 impl VoxelKey {
-    /// The key of a voxel index; exact for any index, unique within any 65536 consecutive voxels.
+    /// The key of a voxel index; unique within any 65536 consecutive voxels.
     #[inline]
     pub const fn from_index(index: VoxelIndex) -> Self {
         Self([key_of(index[0]), key_of(index[1]), key_of(index[2])])
     }
 
-    /// The voxel with this key whose index lies in the 65536 voxels that begin at `min` along each axis.
+    /// The voxel with this key among the 65536 voxels from `min` on along each axis.
     ///
     /// With `min` the lowest voxel of a tile this is the voxel of that tile.
     pub const fn to_index_from(self, min: VoxelIndex) -> VoxelIndex {

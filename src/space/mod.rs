@@ -1,12 +1,12 @@
-//! Metres to integers and back; the only place where that happens.
+//! Metres to integers and back; this happens nowhere else.
 //!
 //! ```text
 //! point (f64 metres) -> voxel index (i32) -> tile index (i32)      grid
 //!                                         -> key (u16) -> Morton   key, morton
 //! ```
 //!
-//! A point belongs to a voxel by arithmetic on its coordinates; a voxel belongs to a tile by integer
-//! division of its index. No voxel has two homes.
+//! A point belongs to a voxel by arithmetic on its coordinates; a voxel belongs to a tile by integer division of its
+//! index. So every voxel belongs to exactly one tile.
 
 mod aabb;
 mod brick;

@@ -38,7 +38,7 @@ impl MortonCode {
     }
 }
 
-/// Puts bit `k` of the input at bit `3k`.
+/// Moves bit `k` of the input to bit `3k`.
 const fn spread(bits: u16) -> u64 {
     let mut code = bits as u64;
     code = (code | code << 16) & 0x0000_0000_ff00_00ff;
@@ -47,7 +47,7 @@ const fn spread(bits: u16) -> u64 {
     (code | code << 2) & EVERY_THIRD_BIT
 }
 
-/// Takes bit `3k` of the input as bit `k`.
+/// Moves bit `3k` of the input to bit `k`.
 const fn gather(code: u64) -> u16 {
     let mut bits = code & EVERY_THIRD_BIT;
     bits = (bits | bits >> 2) & 0x0000_0c30_c30c_30c3;

@@ -1,6 +1,6 @@
 use std::fmt;
 
-/// Which tile: `floor(coordinate / tile_size)` along x, y and z. Ordered by x, then y, then z.
+/// Index of a tile: `floor(coordinate / tile_size)` along x, y and z. Ordered by x, then y, then z.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TileIndex {
     /// Index along x.

@@ -4,16 +4,16 @@ use rustc_hash::FxHashMap;
 use std::fmt;
 use std::iter::Peekable;
 
-/// What is known of each of many tiles, in order and in little memory: all but what changed lately is packed, some twenty
-/// bytes for a tile's stamp and five for its index alone.
+/// A sorted map from tiles to values in little memory: all but recent changes are packed, some twenty bytes for a
+/// tile's file checksums and five for its index alone.
 ///
 /// ```text
 /// recent  hash map: tile -> value, or that the tile was taken out of the blocks
 /// blocks  sorted: first tile, bytes of up to 64 tiles: differences of indices and of values, as variable-length integers
 /// ```
 ///
-/// Once a sixteenth of the tiles is recent, these are merged into the blocks that they lie in. So a change costs the packing
-/// of some sixteen tiles, and a look-up the unpacking of at most 64.
+/// Once a sixteenth of the tiles is recent, these are merged into their blocks. So a change costs the packing of some
+/// sixteen tiles, and a look-up the unpacking of at most 64.
 #[derive(Clone)]
 pub struct TileTable<V> {
     recent: FxHashMap<TileIndex, Option<V>>,
@@ -22,11 +22,11 @@ pub struct TileTable<V> {
     tiles: usize,
 }
 
-/// What a [`TileTable`] can hold.
+/// A value of a [`TileTable`].
 pub trait TileValue: Copy + Default {
-    /// Appends the value, given the one before it.
+    /// Appends the value as a difference from the previous one.
     fn pack(self, before: Self, out: &mut Vec<u8>);
-    /// Takes the value from the front, given the one before it.
+    /// Reads the value from the front; `before` is the previous one.
     fn unpack(before: Self, input: &mut &[u8]) -> Self;
 }
 
@@ -38,7 +38,7 @@ struct Block {
 
 /// Most tiles of a block.
 const BLOCK_TILES: usize = 64;
-/// So many recent tiles are never too many.
+/// So many recent tiles are always allowed.
 const LEAST_RECENT: usize = 1024;
 /// Most recent tiles, as a part of all.
 const RECENT_PART: usize = 16;
@@ -64,7 +64,7 @@ impl<V: TileValue> TileTable<V> {
             + self.block_bytes
     }
 
-    /// What is known of a tile.
+    /// The value of a tile.
     pub fn get(&self, tile: TileIndex) -> Option<V> {
         match self.recent.get(&tile) {
             Some(value) => *value,
@@ -72,19 +72,19 @@ impl<V: TileValue> TileTable<V> {
         }
     }
 
-    /// Whether a tile is there.
+    /// Whether the table has a tile.
     pub fn contains(&self, tile: TileIndex) -> bool {
         self.get(tile).is_some()
     }
 
-    /// Puts a tile in, in place of what was known of it.
+    /// Sets the value of a tile.
     pub fn insert(&mut self, tile: TileIndex, value: V) {
         self.tiles += usize::from(!self.contains(tile));
         self.recent.insert(tile, Some(value));
         self.pack_if_due();
     }
 
-    /// Takes a tile out; tells whether it was there.
+    /// Removes a tile; returns whether it was there.
     pub fn remove(&mut self, tile: TileIndex) -> bool {
         if !self.contains(tile) {
             return false;
@@ -102,7 +102,7 @@ impl<V: TileValue> TileTable<V> {
         true
     }
 
-    /// All tiles, in order.
+    /// All tiles and values, in order.
     pub fn iter(&self) -> impl Iterator<Item = (TileIndex, V)> {
         let mut recent: Vec<_> = self.recent.iter().map(|(&tile, &value)| (tile, value)).collect();
         recent.sort_unstable_by_key(|&(tile, _)| tile);
@@ -110,12 +110,12 @@ impl<V: TileValue> TileTable<V> {
         Merged { packed: packed.peekable(), recent: recent.into_iter().peekable() }
     }
 
-    /// All tiles without what is known of them, in order.
+    /// All tiles, in order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
         self.iter().map(|(tile, _)| tile)
     }
 
-    /// What is known of each tile, in their order.
+    /// All values, in the order of the tiles.
     pub fn values(&self) -> impl Iterator<Item = V> {
         self.iter().map(|(_, value)| value)
     }
@@ -133,7 +133,7 @@ impl<V: TileValue> TileTable<V> {
         }
     }
 
-    /// Merges recent tiles into the blocks that they lie in; the others stay as they are.
+    /// Merges recent tiles into their blocks; other blocks stay as they are.
     fn pack(&mut self) {
         let mut recent: Vec<_> = std::mem::take(&mut self.recent).into_iter().collect();
         recent.sort_unstable_by_key(|&(tile, _)| tile);
@@ -166,7 +166,7 @@ impl<V: TileValue> TileTable<V> {
 }
 
 impl Block {
-    /// Packs tiles, which are in order and at least one.
+    /// Packs a non-empty sorted list.
     fn of<V: TileValue>(tiles: &[(TileIndex, V)]) -> Self {
         let first = tiles.first().map(|&(tile, _)| tile).unwrap_or_default();
         let (mut bytes, mut before) = (Vec::new(), (first, V::default()));
@@ -194,21 +194,21 @@ impl Block {
     }
 }
 
-/// Appends a number as a variable-length integer; negative ones of small size are short too.
+/// Appends a number as a varint; small negative numbers are short too.
 pub fn put_number(number: impl VarInt, out: &mut Vec<u8>) {
     let mut bytes = [0; 10];
     let length = number.encode_var(&mut bytes);
     out.extend_from_slice(&bytes[..length]);
 }
 
-/// Takes a number from the front. What is packed is our own memory, so that it is there.
+/// Reads a number from the front. Packed bytes never leave memory, so it is always there.
 pub fn take_number<N: VarInt + Default>(input: &mut &[u8]) -> N {
     let (number, length) = N::decode_var(input).unwrap_or_default();
     *input = input.get(length..).unwrap_or_default();
     number
 }
 
-/// Takes four bytes from the front, of a number that a variable length would not make shorter.
+/// Reads four bytes from the front, for numbers that a varint would not shorten.
 pub fn take_u32(input: &mut &[u8]) -> u32 {
     let (number, rest) =
         input.split_first_chunk().map_or(([0; 4], &[][..]), |(number, rest)| (*number, rest));
@@ -216,7 +216,7 @@ pub fn take_u32(input: &mut &[u8]) -> u32 {
     u32::from_le_bytes(number)
 }
 
-/// Two sequences of tiles in order as one, in which what is recent holds.
+/// Merges two sorted sequences of tiles; recent values win.
 struct Merged<P: Iterator, R: Iterator> {
     packed: Peekable<P>,
     recent: Peekable<R>,
@@ -283,15 +283,15 @@ impl<V: TileValue + fmt::Debug> fmt::Debug for TileTable<V> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{FileStamp, TileStamp};
+    use crate::store::{FileChecksum, TileVersion};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    fn stamp(seed: u64) -> TileStamp {
+    fn stamp(seed: u64) -> TileVersion {
         let (bytes, crc) = (18 * (seed % 5000) + 96, (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as u32);
-        let table = FileStamp { bytes, crc };
-        let octree = FileStamp { bytes: bytes / 30, crc: !crc };
-        TileStamp {
+        let table = FileChecksum { bytes, crc };
+        let octree = FileChecksum { bytes: bytes / 30, crc: !crc };
+        TileVersion {
             scan_number: seed % 977,
             table,
             octree,

@@ -1,11 +1,11 @@
 use rustc_hash::FxHashMap;
 use std::hint::select_unpredictable;
 
-/// Numbers of cells of an integer grid, such as tiles: which number, if any, has this cell?
+/// A map from cells of an integer grid, such as tiles, to numbers.
 ///
-/// The grid is wrapped around a torus that is as large along each axis as keeps apart the cells that are there, a
-/// power of two. Cells that lie together then never meet in a slot, and a look-up is one comparison without a branch
-/// to guess. A cell that would need too large a torus goes to a hash map.
+/// The grid is wrapped around a torus whose sizes are powers of two, just large enough to keep the present cells apart.
+/// Cells that are close together never share a slot, and a look-up is one comparison without an unpredictable branch. A
+/// cell that would need too large a torus goes to a hash map.
 #[derive(Clone, Debug)]
 pub struct Torus {
     /// Along each axis the size less one, and where its bits begin in a slot's number.
@@ -27,10 +27,10 @@ struct Slot {
 }
 
 impl Torus {
-    /// What a cell has that is not there: numbers begin with 1.
+    /// The number of an absent cell; numbers start at 1.
     pub const NONE: u32 = 0;
 
-    /// Slots that a torus may have, whatever the number of cells, and for each of its cells.
+    /// Slots that a torus may have for any number of cells, and per cell.
     const LEAST_SLOTS: usize = 64;
     const MOST_SLOTS_A_CELL: usize = 16;
 
@@ -62,7 +62,7 @@ impl Torus {
         select_unpredictable(differ == 0, slot.number, Self::NONE)
     }
 
-    /// Gives a cell a number, from 1, in place of the one it may have.
+    /// Sets the number of a cell, from 1.
     pub fn insert(&mut self, cell: Cell, number: u32) {
         self.len += usize::from(self.get(cell) == Self::NONE);
         if self.put(cell, number) {
@@ -77,7 +77,7 @@ impl Torus {
         }
     }
 
-    /// Puts a cell into its slot, unless another is there.
+    /// Puts a cell into its slot; returns `false` if another cell is there.
     fn put(&mut self, cell: Cell, number: u32) -> bool {
         let at = self.slot_of(cell);
         let slot = &mut self.slots[at];
@@ -88,8 +88,8 @@ impl Torus {
         is_free
     }
 
-    /// How two cells that meet in a slot can be kept apart: by so many more bits along this axis. `None` if that
-    /// takes too many slots.
+    /// How to separate two cells that share a slot: the axis, and the number of bits to add. `None` if that takes too
+    /// many slots.
     fn bits_to_part(&self, a: Cell, b: Cell) -> Option<(usize, u32)> {
         let bits_along = |axis: usize| {
             let differ = (a[axis] ^ b[axis]) as u32;
@@ -98,11 +98,11 @@ impl Torus {
         };
         let (axis, bits) = (0..3).filter_map(bits_along).min_by_key(|&(_, bits)| bits)?;
         let most = (Self::MOST_SLOTS_A_CELL * self.len).max(Self::LEAST_SLOTS);
-        // Shifted in 128 bits, in which nothing is lost: there are 32 bits more at most.
+        // In 128 bits nothing is lost: at most 32 bits are added.
         ((self.slots.len() as u128) << bits <= most as u128).then_some((axis, bits))
     }
 
-    /// Makes the torus larger along an axis, and takes in what may no longer be too far for it.
+    /// Enlarges the torus along an axis, and moves cells in from the hash map that now fit.
     fn enlarge(&mut self, axis: usize, bits: u32) {
         self.masks[axis] = ((self.masks[axis] + 1) << bits) - 1;
         self.shifts = shifts(self.masks);
@@ -144,7 +144,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::HashMap;
 
-    /// Cells that lie together, along a line, and anywhere.
+    /// Cells that are close together, along a line, and anywhere.
     fn any_cell() -> impl Strategy<Value = Cell> {
         prop_oneof![
             3 => prop::array::uniform3(-6..6_i32),

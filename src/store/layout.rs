@@ -1,4 +1,4 @@
-use super::snapshot_name::SnapshotName;
+use super::snapshots::snapshot_name::SnapshotName;
 use crate::config::Storage;
 use crate::space::TileIndex;
 use std::path::{Path, PathBuf};
@@ -112,9 +112,9 @@ impl Layout {
         number.parse().ok().filter(|flush_number: &u64| flush_number.to_string() == number)
     }
 
-    /// Updates that wait for a tile while the map is written to.
-    pub fn waiting(&self, tile: TileIndex) -> PathBuf {
-        self.tile_folder(tile).join(WAITING)
+    /// Spilled updates of a tile, while the map is written to.
+    pub fn spill(&self, tile: TileIndex) -> PathBuf {
+        self.tile_folder(tile).join(SPILL)
     }
 
     /// The folder of snapshots.
@@ -144,7 +144,7 @@ impl Layout {
 }
 
 /// The name of the file of updates that wait for a tile. Like all that no commit names, it ends with `.next`.
-pub(super) const WAITING: &str = "updates.next";
+pub(super) const SPILL: &str = "updates.next";
 
 /// The name of the folder for what repair takes out of the map.
 pub const QUARANTINE: &str = "quarantine";

@@ -1,9 +1,9 @@
 //! The folder of a map as a whole: its lock, its two own files, its tile folders.
 
-use super::commit_log::{CommitLog, Commits};
+use super::commit::commit_log::{CommitLog, Commits};
+use super::commit::metadata::Metadata;
 use super::disk::{Disk, DiskLock, DiskRead};
 use super::layout::{Layout, tile_of_folder};
-use super::metadata::Metadata;
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::TileIndex;
 use rustc_hash::FxHashSet;

@@ -1,19 +1,21 @@
-use super::commit_log::{CommitLog, Commits};
+use super::commit::checkpoint::Checkpoint;
+use super::commit::commit_log::{CommitLog, Commits};
+use super::commit::committer::Committer;
+use super::commit::metadata::Metadata;
 use super::disk::{Disk, DiskRead};
 use super::layout::{Layout, TileFile};
+use super::map_files::MapFiles;
 use super::map_folder::{self, Lock};
-use super::metadata::Metadata;
 use super::place;
-use super::readers::Readers;
-use super::recovery::{recover, remove_uncommitted};
-use super::snapshot_list::SnapshotList;
-use super::snapshot_name::SnapshotName;
-use super::snapshots::{Snapshots, seen_by};
-use super::tile_location::{StoredTile, TileLocation};
-use super::tile_stamp::TileStamp;
+use super::recovery::recover::{recover, remove_uncommitted};
+use super::snapshots::kept_tables::KeptTables;
+use super::snapshots::seen_tables::seen_by;
+use super::snapshots::snapshot_name::SnapshotName;
+use super::tiles::tile_location::{StoredTile, TileLocation};
+use super::tiles::tile_version::TileVersion;
+use super::tiles::tile_versions::TileVersions;
 use crate::error::{Error, FormatError, Result};
-use crate::space::{TileIndex, TileTable};
-use rustc_hash::FxHashSet;
+use crate::space::TileIndex;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -23,62 +25,29 @@ use std::sync::Arc;
 ///
 /// A tile is written beside its committed version, as `*.next`. [`TileStore::commit`] makes all of them durable,
 /// appends one synced record to the log (that is the commit), and renames them over the committed versions.
+///
+/// This file opens maps and reads tiles; `flush` writes and commits; `snapshot_store` keeps snapshots.
 #[derive(Debug)]
 pub struct TileStore {
-    pub(super) disk: Arc<dyn Disk>,
-    pub(super) layout: Layout,
-    pub(super) metadata: Metadata,
-    /// `None` for a map of the seed's format, and for nothing else.
-    pub(super) log: Option<CommitLog>,
-    pub(super) commits: Commits,
-    /// Whether the log ends with its last commit. After a failed append its end is unknown.
-    pub(super) is_log_settled: bool,
-    /// Flush number in the `metadata.json` on disk; `None` in the seed's format. A crash can leave it behind the log.
-    pub(super) written_flush: Option<u64>,
-    /// Versions written since the last commit.
-    pub(super) next: TileTable<TileStamp>,
-    /// Versions of which a sync failed: the medium may hold anything, whatever later syncs say.
-    pub(super) suspect: FxHashSet<TileIndex>,
-    /// Tiles that the next commit takes out of the map.
-    pub(super) removed: FxHashSet<TileIndex>,
-    /// Committed versions that still have their `*.next` names.
-    pub(super) unrenamed: TileTable<()>,
-    /// Tiles whose versions have their names, but perhaps not on the medium.
-    pub(super) renamed: TileTable<()>,
-    /// Tiles that a commit took out of the map, with files that are still there or whose absence may not be durable.
-    pub(super) unremoved: BTreeSet<TileIndex>,
-    /// Tile folders that the log does not know: never read, never overwritten.
-    pub(super) strays: FxHashSet<TileIndex>,
+    pub(super) files: MapFiles,
+    /// Which tiles there are, committed or written since.
+    pub(super) versions: TileVersions,
+    /// The log, the metadata and the lock.
+    pub(super) committer: Committer,
+    /// What the last commit left to do.
+    pub(super) checkpoint: Checkpoint,
+    /// Replaced tables that readers and snapshots see; a writer's.
+    pub(super) kept: KeptTables,
     /// How many files of an earlier writer opening has removed.
     leftovers_removed: u64,
-    /// Tiles of a map of the seed's format, which has no log.
-    pub(super) foreign: FxHashSet<TileIndex>,
-    /// A writer's.
-    pub(super) readers: Readers,
-    /// A writer's.
-    pub(super) snapshots: Snapshots,
-    /// The map's snapshots; `None` where nothing says which there are.
-    pub(super) listed: Option<SnapshotList>,
-    /// Whether the log says so too.
-    pub(super) is_list_logged: bool,
-    /// A snapshot that is committed and may not have its name yet.
-    pub(super) unnamed_snapshot: Option<SnapshotName>,
-    /// A snapshot whose deletion is committed and whose file may be there still.
-    pub(super) deleted_snapshot: Option<SnapshotName>,
     /// The snapshot that was opened in place of the map as it is.
-    pub(super) snapshot: Option<SnapshotName>,
-    /// Held while the store may write.
-    pub(super) lock: Option<Lock>,
+    pub(super) opened_snapshot: Option<SnapshotName>,
     /// Held by a reader, so that a writer keeps what it sees.
     #[expect(dead_code, reason = "held for its drop")]
     shared_metadata: Option<SharedMetadata>,
 }
 
 struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Box<dyn DiskRead>);
-
-/// What a commit takes for each tile that it changes, beside the index: its place among those that the last record names and
-/// among those that wait for their names.
-const COMMIT_BYTES_OF_TILE: usize = 30;
 
 /// How often a reader begins to open a map again because a flush came in between.
 const OPEN_ATTEMPTS: usize = 100;
@@ -103,7 +72,7 @@ impl TileStore {
         let log = CommitLog::write_whole(&*disk, &log_path, map_id, &commits, &metadata.to_text())
             .map_err(|error| Error::io(&log_path, "write", error))?;
         let mut store = Self::new(disk, layout, metadata, Some(log), commits);
-        store.lock = Some(lock);
+        store.committer.begin_writing(lock, false);
         store.write_metadata()?;
         Ok(store)
     }
@@ -116,40 +85,44 @@ impl TileStore {
         let lock = Lock::take(&*disk, &layout)?;
         let metadata = map_folder::read_metadata(&*disk, &layout)?;
         let mut store = Self::read(disk, layout, metadata)?;
-        store.lock = Some(lock);
-        let path = store.layout.metadata();
-        let watch = store.disk.watch(&path).map_err(|error| Error::io(&path, "open", error))?;
-        store.readers.watch(store.written_flush.unwrap_or_default(), watch);
-        if store.commits.flush_number == 0 {
+        let is_torn = store.committer.map_id().is_some() && store.commits().torn.is_some();
+        store.committer.begin_writing(lock, is_torn);
+        let path = store.layout().metadata();
+        let watch = store.disk().watch(&path).map_err(|error| Error::io(&path, "open", error))?;
+        store.kept.watch(store.committer.written_flush().unwrap_or_default(), watch);
+        if store.commits().flush_number == 0 {
             // Of a creation that was killed no name may be durable yet.
-            store.sync_folder(folder)?;
+            store.files.sync_map_folder()?;
         }
-        if store.log.is_some() {
-            store.is_log_settled = store.commits.torn.is_none();
+        if store.map_id().is_some() {
             if store.is_metadata_behind() {
                 // The last record may be one that a killed writer wrote and could not sync, and syncing the same bytes
                 // again proves nothing: written anew, it is durable before it is acted upon.
-                store.replace_log()?;
+                store.committer.replace_log(&store.files, store.versions.commits())?;
             }
-            let map_id = store.map_id().unwrap_or_default();
-            let (disk, layout, listed) = (&*store.disk, &store.layout, store.listed.as_ref());
-            let leftovers = recover(disk, layout, &store.commits, map_id, listed)?;
-            store.snapshots = leftovers.snapshots;
-            if store.listed.is_none() && !store.snapshots.found().is_empty() {
-                // Of a version that did not list them: the next commit does.
-                store.listed = Some(store.snapshots.found().clone());
-                store.is_list_logged = false;
-            }
-            store.strays = leftovers.strays;
-            store.leftovers_removed = leftovers.removed;
-            store.unrenamed = leftovers.unrenamed;
-            store.renamed = leftovers.renamed;
-            store.unremoved = store.commits.last_removed.iter().copied().collect();
-            store.put_in_place()?;
+            store.recover()?;
         } else {
-            store.leftovers_removed = remove_uncommitted(&*store.disk, &store.layout, &store.foreign)?;
+            let foreign = store.versions.foreign();
+            store.leftovers_removed = remove_uncommitted(&**store.disk(), store.layout(), foreign)?;
         }
         Ok(store)
+    }
+
+    /// Brings the files to the state of the last commit.
+    fn recover(&mut self) -> Result<()> {
+        let map_id = self.map_id().unwrap_or_default();
+        let listed = self.committer.snapshots();
+        let found = recover(&**self.disk(), self.layout(), self.commits(), map_id, listed)?;
+        if listed.is_none() && !found.snapshots.found().is_empty() {
+            // Of a version that did not list them: the next commit does.
+            self.committer.adopt_snapshots(found.snapshots.found().clone());
+        }
+        self.kept.set_snapshots(found.snapshots);
+        self.versions.set_orphans(found.orphans);
+        self.leftovers_removed = found.removed;
+        let removed = &self.versions.commits().last_removed;
+        self.checkpoint = Checkpoint::of_leftovers(found.unrenamed, found.renamed, removed);
+        self.run_checkpoint()
     }
 
     /// Opens a map for reading beside a writer: takes no lock and writes nothing. The store sees the last flush, and
@@ -164,7 +137,7 @@ impl TileStore {
             // Where the log is ahead of it, the writer does not know which flush is read: a moment later it does, unless it was
             // killed.
             let is_known = !store.is_metadata_behind() || attempt + 1 >= OPEN_ATTEMPTS / 2;
-            if now.ext.map(|ext| ext.flush_number) == store.written_flush && is_known {
+            if now.ext.map(|ext| ext.flush_number) == store.committer.written_flush() && is_known {
                 return Ok(Self { shared_metadata: Some(SharedMetadata(shared)), ..store });
             }
             if !is_known {
@@ -198,7 +171,8 @@ impl TileStore {
             (None, Some((log, commits))) if commits.flush_number > 0 => (log, commits),
             (None, _) => {
                 let foreign = map_folder::list_foreign_tiles(&*disk, &layout)?;
-                return Ok(Self { foreign, ..Self::new(disk, layout, metadata, None, Commits::default()) });
+                let store = Self::new(disk, layout, metadata, None, Commits::default());
+                return Ok(Self { versions: TileVersions::of_foreign(foreign), ..store });
             }
         };
         let written = metadata.ext.as_ref();
@@ -221,7 +195,8 @@ impl TileStore {
             Some(committed) if written_flush != Some(commits.flush_number) => committed.as_of(&commits),
             _ => metadata,
         };
-        Ok(Self { written_flush, ..Self::new(disk, layout, metadata, Some(log), commits) })
+        let committer = Committer::new(Some(log), metadata.clone(), written_flush);
+        Ok(Self { committer, ..Self::new(disk, layout, metadata, Some(log), commits) })
     }
 
     pub(super) fn new(
@@ -232,88 +207,64 @@ impl TileStore {
         commits: Commits,
     ) -> Self {
         let layout = layout.with_storage(metadata.storage());
-        let (next, suspect, removed, unrenamed, renamed) = Default::default();
-        let (unremoved, strays, foreign, readers, snapshots) = Default::default();
-        let listed = metadata.ext.as_ref().and_then(|ext| ext.snapshots.clone());
         Self {
-            disk,
-            layout,
-            metadata,
-            log,
-            commits,
-            is_log_settled: true,
-            written_flush: None,
-            next,
-            suspect,
-            removed,
-            unrenamed,
-            renamed,
-            unremoved,
-            strays,
+            files: MapFiles::new(disk, layout),
+            versions: TileVersions::new(commits),
+            committer: Committer::new(log, metadata, None),
+            checkpoint: Checkpoint::default(),
+            kept: KeptTables::default(),
             leftovers_removed: 0,
-            foreign,
-            readers,
-            snapshots,
-            listed,
-            is_list_logged: true,
-            unnamed_snapshot: None,
-            deleted_snapshot: None,
-            snapshot: None,
-            lock: None,
+            opened_snapshot: None,
             shared_metadata: None,
         }
     }
 
     /// Where the map's files are kept.
     pub fn disk(&self) -> &Arc<dyn Disk> {
-        &self.disk
+        self.files.disk()
     }
 
     /// The map's folder.
     pub fn folder(&self) -> &Path {
-        self.layout.folder()
+        self.files.folder()
     }
 
     /// Where the map's files are.
     pub fn layout(&self) -> &Layout {
-        &self.layout
+        self.files.layout()
     }
 
     /// The metadata as last read or written.
     pub fn metadata(&self) -> &Metadata {
-        &self.metadata
+        self.committer.metadata()
     }
 
     /// The map's id; `None` for a map of the seed's format.
     pub fn map_id(&self) -> Option<[u8; 16]> {
-        self.log.map(|log| log.map_id())
+        self.committer.map_id()
     }
 
     /// The last commit.
     pub fn commits(&self) -> &Commits {
-        &self.commits
+        self.versions.commits()
     }
 
     /// Whether `metadata.json` is older than the log: a crash came between the two.
     pub fn is_metadata_behind(&self) -> bool {
-        self.log.is_some() && self.written_flush != Some(self.commits.flush_number)
+        self.committer.is_metadata_behind(self.commits().flush_number)
     }
 
     /// Whether a map that was of the seed's format when it was opened has a log now: a writer has begun to change it.
-    pub fn is_adopted_meanwhile(&self) -> Result<bool> {
-        if self.log.is_some() {
+    pub fn is_upgraded_meanwhile(&self) -> Result<bool> {
+        if self.map_id().is_some() {
             return Ok(false);
         }
-        let path = self.layout.commit_log();
-        let kind = self.disk.kind(&path).map_err(|error| Error::io(&path, "look at", error))?;
-        Ok(kind.is_some())
+        Ok(self.files.kind(&self.layout().commit_log())?.is_some())
     }
 
     /// The tile folders that the log does not name, in order.
-    pub fn strays(&self) -> Vec<TileIndex> {
-        let mut strays: Vec<_> = self.strays.iter().copied().collect();
-        strays.sort_unstable();
-        strays
+    pub fn orphans(&self) -> Vec<TileIndex> {
+        self.versions.orphans()
     }
 
     /// How many files that an earlier writer left behind were removed when the store was opened.
@@ -323,48 +274,38 @@ impl TileStore {
 
     /// Whether the tile has a version on disk, committed or not.
     pub fn contains(&self, tile: TileIndex) -> bool {
-        self.stamp(tile).is_some() || self.foreign.contains(&tile) || self.strays.contains(&tile)
+        self.versions.contains(tile)
     }
 
     /// The tiles that have a version on disk, in no particular order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
-        let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile));
-        let committed = self.commits.tiles.tiles().filter(|tile| !self.removed.contains(tile));
-        committed.chain(self.foreign.iter().copied()).chain(uncommitted)
+        self.versions.tiles()
     }
 
     /// How many tiles have a version on disk.
     pub fn count_tiles(&self) -> usize {
-        let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile)).count();
-        self.commits.tiles.len() - self.removed.len() + self.foreign.len() + uncommitted
+        self.versions.count()
     }
 
     /// What is known of the latest version of each tile, in no particular order.
-    pub fn stamps(&self) -> impl Iterator<Item = TileStamp> {
-        let is_latest = |tile: TileIndex| !self.removed.contains(&tile) && !self.next.contains(tile);
-        let committed = self.commits.tiles.iter().filter(move |(tile, _)| is_latest(*tile));
-        self.next.values().chain(committed.map(|(_, stamp)| stamp))
+    pub fn versions(&self) -> impl Iterator<Item = TileVersion> {
+        self.versions.versions()
     }
 
     /// Bytes of memory of what is known of the tiles without reading them: some thirty a tile, and as many more for one with
     /// a version that is not committed.
     pub fn index_bytes(&self) -> usize {
-        self.commits.tiles.bytes()
-            + self.commits.last_changed.bytes()
-            + self.next.bytes()
-            + (self.foreign.capacity() + self.strays.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
-            + self.snapshots.bytes()
+        self.versions.bytes() + self.kept.bytes()
     }
 
     /// Bytes of memory that the next commit takes beside the index.
     pub fn commit_bytes(&self) -> usize {
-        self.next.len() * COMMIT_BYTES_OF_TILE
+        self.versions.commit_bytes()
     }
 
     /// What is known of the latest version of a tile on disk without reading it.
-    pub fn stamp(&self, tile: TileIndex) -> Option<TileStamp> {
-        let committed = || self.commits.tiles.get(tile).filter(|_| !self.removed.contains(&tile));
-        self.next.get(tile).or_else(committed)
+    pub fn version(&self, tile: TileIndex) -> Option<TileVersion> {
+        self.versions.version(tile)
     }
 
     /// Opens the latest version of a tile's table; `None` if the tile has none.
@@ -373,7 +314,7 @@ impl TileStore {
     ///
     /// A file that the log names and that is missing, and a tile folder that the log does not name.
     pub fn open_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
-        let path = match &self.snapshot {
+        let path = match &self.opened_snapshot {
             Some(_) => self.path_in_snapshot(tile)?,
             None => self.latest_path(tile),
         };
@@ -383,9 +324,9 @@ impl TileStore {
     /// Where a snapshot's version of a table is while no writer is at work.
     fn path_in_snapshot(&self, tile: TileIndex) -> Result<PathBuf> {
         let kept = self.kept_tables(tile)?;
-        Ok(match seen_by(Some(&kept), self.commits.flush_number) {
-            Some(flush_number) => self.layout.kept(tile, flush_number),
-            None => self.layout.current(tile, TileFile::Table),
+        Ok(match seen_by(Some(&kept), self.commits().flush_number) {
+            Some(flush_number) => self.layout().kept(tile, flush_number),
+            None => self.layout().current(tile, TileFile::Table),
         })
     }
 
@@ -395,14 +336,14 @@ impl TileStore {
     ///
     /// A folder that cannot be listed.
     pub fn kept_tables(&self, tile: TileIndex) -> Result<BTreeSet<u64>> {
-        let folder = self.layout.tile_folder(tile);
-        match self.disk.list(&folder) {
+        let folder = self.layout().tile_folder(tile);
+        match self.disk().list(&folder) {
             // It tells when the table is opened.
             Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
                 Ok(BTreeSet::new())
             }
             Err(error) => Err(Error::io(&folder, "list", error)),
-            Ok(names) => Ok(names.iter().filter_map(|name| self.layout.flush_of_kept(name)).collect()),
+            Ok(names) => Ok(names.iter().filter_map(|name| self.layout().flush_of_kept(name)).collect()),
         }
     }
 
@@ -413,13 +354,13 @@ impl TileStore {
     ///
     /// A folder that cannot be listed.
     pub fn other_places(&self, tile: TileIndex) -> Result<Vec<PathBuf>> {
-        if self.lock.is_some() {
+        if self.committer.is_writer() {
             return Ok(Vec::new());
         }
-        let kept = self.kept_tables(tile)?.split_off(&self.commits.flush_number);
-        let kept = kept.into_iter().map(|flush_number| self.layout.kept(tile, flush_number));
-        let places =
-            kept.chain([self.layout.next(tile, TileFile::Table), self.layout.current(tile, TileFile::Table)]);
+        let kept = self.kept_tables(tile)?.split_off(&self.commits().flush_number);
+        let kept = kept.into_iter().map(|flush_number| self.layout().kept(tile, flush_number));
+        let places = kept
+            .chain([self.layout().next(tile, TileFile::Table), self.layout().current(tile, TileFile::Table)]);
         Ok(places.collect())
     }
 
@@ -429,42 +370,42 @@ impl TileStore {
     ///
     /// As for [`TileStore::open_table`].
     pub fn open_version(&self, tile: TileIndex, path: PathBuf) -> Result<Option<StoredTile>> {
-        if self.strays.contains(&tile) {
+        if self.versions.is_orphan(tile) {
             let reason = "commits.log does not name this tile";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
-        let stamp = self.stamp(tile);
-        if stamp.is_none() && !self.foreign.contains(&tile) {
+        let version = self.version(tile);
+        if version.is_none() && !self.versions.is_foreign(tile) {
             return Ok(None);
         }
-        self.location_at(tile, path, stamp).open().map(Some)
+        self.location_at(tile, path, version).open().map(Some)
     }
 
     /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before the
     /// next commit.
     pub fn location(&self, tile: TileIndex) -> Option<TileLocation> {
-        let stamp = self.stamp(tile)?;
-        Some(self.location_at(tile, self.latest_path(tile), Some(stamp)))
+        let version = self.version(tile)?;
+        Some(self.location_at(tile, self.latest_path(tile), Some(version)))
     }
 
-    fn location_at(&self, tile: TileIndex, path: PathBuf, stamp: Option<TileStamp>) -> TileLocation {
-        let map_id = stamp.and_then(|_| self.map_id());
-        let folder = self.layout.tile_folder(tile);
+    fn location_at(&self, tile: TileIndex, path: PathBuf, version: Option<TileVersion>) -> TileLocation {
+        let map_id = version.and_then(|_| self.map_id());
+        let folder = self.layout().tile_folder(tile);
         TileLocation {
-            disk: self.disk.clone(),
+            disk: self.disk().clone(),
             tile,
             folder,
             path,
             map_id,
-            stamp,
-            storage: self.layout.storage(),
+            version,
+            storage: self.layout().storage(),
         }
     }
 
     fn latest_path(&self, tile: TileIndex) -> PathBuf {
-        match self.next.contains(tile) || self.unrenamed.contains(tile) {
-            true => self.layout.next(tile, TileFile::Table),
-            false => self.layout.current(tile, TileFile::Table),
+        match self.versions.is_uncommitted(tile) || self.checkpoint.is_unrenamed(tile) {
+            true => self.layout().next(tile, TileFile::Table),
+            false => self.layout().current(tile, TileFile::Table),
         }
     }
 }

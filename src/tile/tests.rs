@@ -1,9 +1,8 @@
-//! The table against the simplest thing that could be right, a map from voxels to evidence; its view as an octree and
-//! its files against those of the pointer tree.
+//! The table against a naive map from voxels to evidence; its octree view and its files against those of the pointer
+//! tree.
 
-use super::brick_octree::BrickOctree;
-use super::palette::Palette;
-use super::table::Table;
+use super::octree::BrickOctree;
+use super::table::{Palette, Table};
 use crate::octree::{Octree, write_bt};
 use crate::scan::BrickUpdate;
 use crate::sensor::{Evidence, Iwlo, Observation, SensorModel};
@@ -13,7 +12,7 @@ use std::collections::BTreeMap;
 
 type Naive = BTreeMap<MortonCode, Evidence>;
 
-/// A palette that holds all states, ones that must drop states now and then, and ones that soon hold too few.
+/// A palette that holds all states, ones that drop states now and then, and ones that are soon too small.
 fn any_palette() -> impl Strategy<Value = Palette> {
     prop_oneof![
         Just(Palette::default()),
@@ -124,7 +123,7 @@ fn evidence_is_kept_once_and_dropped_when_no_voxel_has_it() {
     let mut table = Table::default();
     table.update_brick(&model, &all);
     let bytes = table.bytes();
-    // A palette, a block of the directory, and two bytes a voxel: half of what evidence of their own would take.
+    // A palette, a block of the directory, and two bytes per voxel: half of what plain evidence would take.
     assert!(bytes < 6 * 512, "{bytes} bytes for 512 voxels");
     // Each time the whole brick is in a state that no voxel was in before.
     for _ in 0..100_000 {
@@ -168,7 +167,7 @@ fn any_run() -> impl Strategy<Value = (u64, u64, f64)> {
     (run, value).prop_map(|((first, span), value)| (first, span, value))
 }
 
-/// A table with these runs, the later over the earlier, and the tree that it stands for.
+/// A table with these runs, later ones over earlier ones, and the tree that it represents.
 fn table_of(runs: &[(u64, u64, f64)], palette: Palette) -> (Table, Octree) {
     let mut voxels = BTreeMap::new();
     for &(first, span, value) in runs {

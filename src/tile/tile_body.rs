@@ -1,8 +1,7 @@
 use super::OctreeFactory;
-use super::brick_octree::BrickOctree;
+use super::octocache::VoxelCacheCounts;
+use super::octree::{BrickOctree, TileOctree};
 use super::table::Table;
-use super::tile_octree::TileOctree;
-use super::voxel_cache::VoxelCacheCounts;
 use crate::octree::Octree;
 use crate::scan::TileUpdates;
 use crate::sensor::{Evidence, SensorModel};
@@ -25,7 +24,7 @@ pub struct Tile {
 pub struct Voxel {
     /// Its index along x, y and z.
     pub index: VoxelIndex,
-    /// What is known of it.
+    /// Its evidence.
     pub evidence: Evidence,
 }
 
@@ -41,26 +40,26 @@ pub struct TileCounts {
     pub table_bytes: u64,
     /// Bytes of memory in octrees.
     pub octree_bytes: u64,
-    /// Bytes of memory in voxel caches, and on the way from these to octrees.
+    /// Bytes of memory in voxel caches and in batches in flight to octrees.
     pub voxel_cache_bytes: u64,
-    /// What the voxel caches of these tiles have seen.
+    /// Counts of these tiles' voxel caches.
     pub voxel_cache: VoxelCacheCounts,
 }
 
 impl Tile {
-    /// A tile in which nothing was observed yet.
+    /// A tile without observed voxels.
     pub fn empty(grid: &Grid, octrees: &OctreeFactory, index: TileIndex) -> Self {
         Self::from_table(grid, octrees, index, Table::default())
     }
 
-    /// The tile of a table, its octree derived.
+    /// A tile with this table; its octree is derived.
     pub fn from_table(grid: &Grid, octrees: &OctreeFactory, index: TileIndex, mut table: Table) -> Self {
         let octree = octrees.octree_of(&mut table);
         Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }
 
-    /// The tile of a table that is looked at once. Its octree is a view of the bricks, whatever form the map's octrees
-    /// have, and not summed up: the same answers, of which the coarse ones take longer.
+    /// A tile for a few queries. Its octree is a view of the bricks, whatever form the map's octrees have, and not
+    /// synced: answers are the same, but coarse ones take longer.
     pub fn in_passing(grid: &Grid, index: TileIndex, table: Table) -> Self {
         let octree = TileOctree::Bricks(BrickOctree::default());
         Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
@@ -86,12 +85,12 @@ impl Tile {
         self.is_dirty
     }
 
-    /// Notes that the tile's content is to be written.
+    /// Marks the tile as changed.
     pub fn mark_dirty(&mut self) {
         self.is_dirty = true;
     }
 
-    /// Notes that the tile's content is on disk.
+    /// Marks the tile as written.
     pub fn mark_clean(&mut self) {
         self.is_dirty = false;
     }
@@ -114,8 +113,8 @@ impl Tile {
         self.table.get_key(VoxelKey::from_index(voxel))
     }
 
-    /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that holds
-    /// the voxel; `None` if all are unknown. At depth 16 [`Tile::evidence`] has the same without rounding.
+    /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that holds the
+    /// voxel; `None` if all are unknown. At depth 16, [`Tile::evidence`] gives the value without rounding.
     pub fn max_log_odds_under(&self, voxel: VoxelIndex, depth: u8) -> Option<f32> {
         self.octree.max_under(&self.table, VoxelKey::from_index(voxel).morton(), depth)
     }
@@ -137,12 +136,12 @@ impl Tile {
         code.to_key().to_index_from(self.voxels.min)
     }
 
-    /// Whether the octree has taken all updates.
+    /// Whether the octree contains all updates.
     pub fn is_octree_synced(&self) -> bool {
         self.octree.is_synced()
     }
 
-    /// Brings the octree up to date. Answers do not depend on it, only how long they take.
+    /// Brings the octree up to date. Answers are the same without; they only take longer.
     pub fn sync_octree(&mut self) {
         self.octree.sync(&mut self.table);
     }

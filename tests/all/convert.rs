@@ -2,12 +2,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
+use voxtile::integrity::verify_on;
+use voxtile::operations::{Part, convert, crop};
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::session::{Part, convert, crop};
 use voxtile::space::Aabb;
-use voxtile::upkeep::verify_on;
 use voxtile::{
-    Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Result, Scan, Storage,
+    Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Result, Scan, Storage,
 };
 
 const INPUT: &str = "random scans";

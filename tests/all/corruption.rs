@@ -3,9 +3,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
+use voxtile::integrity::{Finding, Repair, Severity, Verification, repair_on, verify_on};
 use voxtile::space::TileIndex;
 use voxtile::store::{TileFile, tile_of_folder};
-use voxtile::upkeep::{Finding, Repair, Severity, Verification, repair_on, verify_on};
 use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 type Digests = BTreeMap<TileIndex, Vec<(u64, i32)>>;

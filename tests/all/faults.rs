@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::{
-    Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions,
+    Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries,
     Result, Scan, Storage,
 };
 
@@ -483,7 +483,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
             disk.set_fault(Fault::IsFull(full));
             let _ = mapper.flush();
             disk.make_room();
-            // Questions push tiles out of memory.
+            // Queries push tiles out of memory.
             for tile in mapper.tile_indices() {
                 mapper.tile(tile).unwrap();
             }

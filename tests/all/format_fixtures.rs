@@ -10,15 +10,15 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
+use voxtile::integrity::verify;
 use voxtile::io::{ScanStreamWriter, open_scans};
+use voxtile::operations::{Decay, Part, clear, decay};
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::session::{Decay, Part, clear, decay};
 use voxtile::share::codec::Packet;
 use voxtile::share::{Sender, SenderConfig, VoxelSet, read_layer, write_layer};
 use voxtile::space::Aabb;
 use voxtile::store::SnapshotName;
-use voxtile::upkeep::verify;
-use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan, Storage};
+use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Scan, Storage};
 
 const MAPS: [&str; 4] = ["plain", "killed", "compact", "seed"];
 
@@ -49,7 +49,7 @@ fn scans() -> Vec<Scan> {
     (0..6).map(|k| random_scan(&mut random, [2.0 * f64::from(k), 0.0, 0.0], 40)).collect()
 }
 
-fn digest(map: &impl Questions) -> Value {
+fn digest(map: &impl Queries) -> Value {
     json!(map.digest().unwrap().to_string())
 }
 

@@ -45,14 +45,14 @@ mod octocache;
 mod octomap_files;
 /// Octree files of maps beyond memory: those of the whole tree, to the byte.
 mod octree_export;
-/// Questions against brute force.
+/// What is done with whole maps: made, merged, cropped, cleared, faded.
+mod operations;
+/// Queries against brute force.
 mod questions;
 /// Scans from files, good and bad.
 mod readers;
 /// The stream of scans, in files and from standard input.
 mod scan_stream;
-/// What is done with whole maps: made, merged, cropped, cleared, faded.
-mod session;
 /// Map sharing: codec, convergence over bad links, layers.
 mod sharing;
 /// The names of snapshots: in their files, and in the log.

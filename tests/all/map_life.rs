@@ -4,11 +4,11 @@ use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
-use voxtile::session::{delete_snapshot_on, revert_on, snapshot_on, snapshots_on};
+use voxtile::integrity::{Finding, Severity, Verification, verify_on};
+use voxtile::operations::{delete_snapshot_on, revert_on, snapshot_on, snapshots_on};
 use voxtile::space::TileIndex;
 use voxtile::store::{SnapshotName, TileStore, tile_of_folder};
-use voxtile::upkeep::{Finding, Severity, Verification, verify_on};
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Result, Scan};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Result, Scan};
 
 fn map() -> &'static Path {
     Path::new("/city/map")

@@ -8,7 +8,7 @@ use voxtile::query::{RayQuery, Shape, UnknownAs};
 use voxtile::scan::{PointBatch, RayWalk};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
 use voxtile::{
-    InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions,
+    InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries,
 };
 
 fn config() -> MapConfig {

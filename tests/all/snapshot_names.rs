@@ -1,10 +1,10 @@
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::session::{delete_snapshot_on, revert_on, snapshots_on};
+use voxtile::integrity::{Severity, repair_on, verify_on};
+use voxtile::operations::{delete_snapshot_on, revert_on, snapshots_on};
 use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
-use voxtile::upkeep::{Severity, repair_on, verify_on};
-use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Result};
+use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Result};
 
 fn map() -> &'static Path {
     Path::new("/map")
@@ -51,7 +51,7 @@ fn digest_of(disk: &FaultyDisk, snapshot: Option<&str>) -> Result<String> {
 
 fn damaged(disk: &FaultyDisk) -> Vec<PathBuf> {
     let mut damaged = Vec::new();
-    let found = |finding: &voxtile::upkeep::Finding| {
+    let found = |finding: &voxtile::integrity::Finding| {
         if finding.severity == Severity::Damage {
             damaged.push(finding.path.clone());
         }

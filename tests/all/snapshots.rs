@@ -7,12 +7,12 @@ use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
-use voxtile::session::{
+use voxtile::integrity::{Severity, repair_on, verify_on};
+use voxtile::operations::{
     Diff, TileChange, TileDiff, delete_snapshot_on, diff, revert_on, snapshot_on, snapshots_on,
 };
 use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileStore};
-use voxtile::upkeep::{Severity, repair_on, verify_on};
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions, Scan, Storage};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Scan, Storage};
 
 fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()
@@ -278,7 +278,7 @@ fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
 
 fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, what: &str) {
     let mut named = false;
-    let found = |finding: &voxtile::upkeep::Finding| {
+    let found = |finding: &voxtile::integrity::Finding| {
         named |= finding.severity == Severity::Damage && finding.path == path;
     };
     assert!(!verify_on(disk.shared(), map, found, |_, _| ()).unwrap().is_whole(), "{what}");

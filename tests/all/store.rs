@@ -4,10 +4,10 @@ use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::voxels_of;
 use testkit::unsynced_disk::UnsyncedDisk;
+use voxtile::integrity::verify;
 use voxtile::simulation::{City, Drive, Lidar, Survey};
 use voxtile::space::TileIndex;
-use voxtile::upkeep::verify;
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Questions};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 3.2).unwrap().with_cache_tiles(2).with_pending_bytes(1000)
@@ -170,7 +170,7 @@ fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
         let readers_bytes = seen_bytes + later.as_ref().map_or(0, |later| later.disk_bytes().unwrap().0);
         let kept = kept_bytes(&path);
         assert!(kept <= readers_bytes, "after {seed} flushes: {kept} bytes kept, {readers_bytes} seen");
-        let told = voxtile::session::kept_tables(&path).unwrap();
+        let told = voxtile::operations::kept_tables(&path).unwrap();
         assert_eq!((told.reader_bytes, told.snapshot_bytes), (kept, 0));
     }
     assert_eq!(reader.digest().unwrap(), digest);
@@ -225,7 +225,7 @@ fn a_lock_that_is_taken_away_or_taken_by_a_stranger_lets_no_two_write() {
     let mut found = Vec::new();
     verify(&path, |finding| found.push(finding.path.clone()), |_, _| ()).unwrap();
     assert_eq!(found, [lock]);
-    assert!(voxtile::upkeep::repair(&path, |_| (), |_, _| ()).unwrap().is_complete());
+    assert!(voxtile::integrity::repair(&path, |_| (), |_, _| ()).unwrap().is_complete());
     assert_eq!(open(&path).unwrap().digest().unwrap(), digest);
 }
 
@@ -251,7 +251,7 @@ fn a_folder_in_place_of_an_octree_stops_nobody() {
     drop(writer);
     assert!(octrees.iter().any(|octree| octree.is_file()));
     assert!(walk(&path).iter().any(|path| path.ends_with("note")), "moved, not deleted");
-    voxtile::upkeep::repair(&path, |_| (), |_, _| ()).unwrap();
+    voxtile::integrity::repair(&path, |_| (), |_, _| ()).unwrap();
     assert!(verify(&path, |_| (), |_, _| ()).unwrap().is_whole());
     assert_eq!(open(&path).unwrap().digest().unwrap(), digest);
 }

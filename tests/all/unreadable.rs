@@ -2,10 +2,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::session::delete_snapshot_on;
+use voxtile::integrity::{Severity, repair_on, verify_on};
+use voxtile::operations::delete_snapshot_on;
 use voxtile::store::SnapshotName;
-use voxtile::upkeep::{Severity, repair_on, verify_on};
-use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Questions, Result, Storage};
+use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Result, Storage};
 
 fn map() -> &'static Path {
     Path::new("/map")
@@ -43,7 +43,7 @@ fn digests(disk: &FaultyDisk) -> Result<[String; 2]> {
 
 fn damaged(disk: &FaultyDisk, what: &str) -> BTreeSet<PathBuf> {
     let mut damaged = BTreeSet::new();
-    let found = |finding: &voxtile::upkeep::Finding| {
+    let found = |finding: &voxtile::integrity::Finding| {
         if finding.severity == Severity::Damage {
             damaged.insert(finding.path.clone());
         }

@@ -6,7 +6,7 @@ use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper,
-    Questions, Scan,
+    Queries, Scan,
 };
 
 /// From masts here and there: every ray goes far, through many tiles.

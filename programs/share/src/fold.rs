@@ -2,12 +2,12 @@ use crate::args::Args;
 use crate::files::{load_layer, open_map};
 use std::path::Path;
 use voxtile::Mapper;
-use voxtile::share::fold_layer;
+use voxtile::share::merge_layer;
 
 pub fn run(args: &Args, layer: &Path, map: &Path) -> anyhow::Result<()> {
     let layer = load_layer(layer, args.max_voxels)?;
     let mut mapper = open_map(map, layer.grid(), args.memory.as_u64() as usize)?;
-    let report = fold_layer(&layer, &mut mapper)?;
+    let report = merge_layer(&layer, &mut mapper)?;
     mapper.flush()?;
     if args.json {
         println!("{}", serde_json::to_string(&report)?);

@@ -103,7 +103,7 @@ fn measure(args: &Args, path: &Path, counts: &mut [[u64; 2]]) -> anyhow::Result<
     let mut mapper = InMemoryMapper::new(config)?;
     let watch = MapWatch::new(args.threshold)?;
     let mut receiver_config = ReceiverConfig::default();
-    receiver_config.asks = !args.no_catch_up;
+    receiver_config.sends_requests = !args.no_catch_up;
     let mut world = World {
         sender: Sender::new(mapper.config().grid, 1, args.sender_config()?)?,
         receiver: Receiver::new(receiver_config),

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use voxtile::share::{ReceiverConfig, Receivers, VoxelSet, fold_layer};
+use voxtile::share::{ReceiverConfig, Receivers, VoxelSet, merge_layer};
 use voxtile::space::{Grid, VoxelBox};
 use voxtile::{Error, MapReader, MapView, Mapper};
 
@@ -291,7 +291,7 @@ fn fold(map: &Path, grid: &Grid, layer: &VoxelSet, memory_bytes: usize) -> anyho
         bail!("has {}, but the map has {}", lengths(layer.grid()), lengths(grid));
     }
     let mut mapper = open_map(map, grid, memory_bytes.saturating_sub(layer.memory_bytes()))?;
-    fold_layer(layer, &mut mapper)?;
+    merge_layer(layer, &mut mapper)?;
     Ok(mapper.flush()?)
 }
 

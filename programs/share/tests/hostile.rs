@@ -16,7 +16,7 @@ use support::{
     summaries_and_success,
 };
 use tempfile::TempDir;
-use voxtile::share::codec::{Ask, Header, Packet, Status, Update};
+use voxtile::share::codec::{Header, Packet, Request, Status, Update};
 use voxtile::simulation::Random;
 use zenoh::{Config, Session, Wait};
 
@@ -37,7 +37,7 @@ fn open(listen: &str) -> Session {
 fn answer_asks(session: &Session, robot: &'static str, resolution_m: f64) -> zenoh::pubsub::Subscriber<()> {
     let answers = session.clone();
     let take = move |sample: zenoh::sample::Sample| {
-        let Ok(Ask::Status { nonce }) = Ask::decode(&sample.payload().to_bytes()) else { return };
+        let Ok(Request::Status { nonce }) = Request::decode(&sample.payload().to_bytes()) else { return };
         let status = Status {
             header: Header { epoch: 1, sequence: 0 },
             nonce,
@@ -215,7 +215,7 @@ fn one_robots_fault_stays_its_own() {
     }
     // All but that of another size are in the map.
     let map_voxels = voxtile::MapReader::open(&map, 16).unwrap();
-    let folded = voxtile::Questions::all_occupied_voxels(&map_voxels, None).unwrap();
+    let folded = voxtile::Queries::all_occupied_voxels(&map_voxels, None).unwrap();
     assert!(folded.len() as u64 > voxels);
     assert!(folded.iter().any(|voxel| voxel.index == [i32::MAX - 1, i32::MIN, 0]));
     // Folded again by hand, the saved layer is known.

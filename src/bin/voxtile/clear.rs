@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
-use voxtile::session::{Cleared, clear};
+use voxtile::operations::{Cleared, clear};
 
 #[derive(Serialize)]
 struct Summary<'a> {

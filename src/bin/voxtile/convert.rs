@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::mapper::{MapReader, MapView};
-use voxtile::session::{WrittenMap, convert};
+use voxtile::operations::{WrittenMap, convert};
 use voxtile::{Result, Storage};
 
 /// What became of what.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
-use voxtile::session::{WrittenMap, crop};
+use voxtile::operations::{WrittenMap, crop};
 
 #[derive(Serialize)]
 struct Summary<'a> {

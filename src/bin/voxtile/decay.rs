@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
-use voxtile::session::{Decay, Decayed, decay};
+use voxtile::operations::{Decay, Decayed, decay};
 
 #[derive(Serialize)]
 struct Summary<'a> {

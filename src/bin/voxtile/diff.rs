@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
-use voxtile::session::{Diff, TileDiff, VoxelDiff, diff};
+use voxtile::operations::{Diff, TileDiff, VoxelDiff, diff};
 use voxtile::store::SnapshotName;
 
 #[derive(Serialize)]

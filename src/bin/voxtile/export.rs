@@ -16,7 +16,7 @@ use voxtile::maths::logit;
 use voxtile::octree::{OctreeFormat, write_bt, write_ot};
 use voxtile::query::OctreeExport;
 use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
-use voxtile::{Error, Questions};
+use voxtile::{Error, Queries};
 
 #[derive(Clone, Copy)]
 enum ExportFormat {

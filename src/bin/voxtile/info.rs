@@ -6,10 +6,10 @@ use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
+use voxtile::operations::{KeptTables, kept_tables};
 use voxtile::sensor::SensorModel;
-use voxtile::session::{KeptTables, kept_tables};
 use voxtile::store::{Bounds, InputRecord};
-use voxtile::{Questions, Result, Storage};
+use voxtile::{Queries, Result, Storage};
 
 /// Inputs that are shown to people; JSON has them all.
 const INPUTS_SHOWN: usize = 5;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use voxtile::session::{Merged, merge};
+use voxtile::operations::{Merged, merge};
 
 #[derive(Serialize)]
 struct Summary<'a> {

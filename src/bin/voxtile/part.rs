@@ -1,6 +1,6 @@
 use crate::args::PartArgs;
 use crate::map_at::point_of;
-use voxtile::session::Part;
+use voxtile::operations::Part;
 use voxtile::space::Aabb;
 use voxtile::{Error, Result};
 

@@ -2,7 +2,7 @@ use crate::args::RaycastArgs;
 use crate::map_at::{point_of, read_map};
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::Questions;
+use voxtile::Queries;
 use voxtile::query::{RayQuery, UnknownAs};
 
 pub fn run(args: &RaycastArgs) -> anyhow::Result<ExitCode> {

@@ -5,7 +5,7 @@ use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::upkeep::{Action, Repair, repair};
+use voxtile::integrity::{Action, Repair, repair};
 
 /// More actions than a person reads; the rest are counted.
 const MAX_ACTIONS: usize = 10_000;

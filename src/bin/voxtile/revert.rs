@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
-use voxtile::session::{Reverted, revert};
+use voxtile::operations::{Reverted, revert};
 
 #[derive(Serialize)]
 struct Summary<'a> {

@@ -2,7 +2,7 @@ use crate::args::SnapshotArgs;
 use crate::map_at::whole_map;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::session::{SnapshotInfo, delete_snapshot, snapshot, snapshots};
+use voxtile::operations::{SnapshotInfo, delete_snapshot, snapshot, snapshots};
 
 pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
     let find = || -> voxtile::Result<Option<SnapshotInfo>> {

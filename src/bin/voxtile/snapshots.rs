@@ -2,7 +2,7 @@ use crate::args::SnapshotsArgs;
 use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::session::{SnapshotInfo, snapshots};
+use voxtile::operations::{SnapshotInfo, snapshots};
 
 pub fn run(args: &SnapshotsArgs) -> anyhow::Result<ExitCode> {
     let infos = snapshots(&args.map)?;

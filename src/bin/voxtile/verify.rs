@@ -6,7 +6,7 @@ use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::upkeep::{Finding, Verification, verify};
+use voxtile::integrity::{Finding, Verification, verify};
 
 /// More findings than a person reads; the rest are counted.
 const MAX_FINDINGS: usize = 10_000;

@@ -1,7 +1,7 @@
 use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
 use std::path::Path;
-use voxtile::session::WrittenMap;
+use voxtile::operations::WrittenMap;
 
 /// Says for a person what a new map is.
 pub fn print_written(map: &Path, written: &WrittenMap, out: &mut impl Write) -> std::io::Result<()> {

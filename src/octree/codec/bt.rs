@@ -14,7 +14,7 @@ pub const OCTOMAP_MIN_LOG_ODDS: f32 = f32::from_bits(0xc000_0075);
 /// Log-odds of an occupied leaf read from `.bt`: OctoMap's upper clamp, `logit(0.971)`, about 3.5.
 pub const OCTOMAP_MAX_LOG_ODDS: f32 = f32::from_bits(0x4060_b4ba);
 
-/// What two bits say about a child.
+/// The two-bit code of a child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Code {
     Unknown,
@@ -40,19 +40,19 @@ impl Code {
         codes.iter().rev().fold(0, |bits: u16, &code| bits << 2 | code as u16).to_le_bytes()
     }
 
-    /// The two bytes of eight voxels of which some are known, and some of these occupied.
+    /// The two bytes of eight voxels, from the masks of known and of occupied ones.
     pub(super) fn pack_voxels(known: u8, occupied: u8) -> [u8; 2] {
         (spread(known & !occupied) | spread(occupied) << 1).to_le_bytes()
     }
 
-    /// What a node with these children becomes if it is pruned, where it can be.
+    /// The code of a node with these children if it can be pruned.
     pub(super) fn pruned(children: [Self; 8]) -> Option<Self> {
         let prunable = matches!(children[0], Self::Free | Self::Occupied);
         (prunable && children.iter().all(|&code| code == children[0])).then_some(children[0])
     }
 }
 
-/// Puts bit `k` at bit `2k`.
+/// Moves bit `k` to bit `2k`.
 fn spread(bits: u8) -> u16 {
     let bits = u16::from(bits);
     let bits = (bits | bits << 4) & 0x0f0f;
@@ -111,10 +111,10 @@ fn read_node(
     Ok(Node::Inner { value: growing.tree.arena[block].max(), block })
 }
 
-/// Writes the `.bt` file that OctoMap's `writeBinary` writes for this tree, and leaves the tree as it is.
+/// Writes the `.bt` file that OctoMap's `writeBinary` writes for this tree, without changing the tree.
 ///
-/// A leaf counts as occupied at or above `threshold_log_odds`, else as free; nodes that become equal by that are
-/// pruned in the file. Besides the tree it takes two bytes of memory for each inner node that is left.
+/// A leaf is occupied at or above `threshold_log_odds`, else free; nodes that become equal by that are pruned in the
+/// file. This takes two bytes of memory for each remaining inner node.
 ///
 /// # Errors
 ///
@@ -162,7 +162,7 @@ fn write_encoded(
     out.write_all(&encoder.payload)
 }
 
-/// Nodes at this depth and deeper are pruned where they can be.
+/// Nodes at this depth and deeper are pruned if possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PrunedDepths(u8);
 
@@ -171,8 +171,8 @@ impl PrunedDepths {
     /// All but the root, which is never pruned.
     pub(super) const ALL: Self = Self(1);
 
-    /// How far OctoMap's `prune` gets, given by depth how many nodes can be pruned once all below them are: from
-    /// the depth above the voxels upwards, not beyond the first depth where it finds nothing to prune.
+    /// The depths that OctoMap's `prune` reaches: from the depth above the voxels upward, up to the first depth without
+    /// a node to prune. `prunable` counts by depth the nodes that can be pruned once all below them are.
     pub(super) fn of(prunable: &[u64; DEPTH as usize]) -> Self {
         let lowest = (1..DEPTH).rev().take_while(|&depth| prunable[usize::from(depth)] > 0).last();
         lowest.map_or(Self::NONE, Self)
@@ -183,13 +183,13 @@ impl PrunedDepths {
         depth >= self.0
     }
 
-    /// Whether no node below the root that could be pruned stays.
+    /// Whether all prunable nodes below the root are pruned.
     pub(super) fn prune_all(self, prunable: &[u64; DEPTH as usize]) -> bool {
         prunable[1..usize::from(self.0)].iter().all(|&count| count == 0)
     }
 }
 
-/// Counts by depth the nodes that can be pruned once all below them are; says what becomes of `node`.
+/// Counts by depth the nodes that can be pruned once all below them are; returns the code of `node`.
 fn count_prunable(
     tree: &Octree,
     node: Node,
@@ -218,7 +218,7 @@ struct Encoder<'a> {
 }
 
 impl Encoder<'_> {
-    /// Appends the bytes of a node with those below it; gives its code and the number of nodes.
+    /// Appends the bytes of a node and all below it; returns its code and the number of nodes.
     fn encode(&mut self, node: Node, depth: u8) -> (Code, u64) {
         let block = match node {
             Node::Unknown => return (Code::Unknown, 0),

@@ -7,10 +7,10 @@ use crate::octree::tree::DEPTH;
 use crate::space::BrickCode;
 use std::io::{self, Write};
 
-/// Writes what [`write_bt`](super::write_bt) writes for the tree of these bricks, without the tree.
+/// Writes the output of [`write_bt`](super::write_bt) for the tree of these bricks, without building the tree.
 ///
-/// `bricks` are those that hold a known voxel, strictly ascending; `nodes_of` gives what is under the one at a
-/// position, and may be asked twice.
+/// `bricks` are those with a known voxel, strictly ascending; `nodes_of` returns the nodes under the one at a position,
+/// and may be called twice.
 ///
 /// # Errors
 ///
@@ -31,7 +31,7 @@ pub fn write_bt_of_bricks(
     let mut encoder = BtEncoder::new(PrunedDepths::ALL);
     let mut root = encode_all(&mut encoder);
     if let Some(depths) = encoder.depths_of_octomap() {
-        // OctoMap stops earlier: once more, as far as it gets.
+        // OctoMap stops pruning earlier: encode again, only that far.
         root = encode_all(&mut BtEncoder::new(depths));
     }
     write_header(out, OctreeFormat::Bt, root.nodes, resolution_m)?;
@@ -39,40 +39,40 @@ pub fn write_bt_of_bricks(
     out.write_all(&payload)
 }
 
-/// Nodes as `.bt` has them: two bits a child.
+/// Nodes in `.bt` form: two bits per child.
 #[derive(Debug)]
 pub(super) struct BtEncoder {
     depths: PrunedDepths,
     prunable: Prunable,
 }
 
-/// A node that was written, with those below it.
+/// An encoded node with those below it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BtNode {
     code: Code,
-    /// The value of a node that is a leaf before states take the place of values.
+    /// The value of a node that is a leaf before values are reduced to occupied and free.
     leaf: Option<f32>,
     nodes: u64,
 }
 
 impl BtEncoder {
-    /// An encoder that prunes as far as this.
+    /// An encoder that prunes to these depths.
     pub(super) fn new(depths: PrunedDepths) -> Self {
         Self { depths, prunable: [0; DEPTH as usize] }
     }
 
-    /// After all was pruned: how far OctoMap would have got, if not that far.
+    /// After pruning everything: the depths that OctoMap would have pruned, if fewer.
     pub(super) fn depths_of_octomap(&self) -> Option<PrunedDepths> {
         let depths = PrunedDepths::of(&self.prunable);
         (!depths.prune_all(&self.prunable)).then_some(depths)
     }
 
-    /// What a file says before its root: of a root that is a leaf, that it has no children.
+    /// The bytes before the root: for a root that is a leaf, that it has no children.
     pub(super) fn before_root(root: &BtNode) -> &'static [u8] {
         if matches!(root.code, Code::Free | Code::Occupied) { &[0; 2] } else { &[] }
     }
 
-    /// Appends the bytes of a brick, of which a voxel is known.
+    /// Appends the bytes of a brick with a known voxel.
     pub(super) fn encode_brick(&mut self, nodes: &BrickNodes, payload: &mut Vec<u8>) -> BtNode {
         if nodes.leaf.is_some() {
             return BtNode { code: state(nodes.occupied[0]), leaf: nodes.leaf, nodes: 1 };
@@ -117,7 +117,7 @@ impl BtEncoder {
 }
 
 impl BtNode {
-    /// A leaf below the depth of bricks, where only the brick's masks tell which values are equal.
+    /// A leaf below the depth of bricks, where the brick's masks tell which values are equal.
     const fn leaf(code: Code) -> Self {
         Self { code, leaf: None, nodes: 1 }
     }

@@ -4,11 +4,11 @@ use super::number::to_six_digits;
 use crate::error::{DecodeError, FormatError};
 use std::io::{self, BufRead, ErrorKind, Write};
 
-/// What a file says before its nodes.
+/// The header of a file.
 #[derive(Debug)]
 pub(super) struct Header {
     pub format: OctreeFormat,
-    /// Name of the tree's class; `OcTree` where the file has OctoMap's earlier `1` or none (legacy).
+    /// Name of the tree's class; `OcTree` if the file has OctoMap's earlier `1` or none (legacy).
     pub id: String,
     pub nodes: u64,
     pub resolution_m: f64,
@@ -17,14 +17,14 @@ pub(super) struct Header {
 const SECOND_LINES: &str =
     "\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n";
 
-/// Far beyond any header that was ever written; ends the search for `data` in what is no such file.
+/// Far longer than any real header; ends the search for `data` in other files.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
 
-/// The first field of the format before there was a text header.
+/// The first field of the format before text headers.
 const LEGACY_TREE_TYPE: [u8; 4] = 3_i32.to_le_bytes();
 
 impl OctreeFormat {
-    /// What the first line begins with.
+    /// The start of the first line.
     const fn magic(self) -> &'static str {
         match self {
             Self::Bt => "# Octomap OcTree binary file",
@@ -49,7 +49,7 @@ pub(super) fn write_header(
     out.write_all(header.as_bytes())
 }
 
-/// Reads the header, of whichever format; the nodes come next.
+/// Reads the header of either format; the nodes follow.
 pub(super) fn read_header(input: &mut Input<impl BufRead>) -> Result<Header, DecodeError> {
     let first_bytes = input.take("the header")?;
     if first_bytes == LEGACY_TREE_TYPE {
@@ -68,7 +68,7 @@ pub(super) fn read_header(input: &mut Input<impl BufRead>) -> Result<Header, Dec
     read_fields(input, format)
 }
 
-/// Reads the words of a text header up to the line of `data`. Where one comes twice, the later counts.
+/// Reads the words of a text header up to the `data` line. Of duplicates the last counts.
 fn read_fields(input: &mut Input<impl BufRead>, format: OctreeFormat) -> Result<Header, DecodeError> {
     let (mut id, mut nodes, mut resolution_m) = (None, 0, None);
     loop {
@@ -77,7 +77,7 @@ fn read_fields(input: &mut Input<impl BufRead>, format: OctreeFormat) -> Result<
             "size" => nodes = next_value(input, "size", "a whole number")?,
             "res" => resolution_m = Some(next_value(input, "res", "a number")?),
             "data" => break,
-            // A comment, or a word that a later OctoMap may know.
+            // A comment, or a word of a later OctoMap.
             _ => skip_line(input)?,
         }
     }
@@ -110,7 +110,7 @@ fn is_resolution(length_m: f64) -> bool {
     length_m.is_finite() && length_m > 0.0
 }
 
-/// The next word of a header; whatever ends it stays.
+/// The next word of a header, without the character that ends it.
 fn next_word(input: &mut Input<impl BufRead>) -> Result<String, DecodeError> {
     while input.peek()?.is_some_and(is_space) {
         next_header_byte(input)?;
@@ -148,7 +148,7 @@ fn next_header_byte(input: &mut Input<impl BufRead>) -> Result<Option<u8>, Decod
     input.next()
 }
 
-/// White space as C++ streams see it.
+/// White space as in C++ streams.
 fn is_space(byte: u8) -> bool {
     byte == b' ' || (b'\t'..=b'\r').contains(&byte)
 }

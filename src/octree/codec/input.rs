@@ -1,7 +1,7 @@
 use crate::error::{DecodeError, FormatError};
 use std::io::{BufRead, ErrorKind};
 
-/// A stream that knows its offset, for the errors.
+/// A stream with its offset, for errors.
 pub(super) struct Input<R> {
     reader: R,
     offset: u64,
@@ -17,7 +17,7 @@ impl<R: BufRead> Input<R> {
         self.offset
     }
 
-    /// The next byte, which stays; `None` at the end.
+    /// The next byte, not consumed; `None` at the end.
     pub(super) fn peek(&mut self) -> Result<Option<u8>, DecodeError> {
         loop {
             match self.reader.fill_buf() {
@@ -28,7 +28,7 @@ impl<R: BufRead> Input<R> {
         }
     }
 
-    /// Takes the next byte; `None` at the end.
+    /// Consumes the next byte; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<u8>, DecodeError> {
         let byte = self.peek()?;
         if byte.is_some() {
@@ -38,7 +38,7 @@ impl<R: BufRead> Input<R> {
         Ok(byte)
     }
 
-    /// Takes exactly `N` bytes, those of a `part` of the file.
+    /// Consumes exactly `N` bytes of a `part` of the file.
     pub(super) fn take<const N: usize>(&mut self, part: &str) -> Result<[u8; N], DecodeError> {
         let mut bytes = [0; N];
         self.reader.read_exact(&mut bytes).map_err(|error| match error.kind() {
@@ -49,7 +49,7 @@ impl<R: BufRead> Input<R> {
         Ok(bytes)
     }
 
-    /// Something wrong with what comes next.
+    /// An error at the present offset.
     pub(super) fn error(&self, reason: impl Into<String>) -> FormatError {
         FormatError::at_offset(self.offset, reason)
     }

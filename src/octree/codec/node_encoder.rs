@@ -5,16 +5,16 @@ use std::ops::Range;
 /// Depth of a brick's node.
 pub(super) const BRICK_DEPTH: u8 = 13;
 
-/// How nodes become bytes in one of OctoMap's formats: in preorder, each inner node as a head of fixed length.
+/// Encodes nodes in one of OctoMap's formats: in preorder, each inner node as a head of fixed length.
 pub(super) trait NodeEncoder {
-    /// What its parent and the header need to know of a node that was written.
+    /// What the parent and the header need of an encoded node.
     type Node: Copy;
     /// The bytes of an inner node itself.
     type Head: AsRef<[u8]> + Default;
-    /// A node below which nothing is known.
+    /// A node without known voxels.
     const UNKNOWN: Self::Node;
 
-    /// What becomes of a node with these children, one of which is known: an inner node, or a leaf if it is pruned.
+    /// A node with these children, one of which is known: an inner node, or a leaf if it is pruned.
     fn join(&mut self, depth: u8, children: &[Self::Node; 8]) -> Self::Node;
 
     /// Whether a known node is a leaf.
@@ -33,8 +33,8 @@ pub(super) trait NodeEncoder {
 /// By depth, the number of nodes that could be pruned once all below them were.
 pub(super) type Prunable = [u64; DEPTH as usize];
 
-/// Appends the bytes of the node at `depth` (at most that of a brick) that has these of the `bricks`, which ascend;
-/// `encode_brick` does it for the parts of one brick.
+/// Appends the bytes of the node at `depth` (at most that of a brick) over these ascending `bricks`; `encode_brick`
+/// encodes the parts of one brick.
 pub(super) fn encode<E: NodeEncoder>(
     encoder: &mut E,
     bricks: &[BrickCode],
@@ -67,14 +67,14 @@ pub(super) fn encode<E: NodeEncoder>(
     end_node(encoder, begin, depth, &children, payload)
 }
 
-/// Leaves room for an inner node's head, and tells where.
+/// Reserves room for an inner node's head; returns its position.
 pub(super) fn begin_node<E: NodeEncoder>(payload: &mut Vec<u8>) -> usize {
     let begin = payload.len();
     payload.extend_from_slice(E::Head::default().as_ref());
     begin
 }
 
-/// Writes a node's head, or takes back all that was written of it if it is pruned.
+/// Writes a node's head, or removes all that was written of the node if it is pruned.
 pub(super) fn end_node<E: NodeEncoder>(
     encoder: &mut E,
     begin: usize,

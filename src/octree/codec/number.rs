@@ -1,4 +1,4 @@
-/// A positive number of finite size as a C++ stream prints it: `%g`, six significant digits.
+/// A positive, finite number as a C++ stream prints it: `%g`, six significant digits.
 pub(super) fn to_six_digits(value: f64) -> String {
     // Rust and C round the same way: the exact decimal value, ties to the even digit.
     let scientific = format!("{value:.5e}");

@@ -7,7 +7,7 @@ use crate::octree::block::{Block, BlockId};
 use std::fmt;
 use std::io::BufRead;
 
-/// Which of OctoMap's two file formats.
+/// One of OctoMap's two file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OctreeFormat {
     /// `.bt`: a voxel is free, occupied or unknown.
@@ -25,14 +25,14 @@ impl fmt::Display for OctreeFormat {
     }
 }
 
-/// What a `.bt` or `.ot` file holds.
+/// The content of a `.bt` or `.ot` file.
 #[derive(Clone, Debug)]
 pub struct OctreeFile {
-    /// The nodes as they stand in the file, pruned or not.
+    /// The nodes as in the file, pruned or not.
     ///
     /// From `.bt` a leaf is [`OCTOMAP_MIN_LOG_ODDS`](super::OCTOMAP_MIN_LOG_ODDS) or
-    /// [`OCTOMAP_MAX_LOG_ODDS`](super::OCTOMAP_MAX_LOG_ODDS) and an inner node the maximum of its children; from
-    /// `.ot` every node is what the file says, even an inner one that is not that maximum.
+    /// [`OCTOMAP_MAX_LOG_ODDS`](super::OCTOMAP_MAX_LOG_ODDS), and an inner node the maximum of its children. From `.ot`
+    /// every node has the value in the file, even an inner one that is not that maximum.
     pub tree: Octree,
     /// Edge of a finest voxel in metres.
     pub resolution_m: f64,
@@ -40,51 +40,49 @@ pub struct OctreeFile {
     pub id: String,
     /// The format that was found.
     pub format: OctreeFormat,
-    /// The number of nodes that the header states. In `.bt` it is right, or the file is refused; in `.ot` OctoMap
-    /// passes it over, and so does voxtile.
+    /// The number of nodes in the header. In `.bt` a wrong number is an error; in `.ot` OctoMap ignores it, and so does
+    /// voxtile.
     pub stated_nodes: u64,
 }
 
-/// Reads a `.bt` or `.ot` file; the first line says which.
+/// Reads a `.bt` or `.ot` file; the first line tells which.
 ///
-/// Reads to the last node and no further: as in OctoMap, what follows it is not looked at, and `input` stays
-/// there. The colors of a `ColorOcTree` are dropped.
+/// Stops after the last node, like OctoMap; what follows stays in `input`. The colors of a `ColorOcTree` are dropped.
 ///
 /// # Errors
 ///
-/// [`DecodeError::Io`] if reading fails; [`DecodeError::Format`] with the byte offset for whatever is not such a
-/// file, is cut short, has a node below the sixteenth level, log-odds or a resolution that are not finite, or
-/// (`.bt`) another number of nodes than it states.
+/// [`DecodeError::Io`] if reading fails; [`DecodeError::Format`] with the byte offset for another or a truncated file,
+/// a node below the sixteenth level, log-odds or a resolution that are not finite, or (`.bt`) a wrong number of nodes.
 pub fn read(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_with_limit(input, usize::MAX)
 }
 
 /// Reads a `.bt` or `.ot` file as [`read`] does, but refuses one whose tree needs more than `max_bytes` of heap.
 ///
-/// A tree needs up to 32 times the bytes of its `.bt` and 13 times those of its `.ot`, and while it grows up to
-/// twice that.
+/// A tree needs up to 32 times the bytes of its `.bt` and 13 times those of its `.ot`; while it grows, up to twice
+/// that.
 ///
 /// # Errors
 ///
-/// Those of [`read`], and [`DecodeError::Format`] at the node that is too many.
+/// Those of [`read`], and [`DecodeError::Format`] at the node that exceeds the limit.
 pub fn read_with_limit(input: impl BufRead, max_bytes: usize) -> Result<OctreeFile, DecodeError> {
     read_format(input, None, max_bytes)
 }
 
-/// Reads a `.bt` file as [`read`] does, and nothing else.
+/// Reads a `.bt` file like [`read`].
 ///
 /// # Errors
 ///
-/// Those of [`read`]; an `.ot` file is one.
+/// Those of [`read`]; an `.ot` file is an error.
 pub fn read_bt(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_format(input, Some(OctreeFormat::Bt), usize::MAX)
 }
 
-/// Reads an `.ot` file as [`read`] does, and nothing else.
+/// Reads an `.ot` file like [`read`].
 ///
 /// # Errors
 ///
-/// Those of [`read`]; a `.bt` file is one.
+/// Those of [`read`]; a `.bt` file is an error.
 pub fn read_ot(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_format(input, Some(OctreeFormat::Ot), usize::MAX)
 }
@@ -109,16 +107,16 @@ fn read_format(
     Ok(OctreeFile { tree, resolution_m, id, format, stated_nodes })
 }
 
-/// A tree that is being read, with the limit of its memory.
+/// A tree being read, with a memory limit.
 pub(super) struct GrowingTree {
     pub tree: Octree,
     max_bytes: usize,
 }
 
 impl GrowingTree {
-    /// A new inner node's block, if the limit allows one more.
+    /// A new inner node's block, if the limit allows it.
     pub(super) fn add_inner(&mut self, input: &Input<impl BufRead>) -> Result<BlockId, DecodeError> {
-        // The arena's own numbers end at 2^32 blocks; a file must not get there.
+        // The arena is limited to 2^32 blocks; a file must not reach that.
         let max_bytes = self.max_bytes.min((u32::MAX as usize / 2).saturating_mul(Block::SIZE));
         if self.tree.arena.used_bytes() + Block::SIZE > max_bytes {
             return Err(input.error(format!("the tree needs more than {max_bytes} bytes of memory")).into());

@@ -10,11 +10,11 @@ use crate::octree::brick_values::{BrickContent, BrickValues};
 use crate::space::MortonCode;
 use std::io::{self, BufWriter, Read, Seek, Write};
 
-/// Writes the `.bt` or `.ot` file of a tree that does not fit into memory, block by block: the bytes that
-/// [`write_bt`](super::write_bt) or [`write_ot`](super::write_ot) writes for the whole tree.
+/// Writes the `.bt` or `.ot` file of a tree larger than memory, block by block, byte for byte as
+/// [`write_bt`](super::write_bt) or [`write_ot`](super::write_ot) would.
 ///
-/// What a header says, and what stands before a block, is known only after the blocks behind it. So the blocks' own
-/// bytes go to a spool first, and a few bytes a block stay in memory.
+/// The header, and the bytes before a block, depend on the blocks behind it. So the blocks go to a spool first, and a
+/// few bytes per block stay in memory.
 #[derive(Debug)]
 pub struct OctreeStream<S: Read + Write + Seek> {
     blocks: Blocks,
@@ -34,7 +34,7 @@ enum Blocks {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BtPruning(Option<PrunedDepths>);
 
-/// What a finished [`OctreeStream`] gave.
+/// The outcome of a finished [`OctreeStream`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StreamOutcome {
     /// The file is written.
@@ -44,14 +44,14 @@ pub enum StreamOutcome {
         /// Nodes of the tree.
         nodes: u64,
     },
-    /// OctoMap's `prune` leaves off at a depth where it finds nothing, and more was pruned here. Nothing is written:
-    /// all blocks are to be added once more, to a stream that prunes so far.
+    /// OctoMap's `prune` stops at a depth without a node to prune, and more was pruned here. Nothing is written: add
+    /// all blocks again to a stream with this pruning.
     Again(BtPruning),
 }
 
 impl<S: Read + Write + Seek> OctreeStream<S> {
-    /// A `.bt` stream in which a voxel of at least `threshold_log_odds` is occupied. The spool, which is empty, gets
-    /// the bytes of the blocks. Begin with the default pruning.
+    /// A `.bt` stream in which voxels of at least `threshold_log_odds` are occupied. The spool must be empty; it
+    /// receives the bytes of the blocks. Start with the default pruning.
     pub fn bt(threshold_log_odds: f32, pruning: BtPruning, spool: S) -> Self {
         let pruned = pruning.0.unwrap_or(PrunedDepths::ALL);
         let encoder = BtEncoder::new(pruned);
@@ -67,12 +67,12 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
         Self { blocks, spool: BufWriter::with_capacity(1 << 16, spool), payload: Vec::new(), voxels: 0 }
     }
 
-    /// Adds all known voxels of the node at `depth` (0 to 13) whose first voxel is `first`. Nodes come in Morton order,
-    /// and none holds another.
+    /// Adds all known voxels of the node at `depth` (0 to 13) whose first voxel is `first`. Nodes must be disjoint and
+    /// in Morton order.
     ///
     /// # Errors
     ///
-    /// A spool that refuses.
+    /// Errors of the spool.
     pub fn add_block(&mut self, first: MortonCode, depth: u8, values: &mut BrickValues) -> io::Result<()> {
         if values.is_empty() {
             return Ok(());
@@ -107,12 +107,12 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
         self.spool.write_all(&self.payload)
     }
 
-    /// Writes the file, of a tree with this resolution.
+    /// Writes the file with this resolution.
     ///
     /// # Errors
     ///
-    /// A spool or an `out` that refuses, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive,
-    /// finite length.
+    /// Errors of the spool or of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite
+    /// length.
     pub fn finish(self, resolution_m: f64, out: &mut impl Write) -> io::Result<StreamOutcome> {
         let Self { blocks, spool, voxels, .. } = self;
         let mut spool = spool.into_inner().map_err(io::IntoInnerError::into_error)?;

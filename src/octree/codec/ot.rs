@@ -23,7 +23,7 @@ pub(super) fn read_nodes(
             return Err(input.error(reason).into());
         }
     };
-    // The size may be missing; an empty tree is one that says 0 and has nothing behind it.
+    // The size may be missing. An empty tree has the size 0 and nothing behind it.
     if header.nodes > 0 || input.peek()?.is_some() {
         growing.tree.root = read_node(input, &mut growing, color_bytes, 0)?;
     }

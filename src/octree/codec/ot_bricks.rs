@@ -3,20 +3,20 @@ use crate::octree::brick_values::BrickContent;
 use crate::octree::tree::DEPTH;
 use crate::space::BRICK_VOXELS;
 
-/// Nodes as `.ot` has them: log-odds, and a mask of the children.
+/// Nodes in `.ot` form: log-odds, and a mask of the children.
 pub(super) struct OtEncoder;
 
-/// A node that was written, with those below it.
+/// An encoded node with those below it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OtNode {
-    /// Negative infinity where nothing is known.
+    /// Negative infinity if no voxel is known.
     value: f32,
     is_leaf: bool,
     nodes: u64,
 }
 
 impl OtEncoder {
-    /// Appends the bytes of a brick, of which a voxel is known.
+    /// Appends the bytes of a brick with a known voxel.
     pub(super) fn encode_brick(&mut self, content: &BrickContent, payload: &mut Vec<u8>) -> OtNode {
         self.encode_run(content, 0, BRICK_VOXELS, BRICK_DEPTH, payload)
     }
@@ -82,7 +82,7 @@ impl NodeEncoder for OtEncoder {
     }
 }
 
-/// The first of equals, as a tree in memory has it: the two zeros are equal, but not to the bit.
+/// The first of equals, as in a tree in memory: the two zeros are equal, but not to the bit.
 fn larger(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }

@@ -2,13 +2,13 @@ use super::node_encoder::NodeEncoder;
 use crate::space::MortonCode;
 use std::io::{self, Read, Write};
 
-/// A node whose bytes lie in a spool.
+/// A node whose bytes are in a spool.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block<N> {
     pub(super) first: MortonCode,
     pub(super) depth: u8,
     pub(super) node: N,
-    /// Of the node and all below it.
+    /// Bytes of the node and all below it.
     pub(super) bytes: u64,
 }
 
@@ -17,7 +17,7 @@ pub(super) enum Spine<E: NodeEncoder> {
     Unknown,
     /// The next block of the spool.
     Block(E::Node, u64),
-    /// An inner node with its children, or a leaf that they were pruned into.
+    /// An inner node with its children, or a leaf into which they were pruned.
     Joined(E::Node, Box<[Self; 8]>),
 }
 
@@ -27,7 +27,7 @@ impl<E: NodeEncoder> Spine<E> {
         Self::below(encoder, blocks, 0)
     }
 
-    /// The node at `depth` that has these blocks below it.
+    /// The node at `depth` above these blocks.
     fn below(encoder: &mut E, blocks: &[Block<E::Node>], depth: u8) -> Self {
         match blocks {
             [] => return Self::Unknown,

@@ -1,15 +1,15 @@
 use super::context::Contexts;
 use crate::error::FormatError;
 
-/// Takes or gives the bits of a packet, each in a context that tells how likely it is.
+/// Writes or reads the bits of a packet, each in a context that predicts its probability.
 ///
-/// Writers write `bit` and return it; readers return what they read. So there is one walk for both.
+/// A writer writes `bit` and returns it; a reader ignores it and returns what it read. So both share one tree walk.
 pub(super) trait Bits {
     fn bit(&mut self, context: usize, bit: bool) -> Result<bool, FormatError>;
 }
 
-/// A binary arithmetic coder: an interval of 32 bits that each bit narrows in proportion to its probability. Bytes leave
-/// once both ends agree on them.
+/// A binary arithmetic coder: each bit narrows an interval of 32 bits in proportion to its probability. Bytes are
+/// written once both ends agree on them.
 pub(super) struct BitWriter {
     contexts: Contexts,
     low: u32,
@@ -22,7 +22,7 @@ impl BitWriter {
         Self { contexts: Contexts::new(), low: 0, high: u32::MAX, bytes: Vec::new() }
     }
 
-    /// The bytes; what a reader finds behind them counts as zeros.
+    /// Finishes and returns the bytes. A reader assumes zeros behind them.
     pub(super) fn finish(mut self) -> Vec<u8> {
         // The shortest number in the interval.
         for bits in [0, 8, 16, 24] {
@@ -79,7 +79,7 @@ impl<'a> BitReader<'a> {
         self.position += 1;
     }
 
-    /// Whether all bytes were needed, as a writer leaves them.
+    /// Whether all bytes were used, as after a writer's output.
     pub(super) fn is_used_up(&self) -> bool {
         self.position >= self.bytes.len()
     }
@@ -99,7 +99,7 @@ impl Bits for BitReader<'_> {
             self.low <<= 8;
             self.high = self.high << 8 | 255;
             self.shift();
-            // A writer leaves at most the zeros out that fill the last interval.
+            // A writer omits at most the zeros that fill the last interval.
             if self.position > self.bytes.len() + 4 {
                 return Err(FormatError::at_offset(
                     self.bytes.len() as u64,
@@ -111,7 +111,7 @@ impl Bits for BitReader<'_> {
     }
 }
 
-/// The last number of the part of an interval that stands for 1.
+/// The last number of the subinterval for 1.
 fn middle(low: u32, high: u32, probability: u32) -> u32 {
     low + ((u64::from(high - low) * u64::from(probability)) >> 16) as u32
 }

@@ -1,6 +1,6 @@
 use crate::error::FormatError;
 
-/// Reads numbers one behind the other; errors say where.
+/// Reads consecutive numbers; errors have the offset.
 pub(super) struct Reader<'a> {
     bytes: &'a [u8],
     position: usize,
@@ -8,7 +8,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// `offset` is where the bytes begin in what an error speaks of.
+    /// `offset` is the offset of the bytes for errors.
     pub(super) fn new(bytes: &'a [u8], offset: u64) -> Self {
         Self { bytes, position: 0, offset }
     }
@@ -35,7 +35,7 @@ impl<'a> Reader<'a> {
         self.array::<1>().map(|[byte]| byte)
     }
 
-    /// A number in groups of seven bits, the lowest first.
+    /// A varint of seven bits per byte, the lowest first.
     pub(super) fn number(&mut self) -> Result<u64, FormatError> {
         let mut number = 0_u64;
         for shift in (0..64).step_by(7) {
@@ -52,7 +52,7 @@ impl<'a> Reader<'a> {
         Err(self.error("a number of more than 64 bits"))
     }
 
-    /// A number with its sign in the lowest bit.
+    /// A varint with the sign in the lowest bit.
     pub(super) fn signed(&mut self) -> Result<i64, FormatError> {
         let number = self.number()?;
         Ok((number >> 1) as i64 ^ -((number & 1) as i64))

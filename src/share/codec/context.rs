@@ -1,25 +1,25 @@
 use super::prior::PRIOR;
 
-/// Contexts of the bits of octree nodes, then of the bits that say whether a voxel comes or goes.
+/// Number of contexts: those of octree nodes, then those of added or removed voxels.
 pub const CONTEXTS: usize = CHILD_CONTEXTS + DIRECTION_CONTEXTS;
 
 const CHILD_CONTEXTS: usize = 8 * 4 * 4 * 4 * 8 * 2;
 const DIRECTION_CONTEXTS: usize = 3 * 4 * 4;
 
-/// What is known before a bit "is there anything in this child?".
+/// The context of a bit "is this child occupied?".
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ChildContext {
-    /// Edge of the child is two to this many voxels.
+    /// The child's edge is 2 to this power, in voxels.
     pub level: u32,
     /// Which child, 0 to 7.
     pub child: usize,
-    /// Face neighbors of the child that are known to hold something.
+    /// Face neighbours of the child that are known to be occupied.
     pub full_neighbors: usize,
-    /// Face neighbors of which only the parent is known, to hold something.
+    /// Face neighbours of which only the parent is known to be occupied.
     pub likely_neighbors: usize,
-    /// Children of the same node before this one that hold something.
+    /// Earlier children of the same node that are occupied.
     pub full_siblings: usize,
-    /// Whether the neighbor below or above is one of the full ones: floors and walls differ in that.
+    /// Whether the neighbour below or above is one of the occupied ones: this tells floors from walls.
     pub is_neighbor_along_z: bool,
 }
 
@@ -33,27 +33,27 @@ impl ChildContext {
     }
 }
 
-/// The context of a bit "does this voxel come (1) or go (0)?": the voxel before it (2 for none), and how many of the
-/// neighbors so far come and go.
+/// The context of a bit "is this voxel added (1) or removed (0)?": the previous voxel (2 for none), and how many of the
+/// neighbours so far are added and removed.
 pub(super) fn direction_context(before: usize, coming: usize, going: usize) -> usize {
     CHILD_CONTEXTS + (before * 4 + coming.min(3)) * 4 + going.min(3)
 }
 
-/// How likely a 1 is in each context, learned on the way; begins with [`PRIOR`].
+/// Adaptive probabilities of a 1 in each context, starting from [`PRIOR`].
 pub(super) struct Contexts(Vec<Context>);
 
 #[derive(Clone, Copy)]
 struct Context {
-    /// Of a 1, in 2^-16.
+    /// Probability of a 1, in 2^-16.
     probability: u16,
-    /// How many bits it stands for.
+    /// Number of bits that it counts for.
     count: u8,
 }
 
-/// What the prior counts for: a packet's own bits soon count more.
+/// The weight of the prior in bits: a packet's own bits soon outweigh it.
 const PRIOR_COUNT: u8 = 16;
 const MAX_COUNT: u8 = 60;
-/// 0.3, where there is no prior.
+/// 0.3, without a prior.
 const UNKNOWN: u16 = 19_661;
 
 impl Contexts {
@@ -65,7 +65,7 @@ impl Contexts {
         Self(PRIOR.iter().map(context).collect())
     }
 
-    /// Of a 1, in 2^-16; never certain.
+    /// Probability of a 1, in 2^-16; never 0 or 1.
     pub(super) fn probability(&self, context: usize) -> u32 {
         u32::from(self.0[context].probability).clamp(MARGIN, (1 << 16) - MARGIN)
     }
@@ -74,7 +74,7 @@ impl Contexts {
         let context = &mut self.0[context];
         let target = if bit { i32::from(u16::MAX) } else { 0 };
         let difference = target - i32::from(context.probability);
-        // A mean of the bits so far that counts the first ones less: 1 / (count + 1.5).
+        // A running mean with less weight for the first bits: 1 / (count + 1.5).
         let step = 2 * difference / (2 * i32::from(context.count) + 3);
         context.probability = (i32::from(context.probability) + step) as u16;
         context.count = (context.count + 1).min(MAX_COUNT);

@@ -1,7 +1,7 @@
 /// Bits of x in a Morton code; those of y and z are one and two higher.
 const X_BITS: u64 = 0x1249_2492_4924_9249;
 
-/// Where the face neighbors of a node are among the nodes of its level: for each axis the one below and the one above.
+/// Positions of a node's face neighbours among the nodes of its level: for each axis the one below and the one above.
 pub(super) struct Faces(pub(super) [[Option<usize>; 2]; 3]);
 
 impl Faces {
@@ -17,7 +17,7 @@ impl Faces {
     }
 }
 
-/// A code's bits of one axis, one lower and one higher; `None` beyond the cube.
+/// A code's bits of one axis, decremented and incremented; `None` outside the cube.
 fn beside(code: u64, axis: usize, levels: u32) -> [Option<u64>; 2] {
     let axis_bits = (X_BITS << axis) & ((1 << (3 * levels)) - 1);
     let part = code & axis_bits;

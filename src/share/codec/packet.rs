@@ -4,28 +4,28 @@ use crate::error::{FormatError, Result};
 use crate::share::set_range::{SetPosition, SetRange};
 use crate::space::{TileIndex, VoxelIndex};
 
-/// The first byte of every packet and ask. Others are refused.
+/// The first byte of every packet and request. Other versions are refused.
 pub const VERSION: u8 = 1;
 
-/// What a sender sends.
+/// A packet of a sender.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Packet {
-    /// Voxels that came into the set or went out of it.
+    /// Voxels that were added to or removed from the set.
     Changes {
-        /// Whose sequence numbers.
+        /// Epoch and sequence number.
         header: Header,
-        /// Packets of the past whose voxels are in this packet's frame once more, as they are now.
+        /// Earlier packets that this packet's frame repairs: it holds the present state of their voxels.
         repaired: Vec<u64>,
-        /// The voxels, all different.
+        /// The voxels, without duplicates.
         updates: Vec<Update>,
     },
-    /// Exactly the voxels of a part of the set.
+    /// Exactly the voxels of a range of the set.
     Content {
         /// As of which packet.
         header: Header,
-        /// Which part.
+        /// The range.
         range: SetRange,
-        /// Its voxels, all different.
+        /// Its voxels, without duplicates.
         voxels: Vec<VoxelIndex>,
     },
     /// Digests of the tiles from a first one on.
@@ -34,26 +34,26 @@ pub enum Packet {
         header: Header,
         /// Where the first entry begins.
         first: TileIndex,
-        /// One behind the other.
+        /// Consecutive entries.
         entries: Vec<DigestEntry>,
     },
-    /// What there is.
+    /// The sender's status.
     Status(Status),
 }
 
-/// Which sender's life, and which of its packets.
+/// The sender's epoch and a packet number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Another one each time that a sender is started.
+    /// A different number for each start of the sender.
     pub epoch: u32,
-    /// Of changes: the packet's number, from 1. Of all else: the last packet of changes before it.
+    /// For changes: the packet's number, from 1. Otherwise: the last packet of changes before it.
     pub sequence: u64,
 }
 
-/// Digest of tiles that lie one behind the other.
+/// Digest of consecutive tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DigestEntry {
-    /// The last tile; the first is that behind the entry before.
+    /// The last tile; the first one follows the previous entry.
     pub last: TileIndex,
     /// Voxels in these tiles.
     pub voxels: u64,
@@ -61,12 +61,12 @@ pub struct DigestEntry {
     pub digest: [u8; 8],
 }
 
-/// What a sender says of itself.
+/// The status of a sender.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Status {
     /// As of which packet.
     pub header: Header,
-    /// That of the ask; 0 if nobody asked.
+    /// The nonce of the request; 0 if there was none.
     pub nonce: u64,
     /// The first packet that can still be repaired.
     pub oldest: u64,
@@ -76,7 +76,7 @@ pub struct Status {
     pub tile_size_m: f64,
     /// Voxels in the set.
     pub voxels: u64,
-    /// Of the set.
+    /// The digest of the set.
     pub digest: [u8; 32],
 }
 
@@ -85,7 +85,7 @@ const CONTENT: u8 = 2;
 const DIGESTS: u8 = 3;
 const STATUS: u8 = 4;
 
-/// Most numbers of packets that one packet lists.
+/// Most repaired packets that one packet lists.
 pub(in crate::share) const MAX_REPAIRED: usize = 256;
 
 impl Packet {
@@ -129,7 +129,7 @@ impl Packet {
         Ok(bytes)
     }
 
-    /// The packet of some bytes.
+    /// Decodes a packet.
     ///
     /// # Errors
     ///
@@ -147,7 +147,7 @@ impl Packet {
         }
     }
 
-    /// Whose packet it is, and which.
+    /// The epoch and the packet number.
     pub fn header(&self) -> Header {
         match self {
             Self::Changes { header, .. } | Self::Content { header, .. } | Self::Digests { header, .. } => {
@@ -163,12 +163,12 @@ pub(super) fn seal(bytes: &mut Vec<u8>) {
     bytes.extend(crc32fast::hash(bytes).to_le_bytes());
 }
 
-/// Looks at version and checksum; what is between is to be read.
+/// Checks version and checksum; returns a reader of what is between.
 pub(super) fn unseal(bytes: &[u8]) -> std::result::Result<Reader<'_>, FormatError> {
     let Some((content, checksum)) = bytes.split_last_chunk::<4>() else {
         return Err(FormatError::at_offset(0, "the packet is too short"));
     };
-    // First, since another version may have its checksum elsewhere.
+    // First, because another version may have its checksum elsewhere.
     match content.first() {
         Some(&VERSION) => {}
         Some(other) => {
@@ -189,7 +189,7 @@ fn put_header(bytes: &mut Vec<u8>, kind: u8, header: Header) {
     put_number(bytes, header.sequence);
 }
 
-/// By its difference to another tile.
+/// Writes a tile as the difference from another one.
 fn put_tile(bytes: &mut Vec<u8>, before: TileIndex, tile: TileIndex) {
     for (before, k) in before.to_array().into_iter().zip(tile.to_array()) {
         put_signed(bytes, i64::from(k) - i64::from(before));
@@ -210,7 +210,7 @@ pub(super) fn put_range(bytes: &mut Vec<u8>, range: SetRange) {
     put_tile(bytes, TileIndex::default(), range.first.tile);
     put_number(bytes, range.first.code);
     put_tile(bytes, range.first.tile, range.last.tile);
-    // Often all of the last tile.
+    // Often the range ends with its last tile.
     put_number(bytes, super::super::set_range::LAST_CODE - range.last.code);
 }
 

@@ -3,20 +3,20 @@ use super::context::CONTEXTS;
 use super::voxel_tree::{Cube, Update};
 use crate::error::{FormatError, Result};
 
-/// How likely a 1 is in each context before a packet's own bits are known, in 1/256; 0 where it was never seen.
+/// Probability of a 1 in each context before a packet's own bits are known, in 1/256; 0 if the context never occurred.
 ///
-/// Counted in packets of lidar scans of a hall, of a street and by hand; `docs/sharing.md` says how, and what it gives
-/// for scans that were not counted. Part of the format: another table is another version.
+/// Counted in packets of lidar scans of a hall, of a street and by hand; `docs/sharing.md` says how, and what it gains
+/// for scans that were not counted. Part of the format: another table needs another version.
 pub(super) static PRIOR: &[u8; CONTEXTS] = include_bytes!("prior.bin");
 
-/// Counts zeros and ones in each context of a packet of these updates: what the codec begins with is made of it.
+/// Counts zeros and ones in each context of a packet of these updates: the source of the prior.
 ///
 /// # Errors
 ///
 /// As for [`encode_updates`](super::encode_updates).
 pub fn count_contexts(updates: &[Update], counts: &mut [[u64; 2]]) -> Result<()> {
     let cube = Cube::of(updates)?;
-    // A counter refuses nothing.
+    // A counter cannot fail.
     let _ = cube.walk(&mut Counter(counts));
     Ok(())
 }

@@ -6,31 +6,31 @@ use super::neighbors::{Faces, around};
 use crate::error::{Error, FormatError, Result};
 use crate::space::{LAST_VOXEL_INDEX, VoxelIndex};
 
-/// A voxel that comes into a set or goes out of it.
+/// A voxel that is added to a set or removed from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Update {
     /// Which voxel.
     pub voxel: VoxelIndex,
-    /// Whether it comes.
+    /// Whether it is added.
     pub is_in: bool,
 }
 
-/// Levels above the voxels of a packet's octree; its voxels lie in a cube of so many halvings.
+/// Most levels of a packet's octree above the voxels: its cube has an edge of at most 2 to this power.
 const MAX_LEVELS: u32 = 20;
 
-/// Voxels of a packet in their cube, by Morton code, and whether each comes.
+/// The voxels of a packet in their cube, by Morton code, and whether each is added.
 pub(super) struct Cube {
     origin: VoxelIndex,
     levels: u32,
     voxels: Vec<(u64, bool)>,
 }
 
-/// How the first byte says whether voxels come or go.
+/// In the first byte: all voxels are added.
 const ALL_COME: u8 = 1;
 const ALL_GO: u8 = 2;
 const MIXED: u8 = 3;
 
-/// The bytes of distinct voxels, in any order; see `docs/sharing.md`.
+/// Encodes distinct voxels, in any order; see `docs/sharing.md`.
 ///
 /// # Errors
 ///
@@ -48,7 +48,7 @@ pub fn encode_updates(updates: &[Update]) -> Result<Vec<u8>> {
         _ => MIXED,
     };
     let mut bytes = vec![mode << 5 | cube.levels as u8];
-    // The lower corner is that of a brick.
+    // The lower corner is a brick's.
     cube.origin.iter().for_each(|k| put_signed(&mut bytes, i64::from(k >> 3)));
     let mut writer = BitWriter::new();
     let walked = walk(&mut writer, cube.levels, mode == MIXED, &cube.voxels);
@@ -57,12 +57,12 @@ pub fn encode_updates(updates: &[Update]) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The voxels of [`encode_updates`]; `offset` is where the bytes lie in their packet, for errors.
+/// Decodes the voxels of [`encode_updates`]; `offset` is the offset of the bytes in their packet, for errors.
 ///
 /// # Errors
 ///
-/// What no encoder writes: more than [`MAX_VOXELS_PER_PACKET`] voxels, an index above [`LAST_VOXEL_INDEX`]. Whatever is
-/// read can be written again.
+/// What no encoder writes, such as more than [`MAX_VOXELS_PER_PACKET`] voxels or an index above [`LAST_VOXEL_INDEX`].
+/// Decoded voxels can always be encoded again.
 pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Update>, FormatError> {
     let mut reader = Reader::new(bytes, offset);
     let first = reader.byte()?;
@@ -85,7 +85,7 @@ pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Upda
     }
     let update = |(code, is_in): (u64, bool)| {
         let is_in = if mode == MIXED { is_in } else { mode == ALL_COME };
-        // The cube may reach beyond all indices, its voxels may not.
+        // The cube may exceed the range of indices, its voxels may not.
         let voxel = voxel_in(origin, gather(code)).ok_or_else(|| {
             reader.error(format!("a voxel behind the last one, which has index {LAST_VOXEL_INDEX}"))
         })?;
@@ -135,8 +135,8 @@ impl Cube {
     }
 }
 
-/// Goes through the octree of a cube level by level, and through each in Morton order: a bit a child, then a bit a voxel
-/// where some come and some go. Returns the voxels; `known` are those of a writer.
+/// Walks the octree of a cube level by level, each in Morton order: one bit per child, then one bit per voxel if some
+/// are added and some removed. Returns the voxels; `known` are those to be written.
 fn walk(
     bits: &mut impl Bits,
     levels: u32,
@@ -147,7 +147,7 @@ fn walk(
     for level in (0..levels).rev() {
         let mut children = Vec::with_capacity(2 * nodes.len());
         let mut masks = Vec::with_capacity(nodes.len());
-        // Of a writer: the voxels behind those of the nodes so far.
+        // For a writer: the voxels behind those of the nodes so far.
         let mut rest = known;
         for number in 0..nodes.len() {
             let wanted = take_mask(&mut rest, nodes[number], level);
@@ -167,7 +167,7 @@ fn walk(
     code_directions(bits, levels, is_mixed, &nodes, known)
 }
 
-/// Which children of a node hold voxels, where the voxels are known.
+/// The children of a node that hold voxels, for a writer.
 fn take_mask(rest: &mut &[(u64, bool)], node: u64, level: u32) -> u8 {
     let mut mask = 0;
     while let Some((code, _)) = rest.first()
@@ -188,7 +188,7 @@ fn code_children(
 ) -> std::result::Result<u8, FormatError> {
     let mut mask = 0_u8;
     for child in 0..8 {
-        // A node holds something.
+        // A node has at least one child.
         let is_certain = child == 7 && mask == 0;
         let context = child_context(level, child, faces, masks, mask);
         let bit = is_certain || bits.bit(context.number(), wanted >> child & 1 == 1)?;
@@ -247,7 +247,7 @@ fn code_directions(
     Ok(voxels)
 }
 
-/// The voxel at a place of a cube, if it is one.
+/// The voxel at a place of a cube, if its index is valid.
 fn voxel_in(origin: VoxelIndex, local: [u32; 3]) -> Option<VoxelIndex> {
     let mut voxel = origin;
     for (k, local) in voxel.iter_mut().zip(local) {
@@ -256,7 +256,7 @@ fn voxel_in(origin: VoxelIndex, local: [u32; 3]) -> Option<VoxelIndex> {
     Some(voxel)
 }
 
-/// Puts bit `k` of x, y and z at bits `3k`, `3k + 1` and `3k + 2`.
+/// Moves bit `k` of x, y and z to bits `3k`, `3k + 1` and `3k + 2`.
 fn spread(local: [u32; 3]) -> u64 {
     let bits =
         |k: usize| (0..MAX_LEVELS).map(move |bit| u64::from(local[k] >> bit & 1) << (3 * bit + k as u32));

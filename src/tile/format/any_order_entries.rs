@@ -6,13 +6,13 @@ use crate::sensor::Evidence;
 use crate::space::{BRICK_VOXELS, MortonCode, VoxelBox};
 use crate::tile::Table;
 
-/// Entries in any order, as in a file without a trailer: gathered in runs of one brick.
+/// Decodes entries in any order, as in a file without a trailer; runs of one brick are gathered.
 pub(super) struct AnyOrderEntries<'a> {
     voxels: &'a VoxelBox,
     table: Table,
     /// The entries of one brick, with their offsets.
     run: Vec<(MortonCode, Evidence, u64)>,
-    /// The same as the table takes them: place and evidence.
+    /// The same for [`Table::insert`]: place and evidence.
     voxels_of_run: Vec<(usize, Evidence)>,
 }
 

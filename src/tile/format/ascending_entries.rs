@@ -9,7 +9,8 @@ use crate::space::{
 };
 use crate::tile::Table;
 
-/// Entries in Morton order, as in a file with a trailer: what is the same for a brick is looked at once a brick.
+/// Decodes entries in Morton order, as in a file with a trailer; what a brick's entries share is checked once per
+/// brick.
 pub(super) struct AscendingEntries<'a> {
     voxels: &'a VoxelBox,
     table: Table,
@@ -21,7 +22,7 @@ pub(super) struct AscendingEntries<'a> {
 #[derive(Clone, Copy)]
 struct OpenBrick {
     code: BrickCode,
-    /// What the keys of its voxels have in common.
+    /// The common upper bits of its voxels' keys.
     upper: [u16; 3],
     /// Its voxels that belong to the tile.
     inside: BrickMask,
@@ -62,7 +63,7 @@ impl<'a> AscendingEntries<'a> {
         if !self.voxels.contains(voxel) {
             return Err(of_another_tile(key, offset));
         }
-        // What is wrong with an entry by itself is told first.
+        // Errors of the entry itself come first.
         check_evidence(evidence, offset)?;
         let code = key.morton().brick();
         if self.brick.is_some_and(|brick| brick.code >= code) {
@@ -74,7 +75,7 @@ impl<'a> AscendingEntries<'a> {
         Ok(brick)
     }
 
-    /// The voxels of the tile in the brick of one of them.
+    /// The tile's voxels in the brick of `voxel`.
     fn inside(&self, voxel: VoxelIndex) -> BrickMask {
         let first = voxel.map(|k| k & !(BRICK_EDGE - 1));
         let local = |of: VoxelIndex| std::array::from_fn(|k| of[k].saturating_sub(first[k]));
@@ -136,7 +137,7 @@ mod tests {
     }
 
     fn read(mut entries: impl TakeEntries, bytes: &[EntryBytes]) -> Result<Table, FormatError> {
-        // In two chunks, as a file comes.
+        // In two chunks, as when a file is read.
         let (first, second) = bytes.split_at(bytes.len() / 3);
         entries.take(first, 16)?;
         entries.take(second, 16 + first.len() as u64 * ENTRY_BYTES)?;
@@ -174,7 +175,7 @@ mod tests {
                     damaged += 1;
                 }
                 (Err(fast), naive, Some(at)) => {
-                    // Whichever comes first; within an entry, what is wrong with it by itself.
+                    // The first error; within an entry, an error of the entry itself comes first.
                     let alone = naive.err().filter(|error| !error.reason.contains("twice"));
                     match alone.filter(|error| error.at < at + ENTRY_BYTES) {
                         Some(naive) => assert_eq!(fast, naive),

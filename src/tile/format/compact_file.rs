@@ -1,6 +1,6 @@
-//! `tile.vxt`: a trailer like that of `iwlo_meta.bin`, in front, and behind it the table in the compact form without its
-//! last four bytes, the checksum, which stands in front too. In front it tells what the file is and where the compact form
-//! begins and ends; and because no checksum follows what it is of, that of the whole file depends on the content.
+//! `tile.vxt`: a front part like the trailer of `iwlo_meta.bin`, then the table in compact form without its checksum.
+//! The checksum is in the front part: a checksum directly behind its data would make the checksum of the whole file a
+//! constant.
 
 use super::compact::{CRC_BYTES, read_compact};
 use super::reader::DecodedTable;
@@ -9,12 +9,12 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
 use std::io::{self, BufReader, Read, Write};
 
-/// Writes a table in the compact form as `tile.vxt`. The checksum in `front.table_crc` is that of the compact form; what
-/// the caller put there is ignored. There is no octree.
+/// Writes a table in compact form as `tile.vxt`. The checksum in `front.table_crc` is computed here; the caller's value
+/// is ignored. There is no octree.
 ///
 /// # Errors
 ///
-/// Those of `out`, and bytes that are too few for a compact form.
+/// Those of `out`, and `compact` shorter than a compact table.
 pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) -> io::Result<()> {
     let Some((body, crc)) = compact.split_last_chunk::<{ CRC_BYTES as usize }>() else {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "no table in the compact form"));
@@ -28,7 +28,7 @@ pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) 
 ///
 /// # Errors
 ///
-/// Anything that is not as the format says, with its offset.
+/// Anything that violates the format, with its offset.
 pub fn read_compact_file(
     input: &mut impl Read,
     file_bytes: u64,
@@ -44,11 +44,11 @@ pub fn read_compact_file(
     Ok(DecodedTable { table, trailer: Some(front) })
 }
 
-/// Reads only what stands in front in a `tile.vxt`.
+/// Reads only the front part of a `tile.vxt`.
 ///
 /// # Errors
 ///
-/// What is not as the format says.
+/// Anything that violates the format.
 pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trailer, DecodeError> {
     let front = Trailer::read_in_front(input, file_bytes)?;
     if (front.octree_crc, front.octree_bytes) != (0, 0) {
@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// A checksum behind what it is of would make that of the whole file the same for all of one length.
+    /// A checksum behind its data would make that of the whole file a constant.
     #[test]
     fn files_of_other_content_have_other_checksums() {
         let files = [0.5, 0.75].map(|log_odds| file(&table(log_odds), 77));

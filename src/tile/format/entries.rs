@@ -6,10 +6,10 @@ use crate::tile::Table;
 /// Bytes of a chunk, more or less.
 const CHUNK_BYTES: usize = 1 << 16;
 
-/// Bytes of the entries of one brick, at most.
+/// Most bytes of the entries of one brick.
 const BRICK_BYTES: usize = BRICK_VOXELS * ENTRY_BYTES as usize;
 
-/// Encodes the entries of a table, some bricks at a time: each chunk that `take` gets is of whole entries.
+/// Encodes the entries of a table, some bricks at a time; a chunk passed to `take` has whole entries.
 ///
 /// # Errors
 ///

@@ -3,7 +3,7 @@ use crate::error::FormatError;
 use crate::sensor::Evidence;
 use crate::space::VoxelKey;
 
-/// One entry as it is read.
+/// A decoded entry.
 #[derive(Clone, Copy)]
 pub(super) struct Entry {
     pub(super) key: VoxelKey,
@@ -38,7 +38,7 @@ pub(super) fn check_evidence(evidence: Evidence, offset: u64) -> Result<(), Form
     }
 }
 
-/// Why values can be no evidence, and where in an entry the one stands that is wrong.
+/// Why the values are not evidence, and the offset of the wrong one in the entry.
 #[inline]
 pub(super) fn fault_of(Evidence { log_odds, observation_count }: Evidence) -> Option<(u64, String)> {
     if !log_odds.is_finite() {

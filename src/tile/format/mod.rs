@@ -1,4 +1,4 @@
-//! A tile's exact table as the bytes of `iwlo_meta.bin`, streamed either way.
+//! A tile's exact table as the bytes of `iwlo_meta.bin`, written and read as a stream.
 //!
 //! ```text
 //! header   16 bytes   magic "IWLO", version 1, count
@@ -32,5 +32,5 @@ const MAGIC: u32 = 0x4957_4C4F;
 const VERSION: u32 = 1;
 const HEADER_BYTES: u64 = 16;
 const ENTRY_BYTES: u64 = 18;
-/// An entry as it stands in the file.
+/// The bytes of an entry.
 type EntryBytes = [u8; ENTRY_BYTES as usize];

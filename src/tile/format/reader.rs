@@ -9,14 +9,14 @@ use std::io::{self, Read};
 
 /// Decodes entries into a table.
 pub(super) trait TakeEntries {
-    /// Takes the next entries, which begin at `offset` of the file.
+    /// Takes the next entries, which start at `offset` in the file.
     fn take(&mut self, entries: &[EntryBytes], offset: u64) -> Result<(), FormatError>;
 
     /// The table of all entries.
     fn end(&mut self) -> Result<Table, FormatError>;
 }
 
-/// What `iwlo_meta.bin` holds.
+/// The content of an `iwlo_meta.bin`.
 #[derive(Debug)]
 pub struct DecodedTable {
     /// The exact table.
@@ -27,12 +27,12 @@ pub struct DecodedTable {
 
 /// Reads an `iwlo_meta.bin` of `file_bytes` bytes that belongs to the tile of `voxels`.
 ///
-/// With a trailer, entries must be in Morton order and the checksum must match. Without one any order is read.
+/// With a trailer, entries must be in Morton order and the checksum must match. Without one, any order is accepted.
 ///
 /// # Errors
 ///
-/// Anything that is not as the format says, with its offset: wrong magic or version, a count that does not fit the
-/// length, keys of another tile, keys that come twice, values that are no evidence, a wrong checksum.
+/// Anything that violates the format, with its offset: wrong magic or version, a count that does not fit the length,
+/// keys of another tile, duplicate keys, values that are not evidence, a wrong checksum.
 pub fn read_table(
     input: &mut impl Read,
     file_bytes: u64,
@@ -65,12 +65,11 @@ pub fn read_table(
     Ok(DecodedTable { table, trailer: Some(trailer) })
 }
 
-/// Reads only what stands behind the entries of an `iwlo_meta.bin`; `None` for a file of the seed's own format. The
-/// entries are passed over and not looked at.
+/// Reads only the trailer of an `iwlo_meta.bin`; `None` for a file of the seed's own format. The entries are skipped.
 ///
 /// # Errors
 ///
-/// A header or a trailer that is not as the format says.
+/// A header or a trailer that violates the format.
 pub fn read_trailer(input: &mut impl Read, file_bytes: u64) -> Result<Option<Trailer>, DecodeError> {
     let (count, trailer_bytes) = read_header(input, file_bytes, &mut crc32fast::Hasher::new())?;
     if trailer_bytes == 0 {

@@ -12,15 +12,15 @@ const MAX_PARAMETERS_BYTES: u64 = 1 << 16;
 const MAGIC: u32 = 0x5254_5856;
 const VERSION: u32 = 1;
 
-/// What stands after the last entry of `iwlo_meta.bin`, and in front in `tile.vxt`: which map, tile and moment the file
-/// belongs to, and checksums of the tile's files.
+/// The trailer of `iwlo_meta.bin`, which is the front part of `tile.vxt`: map, tile and scan number of the file, and
+/// checksums of the tile's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trailer {
     /// Id of the map.
     pub map_id: [u8; 16],
     /// Which tile.
     pub tile: TileIndex,
-    /// Number of the last scan that the map had taken when the file was written.
+    /// Number of the last scan in the map when the file was written.
     pub scan_number: u64,
     /// CRC-32 of header and entries, or of the compact form.
     pub table_crc: u32,
@@ -28,12 +28,12 @@ pub struct Trailer {
     pub octree_crc: u32,
     /// Length of the tile's `octree.bt` in bytes; 0 with compact storage.
     pub octree_bytes: u64,
-    /// The map's parameters as text, behind the trailer: with them a map can be put together from its tiles.
+    /// The map's parameters as text, behind the trailer: a map can be rebuilt from its tiles.
     pub parameters: String,
 }
 
 impl Trailer {
-    /// The trailer as bytes, closed by a CRC-32, and behind it the parameters.
+    /// The trailer as bytes with a CRC-32, then the parameters.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = vec![0; TRAILER_BYTES];
         bytes[0..4].copy_from_slice(&MAGIC.to_le_bytes());
@@ -54,12 +54,12 @@ impl Trailer {
         bytes
     }
 
-    /// Length in bytes, the parameters included.
+    /// Length in bytes, including the parameters.
     pub fn bytes(&self) -> u64 {
         (TRAILER_BYTES + self.parameters.len()) as u64
     }
 
-    /// Reads the trailer and its parameters, which begin at `offset` of a file and take its last `bytes` bytes.
+    /// Reads the trailer and its parameters, which start at `offset` of a file and take its last `bytes` bytes.
     ///
     /// # Errors
     ///
@@ -80,7 +80,7 @@ impl Trailer {
         fixed.with_parameters(input, offset)
     }
 
-    /// Reads the trailer and its parameters from the beginning of a file of so many bytes.
+    /// Reads the trailer and its parameters from the start of a file of so many bytes.
     ///
     /// # Errors
     ///
@@ -101,7 +101,7 @@ impl Trailer {
     }
 }
 
-/// The part of a trailer whose length is fixed, with the right checksum, magic number and version.
+/// The fixed part of a trailer, with checksum, magic number and version checked.
 struct Fixed([u8; TRAILER_BYTES]);
 
 impl Fixed {

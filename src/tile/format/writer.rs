@@ -4,7 +4,7 @@ use super::{HEADER_BYTES, MAGIC, VERSION};
 use crate::tile::Table;
 use std::io::{self, Write};
 
-/// What a written table weighs.
+/// Checksum and size of a written table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TableChecksums {
     /// CRC-32 of header and entries.
@@ -13,8 +13,8 @@ pub struct TableChecksums {
     pub bytes: u64,
 }
 
-/// Streams a table as `iwlo_meta.bin`. The checksum in `trailer.table_crc` is computed here; what the caller put
-/// there is ignored.
+/// Streams a table as `iwlo_meta.bin`. The checksum in `trailer.table_crc` is computed here; the caller's value is
+/// ignored.
 pub fn write_table(table: &Table, trailer: Trailer, out: &mut impl Write) -> io::Result<TableChecksums> {
     let mut crc = crc32fast::Hasher::new();
     let mut bytes = 0;

@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use voxtile::io::ScanStreamWriter;
 use voxtile::octree::{Octree, write_bt, write_bt_unpruned, write_ot};
 use voxtile::sensor::Evidence;
-use voxtile::share::codec::{Ask, DigestEntry, Header, Packet, Status, Update};
+use voxtile::share::codec::{DigestEntry, Header, Packet, Request, Status, Update};
 use voxtile::share::{SetRange, VoxelSet, write_layer};
 use voxtile::space::{BrickCode, Grid, MortonCode, TileIndex, VoxelKey};
 use voxtile::store::{Layout, TileFile};
@@ -185,7 +185,7 @@ fn shared() -> Seeds {
     let status =
         Status { header, nonce: 7, oldest: 1, resolution_m, tile_size_m, voxels: 2, digest: [2; 32] };
     let packet = |packet: Packet| [vec![0], packet.encode().unwrap()].concat();
-    let ask = |ask: Ask| [vec![0], ask.encode()].concat();
+    let request = |request: Request| [vec![0], request.encode()].concat();
     let mut layer = VoxelSet::new(Grid::new(0.1, 0.8).unwrap());
     for x in 0..20 {
         layer.put([x, 2 * x, -x], true);
@@ -204,8 +204,12 @@ fn shared() -> Seeds {
             packet(Packet::Digests { header, first: TileIndex::default(), entries: vec![entry] }),
         ),
         ("share_packet", "status", packet(Packet::Status(status))),
-        ("share_packet", "ask-missing", ask(Ask::Missing { epoch: 1, sequences: vec![2, 3] })),
-        ("share_packet", "ask-content", ask(Ask::Content { epoch: 1, ranges: vec![range, SetRange::ALL] })),
+        ("share_packet", "ask-missing", request(Request::Missing { epoch: 1, sequences: vec![2, 3] })),
+        (
+            "share_packet",
+            "ask-content",
+            request(Request::Content { epoch: 1, ranges: vec![range, SetRange::ALL] }),
+        ),
         ("share_packet", "layer", file),
         ("share_life", "short", life.to_vec()),
     ]

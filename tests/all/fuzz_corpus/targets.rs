@@ -14,7 +14,7 @@ use voxtile::io::{
 use voxtile::octree::{
     OctreeFile, OctreeFormat, read, read_with_limit, write_bt, write_bt_unpruned, write_ot,
 };
-use voxtile::share::codec::{Ask, Packet};
+use voxtile::share::codec::{Packet, Request};
 use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
 use voxtile::space::{Grid, TileIndex};
 use voxtile::store::{CommitLog, Metadata};
@@ -323,7 +323,7 @@ pub fn points(data: &[u8]) -> bool {
     true
 }
 
-/// Packets, asks and layers of map sharing: what was read comes back from what is written of it.
+/// Packets, requests and layers of map sharing: what was read comes back from what is written of it.
 pub fn share_packet(data: &[u8]) -> bool {
     let Some((&choice, packet)) = data.split_first() else { return false };
     let mut packet = packet.to_vec();
@@ -337,11 +337,11 @@ pub fn share_packet(data: &[u8]) -> bool {
         assert_eq!(format!("{:?}", in_order(again)), format!("{:?}", in_order(read)));
         true
     });
-    let is_ask = Ask::decode(&packet).is_ok_and(|read| {
-        assert_eq!(Ask::decode(&read.encode()).expect("what was written is read"), read);
+    let is_request = Request::decode(&packet).is_ok_and(|read| {
+        assert_eq!(Request::decode(&read.encode()).expect("what was written is read"), read);
         true
     });
-    is_packet || is_ask || read_layer(&mut &packet[..], 1 << 20).is_ok()
+    is_packet || is_request || read_layer(&mut &packet[..], 1 << 20).is_ok()
 }
 
 /// Voxels lie in a packet in the order of its cube, which need not be the smallest one.

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use voxtile::share::codec::{
-    Ask, CONTEXTS, DigestEntry, Header, MAX_VOXELS_PER_PACKET, Packet, Status, Update, VERSION,
+    CONTEXTS, DigestEntry, Header, MAX_VOXELS_PER_PACKET, Packet, Request, Status, Update, VERSION,
     count_contexts, decode_updates, encode_updates,
 };
 use voxtile::share::{SetPosition, SetRange, VoxelSet, read_layer, write_layer};
@@ -54,7 +54,7 @@ proptest! {
         let at = at.index(bytes.len());
         bytes[at] ^= flip;
         prop_assert!(Packet::decode(&bytes).is_err());
-        prop_assert!(Ask::decode(&bytes).is_err());
+        prop_assert!(Request::decode(&bytes).is_err());
     }
 }
 
@@ -88,19 +88,19 @@ fn packets_and_asks_come_back() {
         assert_eq!(Packet::decode(&packet.encode().unwrap()).unwrap(), packet);
     }
     let asks = [
-        Ask::Status { nonce: 77 },
-        Ask::Missing { epoch: 3, sequences: vec![1, 2, 500, u64::MAX] },
-        Ask::Digests { epoch: 3, range: SetRange::ALL },
-        Ask::Content { epoch: 3, ranges: vec![range, SetRange::ALL] },
+        Request::Status { nonce: 77 },
+        Request::Missing { epoch: 3, sequences: vec![1, 2, 500, u64::MAX] },
+        Request::Digests { epoch: 3, range: SetRange::ALL },
+        Request::Content { epoch: 3, ranges: vec![range, SetRange::ALL] },
     ];
     for ask in asks {
-        assert_eq!(Ask::decode(&ask.encode()).unwrap(), ask);
+        assert_eq!(Request::decode(&ask.encode()).unwrap(), ask);
     }
 }
 
 #[test]
 fn another_version_is_refused_by_its_name() {
-    let mut bytes = Ask::Status { nonce: 1 }.encode();
+    let mut bytes = Request::Status { nonce: 1 }.encode();
     bytes[0] = VERSION + 1;
     let error = Packet::decode(&bytes).unwrap_err().to_string();
     assert!(error.contains(&format!("version {}", VERSION + 1)), "{error}");

@@ -2,7 +2,7 @@
 
 use super::memory::{EPOCH, config, grid};
 use std::time::Duration;
-use voxtile::share::codec::{Ask, Header, Packet, Status, Update};
+use voxtile::share::codec::{Header, Packet, Request, Status, Update};
 use voxtile::share::{Receivers, Sender, SenderConfig};
 use voxtile::simulation::Random;
 
@@ -90,7 +90,7 @@ fn fill() -> usize {
         for (robot, hostile) in &mut hostile {
             let mut packets = Vec::new();
             for ask in receivers.get_mut(robot).unwrap().poll(now) {
-                if let Ask::Status { nonce } = Ask::decode(&ask).unwrap() {
+                if let Request::Status { nonce } = Request::decode(&ask).unwrap() {
                     packets.push(hostile.status(nonce));
                 }
             }

@@ -5,10 +5,10 @@ use testkit::reference_local::states_of;
 use voxtile::local::{LocalMap, LocalParameters, LocalState};
 use voxtile::query::UnknownAs;
 use voxtile::share::{
-    LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, WithLayers, fold_layer, read_layer, write_layer,
+    LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, WithLayers, merge_layer, read_layer, write_layer,
 };
 use voxtile::space::VoxelIndex;
-use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Questions, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Queries, Scan};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 1.0).unwrap().with_range(0.0, 3.0)
@@ -99,7 +99,7 @@ fn layer(voxels: impl IntoIterator<Item = VoxelIndex>) -> VoxelSet {
 }
 
 #[test]
-fn a_folded_layer_is_occupied_and_folding_it_again_changes_nothing() {
+fn a_merged_layer_is_occupied_and_merging_it_again_changes_nothing() {
     let mut random = Random(9);
     let mut map = InMemoryMapper::new(config()).unwrap();
     let scan = Scan { origin: [0.0; 3], points: vec![[2.05, 0.05, 0.05]; 5], intensities: None };
@@ -109,16 +109,16 @@ fn a_folded_layer_is_occupied_and_folding_it_again_changes_nothing() {
     // One voxel that the map has seen free four times, one that it has seen occupied, others.
     let new = (0..200).map(|_| std::array::from_fn(|_| 30 + random.below(40) as i32));
     let layer = layer(new.chain([[10, 0, 0], [20, 0, 0]]));
-    let report = fold_layer(&layer, &mut map).unwrap();
+    let report = merge_layer(&layer, &mut map).unwrap();
     assert_eq!((report.voxels, report.known, report.hits), (layer.len(), 1, layer.len() - 1));
     let now = occupied(&map, 0.5);
     assert_eq!(now.len() as u64, layer.len() - 1, "what was seen free four times is free");
     let digest = map.digest().unwrap();
-    let again = fold_layer(&layer, &mut map).unwrap();
+    let again = merge_layer(&layer, &mut map).unwrap();
     assert_eq!(again.hits, 1);
     assert_ne!(map.digest().unwrap(), digest, "its hit counts");
     let mut other = InMemoryMapper::new(MapConfig::new(0.2, 1.0).unwrap()).unwrap();
-    assert!(fold_layer(&layer, &mut other).is_err());
+    assert!(merge_layer(&layer, &mut other).is_err());
 }
 
 #[test]

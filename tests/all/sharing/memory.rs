@@ -1,6 +1,6 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
-use voxtile::share::codec::{Ask, DigestEntry, Header, Packet, Status, Update};
+use voxtile::share::codec::{DigestEntry, Header, Packet, Request, Status, Update};
 use voxtile::share::{
     Receiver, ReceiverConfig, Receivers, Sender, SenderConfig, SetPosition, SetRange, VoxelSet,
 };
@@ -120,7 +120,7 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
             for (robot, hostile) in &mut hostile {
                 let mut packets: Vec<Packet> = (0..5).map(|_| hostile.packet()).collect();
                 for ask in receivers.get_mut(robot).unwrap().poll(now) {
-                    if let Ask::Status { nonce } = Ask::decode(&ask).unwrap() {
+                    if let Request::Status { nonce } = Request::decode(&ask).unwrap() {
                         packets.push(hostile.status(nonce));
                     }
                 }

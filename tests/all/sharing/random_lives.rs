@@ -241,7 +241,7 @@ fn thousands_of_tiles_are_compared_in_groups() {
 #[test]
 fn who_only_listens_has_all_that_came() {
     let mut config = receiver_config(1);
-    config.asks = false;
+    config.sends_requests = false;
     let mut sender = Sender::new(grid(), 5, sender_config(ExportPolicy::LastFrame)).unwrap();
     let mut receiver = Receiver::new(config);
     let mut now = Duration::ZERO;

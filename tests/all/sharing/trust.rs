@@ -115,8 +115,10 @@ fn asks_beyond_the_allowance_are_not_answered() {
     let mut pair = Pair::new(ReceiverConfig::default());
     (0..20_000).for_each(|n| pair.sender.put([n * 7 % 1000, n * 13 % 500, n / 100], true));
     pair.run(10);
-    let ask =
-        voxtile::share::codec::Ask::Content { epoch: 77, ranges: vec![voxtile::share::SetRange::ALL; 60] };
+    let ask = voxtile::share::codec::Request::Content {
+        epoch: 77,
+        ranges: vec![voxtile::share::SetRange::ALL; 60],
+    };
     let now = pair.now;
     let answered: usize = (0..1000)
         .flat_map(|_| pair.sender.answer(2, &ask.encode(), now).unwrap())

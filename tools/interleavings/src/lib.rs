@@ -36,7 +36,7 @@ mod scan {
 }
 
 mod sensor {
-    pub(crate) use voxtile::sensor::Evidence;
+    pub(crate) use voxtile::sensor::{Evidence, SensorModel};
 }
 
 mod space {
@@ -59,79 +59,107 @@ mod tile {
     use voxtile::tile::VoxelCacheCounts;
     pub(crate) use voxtile::tile::{OctreeFactory, OctreeStatistics, Table, Tile, TileCounts, format};
 
-    mod octree_statistics {
-        source!("octree_statistics.rs");
+    mod octocache {
+        mod octree_statistics {
+            source!("octree_statistics.rs");
+        }
+        mod octree_worker {
+            source!("octree_worker.rs");
+        }
+        mod shared_tree {
+            source!("shared_tree.rs");
+        }
+        mod work_queue {
+            source!("work_queue.rs");
+        }
+        #[cfg(test)]
+        mod tests;
     }
-    mod octree_worker {
-        source!("octree_worker.rs");
-    }
-    mod shared_tree {
-        source!("shared_tree.rs");
-    }
-    mod work_queue {
-        source!("work_queue.rs");
-    }
-    #[cfg(test)]
-    mod tests;
 }
 
-mod mapper {
-    mod adoption {
-        source!("adoption.rs");
+mod persistence {
+    mod compact_tile {
+        source!("compact_tile.rs");
     }
-    mod cold_tiles {
-        source!("cold_tiles.rs");
+    mod io_threads {
+        source!("io_threads.rs");
     }
-    mod memory_plan;
-
-    mod flush {
-        source!("flush.rs");
-    }
-    mod look_ahead {
-        source!("look_ahead.rs");
+    pub(crate) mod load {
+        source!("load.rs");
     }
     mod map_id {
         source!("map_id.rs");
     }
-    mod pending {
-        source!("pending.rs");
-    }
-    mod residency {
-        source!("residency.rs");
-    }
-    mod resident_tiles {
-        source!("resident_tiles.rs");
-    }
-    mod room {
-        source!("room.rs");
-    }
-    mod side_worker {
-        source!("side_worker.rs");
-    }
-    mod stalls {
-        source!("stalls.rs");
-    }
-    mod statistics {
-        source!("statistics.rs");
-    }
-    mod tile_files {
-        source!("tile_files.rs");
+    mod parameters {
+        source!("parameters.rs");
     }
     mod tile_saver {
         source!("tile_saver.rs");
     }
-    mod tile_traffic {
-        source!("tile_traffic.rs");
+    mod upgrade {
+        source!("upgrade.rs");
     }
-    mod waiting {
-        source!("waiting.rs");
+    mod worker {
+        source!("worker.rs");
     }
-    #[cfg(test)]
-    mod lives;
-    #[cfg(test)]
-    mod memory_disk;
     #[cfg(test)]
     mod tests;
+
+    pub(crate) use compact_tile::CompactTile;
+    pub(crate) use io_threads::{IoThreads, Loaded, Saved};
+    pub(crate) use map_id::new_map_id;
+    pub(crate) use parameters::{config_from, new_metadata};
+    pub(crate) use tile_saver::TileSaver;
+    pub(crate) use upgrade::upgrade;
+}
+
+mod mapper {
+    mod statistics {
+        source!("statistics.rs");
+    }
+    mod paging {
+        mod buffered_updates {
+            source!("buffered_updates.rs");
+        }
+        mod compact_tiles {
+            source!("compact_tiles.rs");
+        }
+        mod eviction {
+            source!("eviction.rs");
+        }
+        mod flush {
+            source!("flush.rs");
+        }
+        mod memory_plan;
+        mod prefetch {
+            source!("prefetch.rs");
+        }
+        mod resident_tiles {
+            source!("resident_tiles.rs");
+        }
+        mod stalls {
+            source!("stalls.rs");
+        }
+        mod tile_cache {
+            source!("tile_cache.rs");
+        }
+        mod tile_disk {
+            source!("tile_disk.rs");
+        }
+        mod tile_pager {
+            source!("tile_pager.rs");
+        }
+        mod tile_span {
+            source!("tile_span.rs");
+        }
+        mod write_buffer {
+            source!("write_buffer.rs");
+        }
+        #[cfg(test)]
+        mod lives;
+        #[cfg(test)]
+        mod memory_disk;
+    }
 }
 
 #[cfg(test)]

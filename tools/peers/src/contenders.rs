@@ -15,7 +15,7 @@ pub struct Contenders {
     pub voxtile: PathBuf,
     /// Short work is repeated until so many seconds were timed.
     pub least_seconds: f64,
-    /// Questions of a kind.
+    /// Queries of a kind.
     pub points: usize,
 }
 

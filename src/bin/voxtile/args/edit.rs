@@ -1,6 +1,6 @@
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use voxtile::session::Prefer;
+use voxtile::operations::Prefer;
 
 #[derive(Debug, Args)]
 pub struct MergeArgs {

@@ -1,18 +1,18 @@
-use super::census::{Census, StateKey};
-use super::symbol::{MOST_STATES, RARE, Symbols};
+use super::state_counts::{StateCounts, StateKey};
+use super::symbol::{MAX_STATES, RARE, Symbols};
 use crate::sensor::Evidence;
 use crate::tile::Table;
-use crate::tile::palette::{Palette, StateId};
+use crate::tile::table::{Palette, StateId};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 
-/// The states that more than one voxel of a table is in, numbered, and how each is written.
+/// The states that more than one voxel of a table is in, numbered, and their symbols.
 pub(super) struct Codebook {
     pub(super) states: Vec<Evidence>,
     pub(super) symbols: Symbols,
-    /// By number in the table's palette, see [`Symbols::code`]; [`RARE`] for the others.
+    /// By number in the table's palette, see [`Symbols::code`]; [`RARE`] for all other states.
     pub(super) interned: Vec<u16>,
-    /// Of the states that the palette does not have.
+    /// For states that are not in the palette.
     others: FxHashMap<StateKey, u16>,
 }
 
@@ -25,7 +25,7 @@ struct Common {
 }
 
 impl Common {
-    /// Such that neighbors have much in common, and that no two are equal.
+    /// A strict order in which neighbours have much in common.
     fn rank(&self) -> (i32, u64) {
         let bits = self.state.log_odds_bits;
         (self.state.observation_count, if bits >> 63 == 1 { !bits } else { bits | 1 << 63 })
@@ -34,17 +34,17 @@ impl Common {
 
 impl Codebook {
     pub(super) fn of(table: &Table) -> Self {
-        let census = Census::of(table);
-        let mut commons = commons(&census, &table.palette);
+        let counts = StateCounts::of(table);
+        let mut commons = commons(&counts, &table.palette);
         commons.sort_unstable_by_key(|common| (Reverse(common.voxels), common.rank()));
-        commons.truncate(MOST_STATES);
+        commons.truncate(MAX_STATES);
         let symbols = Symbols::of(commons.len());
-        // Within what takes one byte, and within what takes two, any order takes the same space.
+        // Within the one-byte symbols and within the two-byte symbols, any order takes the same space.
         let (one_byte, two_bytes) = commons.split_at_mut(symbols.direct().into());
         one_byte.sort_unstable_by_key(|common| common.rank());
         two_bytes.sort_unstable_by_key(|common| common.rank());
 
-        let mut interned = vec![u16::from(RARE); census.interned.len()];
+        let mut interned = vec![u16::from(RARE); counts.interned.len()];
         let mut others = FxHashMap::default();
         for (number, common) in commons.iter().enumerate() {
             match common.interned {
@@ -55,7 +55,7 @@ impl Codebook {
         Self { states: commons.iter().map(|common| common.state.into()).collect(), symbols, interned, others }
     }
 
-    /// How a state is written that is perhaps not in the palette.
+    /// The symbol of a state that may not be in the palette.
     pub(super) fn code(&self, evidence: Evidence, palette: &Palette) -> u16 {
         match palette.find(evidence) {
             Some(state) => self.interned[usize::from(state)],
@@ -64,11 +64,11 @@ impl Codebook {
     }
 }
 
-fn commons(census: &Census, palette: &Palette) -> Vec<Common> {
-    let interned = census.interned.iter().enumerate().map(|(state, &voxels)| {
+fn commons(counts: &StateCounts, palette: &Palette) -> Vec<Common> {
+    let interned = counts.interned.iter().enumerate().map(|(state, &voxels)| {
         let state = state as StateId;
         Common { voxels, state: palette.evidence(state).into(), interned: Some(state) }
     });
-    let others = census.others.iter().map(|(&state, &voxels)| Common { voxels, state, interned: None });
+    let others = counts.others.iter().map(|(&state, &voxels)| Common { voxels, state, interned: None });
     interned.chain(others).filter(|common| common.voxels > 1).collect()
 }

@@ -3,8 +3,8 @@ use crate::sensor::Evidence;
 /// Bytes of a state.
 pub(super) const STATE_BYTES: usize = 12;
 
-/// Appends states byte by byte: the lowest bytes of all counts, their next ones, ..., the highest ones of all log-odds.
-/// What equal states have in common lies side by side.
+/// Appends states as byte planes: the lowest bytes of all counts, their next bytes, ..., the highest bytes of all
+/// log-odds. Equal bytes of similar states are adjacent.
 pub(super) fn put_states(states: impl Iterator<Item = Evidence> + Clone, out: &mut Vec<u8>) {
     for byte in 0..4 {
         out.extend(states.clone().map(|state| state.observation_count.to_le_bytes()[byte]));
@@ -14,7 +14,7 @@ pub(super) fn put_states(states: impl Iterator<Item = Evidence> + Clone, out: &m
     }
 }
 
-/// The state at a place of what [`put_states`] wrote; `states` is of whole states.
+/// The state at a place of the output of [`put_states`], whose length is a multiple of a state's.
 pub(super) fn state_at(states: &[u8], place: usize) -> Evidence {
     let count = states.len() / STATE_BYTES;
     let byte = |column: usize| states[column * count + place];

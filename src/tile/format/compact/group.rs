@@ -1,44 +1,41 @@
 use super::codebook::Codebook;
+use super::column_writer::ColumnWriter;
 use super::columns::put_states;
 use super::numbers::put_number;
-use super::packer::Packer;
 use super::symbol::RARE;
 use crate::sensor::Evidence;
 use crate::space::BrickCode;
-use crate::tile::brick::{Brick, Storage};
-use crate::tile::cells::CELL_VOXELS;
-use crate::tile::packed::Packed;
-use crate::tile::palette::{Palette, StateId};
+use crate::tile::table::{Brick, CELL_VOXELS, Palette, StateId, Storage, UnpaddedEvidence};
 use std::io;
 
-/// A group ends with the brick that brings it to so many voxels.
+/// A group ends with the brick that reaches this many voxels.
 pub(super) const GROUP_VOXELS: usize = 1 << 16;
 
 /// Most bricks of a group.
 pub(super) const GROUP_BRICKS: usize = 1 << 10;
 
-/// Some bricks of a table, one behind the other in Morton order, as columns.
+/// Consecutive bricks of a table in Morton order, as columns.
 #[derive(Default)]
 pub(super) struct Group {
     bricks: usize,
-    /// Of each brick, how far its code is from that of the brick before.
+    /// Per brick, the difference of its code from the previous brick's.
     steps: Vec<u8>,
-    /// Of each brick, which words of its mask are not 0.
+    /// Per brick, which words of its mask are not 0.
     words: Vec<u8>,
     /// These words.
     masks: Vec<u8>,
-    /// Of each voxel.
+    /// Per voxel.
     symbols: Vec<u8>,
-    /// Of each voxel whose symbol is a prefix.
+    /// Per voxel whose symbol is a prefix, the second byte.
     seconds: Vec<u8>,
-    /// Of each voxel whose state is not in the codebook.
+    /// Per voxel whose state is not in the codebook.
     rares: Vec<Evidence>,
-    /// The brick before, in this group or another.
+    /// The previous brick, in this group or another.
     before: Option<BrickCode>,
 }
 
 impl Group {
-    /// Begins with the first group of a table.
+    /// Starts the first group of a table.
     pub(super) fn begin(&mut self) {
         self.clear();
         self.before = None;
@@ -109,7 +106,7 @@ impl Group {
     fn push_plain(
         &mut self,
         mask: u64,
-        cell: &[Packed; CELL_VOXELS],
+        cell: &[UnpaddedEvidence; CELL_VOXELS],
         codebook: &Codebook,
         palette: &Palette,
     ) {
@@ -121,7 +118,7 @@ impl Group {
         }
     }
 
-    /// What stands elsewhere for a voxel than with the symbols.
+    /// Appends a voxel's data beside its symbol.
     fn push_rest(&mut self, code: u16, codebook: &Codebook, evidence: impl Fn() -> Evidence) {
         let [symbol, second] = code.to_le_bytes();
         if symbol == RARE {
@@ -131,18 +128,18 @@ impl Group {
         }
     }
 
-    /// Appends the group's bytes, after which it is empty.
-    pub(super) fn end(&mut self, packer: &mut Packer, out: &mut Vec<u8>) -> io::Result<()> {
+    /// Appends the group's bytes and empties the group.
+    pub(super) fn end(&mut self, column_writer: &mut ColumnWriter, out: &mut Vec<u8>) -> io::Result<()> {
         let mut rares = Vec::new();
         put_states(self.rares.iter().copied(), &mut rares);
         let columns = [&self.steps, &self.words, &self.masks, &self.symbols, &self.seconds, &rares];
         put_number(self.bricks as u64, out);
-        packer.put_columns(columns.map(|column| &column[..]), out)?;
+        column_writer.put_columns(columns.map(|column| &column[..]), out)?;
         self.clear();
         Ok(())
     }
 
-    /// Forgets the bricks, all but which was the last.
+    /// Removes the bricks; the code of the last one stays.
     fn clear(&mut self) {
         let Self { bricks, steps, words, masks, symbols, seconds, rares, before: _ } = self;
         *bricks = 0;

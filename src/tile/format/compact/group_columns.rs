@@ -1,15 +1,15 @@
+use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
 use super::group::{GROUP_BRICKS, GROUP_VOXELS};
 use super::input::Input;
 use super::numbers::take_number;
-use super::unpacker::{Column, Unpacker};
 use crate::error::DecodeError;
 use crate::sensor::Evidence;
 use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
 use crate::tile::format::entry::fault_of;
 use std::io::Read;
 
-/// The columns of a group as they are read, see [`Group`](super::group::Group).
+/// The columns of a group, read; see [`Group`](super::group::Group).
 #[derive(Default)]
 pub(super) struct Columns {
     /// Where the group begins.
@@ -23,7 +23,7 @@ pub(super) struct Columns {
     rares: Vec<u8>,
 }
 
-/// What a group may have at most.
+/// Limits of a group.
 pub(super) struct Room {
     pub(super) bricks: usize,
     pub(super) voxels: usize,
@@ -34,7 +34,7 @@ impl Columns {
     pub(super) fn read(
         &mut self,
         room: &Room,
-        unpacker: &mut Unpacker,
+        column_reader: &mut ColumnReader,
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
         /// Bytes of the largest step.
@@ -44,7 +44,7 @@ impl Columns {
         let voxels = room.voxels.min(GROUP_VOXELS + BRICK_VOXELS - 1).min(bricks * BRICK_VOXELS);
         self.bricks = bricks;
         let column = |name, most, bytes| Column { name, most, bytes };
-        unpacker.take_columns(
+        column_reader.take_columns(
             [
                 column("steps", bricks * STEP_BYTES, &mut self.steps),
                 column("words", bricks, &mut self.words),
@@ -58,7 +58,7 @@ impl Columns {
     }
 }
 
-/// What is left of the columns of a group.
+/// The unread rest of the columns of a group.
 #[derive(Clone, Copy)]
 pub(super) struct Rest<'a> {
     steps: &'a [u8],
@@ -76,14 +76,14 @@ impl<'a> Rest<'a> {
         Self { steps, words, masks: masks.as_chunks().0, symbols, seconds, rares, rares_done: 0 }
     }
 
-    /// Whether nothing is left, not even a part of something.
+    /// Whether all columns are read to their ends.
     pub(super) fn is_empty(&self) -> bool {
         let Self { steps, words, masks, symbols, seconds, rares, rares_done } = *self;
         let is_done = [steps, words, symbols, seconds].iter().all(|column| column.is_empty());
         is_done && masks.is_empty() && rares_done * STATE_BYTES == rares.len()
     }
 
-    /// The code of a brick, which is larger than that of the brick before.
+    /// The code of the next brick, which must be larger than the previous one.
     pub(super) fn take_code(&mut self, before: Option<BrickCode>) -> Result<BrickCode, String> {
         let step = take_number(|| {
             let (&byte, rest) = self.steps.split_first()?;
@@ -95,7 +95,7 @@ impl<'a> Rest<'a> {
         code.map(BrickCode).ok_or_else(|| "a step leads to no brick".into())
     }
 
-    /// The mask of a brick, in which something is set.
+    /// The mask of the next brick, which must not be empty.
     pub(super) fn take_mask(&mut self) -> Result<BrickMask, String> {
         const SHORT: &str = "a group has less than its bricks";
         let (&words, rest) = self.words.split_first().ok_or(SHORT)?;
@@ -112,7 +112,7 @@ impl<'a> Rest<'a> {
         Ok(observed)
     }
 
-    /// The symbols of as many voxels.
+    /// The symbols of the next `count` voxels.
     #[inline]
     pub(super) fn take_symbols(&mut self, voxels: usize) -> Result<&'a [u8], String> {
         let (symbols, rest) = self.symbols.split_at_checked(voxels).ok_or("fewer symbols than voxels")?;

@@ -5,15 +5,14 @@ use super::symbol::Symbols;
 use crate::error::FormatError;
 use crate::space::{BrickCode, VoxelBox};
 use crate::tile::Table;
-use crate::tile::brick::Storage;
-use crate::tile::palette::Palette;
+use crate::tile::table::{Palette, Storage};
 
-/// Puts a table together from groups of bricks.
+/// Builds a table from groups of bricks.
 pub(super) struct GroupReader<'a> {
     voxels: &'a VoxelBox,
     symbols: Symbols,
     table: Table,
-    /// The brick before.
+    /// The previous brick.
     before: Option<BrickCode>,
 }
 
@@ -29,7 +28,7 @@ impl<'a> GroupReader<'a> {
         self.table.bricks.len()
     }
 
-    /// What the next group may have.
+    /// The limits of the next group.
     pub(super) fn room(&self, header: &Header) -> Room {
         Room { bricks: header.bricks - self.bricks(), voxels: header.voxels - self.table.len() }
     }

@@ -3,7 +3,7 @@ use super::numbers::take_number;
 use crate::error::{DecodeError, FormatError};
 use std::io::Read;
 
-/// The bytes of a compact table as they are read: how many are left, and their checksum.
+/// Reads the bytes of a compact table, with the number of bytes left and the checksum.
 pub(super) struct Input<R> {
     input: R,
     /// Bytes read so far.
@@ -14,12 +14,12 @@ pub(super) struct Input<R> {
 }
 
 impl<R: Read> Input<R> {
-    /// Of as many bytes, which are enough for a checksum.
+    /// An input of `bytes` bytes, at least those of a checksum.
     pub(super) fn new(input: R, bytes: u64) -> Self {
         Self { input, offset: 0, end: bytes - CRC_BYTES, crc: crc32fast::Hasher::new() }
     }
 
-    /// An error at what comes next.
+    /// An error at the present offset.
     pub(super) fn wrong(&self, reason: impl Into<String>) -> DecodeError {
         FormatError::at_offset(self.offset, reason).into()
     }
@@ -35,7 +35,7 @@ impl<R: Read> Input<R> {
         Ok(())
     }
 
-    /// A number that may be as large as `most`.
+    /// A number of at most `most`.
     pub(super) fn number(&mut self, what: &str, most: usize) -> Result<usize, DecodeError> {
         let offset = self.offset;
         let mut failed = None;
@@ -51,7 +51,7 @@ impl<R: Read> Input<R> {
         Ok(number.ok_or_else(|| FormatError::at_offset(offset, reason()))?)
     }
 
-    /// Sees to it that nothing but a checksum follows that is right.
+    /// Checks that only the right checksum follows.
     pub(super) fn end(mut self) -> Result<(), DecodeError> {
         if self.offset != self.end {
             return Err(self.wrong(format!("{} bytes stand behind the last voxel", self.end - self.offset)));

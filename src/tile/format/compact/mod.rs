@@ -1,4 +1,4 @@
-//! A tile's exact table in a small part of its memory: for tiles that wait in memory, and for files.
+//! A tile's exact table in compact form: for unused tiles in memory, and for files.
 //!
 //! ```text
 //! header   24 bytes   magic "VXTC", version, voxels, bricks, states of the codebook
@@ -7,12 +7,12 @@
 //! CRC-32    4 bytes
 //! ```
 //!
-//! Everything stands in columns, each packed by zstd where that makes it smaller. The bytes follow from what the table
-//! holds, never from how it came about: bricks in Morton order, states numbered by how many voxels are in them. The
-//! byte tables are in `docs/format.md`.
+//! Data are columns, each compressed by zstd if that makes it smaller. The bytes depend on the table's content alone:
+//! bricks in Morton order, states numbered by how many voxels are in them. The byte tables are in `docs/format.md`.
 
-mod census;
 mod codebook;
+mod column_reader;
+mod column_writer;
 mod columns;
 mod effort;
 mod group;
@@ -21,12 +21,11 @@ mod group_reader;
 mod input;
 mod numbers;
 mod open_brick;
-mod packer;
 mod reader;
+mod state_counts;
 mod symbol;
 #[cfg(test)]
 mod tests;
-mod unpacker;
 mod writer;
 
 pub use effort::CompactEffort;
@@ -37,5 +36,5 @@ pub use writer::{CompactWriter, write_compact};
 const MAGIC: u32 = 0x4354_5856;
 const VERSION: u32 = 1;
 const HEADER_BYTES: usize = 24;
-/// What a compact table ends with.
+/// Length of the checksum at the end.
 pub(super) const CRC_BYTES: u64 = 4;

@@ -1,4 +1,4 @@
-/// Appends a number, seven bits a byte, the lowest first; all bytes but the last have their highest bit set.
+/// Appends a number, seven bits per byte, the lowest first; all bytes but the last have their highest bit set.
 pub(super) fn put_number(mut number: u64, out: &mut Vec<u8>) {
     while number >= 0x80 {
         out.push(number as u8 | 0x80);
@@ -7,8 +7,8 @@ pub(super) fn put_number(mut number: u64, out: &mut Vec<u8>) {
     out.push(number as u8);
 }
 
-/// Reads what [`put_number`] wrote, from bytes that come one by one: `None` if they end, or the number takes more
-/// than 64 bits or more bytes than it needs.
+/// Reads the output of [`put_number`] byte by byte: `None` if the bytes end, if the number exceeds 64 bits, or if it
+/// takes more bytes than necessary.
 pub(super) fn take_number(mut next: impl FnMut() -> Option<u8>) -> Option<u64> {
     let mut number = 0;
     for shift in (0..64).step_by(7) {

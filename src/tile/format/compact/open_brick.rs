@@ -3,10 +3,9 @@ use super::group_columns::Rest;
 use super::symbol::{RARE, Symbols};
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, VoxelBox, mask_of_box, places};
-use crate::tile::brick::{Brick, Storage};
-use crate::tile::cells::{CELL_VOXELS, Cells};
-use crate::tile::packed::Packed;
-use crate::tile::palette::{Full, Palette, StateId, UNKNOWN};
+use crate::tile::table::{
+    Brick, CELL_VOXELS, Cells, Full, Palette, StateId, Storage, UNKNOWN, UnpaddedEvidence,
+};
 
 /// A brick whose voxels are being read.
 pub(super) struct OpenBrick {
@@ -15,9 +14,9 @@ pub(super) struct OpenBrick {
     pub(super) symbols: Symbols,
 }
 
-/// Why a brick cannot be read as states of the palette.
+/// Why a brick cannot be read as palette states.
 pub(super) enum Refusal {
-    /// The palette takes no more states.
+    /// The palette is full.
     Full,
     Wrong(String),
 }
@@ -53,12 +52,12 @@ impl OpenBrick {
         if is_inside { Ok(()) } else { Err(other()) }
     }
 
-    /// The brick of what was read.
+    /// The finished brick.
     pub(super) fn closed(self, evidence: Storage) -> Brick {
         Brick::with(self.code, self.observed, evidence)
     }
 
-    /// The states of the voxels; the palette takes those that it does not have.
+    /// The states of the voxels; missing ones are added to the palette.
     pub(super) fn interned(
         &self,
         rest: &mut Rest<'_>,
@@ -87,9 +86,13 @@ impl OpenBrick {
         Ok(self.common(symbol, rest)?)
     }
 
-    /// The evidence of the voxels, where the palette cannot take all of it.
-    pub(super) fn plain(&self, rest: &mut Rest<'_>, palette: &Palette) -> Result<Cells<Packed>, String> {
-        let mut cells = Cells::of_words(&self.observed, Packed::from(Evidence::PRIOR));
+    /// The evidence of the voxels, if the palette is full.
+    pub(super) fn plain(
+        &self,
+        rest: &mut Rest<'_>,
+        palette: &Palette,
+    ) -> Result<Cells<UnpaddedEvidence>, String> {
+        let mut cells = Cells::of_words(&self.observed, UnpaddedEvidence::from(Evidence::PRIOR));
         let masks = self.observed.iter().filter(|&&mask| mask != 0);
         for (cell, &mask) in cells.all_mut().iter_mut().zip(masks) {
             let symbols = rest.take_symbols(mask.count_ones() as usize)?;
@@ -104,7 +107,7 @@ impl OpenBrick {
         Ok(cells)
     }
 
-    /// The state of the codebook that a symbol stands for.
+    /// The codebook's state of a symbol.
     fn common(&self, symbol: u8, rest: &mut Rest<'_>) -> Result<StateId, String> {
         let number = if symbol < self.symbols.direct() {
             Some(usize::from(symbol))
@@ -118,12 +121,12 @@ impl OpenBrick {
     }
 }
 
-/// The state in the palette that a state of the codebook is.
+/// The palette's state of a codebook number.
 const fn state_of(number: u16) -> StateId {
     number + 1
 }
 
-/// Sets the states of a mask, whose symbols are their numbers.
+/// Sets the states of a mask whose symbols are codebook numbers.
 #[inline]
 fn set(cell: &mut [StateId; CELL_VOXELS], mask: u64, symbols: &[u8]) {
     if let Ok(symbols) = <&[u8; CELL_VOXELS]>::try_from(symbols) {

@@ -1,21 +1,21 @@
+use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
 use super::group_columns::Columns;
 use super::group_reader::GroupReader;
 use super::input::Input;
-use super::symbol::MOST_STATES;
-use super::unpacker::{Column, Unpacker};
+use super::symbol::MAX_STATES;
 use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
 use crate::tile::Table;
 use crate::tile::format::entry::fault_of;
-use crate::tile::palette::Palette;
+use crate::tile::table::Palette;
 use std::io::{self, Read};
 
-/// Reads tables in their compact form. What it works with is kept from one table to the next: 0.4 MB, and up to 1.5 MB
-/// more once there was a table of which hardly two voxels were in one state.
+/// Reads tables in compact form. Its buffers are kept from table to table: 0.4 MB, and up to 1.5 MB more after a table
+/// in which hardly two voxels were in one state.
 pub struct CompactReader {
-    unpacker: Unpacker,
+    column_reader: ColumnReader,
     columns: Columns,
 }
 
@@ -26,17 +26,17 @@ impl CompactReader {
     ///
     /// Those of zstd.
     pub fn new() -> io::Result<Self> {
-        Ok(Self { unpacker: Unpacker::new()?, columns: Columns::default() })
+        Ok(Self { column_reader: ColumnReader::new()?, columns: Columns::default() })
     }
 
-    /// Reads a table of `bytes` bytes that belongs to the tile of `voxels`. Whatever the bytes say, the table holds no
-    /// voxel that is not of the tile, and nothing takes memory that the tile could not need.
+    /// Reads a table of `bytes` bytes that belongs to the tile of `voxels`. Damaged bytes cannot add voxels outside the
+    /// tile, or take more memory than the tile could need.
     ///
     /// # Errors
     ///
-    /// Anything that is not as the format says, with the offset of the part that it is in: wrong magic or version, lengths
-    /// and counts that do not fit, bricks that are out of order or of another tile, states that come twice or are no
-    /// evidence, bytes behind the end, a wrong checksum.
+    /// Anything that violates the format, with the offset of the part: wrong magic or version, lengths and counts that
+    /// do not fit, bricks out of order or of another tile, duplicate or invalid states, bytes after the end, a wrong
+    /// checksum.
     pub fn read(
         &mut self,
         input: &mut impl Read,
@@ -49,10 +49,10 @@ impl CompactReader {
         }
         let mut input = Input::new(input, bytes);
         let header = Header::read(&mut input, voxels)?;
-        let palette = read_codebook(header.states, &mut self.unpacker, &mut input)?;
+        let palette = read_codebook(header.states, &mut self.column_reader, &mut input)?;
         let mut groups = GroupReader::new(voxels, palette);
         while groups.bricks() < header.bricks {
-            self.columns.read(&groups.room(&header), &mut self.unpacker, &mut input)?;
+            self.columns.read(&groups.room(&header), &mut self.column_reader, &mut input)?;
             groups.add(&self.columns)?;
         }
         let table = groups.end();
@@ -74,7 +74,7 @@ pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Res
     CompactReader::new()?.read(input, bytes, voxels)
 }
 
-/// What a compact table begins with.
+/// The header of a compact table.
 pub(super) struct Header {
     pub(super) voxels: usize,
     pub(super) bricks: usize,
@@ -103,7 +103,7 @@ impl Header {
         if bricks > count || (bricks == 0) != (count == 0) {
             return wrong(16, format!("{count} voxels in {bricks} bricks"));
         }
-        if states > count.min(MOST_STATES) {
+        if states > count.min(MAX_STATES) {
             return wrong(20, format!("a codebook of {states} states for {count} voxels"));
         }
         Ok(Self { voxels: count, bricks, states })
@@ -118,14 +118,14 @@ fn voxels_in(voxels: &VoxelBox) -> u64 {
 /// The codebook as a palette: its states are numbered from 1.
 fn read_codebook(
     states: usize,
-    unpacker: &mut Unpacker,
+    column_reader: &mut ColumnReader,
     input: &mut Input<impl Read>,
 ) -> Result<Palette, DecodeError> {
     let offset = input.offset;
     let wrong = |reason: String| Err(FormatError::at_offset(offset, reason).into());
     let mut bytes = Vec::new();
     let column = Column { name: "codebook", most: states * STATE_BYTES, bytes: &mut bytes };
-    unpacker.take_columns([column], input)?;
+    column_reader.take_columns([column], input)?;
     if bytes.len() != states * STATE_BYTES {
         return wrong(format!("a codebook of {} bytes for {states} states", bytes.len()));
     }

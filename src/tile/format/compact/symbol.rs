@@ -1,7 +1,7 @@
-/// How the states of a codebook are written: the byte of a voxel and, behind some, a second one.
+/// The symbols of a codebook's states: one byte per voxel and, for some, a second one.
 ///
 /// Symbols below [`first_prefix`](Self::first_prefix) are the codebook's first states. A prefix stands for 256 states,
-/// of which the second byte chooses one. [`RARE`] is a state that is not in the codebook.
+/// of which the second byte selects one. [`RARE`] is a state that is not in the codebook.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Symbols {
     states: usize,
@@ -11,11 +11,11 @@ pub(super) struct Symbols {
 /// The symbol of a voxel whose state is written out.
 pub(super) const RARE: u8 = u8::MAX;
 
-/// Most states of a codebook: half of the symbols are prefixes then.
-pub(super) const MOST_STATES: usize = 255 + 127 * 255;
+/// Most states of a codebook: then half of the symbols are prefixes.
+pub(super) const MAX_STATES: usize = 255 + 127 * 255;
 
 impl Symbols {
-    /// Symbols for as many states, at most [`MOST_STATES`].
+    /// Symbols for as many states, at most [`MAX_STATES`].
     pub(super) fn of(states: usize) -> Self {
         let prefixes = states.saturating_sub(255).div_ceil(255);
         Self { states, first_prefix: 255 - prefixes }
@@ -26,12 +26,12 @@ impl Symbols {
         self.first_prefix as u8
     }
 
-    /// The first symbol that is no state of the codebook by itself.
+    /// The first symbol that is not a state by itself.
     pub(super) fn direct(self) -> u8 {
         self.states.min(self.first_prefix) as u8
     }
 
-    /// The symbol of a state of the codebook, and in the upper byte the second one.
+    /// The symbol of a state, with the second byte in the upper byte.
     pub(super) fn code(self, number: usize) -> u16 {
         match number.checked_sub(self.first_prefix) {
             None => number as u16,
@@ -39,7 +39,7 @@ impl Symbols {
         }
     }
 
-    /// The number of the state of a prefix and a second byte; `None` if the codebook has no such state.
+    /// The state number of a prefix and a second byte; `None` if the codebook has no such state.
     pub(super) fn number(self, prefix: u8, second: u8) -> Option<usize> {
         let behind = (usize::from(prefix) - self.first_prefix) * 256 + usize::from(second);
         Some(self.first_prefix + behind).filter(|&number| number < self.states)
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn every_state_has_its_symbol_and_no_symbol_two_states() {
-        for states in [0, 1, 254, 255, 256, 509, 510, 511, 5000, MOST_STATES] {
+        for states in [0, 1, 254, 255, 256, 509, 510, 511, 5000, MAX_STATES] {
             let symbols = Symbols::of(states);
             assert!(symbols.first_prefix >= 128);
             for number in 0..states {

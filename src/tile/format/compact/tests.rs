@@ -1,4 +1,4 @@
-//! Tables of every kind go through the compact form and come back to the bit; what is not a compact table is an error.
+//! Tables of every kind survive the compact form to the bit; damaged input is an error.
 
 use super::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
 use crate::error::{DecodeError, FormatError};
@@ -6,8 +6,7 @@ use crate::sensor::Evidence;
 use crate::simulation::Random;
 use crate::space::{BrickCode, MortonCode, VoxelBox, VoxelKey};
 use crate::tile::Table;
-use crate::tile::brick::Storage;
-use crate::tile::palette::Palette;
+use crate::tile::table::{Palette, Storage};
 use std::collections::BTreeMap;
 
 type Voxels = BTreeMap<MortonCode, Evidence>;
@@ -28,7 +27,7 @@ fn any_tile(random: &mut Random) -> VoxelBox {
     VoxelBox { min, end: min.map(|k| k + n) }
 }
 
-/// Few states, many, or one a voxel; now and then one that is hardly ever seen.
+/// Few states, many, or one per voxel; now and then one that is rare.
 fn any_state(random: &mut Random, kind: u64) -> Evidence {
     const ODD: [f64; 8] =
         [0.0, -0.0, f64::MIN_POSITIVE / 3.0, -5e-324, f64::MAX, f64::MIN, 1.0 + f64::EPSILON, -2.0];
@@ -57,7 +56,7 @@ fn any_voxels(random: &mut Random, tile: &VoxelBox) -> Voxels {
     voxels
 }
 
-/// A table of these voxels that came about in some way, with a palette that holds all states or soon too few.
+/// A table of these voxels, built in some order, with a palette that holds all states or is soon too small.
 fn table_of(voxels: &Voxels, random: &mut Random) -> Table {
     let limit = 1 << random.between(2.0, 12.0) as usize;
     let palette = [Palette::default(), Palette::limited(limit, limit)][random.below(2) as usize].clone();
@@ -221,12 +220,12 @@ fn every_truncation_and_every_wrong_bit_is_an_error() {
         read(&wrong, &tile).unwrap_err();
     }
     read(&[&bytes[..], &[0]].concat(), &tile).unwrap_err();
-    // A stream that ends before the bytes that it should have.
+    // A stream that is shorter than announced.
     let longer = read_compact(&mut &bytes[..bytes.len() - 1], bytes.len() as u64, &tile);
     assert!(matches!(longer, Err(DecodeError::Io(_))));
 }
 
-/// With a checksum that is right: nothing but an error, or a table of this tile.
+/// With a valid checksum: an error, or a table of this tile.
 #[test]
 fn hostile_bytes_are_an_error_or_a_table_of_the_tile() {
     let (tile, table) = small();

@@ -1,17 +1,17 @@
 use super::codebook::Codebook;
+use super::column_writer::ColumnWriter;
 use super::columns::put_states;
 use super::effort::CompactEffort;
 use super::group::Group;
-use super::packer::Packer;
 use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::tile::Table;
 use std::fmt;
 use std::io::{self, Write};
 
-/// Writes tables in their compact form. What it works with is kept from one table to the next: 0.7 MB, or 1.7 MB for
-/// [`CompactEffort::Small`], and up to 3 MB more once there was a table of which hardly two voxels were in one state.
+/// Writes tables in compact form. Its buffers are kept from table to table: 0.7 MB, or 1.7 MB for
+/// [`CompactEffort::Small`], and up to 3 MB more after a table in which hardly two voxels were in one state.
 pub struct CompactWriter {
-    packer: Packer,
+    column_writer: ColumnWriter,
     group: Group,
     part: Vec<u8>,
 }
@@ -23,19 +23,19 @@ impl CompactWriter {
     ///
     /// Those of zstd.
     pub fn new(effort: CompactEffort) -> io::Result<Self> {
-        Ok(Self { packer: Packer::new(effort)?, group: Group::default(), part: Vec::new() })
+        Ok(Self { column_writer: ColumnWriter::new(effort)?, group: Group::default(), part: Vec::new() })
     }
 
-    /// Streams a table in its compact form, and returns the number of bytes.
+    /// Streams a table in compact form. Returns the number of bytes.
     ///
-    /// Equal tables give equal bytes, whatever way they came about. While it is written, a table takes up to 80 bytes
-    /// a state of its palette more; where some bricks do without the palette, up to 12 MB.
+    /// Equal tables give equal bytes. Writing takes up to 80 bytes of memory per state of the palette, and up to 12 MB
+    /// if some bricks do not use the palette.
     ///
     /// # Errors
     ///
     /// Those of `out` and of zstd.
     pub fn write(&mut self, table: &Table, out: &mut impl Write) -> io::Result<u64> {
-        let Self { packer, group, part } = self;
+        let Self { column_writer, group, part } = self;
         let codebook = Codebook::of(table);
         let mut crc = crc32fast::Hasher::new();
         let mut bytes = 0;
@@ -46,23 +46,23 @@ impl CompactWriter {
             part.clear();
             written
         };
-        // A table that could not be written may have left something behind.
+        // A failed write may have left something behind.
         part.clear();
         group.begin();
         part.extend_from_slice(&header(table, &codebook));
         let mut states = Vec::new();
         put_states(codebook.states.iter().copied(), &mut states);
-        packer.put_columns([&states], part)?;
+        column_writer.put_columns([&states], part)?;
         write(part)?;
         for brick in table.bricks_in_order() {
             group.push(brick, &codebook, &table.palette);
             if group.is_full() {
-                group.end(packer, part)?;
+                group.end(column_writer, part)?;
                 write(part)?;
             }
         }
         if !group.is_empty() {
-            group.end(packer, part)?;
+            group.end(column_writer, part)?;
             write(part)?;
         }
         out.write_all(&crc.finalize().to_le_bytes())?;
@@ -90,7 +90,7 @@ fn header(table: &Table, codebook: &Codebook) -> [u8; HEADER_BYTES] {
     header[0..4].copy_from_slice(&MAGIC.to_le_bytes());
     header[4..8].copy_from_slice(&VERSION.to_le_bytes());
     header[8..16].copy_from_slice(&(table.len() as u64).to_le_bytes());
-    // A tile has 2^21.1 bricks at most.
+    // A tile has at most 2^21.1 bricks.
     header[16..20].copy_from_slice(&(table.bricks.len() as u32).to_le_bytes());
     header[20..24].copy_from_slice(&(codebook.states.len() as u32).to_le_bytes());
     header

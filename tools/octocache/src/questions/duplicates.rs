@@ -125,7 +125,7 @@ impl VoxelSet {
     fn of(updates: &ScanUpdates) -> Self {
         let mut set = Self::default();
         for (tile, updates) in &updates.tiles {
-            let TileUpdates::Once(bricks) = updates else { continue };
+            let TileUpdates::Masks(bricks) = updates else { continue };
             for update in bricks {
                 set.0.insert((*tile, update.brick), update.touched());
             }

@@ -16,7 +16,7 @@ use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Random;
 use voxtile::space::{Point, VoxelIndex};
 use voxtile::{
-    InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Questions, Scan,
+    InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries, Scan,
 };
 use workload::ScanReader;
 
@@ -41,7 +41,7 @@ enum Task {
     /// Write points to ask for: N anywhere in the bounding box of the known voxels, N centers of known voxels
     WritePoints(WritePointsArguments),
     /// Time the questions for points, one by one
-    Questions(QuestionsArguments),
+    Queries(QuestionsArguments),
     /// Write every known voxel to a file
     Dump(DumpArguments),
 }
@@ -129,7 +129,7 @@ fn main() -> ExitCode {
         Task::Build(arguments) => build(&arguments),
         Task::Memory(arguments) => memory(&arguments),
         Task::WritePoints(arguments) => write_points(&arguments),
-        Task::Questions(arguments) => questions(&arguments),
+        Task::Queries(arguments) => questions(&arguments),
         Task::Dump(arguments) => dump(&arguments),
     };
     match done {

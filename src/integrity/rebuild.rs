@@ -1,0 +1,290 @@
+//! What a map is, told from whatever is left of it: `metadata.json`, `commits.log`, and the tiles themselves.
+
+use super::snapshots::last_known_flush;
+use crate::config::{MapConfig, Storage};
+use crate::error::{Error, FormatError, Result, is_of_medium};
+use crate::persistence::load::{ReadTable, read_stored_table};
+use crate::space::{Grid, TileIndex};
+use crate::store::{
+    Checksumming, Commits, Disk, Extension, FileChecksum, Layout, MAX_NUMBER, MapParameters, Metadata,
+    Salvage, Snapshot, StoredTile, TileFile, TileVersion, hex, id_from_hex, tile_of_folder,
+};
+use crate::tile::format::{Trailer, read_compact_front, read_trailer};
+use rustc_hash::FxHashMap;
+use std::path::Path;
+
+/// A map's index, put together again.
+pub(super) struct Index {
+    pub map_id: [u8; 16],
+    pub metadata: Metadata,
+    pub commits: Commits,
+    /// Tiles whose table is whole only under the name that waits for a commit.
+    pub waiting: Vec<TileIndex>,
+    /// Tiles whose table cannot be used.
+    pub damaged: Vec<(TileIndex, Error)>,
+    /// Whether the tiles may be of different flushes, because no log says what belongs together.
+    pub is_from_tiles: bool,
+}
+
+/// Puts the index together. `None` for a map of the seed's format, which has none.
+///
+/// # Errors
+///
+/// Too little left to tell what the map is; a disk that refuses.
+pub(super) fn index_of(
+    disk: &dyn Disk,
+    layout: &Layout,
+    remains: &Salvage,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Option<Index>> {
+    if let Some((map_id, metadata)) = told_by_log(remains) {
+        let commits = remains.commits.clone();
+        let (waiting, damaged) = Default::default();
+        return Ok(Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles: false }));
+    }
+    if let Ok(metadata) = &remains.metadata
+        && metadata.ext.is_none()
+    {
+        return Ok(None);
+    }
+    index_from_tiles(disk, layout, remains, progress).map(Some)
+}
+
+/// Id and metadata of a log that leads to the last flush.
+fn told_by_log(remains: &Salvage) -> Option<([u8; 16], Metadata)> {
+    let map_id = remains.log_map_id?;
+    let logged = remains.commits.metadata.clone().filter(|metadata| metadata.ext.is_some())?;
+    let is_last = match &remains.metadata {
+        Ok(Metadata { ext: Some(ext), .. }) => {
+            ext.map_id == hex(&map_id) && ext.flush_number <= remains.commits.flush_number
+        }
+        // What is torn off may be a flush that never happened, or one that did.
+        _ => remains.commits.torn.is_none(),
+    };
+    is_last.then_some((map_id, logged))
+}
+
+fn index_from_tiles(
+    disk: &dyn Disk,
+    layout: &Layout,
+    remains: &Salvage,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Index> {
+    let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
+    let mut tiles: Vec<_> = names.iter().filter_map(|name| tile_of_folder(name)).collect();
+    tiles.sort_unstable();
+    let trailers = Trailers::of(disk, layout, &tiles)?;
+    let written = remains.metadata.as_ref().ok();
+    let (map_id, metadata) = identity(layout, remains, &trailers)?;
+    let config = crate::persistence::config_from(&metadata, &layout.metadata())?;
+    let known_scan = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.scan_number);
+    let written_flush = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.flush_number);
+    let known_flush = last_known_flush(disk, layout, map_id, &tiles);
+    let mut index = Index {
+        map_id,
+        metadata,
+        commits: Commits {
+            flush_number: known_flush.max(written_flush.unwrap_or(0)).max(remains.commits.flush_number) + 1,
+            scan_number: known_scan.unwrap_or(0).max(remains.commits.scan_number),
+            ..Commits::default()
+        },
+        waiting: Vec::new(),
+        damaged: Vec::new(),
+        is_from_tiles: true,
+    };
+    index.join_snapshots(disk, layout, written);
+    for (done, &tile) in (1..).zip(&tiles) {
+        index.add(disk, layout, &config, tile, known_scan)?;
+        progress(done, tiles.len() as u64);
+    }
+    let files = [written, remains.commits.metadata.as_ref()];
+    if files.into_iter().flatten().all(|metadata| metadata.ext.is_none())
+        && let Some(ext) = &mut index.metadata.ext
+    {
+        // Tiles do not say how much of their evidence has faded: rather too little of it fades than some of it twice.
+        ext.decayed_scan = index.commits.scan_number;
+    }
+    Ok(index)
+}
+
+impl Index {
+    /// The snapshots that `metadata.json` names, and those that are there: a log that cannot be read does not tell which of
+    /// them were deleted, and without a list all of them count.
+    fn join_snapshots(&mut self, disk: &dyn Disk, layout: &Layout, written: Option<&Metadata>) {
+        let Some(ext) = &mut self.metadata.ext else { return };
+        ext.snapshots = written.and_then(|metadata| metadata.ext.as_ref()?.snapshots.clone());
+        let Some(listed) = &mut ext.snapshots else { return };
+        for name in Snapshot::list(disk, layout).unwrap_or_default() {
+            if !listed.contains(&name)
+                && let Ok(snapshot) = Snapshot::read(disk, layout, &name, self.map_id, None)
+            {
+                listed.insert(name, Some(snapshot.commits.flush_number));
+            }
+        }
+    }
+
+    fn add(
+        &mut self,
+        disk: &dyn Disk,
+        layout: &Layout,
+        config: &MapConfig,
+        tile: TileIndex,
+        known_scan: Option<u64>,
+    ) -> Result<()> {
+        let read = |file: &Path| read_alone(disk, file, layout.storage(), &config.grid, self.map_id, tile);
+        let (current, next) = (layout.current(tile, TileFile::Table), layout.next(tile, TileFile::Table));
+        let table = match (read(&current)?, read(&next)?) {
+            (Some(Ok(table)), _) => table,
+            // Written before the last flush that is known of, so it was part of it.
+            (_, Some(Ok(table))) if scan_number_of(&table) <= known_scan => {
+                self.waiting.push(tile);
+                table
+            }
+            (Some(Err(error)), _) => {
+                self.damaged.push((tile, error));
+                return Ok(());
+            }
+            (None, next_table) => {
+                let folder = layout.tile_folder(tile);
+                let is_kept = |name: &String| layout.flush_of_kept(name).is_some();
+                let (path, reason) = match next_table {
+                    Some(_) => (&next, "nothing tells whether this version was committed"),
+                    // Of a removed tile that a snapshot sees, perhaps.
+                    None if disk.list(&folder).is_ok_and(|names| names.iter().all(is_kept)) => return Ok(()),
+                    None => (&current, "the file is missing"),
+                };
+                self.damaged.push((tile, FormatError::at_offset(0, reason).in_map(path, Some(tile))));
+                return Ok(());
+            }
+        };
+        let version = version_of(&table, config);
+        if known_scan.is_none_or(|known| version.scan_number > known) {
+            // Nothing tells how many scans the tiles have in common: an input cannot be gone on with.
+            if let Some(ext) = &mut self.metadata.ext {
+                ext.inputs.clear();
+            }
+        }
+        self.commits.scan_number = self.commits.scan_number.max(version.scan_number);
+        self.commits.tiles.insert(tile, version);
+        Ok(())
+    }
+}
+
+fn scan_number_of(table: &ReadTable) -> Option<u64> {
+    table.trailer.as_ref().map(|trailer| trailer.scan_number)
+}
+
+/// A table by itself, without a log: whole, of this map and tile; `None` if there is no file.
+pub(super) fn read_alone(
+    disk: &dyn Disk,
+    path: &Path,
+    storage: Storage,
+    grid: &Grid,
+    map_id: [u8; 16],
+    tile: TileIndex,
+) -> Result<Option<Result<ReadTable>>> {
+    let input = match disk.open(path) {
+        Ok(input) => input,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) if error.kind() == std::io::ErrorKind::InvalidInput => {
+            let error = FormatError::at_offset(0, error.to_string()).in_map(path, Some(tile));
+            return Ok(Some(Err(error)));
+        }
+        Err(error) if is_of_medium(&error) => return Ok(Some(Err(Error::io(path, "open", error)))),
+        Err(error) => return Err(Error::io(path, "open", error)),
+    };
+    let bytes = input.file_bytes();
+    let (path, input, map_id) = (path.to_owned(), Checksumming::new(input), Some(map_id));
+    match read_stored_table(grid, tile, StoredTile { path, input, bytes, map_id, version: None, storage }) {
+        Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => Ok(Some(Err(error))),
+        Err(error) => Err(error),
+        Ok(table) => Ok(Some(Ok(table))),
+    }
+}
+
+fn version_of(table: &ReadTable, config: &MapConfig) -> TileVersion {
+    let threshold = config.occupied_log_odds();
+    let occupied = table.table.iter().filter(|(_, evidence)| evidence.log_odds >= threshold).count();
+    let trailer = table.trailer.as_ref();
+    TileVersion {
+        // What a file says of itself is no reason to count from there if nobody counts that far.
+        scan_number: trailer.map_or(0, |trailer| trailer.scan_number.min(MAX_NUMBER)),
+        table: table.file,
+        octree: trailer.map_or(FileChecksum::default(), |trailer| FileChecksum {
+            bytes: trailer.octree_bytes,
+            crc: trailer.octree_crc,
+        }),
+        voxels: table.table.len() as u64,
+        occupied: occupied as u64,
+    }
+}
+
+/// Which map the tiles say they belong to.
+struct Trailers {
+    /// By map: a trailer, and how many there are.
+    by_map: FxHashMap<[u8; 16], (Trailer, u64)>,
+}
+
+impl Trailers {
+    fn of(disk: &dyn Disk, layout: &Layout, tiles: &[TileIndex]) -> Result<Self> {
+        let mut by_map: FxHashMap<_, (Trailer, u64)> = FxHashMap::default();
+        for &tile in tiles {
+            let path = layout.current(tile, TileFile::Table);
+            let Ok(mut input) = disk.open(&path) else { continue };
+            let bytes = input.file_bytes();
+            let trailer = match layout.storage() {
+                Storage::Seed => read_trailer(&mut input, bytes),
+                Storage::Compact => read_compact_front(&mut input, bytes).map(Some),
+            };
+            if let Ok(Some(trailer)) = trailer {
+                by_map.entry(trailer.map_id).or_insert((trailer, 0)).1 += 1;
+            }
+        }
+        Ok(Self { by_map })
+    }
+
+    /// The map that most tiles belong to.
+    fn most(&self) -> Option<&Trailer> {
+        let most = self.by_map.values().max_by_key(|(trailer, count)| (*count, trailer.map_id));
+        most.map(|(trailer, _)| trailer)
+    }
+}
+
+/// Id and metadata, from the best that is left.
+fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<([u8; 16], Metadata)> {
+    let written = remains.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
+    let logged = remains.commits.metadata.as_ref().filter(|metadata| metadata.ext.is_some());
+    let id_of = |metadata: &Metadata| metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id));
+    let of_tiles = trailers.most();
+    // Where the two files contradict each other, the tiles decide.
+    let candidates =
+        [written, logged].into_iter().flatten().filter_map(|metadata| Some((id_of(metadata)?, metadata)));
+    let mut candidates: Vec<_> = candidates.collect();
+    candidates.sort_by_key(|(id, _)| of_tiles.is_some_and(|trailer| trailer.map_id != *id));
+    if let Some((id, metadata)) = candidates.first() {
+        return Ok((*id, (*metadata).clone()));
+    }
+    let Some(trailer) = of_tiles else {
+        let reason = "neither metadata.json nor commits.log nor a tile with a trailer tells what the map is; \
+                      write metadata.json with its resolution and tile size by hand";
+        return Err(FormatError::at_offset(0, reason).in_map(&layout.metadata(), None));
+    };
+    let path = layout.current(trailer.tile, TileFile::Table);
+    let parameters = MapParameters::from_text(&trailer.parameters)
+        .map_err(|error| error.in_map(&path, Some(trailer.tile)))?;
+    let ext = Extension {
+        empty: false,
+        map_id: hex(&trailer.map_id),
+        flush_number: 0,
+        scan_number: 0,
+        sensor_model: parameters.sensor_model,
+        occupancy_threshold: parameters.occupancy_threshold,
+        rays: crate::config::RayConfig::default(),
+        inputs: Vec::new(),
+        decayed_scan: 0,
+        storage: layout.storage(),
+        snapshots: None,
+    };
+    let (resolution_m, tile_size_m) = (parameters.resolution, parameters.tile_size);
+    Ok((trailer.map_id, Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }))
+}

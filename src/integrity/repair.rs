@@ -1,0 +1,351 @@
+use super::finding::Finding;
+use super::rebuild::{self, Index};
+use super::tile_check::{check_tile, write_octree};
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::persistence::TileSaver;
+use crate::persistence::config_from;
+use crate::space::TileIndex;
+use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Quarantine, Salvage, TileFile, TileStore, hex};
+use crate::tile::{OctreeFactory, Tile};
+use serde::Serialize;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// One thing that a repair did.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Action {
+    /// What was done.
+    pub kind: ActionKind,
+    /// To which file or folder.
+    pub path: PathBuf,
+    /// Why, and where something was put.
+    pub reason: String,
+}
+
+/// What a repair can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum ActionKind {
+    /// Written anew from what else the map holds.
+    Derived,
+    /// Moved to `quarantine/`.
+    Quarantined,
+    /// Given its committed name.
+    Renamed,
+    /// Removed, because the log proves that it was never committed or has been replaced.
+    Removed,
+    /// No longer named by the log, because its files are missing; or by a snapshot, because they are missing or damaged.
+    Forgotten,
+    /// Nothing: the medium refused.
+    Left,
+}
+
+/// What a repair did.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Repair {
+    /// Tiles of the map now.
+    pub tiles: u64,
+    /// Tiles that are no longer part of some snapshot.
+    pub snapshot_tiles_lost: u64,
+    /// Snapshots that the map no longer has.
+    pub snapshots_lost: u64,
+    /// Tiles that are no longer part of the map: their space is unknown again.
+    pub tiles_lost: u64,
+    /// Damage that is still there, because the medium refused.
+    pub left: u64,
+    /// Number of things done; 0 if the map was whole.
+    pub actions: u64,
+}
+
+impl Repair {
+    /// Whether all that the map and its snapshots held is there, and nothing is damaged any more.
+    pub fn is_complete(&self) -> bool {
+        self.tiles_lost + self.snapshot_tiles_lost + self.snapshots_lost + self.left == 0
+    }
+}
+
+/// Does what is possible for a damaged map: index and octrees are derived, damaged tiles go to `quarantine/`, what a
+/// crash left behind is removed. No data is deleted, and a repair that was cut short is finished by another.
+///
+/// `done` is told each action, `progress` the tiles done and all.
+///
+/// # Errors
+///
+/// No map there, another writer, a disk that refuses, or too little left to tell what the map is.
+pub fn repair(
+    folder: impl AsRef<Path>,
+    done: impl FnMut(&Action),
+    progress: impl FnMut(u64, u64),
+) -> Result<Repair> {
+    repair_on(Arc::new(FsDisk), folder.as_ref(), done, progress)
+}
+
+/// [`repair`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`repair`].
+pub fn repair_on(
+    disk: Arc<dyn Disk>,
+    folder: &Path,
+    done: impl FnMut(&Action),
+    progress: impl FnMut(u64, u64),
+) -> Result<Repair> {
+    let layout = Layout::new(folder);
+    let mut repairer = Repairer { disk: &*disk, layout, done, progress, counts: Repair::default() };
+    repairer.repair_lock()?;
+    let mut store = match TileStore::open(disk.clone(), folder) {
+        Err(error) if matches!(error, Error::Damaged { tile: None, .. }) || Finding::is_of_file(&error) => {
+            repairer.repair_index()?;
+            TileStore::open(disk.clone(), folder)?
+        }
+        store => store?,
+    };
+    let config = config_from(store.metadata(), &store.layout().metadata())?;
+    repairer.layout = store.layout().clone();
+    repairer.repair_tiles(&mut store, &config)?;
+    Ok(repairer.counts)
+}
+
+pub(super) struct Repairer<'a, F, P> {
+    pub(super) disk: &'a dyn Disk,
+    pub(super) layout: Layout,
+    done: F,
+    progress: P,
+    pub(super) counts: Repair,
+}
+
+impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
+    pub(super) fn note(&mut self, kind: ActionKind, path: &Path, reason: impl Into<String>) {
+        self.counts.actions += 1;
+        (self.done)(&Action { kind, path: path.to_owned(), reason: reason.into() });
+    }
+
+    pub(super) fn quarantine(&mut self, path: &Path, why: &str) -> Result<()> {
+        let to = Quarantine::new(self.disk, &self.layout).take(path)?;
+        self.note(ActionKind::Quarantined, path, format!("{why}; now {}", to.display()));
+        Ok(())
+    }
+
+    /// Takes a tile out of the map; tables that snapshots see stay.
+    fn quarantine_tile(&mut self, tile: TileIndex, why: &str) -> Result<()> {
+        let folder = self.layout.tile_folder(tile);
+        let names = match self.kind(&folder)? {
+            Some(EntryKind::Folder) if self.kind(&self.layout.snapshots())?.is_some() => {
+                self.disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?
+            }
+            _ => Vec::new(),
+        };
+        let is_kept = |name: &String| self.layout.flush_of_kept(name).is_some();
+        let (kept, others): (Vec<_>, Vec<_>) = names.into_iter().partition(is_kept);
+        if kept.is_empty() {
+            return self.quarantine(&folder, why);
+        }
+        others.iter().try_for_each(|name| self.quarantine(&folder.join(name), why))
+    }
+
+    pub(super) fn quarantine_copy(&mut self, path: &Path, why: &str) -> Result<()> {
+        if let Some(to) = Quarantine::new(self.disk, &self.layout).take_copy(path)? {
+            self.note(ActionKind::Quarantined, path, format!("{why}; kept as {}", to.display()));
+        }
+        Ok(())
+    }
+
+    pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
+        self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
+    }
+
+    /// Makes way for the lock, which any file can be.
+    fn repair_lock(&mut self) -> Result<()> {
+        let path = self.layout.lock();
+        match self.kind(&path)? {
+            Some(EntryKind::Folder | EntryKind::Other) if self.kind(&self.layout.metadata())?.is_some() => {
+                self.quarantine(&path, "no regular file: nobody could lock the map")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Writes `commits.log` and `metadata.json` anew from what is left of them and from the tiles.
+    fn repair_index(&mut self) -> Result<()> {
+        let _lock = Lock::take(self.disk, &self.layout)?;
+        let remains = Salvage::read(self.disk, &self.layout)?;
+        self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
+        let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
+        let Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles }) = index else {
+            // Of the seed's format, but with a log that cannot be read: the log is no part of it.
+            return self.quarantine(&self.layout.commit_log(), "metadata.json is of the seed's format");
+        };
+        for (tile, error) in damaged {
+            self.quarantine_tile(tile, &error.to_string())?;
+            self.counts.tiles_lost += 1;
+        }
+        if is_from_tiles {
+            self.settle_waiting(&commits.tiles.tiles().collect::<Vec<_>>(), &waiting)?;
+        }
+        let paths = [self.layout.commit_log(), self.layout.metadata()];
+        if is_from_tiles {
+            let why = remains.log_error.as_ref().map(Error::to_string);
+            let why = why.unwrap_or("it does not lead to the flush that metadata.json names".into());
+            self.quarantine_copy(&paths[0], &why)?;
+        }
+        let written_id =
+            remains.metadata.as_ref().map(|metadata| metadata.ext.as_ref().map(|ext| &*ext.map_id));
+        match written_id {
+            Err(error) => self.quarantine_copy(&paths[1], &error.to_string())?,
+            Ok(id) if id != Some(&hex(&map_id)) => self.quarantine_copy(&paths[1], "it is of another map")?,
+            Ok(_) => {}
+        }
+        remains.write(self.disk, &self.layout, map_id, &commits, &metadata)?;
+        let (source, tiles) = match is_from_tiles {
+            true => {
+                ("the tiles; without the log nothing tells whether all are of one flush", commits.tiles.len())
+            }
+            false => ("commits.log", commits.tiles.len()),
+        };
+        self.note(
+            ActionKind::Derived,
+            &paths[1],
+            format!("and commits.log, with {tiles} tiles, from {source}"),
+        );
+        Ok(())
+    }
+
+    /// Without a log nothing proves that a `*.next` was never committed: those that are no part of the map now are kept
+    /// in quarantine.
+    fn settle_waiting(&mut self, tiles: &[TileIndex], waiting: &[TileIndex]) -> Result<()> {
+        let mut tiles = tiles.to_vec();
+        tiles.sort_unstable();
+        for tile in tiles {
+            let is_waiting = waiting.contains(&tile);
+            for &file in self.layout.files() {
+                let (next, current) = (self.layout.next(tile, file), self.layout.current(tile, file));
+                if self.kind(&next)?.is_none() {
+                    continue;
+                }
+                if !is_waiting {
+                    self.quarantine(&next, "nothing tells whether it was committed")?;
+                    continue;
+                }
+                if self.kind(&current)?.is_some() {
+                    self.quarantine(&current, "damaged; the version that waited for its name is whole")?;
+                }
+                self.disk.rename(&next, &current).map_err(|error| Error::io(&next, "rename", error))?;
+                self.note(ActionKind::Renamed, &next, "whole, and of the last flush or one before");
+            }
+            let folder = self.layout.tile_folder(tile);
+            self.disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
+        }
+        Ok(())
+    }
+
+    fn repair_tiles(&mut self, store: &mut TileStore, config: &MapConfig) -> Result<()> {
+        if store.leftovers_removed() > 0 {
+            let reason =
+                format!("{} files that were never committed or had been replaced", store.leftovers_removed());
+            let folder = self.layout.folder().to_owned();
+            self.note(ActionKind::Removed, &folder, reason);
+        }
+        for tile in store.orphans() {
+            self.quarantine_tile(tile, "commits.log does not name this tile")?;
+        }
+        let mut tiles: Vec<_> = store.tiles().collect();
+        tiles.sort_unstable();
+        let mut lost = Vec::new();
+        for (done, &tile) in (1..).zip(&tiles) {
+            match self.repair_tile(store, config, tile) {
+                Ok(true) => {}
+                Ok(false) => lost.push(tile),
+                Err(error) if error.is_of_medium() => {
+                    self.counts.left += 1;
+                    self.note(ActionKind::Left, &self.layout.tile_folder(tile), error.to_string());
+                }
+                Err(error) => return Err(error),
+            }
+            (self.progress)(done, tiles.len() as u64);
+        }
+        if !lost.is_empty() {
+            if store.map_id().is_none() {
+                // The seed's own file, and perhaps with keys that voxtile does not know.
+                self.quarantine_copy(&self.layout.metadata(), "its bounds change")?;
+            }
+            store.forget(&lost)?;
+        } else if store.commits().torn.is_some() || store.is_metadata_behind() {
+            store.tidy()?;
+            self.note(
+                ActionKind::Derived,
+                &self.layout.metadata(),
+                "brought up to the last flush in commits.log",
+            );
+        }
+        self.repair_snapshots(store, config)?;
+        self.counts.tiles = (tiles.len() - lost.len()) as u64;
+        self.counts.tiles_lost += lost.len() as u64;
+        Ok(())
+    }
+
+    /// Repairs a tile that the map holds; false if it cannot stay in the map.
+    fn repair_tile(&mut self, store: &mut TileStore, config: &MapConfig, tile: TileIndex) -> Result<bool> {
+        let mut check = check_tile(self.disk, store, config, tile)?;
+        if matches!(&check.table, Err(error) if error.is_of_medium()) {
+            // Not for what passes.
+            check = check_tile(self.disk, store, config, tile)?;
+        }
+        let table = match check.table {
+            Ok(table) => table,
+            Err(error) => {
+                let folder = self.layout.tile_folder(tile);
+                let finding = Finding::of(error)?;
+                if self.kind(&folder)?.is_none() {
+                    self.note(ActionKind::Forgotten, &folder, "the tile's folder is missing");
+                } else {
+                    self.quarantine_tile(tile, &finding.reason)?;
+                }
+                return Ok(false);
+            }
+        };
+        let Some(Err(cause)) = check.octree else { return Ok(true) };
+        let path = self.layout.current(tile, TileFile::Octree);
+        match self.quarantine_copy(&path, &cause.reason) {
+            // What can be derived is replaced all the same.
+            Err(error) if error.is_of_medium() => {}
+            copied => copied?,
+        }
+        if !matches!(self.kind(&path)?, None | Some(EntryKind::File(_))) {
+            self.quarantine(&path, "no file")?;
+        }
+        let expected = store.version(tile).map(|version| version.octree);
+        let written = store.write_next(tile, TileFile::Octree, |out| write_octree(config, &table, out))?;
+        if Some(written) == expected {
+            store.place_octree(tile)?;
+        } else {
+            // Another writer's octree cannot be had again: the tile is written anew with the present one.
+            let scan_number = table.trailer.map_or(0, |trailer| trailer.scan_number);
+            let tile = Tile::from_table(&config.grid, &OctreeFactory::default(), tile, table.table);
+            TileSaver::new(config).save(store, &tile, scan_number)?;
+            let (metadata, scan_number) = (store.metadata().clone(), store.commits().scan_number);
+            store.commit(metadata, scan_number)?;
+        }
+        self.note(ActionKind::Derived, &path, "from the tile's table");
+        Ok(true)
+    }
+}
+
+impl fmt::Display for Action {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            ActionKind::Derived => "derived",
+            ActionKind::Quarantined => "quarantined",
+            ActionKind::Renamed => "renamed",
+            ActionKind::Removed => "removed",
+            ActionKind::Forgotten => "forgotten",
+            ActionKind::Left => "left",
+        };
+        write!(f, "{kind}: {}: {}", self.path.display(), self.reason)
+    }
+}

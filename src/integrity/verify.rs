@@ -1,0 +1,385 @@
+use super::finding::{Finding, Severity};
+use super::rebuild::{self, Index};
+use super::snapshots::{WholeTables, lost_tiles};
+use super::tile_check::{check_tile, first_difference, write_octree};
+use crate::config::MapConfig;
+use crate::error::{Error, FormatError, Result};
+use crate::persistence::config_from;
+use crate::space::TileIndex;
+use crate::store::{
+    Disk, EntryKind, FsDisk, Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage, SnapshotList,
+    SnapshotName, TileFile, TileStore, TileVersion, read_log, tile_of_folder,
+};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What a look at every byte of a map gave.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Verification {
+    /// Whether the map has the checksums that let damage be found; a map of the seed's own format has none.
+    pub verified: bool,
+    /// Number of the flush that was looked at.
+    pub flush_number: u64,
+    /// Number of the last scan in it.
+    pub scan_number: u64,
+    /// Tiles of the map.
+    pub tiles: u64,
+    /// Snapshots of the map.
+    pub snapshots: u64,
+    /// Observed voxels in the tiles that are whole.
+    pub voxels: u64,
+    /// Bytes of the tables that are whole.
+    pub table_bytes: u64,
+    /// Findings that are damage.
+    pub damage: u64,
+    /// Findings that are none.
+    pub notes: u64,
+}
+
+impl Verification {
+    /// Whether nothing is damaged.
+    pub fn is_whole(&self) -> bool {
+        self.damage == 0
+    }
+}
+
+/// Checks every file of a map, beside a writer too. Takes no lock and writes nothing.
+///
+/// `found` is told each finding, `progress` the tiles done and all. Memory: the list of tiles, and one tile.
+///
+/// # Errors
+///
+/// No map there, or a disk that refuses more than single files. Damage is a finding, and so is a file or folder that the medium
+/// does not give back; the others are looked at all the same.
+pub fn verify(
+    folder: impl AsRef<Path>,
+    found: impl FnMut(&Finding),
+    progress: impl FnMut(u64, u64),
+) -> Result<Verification> {
+    verify_on(Arc::new(FsDisk), folder.as_ref(), found, progress)
+}
+
+/// [`verify`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`verify`].
+pub fn verify_on(
+    disk: Arc<dyn Disk>,
+    folder: &Path,
+    found: impl FnMut(&Finding),
+    progress: impl FnMut(u64, u64),
+) -> Result<Verification> {
+    let layout = Layout::new(folder);
+    let mut verifier = Verifier {
+        listed: None,
+        disk: &*disk,
+        layout,
+        found,
+        progress,
+        counts: Verification::default(),
+        told: BTreeSet::new(),
+    };
+    let store = match TileStore::open_read_only(disk.clone(), folder) {
+        Ok(store) => Some(store),
+        Err(error) => {
+            let finding = Finding::of(error)?;
+            verifier.report(finding);
+            verifier.index_from_remains(&disk)?
+        }
+    };
+    if let Some(store) = store {
+        verifier.layout = store.layout().clone();
+        verifier.listed = store.snapshot_list().cloned();
+        let path = store.layout().metadata();
+        match config_from(store.metadata(), &path) {
+            Ok(config) => verifier.verify_map(&disk, &store, &config)?,
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                verifier.report(finding);
+            }
+        }
+    }
+    Ok(verifier.counts)
+}
+
+struct Verifier<'a, F, P> {
+    disk: &'a dyn Disk,
+    layout: Layout,
+    found: F,
+    progress: P,
+    counts: Verification,
+    /// The snapshots that the log names; `None` if it names none.
+    listed: Option<SnapshotList>,
+    /// Tiles that are no longer in the list of tiles because they are damaged, which has been told.
+    told: BTreeSet<TileIndex>,
+}
+
+impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
+    fn report(&mut self, finding: Finding) {
+        match finding.severity {
+            Severity::Damage => self.counts.damage += 1,
+            Severity::Note => self.counts.notes += 1,
+        }
+        (self.found)(&finding);
+    }
+
+    fn damage(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
+        self.report(Finding::damage(path, tile, &FormatError::at_offset(0, reason)));
+    }
+
+    fn verify_map(&mut self, disk: &Arc<dyn Disk>, store: &TileStore, config: &MapConfig) -> Result<()> {
+        self.counts.verified = store.map_id().is_some();
+        self.counts.flush_number = store.commits().flush_number;
+        self.counts.scan_number = store.commits().scan_number;
+        if !self.counts.verified {
+            let reason =
+                "a map of the seed's own format: no checksums, so only the form of its tables is checked";
+            self.report(Finding::note(&self.layout.metadata(), None, reason));
+        }
+        if let Some(torn) = &store.commits().torn {
+            let mut note = Finding::note(&self.layout.commit_log(), None, torn.reason.clone());
+            (note.offset, note.reason) =
+                (Some(torn.at), format!("a flush that never happened: {}", torn.reason));
+            self.report(note);
+        }
+        let mut tiles: Vec<_> = store.tiles().collect();
+        tiles.sort_unstable();
+        self.counts.tiles = tiles.len() as u64;
+        for (done, tile) in (1..).zip(&tiles) {
+            self.verify_tile(store, config, *tile)?;
+            (self.progress)(done, tiles.len() as u64);
+        }
+        let seen = self.verify_snapshots(disk, store, config)?;
+        self.look_around(&seen, |tile| tiles.binary_search(&tile).is_ok())
+    }
+
+    fn verify_tile(&mut self, store: &TileStore, config: &MapConfig, tile: TileIndex) -> Result<()> {
+        let check = check_tile(self.disk, store, config, tile)?;
+        let table = match check.table {
+            Ok(table) => table,
+            Err(_) if self.has_changed_since(store, tile) => {
+                let folder = self.layout.tile_folder(tile);
+                self.report(Finding::note(&folder, Some(tile), "flushed anew while the map was verified"));
+                return Ok(());
+            }
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                self.report(finding.in_tile(tile));
+                return Ok(());
+            }
+        };
+        self.counts.voxels += table.table.len() as u64;
+        self.counts.table_bytes += table.file.bytes;
+        if let Some(Err(mut cause)) = check.octree
+            && !self.has_changed_since(store, tile)
+        {
+            let path = self.layout.current(tile, TileFile::Octree);
+            let mut expected = Vec::new();
+            if write_octree(config, &table, &mut expected).is_ok() {
+                cause.at = first_difference(self.disk, &path, &expected).unwrap_or(cause.at);
+            }
+            self.report(Finding::damage(&path, Some(tile), &cause));
+        }
+        Ok(())
+    }
+
+    /// Whether a writer has flushed a tile since the store was opened. It keeps tables for readers, not octrees; and a
+    /// writer that was started since has not seen this reader.
+    fn has_changed_since(&self, store: &TileStore, tile: TileIndex) -> bool {
+        let now = self.version_now(tile);
+        now.is_some() && now != store.version(tile)
+    }
+
+    /// Where metadata or log cannot be read, the tiles are checked against what else tells of them.
+    fn index_from_remains(&mut self, disk: &Arc<dyn Disk>) -> Result<Option<TileStore>> {
+        let remains = Salvage::read(self.disk, &self.layout)?;
+        self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
+        match rebuild::index_of(self.disk, &self.layout, &remains, &mut |_, _| ()) {
+            Ok(Some(Index { map_id, metadata, commits, damaged, .. })) => {
+                for (tile, error) in damaged {
+                    self.told.insert(tile);
+                    let finding = Finding::of(error)?;
+                    self.report(finding.in_tile(tile));
+                }
+                let folder = self.layout.folder();
+                Ok(Some(TileStore::of_commits(disk.clone(), folder, map_id, metadata, commits)))
+            }
+            Ok(None) => Ok(None),
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                Ok(None)
+            }
+        }
+    }
+
+    /// Looks at the snapshots, and at the tables that only they see. Returns those that are whole.
+    fn verify_snapshots(
+        &mut self,
+        disk: &Arc<dyn Disk>,
+        store: &TileStore,
+        config: &MapConfig,
+    ) -> Result<WholeTables> {
+        let mut whole = WholeTables::new();
+        let names = match store.snapshot_names() {
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                return Ok(whole);
+            }
+            Ok(names) => names,
+        };
+        for name in names {
+            self.counts.snapshots += 1;
+            let lost =
+                store.snapshot(&name).and_then(|snapshot| lost_tiles(store, config, &snapshot, &mut whole));
+            let errors = match lost {
+                // Deleted meanwhile.
+                Err(Error::InvalidArgument { .. }) => continue,
+                Err(error) => vec![error],
+                Ok(lost) => lost.into_iter().map(|(_, error)| error).collect(),
+            };
+            let is_deleted = |now: TileStore| now.snapshot_names().is_ok_and(|names| !names.contains(&name));
+            if !errors.is_empty()
+                && TileStore::open_read_only(disk.clone(), self.layout.folder()).is_ok_and(is_deleted)
+            {
+                continue;
+            }
+            for error in errors {
+                let mut finding = Finding::of(error)?;
+                finding.reason += &format!("; the snapshot {name} needs it");
+                self.report(finding);
+            }
+        }
+        Ok(whole)
+    }
+
+    fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
+        if self.kind(folder)? != Some(EntryKind::Folder) {
+            return Ok(()); // Told already.
+        }
+        for name in self.list(folder)? {
+            let path = folder.join(&name);
+            let reason = match SnapshotName::new(&*name) {
+                Ok(name) if self.listed.as_ref().is_none_or(|listed| listed.contains(&name)) => continue,
+                Ok(_) => "no snapshot of the map: commits.log does not name it",
+                Err(_) if name == SNAPSHOT_NEXT => "left behind, or being written",
+                Err(_) => "no snapshot: it has no name of one",
+            };
+            self.report(Finding::note(&path, None, reason));
+        }
+        Ok(())
+    }
+
+    /// Looks for what is no part of the map.
+    fn look_around(&mut self, seen: &WholeTables, is_known: impl Fn(TileIndex) -> bool) -> Result<()> {
+        let folder = self.layout.folder().to_owned();
+        for name in self.list(&folder)? {
+            let path = folder.join(&name);
+            match (&*name, tile_of_folder(&name)) {
+                ("metadata.json" | "commits.log", _) => {}
+                ("writer.lock", _) => {
+                    if matches!(self.kind(&path)?, Some(EntryKind::Folder | EntryKind::Other)) {
+                        self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
+                    }
+                }
+                (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
+                (QUARANTINE, _) => {
+                    self.report(Finding::note(&path, None, "taken out of the map by a repair"))
+                }
+                (_, Some(tile)) => {
+                    let is_known = is_known(tile) || self.told.contains(&tile);
+                    self.look_into(&path, tile, seen, is_known)?;
+                }
+                (name, None) if name.ends_with(".next") => {
+                    self.report(Finding::note(&path, None, "left behind, or being written"));
+                }
+                _ => self.report(Finding::note(&path, None, "no part of a map")),
+            }
+        }
+        Ok(())
+    }
+
+    fn look_into(
+        &mut self,
+        folder: &Path,
+        tile: TileIndex,
+        seen: &WholeTables,
+        is_known: bool,
+    ) -> Result<()> {
+        let kind = self.kind(folder)?;
+        if kind != Some(EntryKind::Folder) {
+            if !is_known {
+                self.damage(folder, Some(tile), "something with a tile's name that is no folder");
+            }
+            return Ok(());
+        }
+        let mut is_orphan = false;
+        for name in self.list(folder)? {
+            let path = folder.join(&name);
+            let kept = self.layout.flush_of_kept(&name);
+            if kept.is_some_and(|flush_number| seen.contains_key(&(tile, flush_number))) {
+                continue;
+            }
+            if name.ends_with(".next") || kept.is_some() {
+                self.report(Finding::note(
+                    &path,
+                    Some(tile),
+                    "left behind, being written, or kept for a reader",
+                ));
+            } else if self.layout.files().iter().all(|file| file.name(self.layout.storage()) != name) {
+                self.report(Finding::note(&path, Some(tile), "no part of a map"));
+            } else {
+                is_orphan |= !is_known;
+            }
+        }
+        if !is_orphan {
+            return Ok(());
+        }
+        // A writer may have added it, or begun to remove it, since the log was read.
+        let now = read_log(self.disk, &self.layout).ok().flatten().map(|(_, commits)| commits);
+        if now.as_ref().is_some_and(|now| now.last_removed.contains(&tile)) {
+            let reason = "taken out of the map; its files go when the map is next opened for writing";
+            self.report(Finding::note(folder, Some(tile), reason));
+        } else if now.is_none_or(|now| !now.tiles.contains(tile)) {
+            let path = self.layout.current(tile, TileFile::Table);
+            self.damage(&path, Some(tile), "commits.log does not name this tile");
+        }
+        Ok(())
+    }
+
+    /// What the log says of a tile now.
+    fn version_now(&self, tile: TileIndex) -> Option<TileVersion> {
+        let (_, commits) = read_log(self.disk, &self.layout).ok()??;
+        commits.tiles.get(tile)
+    }
+
+    /// What has a name; nothing, and a finding, where the medium does not tell.
+    fn kind(&mut self, path: &Path) -> Result<Option<EntryKind>> {
+        let kind = self.disk.kind(path).map_err(|error| Error::io(path, "look at", error));
+        self.unless_unreadable(kind)
+    }
+
+    /// The names in a folder; none, and a finding, where it cannot be read.
+    fn list(&mut self, folder: &Path) -> Result<Vec<String>> {
+        let names = self.disk.list(folder).map_err(|error| Error::io(folder, "list", error));
+        let mut names = self.unless_unreadable(names)?;
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    fn unless_unreadable<T: Default>(&mut self, result: Result<T>) -> Result<T> {
+        match result {
+            Err(error) if error.is_of_medium() => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                Ok(T::default())
+            }
+            result => result,
+        }
+    }
+}

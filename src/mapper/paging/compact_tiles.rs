@@ -1,0 +1,173 @@
+use crate::error::{Error, Result};
+use crate::persistence::CompactTile;
+use crate::space::TileIndex;
+use crate::tile::Tile;
+use crate::tile::format::{CompactEffort, CompactWriter};
+use lru::LruCache;
+use std::collections::BTreeMap;
+
+/// Tiles in the compact form, oldest to newest: the tier between resident tiles and the disk.
+#[derive(Debug)]
+pub(super) struct CompactTiles {
+    tiles: LruCache<TileIndex, Entry>,
+    /// Made with the first tile and kept: making one takes longer than encoding a small tile.
+    writer: Option<CompactWriter>,
+    bytes: usize,
+    /// Dirty tiles that are not being saved, by number. Looking for one from the oldest tile on would pass all clean ones,
+    /// again and again.
+    to_save: BTreeMap<u64, TileIndex>,
+    dirty: usize,
+    /// How many tiles were ever put in.
+    puts: u64,
+}
+
+#[derive(Debug)]
+struct Entry {
+    tile: CompactTile,
+    is_dirty: bool,
+    is_saving: bool,
+    /// How many tiles were put in before it.
+    number: u64,
+}
+
+/// Bytes that a tile takes beside its encoding.
+const SLOT_BYTES: usize = size_of::<(TileIndex, Entry)>() + 128;
+
+impl Default for CompactTiles {
+    fn default() -> Self {
+        let (tiles, to_save) = (LruCache::unbounded(), BTreeMap::new());
+        Self { tiles, writer: None, bytes: 0, to_save, dirty: 0, puts: 0 }
+    }
+}
+
+impl CompactTiles {
+    pub(super) fn len(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Number of dirty tiles.
+    pub(super) fn dirty(&self) -> usize {
+        self.dirty
+    }
+
+    pub(super) fn contains(&self, index: TileIndex) -> bool {
+        self.tiles.contains(&index)
+    }
+
+    pub(super) fn get(&self, index: TileIndex) -> Option<&CompactTile> {
+        self.tiles.peek(&index).map(|entry| &entry.tile)
+    }
+
+    pub(super) fn is_dirty(&self, index: TileIndex) -> bool {
+        self.tiles.peek(&index).is_some_and(|entry| entry.is_dirty)
+    }
+
+    /// The tiles, newest first.
+    pub(super) fn indices(&self) -> impl DoubleEndedIterator<Item = TileIndex> {
+        self.tiles.iter().map(|(&index, _)| index)
+    }
+
+    /// Encodes a tile and puts it in as the newest. See [`CompactTile::encode`] for `occupied_from`.
+    ///
+    /// # Errors
+    ///
+    /// A lack of memory.
+    pub(super) fn encode(&mut self, tile: &Tile, occupied_from: Option<f64>) -> Result<()> {
+        let writer = match &mut self.writer {
+            Some(writer) => writer,
+            none => {
+                let writer = CompactWriter::new(CompactEffort::Fast);
+                none.insert(writer.map_err(|error| Error::io("memory".as_ref(), "pack a tile in", error))?)
+            }
+        };
+        let compact = CompactTile::encode(writer, tile, occupied_from)?;
+        self.put(tile.index(), compact, tile.is_dirty());
+        Ok(())
+    }
+
+    fn put(&mut self, index: TileIndex, tile: CompactTile, is_dirty: bool) {
+        self.remove(index);
+        let entry = Entry { tile, is_dirty, is_saving: false, number: self.puts };
+        self.puts += 1;
+        self.bytes += entry.bytes();
+        if is_dirty {
+            self.dirty += 1;
+            self.to_save.insert(entry.number, index);
+        }
+        self.tiles.put(index, entry);
+    }
+
+    /// Drops a tile; tells whether it was there.
+    pub(super) fn remove(&mut self, index: TileIndex) -> bool {
+        let Some(removed) = self.tiles.pop(&index) else { return false };
+        self.bytes -= removed.bytes();
+        self.dirty -= usize::from(removed.is_dirty);
+        self.to_save.remove(&removed.number);
+        true
+    }
+
+    /// The dirty tiles, in order of their indices.
+    pub(super) fn dirty_tiles(&self) -> Vec<TileIndex> {
+        let dirty = self.tiles.iter().filter(|(_, entry)| entry.is_dirty);
+        let mut dirty: Vec<_> = dirty.map(|(&index, _)| index).collect();
+        dirty.sort_unstable();
+        dirty
+    }
+
+    pub(super) fn oldest(&self) -> Option<TileIndex> {
+        self.indices().next_back()
+    }
+
+    /// The oldest dirty tile that is not being saved.
+    pub(super) fn next_to_save(&self) -> Option<TileIndex> {
+        self.to_save.first_key_value().map(|(_, index)| *index)
+    }
+
+    /// Whether a tile is dirty and not being saved.
+    pub(super) fn needs_save(&self, index: TileIndex) -> bool {
+        self.tiles.peek(&index).is_some_and(|entry| entry.is_dirty && !entry.is_saving)
+    }
+
+    /// Notes that a tile is being saved, and returns it.
+    pub(super) fn begin_save(&mut self, index: TileIndex) -> Option<CompactTile> {
+        let entry = self.tiles.peek_mut(&index)?;
+        entry.is_saving = true;
+        self.to_save.remove(&entry.number);
+        Some(entry.tile.clone())
+    }
+
+    /// Notes that a save has ended. Tells whether the tile here still is the version that was saved.
+    pub(super) fn save_ended(&mut self, index: TileIndex, saved: &CompactTile, is_on_disk: bool) -> bool {
+        let current = self.tiles.peek_mut(&index).filter(|entry| entry.tile.is_same(saved));
+        let Some(entry) = current else { return false };
+        entry.is_saving = false;
+        if entry.is_dirty && is_on_disk {
+            entry.is_dirty = false;
+            self.dirty -= 1;
+        } else if entry.is_dirty {
+            self.to_save.insert(entry.number, index);
+        }
+        true
+    }
+
+    /// Notes that no save is in flight.
+    pub(super) fn no_save_in_flight(&mut self) {
+        for (index, entry) in self.tiles.iter_mut().filter(|(_, entry)| entry.is_saving) {
+            entry.is_saving = false;
+            if entry.is_dirty {
+                self.to_save.insert(entry.number, *index);
+            }
+        }
+    }
+}
+
+impl Entry {
+    fn bytes(&self) -> usize {
+        SLOT_BYTES + self.tile.bytes().len()
+    }
+}

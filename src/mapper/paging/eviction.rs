@@ -1,0 +1,189 @@
+//! How room is made: resident tiles go into the compact form, and these to disk, beside the mapper.
+
+use super::tile_cache::Eviction;
+use super::tile_pager::TilePager;
+use crate::error::{Error, Result};
+use crate::persistence::Saved;
+use crate::scan::ScanUpdates;
+use crate::space::TileIndex;
+use crate::tile::Tile;
+
+/// Bytes of memory that a new tile takes beside its voxels while the scan that makes it is inserted: its part of the scan, its
+/// buffered updates, and what is known of it until it is flushed.
+const BYTES_OF_NEW_TILE: usize = 120;
+
+impl TilePager {
+    /// Checks that what is known of the map's tiles leaves room to work in.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] with the limit that would do, if it takes more than half of it.
+    pub(super) fn check_index(&self, updates: &ScanUpdates) -> Result<()> {
+        let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.buffer.is_staged(**tile);
+        let tiles = updates.tiles.iter().map(|(tile, _)| tile).filter(is_new).count();
+        let tiles = tiles + self.buffer.staged_tiles().filter(|tile| !self.exists(*tile)).count();
+        let plan = self.cache.plan();
+        let index = self.disk.index_bytes() + BYTES_OF_NEW_TILE * tiles;
+        if !plan.is_kept || index <= plan.bytes / 2 {
+            return Ok(());
+        }
+        let mib = |bytes: usize| bytes.div_ceil(1 << 20);
+        let reason = format!(
+            "{} MiB are too few for a map of {} tiles: to know which there are takes {} MiB; go on with at least {} MiB, or \
+             build with larger tiles",
+            mib(plan.bytes),
+            self.count_tiles() + tiles,
+            mib(index),
+            mib(3 * index),
+        );
+        Err(Error::argument("memory", reason))
+    }
+
+    /// How many tiles one scan may touch.
+    pub(in crate::mapper) fn most_tiles_of_scan(&self) -> usize {
+        let plan = self.cache.plan();
+        match plan.is_kept {
+            true => (plan.bytes / 2).saturating_sub(self.memory().index as usize) / BYTES_OF_NEW_TILE,
+            false => usize::MAX,
+        }
+    }
+
+    /// Bytes of memory that grow outside of the cache.
+    fn outside_bytes(&self) -> usize {
+        self.buffer.bytes() + self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes()
+    }
+
+    /// Whether one more tile fits, and so many bytes with it.
+    pub(super) fn has_room_for(&self, bytes: usize) -> bool {
+        self.cache.has_room_for(bytes, self.outside_bytes())
+    }
+
+    /// Whether a tile may come in before it has to: not when others would soon have to go for it.
+    pub(super) fn has_room_to_spare(&self) -> bool {
+        self.has_room_for(self.cache.plan().spare_bytes)
+    }
+
+    /// Evicts tiles until this one fits.
+    pub(super) fn make_room(&mut self, tile: &Tile, scan_number: u64) -> Result<()> {
+        self.make_room_for(tile.bytes(), self.cache.plan().tiles - 1, scan_number)
+    }
+
+    /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles that somebody holds stay; if all are
+    /// held, what comes next goes beyond the limit.
+    pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize, scan_number: u64) -> Result<()> {
+        while let Some(eviction) = self.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
+            match eviction {
+                Eviction::Resident(index) => self.evict(index, scan_number)?,
+                Eviction::Compact(index) => self.evict_compact(index, scan_number)?,
+            }
+        }
+        self.save_ahead(scan_number)
+    }
+
+    /// Evicts a resident tile: into the compact form, or to disk where there is no such tier.
+    pub(super) fn evict(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+        if self.cache.has_compact_tier() {
+            return self.cache.make_compact(index);
+        }
+        if self.cache.is_dirty(index) {
+            self.write(index, scan_number)?;
+        }
+        self.cache.drop_resident(index);
+        Ok(())
+    }
+
+    /// Drops a tile in the compact form, once it is on disk.
+    fn evict_compact(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+        while self.cache.is_dirty(index) {
+            self.begin_save(index, scan_number)?;
+            self.wait_for_save()?;
+        }
+        self.cache.drop_compact(index);
+        Ok(())
+    }
+
+    /// Saves tiles before they have to go, as many as may be in flight.
+    fn save_ahead(&mut self, scan_number: u64) -> Result<()> {
+        if !self.cache.has_compact_tier() || self.disk.has_save_error() {
+            return Ok(());
+        }
+        while self.disk.can_save()
+            && let Some(index) = self.cache.next_to_save()
+        {
+            self.begin_save(index, scan_number)?;
+        }
+        Ok(())
+    }
+
+    /// Begins to save a tile in the compact form, if it is dirty and not being saved.
+    pub(super) fn begin_save(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+        if !self.cache.needs_save(index) {
+            return Ok(());
+        }
+        self.upgrade()?;
+        while !self.disk.can_save() {
+            self.wait_for_save()?;
+        }
+        let writer = self.disk.writer()?;
+        if let Some(tile) = self.cache.begin_save(index) {
+            self.disk.save(writer, index, tile, scan_number);
+        }
+        Ok(())
+    }
+
+    /// Waits for a save to end.
+    ///
+    /// # Errors
+    ///
+    /// Why a save has failed.
+    fn wait_for_save(&mut self) -> Result<()> {
+        match self.disk.stall(|disk| disk.wait_saved()) {
+            Some(saved) => self.note_saved(saved),
+            // None is in flight any more, whatever happened to them.
+            None => self.cache.no_save_in_flight(),
+        }
+        self.disk.take_save_error().map_or(Ok(()), Err)
+    }
+
+    fn note_saved(&mut self, saved: Saved) {
+        let is_current = self.cache.save_ended(saved.index, &saved.tile, saved.result.is_ok());
+        self.disk.note_saved(saved, is_current);
+    }
+
+    /// Takes note of saves that have ended.
+    pub(super) fn take_saved(&mut self) {
+        while let Some(saved) = self.disk.take_saved() {
+            self.note_saved(saved);
+        }
+    }
+
+    /// Waits until no version of a tile is being saved: an older one must not come after a newer.
+    pub(super) fn end_saves_of(&mut self, index: TileIndex) {
+        while self.disk.is_saving(index) {
+            if let Some(saved) = self.disk.stall(|disk| disk.wait_saved()) {
+                self.note_saved(saved);
+            }
+        }
+    }
+
+    /// Waits until all saves have ended.
+    ///
+    /// # Errors
+    ///
+    /// Why one of them failed.
+    pub(super) fn end_saves(&mut self) -> Result<()> {
+        while let Some(saved) = self.disk.wait_saved() {
+            self.note_saved(saved);
+        }
+        self.cache.no_save_in_flight();
+        self.disk.take_save_error().map_or(Ok(()), Err)
+    }
+
+    /// Waits until nothing is in flight, to disk or from there.
+    pub(super) fn end_io(&mut self, scan_number: u64) -> Result<()> {
+        self.end_prefetches(scan_number)?;
+        // A tile that was not saved is dirty still, and is saved again.
+        let _ = self.end_saves();
+        Ok(())
+    }
+}

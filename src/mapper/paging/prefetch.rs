@@ -1,0 +1,83 @@
+//! Tiles are fetched before they are needed: those with the most buffered updates, and those in the direction of travel.
+
+use super::tile_pager::TilePager;
+use super::tile_span::TileSpan;
+use crate::error::Result;
+use crate::scan::TileUpdates;
+use crate::space::TileIndex;
+use crate::tile::Table;
+use std::sync::Arc;
+
+impl TilePager {
+    /// Prefetches tiles that will be needed, as far as there is room for them. `updates` are those of the scan that is being
+    /// inserted.
+    pub(in crate::mapper) fn prefetch(&mut self, updates: &[(TileIndex, TileUpdates)]) {
+        if !self.cache.has_compact_tier() {
+            return;
+        }
+        // Soon these will have to come in.
+        let excess = self.buffer.bytes().saturating_sub(self.cache.plan().buffer_bytes / 4 * 3);
+        if excess > 0 {
+            for tile in self.buffer.heaviest(excess) {
+                if !self.is_spilling_cheaper(tile) {
+                    self.begin_prefetch(tile);
+                }
+            }
+        }
+        let span = TileSpan::of(updates.iter().map(|(tile, _)| *tile));
+        let before = std::mem::replace(&mut self.last_span, span);
+        if let (Some(before), Some(now)) = (before, span) {
+            for tile in now.ahead(&before) {
+                if self.disk.is_unread(tile) && self.has_room_to_spare() {
+                    self.begin_prefetch(tile);
+                }
+            }
+        }
+    }
+
+    fn begin_prefetch(&mut self, index: TileIndex) {
+        if !self.cache.contains(index) && !self.disk.is_prefetching(index) && self.disk.can_prefetch() {
+            self.disk.prefetch(index);
+        }
+    }
+
+    /// Takes note of saves and prefetches that have ended.
+    pub(super) fn take_prefetched(&mut self, scan_number: u64) -> Result<()> {
+        self.take_saved();
+        while let Some((index, table)) = self.disk.take_prefetched() {
+            self.put_prefetched(index, table, scan_number)?;
+        }
+        Ok(())
+    }
+
+    fn put_prefetched(&mut self, index: TileIndex, table: Option<Table>, scan_number: u64) -> Result<()> {
+        let Some(table) = table else { return Ok(()) };
+        let is_wanted = self.buffer.contains(index) || self.has_room_to_spare();
+        if !is_wanted || self.buffer.is_staged(index) || self.cache.contains(index) {
+            return Ok(());
+        }
+        let tile = Arc::new(self.make_tile(index, table)?);
+        self.make_room(&tile, scan_number)?;
+        self.put(tile);
+        Ok(())
+    }
+
+    /// Waits until a tile that is being prefetched is there.
+    pub(super) fn end_prefetch_of(&mut self, index: TileIndex, scan_number: u64) -> Result<()> {
+        while self.disk.is_prefetching(index) {
+            match self.disk.stall(|disk| disk.wait_prefetched()) {
+                Some((index, table)) => self.put_prefetched(index, table, scan_number)?,
+                None => break,
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits until all prefetches have ended.
+    pub(super) fn end_prefetches(&mut self, scan_number: u64) -> Result<()> {
+        while let Some((index, table)) = self.disk.wait_prefetched() {
+            self.put_prefetched(index, table, scan_number)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,324 @@
+use super::stalls::Stalls;
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::mapper::statistics::{IoCounts, MapStatistics};
+use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
+use crate::scan::{PackedUpdates, TileUpdates};
+use crate::space::{TileIndex, TileTable};
+use crate::store::{InputRecord, Metadata, SnapshotName, SpillFile, TileStore, TileVersion, TileWriter};
+use crate::tile::{Table, Tile};
+use std::time::Instant;
+
+/// The disk as the pager sees it: the map's store, the threads that save and load beside the mapper, and the counts of both.
+#[derive(Debug)]
+pub(super) struct TileDisk {
+    config: MapConfig,
+    store: TileStore,
+    /// Saves on the mapper's own thread.
+    saver: TileSaver,
+    threads: IoThreads,
+    stalls: Stalls,
+    counts: IoCounts,
+    /// Tiles on disk that were neither read nor written since the map was opened: nobody knows whether they are whole.
+    /// Updates are not buffered for these, so that a damaged tile is found before a scan is accepted.
+    unread: TileTable<()>,
+    /// Tiles written since the caller last asked.
+    written: TileTable<()>,
+    /// Why a save beside the mapper failed; its tile is still dirty.
+    save_error: Option<Error>,
+}
+
+/// Bytes of memory that a voxel of a tile on disk takes, about.
+const BYTES_OF_VOXEL: usize = 6;
+
+impl TileDisk {
+    pub(super) fn new(config: &MapConfig, store: TileStore) -> Self {
+        let unread = store.tiles().chain(store.orphans()).map(|tile| (tile, ())).collect();
+        Self {
+            config: config.clone(),
+            store,
+            saver: TileSaver::new(config),
+            threads: IoThreads::new(config),
+            stalls: Stalls::default(),
+            counts: IoCounts::default(),
+            unread,
+            written: TileTable::default(),
+            save_error: None,
+        }
+    }
+
+    /// The store, to be asked.
+    pub(super) fn store(&self) -> &TileStore {
+        &self.store
+    }
+
+    /// Whether a tile is on disk and nobody knows whether it is whole.
+    pub(super) fn is_unread(&self, index: TileIndex) -> bool {
+        self.unread.contains(index)
+    }
+
+    /// Does something that keeps the mapper waiting for the disk, and counts how long.
+    pub(super) fn stall<T>(&mut self, wait: impl FnOnce(&mut Self) -> T) -> T {
+        let since = Instant::now();
+        let answer = wait(self);
+        self.stalls.note(since.elapsed());
+        answer
+    }
+
+    // Reading.
+
+    /// Reads a tile's table; `None` if it is not on disk.
+    ///
+    /// # Errors
+    ///
+    /// Damage, and a disk that refuses.
+    pub(super) fn read(&mut self, index: TileIndex) -> Result<Option<Table>> {
+        if !self.store.contains(index) {
+            return Ok(None);
+        }
+        let read = self.stall(|disk| load::load_table(&disk.store, &disk.config.grid, index))?;
+        Ok(read.map(|read| {
+            self.note_read(index, read.file.bytes);
+            read.table
+        }))
+    }
+
+    fn note_read(&mut self, index: TileIndex, bytes: u64) {
+        self.counts.loads += 1;
+        self.counts.bytes_read += bytes;
+        self.unread.remove(index);
+    }
+
+    /// Whether another tile may be prefetched.
+    pub(super) fn can_prefetch(&self) -> bool {
+        self.threads.can_load()
+    }
+
+    /// Whether a tile is being prefetched.
+    pub(super) fn is_prefetching(&self, index: TileIndex) -> bool {
+        self.threads.is_loading(index)
+    }
+
+    /// Begins to read a tile beside the mapper, if it is on disk.
+    pub(super) fn prefetch(&mut self, index: TileIndex) {
+        if let Some(location) = self.store.location(index) {
+            let voxels = self.store.version(index).map_or(0, |version| version.voxels) as usize;
+            self.threads.load(location, BYTES_OF_VOXEL.saturating_mul(voxels));
+        }
+    }
+
+    /// A prefetch that has ended, if there is one; without a table if it failed. The tile is read again when it is needed,
+    /// and the error reported then.
+    pub(super) fn take_prefetched(&mut self) -> Option<(TileIndex, Option<Table>)> {
+        let loaded = self.threads.take_loaded()?;
+        Some(self.note_prefetched(loaded))
+    }
+
+    /// Waits for a prefetch to end; `None` if none is in flight.
+    pub(super) fn wait_prefetched(&mut self) -> Option<(TileIndex, Option<Table>)> {
+        let loaded = self.threads.wait_loaded()?;
+        Some(self.note_prefetched(loaded))
+    }
+
+    fn note_prefetched(&mut self, loaded: Loaded) -> (TileIndex, Option<Table>) {
+        let Loaded { index, result } = loaded;
+        let Ok(read) = result else { return (index, None) };
+        self.note_read(index, read.file.bytes);
+        self.counts.prefetches += 1;
+        (index, Some(read.table))
+    }
+
+    // Writing.
+
+    /// Writes a tile's next version. No save of the tile may be in flight: an older version must not come after this one.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub(super) fn write(&mut self, tile: &Tile, scan_number: u64) -> Result<()> {
+        let version = self.saver.save(&mut self.store, tile, scan_number)?;
+        self.note_written(tile.index(), version);
+        Ok(())
+    }
+
+    fn note_written(&mut self, index: TileIndex, version: TileVersion) {
+        self.counts.saves += 1;
+        self.counts.bytes_written += version.table.bytes + version.octree.bytes;
+        self.unread.remove(index);
+        self.written.insert(index, ());
+    }
+
+    /// The tiles written since the last call, in order of their indices.
+    pub(super) fn take_written(&mut self) -> Vec<TileIndex> {
+        std::mem::take(&mut self.written).tiles().collect()
+    }
+
+    /// Whether another tile may be saved beside the mapper.
+    pub(super) fn can_save(&self) -> bool {
+        self.threads.can_save()
+    }
+
+    /// Whether a version of a tile is being saved beside the mapper.
+    pub(super) fn is_saving(&self, index: TileIndex) -> bool {
+        self.threads.is_saving(index)
+    }
+
+    /// What begins a save beside the mapper.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses to finish what the last commit left to do.
+    pub(super) fn writer(&mut self) -> Result<TileWriter> {
+        self.store.writer()
+    }
+
+    /// Begins to save a tile beside the mapper.
+    pub(super) fn save(&mut self, writer: TileWriter, index: TileIndex, tile: CompactTile, scan_number: u64) {
+        self.threads.save(writer, index, tile, scan_number);
+    }
+
+    /// A save that has ended, if there is one; [`TileDisk::note_saved`] is to be told of it.
+    pub(super) fn take_saved(&mut self) -> Option<Saved> {
+        self.threads.take_saved()
+    }
+
+    /// Waits for a save to end; `None` if none is in flight.
+    pub(super) fn wait_saved(&mut self) -> Option<Saved> {
+        self.threads.wait_saved()
+    }
+
+    /// Takes note of a save that has ended. `is_current` tells whether the tile in memory still is the version that was
+    /// saved: otherwise it is written again, and an error does not matter.
+    pub(super) fn note_saved(&mut self, saved: Saved, is_current: bool) {
+        let Saved { index, result, .. } = saved;
+        match result {
+            Ok(version) => {
+                self.store.note_next(index, version);
+                self.note_written(index, version);
+            }
+            Err(error) if is_current => self.save_error = Some(error),
+            Err(error) => log::debug!("an older version of tile {index} was not saved: {error}"),
+        }
+    }
+
+    /// Whether a save beside the mapper has failed, and nobody was told.
+    pub(super) fn has_save_error(&self) -> bool {
+        self.save_error.is_some()
+    }
+
+    /// Why a save beside the mapper has failed, told once.
+    pub(super) fn take_save_error(&mut self) -> Option<Error> {
+        self.save_error.take()
+    }
+
+    // Updates in files.
+
+    /// Appends updates of a tile to its spill file, behind the bytes that count so far.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; the file is as before.
+    pub(super) fn spill(
+        &mut self,
+        index: TileIndex,
+        before: SpillFile,
+        updates: &PackedUpdates,
+    ) -> Result<SpillFile> {
+        let appended = self.store.append_spill(index, before, updates.as_bytes());
+        let file = appended.inspect_err(|_| self.store.cut_spill(index, before))?;
+        self.counts.bytes_written += updates.as_bytes().len() as u64;
+        Ok(file)
+    }
+
+    /// Reads the updates in a tile's spill file, in order.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses, or a file that is not what was written.
+    pub(super) fn read_spill(
+        &mut self,
+        index: TileIndex,
+        file: SpillFile,
+        take: impl FnMut(TileUpdates),
+    ) -> Result<()> {
+        let input = self.stall(|disk| disk.store.open_spill(index, file))?;
+        self.counts.bytes_read += file.bytes;
+        PackedUpdates::unpack(input, take)
+            .map_err(|error| Error::io(&self.store.layout().spill(index), "read", error))
+    }
+
+    /// Removes a tile's spill file.
+    pub(super) fn remove_spill(&self, index: TileIndex) {
+        self.store.remove_spill(index);
+    }
+
+    /// Cuts a tile's spill file to the bytes that count.
+    pub(super) fn cut_spill(&self, index: TileIndex, file: SpillFile) {
+        self.store.cut_spill(index, file);
+    }
+
+    // Commits.
+
+    /// Makes a map of the seed's format, before its first change, one of voxtile's own.
+    ///
+    /// # Errors
+    ///
+    /// Damage, and a disk that refuses.
+    pub(super) fn upgrade(&mut self, inputs: &[InputRecord]) -> Result<()> {
+        let Self { store, saver, config, .. } = self;
+        upgrade(store, saver, config, |map_id| new_metadata(config, map_id, inputs))
+    }
+
+    /// Commits all that was written.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; nothing is committed then.
+    pub(super) fn commit(&mut self, inputs: &[InputRecord], scan_number: u64) -> Result<()> {
+        let metadata = self.metadata(inputs);
+        self.store.commit(metadata, scan_number)
+    }
+
+    fn metadata(&self, inputs: &[InputRecord]) -> Metadata {
+        let map_id = self.store.map_id().unwrap_or_default();
+        let mut metadata = new_metadata(&self.config, map_id, inputs);
+        if let (Some(ext), Some(before)) = (&mut metadata.ext, &self.store.metadata().ext) {
+            ext.decayed_scan = before.decayed_scan;
+        }
+        metadata
+    }
+
+    /// Keeps the last commit under a name.
+    ///
+    /// # Errors
+    ///
+    /// A name that is taken, and a disk that refuses.
+    pub(super) fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
+        self.store.create_snapshot(name)
+    }
+
+    // Counts.
+
+    /// Bytes of memory of tiles in flight.
+    pub(super) fn in_flight_bytes(&self) -> usize {
+        self.threads.bytes()
+    }
+
+    /// Bytes of memory of what is known of each tile, without what a commit takes.
+    pub(super) fn index_bytes(&self) -> usize {
+        self.store.index_bytes() + self.unread.bytes() + self.written.bytes()
+    }
+
+    /// Bytes of memory that a commit takes now.
+    pub(super) fn commit_bytes(&self) -> usize {
+        self.store.commit_bytes()
+    }
+
+    /// Adds the disk's part of the statistics.
+    pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
+        let versions = self.store.versions();
+        statistics.disk_bytes = versions.map(|version| version.table.bytes + version.octree.bytes).sum();
+        statistics.stalls = self.stalls.counts();
+        statistics.io = self.counts;
+    }
+}

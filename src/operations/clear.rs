@@ -1,0 +1,90 @@
+use super::map_editor::{MapEditor, edit};
+use super::part::{Part, Share, VoxelPart};
+use super::table_change::voxels_of_part;
+use crate::error::Result;
+use crate::space::TileIndex;
+use crate::store::{Disk, FsDisk};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What clearing a part of a map did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Cleared {
+    /// Voxels that are unknown now and were not before.
+    pub voxels_cleared: u64,
+    /// Tiles that lost some of their voxels.
+    pub tiles_changed: u64,
+    /// Tiles that lost all of their voxels, and are no longer part of the map.
+    pub tiles_removed: u64,
+    /// Tiles that the map still has.
+    pub tiles: u64,
+}
+
+/// Makes the voxels of a part of space unknown, in place and in one commit: all of it is cleared, or nothing.
+///
+/// A tile that is cleared whole is not read. `progress` is told the tiles done and all.
+///
+/// # Errors
+///
+/// No map there, another writer, a box that is none, a damaged tile, a disk that refuses; the map is as before then.
+pub fn clear(map: impl AsRef<Path>, part: &Part, progress: impl FnMut(u64, u64)) -> Result<Cleared> {
+    clear_on(Arc::new(FsDisk), map.as_ref(), part, progress)
+}
+
+/// [`clear`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`clear`].
+pub fn clear_on(
+    disk: Arc<dyn Disk>,
+    map: &Path,
+    part: &Part,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Cleared> {
+    edit(disk, map, |editor| {
+        let grid = editor.config().grid;
+        let part = part.voxels(&grid)?;
+        let mut tiles = editor.tiles();
+        let all = tiles.len() as u64;
+        tiles.retain(|&tile| part.share_of(&grid.voxels_of_tile(tile)) != Share::Nothing);
+        let mut cleared = Cleared::default();
+        for (done, &tile) in (0..).zip(&tiles) {
+            progress(done, tiles.len() as u64);
+            clear_tile(editor, tile, &part, &mut cleared)?;
+        }
+        progress(tiles.len() as u64, tiles.len() as u64);
+        cleared.tiles = all - cleared.tiles_removed;
+        if cleared.tiles_changed + cleared.tiles_removed > 0 {
+            editor.commit(|_| {})?;
+        }
+        Ok(cleared)
+    })
+}
+
+fn clear_tile(
+    editor: &mut MapEditor,
+    tile: TileIndex,
+    part: &VoxelPart,
+    cleared: &mut Cleared,
+) -> Result<()> {
+    let voxels = editor.config().grid.voxels_of_tile(tile);
+    if part.share_of(&voxels) == Share::Everything
+        && let Some(version) = editor.version(tile)
+    {
+        cleared.voxels_cleared += version.voxels;
+        cleared.tiles_removed += 1;
+        return editor.remove(tile);
+    }
+    let before = editor.table(tile)?;
+    let after = voxels_of_part(&before, &voxels, &part.rest());
+    if after.len() == before.len() {
+        return Ok(());
+    }
+    cleared.voxels_cleared += (before.len() - after.len()) as u64;
+    *(if after.is_empty() { &mut cleared.tiles_removed } else { &mut cleared.tiles_changed }) += 1;
+    drop(before);
+    editor.replace(tile, &after)
+}

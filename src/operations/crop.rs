@@ -1,0 +1,50 @@
+use super::map_writer::{MapWriter, WrittenMap};
+use super::part::{Part, Share};
+use super::table_change::voxels_of_part;
+use crate::error::Result;
+use crate::mapper::{MapReader, MapView};
+use crate::persistence::{new_map_id, new_metadata};
+use crate::store::Metadata;
+use std::path::Path;
+
+/// Makes a map of the voxels of another that are in a part of space.
+///
+/// The new one has the parameters, storage and number of scans of the other, but an id of its own and no input to go on
+/// with: it is a part of what the scans have said. It is there as a whole or not at all, see [`MapWriter`]. `progress` is
+/// told the tiles done and all.
+///
+/// # Errors
+///
+/// A box that is none, a damaged tile, an output with other content, a disk that refuses.
+pub fn crop(
+    map: &MapReader,
+    part: &Part,
+    output: impl AsRef<Path>,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<WrittenMap> {
+    let grid = map.config().grid;
+    let part = part.voxels(&grid)?;
+    let mut writer = MapWriter::create_as(map.disk(), output.as_ref(), metadata_of_part(map))?;
+    let mut tiles = map.tile_indices();
+    tiles.retain(|&tile| part.share_of(&grid.voxels_of_tile(tile)) != Share::Nothing);
+    for (done, &tile) in (0..).zip(&tiles) {
+        progress(done, tiles.len() as u64);
+        let Some(found) = map.tile_in_passing(tile)? else { continue };
+        match part.share_of(&found.voxel_box()) {
+            Share::Nothing => {}
+            Share::Everything => writer.put(tile, found.table())?,
+            Share::Some => writer.put(tile, &voxels_of_part(found.table(), &found.voxel_box(), &part))?,
+        }
+    }
+    progress(tiles.len() as u64, tiles.len() as u64);
+    writer.finish()
+}
+
+/// What a part says of itself: what the whole says, but for its identity.
+fn metadata_of_part(map: &MapReader) -> Metadata {
+    let mut metadata = new_metadata(map.config(), new_map_id(), &[]);
+    if let (Some(ext), Some(whole)) = (&mut metadata.ext, &map.metadata().ext) {
+        (ext.scan_number, ext.decayed_scan) = (whole.scan_number, whole.decayed_scan);
+    }
+    metadata
+}

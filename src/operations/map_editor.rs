@@ -1,0 +1,109 @@
+use crate::config::MapConfig;
+use crate::error::Result;
+use crate::persistence::TileSaver;
+use crate::persistence::upgrade;
+use crate::persistence::{config_from, load, new_metadata};
+use crate::space::TileIndex;
+use crate::store::{Disk, Extension, TileStore, TileVersion};
+use crate::tile::Table;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Changes a map in place, tile by tile, with one commit for all of it: until then the map is as it was, whatever
+/// happens.
+#[derive(Debug)]
+pub(super) struct MapEditor {
+    /// Holds the map's lock.
+    store: TileStore,
+    config: MapConfig,
+    saver: TileSaver,
+    is_written_to: bool,
+}
+
+/// Opens a map, takes its lock, and lets `change` change it. If that fails, what it wrote beside the map's files is
+/// removed; after a crash the next opening of the map does so.
+pub(super) fn edit<T>(
+    disk: Arc<dyn Disk>,
+    folder: &Path,
+    change: impl FnOnce(&mut MapEditor) -> Result<T>,
+) -> Result<T> {
+    let store = TileStore::open(disk.clone(), folder)?;
+    let config = config_from(store.metadata(), &store.layout().metadata())?;
+    let saver = TileSaver::new(&config);
+    let mut editor = MapEditor { store, config, saver, is_written_to: false };
+    let outcome = change(&mut editor);
+    let leaves_something = editor.is_written_to && outcome.is_err();
+    drop(editor);
+    if leaves_something && let Err(error) = TileStore::open(disk, folder) {
+        log::warn!("{}: not tidied up after an error: {error}", folder.display());
+    }
+    outcome
+}
+
+impl MapEditor {
+    pub(super) fn config(&self) -> &MapConfig {
+        &self.config
+    }
+
+    /// Number of the last scan in the map.
+    pub(super) fn scan_number(&self) -> u64 {
+        self.store.commits().scan_number
+    }
+
+    /// What voxtile adds to the seed's metadata, if the map is voxtile's own.
+    pub(super) fn ext(&self) -> Option<&Extension> {
+        self.store.metadata().ext.as_ref()
+    }
+
+    /// The map's tiles, in order.
+    pub(super) fn tiles(&self) -> Vec<TileIndex> {
+        let mut tiles: Vec<_> = self.store.tiles().collect();
+        tiles.sort_unstable();
+        tiles
+    }
+
+    /// What is known of a tile without reading it.
+    pub(super) fn version(&self, tile: TileIndex) -> Option<TileVersion> {
+        self.store.version(tile)
+    }
+
+    /// The table of a tile; an empty one where there is none.
+    pub(super) fn table(&self, tile: TileIndex) -> Result<Table> {
+        let read = load::load_table(&self.store, &self.config.grid, tile)?;
+        Ok(read.map(|read| read.table).unwrap_or_default())
+    }
+
+    /// Puts another table in a tile's place; an empty one takes the tile out of the map.
+    pub(super) fn replace(&mut self, tile: TileIndex, table: &Table) -> Result<()> {
+        if table.is_empty() {
+            return self.remove(tile);
+        }
+        self.begin_writing()?;
+        let version = self.saver.write(&self.store.writer()?, tile, table, self.scan_number())?;
+        self.store.note_next(tile, version);
+        Ok(())
+    }
+
+    /// Takes a tile out of the map.
+    pub(super) fn remove(&mut self, tile: TileIndex) -> Result<()> {
+        self.begin_writing()?;
+        self.store.remove(tile)
+    }
+
+    /// Commits every change, and what `note` changes in the map's metadata.
+    pub(super) fn commit(&mut self, note: impl FnOnce(&mut Extension)) -> Result<()> {
+        self.begin_writing()?;
+        let mut metadata = self.store.metadata().clone();
+        if let Some(ext) = &mut metadata.ext {
+            note(ext);
+        }
+        self.store.commit(metadata, self.scan_number())
+    }
+
+    /// Before the first change a map of the seed's format becomes one of voxtile's own.
+    fn begin_writing(&mut self) -> Result<()> {
+        self.is_written_to = true;
+        let Self { saver, config, store, .. } = self;
+        upgrade(store, saver, config, |map_id| new_metadata(config, map_id, &[]))
+    }
+}

@@ -1,0 +1,148 @@
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::persistence::TileSaver;
+use crate::persistence::{config_from, new_map_id, new_metadata};
+use crate::space::TileIndex;
+use crate::store::{Disk, FsDisk, Metadata, StagedMap, id_from_hex};
+use crate::tile::Table;
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Makes a new map from the tables of its tiles, one at a time: in memory are the table at hand and some 200 bytes a tile.
+///
+/// Until [`MapWriter::finish`] the map lies beside its place, as `MAP.unfinished`, where no command takes it for the one
+/// that was asked for. A process that is killed leaves that folder behind, and the next attempt to make the same map removes
+/// it; so does a writer that is dropped.
+#[derive(Debug)]
+pub struct MapWriter {
+    map: StagedMap,
+    saver: TileSaver,
+    config: MapConfig,
+    metadata: Metadata,
+    scan_number: u64,
+    last: Option<TileIndex>,
+    /// Tiles put since the last commit.
+    uncommitted: usize,
+    written: WrittenMap,
+}
+
+/// What a [`MapWriter`] wrote.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct WrittenMap {
+    /// Tiles with an observed voxel.
+    pub tiles: u64,
+    /// Observed voxels.
+    pub voxels: u64,
+    /// Occupied voxels.
+    pub occupied: u64,
+    /// Bytes of the tables' files.
+    pub table_bytes: u64,
+    /// Bytes of the octrees' files.
+    pub octree_bytes: u64,
+}
+
+/// Tiles that are made durable together. A commit of the unfinished map means nothing to anybody; it keeps the list of
+/// files to sync short, and the disk at work from the beginning.
+const COMMIT_TILES: usize = 256;
+
+impl MapWriter {
+    /// Begins an empty map with an id of its own, without scans, in a folder that does not exist yet or is empty.
+    ///
+    /// # Errors
+    ///
+    /// A wrong configuration, a folder with other content, another process that makes the same map, a disk that refuses.
+    pub fn create(folder: impl AsRef<Path>, config: &MapConfig) -> Result<Self> {
+        Self::create_on(Arc::new(FsDisk), folder.as_ref(), config)
+    }
+
+    /// [`MapWriter::create`] on another disk than the file system.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapWriter::create`].
+    pub fn create_on(disk: Arc<dyn Disk>, folder: &Path, config: &MapConfig) -> Result<Self> {
+        let config = config.clone().validated()?;
+        Self::create_as(disk, folder, new_metadata(&config, new_map_id(), &[]))
+    }
+
+    /// Begins a map that says of itself what `metadata` says: parameters, id, number of scans, input. Tiles, bounds and
+    /// number of flushes are its own.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapWriter::create`], and metadata of the seed's format, which does not say it all.
+    pub fn create_as(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata) -> Result<Self> {
+        let config = config_from(&metadata, folder)?;
+        let ext = metadata.ext.as_ref();
+        let Some((map_id, ext)) = ext.and_then(|ext| Some((id_from_hex(&ext.map_id)?, ext))) else {
+            let reason = "without an id and parameters of voxtile's own no map can be made";
+            return Err(Error::argument("metadata", reason));
+        };
+        let scan_number = ext.scan_number;
+        let map = StagedMap::begin(disk, folder, metadata.clone(), map_id)?;
+        let (last, uncommitted, written) = Default::default();
+        let saver = TileSaver::new(&config);
+        Ok(Self { map, saver, config, metadata, scan_number, last, uncommitted, written })
+    }
+
+    /// How the map is made.
+    pub fn config(&self) -> &MapConfig {
+        &self.config
+    }
+
+    /// Adds a tile. One without voxels is left out, for a map has none.
+    ///
+    /// # Errors
+    ///
+    /// A tile that does not come after the one before it, by x, then y, then z; a disk that refuses: the map cannot be
+    /// finished then.
+    pub fn put(&mut self, tile: TileIndex, table: &Table) -> Result<()> {
+        self.put_as_of(tile, table, self.scan_number)
+    }
+
+    /// The same for a tile whose file is to say that it was written after another scan than the map's last.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapWriter::put`].
+    pub fn put_as_of(&mut self, tile: TileIndex, table: &Table, scan_number: u64) -> Result<()> {
+        if let Some(last) = self.last.filter(|&last| last >= tile) {
+            return Err(Error::argument("tile", format!("{tile} does not come after {last}")));
+        }
+        if table.is_empty() {
+            return Ok(());
+        }
+        let store = self.map.store();
+        let version = self.saver.write(&store.writer()?, tile, table, scan_number)?;
+        store.note_next(tile, version);
+        self.last = Some(tile);
+        self.written.tiles += 1;
+        self.written.voxels += version.voxels;
+        self.written.occupied += version.occupied;
+        self.written.table_bytes += version.table.bytes;
+        self.written.octree_bytes += version.octree.bytes;
+        self.uncommitted += 1;
+        if self.uncommitted == COMMIT_TILES { self.commit() } else { Ok(()) }
+    }
+
+    /// Makes the map whole and gives it its name.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses: there is no map then, unless it was the name of the finished one that could not be made
+    /// durable.
+    pub fn finish(mut self) -> Result<WrittenMap> {
+        self.commit()?;
+        // What a commit may leave to the next opening of the map is not left here: nobody else is to see it.
+        self.map.store().tidy()?;
+        self.map.finish()?;
+        Ok(self.written)
+    }
+
+    fn commit(&mut self) -> Result<()> {
+        self.uncommitted = 0;
+        self.map.store().commit(self.metadata.clone(), self.scan_number)
+    }
+}

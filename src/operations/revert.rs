@@ -1,0 +1,185 @@
+use super::snapshot::check_is_free;
+use crate::config::MapConfig;
+use crate::error::{Error, FormatError, Result};
+use crate::persistence::TileSaver;
+use crate::persistence::config_from;
+use crate::persistence::load::read_stored_table;
+use crate::space::TileIndex;
+use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileFile, TileStore, TileVersion};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What a revert did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Reverted {
+    /// Number of the last scan in the map before.
+    pub scan_number_before: u64,
+    /// Number of the last scan in the map now.
+    pub scan_number: u64,
+    /// Number of the flush that the revert is.
+    pub flush_number: u64,
+    /// Tiles that the map has now.
+    pub tiles: u64,
+    /// Tiles that had changed since and are as of then again.
+    pub tiles_restored: u64,
+    /// Tiles that were not there then, and are not any more.
+    pub tiles_removed: u64,
+}
+
+/// Makes the map in `folder` again what it was when a snapshot was made: tiles, scan number and input. It is one commit like
+/// any other, so that it has happened or not; flushes go on being counted upward. All snapshots stay, and readers go on
+/// seeing what they see.
+///
+/// What came after the snapshot is in no map any more, unless `keep_as` names a snapshot to be made of it before.
+/// `progress` is told the tiles done and all. Memory: the lists of tiles of the map and of the snapshot, and one tile.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] if there is no such snapshot, [`Error::AlreadyExists`] if there is one with the name
+/// `keep_as`; no map there, another writer, a damaged table, a disk that refuses. The map is as it was then; a snapshot
+/// `keep_as` may have been made.
+pub fn revert(
+    folder: impl AsRef<Path>,
+    name: &SnapshotName,
+    keep_as: Option<&SnapshotName>,
+    progress: impl FnMut(u64, u64),
+) -> Result<Reverted> {
+    revert_on(Arc::new(FsDisk), folder.as_ref(), name, keep_as, progress)
+}
+
+/// [`revert`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`revert`].
+pub fn revert_on(
+    disk: Arc<dyn Disk>,
+    folder: &Path,
+    name: &SnapshotName,
+    keep_as: Option<&SnapshotName>,
+    progress: impl FnMut(u64, u64),
+) -> Result<Reverted> {
+    let mut store = TileStore::open(disk.clone(), folder)?;
+    let past = TileStore::open_snapshot(disk.clone(), folder, name)?;
+    check_is_of_map(&store, &past)?;
+    if let Some(keep_as) = keep_as {
+        check_is_free(&store, keep_as)?;
+        store.create_snapshot(keep_as)?;
+    }
+    let outcome = revert_to(&mut store, &past, progress);
+    drop(store);
+    // What was written in vain gives its room back.
+    if outcome.is_err()
+        && let Err(error) = TileStore::open(disk, folder)
+    {
+        log::warn!("{}: not tidied up after an error: {error}", folder.display());
+    }
+    outcome
+}
+
+fn revert_to(
+    store: &mut TileStore,
+    past: &TileStore,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Reverted> {
+    let mut reverted = Reverted { scan_number_before: store.commits().scan_number, ..Reverted::default() };
+    let mut reverter = Reverter::new(store, past)?;
+    let mut tiles: Vec<_> = past.tiles().collect();
+    tiles.sort_unstable();
+    for (done, &tile) in (1..).zip(&tiles) {
+        reverted.tiles_restored += u64::from(reverter.restore(tile)?);
+        progress(done, tiles.len() as u64);
+    }
+    for tile in store.tiles().collect::<Vec<_>>() {
+        if past.version(tile).is_none() {
+            store.remove(tile)?;
+            reverted.tiles_removed += 1;
+        }
+    }
+    store.commit(past.metadata().clone(), past.commits().scan_number)?;
+    reverted.scan_number = store.commits().scan_number;
+    reverted.flush_number = store.commits().flush_number;
+    reverted.tiles = tiles.len() as u64;
+    Ok(reverted)
+}
+
+/// Whether a snapshot says what a map can be made again, with nothing else in the way.
+fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
+    let lengths = |metadata: &Metadata| [metadata.resolution_m, metadata.tile_size_m].map(f64::to_bits);
+    if lengths(store.metadata()) != lengths(past.metadata())
+        || store.metadata().storage() != past.metadata().storage()
+    {
+        let reason = "the snapshot has another resolution, tile size or storage than its map";
+        let path = past.opened_snapshot().map(|name| past.layout().snapshot(name)).unwrap_or_default();
+        return Err(FormatError::at_offset(0, reason).in_map(&path, None));
+    }
+    for tile in store.orphans() {
+        if past.version(tile).is_some() {
+            let hint = "it is no part of the map as it is; `voxtile repair` moves it out of the way";
+            return Err(Error::AlreadyExists { path: store.layout().tile_folder(tile), hint });
+        }
+    }
+    Ok(())
+}
+
+struct Reverter<'a> {
+    store: &'a mut TileStore,
+    past: &'a TileStore,
+    config: MapConfig,
+    saver: TileSaver,
+}
+
+impl<'a> Reverter<'a> {
+    fn new(store: &'a mut TileStore, past: &'a TileStore) -> Result<Self> {
+        let config = config_from(past.metadata(), past.folder())?;
+        let saver = TileSaver::new(&config);
+        Ok(Self { store, past, config, saver })
+    }
+
+    /// Makes the snapshot's version of a tile the next one; false if it is the present one.
+    fn restore(&mut self, tile: TileIndex) -> Result<bool> {
+        let Some(version) =
+            self.past.version(tile).filter(|_| self.past.version(tile) != self.store.version(tile))
+        else {
+            return Ok(false);
+        };
+        let stored = self.past.open_table(tile)?.ok_or_else(|| self.missing(tile))?;
+        let path = stored.path.clone();
+        // Whole and the one that the snapshot names, or an error before anything has changed.
+        let read = read_stored_table(&self.config.grid, tile, stored)?;
+        if self.has_octree_of(tile, &read.table, version)? {
+            self.store.link_next(tile, &path)?;
+            self.store.note_next(tile, version);
+        } else {
+            // The table names an octree that another version of the program derived: both are written anew.
+            let scan_number = read.trailer.map_or(version.scan_number, |trailer| trailer.scan_number);
+            let version = self.saver.write(&self.store.writer()?, tile, &read.table, scan_number)?;
+            self.store.note_next(tile, version);
+        }
+        Ok(true)
+    }
+
+    /// Derives the octree, and tells whether it is the one that the snapshot's table names.
+    fn has_octree_of(
+        &mut self,
+        tile: TileIndex,
+        table: &crate::tile::Table,
+        version: TileVersion,
+    ) -> Result<bool> {
+        if !self.store.layout().files().contains(&TileFile::Octree) {
+            return Ok(true);
+        }
+        let (resolution_m, threshold) = (self.config.grid.resolution_m(), self.config.occupied_log_odds());
+        let octree = self.store.write_next(tile, TileFile::Octree, |mut out| {
+            table.write_bt(resolution_m, threshold as f32, &mut out)
+        })?;
+        Ok(octree == version.octree)
+    }
+
+    fn missing(&self, tile: TileIndex) -> Error {
+        let path = self.past.layout().current(tile, TileFile::Table);
+        FormatError::at_offset(0, "the snapshot does not hold this tile").in_map(&path, Some(tile))
+    }
+}

@@ -1,0 +1,177 @@
+use crate::error::{Error, Result};
+use crate::mapper::{MapReader, OutOfCoreTileMapper};
+use crate::space::TileIndex;
+use crate::store::{Disk, FsDisk, Layout, Snapshot, SnapshotName, TileStore};
+use rustc_hash::FxHashMap;
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A snapshot of a map: the map as of a flush, under a name.
+///
+/// A snapshot is one small file that says which tiles the map had, and what a reader is that never leaves: the tables that it
+/// sees stay when they are replaced. So it costs next to nothing when it is made, and from then on the bytes of the tables
+/// that have changed since.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct SnapshotInfo {
+    /// Its name.
+    pub name: String,
+    /// Number of the flush that it keeps.
+    pub flush_number: u64,
+    /// Number of the last scan in it.
+    pub scan_number: u64,
+    /// Tiles in it.
+    pub tiles: u64,
+    /// Observed voxels in it.
+    pub voxels: u64,
+    /// Bytes of the tables that it sees.
+    pub table_bytes: u64,
+    /// Bytes that no other snapshot and not the present map names: at most so many are free when it is deleted. Fewer are where
+    /// a revert has linked a table, so that it is there under two names.
+    pub own_bytes: u64,
+    /// Why it cannot be read, if it cannot; the numbers are 0 then.
+    pub damage: Option<String>,
+}
+
+/// Keeps the last flush of the map in `folder` under a name. A map of the seed's own format gets an id and checksums first, as
+/// before any change.
+///
+/// # Errors
+///
+/// [`Error::AlreadyExists`] if there is a snapshot of this name; no map there, another writer, a disk that refuses: there is no
+/// such snapshot then.
+pub fn snapshot(folder: impl AsRef<Path>, name: &SnapshotName) -> Result<()> {
+    snapshot_on(Arc::new(FsDisk), folder.as_ref(), name)
+}
+
+/// [`snapshot`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`snapshot`].
+pub fn snapshot_on(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotName) -> Result<()> {
+    let mut store = TileStore::open(disk.clone(), folder)?;
+    if store.metadata().ext.is_some() {
+        return store.create_snapshot(name);
+    }
+    drop(store);
+    let config = MapReader::config_of_on(disk.clone(), folder)?;
+    OutOfCoreTileMapper::open_on(disk, folder, config)?.snapshot(name)
+}
+
+/// Deletes a snapshot, and the tables that no other one and no reader sees.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] if there is none of this name; no map there, another writer, a disk that refuses.
+pub fn delete_snapshot(folder: impl AsRef<Path>, name: &SnapshotName) -> Result<()> {
+    delete_snapshot_on(Arc::new(FsDisk), folder.as_ref(), name)
+}
+
+/// [`delete_snapshot`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`delete_snapshot`].
+pub fn delete_snapshot_on(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotName) -> Result<()> {
+    TileStore::open(disk, folder)?.delete_snapshot(name)
+}
+
+/// The snapshots of a map, by flush and then by name, those that cannot be read first. Takes no lock; beside a writer the bytes
+/// may be those of a moment.
+///
+/// # Errors
+///
+/// No map there, or a disk that refuses. Damage is part of the answer.
+pub fn snapshots(folder: impl AsRef<Path>) -> Result<Vec<SnapshotInfo>> {
+    snapshots_on(Arc::new(FsDisk), folder.as_ref())
+}
+
+/// [`snapshots`] on another disk than the file system.
+///
+/// # Errors
+///
+/// As for [`snapshots`].
+pub fn snapshots_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<Vec<SnapshotInfo>> {
+    let store = TileStore::open_read_only(disk, folder)?;
+    let (mut infos, mut owners) = (Vec::new(), Owners::default());
+    for name in store.snapshot_names()? {
+        match store.snapshot(&name) {
+            Ok(snapshot) => {
+                owners.count(&store, infos.len(), &snapshot)?;
+                infos.push(SnapshotInfo::of(&snapshot));
+            }
+            Err(error @ (Error::Damaged { .. } | Error::Io { .. })) => {
+                infos.push(SnapshotInfo::damaged(&name, &error));
+            }
+            // Deleted since they were listed.
+            Err(Error::InvalidArgument { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    for (_, owner) in owners.0 {
+        if let Owner::One { snapshot, bytes } = owner {
+            infos[snapshot].own_bytes += bytes;
+        }
+    }
+    infos.sort_by(|a, b| (a.flush_number, &a.name).cmp(&(b.flush_number, &b.name)));
+    Ok(infos)
+}
+
+/// Whether a map has room for a snapshot of this name, without making it.
+pub(super) fn check_is_free(store: &TileStore, name: &SnapshotName) -> Result<()> {
+    match store.snapshot_names()?.contains(name) {
+        false => Ok(()),
+        true => {
+            let hint = "choose another name, or delete that snapshot first";
+            Err(Error::AlreadyExists { path: Layout::new(store.folder()).snapshot(name), hint })
+        }
+    }
+}
+
+/// Who sees each of the kept tables.
+#[derive(Default)]
+struct Owners(FxHashMap<(TileIndex, u64), Owner>);
+
+enum Owner {
+    One { snapshot: usize, bytes: u64 },
+    Several,
+}
+
+impl Owners {
+    fn count(&mut self, store: &TileStore, number: usize, snapshot: &Snapshot) -> Result<()> {
+        for (tile, version) in snapshot.commits.tiles.iter() {
+            if store.version(tile) == Some(version) {
+                continue; // It is the present one, under whatever names.
+            }
+            let kept = store.kept_tables(tile)?;
+            let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
+            let one = Owner::One { snapshot: number, bytes: version.table.bytes };
+            self.0.entry((tile, flush_number)).and_modify(|owner| *owner = Owner::Several).or_insert(one);
+        }
+        Ok(())
+    }
+}
+
+impl SnapshotInfo {
+    fn of(snapshot: &Snapshot) -> Self {
+        let versions = || snapshot.commits.tiles.values();
+        Self {
+            name: snapshot.name.to_string(),
+            flush_number: snapshot.commits.flush_number,
+            scan_number: snapshot.commits.scan_number,
+            tiles: snapshot.commits.tiles.len() as u64,
+            voxels: versions().map(|version| version.voxels).sum(),
+            table_bytes: versions().map(|version| version.table.bytes).sum(),
+            own_bytes: snapshot.bytes,
+            damage: None,
+        }
+    }
+
+    fn damaged(name: &SnapshotName, error: &Error) -> Self {
+        let (flush_number, scan_number, tiles, voxels, table_bytes, own_bytes) = Default::default();
+        let (name, damage) = (name.to_string(), Some(error.to_string()));
+        Self { name, flush_number, scan_number, tiles, voxels, table_bytes, own_bytes, damage }
+    }
+}

@@ -1,0 +1,135 @@
+//! Tiles to their files. How they come back is `load.rs`.
+
+use super::compact_tile::CompactTile;
+use super::parameters::map_parameters;
+use crate::config::{MapConfig, Storage};
+use crate::error::{Error, Result};
+use crate::space::{Grid, TileIndex};
+use crate::store::{FileChecksum, TileFile, TileStore, TileVersion, TileWriter};
+use crate::tile::format::{CompactEffort, CompactWriter, Trailer, write_compact_file, write_table};
+use crate::tile::{Table, Tile};
+
+/// Writes the files of a map's tiles. What packing takes is kept from one tile to the next.
+#[derive(Debug)]
+pub(crate) struct TileSaver {
+    resolution_m: f64,
+    /// Log-odds from which a voxel counts as occupied.
+    threshold: f64,
+    parameters: String,
+    /// Made with the first tile that has to be packed.
+    packer: Option<CompactWriter>,
+}
+
+impl TileSaver {
+    pub(crate) fn new(config: &MapConfig) -> Self {
+        Self {
+            resolution_m: config.grid.resolution_m(),
+            threshold: config.occupied_log_odds(),
+            parameters: map_parameters(config).to_text(),
+            packer: None,
+        }
+    }
+
+    /// Writes the next version of a tile's files.
+    pub(crate) fn save(
+        &mut self,
+        store: &mut TileStore,
+        tile: &Tile,
+        scan_number: u64,
+    ) -> Result<TileVersion> {
+        let version = self.write(&store.writer()?, tile.index(), tile.table(), scan_number)?;
+        store.note_next(tile.index(), version);
+        Ok(version)
+    }
+
+    /// Writes the next version of a tile's files, of which the store is still to be told.
+    pub(crate) fn write(
+        &mut self,
+        writer: &TileWriter,
+        index: TileIndex,
+        table: &Table,
+        scan_number: u64,
+    ) -> Result<TileVersion> {
+        match writer.storage() {
+            Storage::Seed => self.write_seed(writer, index, table, scan_number),
+            Storage::Compact => {
+                let compact = self.pack(table)?;
+                let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
+                self.write_encoded(writer, index, &compact, [voxels, occupied], scan_number)
+            }
+        }
+    }
+
+    /// [`TileSaver::write`] of a tile in the compact form.
+    pub(crate) fn write_compact(
+        &self,
+        writer: &TileWriter,
+        grid: &Grid,
+        index: TileIndex,
+        tile: &CompactTile,
+        scan_number: u64,
+    ) -> Result<TileVersion> {
+        match tile.occupied() {
+            Some(occupied) => {
+                self.write_encoded(writer, index, tile.bytes(), [tile.voxels(), occupied], scan_number)
+            }
+            None => self.write_seed(writer, index, &tile.decode(grid, index)?, scan_number),
+        }
+    }
+
+    fn write_encoded(
+        &self,
+        writer: &TileWriter,
+        index: TileIndex,
+        compact: &[u8],
+        [voxels, occupied]: [u64; 2],
+        scan_number: u64,
+    ) -> Result<TileVersion> {
+        let front = self.trailer(writer, index, scan_number, FileChecksum::default());
+        let table = writer
+            .write_next(index, TileFile::Table, |mut out| write_compact_file(compact, front, &mut out))?;
+        Ok(TileVersion { scan_number, table, octree: FileChecksum::default(), voxels, occupied })
+    }
+
+    /// [`TileSaver::write`] in a map with the seed's storage.
+    fn write_seed(
+        &self,
+        writer: &TileWriter,
+        index: TileIndex,
+        table: &Table,
+        scan_number: u64,
+    ) -> Result<TileVersion> {
+        let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
+        let octree = writer.write_next(index, TileFile::Octree, |mut out| {
+            table.write_bt(self.resolution_m, self.threshold as f32, &mut out)
+        })?;
+        let trailer = self.trailer(writer, index, scan_number, octree);
+        let table = writer
+            .write_next(index, TileFile::Table, |mut out| write_table(table, trailer, &mut out).map(drop))?;
+        Ok(TileVersion { scan_number, table, octree, voxels, occupied })
+    }
+
+    fn trailer(
+        &self,
+        writer: &TileWriter,
+        tile: TileIndex,
+        scan_number: u64,
+        octree: FileChecksum,
+    ) -> Trailer {
+        let (map_id, parameters) = (writer.map_id(), self.parameters.clone());
+        let (octree_crc, octree_bytes) = (octree.crc, octree.bytes);
+        Trailer { map_id, tile, scan_number, table_crc: 0, octree_crc, octree_bytes, parameters }
+    }
+
+    /// A table in the compact form.
+    fn pack(&mut self, table: &Table) -> Result<Vec<u8>> {
+        let failed = |error| Error::io("memory".as_ref(), "pack a tile in", error);
+        let packer = match &mut self.packer {
+            Some(packer) => packer,
+            none => none.insert(CompactWriter::new(CompactEffort::Fast).map_err(failed)?),
+        };
+        let mut compact = Vec::new();
+        packer.write(table, &mut compact).map_err(failed)?;
+        Ok(compact)
+    }
+}

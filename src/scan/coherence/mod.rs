@@ -1,0 +1,12 @@
+//! Beam coherence: rays of nearly the same direction cross nearly the same voxels, so most of a ray need not be walked.
+//!
+//! The points are taken in sampling passes. The first passes are spread over the whole scan; what they marked is then
+//! known by cones of directions, and the rays of later passes begin behind it. This saves time only; the marks are the
+//! same.
+
+mod cone;
+mod marked_prefix;
+mod sampling;
+
+pub(crate) use marked_prefix::MarkedPrefixes;
+pub(crate) use sampling::{sampling_passes, single_pass};

@@ -1,0 +1,149 @@
+use super::footprint::Footprint;
+use super::marked_page::MarkedPage;
+use super::window::{Local, PAGE_EDGE, Window};
+use crate::space::VoxelIndex;
+use rustc_hash::FxHashMap;
+
+/// The pages that the rays of a scan write to.
+///
+/// Inside the window around the sensor, where nearly all pages are, a page is found by one look-up in a table; outside,
+/// in a hash map.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PageMap<F> {
+    window: Window,
+    /// Number of each page of the window, plus one; 0 if there is none.
+    directory: Vec<u32>,
+    /// Number of each page outside the window.
+    far: FxHashMap<VoxelIndex, u32>,
+    pages: Vec<F>,
+    /// Index of each page: its voxels' indices divided by 64.
+    indices: Vec<VoxelIndex>,
+    /// Emptied pages of earlier scans, for reuse.
+    spare: Vec<F>,
+    /// The first so many pages may be fast; later ones are small.
+    max_fast: usize,
+}
+
+impl<F: Footprint> PageMap<F> {
+    /// Removes all pages and sets another window, in which up to `max_fast` pages may be fast; the memory is kept.
+    pub(crate) fn clear(&mut self, window: Window, max_fast: usize) {
+        self.window = window;
+        self.max_fast = max_fast;
+        self.directory.clear();
+        self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
+        self.far.clear();
+        // At most as many as the last scan had, so a scan with stray rays far away costs no memory for good.
+        self.spare.clear();
+        self.spare.extend(self.pages.drain(..).filter_map(F::cleared));
+        self.indices.clear();
+    }
+
+    /// Removes the pages from this number on and returns them with their indices.
+    pub(crate) fn take_from(&mut self, first: usize) -> Vec<(VoxelIndex, F)> {
+        let first = first.min(self.pages.len());
+        for &index in &self.indices[first..] {
+            let voxel = index.map(|k| k.wrapping_mul(PAGE_EDGE as i32));
+            match self.window.local(voxel) {
+                Some(local) => self.directory[self.window.page_of(local)] = 0,
+                None => drop(self.far.remove(&index)),
+            }
+        }
+        self.indices.drain(first..).zip(self.pages.drain(first..)).collect()
+    }
+
+    /// Number of the first small page.
+    pub(crate) fn first_small(&self) -> usize {
+        self.max_fast.min(self.pages.len())
+    }
+
+    /// Bytes of memory on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.directory.capacity() * size_of::<u32>()
+            + self.far.capacity() * 8 / 7 * (size_of::<(VoxelIndex, u32)>() + 1)
+            + (self.pages.capacity() + self.spare.capacity()) * size_of::<F>()
+            + self.pages.iter().chain(&self.spare).map(F::heap_bytes).sum::<usize>()
+            + self.indices.capacity() * size_of::<VoxelIndex>()
+    }
+
+    pub(crate) fn window(&self) -> &Window {
+        &self.window
+    }
+
+    /// The page that holds a voxel of the window.
+    #[inline]
+    pub(crate) fn at(&mut self, voxel: Local) -> &mut F {
+        let number = self.number_at(voxel);
+        &mut self.pages[number]
+    }
+
+    /// The number of the page that holds a voxel of the window.
+    #[inline]
+    pub(crate) fn number_at(&mut self, voxel: Local) -> usize {
+        match self.directory[self.window.page_of(voxel)] {
+            0 => self.new_near(voxel),
+            number => number as usize - 1,
+        }
+    }
+
+    /// The number of the page that holds a voxel, wherever it is.
+    pub(crate) fn number_of(&mut self, voxel: VoxelIndex) -> usize {
+        if let Some(local) = self.window.local(voxel) {
+            return self.number_at(local);
+        }
+        let index = voxel.map(|k| k.div_euclid(PAGE_EDGE as i32));
+        if let Some(&number) = self.far.get(&index) {
+            return number as usize;
+        }
+        let number = self.push(index);
+        self.far.insert(index, number as u32);
+        number
+    }
+
+    /// The pages, by number.
+    pub(crate) fn pages(&self) -> &[F] {
+        &self.pages
+    }
+
+    /// The pages, by number, mutably.
+    pub(crate) fn pages_mut(&mut self) -> &mut [F] {
+        &mut self.pages
+    }
+
+    /// Index of each page, by number: its voxels' indices divided by 64.
+    pub(crate) fn indices(&self) -> &[VoxelIndex] {
+        &self.indices
+    }
+
+    #[cold]
+    fn new_near(&mut self, voxel: Local) -> usize {
+        let base = self.window.base();
+        let index = |k: usize| (base[k] + voxel[k] as i32).div_euclid(PAGE_EDGE as i32);
+        let number = self.push(std::array::from_fn(index));
+        self.directory[self.window.page_of(voxel)] = self.pages.len() as u32;
+        number
+    }
+
+    fn push(&mut self, index: VoxelIndex) -> usize {
+        let new = || if self.pages.len() < self.max_fast { F::default() } else { F::sparse() };
+        let page = self.spare.pop().unwrap_or_else(new);
+        self.pages.push(page);
+        self.indices.push(index);
+        self.pages.len() - 1
+    }
+}
+
+impl PageMap<MarkedPage> {
+    /// Whether all voxels from `low` to `high`, both in the window, are marked.
+    #[inline]
+    pub(crate) fn are_marked(&self, low: Local, high: Local) -> bool {
+        let page =
+            |voxel| self.pages.get((self.directory[self.window.page_of(voxel)] as usize).wrapping_sub(1));
+        let is_one_page = (0..3).all(|k| (low[k] ^ high[k]) < PAGE_EDGE as u32);
+        if is_one_page {
+            return page(low).is_some_and(|page| page.are_marked(low, high));
+        }
+        let is_marked = |voxel| page(voxel).is_some_and(|page| page.are_marked(voxel, voxel));
+        let [x, y, z] = [0, 1, 2].map(|k| low[k]..=high[k]);
+        x.into_iter().all(|x| y.clone().all(|y| z.clone().all(|z| is_marked([x, y, z]))))
+    }
+}

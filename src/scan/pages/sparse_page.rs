@@ -1,0 +1,112 @@
+use super::window::PAGE_EDGE;
+use crate::space::{BRICK_EDGE, BRICK_VOXELS, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
+
+/// A page in which only bricks that rays write to take memory.
+///
+/// A ray goes from brick to brick without testing for their borders.
+#[derive(Clone, Debug)]
+pub(crate) struct SparsePage<B> {
+    /// The number of each brick, in Morton order, counted from 1; 0 if it is absent.
+    numbers: [u16; PAGE_BRICKS],
+    bricks: Vec<B>,
+}
+
+/// The content of a brick.
+pub(crate) trait BrickContent: Copy {
+    /// The content of a brick that no ray has written to.
+    const EMPTY: Self;
+}
+
+const PAGE_BRICKS: usize = 512;
+
+/// The part of a voxel's place in Morton order that comes from its index along an axis. Of the page's 18 bits the upper
+/// nine are the place of the brick.
+#[inline]
+pub(crate) fn part_of_place(axis: usize, index: u32) -> u32 {
+    const SPREAD: [u32; PAGE_EDGE as usize] = spread();
+    SPREAD[index as usize % PAGE_EDGE as usize] << axis
+}
+
+const fn spread() -> [u32; PAGE_EDGE as usize] {
+    let mut spread = [0; PAGE_EDGE as usize];
+    let mut index = 0;
+    while index < spread.len() {
+        let low = place_of_voxel([index as i32, 0, 0]) as u32;
+        let high = place_of_voxel([index as i32 / BRICK_EDGE, 0, 0]) as u32;
+        spread[index] = high << 9 | low;
+        index += 1;
+    }
+    spread
+}
+
+/// The place of a voxel in its page's Morton order.
+#[inline]
+pub(crate) fn place_in_page(voxel: VoxelIndex) -> u32 {
+    (0..3).fold(0, |place, axis| place | part_of_place(axis, voxel[axis] as u32))
+}
+
+/// The index of the brick at a place of a page: its voxels' indices divided by 8. `page` is the page's index, divided
+/// by 64.
+pub(crate) fn brick_in_page(page: VoxelIndex, place: u32) -> VoxelIndex {
+    let VoxelKey(local) = MortonCode(place.into()).to_key();
+    std::array::from_fn(|k| page[k] * 8 + i32::from(local[k]))
+}
+
+impl<B> Default for SparsePage<B> {
+    fn default() -> Self {
+        Self { numbers: [0; PAGE_BRICKS], bricks: Vec::new() }
+    }
+}
+
+impl<B: BrickContent> SparsePage<B> {
+    /// The brick that holds the voxel at a place; made if it is absent.
+    #[inline]
+    pub(crate) fn brick(&mut self, place: u32) -> &mut B {
+        let brick = place as usize / BRICK_VOXELS % PAGE_BRICKS;
+        let mut number = usize::from(self.numbers[brick]);
+        if number == 0 {
+            number = self.make(brick);
+        }
+        &mut self.bricks[number - 1]
+    }
+
+    /// The bricks, by number less one.
+    pub(crate) fn bricks(&self) -> &[B] {
+        &self.bricks
+    }
+
+    /// The brick at a place of the page, if it exists.
+    pub(crate) fn brick_at(&self, place: usize) -> Option<&B> {
+        self.bricks.get(usize::from(self.numbers[place]).wrapping_sub(1))
+    }
+
+    /// The places of the bricks in the page, in Morton order, with their numbers less one.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (u32, usize)> {
+        let number = |(place, number): (u32, &u16)| Some((place, usize::from(*number).checked_sub(1)?));
+        (0..).zip(&self.numbers).filter_map(number)
+    }
+
+    /// The number, less one, of the existing brick that holds the voxel at a place.
+    pub(crate) fn number_of(&self, place: u32) -> usize {
+        usize::from(self.numbers[place as usize / BRICK_VOXELS % PAGE_BRICKS]).saturating_sub(1)
+    }
+
+    /// Bytes of memory on the heap.
+    pub(crate) fn bricks_bytes(&self) -> usize {
+        self.bricks.capacity() * size_of::<B>()
+    }
+
+    /// The page without bricks; the memory is kept.
+    pub(crate) fn emptied(mut self) -> Self {
+        self.numbers.fill(0);
+        self.bricks.clear();
+        self
+    }
+
+    #[cold]
+    fn make(&mut self, brick: usize) -> usize {
+        self.bricks.push(B::EMPTY);
+        self.numbers[brick] = self.bricks.len() as u16;
+        self.bricks.len()
+    }
+}

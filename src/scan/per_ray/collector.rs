@@ -1,0 +1,281 @@
+use super::far_runs::FarRuns;
+use crate::scan::ScanReport;
+use crate::scan::pages::{CountedPage, Counts, Footprint, PageMap, Window, brick_in_page, place_in_page};
+use crate::scan::ray::SlabRay;
+use crate::scan::spill::ScanParts;
+use crate::scan::trace::{Allowance, CollectorLimit};
+use crate::scan::updates::{
+    BrickRuns, Run, ScanUpdates, TileUpdates, brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile,
+};
+use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// Collects the updates of consecutive rays, where every ray counts.
+///
+/// A voxel's updates are kept as runs: a number of misses, then a hit. That preserves their order, and the order
+/// between voxels does not matter.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PerRayCollector {
+    pages: PageMap<CountedPage>,
+    /// The runs that ended with a hit, in order.
+    ended: Vec<EndedRun>,
+    /// Updates outside the window, where memory is limited; otherwise pages have these, too.
+    far: Option<FarRuns>,
+    max_bytes: usize,
+    allowance: Allowance,
+}
+
+/// Most bytes that a ray adds per slab: three eighths of a brick of 1 KiB, and three 64ths of a page.
+const BYTES_PER_SLAB: usize = 448;
+/// Most bytes that a ray adds beside its slabs: the page and the brick that it ends in.
+const BYTES_PER_RAY: usize = 4 << 10;
+
+/// Misses, then a hit.
+#[derive(Clone, Copy, Debug)]
+struct EndedRun {
+    page: u32,
+    /// The voxel's place in the page.
+    place: u32,
+    misses: u16,
+    intensity: f32,
+}
+
+/// A brick with counts or hits.
+struct Brick<'a> {
+    counts: &'a Counts,
+    /// The runs that ended in it with a hit, in order.
+    ended: &'a [Run],
+}
+
+impl PerRayCollector {
+    /// Clears the collector and sets another window; the memory is kept. With a limit, updates outside the window are
+    /// kept by tiles of `grid`.
+    pub(crate) fn clear(&mut self, window: Window, limit: Option<(&CollectorLimit, &Grid)>) {
+        self.pages.clear(window, usize::MAX);
+        self.ended.clear();
+        self.far = limit.map(|(_, grid)| FarRuns::new(*grid));
+        self.max_bytes = limit.map_or(usize::MAX, |(limit, _)| limit.small_bytes);
+        self.allowance.grant(self.max_bytes);
+    }
+
+    /// Whether another ray may exceed the limit. The first ray never does.
+    #[inline]
+    pub(crate) fn is_full_for(&mut self, ray: &SlabRay) -> bool {
+        let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs() as usize;
+        self.allowance.is_spent_by(new_bytes) && self.look_whether_full(new_bytes)
+    }
+
+    #[cold]
+    fn look_whether_full(&mut self, new_bytes: usize) -> bool {
+        let pages: usize =
+            self.pages.pages().iter().map(|page| size_of::<CountedPage>() + page.heap_bytes()).sum();
+        let far = self.far.as_ref().map_or(0, FarRuns::bytes);
+        let bytes = pages + far + self.ended.len() * size_of::<EndedRun>();
+        let left = self.max_bytes.saturating_sub(bytes);
+        // Otherwise the next ray would measure again.
+        self.allowance.grant(left);
+        bytes > 0 && left < new_bytes.max(self.max_bytes / 8)
+    }
+
+    /// Bytes of memory on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        let far = self.far.as_ref().map_or(0, FarRuns::bytes);
+        self.pages.bytes() + self.ended.capacity() * size_of::<EndedRun>() + far
+    }
+
+    /// A ray passes all voxels before its last. Takes at most [`MAX_RAYS`](crate::scan::pages::MAX_RAYS) rays.
+    pub(crate) fn pass(&mut self, ray: &SlabRay) {
+        let Self { pages, far: Some(far), .. } = self else {
+            let mut far = Vec::new();
+            ray.pass(&mut self.pages, 0, false, |voxel| far.push(voxel));
+            for voxel in far {
+                let page = self.pages.number_of(voxel);
+                *self.pages.pages_mut()[page].count(place_in_page(voxel)) += 1;
+            }
+            return;
+        };
+        ray.pass(pages, 0, false, |voxel| far.pass(voxel));
+    }
+
+    /// A ray ends in a voxel, with an intensity if the sensor model needs one.
+    pub(crate) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
+        if let Some(far) = &mut self.far
+            && self.pages.window().local(voxel).is_none()
+        {
+            return far.hit(voxel, intensity);
+        }
+        let (page, place) = (self.pages.number_of(voxel), place_in_page(voxel));
+        let misses = std::mem::take(self.pages.pages_mut()[page].count(place));
+        self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
+    }
+
+    /// Number of hits and of misses.
+    fn hits_and_misses(&self) -> (u64, u64) {
+        // Fits: at most 2^16 times 2^9.
+        let of_brick =
+            |counts: &Counts| u64::from(counts.iter().map(|&misses| u32::from(misses)).sum::<u32>());
+        let passed = self.pages.pages().iter().flat_map(CountedPage::bricks).map(of_brick);
+        let ended = self.ended.iter().map(|run| u64::from(run.misses));
+        (self.ended.len() as u64, passed.sum::<u64>() + ended.sum::<u64>())
+    }
+
+    /// The updates by tile. Bricks across a tile border are split.
+    fn runs_by_tile(&self, grid: &Grid) -> Vec<(TileIndex, Vec<BrickRuns>)> {
+        let (bricks, indices) = self.bricks();
+        let ended = self.ended_by_brick(&bricks);
+        let runs_of_tile = |(tile, numbers): (TileIndex, Vec<u32>)| {
+            let mut scratch = [NO_RUN; BRICK_VOXELS];
+            let runs_of_brick = |number: u32| {
+                let index = indices[number as usize];
+                let brick = Brick { counts: bricks[number as usize], ended: ended.of_brick(number) };
+                let runs = brick.runs(&part_in_tile(grid, tile, index), &mut scratch);
+                (!runs.is_empty()).then(|| BrickRuns { brick: brick_code(index), runs })
+            };
+            (tile, numbers.into_iter().filter_map(runs_of_brick).collect())
+        };
+        bricks_by_tile(grid, &indices).into_par_iter().map(runs_of_tile).collect()
+    }
+
+    /// The bricks of all pages, page by page, and their indices: their voxels' indices divided by 8.
+    fn bricks(&self) -> (Vec<&Counts>, Vec<VoxelIndex>) {
+        let bricks: Vec<&Counts> = self.pages.pages().iter().flat_map(CountedPage::bricks).collect();
+        let mut indices = Vec::with_capacity(bricks.len());
+        for (page, &index) in self.pages.pages().iter().zip(self.pages.indices()) {
+            let first = indices.len();
+            indices.resize(first + page.bricks().len(), index);
+            page.places().for_each(|(place, brick)| indices[first + brick] = brick_in_page(index, place));
+        }
+        (bricks, indices)
+    }
+
+    /// The runs that ended with a hit, by brick: a counting sort in two passes.
+    fn ended_by_brick(&self, bricks: &[&Counts]) -> EndedByBrick {
+        let mut first_of_page = Vec::with_capacity(self.pages.pages().len());
+        let mut first = 0;
+        for page in self.pages.pages() {
+            first_of_page.push(first);
+            first += page.bricks().len();
+        }
+        let brick_of = |run: &EndedRun| {
+            let page = run.page as usize;
+            first_of_page[page] + self.pages.pages()[page].number_of(run.place)
+        };
+        let mut ends = vec![0_u32; bricks.len() + 1];
+        self.ended.iter().for_each(|run| ends[brick_of(run) + 1] += 1);
+        (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
+        let mut runs = vec![NO_RUN; self.ended.len()];
+        for run in &self.ended {
+            // The start of the brick's runs advances to their end.
+            let next = &mut ends[brick_of(run)];
+            runs[*next as usize] = run.run();
+            *next += 1;
+        }
+        EndedByBrick { runs, ends }
+    }
+}
+
+/// The runs that ended with a hit, brick by brick; those of a brick in the order of the rays.
+struct EndedByBrick {
+    runs: Vec<Run>,
+    /// Where each brick's runs end.
+    ends: Vec<u32>,
+}
+
+impl EndedByBrick {
+    fn of_brick(&self, number: u32) -> &[Run] {
+        let number = number as usize;
+        let start = number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.runs[start as usize..self.ends[number] as usize]
+    }
+}
+
+const NO_RUN: Run = Run { place: 0, misses: 0, hit: None };
+
+impl EndedRun {
+    fn run(&self) -> Run {
+        let place = (self.place as usize % BRICK_VOXELS) as u16;
+        Run { place, misses: self.misses, hit: Some(self.intensity) }
+    }
+}
+
+impl Brick<'_> {
+    /// The runs of the voxels of a mask.
+    fn runs(&self, part: &BrickMask, scratch: &mut [Run; BRICK_VOXELS]) -> Box<[Run]> {
+        let count = self.passed(part, scratch);
+        let passed = &scratch[..count];
+        if self.ended.is_empty() {
+            return passed.into();
+        }
+        let mut runs: Vec<Run> = Vec::with_capacity(self.ended.len() + count);
+        runs.extend(self.ended.iter().filter(|run| is_in(part, run.place)));
+        // Both sorts are stable: a voxel's runs stay in order, and the misses after its last hit come last.
+        runs.sort_by_key(|run| run.place);
+        runs.extend_from_slice(passed);
+        runs.sort_by_key(|run| run.place);
+        runs.into()
+    }
+
+    /// Writes the misses since each voxel's last hit, if any, to `runs`; returns the number of voxels with some.
+    fn passed(&self, part: &BrickMask, runs: &mut [Run; BRICK_VOXELS]) -> usize {
+        let mut count = 0;
+        // Most voxels were not passed, so eight at a time are skipped.
+        for (chunk, first) in self.counts.chunks_exact(8).zip((0..).step_by(8)) {
+            if chunk.iter().fold(0, |any, misses| any | misses) == 0 {
+                continue;
+            }
+            // Without a branch: it would be unpredictable.
+            for (&misses, place) in chunk.iter().zip(first..) {
+                runs[count] = Run { place, misses, hit: None };
+                count += usize::from(misses > 0 && is_in(part, place));
+            }
+        }
+        count
+    }
+}
+
+fn is_in(mask: &BrickMask, place: u16) -> bool {
+    mask[usize::from(place) / 64] >> (place % 64) & 1 == 1
+}
+
+/// Moves the updates of several collectors to `parts`; the first collector saw the first rays.
+pub(crate) fn drain_in_order(grid: &Grid, collectors: &mut [PerRayCollector], parts: &ScanParts<'_>) {
+    for collector in collectors {
+        for (tile, bricks) in collector.runs_by_tile(grid) {
+            let runs = || bricks.iter().flat_map(|brick| &brick.runs);
+            let hits = runs().filter(|run| run.hit.is_some()).count() as u64;
+            let misses = runs().map(|run| u64::from(run.misses)).sum();
+            if hits + misses > 0 {
+                parts.add(std::iter::once((tile, TileUpdates::Runs(bricks), (hits, misses))));
+            }
+        }
+        if let Some(far) = &mut collector.far {
+            parts.add(far.take());
+        }
+    }
+}
+
+/// The updates of several collectors; the first collector saw the first rays.
+pub(crate) fn updates_in_order(
+    grid: &Grid,
+    collectors: &mut [PerRayCollector],
+    mut report: ScanReport,
+) -> ScanUpdates {
+    let mut tiles: FxHashMap<TileIndex, Vec<BrickRuns>> = FxHashMap::default();
+    for collector in collectors {
+        let (hits, misses) = collector.hits_and_misses();
+        report.hits += hits;
+        report.misses += misses;
+        for (tile, runs) in collector.runs_by_tile(grid) {
+            if !runs.is_empty() {
+                tiles.entry(tile).or_default().extend(runs);
+            }
+        }
+    }
+    let in_order = |(tile, mut bricks): (TileIndex, Vec<BrickRuns>)| {
+        // Stable: for the same brick, runs of earlier rays come first.
+        bricks.sort_by_key(|runs| runs.brick);
+        (tile, TileUpdates::Runs(bricks))
+    };
+    in_order_of_tiles(grid, tiles.into_iter().map(in_order).collect(), report)
+}

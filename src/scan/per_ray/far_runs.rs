@@ -1,0 +1,89 @@
+use crate::scan::PackedUpdates;
+use crate::scan::updates::{BrickRuns, Run, TileUpdates, brick_code};
+use crate::space::{BRICK_EDGE, Grid, TileIndex, VoxelIndex, place_of_voxel};
+
+/// Updates of consecutive rays outside the window, where every ray counts: packed, tile after tile as each ray reaches
+/// them.
+#[derive(Clone, Debug)]
+pub(crate) struct FarRuns {
+    grid: Grid,
+    /// The tile that the present ray is in, and its updates there.
+    tile: Option<TileIndex>,
+    bricks: Vec<BrickOfRay>,
+    hits: u64,
+    misses: u64,
+    done: Vec<Done>,
+    bytes: usize,
+}
+
+#[derive(Clone, Debug)]
+struct BrickOfRay {
+    index: VoxelIndex,
+    runs: Vec<Run>,
+}
+
+/// The updates of a ray in one tile, with the numbers of hits and misses.
+type Done = (TileIndex, PackedUpdates, (u64, u64));
+
+impl FarRuns {
+    pub(crate) fn new(grid: Grid) -> Self {
+        Self { grid, tile: None, bricks: Vec::new(), hits: 0, misses: 0, done: Vec::new(), bytes: 0 }
+    }
+
+    /// A ray passes a voxel.
+    #[inline]
+    pub(crate) fn pass(&mut self, voxel: VoxelIndex) {
+        self.push(voxel, Run { place: place_of_voxel(voxel) as u16, misses: 1, hit: None });
+        self.misses += 1;
+    }
+
+    /// A ray ends in a voxel.
+    pub(crate) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
+        self.push(voxel, Run { place: place_of_voxel(voxel) as u16, misses: 0, hit: Some(intensity) });
+        self.hits += 1;
+        // The next ray may cross the same voxels again.
+        self.end_tile();
+    }
+
+    fn push(&mut self, voxel: VoxelIndex, run: Run) {
+        let tile = self.grid.tile_of_voxel(voxel);
+        if self.tile != Some(tile) {
+            self.end_tile();
+            self.tile = Some(tile);
+        }
+        let index = voxel.map(|k| k.div_euclid(BRICK_EDGE));
+        match self.bricks.last_mut() {
+            Some(brick) if brick.index == index => brick.runs.push(run),
+            _ => self.bricks.push(BrickOfRay { index, runs: vec![run] }),
+        }
+    }
+
+    fn end_tile(&mut self) {
+        let Some(tile) = self.tile.take() else { return };
+        let in_order = |BrickOfRay { index, mut runs }: BrickOfRay| {
+            // Stable: a voxel's runs stay in order.
+            runs.sort_by_key(|run| run.place);
+            BrickRuns { brick: brick_code(index), runs: runs.into() }
+        };
+        let mut bricks: Vec<BrickRuns> = self.bricks.drain(..).map(in_order).collect();
+        bricks.sort_by_key(|runs| runs.brick);
+        let mut packed = PackedUpdates::of(&TileUpdates::Runs(bricks));
+        packed.shrink();
+        self.bytes += packed.bytes() + 2 * size_of::<Done>();
+        let counts = (std::mem::take(&mut self.hits), std::mem::take(&mut self.misses));
+        self.done.push((tile, packed, counts));
+    }
+
+    /// Removes and returns all updates.
+    pub(crate) fn take(&mut self) -> impl Iterator<Item = (TileIndex, TileUpdates, (u64, u64))> + use<> {
+        self.end_tile();
+        self.bytes = 0;
+        let done = std::mem::take(&mut self.done).into_iter();
+        done.map(|(tile, packed, counts)| (tile, TileUpdates::Packed(packed), counts))
+    }
+
+    /// Bytes of memory on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
+    }
+}

@@ -1,0 +1,155 @@
+use crate::scan::pages::MarkedBrick;
+use crate::scan::updates::{BrickUpdate, brick_code, bricks_by_tile, part_in_tile};
+use crate::space::{BRICK_EDGE, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, VoxelKey, places};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// The largest intensity of every hit voxel; empty for sensor models that need none.
+pub(crate) type Intensities = FxHashMap<VoxelIndex, f32>;
+
+/// The updates of marked bricks by tile, in Morton order. Bricks across a tile border are split.
+pub(crate) fn updates_by_tile(
+    grid: &Grid,
+    bricks: &[MarkedBrick],
+    intensities: &Intensities,
+) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
+    let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
+    let updates = bricks_by_tile(grid, &indices)
+        .into_par_iter()
+        .map(|(tile, numbers)| (tile, updates_of_tile(grid, tile, bricks, &numbers, intensities)));
+    let mut tiles: Vec<(TileIndex, Vec<BrickUpdate>)> = updates.collect();
+    tiles.retain(|(_, bricks)| !bricks.is_empty());
+    tiles
+}
+
+fn updates_of_tile(
+    grid: &Grid,
+    tile: TileIndex,
+    bricks: &[MarkedBrick],
+    numbers: &[u32],
+    intensities: &Intensities,
+) -> Vec<BrickUpdate> {
+    let update = |&number: &u32| {
+        let MarkedBrick { index, mut hits, passed: mut misses } = bricks[number as usize];
+        let part = part_in_tile(grid, tile, index);
+        for word in 0..8 {
+            hits[word] &= part[word];
+            misses[word] &= part[word] & !hits[word];
+        }
+        let is_empty = hits == [0; 8] && misses == [0; 8];
+        let intensities = || intensities_of(index, &hits, intensities);
+        (!is_empty).then(|| BrickUpdate {
+            brick: brick_code(index),
+            hits,
+            misses,
+            intensities: intensities(),
+        })
+    };
+    numbers.iter().filter_map(update).collect()
+}
+
+/// The intensities of the given hits of a brick, in the order of the mask.
+fn intensities_of(brick: VoxelIndex, hits: &BrickMask, intensities: &Intensities) -> Box<[f32]> {
+    if intensities.is_empty() {
+        return Box::default();
+    }
+    let intensity = |place| {
+        let VoxelKey(local) = MortonCode(place as u64).to_key();
+        let voxel = std::array::from_fn(|k| brick[k] * BRICK_EDGE + i32::from(local[k]));
+        intensities.get(&voxel).copied().unwrap_or_default()
+    };
+    places(*hits).map(intensity).collect()
+}
+
+/// Number of hits and of misses.
+pub(crate) fn hits_and_misses(bricks: &[BrickUpdate]) -> (u64, u64) {
+    let ones = |mask: &BrickMask| mask.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
+    bricks
+        .iter()
+        .fold((0, 0), |(hits, misses), brick| (hits + ones(&brick.hits), misses + ones(&brick.misses)))
+}
+
+/// Merges two parts of one scan for a tile: each voxel once, a hit over any miss, and the largest intensity of its
+/// hits. Both parts are in Morton order with each brick once; so is the result.
+pub(crate) fn merge_bricks(a: Vec<BrickUpdate>, b: Vec<BrickUpdate>) -> Vec<BrickUpdate> {
+    let mut all = Vec::with_capacity(a.len() + b.len());
+    let (mut a, mut b) = (a.into_iter().peekable(), b.into_iter().peekable());
+    while let (Some(first), Some(second)) = (a.peek(), b.peek()) {
+        let order = first.brick.cmp(&second.brick);
+        let first = if order.is_le() { a.next() } else { None };
+        let second = if order.is_ge() { b.next() } else { None };
+        all.extend(match (first, second) {
+            (Some(first), Some(second)) => Some(merge_brick(&first, &second)),
+            (first, second) => first.or(second),
+        });
+    }
+    all.extend(a.chain(b));
+    all
+}
+
+fn merge_brick(a: &BrickUpdate, b: &BrickUpdate) -> BrickUpdate {
+    let hits: BrickMask = std::array::from_fn(|word| a.hits[word] | b.hits[word]);
+    let misses = std::array::from_fn(|word| (a.misses[word] | b.misses[word]) & !hits[word]);
+    let has_intensities = !(a.intensities.is_empty() && b.intensities.is_empty());
+    let of = |brick: &BrickUpdate| places(brick.hits).zip(brick.intensities.to_vec()).collect::<Vec<_>>();
+    let (mut of_a, mut of_b) = (of(a).into_iter().peekable(), of(b).into_iter().peekable());
+    let largest = |place: usize| {
+        let a = of_a.next_if(|&(at, _)| at == place).map(|(_, intensity)| intensity);
+        let b = of_b.next_if(|&(at, _)| at == place).map(|(_, intensity)| intensity);
+        a.into_iter().chain(b).max_by(f32::total_cmp).unwrap_or_default()
+    };
+    let intensities = if has_intensities { places(hits).map(largest).collect() } else { Box::default() };
+    BrickUpdate { brick: a.brick, hits, misses, intensities }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::BrickCode;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    /// For each voxel a miss (`None`) or a hit's intensity.
+    type Naive = BTreeMap<(u64, usize), Option<f32>>;
+
+    fn naive(parts: &[&[BrickUpdate]]) -> Naive {
+        let mut voxels = Naive::new();
+        for brick in parts.iter().copied().flatten() {
+            let misses = places(brick.misses).map(|place| (place, None));
+            let hits = places(brick.hits).zip(brick.intensities.iter().copied().map(Some));
+            for (place, said) in misses.chain(hits) {
+                let known = voxels.entry((brick.brick.0, place)).or_insert(said);
+                if said.map_or(f32::MIN, |i| i) > known.map_or(f32::MIN, |i| i) {
+                    *known = said;
+                }
+            }
+        }
+        voxels
+    }
+
+    fn part() -> impl Strategy<Value = Vec<BrickUpdate>> {
+        let brick = (0..6_u64, any::<[u64; 8]>(), any::<[u64; 8]>(), 0..1000_u32);
+        prop::collection::vec(brick, 0..5).prop_map(|bricks| {
+            let bricks: BTreeMap<u64, _> =
+                bricks.into_iter().map(|(code, h, p, i)| (code, (h, p, i))).collect();
+            let brick = |(code, (h, p, i)): (u64, ([u64; 8], [u64; 8], u32))| {
+                let hits: BrickMask =
+                    std::array::from_fn(|word| h[word] & h[(word + 1) % 8] & p[(word + 3) % 8]);
+                let misses = std::array::from_fn(|word| p[word] & !hits[word]);
+                let intensities = places(hits).map(|place| ((place as u32 * 7 + i) % 50) as f32).collect();
+                BrickUpdate { brick: BrickCode(code), hits, misses, intensities }
+            };
+            bricks.into_iter().map(brick).collect()
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn parts_together_say_what_the_whole_scan_says(a in part(), b in part()) {
+            let expected = naive(&[&a, &b]);
+            let united = merge_bricks(a, b);
+            prop_assert!(united.is_sorted_by(|a, b| a.brick < b.brick));
+            prop_assert_eq!(naive(&[&united]), expected);
+        }
+    }
+}

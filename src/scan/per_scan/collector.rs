@@ -1,0 +1,309 @@
+use super::bricks::{Intensities, hits_and_misses, updates_by_tile};
+use super::far_bricks::FarBricks;
+use crate::scan::ScanReport;
+use crate::scan::coherence::MarkedPrefixes;
+use crate::scan::pages::{Footprint, MarkedBrick, MarkedPage, PAGE_EDGE, PageMap, Window};
+use crate::scan::ray::{RayEnd, RayOrigin, SlabRay};
+use crate::scan::spill::ScanParts;
+use crate::scan::trace::{Allowance, CollectorLimit};
+use crate::scan::updates::{ScanUpdates, TileUpdates, in_order_of_tiles};
+use crate::space::{Grid, VoxelIndex};
+use rayon::prelude::*;
+
+/// Most rays per call of [`PerScanCollector::take`].
+pub(crate) const BATCH: usize = 256;
+
+/// Collects the updates of one scan, one per voxel: a hit over any miss, and the largest intensity of its hits.
+///
+/// If memory is short, only the first pages are fast; the marks in others are drained to [`ScanParts`] when they exceed
+/// the limit.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PerScanCollector {
+    pages: PageMap<MarkedPage>,
+    prefixes: MarkedPrefixes,
+    /// Bricks outside the window.
+    far: FarBricks,
+    intensities: Intensities,
+    max_small_bytes: usize,
+    allowance: Allowance,
+}
+
+/// Most bytes that a ray adds per slab: three eighths of a brick of 64 bytes in a list that may be half empty, and
+/// three 64ths of a page.
+const BYTES_PER_SLAB: usize = 128;
+/// Most bytes that a ray adds beside its slabs: the page and the brick that it ends in.
+const BYTES_PER_RAY: usize = 4 << 10;
+
+impl PerScanCollector {
+    /// Clears the collector and sets another window; the memory is kept.
+    pub(crate) fn clear(&mut self, window: Window, limit: &CollectorLimit) {
+        self.pages.clear(window, limit.fast_pages);
+        self.prefixes.clear();
+        self.far.clear();
+        self.intensities.clear();
+        self.max_small_bytes = limit.small_bytes;
+        self.allowance.grant(limit.small_bytes);
+    }
+
+    /// Bytes of memory on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.pages.bytes() + self.prefixes.bytes() + self.far.bytes() + self.intensities_bytes()
+    }
+
+    fn intensities_bytes(&self) -> usize {
+        self.intensities.capacity() * 8 / 7 * (size_of::<(VoxelIndex, f32)>() + 1)
+    }
+
+    /// Bytes of the marks alone.
+    pub(crate) fn marks_bytes(&self) -> usize {
+        self.pages.pages().iter().map(MarkedPage::heap_bytes).sum::<usize>() + self.far.bytes()
+    }
+
+    /// Number of bricks with marks.
+    pub(crate) fn count_bricks(&self) -> usize {
+        self.pages.pages().iter().map(MarkedPage::count_bricks).sum::<usize>() + self.far.len()
+    }
+
+    /// Takes at most [`BATCH`] rays from one origin: their hits, and the voxels before their last. What exceeds the
+    /// limit, if there is one, goes to `parts`.
+    pub(crate) fn take(
+        &mut self,
+        origin: &RayOrigin,
+        ends: &[RayEnd],
+        needs_intensity: bool,
+        parts: Option<&ScanParts<'_>>,
+    ) {
+        for end in ends {
+            if let Some(intensity) = end.hit {
+                self.hit(end.voxel, needs_intensity.then_some(intensity));
+            }
+        }
+        // Selects the rays that are left to walk, without a branch: it would be unpredictable.
+        let (mut left, mut count) = ([(0, 0); BATCH], 0);
+        for (number, &end) in ends.iter().enumerate() {
+            let slabs = self.prefixes.of(&SlabRay::new(origin, end));
+            left[count % BATCH] = (number, slabs.unwrap_or(0));
+            count += usize::from(slabs.is_some());
+        }
+        for &(number, slabs) in &left[..count] {
+            let end = ends[number];
+            let ray = SlabRay::new(origin, end);
+            if let Some(parts) = parts {
+                let new_bytes =
+                    BYTES_PER_RAY + BYTES_PER_SLAB * (ray.slabs() - slabs.min(ray.slabs())) as usize;
+                if self.allowance.is_spent_by(new_bytes) {
+                    self.keep_to_limit(new_bytes, parts);
+                }
+            }
+            let Self { pages, far, intensities, max_small_bytes, .. } = self;
+            ray.pass(pages, slabs, end.hit.is_some(), |voxel| {
+                far.pass(voxel);
+                if let Some(parts) = parts
+                    && far.bytes() > *max_small_bytes / 2
+                {
+                    parts.add_marked(far.take().into_iter(), intensities);
+                }
+            });
+        }
+    }
+
+    /// Lets later rays skip what is marked so far; see [`MarkedPrefixes::extend`] for `edges`.
+    pub(crate) fn extend_prefixes(&mut self, origin: &RayOrigin, edges: &[usize]) {
+        self.prefixes.extend(&self.pages, origin, edges);
+    }
+
+    fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
+        match self.pages.window().local(voxel) {
+            Some(near) => self.pages.at(near).hit(voxel),
+            None => self.far.hit(voxel),
+        }
+        if let Some(intensity) = intensity {
+            keep_largest(&mut self.intensities, voxel, intensity);
+        }
+    }
+
+    /// Makes room for so many bytes: drains the small pages to `parts`, and if need be all pages.
+    #[cold]
+    fn keep_to_limit(&mut self, new_bytes: usize, parts: &ScanParts<'_>) {
+        let first_small = self.pages.first_small();
+        let pages_bytes: usize = self.pages.pages()[first_small..]
+            .iter()
+            .map(|page| size_of::<MarkedPage>() + page.heap_bytes())
+            .sum();
+        let bytes = pages_bytes + self.far.bytes() + self.intensities_bytes();
+        // Otherwise the next ray would measure again.
+        let least = new_bytes.max(self.max_small_bytes / 8);
+        if bytes + least <= self.max_small_bytes {
+            return self.allowance.grant(self.max_small_bytes - bytes);
+        }
+        let first = if self.intensities_bytes() > self.max_small_bytes / 4 { 0 } else { first_small };
+        self.drain_from(first, parts);
+        self.allowance.grant(self.max_small_bytes - self.intensities_bytes().min(self.max_small_bytes));
+    }
+
+    /// Drains the pages from this number on, and all marks outside the window. Marked prefixes stay valid.
+    fn drain_from(&mut self, first: usize, parts: &ScanParts<'_>) {
+        let mut pages = self.pages.take_from(first);
+        pages.sort_unstable_by_key(|(index, _)| *index);
+        let bricks = pages.iter().flat_map(|(index, page)| page.bricks(*index));
+        parts.add_marked(bricks, &self.intensities);
+        parts.add_marked(self.far.take().into_iter(), &self.intensities);
+        if first == 0 {
+            self.intensities = Intensities::default();
+        }
+    }
+
+    /// Drains everything.
+    pub(crate) fn finish(&mut self, parts: &ScanParts<'_>) {
+        self.drain_from(0, parts);
+    }
+
+    /// Adds the marks of another collector with the same window.
+    pub(crate) fn absorb(&mut self, other: &Self) {
+        for (page, index) in other.pages.pages().iter().zip(other.pages.indices()) {
+            let number = self.pages.number_of(index.map(|k| k * PAGE_EDGE as i32));
+            self.pages.pages_mut()[number].absorb(page);
+        }
+        self.far.absorb(&other.far);
+        for (&voxel, &intensity) in &other.intensities {
+            keep_largest(&mut self.intensities, voxel, intensity);
+        }
+    }
+
+    /// The updates. Bricks across a tile border are split.
+    pub(crate) fn updates(&mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
+        let pages = self.pages.pages().par_iter().zip(self.pages.indices());
+        let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
+        bricks.extend(self.far.take());
+        let tiles = updates_by_tile(grid, &bricks, &self.intensities);
+        for (_, bricks) in &tiles {
+            let (hits, misses) = hits_and_misses(bricks);
+            report.hits += hits;
+            report.misses += misses;
+        }
+        let tiles = tiles.into_iter().map(|(tile, bricks)| (tile, TileUpdates::Masks(bricks))).collect();
+        in_order_of_tiles(grid, tiles, report)
+    }
+}
+
+fn keep_largest(intensities: &mut Intensities, voxel: VoxelIndex, intensity: f32) {
+    let largest = intensities.entry(voxel).or_insert(intensity);
+    if intensity.total_cmp(largest).is_gt() {
+        *largest = intensity;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::{BRICK_EDGE, BrickMask, Point};
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn end(point: Point, hit: bool) -> RayEnd {
+        RayEnd { point, voxel: point.map(|x| x.floor() as i32), hit: hit.then_some(0.0) }
+    }
+
+    /// Ends of rays in all directions of a part of a sphere, near and far as over a rough surface.
+    fn ends_of_rays(origin: Point, rays: usize, reach: f64, roughness: f64, opening: f64) -> Vec<RayEnd> {
+        let ray = |k: usize| {
+            let (azimuth, up) =
+                (k as f64 * 2.399_963, opening * (2.0 * (k as f64 + 0.5) / rays as f64 - 1.0));
+            let reach = reach * (1.0 + roughness * ((3.0 * azimuth).sin() + (7.0 * up).cos()));
+            let flat = (1.0 - up * up).sqrt() * reach;
+            let point =
+                [origin[0] + flat * azimuth.cos(), origin[1] + flat * azimuth.sin(), origin[2] + up * reach];
+            end(point, !k.is_multiple_of(11))
+        };
+        (0..rays).map(ray).collect()
+    }
+
+    /// Voxels that are hit, and voxels that are only passed.
+    type Marks = [BTreeSet<VoxelIndex>; 2];
+
+    fn walked(origin: &RayOrigin, ends: &[RayEnd]) -> Marks {
+        let [mut hits, mut passed] = Marks::default();
+        for &end in ends {
+            SlabRay::new(origin, end).walk().for_each_before_end(|voxel| {
+                passed.insert(voxel);
+            });
+            hits.extend(end.hit.map(|_| end.voxel));
+        }
+        let missed = passed.difference(&hits).copied().collect();
+        [hits, missed]
+    }
+
+    fn collected(collector: &PerScanCollector) -> Marks {
+        let mut marks = Marks::default();
+        for (page, index) in collector.pages.pages().iter().zip(collector.pages.indices()) {
+            for brick in page.bricks(*index) {
+                for place in 0..512_usize {
+                    let voxel = std::array::from_fn(|axis| {
+                        let bit = |level: usize| (place >> (3 * level + axis) & 1) << level;
+                        brick.index[axis] * BRICK_EDGE + (bit(0) | bit(1) | bit(2)) as i32
+                    });
+                    let is_set = |mask: &BrickMask| mask[place / 64] >> (place % 64) & 1 != 0;
+                    match (is_set(&brick.hits), is_set(&brick.passed)) {
+                        (true, _) => marks[0].insert(voxel),
+                        (false, true) => marks[1].insert(voxel),
+                        (false, false) => false,
+                    };
+                }
+            }
+        }
+        marks
+    }
+
+    #[test]
+    fn rays_to_the_far_end_of_the_window_leave_the_marks_of_whole_rays() {
+        let origin = [12.3, -45.6, 7.75];
+        let ends = ends_of_rays(origin, 80, 5_000.0, 0.25, 0.005);
+        let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
+        let mut collector = PerScanCollector::default();
+        let far = 8_000.0;
+        let bounds = (origin.point.map(|x| x - far), origin.point.map(|x| x + far));
+        let [(low_x, high_x), (low_y, high_y)] = [0, 1].map(|k| (bounds.0[k], bounds.1[k]));
+        let window = Window::around(origin.voxel, ([low_x, low_y, -50.0], [high_x, high_y, 50.0]));
+        assert!(window.pages()[0] > 240 && window.pages()[1] > 240);
+        collector.clear(window, &CollectorLimit::NONE);
+        collector.take(origin, &ends, false, None);
+        assert!(collector.far.is_empty());
+        assert!(collected(&collector) == walked(origin, &ends));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn rays_that_begin_after_what_is_shared_leave_the_marks_of_whole_rays(
+            origin in prop::array::uniform3(-100.0..100.0_f64),
+            is_on_border in prop::array::uniform3(prop::bool::ANY),
+            reach in 3.0..40.0_f64,
+            roughness in prop::sample::select(vec![0.0, 0.1, 0.4]),
+            opening in prop::sample::select(vec![1.0, 0.2]),
+        ) {
+            let origin: Point =
+                std::array::from_fn(|k| if is_on_border[k] { origin[k].floor() } else { origin[k] });
+            let ends = ends_of_rays(origin, 6000, reach, roughness, opening);
+            let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
+            let mut collector = PerScanCollector::default();
+            let window = Window::around(origin.voxel, (
+                origin.point.map(|x| x - 2.0 * reach),
+                origin.point.map(|x| x + 2.0 * reach),
+            ));
+            collector.clear(window, &CollectorLimit::NONE);
+            let mut shared = 0;
+            for round in 0..8 {
+                let part: Vec<RayEnd> = ends.iter().skip(round).step_by(8).copied().collect();
+                shared += part
+                    .iter()
+                    .filter(|end| collector.prefixes.of(&SlabRay::new(origin, **end)) != Some(0))
+                    .count();
+                part.chunks(BATCH).for_each(|batch| collector.take(origin, batch, false, None));
+                collector.extend_prefixes(origin, &[8, 4, 2, 1]);
+            }
+            prop_assert_eq!(collected(&collector), walked(origin, &ends));
+            prop_assert!(shared > 100, "only {} rays were spared something", shared);
+        }
+    }
+}

@@ -1,0 +1,91 @@
+use crate::scan::pages::MarkedBrick;
+use crate::space::{BRICK_EDGE, VoxelIndex, place_of_voxel};
+use rustc_hash::FxHashMap;
+
+/// Marks outside the window, brick by brick: a page for the few voxels of a stray ray would be too large.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FarBricks {
+    bricks: FxHashMap<VoxelIndex, MarkedBrick>,
+    /// The brick that the present ray is in; not in `bricks` yet.
+    latest: Option<MarkedBrick>,
+}
+
+impl FarBricks {
+    /// A ray passes a voxel.
+    #[inline]
+    pub(crate) fn pass(&mut self, voxel: VoxelIndex) {
+        let (word, bit) = bit_of(voxel);
+        self.brick(voxel).passed[word] |= bit;
+    }
+
+    /// A ray ends in a voxel.
+    pub(crate) fn hit(&mut self, voxel: VoxelIndex) {
+        let (word, bit) = bit_of(voxel);
+        self.brick(voxel).hits[word] |= bit;
+    }
+
+    #[inline]
+    fn brick(&mut self, voxel: VoxelIndex) -> &mut MarkedBrick {
+        let index = voxel.map(|k| k.div_euclid(BRICK_EDGE));
+        if self.latest.is_none_or(|latest| latest.index != index) {
+            self.put_latest_in();
+        }
+        self.latest.get_or_insert(MarkedBrick { index, hits: [0; 8], passed: [0; 8] })
+    }
+
+    fn put_latest_in(&mut self) {
+        if let Some(latest) = self.latest.take() {
+            self.absorb_brick(&latest);
+        }
+    }
+
+    fn absorb_brick(&mut self, other: &MarkedBrick) {
+        let empty = MarkedBrick { hits: [0; 8], passed: [0; 8], ..*other };
+        let mine = self.bricks.entry(other.index).or_insert(empty);
+        for word in 0..8 {
+            mine.hits[word] |= other.hits[word];
+            mine.passed[word] |= other.passed[word];
+        }
+    }
+
+    /// Adds the marks of others.
+    pub(crate) fn absorb(&mut self, others: &Self) {
+        others.iter().for_each(|other| self.absorb_brick(other));
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &MarkedBrick> {
+        self.bricks.values().chain(&self.latest)
+    }
+
+    /// Removes and returns the bricks, each once.
+    pub(crate) fn take(&mut self) -> Vec<MarkedBrick> {
+        self.put_latest_in();
+        std::mem::take(&mut self.bricks).into_values().collect()
+    }
+
+    /// Removes all bricks.
+    pub(crate) fn clear(&mut self) {
+        self.bricks.clear();
+        self.latest = None;
+    }
+
+    #[cfg(test)]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.iter().next().is_none()
+    }
+
+    /// Number of bricks; the last ray's brick may count twice.
+    pub(crate) fn len(&self) -> usize {
+        self.bricks.len() + usize::from(self.latest.is_some())
+    }
+
+    /// Bytes of memory on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.bricks.capacity() * 8 / 7 * (size_of::<(VoxelIndex, MarkedBrick)>() + 1)
+    }
+}
+
+fn bit_of(voxel: VoxelIndex) -> (usize, u64) {
+    let place = place_of_voxel(voxel);
+    (place / 64, 1 << (place % 64))
+}

@@ -1,0 +1,10 @@
+//! Insertion per scan, as in OctoMap's `insertPointCloud`: a scan updates a voxel once, and a hit wins over any miss.
+//!
+//! So rays only mark voxels, in any order and on any number of threads.
+
+mod bricks;
+mod collector;
+mod far_bricks;
+
+pub(crate) use bricks::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
+pub(crate) use collector::{BATCH, PerScanCollector};

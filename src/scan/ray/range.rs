@@ -1,0 +1,107 @@
+use crate::config::RayConfig;
+use crate::scan::SkippedPoints;
+use crate::space::Point;
+
+/// Outcome of the range rule for a point.
+pub(crate) enum Ranged {
+    /// A ray to the point, which is a hit.
+    Hit(Point),
+    /// A ray to where the max range cuts it; nothing is hit.
+    Cut(Point),
+    /// The point is ignored.
+    Skipped,
+}
+
+/// The range rule for points seen from one origin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RangeRule {
+    /// In metres.
+    origin: Point,
+    min_range_m: f64,
+    max_range_m: Option<f64>,
+    /// Squared distances between which a point is certainly a hit.
+    certain_m2: [f64; 2],
+}
+
+impl RangeRule {
+    /// The rule of `rays` for points seen from `origin`, in metres and finite.
+    pub(crate) fn new(rays: &RayConfig, origin: Point) -> Self {
+        let RayConfig { min_range_m, max_range_m, .. } = *rays;
+        // Far above the rounding error of squares and square roots.
+        const MARGIN: f64 = 1e-12;
+        let nearest = min_range_m * min_range_m * (1.0 + MARGIN);
+        let farthest = max_range_m.map_or(f64::MAX, |max_m| (max_m * max_m * (1.0 - MARGIN)).min(f64::MAX));
+        Self { origin, min_range_m, max_range_m, certain_m2: [nearest, farthest] }
+    }
+
+    /// Applies the rule to a point in metres.
+    #[inline]
+    pub(crate) fn apply(&self, point: Point, skipped: &mut SkippedPoints) -> Ranged {
+        let [dx, dy, dz]: Point = std::array::from_fn(|k| point[k] - self.origin[k]);
+        let squared = dx * dx + dy * dy + dz * dz;
+        // Also false for non-finite points and for the origin.
+        match squared > self.certain_m2[0] && squared < self.certain_m2[1] {
+            true => Ranged::Hit(point),
+            false => self.apply_exactly(point, skipped),
+        }
+    }
+
+    /// At exactly the max range a point is a hit, as in OctoMap.
+    #[cold]
+    fn apply_exactly(&self, point: Point, skipped: &mut SkippedPoints) -> Ranged {
+        let origin = self.origin;
+        if !point.iter().all(|coordinate| coordinate.is_finite()) {
+            skipped.not_finite += 1;
+            return Ranged::Skipped;
+        }
+        if point == origin {
+            skipped.no_return += 1;
+            return Ranged::Skipped;
+        }
+        let [dx, dy, dz]: Point = std::array::from_fn(|k| point[k] - origin[k]);
+        let length_m = (dx * dx + dy * dy + dz * dz).sqrt();
+        if !length_m.is_finite() {
+            skipped.out_of_range += 1;
+            return Ranged::Skipped;
+        }
+        if length_m < self.min_range_m {
+            skipped.too_near += 1;
+            return Ranged::Skipped;
+        }
+        match self.max_range_m {
+            Some(max_range_m) if length_m > max_range_m => {
+                let share = max_range_m / length_m;
+                Ranged::Cut([origin[0] + dx * share, origin[1] + dy * share, origin[2] + dz * share])
+            }
+            _ => Ranged::Hit(point),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Outcome for a point at `x` metres.
+    fn at(rule: &RangeRule, x: f64) -> &'static str {
+        match rule.apply([x, 0.0, 0.0], &mut SkippedPoints::default()) {
+            Ranged::Hit(point) if point == [x, 0.0, 0.0] => "hit",
+            Ranged::Cut([2.0, 0.0, 0.0]) => "cut",
+            Ranged::Skipped => "skipped",
+            _ => "elsewhere",
+        }
+    }
+
+    #[test]
+    fn at_exactly_the_ranges_a_point_is_a_hit() {
+        let mut rays = RayConfig { min_range_m: 0.3, max_range_m: Some(2.0), ..RayConfig::default() };
+        let rule = RangeRule::new(&rays, [0.0; 3]);
+        let points =
+            [0.0, 0.3_f64.next_down(), 0.3, 1.0, 2.0, 2.0_f64.next_up(), 1e160, f64::NAN, f64::INFINITY];
+        let expected = ["skipped", "skipped", "hit", "hit", "hit", "cut", "skipped", "skipped", "skipped"];
+        assert_eq!(points.map(|x| at(&rule, x)), expected);
+        (rays.min_range_m, rays.max_range_m) = (0.0, None);
+        let rule = RangeRule::new(&rays, [0.0; 3]);
+        assert_eq!([0.0, 1e-200, 1e9, 1e160].map(|x| at(&rule, x)), ["skipped", "hit", "hit", "skipped"]);
+    }
+}

@@ -1,0 +1,412 @@
+use super::ray_end::RayEnd;
+use super::ray_origin::RayOrigin;
+use super::ray_walk::RayWalk;
+use super::slab_path::SlabPath;
+use crate::scan::pages::{Footprint, Local, PageMap};
+use crate::space::{Point, VoxelIndex};
+
+/// A ray from a scan's origin, in units of voxels, world frame; see [`RayWalk`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SlabRay<'a> {
+    pub(crate) origin: &'a RayOrigin,
+    pub(crate) end: Point,
+    pub(crate) last: VoxelIndex,
+    /// From the origin to the end.
+    pub(crate) direction: Point,
+    /// The axis of the largest component; slabs lie across it.
+    pub(crate) axis: usize,
+    /// One over the largest component; infinite if that is almost 0.
+    pub(crate) per_slab: f64,
+}
+
+/// At most so many slabs of a ray are walked by the closed form one at a time; after that, the rest of the ray is.
+const MAX_WALKED: u32 = 4;
+
+impl<'a> SlabRay<'a> {
+    /// The ray from `origin` to `end`.
+    #[inline]
+    pub(crate) fn new(origin: &'a RayOrigin, RayEnd { point: end, voxel: last, .. }: RayEnd) -> Self {
+        let direction: Point = std::array::from_fn(|k| end[k] - origin.point[k]);
+        let [x, y, z] = direction.map(f64::abs);
+        let (axis, longest) = if x >= y && x >= z {
+            (0, x)
+        } else if y >= z {
+            (1, y)
+        } else {
+            (2, z)
+        };
+        Self { origin, end, last, direction, axis, per_slab: 1.0 / longest }
+    }
+
+    /// Number of slabs after the origin's.
+    #[inline]
+    pub(crate) fn slabs(&self) -> u32 {
+        let [x, y, z]: [u32; 3] = std::array::from_fn(|k| self.last[k].abs_diff(self.origin.voxel[k]));
+        // Not by index: that would go through memory.
+        match self.axis {
+            0 => x,
+            1 => y,
+            _ => z,
+        }
+    }
+
+    /// The exact walk of the ray, voxel by voxel.
+    pub(crate) fn walk(&self) -> RayWalk {
+        RayWalk::between(self.origin.point, self.origin.voxel, self.end, self.last)
+    }
+
+    /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last. Voxels outside the
+    /// pages' window go to `pass_far`.
+    ///
+    /// The first `skipped` slabs, counted from the origin's, may be left out. With `may_pass_last` the last voxel may
+    /// be passed, too.
+    #[inline]
+    pub(crate) fn pass<F: Footprint>(
+        &self,
+        pages: &mut PageMap<F>,
+        skipped: u32,
+        may_pass_last: bool,
+        pass_far: impl FnMut(VoxelIndex),
+    ) {
+        let passed = match self.axis {
+            0 => self.pass_slabs::<0, 1, 2, F>(pages, skipped, may_pass_last),
+            1 => self.pass_slabs::<1, 0, 2, F>(pages, skipped, may_pass_last),
+            _ => self.pass_slabs::<2, 0, 1, F>(pages, skipped, may_pass_last),
+        };
+        if let Err(from) = passed {
+            self.pass_exactly(pages, from, pass_far);
+        }
+    }
+
+    /// The same by the closed form, from voxel `from` on.
+    #[cold]
+    fn pass_exactly<F: Footprint>(
+        &self,
+        pages: &mut PageMap<F>,
+        from: VoxelIndex,
+        mut pass_far: impl FnMut(VoxelIndex),
+    ) {
+        self.walk().resumed_at(from).for_each_before_end(|voxel| match pages.window().local(voxel) {
+            Some(near) => pages.at(near).pass::<0>(near[0], F::cell::<1, 2>(near[1], near[2])),
+            None => pass_far(voxel),
+        });
+    }
+
+    /// Passes the voxels from the first on, in order, as far as they can be told without the closed form. The error is
+    /// the first voxel that cannot.
+    ///
+    /// The walk goes in slabs, one voxel thick, along the axis of the ray's largest component. The crossing from slab
+    /// to slab is a sum of fixed-point numbers. In a slab the ray crosses the entry voxel, the exit voxel and, if these
+    /// differ along both other axes, the one between them. This agrees with the closed form as long as no crossing is
+    /// next to a border and no two are next to each other. A few slabs where this fails, such as the first of a sensor
+    /// beside a border, are walked by the closed form.
+    ///
+    /// `A` is the axis of the largest component, `B` and `C` are the others, the lower first.
+    fn pass_slabs<const A: usize, const B: usize, const C: usize, F: Footprint>(
+        &self,
+        pages: &mut PageMap<F>,
+        skipped: u32,
+        may_pass_last: bool,
+    ) -> Result<(), VoxelIndex> {
+        let base = pages.window().base();
+        let last = pages.window().local(self.last).ok_or(self.origin.voxel)?;
+        let start = match self.origin.is_on_border {
+            true => self.leave_borders(pages)?,
+            false => pages.window().local(self.origin.voxel).ok_or(self.origin.voxel)?,
+        };
+        let [mut a, mut b, mut c] = [start[A], start[B], start[C]];
+        let unknown = |a, b, c| {
+            let local = voxel::<A, B, C>(a, b, c);
+            Err(std::array::from_fn(|k| base[k] + local[k] as i32))
+        };
+        let slabs = last[A].abs_diff(a);
+        if slabs > 0 {
+            let is_up = last[A] > a;
+            let path = SlabPath::along::<A, B, C>(self, base, a, is_up);
+            // Leaving a border may have counted as a slab.
+            let mut done =
+                skipped.saturating_sub(a.abs_diff((self.origin.voxel[A] - base[A]) as u32)).min(slabs);
+            if done > 0 {
+                let crossing = path.after(done - 1);
+                if crossing.is_near_border() {
+                    // No voxel may be left out.
+                    done = 0;
+                } else {
+                    (b, c) = crossing.voxel();
+                    a = if is_up { a + done } else { a - done };
+                }
+            }
+            let mut walked = 0;
+            while done < slabs {
+                let stretch = path.stretch([a, b, c], [last[A], last[B], last[C]], done, slabs);
+                let page = pages.number_at(voxel::<A, B, C>(a, b, c));
+                let certain = pages.pages_mut()[page].pass_stretch::<A, B, C>(&stretch, a);
+                if certain > 0 {
+                    (b, c) = path.after(done + certain - 1).voxel();
+                    a = if is_up { a + certain } else { a - certain };
+                    done += certain;
+                }
+                let leaves_page = certain == stretch.slabs;
+                if done == slabs || leaves_page && !stretch.leaves_sideways {
+                    continue;
+                }
+                // The ray leaves the page within a slab, or it is not certain where it leaves the slab.
+                let crossing = path.after(done);
+                let certain = leaves_page.then(|| Self::pass_slab::<A, B, C, F>(pages, &crossing, [a, b, c]));
+                let exit = certain.flatten().or_else(|| {
+                    walked += 1;
+                    (walked <= MAX_WALKED).then(|| self.walk_slab::<A, B, C, F>(pages, [a, b, c]))?
+                });
+                let Some((exit_b, exit_c)) = exit else { return unknown(a, b, c) };
+                (b, c, done) = (exit_b, exit_c, done + 1);
+                a = if is_up { a + 1 } else { a - 1 };
+            }
+        }
+        let ahead = |axis: usize, at: u32| match last[axis] < start[axis] {
+            true => at.wrapping_sub(last[axis]),
+            false => last[axis].wrapping_sub(at),
+        };
+        let (ahead_b, ahead_c) = (ahead(B, b), ahead(C, c));
+        if ahead_b | ahead_c > 1 {
+            return unknown(a, b, c);
+        }
+        if may_pass_last || ahead_b | ahead_c > 0 {
+            pages.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
+        }
+        if ahead_b & ahead_c > 0 {
+            (b, c) = match self.crosses_first::<B, C>(base, b.max(last[B]), c.max(last[C])) {
+                true => (last[B], c),
+                false => (b, last[C]),
+            };
+            pages.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
+        }
+        Ok(())
+    }
+
+    /// Passes the voxels of a slab, from `[a, b, c]` on, in any page. Returns where the ray enters the next slab by
+    /// this crossing; `None`, with nothing passed, if that is not certain.
+    #[inline]
+    fn pass_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
+        pages: &mut PageMap<F>,
+        crossing: &SlabPath,
+        [a, b, c]: [u32; 3],
+    ) -> Option<(u32, u32)> {
+        let between = crossing.between((b, c))?;
+        let exit = crossing.voxel();
+        let mut pass = |(b, c): (u32, u32)| {
+            pages.at(voxel::<A, B, C>(a, b, c)).pass::<A>(a, F::cell::<B, C>(b, c));
+        };
+        pass((b, c));
+        between.into_iter().for_each(&mut pass);
+        if (b, c) != exit {
+            pass(exit);
+        }
+        Some(exit)
+    }
+
+    /// Passes the voxels of a slab, from `[a, b, c]` on, by the closed form. Returns where the ray enters the next
+    /// slab; `None`, with nothing passed, if it ends before.
+    #[cold]
+    fn walk_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
+        &self,
+        pages: &mut PageMap<F>,
+        [a, b, c]: [u32; 3],
+    ) -> Option<(u32, u32)> {
+        let base = pages.window().base();
+        let first = voxel::<A, B, C>(a, b, c);
+        let mut walk = self.walk().resumed_at(std::array::from_fn(|k| base[k] + first[k] as i32));
+        // Except for rounding, a ray crosses at most one border along `B` and one along `C` in a slab.
+        let mut voxels = [first; 5];
+        for passed in 1..=voxels.len() {
+            walk.advance();
+            let next = pages.window().local(walk.voxel())?;
+            if next[A] != a {
+                for voxel in &voxels[..passed] {
+                    pages.at(*voxel).pass::<A>(a, F::cell::<B, C>(voxel[B], voxel[C]));
+                }
+                return Some((next[B], next[C]));
+            }
+            *voxels.get_mut(passed)? = next;
+        }
+        None
+    }
+
+    /// The crossings at time 0. An origin on a border between voxels belongs to the upper voxel, and a ray toward lower
+    /// indices leaves it at once, the lowest axis first. Returns the voxel after these crossings.
+    fn leave_borders<F: Footprint>(&self, pages: &mut PageMap<F>) -> Result<Local, VoxelIndex> {
+        let origin = self.origin;
+        let mut voxel = pages.window().local(origin.voxel).ok_or(origin.voxel)?;
+        let is_left: [bool; 3] =
+            std::array::from_fn(|k| origin.is_on_border_along[k] && self.last[k] < origin.voxel[k]);
+        // The closed form is undefined for a crossing of a ray that hardly moves.
+        if (0..3).any(|k| is_left[k] && self.direction[k] > -f64::MIN_POSITIVE) {
+            return Err(origin.voxel);
+        }
+        for axis in 0..3 {
+            if is_left[axis] {
+                pages.at(voxel).pass::<0>(voxel[0], F::cell::<1, 2>(voxel[1], voxel[2]));
+                voxel[axis] -= 1;
+            }
+        }
+        Ok(voxel)
+    }
+
+    /// Whether, by the closed form, the border below voxel `b` along `B` is crossed before the one below voxel `c`
+    /// along `C`. At equal times the lower axis is first, and `B` is lower.
+    fn crosses_first<const B: usize, const C: usize>(&self, base: VoxelIndex, b: u32, c: u32) -> bool {
+        let time = |axis: usize, border: u32| {
+            let inv_direction = 1.0 / self.direction[axis];
+            (f64::from(base[axis]) + f64::from(border) - self.origin.point[axis]) * inv_direction
+        };
+        time(B, b) <= time(C, c)
+    }
+}
+
+/// The voxel with these indices along the axes `A`, `B` and `C`.
+#[inline]
+pub(crate) fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u32, c: u32) -> Local {
+    let mut voxel = [0; 3];
+    (voxel[A], voxel[B], voxel[C]) = (a, b, c);
+    voxel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::pages::CountedPage;
+    use crate::scan::pages::MarkedPage;
+    use crate::scan::pages::Window;
+    use crate::scan::pages::brick_in_page;
+    use crate::space::place_of_voxel;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    fn voxel_of(point: Point) -> VoxelIndex {
+        point.map(|x| x.floor() as i32)
+    }
+
+    /// How often each voxel was passed.
+    type Passes = BTreeMap<VoxelIndex, u32>;
+
+    fn add(passes: &mut Passes, brick: VoxelIndex, passes_at: impl Fn(usize) -> u32) {
+        for k in 0..512 {
+            let offset = [k & 7, k >> 3 & 7, k >> 6];
+            let count = passes_at(place_of_voxel(offset));
+            if count > 0 {
+                passes.insert(std::array::from_fn(|axis| brick[axis] * 8 + offset[axis]), count);
+            }
+        }
+    }
+
+    fn visits(rays: &[SlabRay<'_>]) -> Passes {
+        let mut visits = Passes::new();
+        for ray in rays {
+            ray.walk().for_each_before_end(|voxel| *visits.entry(voxel).or_default() += 1);
+        }
+        visits
+    }
+
+    fn is_unknown(ray: &SlabRay, pages: &mut PageMap<MarkedPage>) -> bool {
+        let passed = match ray.axis {
+            0 => ray.pass_slabs::<0, 1, 2, _>(pages, 0, false),
+            1 => ray.pass_slabs::<1, 0, 2, _>(pages, 0, false),
+            _ => ray.pass_slabs::<2, 0, 1, _>(pages, 0, false),
+        };
+        passed.is_err()
+    }
+
+    /// Passes along the rays from one origin, and compares with the exact walk. Returns the number of rays for which
+    /// the slabs alone did not suffice.
+    fn check(origin: Point, ends: &[Point]) -> usize {
+        let bounds = ends.iter().fold((origin, origin), |(low, high), end| {
+            (std::array::from_fn(|k| low[k].min(end[k])), std::array::from_fn(|k| high[k].max(end[k])))
+        });
+        let origin = &RayOrigin::new(origin, voxel_of(origin));
+        let rays: Vec<_> = ends
+            .iter()
+            .map(|&end| SlabRay::new(origin, RayEnd { point: end, voxel: voxel_of(end), hit: None }))
+            .collect();
+        let window = Window::around(origin.voxel, bounds);
+        let mut marked = PageMap::<MarkedPage>::default();
+        let mut counted = PageMap::<CountedPage>::default();
+        marked.clear(window, usize::MAX);
+        counted.clear(window, usize::MAX);
+        let unknown =
+            rays.iter().filter(|ray| is_unknown(ray, &mut PageMap::<MarkedPage>::clone(&marked))).count();
+        for ray in &rays {
+            ray.pass(&mut marked, 0, false, |_| unreachable!("the window holds all ends"));
+            ray.pass(&mut counted, 0, false, |_| unreachable!("the window holds all ends"));
+        }
+        let expected = visits(&rays);
+        let mut passes = Passes::new();
+        for (page, index) in counted.pages().iter().zip(counted.indices()) {
+            for (place, brick) in page.places() {
+                let counts = page.bricks()[brick];
+                add(&mut passes, brick_in_page(*index, place), |place| u32::from(counts[place]));
+            }
+        }
+        assert_eq!(passes, expected, "{origin:?} to {ends:?}");
+        let mut passes = Passes::new();
+        for (page, index) in marked.pages().iter().zip(marked.indices()) {
+            for brick in page.bricks(*index) {
+                add(&mut passes, brick.index, |place| (brick.passed[place / 64] >> (place % 64)) as u32 & 1);
+            }
+        }
+        assert!(passes.keys().eq(expected.keys()), "{origin:?} to {ends:?}");
+        unknown
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(500))]
+
+        #[test]
+        fn the_voxels_are_those_of_the_exact_walk(
+            origin in prop::array::uniform3(-100.0..100.0_f64),
+            ends in prop::collection::vec(prop::array::uniform3(-150.0..150.0_f64), 1..8),
+        ) {
+            check(origin, &ends);
+        }
+
+        #[test]
+        fn rays_through_edges_and_corners_are_right_or_left_to_the_exact_walk(
+            origin in prop::array::uniform3(-40..40_i32),
+            ends in prop::collection::vec(prop::array::uniform3(-60..60_i32), 1..8),
+            nudge in prop::array::uniform3(prop::sample::select(vec![0.0, 1e-7, -1e-7, 5e-7, -5e-7, 1e-12, 0.25])),
+            unit in prop::sample::select(vec![1.0, 0.5, 0.25]),
+        ) {
+            let point = |p: [i32; 3], nudge: Point| std::array::from_fn(|k| f64::from(p[k]) * unit + nudge[k]);
+            let ends: Vec<_> = ends.into_iter().map(|end| point(end, [0.0; 3])).collect();
+            check(point(origin, nudge), &ends);
+        }
+
+        #[test]
+        fn far_from_zero_and_for_long_rays_too(
+            origin in prop::array::uniform3(-1.0e8..1.0e8_f64),
+            reach in prop::array::uniform3(-1900.0..1900.0_f64),
+        ) {
+            check(origin, &[std::array::from_fn(|k| origin[k] + reach[k])]);
+        }
+    }
+
+    #[test]
+    fn a_sensor_on_a_corner_of_voxels_leaves_few_rays_to_the_exact_walk() {
+        let directions = (0..1000).map(|k| {
+            let (azimuth, up) = (f64::from(k) * 0.618, f64::from(k % 37) * 0.05 - 0.87);
+            [3.0 + 30.0 * azimuth.cos(), -4.0 + 30.0 * azimuth.sin(), 9.0 + 20.0 * up]
+        });
+        let left = check([3.0, -4.0, 9.0], &directions.collect::<Vec<_>>());
+        assert!(left < 5, "{left} of 1000 rays");
+    }
+
+    #[test]
+    fn a_sensor_beside_a_border_leaves_few_rays_to_the_exact_walk() {
+        // 0.9 m and 1.4 m at 0.05 m, by way of `f32`.
+        let origin = [17.999999523162842, 200.0, 27.999999523162842];
+        let ends = (0..1000).map(|k| {
+            let (azimuth, up) = (f64::from(k) * 0.618, f64::from(k % 37) * 0.05 - 0.87);
+            [origin[0] + 80.0 * azimuth.cos(), origin[1] + 80.0 * azimuth.sin(), origin[2] + 40.0 * up]
+        });
+        let left = check(origin, &ends.collect::<Vec<_>>());
+        assert!(left < 5, "{left} of 1000 rays");
+    }
+}

@@ -1,0 +1,140 @@
+use crate::scratch::Scratch;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+
+/// Makes the file to which a [`PartLog`] spills.
+pub(crate) type MakeScratch<'a> = dyn Fn() -> io::Result<Box<dyn Scratch>> + Sync + 'a;
+
+/// An append-only log of records: the tail is in memory, the rest in a file if it is too large. Each record links to
+/// the previous record of its list, so a list is given by its last record.
+pub(crate) struct PartLog<'a> {
+    tail: Vec<u8>,
+    max_tail_bytes: usize,
+    /// Where the tail begins.
+    tail_at: u64,
+    make_file: &'a MakeScratch<'a>,
+    file: Option<Box<dyn Scratch>>,
+}
+
+/// The link of the first record of a list.
+pub(crate) const NONE: u64 = u64::MAX;
+
+const HEADER_BYTES: usize = 12;
+
+impl<'a> PartLog<'a> {
+    pub(crate) fn new(max_tail_bytes: usize, make_file: &'a MakeScratch<'a>) -> Self {
+        Self { tail: Vec::new(), max_tail_bytes, tail_at: 0, make_file, file: None }
+    }
+
+    /// Appends a record to the list that ends with `before`, and returns its position.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be made or written to.
+    pub(crate) fn append(&mut self, before: u64, record: &[u8]) -> io::Result<u64> {
+        let length = u32::try_from(record.len())
+            .map_err(|_| io::Error::other("more than 4 GiB of updates of one tile at a time"))?;
+        if !self.tail.is_empty() && self.tail.len() + HEADER_BYTES + record.len() > self.max_tail_bytes {
+            self.write_tail()?;
+        }
+        let at = self.tail_at + self.tail.len() as u64;
+        self.tail.extend(before.to_le_bytes());
+        self.tail.extend(length.to_le_bytes());
+        self.tail.extend(record);
+        Ok(at)
+    }
+
+    fn write_tail(&mut self) -> io::Result<()> {
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert((self.make_file)()?),
+        };
+        file.seek(SeekFrom::Start(self.tail_at))?;
+        file.write_all(&self.tail)?;
+        self.tail_at += self.tail.len() as u64;
+        self.tail.clear();
+        Ok(())
+    }
+
+    /// Position of the previous record of the list.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
+    pub(crate) fn before(&mut self, at: u64) -> io::Result<u64> {
+        Ok(self.header(at)?.0)
+    }
+
+    /// Reads the record at a position into `record`.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
+    pub(crate) fn read(&mut self, at: u64, record: &mut Vec<u8>) -> io::Result<()> {
+        let (_, length) = self.header(at)?;
+        record.clear();
+        match (&mut self.file, at.checked_sub(self.tail_at)) {
+            // After its header.
+            (Some(file), None) => file.take(length as u64).read_to_end(record).map(drop)?,
+            (_, at) => {
+                let first = at.unwrap_or_default() as usize + HEADER_BYTES;
+                record.extend(self.tail.iter().skip(first).take(length));
+            }
+        }
+        if record.len() < length { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
+    }
+
+    fn header(&mut self, at: u64) -> io::Result<(u64, usize)> {
+        let mut header = [0; HEADER_BYTES];
+        match (&mut self.file, at.checked_sub(self.tail_at)) {
+            (Some(file), None) => {
+                file.seek(SeekFrom::Start(at))?;
+                file.read_exact(&mut header)?;
+            }
+            (_, at) => self
+                .tail
+                .get(at.unwrap_or_default() as usize..)
+                .unwrap_or_default()
+                .read_exact(&mut header)?,
+        }
+        Ok(parsed(&header))
+    }
+}
+
+fn parsed(header: &[u8; HEADER_BYTES]) -> (u64, usize) {
+    let before = u64::from_le_bytes(std::array::from_fn(|k| header[k]));
+    (before, u32::from_le_bytes(std::array::from_fn(|k| header[8 + k])) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::io::Cursor;
+
+    proptest! {
+        #[test]
+        fn every_list_comes_back_in_order_wherever_it_lies(
+            records in prop::collection::vec((0..4_usize, prop::collection::vec(any::<u8>(), 0..40)), 0..60),
+            max_tail_bytes in 0..300_usize,
+        ) {
+            let make = || Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
+            let mut log = PartLog::new(max_tail_bytes, &make);
+            let mut last = [NONE; 4];
+            for (list, record) in &records {
+                last[*list] = log.append(last[*list], record).unwrap();
+            }
+            for (list, mut at) in last.into_iter().enumerate() {
+                let mut back = Vec::new();
+                while at != NONE {
+                    let mut record = Vec::new();
+                    log.read(at, &mut record).unwrap();
+                    back.push(record);
+                    at = log.before(at).unwrap();
+                }
+                back.reverse();
+                let of_list = records.iter().filter(|(of, _)| *of == list).map(|(_, record)| record.clone());
+                prop_assert_eq!(back, of_list.collect::<Vec<_>>());
+            }
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! Tracing a scan: the range rule for each point, the rays on all threads, and the updates at the end.
+
+mod scan_rays;
+mod scan_tracer;
+mod trace_limit;
+
+pub use scan_tracer::ScanTracer;
+pub(crate) use scan_tracer::{UpdateOrder, check_intensities};
+pub(crate) use trace_limit::{Allowance, CollectorLimit};

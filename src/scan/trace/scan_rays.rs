@@ -1,0 +1,367 @@
+use super::scan_tracer::origin_voxel;
+use super::trace_limit::{CollectorLimit, TraceLimit};
+use crate::config::RayConfig;
+use crate::error::Result;
+use crate::scan::ScanReport;
+use crate::scan::coherence::{sampling_passes, single_pass};
+use crate::scan::pages::{MAX_RAYS, Window};
+use crate::scan::per_ray::{OrderedCollector, PerRayCollector, drain_in_order, updates_in_order};
+use crate::scan::per_scan::{BATCH, PerScanCollector};
+use crate::scan::ray::{MAX_RAY_STEPS, RangeRule, Ranged, RayEnd, RayOrigin, SlabRay};
+use crate::scan::scan_points::ScanPoints;
+use crate::scan::spill::ScanParts;
+use crate::scan::stop::Stop;
+use crate::scan::updates::ScanUpdates;
+use crate::sensor::{Observation, SensorModel};
+use crate::space::{Grid, Point};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Fewest rays per thread: fewer do not pay for a thread's own pages.
+const MIN_RAYS_PER_THREAD: usize = 4096;
+
+/// Rays that a collector takes at first under a memory limit, before their size is known.
+const FIRST_RAYS: usize = 1024;
+
+/// The rays of a scan, from one origin.
+pub(crate) struct ScanRays<'a> {
+    grid: &'a Grid,
+    model: &'a SensorModel,
+    rays: &'a RayConfig,
+    points: &'a dyn ScanPoints,
+    origin_m: Point,
+    origin: RayOrigin,
+    window: Window,
+    range: RangeRule,
+    stop: &'a Stop,
+}
+
+/// The outcome of an insertion per scan under a memory limit.
+pub(crate) enum PerScanUpdates {
+    /// All updates fit into memory.
+    Whole(ScanUpdates),
+    /// They did not fit: all went to the parts. The report is about the points.
+    InParts(ScanReport),
+}
+
+impl<'a> ScanRays<'a> {
+    pub(crate) fn new(
+        grid: &'a Grid,
+        model: &'a SensorModel,
+        rays: &'a RayConfig,
+        origin_m: Point,
+        points: &'a dyn ScanPoints,
+        stop: &'a Stop,
+    ) -> Result<Self> {
+        let voxel = origin_voxel(grid, origin_m)?;
+        let origin = RayOrigin::new(grid.to_voxel_units(origin_m), voxel);
+        let range = RangeRule::new(rays, origin_m);
+        let window = Window::default();
+        let mut scan_rays = Self { grid, model, rays, points, origin_m, origin, window, range, stop };
+        scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
+        Ok(scan_rays)
+    }
+
+    /// Insertion per scan: one update per voxel, a hit over any miss. The result does not depend on the order of the
+    /// rays, so each thread walks some of them.
+    pub(crate) fn per_scan(&self, collectors: &mut Vec<PerScanCollector>) -> Result<ScanUpdates> {
+        let (collectors, report) =
+            self.collect_per_scan(collectors, self.threads(), &CollectorLimit::NONE, None)?;
+        Ok(self.merge(collectors, report))
+    }
+
+    /// The same under a memory limit: the updates if they fit, otherwise all of them go to `parts`.
+    pub(crate) fn per_scan_in_parts(
+        &self,
+        collectors: &mut Vec<PerScanCollector>,
+        limit: &TraceLimit,
+        parts: &ScanParts<'_>,
+    ) -> Result<PerScanUpdates> {
+        let threads = limit.collectors(self.threads());
+        let (collectors, report) =
+            self.collect_per_scan(collectors, threads, &limit.of_collector(threads), Some(parts))?;
+        if parts.is_empty() && limit.has_room_for(collectors) {
+            return Ok(PerScanUpdates::Whole(self.merge(collectors, report)));
+        }
+        collectors.par_iter_mut().for_each(|collector| collector.finish(parts));
+        Ok(PerScanUpdates::InParts(report))
+    }
+
+    fn merge(&self, collectors: &mut [PerScanCollector], report: ScanReport) -> ScanUpdates {
+        let (first, others) = collectors.split_at_mut(1);
+        others.iter().for_each(|other| first[0].absorb(other));
+        first[0].updates(self.grid, report)
+    }
+
+    fn collect_per_scan<'c>(
+        &self,
+        collectors: &'c mut Vec<PerScanCollector>,
+        threads: usize,
+        limit: &CollectorLimit,
+        parts: Option<&ScanParts<'_>>,
+    ) -> Result<(&'c mut [PerScanCollector], ScanReport)> {
+        let needs_intensity = self.model.needs_intensity();
+        self.collect(collectors, threads, |collector, range| {
+            collector.clear(self.window, limit);
+            let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
+            let mut batch = Vec::with_capacity(BATCH);
+            let (mut seen, mut extend_at) = (0, 0);
+            self.points.for_each_chunk(range, &mut |points, intensities| {
+                // Each chunk adds less to the prefixes, and extending them takes as long each time.
+                let extends = seen >= extend_at;
+                if extends {
+                    extend_at = 2 * (seen + points.len());
+                }
+                seen += points.len();
+                for pass in
+                    if extends { sampling_passes(0..points.len()) } else { single_pass(0..points.len()) }
+                {
+                    collector.extend_prefixes(&self.origin, pass.squares);
+                    for number in pass.points() {
+                        batch.extend(self.ray(points[number], intensity(intensities, number), &mut report));
+                        if batch.len() == BATCH {
+                            collector.take(&self.origin, &batch, needs_intensity, parts);
+                            batch.clear();
+                            if !self.goes_on(parts) {
+                                return false;
+                            }
+                        }
+                    }
+                    collector.take(&self.origin, &batch, needs_intensity, parts);
+                    batch.clear();
+                }
+                self.goes_on(parts)
+            })?;
+            Ok(report)
+        })
+    }
+
+    /// Insertion per ray: its misses from the sensor outward, then its hit, in the order of the points.
+    pub(crate) fn per_ray(&self, collectors: &mut Vec<PerRayCollector>) -> Result<ScanUpdates> {
+        let parts = self.threads().max(self.points.len().div_ceil(MAX_RAYS));
+        let (collectors, report) = self.collect(collectors, parts, |collector, range| {
+            collector.clear(self.window, None);
+            let mut report = ScanReport::default();
+            self.take_rays(collector, range, |_, _| false, &mut report)?;
+            Ok(report)
+        })?;
+        Ok(updates_in_order(self.grid, collectors, report))
+    }
+
+    /// The same under a memory limit: as many rays at a time as fit. A part is added after the parts of all earlier
+    /// rays.
+    pub(crate) fn per_ray_in_parts(
+        &self,
+        collectors: &mut Vec<PerRayCollector>,
+        limit: &TraceLimit,
+        parts: &ScanParts<'_>,
+    ) -> Result<ScanReport> {
+        let all = self.points.len();
+        let threads = limit.collectors(rayon::current_num_threads());
+        let each = limit.of_collector(threads);
+        let mut report = ScanReport::default();
+        let (mut next, mut at_a_time) = (0, FIRST_RAYS);
+        while next < all && self.goes_on(Some(parts)) {
+            let some = next..all.min(next + threads * at_a_time.min(MAX_RAYS));
+            let threads = threads.min(some.len().div_ceil(FIRST_RAYS));
+            let reports = self.collect_each(collectors, some.clone(), threads, |collector, range| {
+                collector.clear(self.window, Some((&each, self.grid)));
+                let mut report = ScanReport::default();
+                self.take_rays(collector, range, PerRayCollector::is_full_for, &mut report)?;
+                Ok(report)
+            })?;
+            // Rays behind a collector that was full are taken again.
+            let mut used = 0;
+            for (part, of_part) in reports.into_iter().enumerate() {
+                let wanted = part_of(&some, part, threads);
+                next = wanted.start + of_part.points as usize;
+                report += of_part;
+                used = part + 1;
+                if next < wanted.end {
+                    break;
+                }
+            }
+            drain_in_order(self.grid, &mut collectors[..used], parts);
+            at_a_time = match next < some.end {
+                true => ((next - some.start) / threads).max(1),
+                false => at_a_time.saturating_mul(2),
+            };
+        }
+        Ok(report)
+    }
+
+    /// Takes the rays to the points of a range until the collector is full.
+    fn take_rays(
+        &self,
+        collector: &mut PerRayCollector,
+        range: Range<usize>,
+        is_full_for: impl Fn(&mut PerRayCollector, &SlabRay<'_>) -> bool,
+        report: &mut ScanReport,
+    ) -> Result<()> {
+        self.points.for_each_chunk(range, &mut |points, intensities| {
+            for (number, &point) in points.iter().enumerate() {
+                let before = *report;
+                report.points += 1;
+                let Some(end) = self.ray(point, intensity(intensities, number), report) else { continue };
+                let ray = SlabRay::new(&self.origin, end);
+                if is_full_for(collector, &ray) {
+                    *report = before;
+                    return false;
+                }
+                collector.pass(&ray);
+                if let Some(intensity) = end.hit {
+                    collector.hit(end.voxel, intensity);
+                }
+            }
+            !self.stop.is_set()
+        })
+    }
+
+    /// Insertion per ray, as a list of all updates.
+    pub(crate) fn per_ray_in_order(&self) -> Result<ScanUpdates> {
+        let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
+        let report = self.in_order(&mut collector, |_| ())?;
+        Ok(collector.into_updates(report))
+    }
+
+    /// The same under a memory limit.
+    pub(crate) fn per_ray_in_order_in_parts(
+        &self,
+        limit: &TraceLimit,
+        parts: &ScanParts<'_>,
+    ) -> Result<ScanReport> {
+        let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
+        let max_bytes = limit.of_collector(1).small_bytes;
+        let report = self.in_order(&mut collector, |collector| {
+            if collector.bytes() > max_bytes {
+                collector.drain_to(parts);
+            }
+        })?;
+        collector.drain_to(parts);
+        Ok(report)
+    }
+
+    fn in_order(
+        &self,
+        collector: &mut OrderedCollector<'_>,
+        mut after_ray: impl FnMut(&mut OrderedCollector<'_>),
+    ) -> Result<ScanReport> {
+        let range = 0..self.points.len();
+        let mut report = ScanReport { points: range.len() as u64, ..ScanReport::default() };
+        self.points.for_each_chunk(range, &mut |points, intensities| {
+            for (number, &point) in points.iter().enumerate() {
+                let Some(end) = self.ray(point, intensity(intensities, number), &mut report) else {
+                    continue;
+                };
+                let walk = SlabRay::new(&self.origin, end).walk();
+                walk.for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
+                if let Some(intensity) = end.hit {
+                    collector.push(end.voxel, Observation::Hit(intensity));
+                }
+                after_ray(collector);
+            }
+            !self.stop.is_set()
+        })?;
+        Ok(report)
+    }
+
+    /// Into how many parts the points are divided, each with its own collector.
+    fn threads(&self) -> usize {
+        rayon::current_num_threads().min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
+    }
+
+    fn goes_on(&self, parts: Option<&ScanParts<'_>>) -> bool {
+        !self.stop.is_set() && !parts.is_some_and(ScanParts::has_failed)
+    }
+
+    /// Collects each part of the points with its own collector, in order.
+    fn collect<'c, C: Default + Send>(
+        &self,
+        collectors: &'c mut Vec<C>,
+        parts: usize,
+        collect: impl Fn(&mut C, Range<usize>) -> Result<ScanReport> + Sync,
+    ) -> Result<(&'c mut [C], ScanReport)> {
+        let reports = self.collect_each(collectors, 0..self.points.len(), parts, collect)?;
+        let mut report = ScanReport::default();
+        reports.into_iter().for_each(|part| report += part);
+        Ok((&mut collectors[..parts], report))
+    }
+
+    fn collect_each<C: Default + Send>(
+        &self,
+        collectors: &mut Vec<C>,
+        points: Range<usize>,
+        parts: usize,
+        collect: impl Fn(&mut C, Range<usize>) -> Result<ScanReport> + Sync,
+    ) -> Result<Vec<ScanReport>> {
+        if collectors.len() < parts {
+            collectors.resize_with(parts, C::default);
+        }
+        let collectors = collectors[..parts].par_iter_mut().enumerate();
+        collectors.map(|(part, collector)| collect(collector, part_of(&points, part, parts))).collect()
+    }
+
+    /// Bounds of the points, cut at the max range, in units of voxels, without the points that are not finite.
+    fn bounds(&self) -> Result<(Point, Point)> {
+        let (mut low, mut high) = (self.origin_m, self.origin_m);
+        self.points.for_each_chunk(0..self.points.len(), &mut |points, _| {
+            for point in points.iter().filter(|point| point.iter().all(|x| x.is_finite())) {
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(point[axis]);
+                    high[axis] = high[axis].max(point[axis]);
+                }
+            }
+            true
+        })?;
+        if let Some(range_m) = self.rays.max_range_m {
+            for axis in 0..3 {
+                low[axis] = low[axis].max(self.origin_m[axis] - range_m);
+                high[axis] = high[axis].min(self.origin_m[axis] + range_m);
+            }
+        }
+        Ok((self.grid.to_voxel_units(low), self.grid.to_voxel_units(high)))
+    }
+
+    /// Where the ray to a point ends; `None` if the point is skipped.
+    #[inline]
+    fn ray(&self, point: Point, intensity: f32, report: &mut ScanReport) -> Option<RayEnd> {
+        if self.stop.is_set() {
+            return None;
+        }
+        let skipped = &mut report.skipped;
+        if self.model.needs_intensity() && intensity.is_nan() {
+            skipped.no_intensity += 1;
+            return None;
+        }
+        let (end_m, is_hit) = match self.range.apply(point, skipped) {
+            Ranged::Hit(point) => (point, true),
+            Ranged::Cut(point) => (point, false),
+            Ranged::Skipped => return None,
+        };
+        let end = self.grid.to_voxel_units(end_m);
+        let Some(last) = Grid::voxel_of_units(end) else {
+            skipped.out_of_range += 1;
+            return None;
+        };
+        let steps: u64 = (0..3).map(|k| u64::from(self.origin.voxel[k].abs_diff(last[k]))).sum();
+        if steps > MAX_RAY_STEPS {
+            skipped.ray_too_long += 1;
+            return None;
+        }
+        report.cut_at_max_range += u64::from(!is_hit);
+        let hit = Observation::Hit(intensity);
+        let hit = (is_hit && self.model.is_evidence(hit)).then_some(intensity);
+        Some(RayEnd { point: end, voxel: last, hit })
+    }
+}
+
+/// The points of part `part` of `parts` equal parts of a range.
+fn part_of(points: &Range<usize>, part: usize, parts: usize) -> Range<usize> {
+    let at = |part| points.start + points.len() * part / parts;
+    at(part)..at(part + 1)
+}
+
+#[inline]
+fn intensity(intensities: Option<&[f32]>, number: usize) -> f32 {
+    intensities.map_or(0.0, |intensities| intensities[number])
+}

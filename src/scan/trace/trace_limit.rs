@@ -1,0 +1,81 @@
+use crate::scan::per_scan::PerScanCollector;
+
+/// The memory limit for tracing a scan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TraceLimit {
+    bytes: usize,
+}
+
+/// The share of one collector.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CollectorLimit {
+    /// How many pages may be fast, which makes them large.
+    pub(crate) fast_pages: usize,
+    /// Most bytes of all other marks. Converting these to updates takes about as much again.
+    pub(crate) small_bytes: usize,
+}
+
+/// A fast page, with hits.
+const FAST_PAGE_BYTES: usize = 64 << 10;
+/// Bytes of a brick while its marks are converted to updates, three times in lists.
+const UPDATE_BYTES: usize = 450;
+/// With less, a collector would be drained all the time.
+const MIN_COLLECTOR_BYTES: usize = 4 << 20;
+
+impl Default for TraceLimit {
+    fn default() -> Self {
+        Self::new(usize::MAX)
+    }
+}
+
+impl TraceLimit {
+    pub(crate) fn new(bytes: usize) -> Self {
+        Self { bytes }
+    }
+
+    /// How many of the wanted collectors fit.
+    pub(crate) fn collectors(&self, wanted: usize) -> usize {
+        wanted.min(self.bytes / MIN_COLLECTOR_BYTES).max(1)
+    }
+
+    /// Whether the updates of these collectors fit.
+    pub(crate) fn has_room_for(&self, collectors: &[PerScanCollector]) -> bool {
+        let max_bricks = self.bytes / 2 / UPDATE_BYTES;
+        let marks_bytes: usize = collectors.iter().map(PerScanCollector::marks_bytes).sum();
+        // A page has at most 512 bricks; they are counted only if that might be too many.
+        marks_bytes / FAST_PAGE_BYTES * 2 * 512 < max_bricks
+            || collectors.iter().map(PerScanCollector::count_bricks).sum::<usize>() < max_bricks
+    }
+
+    /// The limit of each of so many collectors.
+    pub(crate) fn of_collector(&self, collectors: usize) -> CollectorLimit {
+        let bytes = self.bytes / collectors.max(1);
+        CollectorLimit { fast_pages: bytes / 2 / FAST_PAGE_BYTES, small_bytes: bytes / 4 }
+    }
+}
+
+impl CollectorLimit {
+    /// No limit.
+    pub(crate) const NONE: Self = Self { fast_pages: usize::MAX, small_bytes: usize::MAX };
+}
+
+/// A budget of bytes, spent by upper bounds, so that the memory itself is seldom measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Allowance {
+    bytes: usize,
+}
+
+impl Allowance {
+    /// Sets the remaining budget.
+    pub(crate) fn grant(&mut self, bytes: usize) {
+        self.bytes = bytes;
+    }
+
+    /// Spends bytes; returns whether they exceed the budget, so that the memory must be measured.
+    #[inline]
+    pub(crate) fn is_spent_by(&mut self, bytes: usize) -> bool {
+        let is_spent = self.bytes < bytes;
+        self.bytes = self.bytes.saturating_sub(bytes);
+        is_spent
+    }
+}

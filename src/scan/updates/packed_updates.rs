@@ -1,0 +1,340 @@
+use super::tile_updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdates};
+use crate::space::{BrickCode, BrickMask};
+use std::io::{self, BufRead};
+
+/// Updates of one tile from any number of scans, in order and packed: a fourth to a tenth of the unpacked size.
+///
+/// Numbers take seven bits per byte; of masks only the bytes that are not 0 are stored.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PackedUpdates {
+    bytes: Vec<u8>,
+    updates: usize,
+}
+
+const MASKS: u8 = 0;
+const RUNS: u8 = 1;
+const ORDERED: u8 = 2;
+
+impl PackedUpdates {
+    /// Appends the updates of one scan.
+    pub fn push(&mut self, updates: &TileUpdates) {
+        self.updates += updates.len();
+        if let TileUpdates::Packed(packed) = updates {
+            return self.bytes.extend_from_slice(&packed.bytes);
+        }
+        let out = &mut Packer { bytes: &mut self.bytes };
+        match updates {
+            TileUpdates::Masks(bricks) => {
+                out.byte(MASKS);
+                out.number(bricks.len() as u64);
+                let mut last = 0;
+                for brick in bricks {
+                    out.brick(brick.brick, &mut last);
+                    out.mask(&brick.hits);
+                    out.mask(&brick.misses);
+                    out.number(brick.intensities.len() as u64);
+                    brick.intensities.iter().for_each(|intensity| out.float(*intensity));
+                }
+            }
+            TileUpdates::Runs(bricks) => {
+                out.byte(RUNS);
+                out.number(bricks.len() as u64);
+                let mut last = 0;
+                for brick in bricks {
+                    out.brick(brick.brick, &mut last);
+                    out.number(brick.runs.len() as u64);
+                    brick.runs.iter().for_each(|run| out.run(run));
+                }
+            }
+            TileUpdates::Ordered(updates) => {
+                out.byte(ORDERED);
+                let (voxels, intensities) = updates.parts();
+                out.number(voxels.len() as u64);
+                voxels.iter().for_each(|voxel| out.bytes.extend(voxel.to_le_bytes()));
+                out.number(intensities.len() as u64);
+                intensities.iter().for_each(|intensity| out.float(*intensity));
+            }
+            TileUpdates::Packed(_) => {}
+        }
+    }
+
+    /// The packed updates of one scan.
+    pub(crate) fn of(updates: &TileUpdates) -> Self {
+        let mut packed = Self::default();
+        packed.push(updates);
+        packed
+    }
+
+    /// The inverse of [`PackedUpdates::as_bytes`]; `updates` is their number. Takes no other bytes.
+    pub(crate) fn from_parts(bytes: Vec<u8>, updates: usize) -> Self {
+        Self { bytes, updates }
+    }
+
+    /// Appends later updates.
+    pub(crate) fn append(&mut self, others: &Self) {
+        self.bytes.extend_from_slice(&others.bytes);
+        self.updates += others.updates;
+    }
+
+    /// Releases unused memory.
+    pub(crate) fn shrink(&mut self) {
+        self.bytes.shrink_to_fit();
+    }
+
+    /// The updates as bytes. Appending leaves earlier bytes unchanged.
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The updates of each scan, in order.
+    pub fn iter(&self) -> impl Iterator<Item = TileUpdates> {
+        let mut input = Unpacker { input: &*self.bytes };
+        std::iter::from_fn(move || {
+            let next = input.next().transpose()?;
+            Some(next.expect("what was packed is whole"))
+        })
+    }
+
+    /// Passes the updates of each scan to `take`, in order, from the bytes of [`PackedUpdates::as_bytes`].
+    ///
+    /// # Errors
+    ///
+    /// An `input` that cannot be read, or ends too soon.
+    pub fn unpack(input: impl BufRead, mut take: impl FnMut(TileUpdates)) -> io::Result<()> {
+        let mut input = Unpacker { input };
+        while let Some(updates) = input.next()? {
+            take(updates);
+        }
+        Ok(())
+    }
+
+    /// Number of updates.
+    pub fn len(&self) -> usize {
+        self.updates
+    }
+
+    /// Whether nothing was appended.
+    pub fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
+    }
+
+    /// Bytes of memory on the heap.
+    pub fn bytes(&self) -> usize {
+        self.bytes.capacity()
+    }
+}
+
+struct Packer<'a> {
+    bytes: &'a mut Vec<u8>,
+}
+
+impl Packer<'_> {
+    fn byte(&mut self, byte: u8) {
+        self.bytes.push(byte);
+    }
+
+    /// Seven bits per byte, the lowest first; the eighth bit is set if more bytes follow.
+    fn number(&mut self, mut number: u64) {
+        while number >= 0x80 {
+            self.byte(number as u8 | 0x80);
+            number >>= 7;
+        }
+        self.byte(number as u8);
+    }
+
+    fn float(&mut self, number: f32) {
+        self.bytes.extend(number.to_le_bytes());
+    }
+
+    /// A brick's code, as the difference from the previous one: bricks are in order.
+    fn brick(&mut self, BrickCode(code): BrickCode, last: &mut u64) {
+        self.number(code.wrapping_sub(*last));
+        *last = code;
+    }
+
+    /// Which words are not 0; for each of these, which bytes are not 0, and these bytes.
+    fn mask(&mut self, mask: &BrickMask) {
+        self.byte(set_of(mask.map(|word| word != 0)));
+        for word in mask.iter().filter(|word| **word != 0) {
+            let bytes = word.to_le_bytes();
+            self.byte(set_of(bytes.map(|byte| byte != 0)));
+            self.bytes.extend(bytes.iter().filter(|byte| **byte != 0));
+        }
+    }
+
+    fn run(&mut self, run: &Run) {
+        self.number(u64::from(run.place));
+        self.number(u64::from(run.misses) << 1 | u64::from(run.hit.is_some()));
+        if let Some(intensity) = run.hit {
+            self.float(intensity);
+        }
+    }
+}
+
+/// Bit `k` for the `k`-th of eight.
+fn set_of(are_in: [bool; 8]) -> u8 {
+    (0..8).fold(0, |set, k| set | u8::from(are_in[k]) << k)
+}
+
+/// Reads what [`Packer`] wrote.
+struct Unpacker<R> {
+    input: R,
+}
+
+/// Most items that are reserved at once for a count in the input.
+const MAX_RESERVED: usize = 1 << 12;
+
+impl<R: BufRead> Unpacker<R> {
+    /// The updates of one scan; `None` at the end.
+    fn next(&mut self) -> io::Result<Option<TileUpdates>> {
+        if self.input.fill_buf()?.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(match self.byte()? {
+            MASKS => TileUpdates::Masks(self.bricks(Self::brick_update)?),
+            RUNS => TileUpdates::Runs(self.bricks(Self::brick_runs)?),
+            _ => {
+                let voxels = self.many(|input| Ok(u32::from_le_bytes(input.take()?)))?;
+                let intensities = self.many(Self::float)?;
+                TileUpdates::Ordered(OrderedUpdates::from_parts(voxels, intensities))
+            }
+        }))
+    }
+
+    fn bricks<T>(
+        &mut self,
+        mut brick: impl FnMut(&mut Self, BrickCode) -> io::Result<T>,
+    ) -> io::Result<Vec<T>> {
+        let mut last = 0_u64;
+        self.many(|input| {
+            last = last.wrapping_add(input.number()?);
+            brick(input, BrickCode(last))
+        })
+    }
+
+    fn brick_update(&mut self, brick: BrickCode) -> io::Result<BrickUpdate> {
+        let (hits, misses) = (self.mask()?, self.mask()?);
+        Ok(BrickUpdate { brick, hits, misses, intensities: self.many(Self::float)?.into() })
+    }
+
+    fn brick_runs(&mut self, brick: BrickCode) -> io::Result<BrickRuns> {
+        Ok(BrickRuns { brick, runs: self.many(Self::run)?.into() })
+    }
+
+    fn run(&mut self) -> io::Result<Run> {
+        let place = self.number()? as u16;
+        let misses = self.number()?;
+        let hit = if misses & 1 == 1 { Some(self.float()?) } else { None };
+        Ok(Run { place, misses: (misses >> 1) as u16, hit })
+    }
+
+    fn mask(&mut self) -> io::Result<BrickMask> {
+        let words = self.byte()?;
+        let mut mask = [0; 8];
+        for (_, word) in mask.iter_mut().enumerate().filter(|(k, _)| words >> k & 1 == 1) {
+            *word = self.word()?;
+        }
+        Ok(mask)
+    }
+
+    fn word(&mut self) -> io::Result<u64> {
+        let set = self.byte()?;
+        let mut bytes = [0; 8];
+        for (_, byte) in bytes.iter_mut().enumerate().filter(|(k, _)| set >> k & 1 == 1) {
+            *byte = self.byte()?;
+        }
+        Ok(u64::from_le_bytes(bytes))
+    }
+
+    /// A list behind its length. It grows as items are read, so a wrong length reserves no memory.
+    fn many<T>(&mut self, mut one: impl FnMut(&mut Self) -> io::Result<T>) -> io::Result<Vec<T>> {
+        let count = self.number()? as usize;
+        let mut all = Vec::with_capacity(count.min(MAX_RESERVED));
+        for _ in 0..count {
+            all.push(one(self)?);
+        }
+        Ok(all)
+    }
+
+    fn number(&mut self) -> io::Result<u64> {
+        let mut number = 0;
+        for shift in (0..64).step_by(7) {
+            let byte = self.byte()?;
+            number |= u64::from(byte & 0x7f) << shift;
+            if byte < 0x80 {
+                break;
+            }
+        }
+        Ok(number)
+    }
+
+    fn float(&mut self) -> io::Result<f32> {
+        Ok(f32::from_le_bytes(self.take()?))
+    }
+
+    #[inline]
+    fn byte(&mut self) -> io::Result<u8> {
+        let [byte] = self.take()?;
+        Ok(byte)
+    }
+
+    #[inline]
+    fn take<const N: usize>(&mut self) -> io::Result<[u8; N]> {
+        let mut taken = [0; N];
+        self.input.read_exact(&mut taken)?;
+        Ok(taken)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::Observation;
+    use proptest::prelude::*;
+
+    fn mask() -> impl Strategy<Value = BrickMask> {
+        let word = prop_oneof![3 => Just(0), 1 => any::<u64>(), 1 => (0..64_u32).prop_map(|bit| 1 << bit)];
+        prop::array::uniform8(word)
+    }
+
+    fn masks() -> impl Strategy<Value = TileUpdates> {
+        let brick = (0..1_u64 << 39, mask(), mask(), any::<bool>()).prop_map(|(code, hits, misses, has)| {
+            let count: u32 = hits.iter().map(|word| word.count_ones()).sum();
+            let intensities = (0..if has { count } else { 0 }).map(|k| k as f32 * 0.5).collect();
+            BrickUpdate { brick: BrickCode(code), hits, misses, intensities }
+        });
+        prop::collection::vec(brick, 0..6).prop_map(TileUpdates::Masks)
+    }
+
+    fn runs() -> impl Strategy<Value = TileUpdates> {
+        let run = (0..512_u16, any::<u16>(), prop::option::of(-1e3..1e3_f32));
+        let run = run.prop_map(|(place, misses, hit)| Run { place, misses, hit });
+        let brick = (0..1_u64 << 39, prop::collection::vec(run, 0..20));
+        let brick = brick.prop_map(|(code, runs)| BrickRuns { brick: BrickCode(code), runs: runs.into() });
+        prop::collection::vec(brick, 0..6).prop_map(TileUpdates::Runs)
+    }
+
+    fn ordered() -> impl Strategy<Value = TileUpdates> {
+        let update = (prop::array::uniform3(0..1024_i32), prop::option::of(0.0..255_f32));
+        (prop::collection::vec(update, 0..30), any::<bool>()).prop_map(|(updates, keep)| {
+            let mut ordered = OrderedUpdates::default();
+            for (offset, hit) in updates {
+                ordered.push(offset, hit.map_or(Observation::Miss, Observation::Hit), keep);
+            }
+            TileUpdates::Ordered(ordered)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_packed_comes_back_in_order(
+            all in prop::collection::vec(prop_oneof![masks(), runs(), ordered()], 0..8),
+        ) {
+            let mut packed = PackedUpdates::default();
+            all.iter().for_each(|updates| packed.push(updates));
+            prop_assert_eq!(packed.iter().collect::<Vec<_>>(), all.clone());
+            prop_assert_eq!(packed.len(), all.iter().map(TileUpdates::len).sum::<usize>());
+            prop_assert_eq!(packed.is_empty(), all.is_empty());
+        }
+    }
+}

@@ -1,0 +1,206 @@
+use crate::scan::{PackedUpdates, ScanReport};
+use crate::sensor::Observation;
+use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, places};
+
+/// All updates of one accepted call, grouped by tile in Morton order of the tiles.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScanUpdates {
+    /// The updates of each tile.
+    pub tiles: Vec<(TileIndex, TileUpdates)>,
+    /// What happened to the points.
+    pub report: ScanReport,
+}
+
+impl ScanUpdates {
+    /// Bytes of memory that the updates occupy.
+    pub fn bytes(&self) -> usize {
+        self.tiles.iter().map(|(_, updates)| updates.bytes()).sum()
+    }
+}
+
+/// The updates of one call for one tile, in a form that can be stored and applied later.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TileUpdates {
+    /// At most one update per voxel: masks per brick, in Morton order.
+    Masks(Vec<BrickUpdate>),
+    /// Any number of updates per voxel, those of a voxel in order: runs per brick, in Morton order.
+    Runs(Vec<BrickRuns>),
+    /// Any number of updates per voxel, all in order.
+    Ordered(OrderedUpdates),
+    /// Any of these, packed.
+    Packed(PackedUpdates),
+}
+
+/// The voxels of one brick that one scan updates, each once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickUpdate {
+    /// Which brick.
+    pub brick: BrickCode,
+    /// Voxels that were hit.
+    pub hits: BrickMask,
+    /// Voxels that were passed and not hit.
+    pub misses: BrickMask,
+    /// The largest intensity of each hit voxel, in the order of the mask; empty for sensor models that need none.
+    pub intensities: Box<[f32]>,
+}
+
+/// Updates of voxels of one brick, any number per voxel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickRuns {
+    /// Which brick.
+    pub brick: BrickCode,
+    /// The runs in Morton order of their voxels; those of a voxel in the order in which they count.
+    pub runs: Box<[Run]>,
+}
+
+/// Consecutive updates of one voxel: misses, and then a hit or nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Run {
+    /// The voxel's place in its brick's Morton order.
+    pub place: u16,
+    /// Number of misses before the hit.
+    pub misses: u16,
+    /// The hit after them, if any: its intensity, which some sensor models use.
+    pub hit: Option<f32>,
+}
+
+impl Run {
+    /// Number of updates.
+    pub fn len(&self) -> usize {
+        usize::from(self.misses) + usize::from(self.hit.is_some())
+    }
+
+    /// Whether there is no update.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Updates of voxels of one tile in the order in which they count.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OrderedUpdates {
+    /// The voxel relative to the tile's lowest, 10 bits an axis from x at bit 0; bit 31 is set for a hit.
+    voxels: Vec<u32>,
+    /// The intensity of each hit, in order; empty for sensor models that need none.
+    intensities: Vec<f32>,
+}
+
+const HIT: u32 = 1 << 31;
+
+impl OrderedUpdates {
+    /// Appends an update. `offset` is the voxel relative to the tile's lowest, below 1024 along every axis.
+    pub(crate) fn push(&mut self, offset: VoxelIndex, observation: Observation, keep_intensity: bool) {
+        let [x, y, z] = offset.map(|k| k as u32 & 1023);
+        let voxel = x | y << 10 | z << 20;
+        match observation {
+            Observation::Miss => self.voxels.push(voxel),
+            Observation::Hit(intensity) => {
+                self.voxels.push(voxel | HIT);
+                if keep_intensity {
+                    self.intensities.push(intensity);
+                }
+            }
+        }
+    }
+
+    /// The packed voxels and the intensities, as for [`OrderedUpdates::from_parts`].
+    pub(crate) fn parts(&self) -> (&[u32], &[f32]) {
+        (&self.voxels, &self.intensities)
+    }
+
+    pub(crate) fn from_parts(voxels: Vec<u32>, intensities: Vec<f32>) -> Self {
+        Self { voxels, intensities }
+    }
+
+    /// The updates in order: the voxel relative to the tile's lowest, and what was observed.
+    pub fn iter(&self) -> impl Iterator<Item = (VoxelIndex, Observation)> {
+        let mut intensities = self.intensities.iter();
+        self.voxels.iter().map(move |packed| {
+            let offset = [packed & 1023, packed >> 10 & 1023, packed >> 20 & 1023].map(|k| k as i32);
+            let observation = if packed & HIT == 0 {
+                Observation::Miss
+            } else {
+                Observation::Hit(intensities.next().copied().unwrap_or_default())
+            };
+            (offset, observation)
+        })
+    }
+
+    /// Number of hits and of misses.
+    pub(crate) fn hits_and_misses(&self) -> (u64, u64) {
+        let hits = self.voxels.iter().filter(|packed| **packed & HIT != 0).count() as u64;
+        (hits, self.voxels.len() as u64 - hits)
+    }
+
+    /// Number of updates.
+    pub fn len(&self) -> usize {
+        self.voxels.len()
+    }
+
+    /// Whether there is no update.
+    pub fn is_empty(&self) -> bool {
+        self.voxels.is_empty()
+    }
+}
+
+impl BrickUpdate {
+    /// The voxels that are updated.
+    pub fn touched(&self) -> BrickMask {
+        std::array::from_fn(|word| self.hits[word] | self.misses[word])
+    }
+
+    /// What was observed of each touched voxel, in Morton order.
+    pub fn observations(&self) -> impl Iterator<Item = Observation> {
+        let mut intensities = self.intensities.iter();
+        places(self.touched()).map(move |place| {
+            if self.hits[place / 64] >> (place % 64) & 1 == 1 {
+                Observation::Hit(intensities.next().copied().unwrap_or_default())
+            } else {
+                Observation::Miss
+            }
+        })
+    }
+}
+
+impl TileUpdates {
+    /// Number of updates.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Masks(bricks) => bricks
+                .iter()
+                .flat_map(|brick| brick.hits.iter().chain(&brick.misses))
+                .map(|word| word.count_ones() as usize)
+                .sum(),
+            Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).map(Run::len).sum(),
+            Self::Ordered(updates) => updates.len(),
+            Self::Packed(updates) => updates.len(),
+        }
+    }
+
+    /// Whether there is no update.
+    pub fn is_empty(&self) -> bool {
+        match self {
+            Self::Masks(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),
+            Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).all(Run::is_empty),
+            Self::Ordered(updates) => updates.is_empty(),
+            Self::Packed(updates) => updates.is_empty(),
+        }
+    }
+
+    /// Bytes of memory that the updates occupy.
+    pub fn bytes(&self) -> usize {
+        let heap = match self {
+            Self::Masks(bricks) => {
+                let intensities: usize = bricks.iter().map(|brick| size_of_val(&*brick.intensities)).sum();
+                bricks.capacity() * size_of::<BrickUpdate>() + intensities
+            }
+            Self::Runs(bricks) => {
+                let runs: usize = bricks.iter().map(|brick| size_of_val(&*brick.runs)).sum();
+                bricks.capacity() * size_of::<BrickRuns>() + runs
+            }
+            Self::Ordered(updates) => (updates.voxels.capacity() + updates.intensities.capacity()) * 4,
+            Self::Packed(updates) => updates.bytes(),
+        };
+        size_of::<Self>() + heap
+    }
+}

@@ -1,0 +1,236 @@
+use super::commit_record::{Flush, Next, Record};
+use super::metadata::Metadata;
+use crate::error::{DecodeError, FormatError};
+use crate::space::{TileIndex, TileTable};
+use crate::store::disk::Disk;
+use crate::store::tiles::tile_version::TileVersion;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// The append-only record of flushes, `commits.log`. A record that is whole is a commit.
+///
+/// ```text
+/// header  32 bytes  magic "VXTCOMIT", version u32 1, map id 16 bytes, CRC-32 of these
+/// record            payload length u32, its complement u32, payload, CRC-32 of the payload
+/// payload           kind u32 (bit 0: whole map, else a change; bit 1: tiles were removed), tile count u32,
+///                   flush number u64, scan number u64, a tile: index 3 x i32, version 48 bytes;
+///                   where tiles were removed, their count u32 and the index of each, 3 x i32;
+///                   then, where it changed, the text of metadata.json
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CommitLog {
+    map_id: [u8; 16],
+    /// Length of the valid part in bytes: the next record goes here.
+    bytes: u64,
+}
+
+/// All commits of a log, taken together.
+#[derive(Clone, Debug, Default)]
+pub struct Commits {
+    /// Number of the last flush; 0 before the first.
+    pub flush_number: u64,
+    /// Number of the last scan in the last flush; 0 before the first.
+    pub scan_number: u64,
+    /// Every tile of the map.
+    pub tiles: TileTable<TileVersion>,
+    /// The tiles that the last record names.
+    pub last_changed: TileTable<()>,
+    /// The tiles that the last record takes out of the map: their files may still be there.
+    pub last_removed: Vec<TileIndex>,
+    /// The last metadata in the log: its parameters are the map's, its bounds and numbers may be older ones.
+    pub metadata: Option<Metadata>,
+    /// What is wrong with the end of the log, where a flush may have been cut short: it never happened, unless
+    /// something else names it.
+    pub torn: Option<FormatError>,
+}
+
+const MAGIC: &[u8; 8] = b"VXTCOMIT";
+const VERSION: u32 = 1;
+const HEADER_BYTES: usize = 32;
+
+impl CommitLog {
+    /// The log of a map of which nothing is written yet.
+    pub(in crate::store) fn of_map(map_id: [u8; 16]) -> Self {
+        Self { map_id, bytes: 0 }
+    }
+
+    /// Length of the valid part in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The map that the log belongs to.
+    pub fn map_id(&self) -> [u8; 16] {
+        self.map_id
+    }
+
+    /// Writes a log with one record of the whole map, synced, in place of nothing or of a temporary name.
+    pub fn write_whole(
+        disk: &dyn Disk,
+        path: &Path,
+        map_id: [u8; 16],
+        commits: &Commits,
+        metadata_text: &str,
+    ) -> io::Result<Self> {
+        let whole = Flush {
+            number: commits.flush_number,
+            scan_number: commits.scan_number,
+            changed: &commits.tiles,
+            removed: &commits.last_removed,
+            metadata_text: Some(metadata_text),
+        };
+        let mut out = disk.create(path)?;
+        let record_bytes = whole.write(true, &header(map_id), &mut out)?;
+        out.sync()?;
+        Ok(Self { map_id, bytes: HEADER_BYTES as u64 + record_bytes })
+    }
+
+    /// Appends a record of changed and removed tiles and syncs it: when this returns, the flush is committed. After an error
+    /// the record may be in the file or not, until [`CommitLog::cut`] has taken it out.
+    pub fn append(&mut self, disk: &dyn Disk, path: &Path, flush: &Flush<'_>) -> io::Result<()> {
+        let mut out = disk.append(path, self.bytes)?;
+        let record_bytes = flush.write(false, &[], &mut out)?;
+        out.sync()?;
+        self.bytes += record_bytes;
+        Ok(())
+    }
+
+    /// Cuts off what a failed attempt may have left behind the valid part, durably.
+    pub fn cut(&self, disk: &dyn Disk, path: &Path) -> io::Result<()> {
+        disk.append(path, self.bytes)?.sync()
+    }
+
+    /// Reads a log of `file_bytes` bytes. An incomplete record at the end is a flush that never happened and is left
+    /// out.
+    ///
+    /// # Errors
+    ///
+    /// A wrong header, or a record that is complete and does not match its checksum.
+    pub fn read(input: &mut impl Read, file_bytes: u64) -> Result<(Self, Commits), DecodeError> {
+        let mut commits = Commits::default();
+        let log = commits.read_from(input, file_bytes)?;
+        Ok((log, commits))
+    }
+}
+
+impl Commits {
+    /// Takes in the records of a log. After an error, those before the damage have been taken in.
+    ///
+    /// # Errors
+    ///
+    /// As for [`CommitLog::read`].
+    pub fn read_from(&mut self, input: &mut impl Read, file_bytes: u64) -> Result<CommitLog, DecodeError> {
+        let map_id = read_header(input, file_bytes)?;
+        let mut bytes = HEADER_BYTES as u64;
+        loop {
+            match Next::read(input, bytes, file_bytes)? {
+                Next::Record(record, record_bytes) => {
+                    self.take(*record, bytes)?;
+                    bytes += record_bytes;
+                }
+                Next::Torn(error) => {
+                    self.torn = Some(error);
+                    break;
+                }
+                Next::End => break,
+            }
+        }
+        Ok(CommitLog { map_id, bytes })
+    }
+
+    fn take(&mut self, record: Record, offset: u64) -> Result<(), FormatError> {
+        if record.flush_number < self.flush_number {
+            let reason = "the flush number is lower than in the record before";
+            return Err(FormatError::at_offset(offset, reason));
+        }
+        self.flush_number = record.flush_number;
+        self.scan_number = record.scan_number;
+        self.metadata = record.metadata.or(self.metadata.take());
+        self.last_changed = record.changed.tiles().map(|tile| (tile, ())).collect();
+        match record.is_whole_map {
+            true => self.tiles = record.changed,
+            false => self.tiles.extend(record.changed.iter()),
+        }
+        for &tile in &record.removed {
+            self.tiles.remove(tile);
+        }
+        self.last_removed = record.removed;
+        Ok(())
+    }
+}
+
+fn header(map_id: [u8; 16]) -> [u8; HEADER_BYTES] {
+    let mut bytes = [0; HEADER_BYTES];
+    bytes[0..8].copy_from_slice(MAGIC);
+    bytes[8..12].copy_from_slice(&VERSION.to_le_bytes());
+    bytes[12..28].copy_from_slice(&map_id);
+    let crc = crc32fast::hash(&bytes[..28]);
+    bytes[28..].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], DecodeError> {
+    let mut bytes = [0; HEADER_BYTES];
+    if file_bytes < HEADER_BYTES as u64 {
+        return Err(FormatError::at_offset(0, "too short for the header of a commit log").into());
+    }
+    input.read_exact(&mut bytes)?;
+    let map_id = std::array::from_fn(|k| bytes[12 + k]);
+    if bytes != header(map_id) {
+        return Err(FormatError::at_offset(0, "not the header of a commit log of version 1").into());
+    }
+    Ok(map_id)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{FileChecksum, FsDisk};
+    use std::fs;
+
+    fn version(number: u64) -> TileVersion {
+        let file = FileChecksum { bytes: 100 + number, crc: number as u32 };
+        TileVersion { scan_number: number, table: file, octree: file, voxels: number, occupied: number / 2 }
+    }
+
+    /// Records that are longer than what is read and written at a time.
+    #[test]
+    fn a_log_cut_anywhere_ends_with_its_last_whole_record_and_a_wrong_byte_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("commits.log");
+        let tiles = |of: std::ops::Range<i32>| {
+            of.map(|k| (TileIndex::new(k % 50, k / 50, -k), version(k as u64))).collect::<TileTable<_>>()
+        };
+        let first = Commits { flush_number: 3, tiles: tiles(0..4000), ..Commits::default() };
+        let mut log = CommitLog::write_whole(&FsDisk, &path, [7; 16], &first, "").unwrap();
+        let end_of_first = log.bytes();
+        let changed = tiles(3000..5500);
+        let removed: Vec<_> = first.tiles.tiles().step_by(3).collect();
+        let flush =
+            Flush { number: 4, scan_number: 9, changed: &changed, removed: &removed, metadata_text: None };
+        log.append(&FsDisk, &path, &flush).unwrap();
+
+        let mut second = first.tiles.clone();
+        second.extend(changed.iter());
+        removed.iter().for_each(|tile| assert!(second.remove(*tile)));
+        let bytes = fs::read(&path).unwrap();
+        let read = |bytes: &[u8]| CommitLog::read(&mut &*bytes, bytes.len() as u64);
+        let (again, commits) = read(&bytes).unwrap();
+        assert_eq!((again, commits.flush_number, commits.torn.is_none()), (log, 4, true));
+        assert!(commits.tiles == second && commits.last_removed == removed);
+        assert!(commits.last_changed.tiles().eq(changed.tiles()));
+
+        for end in (end_of_first as usize..bytes.len()).step_by(7001) {
+            let (cut, commits) = read(&bytes[..end]).unwrap();
+            assert_eq!((cut.bytes(), commits.torn.is_some()), (end_of_first, end as u64 > end_of_first));
+            assert!(commits.tiles == first.tiles);
+        }
+        for at in (0..bytes.len()).step_by(6007).chain([33, 60, bytes.len() - 1]) {
+            let mut wrong = bytes.clone();
+            wrong[at] ^= 1;
+            let found = read(&wrong).map(|(_, commits)| commits.torn.is_some());
+            let is_last = at as u64 >= end_of_first;
+            assert!(if is_last { found.unwrap() } else { found.unwrap_or(true) }, "byte {at}");
+        }
+    }
+}

@@ -1,0 +1,242 @@
+use super::commit_log::{CommitLog, Commits};
+use super::commit_record::{Flush, whole_map_bytes};
+use super::metadata::{Bounds, Metadata};
+use crate::error::{Error, Result};
+use crate::store::disk::ReaderWatch;
+use crate::store::map_files::MapFiles;
+use crate::store::map_folder::{self, Lock};
+use crate::store::snapshots::snapshot_list::SnapshotList;
+use crate::store::tiles::tile_versions::TileVersions;
+
+/// The map's own two files, `commits.log` and `metadata.json`, and the lock that lets only one process write them.
+#[derive(Debug)]
+pub(in crate::store) struct Committer {
+    /// `None` for a map of the seed's format, and for nothing else.
+    log: Option<CommitLog>,
+    /// Whether the log ends with its last commit. After a failed append its end is unknown.
+    is_log_settled: bool,
+    metadata: Metadata,
+    /// Flush number in the `metadata.json` on disk; `None` in the seed's format. A crash can leave it behind the log.
+    written_flush: Option<u64>,
+    /// The map's snapshots; `None` where nothing says which there are.
+    listed: Option<SnapshotList>,
+    /// Whether the log says so too.
+    is_list_logged: bool,
+    /// Held while the store may write.
+    lock: Option<Lock>,
+}
+
+/// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
+const COMPACT_LOG_BYTES: u64 = 2048;
+
+impl Committer {
+    pub(in crate::store) fn new(
+        log: Option<CommitLog>,
+        metadata: Metadata,
+        written_flush: Option<u64>,
+    ) -> Self {
+        let listed = metadata.ext.as_ref().and_then(|ext| ext.snapshots.clone());
+        let (is_log_settled, is_list_logged, lock) = (true, true, None);
+        Self { log, is_log_settled, metadata, written_flush, listed, is_list_logged, lock }
+    }
+
+    /// Holds the lock from here on, so that the map may be written. `is_torn` tells whether the log ends with a record that
+    /// is not whole.
+    pub(in crate::store) fn begin_writing(&mut self, lock: Lock, is_torn: bool) {
+        self.lock = Some(lock);
+        self.is_log_settled = !is_torn;
+    }
+
+    /// Whether the map may be written.
+    pub(in crate::store) fn is_writer(&self) -> bool {
+        self.lock.is_some()
+    }
+
+    /// Checks that the lock still keeps others from writing.
+    pub(in crate::store) fn check_lock(&self) -> Result<()> {
+        self.lock.as_ref().map_or(Ok(()), Lock::check)
+    }
+
+    /// The map's id; `None` for a map of the seed's format.
+    pub(in crate::store) fn map_id(&self) -> Option<[u8; 16]> {
+        self.log.map(|log| log.map_id())
+    }
+
+    /// The map's id.
+    ///
+    /// # Errors
+    ///
+    /// A map of the seed's format has none.
+    pub(in crate::store) fn logged_map_id(&self) -> Result<[u8; 16]> {
+        let reason = "a map of the seed's format must be upgraded first";
+        self.map_id().ok_or_else(|| Error::argument("map", reason))
+    }
+
+    /// The metadata as last read or written.
+    pub(in crate::store) fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// Flush number in the `metadata.json` on disk.
+    pub(in crate::store) fn written_flush(&self) -> Option<u64> {
+        self.written_flush
+    }
+
+    /// Whether `metadata.json` is older than the log, which ends with this flush.
+    pub(in crate::store) fn is_metadata_behind(&self, flush_number: u64) -> bool {
+        self.log.is_some() && self.written_flush != Some(flush_number)
+    }
+
+    /// Which snapshots the map has, if anything says so.
+    pub(in crate::store) fn snapshots(&self) -> Option<&SnapshotList> {
+        self.listed.as_ref()
+    }
+
+    /// Takes over which snapshots were found: the next commit lists them.
+    pub(in crate::store) fn adopt_snapshots(&mut self, found: SnapshotList) {
+        self.listed = Some(found);
+        self.is_list_logged = false;
+    }
+
+    /// Metadata with what the store knows better than its callers: bounds, numbers, storage and snapshots.
+    pub(in crate::store) fn fill_in(
+        &self,
+        mut metadata: Metadata,
+        files: &MapFiles,
+        versions: &TileVersions,
+        [flush_number, scan_number]: [u64; 2],
+    ) -> Metadata {
+        metadata.bounds = Bounds::of(versions.tiles());
+        if let Some(ext) = &mut metadata.ext {
+            ext.storage = files.layout().storage();
+            ext.snapshots = self.listed.clone();
+            ext.empty = metadata.bounds.is_none();
+            (ext.flush_number, ext.scan_number) = (flush_number, scan_number);
+        }
+        metadata
+    }
+
+    /// Whether a commit has to say what the metadata is.
+    pub(in crate::store) fn is_new(&self, metadata: &Metadata) -> bool {
+        !self.is_list_logged
+            || self.metadata.ext.is_none()
+            || !self.metadata.is_same_but_for_progress(metadata)
+    }
+
+    /// Appends a record and syncs it: the commit. After an error the end of the log is unknown, until it is settled.
+    pub(in crate::store) fn append(
+        &mut self,
+        files: &MapFiles,
+        flush: &Flush<'_>,
+        metadata: &Metadata,
+    ) -> Result<()> {
+        self.logged_map_id()?;
+        let Some(mut log) = self.log else { return Ok(()) };
+        let path = files.layout().commit_log();
+        if let Err(error) = log.append(&**files.disk(), &path, flush) {
+            self.is_log_settled = false;
+            return Err(Error::io(&path, "append to", error));
+        }
+        (self.log, self.is_list_logged) = (Some(log), true);
+        self.metadata = metadata.clone();
+        Ok(())
+    }
+
+    /// Cuts off what a failed append may have left. A record that came to disk after all names files that must stay as they
+    /// are until then.
+    pub(in crate::store) fn settle_log(&mut self, files: &MapFiles) -> Result<()> {
+        if let (false, Some(log)) = (self.is_log_settled, self.log) {
+            let path = files.layout().commit_log();
+            log.cut(&**files.disk(), &path).map_err(|error| Error::io(&path, "cut", error))?;
+            files.sync_map_folder()?;
+            self.is_log_settled = true;
+        }
+        Ok(())
+    }
+
+    /// Gives a map of the seed's format an id and a log.
+    pub(in crate::store) fn begin_log(
+        &mut self,
+        files: &MapFiles,
+        map_id: [u8; 16],
+        commits: &Commits,
+    ) -> Result<()> {
+        if self.log.is_none() {
+            let (disk, text) = (&**files.disk(), self.metadata.to_text());
+            let log = map_folder::replace(disk, &files.layout().commit_log(), |next| {
+                CommitLog::write_whole(disk, next, map_id, commits, &text)
+            })?;
+            self.log = Some(log);
+        }
+        Ok(())
+    }
+
+    /// Replaces the log by one record of the whole map.
+    pub(in crate::store) fn replace_log(&mut self, files: &MapFiles, commits: &Commits) -> Result<()> {
+        let Some(log) = self.log else { return Ok(()) };
+        let mut metadata = self.metadata.clone();
+        if let Some(ext) = &mut metadata.ext {
+            ext.snapshots = self.listed.clone();
+        }
+        let (disk, text) = (&**files.disk(), metadata.to_text());
+        let compacted = map_folder::replace(disk, &files.layout().commit_log(), |next| {
+            CommitLog::write_whole(disk, next, log.map_id(), commits, &text)
+        })?;
+        self.log = Some(compacted);
+        self.is_list_logged = true;
+        // What is appended from now on is in this file only; every commit syncs the folder first.
+        files.sync_map_folder()
+    }
+
+    /// Replaces the log by one record of the whole map, if that makes it much shorter.
+    pub(in crate::store) fn compact_log(&mut self, files: &MapFiles, commits: &Commits) -> Result<()> {
+        let Some(log) = self.log else { return Ok(()) };
+        let whole_bytes = whole_map_bytes(commits.tiles.len());
+        match log.bytes() < COMPACT_LOG_BYTES.max(2 * whole_bytes) {
+            true => Ok(()),
+            false => self.replace_log(files, commits),
+        }
+    }
+
+    /// Replaces `metadata.json`: written beside, synced, renamed. The caller syncs the folder, once it watches for readers of
+    /// the new file by what is returned.
+    pub(in crate::store) fn write_metadata(
+        &mut self,
+        files: &MapFiles,
+        versions: &TileVersions,
+    ) -> Result<Box<dyn ReaderWatch>> {
+        let Commits { flush_number, scan_number, .. } = *versions.commits();
+        self.metadata = self.fill_in(self.metadata.clone(), files, versions, [flush_number, scan_number]);
+        let (disk, text) = (&**files.disk(), self.metadata.to_text());
+        let watch = map_folder::replace(disk, &files.layout().metadata(), |next| {
+            map_folder::write_text(disk, next, &text)?;
+            // Before anybody can read it: no reader goes unseen.
+            disk.watch(next)
+        })?;
+        self.written_flush = Some(flush_number);
+        Ok(watch)
+    }
+
+    /// Commits which snapshots the map has, and nothing else. It is a flush of its own in the log, so that whatever ends the
+    /// process is found like any other.
+    pub(in crate::store) fn append_snapshots(
+        &mut self,
+        files: &MapFiles,
+        versions: &TileVersions,
+        listed: SnapshotList,
+    ) -> Result<u64> {
+        self.logged_map_id()?;
+        let before = self.listed.replace(listed);
+        let (number, scan_number) = (versions.commits().flush_number + 1, versions.commits().scan_number);
+        let metadata = self.fill_in(self.metadata.clone(), files, versions, [number, scan_number]);
+        let text = metadata.to_text();
+        let changed = Default::default();
+        let flush =
+            Flush { number, scan_number, changed: &changed, removed: &[], metadata_text: Some(&text) };
+        if let Err(error) = self.append(files, &flush, &metadata) {
+            self.listed = before;
+            return Err(error);
+        }
+        Ok(number)
+    }
+}

@@ -1,0 +1,238 @@
+//! The writing half of [`TileStore`]: versions beside the committed ones, and the commit that puts them in place.
+
+use super::checkpoint::TILES_SYNCED_AT_ONCE;
+use super::commit_record::Flush;
+use super::metadata::Metadata;
+use crate::error::{Error, Result};
+use crate::space::TileIndex;
+use crate::store::layout::TileFile;
+use crate::store::map_files::MapFiles;
+use crate::store::tile_store::TileStore;
+use crate::store::tiles::tile_version::{FileChecksum, TileVersion};
+use crate::store::tiles::tile_versions::TileVersions;
+use crate::store::tiles::tile_writer::TileWriter;
+use std::io::{self, Write};
+
+impl TileStore {
+    /// Writes the next version of one of a tile's files; the committed version stays as it is.
+    pub fn write_next(
+        &mut self,
+        tile: TileIndex,
+        file: TileFile,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<FileChecksum> {
+        self.writer()?.write_next(tile, file, write)
+    }
+
+    /// What writes next versions, for another thread too, until the next commit.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses to finish what the last commit left to do.
+    pub fn writer(&mut self) -> Result<TileWriter> {
+        // A committed version may still be there under the name that is written to now.
+        self.settle()?;
+        let map_id = self.map_id().unwrap_or_default();
+        Ok(TileWriter { files: self.files.clone(), map_id })
+    }
+
+    /// Notes that the next version of a tile is written, both files.
+    pub fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
+        self.versions.note_next(tile, version);
+    }
+
+    /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not hold
+    /// the tile, unless a next version of it is written later. What is not committed leaves the tile where it was.
+    ///
+    /// Memory that holds the tile is the caller's to clear.
+    ///
+    /// # Errors
+    ///
+    /// A map of the seed's format, which has no log that could name removed tiles.
+    pub fn remove(&mut self, tile: TileIndex) -> Result<()> {
+        self.committer.logged_map_id()?;
+        self.versions.remove(tile);
+        Ok(())
+    }
+
+    /// Forgets the next version of a tile, as if it had not been written.
+    pub fn drop_next(&mut self, tile: TileIndex) {
+        self.versions.drop_next(tile);
+    }
+
+    /// The tiles whose next version must be written again before the next commit: the disk failed to sync it, and what
+    /// it says of these files from then on proves nothing.
+    pub fn suspects(&self) -> Vec<TileIndex> {
+        self.versions.suspects()
+    }
+
+    /// Commits every version written and every tile removed since the last commit. When this returns they are durable, and
+    /// only they.
+    ///
+    /// `metadata` gives the map's parameters; bounds and numbers are filled in here. After an error nothing is
+    /// committed, and calling again tries again. What comes after the commit only tidies up: if the disk refuses that,
+    /// it is logged as a warning and made good later.
+    pub fn commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<()> {
+        self.settle()?;
+        self.keep_for_late_readers();
+        self.committer.logged_map_id()?;
+        if let Some(&tile) = self.versions.suspects().first() {
+            let folder = self.layout().tile_folder(tile);
+            return Err(Error::io(&folder, "trust", io::Error::other("an earlier sync failed")));
+        }
+        let number = self.commits().flush_number + 1;
+        let metadata = self.committer.fill_in(metadata, &self.files, &self.versions, [number, scan_number]);
+        let is_new = self.committer.is_new(&metadata);
+        let removed = self.versions.removed();
+        let has_changed = !self.versions.next().is_empty() || !removed.is_empty();
+        if has_changed || is_new || scan_number != self.commits().scan_number {
+            sync_next(&self.files, &mut self.versions)?;
+            // As late as can be: what another writer commits must not be cut off.
+            self.committer.check_lock()?;
+            let text = metadata.to_text();
+            let metadata_text = is_new.then_some(&*text);
+            let changed = self.versions.next();
+            let flush = Flush { number, scan_number, changed, removed: &removed, metadata_text };
+            if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
+                // At once if it goes: another process may come next, and would see a record that is not on the medium.
+                let _ = self.settle();
+                return Err(error);
+            }
+            // Committed.
+            self.note_births(number);
+            let changed = self.versions.committed(number, scan_number);
+            self.checkpoint.add(changed.tiles(), &removed);
+        }
+        if let Err(error) = self.tidy_up() {
+            log::warn!("flushed, but not tidied up: {error}");
+        }
+        Ok(())
+    }
+
+    /// Notes which tiles a commit brings into the map: who reads an earlier flush does not miss them. Who opens the map only
+    /// now is taken to see more than it does, for a while.
+    fn note_births(&mut self, number: u64) {
+        if !self.kept.readers().are_there() {
+            return;
+        }
+        let committed = &self.versions.commits().tiles;
+        for tile in self.versions.next().tiles().filter(|tile| !committed.contains(*tile)) {
+            self.kept.readers().note_birth(tile, number);
+        }
+    }
+
+    /// Brings the files to what the last commit says, without another one.
+    pub fn tidy(&mut self) -> Result<()> {
+        self.settle()?;
+        self.tidy_up()
+    }
+
+    /// Brings about what earlier calls left open, before anything that builds upon it is written.
+    pub(in crate::store) fn settle(&mut self) -> Result<()> {
+        self.committer.check_lock()?;
+        self.committer.settle_log(&self.files)?;
+        self.run_checkpoint()
+    }
+
+    pub(in crate::store) fn run_checkpoint(&mut self) -> Result<()> {
+        self.checkpoint.run(&self.files, &mut self.versions, &mut self.kept)
+    }
+
+    /// What comes after a commit. What the disk refuses of it is made good later.
+    pub(in crate::store) fn tidy_up(&mut self) -> Result<()> {
+        // At once: who opens the map in between cannot tell the writer which flush it reads.
+        if self.committer.written_flush() != Some(self.commits().flush_number) {
+            self.write_metadata()?;
+        }
+        self.run_checkpoint()?;
+        self.kept.release(&self.files);
+        self.committer.compact_log(&self.files, self.versions.commits())
+    }
+
+    /// Puts the next version of a tile's octree in place by itself: it must be the one that the log names.
+    pub fn place_octree(&mut self, tile: TileIndex) -> Result<()> {
+        let layout = self.layout();
+        let (next, current) = (layout.next(tile, TileFile::Octree), layout.current(tile, TileFile::Octree));
+        self.disk().sync_file(&next).map_err(|error| Error::io(&next, "sync", error))?;
+        self.files.rename(&next, &current)?;
+        self.files.sync_folder(&layout.tile_folder(tile))
+    }
+
+    /// Takes tiles out of the map: one commit, after which the log does not name them. Their folders stay.
+    pub fn forget(&mut self, tiles: &[TileIndex]) -> Result<()> {
+        self.settle()?;
+        self.versions.forget(tiles);
+        if self.map_id().is_some() {
+            self.versions.committed_nothing(self.commits().flush_number + 1);
+            self.committer.replace_log(&self.files, self.versions.commits())?;
+        }
+        self.write_metadata()
+    }
+
+    /// Gives a map of the seed's format an id and a log, so that it can be written to. Its tiles count as unread
+    /// until they have been written again.
+    pub fn upgrade(&mut self, map_id: [u8; 16]) -> Result<()> {
+        self.committer.begin_log(&self.files, map_id, self.versions.commits())
+    }
+
+    /// Where `metadata.json` could not be replaced after the last commit, readers of it may have opened that commit.
+    pub(in crate::store) fn keep_for_late_readers(&mut self) {
+        if self.is_metadata_behind() {
+            let flush_number = self.commits().flush_number;
+            self.kept.readers().may_see(flush_number);
+        }
+    }
+
+    /// Replaces `metadata.json`, durably.
+    pub(in crate::store) fn write_metadata(&mut self) -> Result<()> {
+        let watch = self.committer.write_metadata(&self.files, &self.versions)?;
+        self.kept.watch(self.commits().flush_number, watch);
+        self.files.sync_map_folder()
+    }
+}
+
+/// Syncs all versions that the next commit names.
+fn sync_next(files: &MapFiles, versions: &mut TileVersions) -> Result<()> {
+    let mut suspects = Vec::new();
+    let mut changed = versions.next().tiles().peekable();
+    let synced = loop {
+        let group: Vec<_> = changed.by_ref().take(TILES_SYNCED_AT_ONCE).collect();
+        let is_last = changed.peek().is_none();
+        let synced = sync_group(files, &group, is_last, &mut suspects);
+        if is_last || synced.is_err() {
+            break synced;
+        }
+    };
+    drop(changed);
+    suspects.into_iter().for_each(|tile| versions.suspect(tile));
+    synced
+}
+
+/// Syncs the versions of some tiles, and adds the tiles of which that failed to `suspects`. With the last of them goes the map's
+/// own folder, which names the new tile folders.
+fn sync_group(
+    files: &MapFiles,
+    changed: &[TileIndex],
+    is_last: bool,
+    suspects: &mut Vec<TileIndex>,
+) -> Result<()> {
+    let layout = files.layout();
+    let paths: Vec<_> = changed
+        .iter()
+        .flat_map(|&tile| layout.files().iter().map(move |&file| layout.next(tile, file)))
+        .collect();
+    let folders = changed.iter().map(|&tile| layout.tile_folder(tile));
+    let folders: Vec<_> = folders.chain(is_last.then(|| layout.folder().to_owned())).collect();
+    let [synced_files, synced_folders] = files.disk().sync_all(&paths, &folders);
+    let per_tile = layout.files().len();
+    for (number, result) in synced_files.iter().enumerate() {
+        if result.is_err() {
+            suspects.push(changed[number / per_tile]);
+        }
+    }
+    let synced_files = paths.iter().zip(synced_files);
+    for (path, result) in synced_files.chain(folders.iter().zip(synced_folders)) {
+        result.map_err(|error| Error::io(path, "sync", error))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,367 @@
+use super::commit_log::Commits;
+use super::input_record::InputRecord;
+use crate::config::{RayConfig, Storage};
+use crate::error::FormatError;
+use crate::sensor::SensorModel;
+use crate::space::TileIndex;
+use crate::store::snapshots::snapshot_list::SnapshotList;
+use crate::store::tiles::tile_version::MAX_NUMBER;
+use serde::{Deserialize, Serialize};
+
+/// What `metadata.json` says: the seed's keys, and voxtile's own in a last object `ext`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metadata {
+    /// Edge of a voxel in metres.
+    pub resolution_m: f64,
+    /// Edge of a tile in metres.
+    pub tile_size_m: f64,
+    /// The exact hull of the tiles; `None` for an empty map.
+    pub bounds: Option<Bounds>,
+    /// voxtile's own; `None` for a map of the seed's format, which cannot be verified.
+    pub ext: Option<Extension>,
+}
+
+/// Lowest and highest tile index along each axis, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Bounds {
+    /// Lowest tile index along x, y and z.
+    pub min: [i32; 3],
+    /// Highest tile index along x, y and z.
+    pub max: [i32; 3],
+}
+
+/// What voxtile adds to the seed's metadata.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extension {
+    /// Whether the map has no tile, which zeros as bounds cannot say.
+    pub empty: bool,
+    /// Id of the map, 32 hexadecimal digits.
+    pub map_id: String,
+    /// Number of the last flush.
+    pub flush_number: u64,
+    /// Number of the last scan in the map.
+    pub scan_number: u64,
+    /// How observations become evidence.
+    pub sensor_model: SensorModel,
+    /// Probability from which a voxel counts as occupied.
+    pub occupancy_threshold: f64,
+    /// Which part of a ray counted when the map was last written to.
+    pub rays: RayConfig,
+    /// What the map was built from, the latest last: of more than a thousand inputs the earliest are forgotten.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<InputRecord>,
+    /// Number of the last scan in the map when its evidence last faded; 0 if it never has.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub decayed_scan: u64,
+    /// How the tiles are stored; maps of the seed's files do not say.
+    #[serde(default, skip_serializing_if = "Storage::is_seed")]
+    pub storage: Storage,
+    /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions that did
+    /// not list them: every file of the folder of snapshots is one then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snapshots: Option<SnapshotList>,
+}
+
+/// What makes a map the map it is. It stands in every tile, so that a map can be put together again from its tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapParameters {
+    /// Edge of a voxel in metres.
+    pub resolution: f64,
+    /// Edge of a tile in metres.
+    pub tile_size: f64,
+    /// How observations become evidence.
+    pub sensor_model: SensorModel,
+    /// Probability from which a voxel counts as occupied.
+    pub occupancy_threshold: f64,
+}
+
+impl MapParameters {
+    /// The parameters as one line of JSON.
+    pub fn to_text(&self) -> String {
+        serde_json::to_string(self).expect("plain data of strings and numbers")
+    }
+
+    /// Reads the line.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no such JSON.
+    pub fn from_text(text: &str) -> Result<Self, FormatError> {
+        serde_json::from_str(text)
+            .map_err(|error| FormatError::at_offset(0, format!("not the parameters of a map: {error}")))
+    }
+}
+
+#[derive(Deserialize)]
+struct Document {
+    version: String,
+    resolution: f64,
+    tile_size: f64,
+    bounds: Bounds,
+    ext: Option<ReadExtension>,
+}
+
+/// An extension as earlier versions wrote it, too: with the name of the last input alone.
+#[derive(Deserialize)]
+struct ReadExtension {
+    #[serde(flatten)]
+    ext: Extension,
+    input_fingerprint: Option<String>,
+    #[serde(default)]
+    input_first_scan: u64,
+}
+
+impl ReadExtension {
+    fn into_extension(self) -> Extension {
+        let Self { mut ext, input_fingerprint, input_first_scan: first_scan } = self;
+        if let Some(name) = input_fingerprint {
+            ext.inputs.push(InputRecord { name, first_scan, content: None });
+        }
+        ext
+    }
+}
+
+const VERSION: &str = "1.0";
+/// The file ends with the checksum of all bytes before it, so that no byte is without guard.
+const CHECKSUM_KEY: &str = "    \"crc32\": \"";
+const END: &str = "\"\n  }\n}\n";
+
+impl Bounds {
+    /// The hull of tiles; `None` of none.
+    pub fn of(tiles: impl Iterator<Item = TileIndex>) -> Option<Self> {
+        tiles.map(TileIndex::to_array).fold(None, |bounds: Option<Self>, tile| {
+            let Self { min, max } = bounds.unwrap_or(Self { min: tile, max: tile });
+            Some(Self {
+                min: std::array::from_fn(|k| min[k].min(tile[k])),
+                max: std::array::from_fn(|k| max[k].max(tile[k])),
+            })
+        })
+    }
+}
+
+impl Metadata {
+    /// What makes the map the map it is; `None` for a map of the seed's format, which does not say it all.
+    pub fn parameters(&self) -> Option<MapParameters> {
+        self.ext.as_ref().map(|ext| MapParameters {
+            resolution: self.resolution_m,
+            tile_size: self.tile_size_m,
+            sensor_model: ext.sensor_model,
+            occupancy_threshold: ext.occupancy_threshold,
+        })
+    }
+
+    /// How the tiles are stored.
+    pub fn storage(&self) -> Storage {
+        self.ext.as_ref().map_or(Storage::Seed, |ext| ext.storage)
+    }
+
+    /// The same as of a commit: its tiles' hull and its numbers.
+    pub(in crate::store) fn as_of(&self, commits: &Commits) -> Self {
+        let mut metadata = Self { bounds: Bounds::of(commits.tiles.tiles()), ..self.clone() };
+        if let Some(ext) = &mut metadata.ext {
+            ext.empty = metadata.bounds.is_none();
+            (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
+        }
+        metadata
+    }
+
+    /// Whether the two say the same but for what every flush brings: bounds and numbers.
+    pub(in crate::store) fn is_same_but_for_progress(&self, other: &Self) -> bool {
+        let without_progress = |metadata: &Self| {
+            let mut metadata = Self { bounds: None, ..metadata.clone() };
+            if let Some(ext) = &mut metadata.ext {
+                (ext.empty, ext.flush_number, ext.scan_number) = (true, 0, 0);
+            }
+            metadata
+        };
+        without_progress(self) == without_progress(other)
+    }
+
+    /// The file's text. The seed's keys come first and in its order; lengths are plain decimals.
+    pub fn to_text(&self) -> String {
+        let Bounds { min, max } = self.bounds.unwrap_or(Bounds { min: [0; 3], max: [0; 3] });
+        let bounds = format!("\"bounds\": {{\n    \"min\": {min:?},\n    \"max\": {max:?}\n  }}");
+        // Rust prints the shortest decimal that reads back to the same bits, never with an exponent.
+        let (resolution, tile_size) = (decimal(self.resolution_m), decimal(self.tile_size_m));
+        let head = format!(
+            "{{\n  \"version\": \"{VERSION}\",\n  \"resolution\": {resolution},\n  \"tile_size\": {tile_size},\n  {bounds}"
+        );
+        let Some(ext) = &self.ext else { return head + "\n}\n" };
+        let ext = serde_json::to_string_pretty(ext).expect("plain data of strings and numbers");
+        let ext = ext.replace('\n', "\n  ");
+        let ext = ext.strip_suffix("\n  }").expect("an object ends with its brace").to_owned();
+        let text = format!("{head},\n  \"ext\": {ext},\n{CHECKSUM_KEY}");
+        let crc = crc32fast::hash(text.as_bytes());
+        format!("{text}{crc:08x}{END}")
+    }
+
+    /// Reads the file's text.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no such JSON, a version other than 1.0, or a checksum that does not match.
+    pub fn from_text(text: &str) -> Result<Self, FormatError> {
+        let document: Document = serde_json::from_str(text).map_err(|error| {
+            FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}"))
+        })?;
+        if document.version != VERSION {
+            let reason =
+                format!("version {:?} is not known; this program reads {VERSION:?}", document.version);
+            return Err(FormatError::at_offset(0, reason));
+        }
+        // A checksum without `ext` is a damaged name of that key, not a file of the seed's.
+        if document.ext.is_some() || text.contains("\"crc32\"") {
+            check_crc(text)?;
+        }
+        let ext = document.ext.map(ReadExtension::into_extension);
+        if let Some(ext) = &ext
+            && !([ext.flush_number, ext.scan_number, ext.decayed_scan]
+                .into_iter()
+                .chain(ext.snapshots.iter().flat_map(SnapshotList::flushes))
+                .all(|number| number <= MAX_NUMBER)
+                && ext.inputs.iter().all(InputRecord::is_sound))
+        {
+            return Err(FormatError::at_offset(0, "flush or scan number is too high to be true"));
+        }
+        let is_empty = ext.as_ref().is_some_and(|ext| ext.empty);
+        Ok(Self {
+            resolution_m: document.resolution,
+            tile_size_m: document.tile_size,
+            bounds: (!is_empty).then_some(document.bounds),
+            ext,
+        })
+    }
+}
+
+fn check_crc(text: &str) -> Result<(), FormatError> {
+    let wrong = |at: usize| Err(FormatError::at_offset(at as u64, "the text does not match its checksum"));
+    let Some(key) = text.rfind(CHECKSUM_KEY) else { return wrong(text.len()) };
+    let end = key + CHECKSUM_KEY.len();
+    let crc = format!("{:08x}{END}", crc32fast::hash(&text.as_bytes()[..end]));
+    if text[end..] == crc { Ok(()) } else { wrong(end) }
+}
+
+fn is_zero(number: &u64) -> bool {
+    *number == 0
+}
+
+/// A length as a plain decimal that is a JSON float.
+fn decimal(length_m: f64) -> String {
+    let text = length_m.to_string();
+    if text.contains('.') { text } else { text + ".0" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::InputContent;
+
+    fn metadata() -> Metadata {
+        let ext = Extension {
+            empty: false,
+            map_id: "00ff".repeat(8),
+            flush_number: 3,
+            scan_number: 75,
+            sensor_model: SensorModel::default(),
+            occupancy_threshold: 0.5,
+            rays: RayConfig::default(),
+            inputs: vec![InputRecord { first_scan: 45, ..InputRecord::from("abc") }],
+            decayed_scan: 0,
+            storage: Storage::Seed,
+            snapshots: None,
+        };
+        let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());
+        Metadata { resolution_m: 0.05, tile_size_m: 10.0, bounds, ext: Some(ext) }
+    }
+
+    #[test]
+    fn text_and_back() {
+        let written = metadata();
+        let text = written.to_text();
+        let seed = "{\n  \"version\": \"1.0\",\n  \"resolution\": 0.05,\n  \"tile_size\": 10.0,\n  \"bounds\": {\n    \
+                    \"min\": [-7, -1, 0],\n    \"max\": [0, 2, 4]\n  },\n  \"ext\": {\n    \"empty\": false";
+        assert!(text.starts_with(seed), "{text}");
+        assert_eq!(Metadata::from_text(&text), Ok(written));
+    }
+
+    #[test]
+    fn inputs_are_kept_with_their_content_and_those_of_earlier_versions_are_read() {
+        let mut written = metadata();
+        let content = InputContent {
+            scans: 12,
+            begins_with: Some("0a".repeat(16)),
+            scan_chain: "0b".repeat(16),
+            pose_chain: "0c".repeat(16),
+            skipped: vec![3, 7],
+        };
+        let ext = written.ext.as_mut().unwrap();
+        ext.inputs.push(InputRecord { name: "a \"b\"".into(), first_scan: 60, content: Some(content) });
+        assert_eq!(Metadata::from_text(&written.to_text()), Ok(written.clone()));
+        written.ext.as_mut().unwrap().inputs[1].first_scan = u64::MAX;
+        assert!(Metadata::from_text(&written.to_text()).is_err());
+
+        let mut without = metadata();
+        without.ext.as_mut().unwrap().inputs.clear();
+        let text = without.to_text();
+        let text = text.replace(
+            "    \"crc32\"",
+            "    \"input_fingerprint\": \"abc\",\n    \"input_first_scan\": 45,\n    \"crc32\"",
+        );
+        let end = text.find(CHECKSUM_KEY).unwrap() + CHECKSUM_KEY.len();
+        let crc = crc32fast::hash(&text.as_bytes()[..end]);
+        let earlier = format!("{}{crc:08x}{END}", &text[..end]);
+        assert_eq!(Metadata::from_text(&earlier), Ok(metadata()));
+    }
+
+    #[test]
+    fn a_decay_is_named_where_there_was_one() {
+        let mut written = metadata();
+        assert!(!written.to_text().contains("decayed"));
+        if let Some(ext) = &mut written.ext {
+            ext.decayed_scan = 70;
+        }
+        assert!(written.to_text().contains("\n    \"decayed_scan\": 70"));
+        assert_eq!(Metadata::from_text(&written.to_text()), Ok(written));
+    }
+
+    #[test]
+    fn a_storage_is_named_where_it_is_not_the_seeds() {
+        let mut written = metadata();
+        assert!(!written.to_text().contains("storage"));
+        if let Some(ext) = &mut written.ext {
+            ext.storage = Storage::Compact;
+        }
+        assert!(written.to_text().contains("\n    \"storage\": \"compact\",\n"));
+        assert_eq!(Metadata::from_text(&written.to_text()), Ok(written));
+    }
+
+    #[test]
+    fn the_seeds_own_file_is_read_and_has_no_ext() {
+        let text = r#"{"version": "1.0", "resolution": 0.05, "tile_size": 10.0,
+            "bounds": {"min": [0, -1, 0], "max": [5, 3, 2]}}"#;
+        let read = Metadata::from_text(text).unwrap();
+        assert_eq!(read.bounds, Some(Bounds { min: [0, -1, 0], max: [5, 3, 2] }));
+        assert_eq!(read.ext, None);
+    }
+
+    #[test]
+    fn every_changed_byte_is_found() {
+        let text = metadata().to_text();
+        for at in 0..text.len() {
+            for flip in [1, 2, 16, 32] {
+                let mut bytes = text.clone().into_bytes();
+                bytes[at] ^= flip;
+                if let Ok(changed) = String::from_utf8(bytes) {
+                    assert!(Metadata::from_text(&changed).is_err(), "byte {at} ^ {flip}: {changed}");
+                }
+            }
+            assert!(Metadata::from_text(&text[..at]).is_err());
+        }
+    }
+
+    #[test]
+    fn small_lengths_are_written_without_exponent() {
+        let tiny = Metadata { resolution_m: 1e-7, tile_size_m: 1e-5, bounds: None, ext: None };
+        assert!(tiny.to_text().contains("\"resolution\": 0.0000001,"));
+    }
+}

@@ -1,0 +1,62 @@
+use super::disk::{Disk, EntryKind};
+use super::layout::Layout;
+use crate::error::{Error, Result};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A map's files: where they are, and the operations on them. Every error names its path.
+#[derive(Clone, Debug)]
+pub(super) struct MapFiles {
+    disk: Arc<dyn Disk>,
+    layout: Layout,
+}
+
+impl MapFiles {
+    pub(super) fn new(disk: Arc<dyn Disk>, layout: Layout) -> Self {
+        Self { disk, layout }
+    }
+
+    pub(super) fn disk(&self) -> &Arc<dyn Disk> {
+        &self.disk
+    }
+
+    pub(super) fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The map's folder.
+    pub(super) fn folder(&self) -> &Path {
+        self.layout.folder()
+    }
+
+    /// Renames a file. One that is not there was renamed by an earlier attempt, or never was.
+    pub(super) fn rename(&self, from: &Path, to: &Path) -> Result<()> {
+        match self.disk.rename(from, to) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            result => result.map_err(|error| Error::io(from, "rename", error)),
+        }
+    }
+
+    /// Removes a file, if it is there.
+    pub(super) fn remove_file(&self, path: &Path) -> Result<()> {
+        match self.disk.remove_file(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            result => result.map_err(|error| Error::io(path, "remove", error)),
+        }
+    }
+
+    /// What has this name, if anything does.
+    pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
+        self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
+    }
+
+    pub(super) fn sync_folder(&self, folder: &Path) -> Result<()> {
+        self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
+    }
+
+    /// Syncs the map's own folder: the names in it are durable then.
+    pub(super) fn sync_map_folder(&self) -> Result<()> {
+        self.sync_folder(self.folder())
+    }
+}

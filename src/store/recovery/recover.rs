@@ -1,0 +1,319 @@
+use crate::error::{Error, Result, is_of_medium};
+use crate::space::{TileIndex, TileTable};
+use crate::store::commit::commit_log::Commits;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::{Layout, SPILL, tile_of_folder};
+use crate::store::snapshots::seen_tables::{KeptFlushes, Snapshots};
+use crate::store::snapshots::snapshot_file::Snapshot;
+use crate::store::snapshots::snapshot_list::SnapshotList;
+use crate::store::snapshots::snapshot_name::SnapshotName;
+use crate::store::tiles::tile_version::{Checksumming, FileChecksum, TileVersion};
+use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
+use std::io;
+use std::path::Path;
+
+/// What a writer may have left beside the map's own two files.
+const OWN_NEXT: [&str; 2] = ["metadata.json.next", "commits.log.next"];
+
+/// What a crash left behind that is not to be removed.
+#[derive(Debug, Default)]
+pub(in crate::store) struct Leftovers {
+    /// Committed versions that still have their `*.next` names.
+    pub unrenamed: TileTable<()>,
+    /// Tiles of the last commit that have their names, but perhaps not on the medium.
+    pub renamed: TileTable<()>,
+    /// Tile folders that hold files and are not in the log.
+    pub orphans: FxHashSet<TileIndex>,
+    /// What the map's snapshots see.
+    pub snapshots: Snapshots,
+    /// How many files were removed.
+    pub removed: u64,
+}
+
+/// Looks through the folders of a map for what a writer left when it ended: removes versions that were never
+/// committed and tables kept for readers, and finds the committed ones that wait for their names.
+///
+/// Safe to repeat and to break off anywhere.
+///
+/// A file or folder that the medium refuses to show is left as it is: reading its tile tells, and the others go on.
+pub(in crate::store) fn recover(
+    disk: &dyn Disk,
+    layout: &Layout,
+    commits: &Commits,
+    map_id: [u8; 16],
+    listed: Option<&SnapshotList>,
+) -> Result<Leftovers> {
+    let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
+    let mut leftovers = Leftovers::default();
+    let (mut kept, mut hollow) = (KeptFlushes::default(), Vec::new());
+    for name in list(disk, layout.folder())? {
+        let path = layout.folder().join(&name);
+        if OWN_NEXT.contains(&&*name) {
+            remove(disk, &path, &mut leftovers.removed)?;
+        }
+        let Some(tile) = tile_of_folder(&name) else { continue };
+        let version = commits.tiles.get(tile);
+        let is_of_last_commit = commits.last_changed.contains(tile);
+        let (state, flushes) =
+            look_at_tile(disk, layout, tile, version, is_of_last_commit, &mut leftovers.removed)?;
+        if !flushes.is_empty() {
+            kept.insert(tile, flushes);
+        }
+        match state {
+            // Its names may not be on the medium yet, if the writer was killed before it could see to that.
+            State::Whole if is_of_last_commit => {
+                leftovers.renamed.insert(tile, ());
+            }
+            State::Whole | State::Unreadable => {}
+            State::Unrenamed => {
+                leftovers.unrenamed.insert(tile, ());
+            }
+            // Made for a tile that was never committed, or of one that is no part of the map any more.
+            State::Empty if version.is_none() => hollow.push(tile),
+            State::Empty => {}
+            // The store goes on with its removal.
+            State::Orphan if removed.contains(&tile) => {}
+            State::Orphan => {
+                leftovers.orphans.insert(tile);
+            }
+        }
+    }
+    settle_snapshots(disk, layout, map_id, listed, &mut leftovers.removed)?;
+    leftovers.snapshots = Snapshots::look(disk, layout, map_id, commits, listed, &kept)?;
+    remove_unseen(disk, layout, &kept, &mut leftovers)?;
+    for tile in hollow.into_iter().filter(|tile| !leftovers.snapshots.pinned().contains_key(tile)) {
+        let path = layout.tile_folder(tile);
+        tolerate(disk.remove_folder(&path), &path, "remove")?;
+    }
+    Ok(leftovers)
+}
+
+/// Finishes what the log says of snapshots: one that was made gets its name, one that was deleted loses its file.
+fn settle_snapshots(
+    disk: &dyn Disk,
+    layout: &Layout,
+    map_id: [u8; 16],
+    listed: Option<&SnapshotList>,
+    removed: &mut u64,
+) -> Result<()> {
+    let folder = layout.snapshots();
+    if kind(disk, &folder)? != Some(EntryKind::Folder) {
+        return Ok(());
+    }
+    let next = layout.snapshot_next();
+    if matches!(kind(disk, &next)?, Some(EntryKind::File(_))) {
+        let mut names = listed.into_iter().flat_map(SnapshotList::names);
+        let is_due = |name: &&SnapshotName| {
+            matches!(disk.kind(&layout.snapshot(name)), Ok(None))
+                && Snapshot::read(disk, layout, name, map_id, listed).is_ok()
+        };
+        match names.find(is_due) {
+            Some(name) => tolerate(disk.rename(&next, &layout.snapshot(name)), &next, "rename")?,
+            None => remove(disk, &next, removed)?,
+        }
+    }
+    if let Some(listed) = listed {
+        for name in Snapshot::list(disk, layout).unwrap_or_default() {
+            // What somebody else put there stays.
+            let is_deleted = || {
+                let file = Snapshot::read_file(disk, &layout.snapshot(&name), &name, map_id);
+                file.is_ok_and(|file| file.is_some_and(|file| file.has_own_name()))
+            };
+            if !listed.contains(&name) && is_deleted() {
+                remove(disk, &layout.snapshot(&name), removed)?;
+            }
+        }
+    }
+    // In a map that lists none, a deletion that a killed writer could not make durable would come back and miss its tables.
+    tolerate(disk.sync_folder(&folder), &folder, "sync")
+}
+
+/// Removes what an attempt to give tiles of the seed's format their trailers left. Returns how many files.
+pub(in crate::store) fn remove_uncommitted(
+    disk: &dyn Disk,
+    layout: &Layout,
+    tiles: &FxHashSet<TileIndex>,
+) -> Result<u64> {
+    let mut removed = 0;
+    for &tile in tiles {
+        let folder = layout.tile_folder(tile);
+        if kind(disk, &folder)? != Some(EntryKind::Folder) {
+            continue;
+        }
+        for file in layout.files() {
+            remove(disk, &layout.next(tile, *file), &mut removed)?;
+        }
+    }
+    Ok(removed)
+}
+
+/// Removes kept tables that no snapshot sees: they were kept for readers, or for a snapshot that is deleted.
+fn remove_unseen(
+    disk: &dyn Disk,
+    layout: &Layout,
+    kept: &KeptFlushes,
+    leftovers: &mut Leftovers,
+) -> Result<()> {
+    for (&tile, flushes) in kept {
+        for &flush_number in flushes.iter().filter(|&&n| !leftovers.snapshots.sees_kept(tile, n)) {
+            remove(disk, &layout.kept(tile, flush_number), &mut leftovers.removed)?;
+        }
+    }
+    Ok(())
+}
+
+enum State {
+    Whole,
+    Unreadable,
+    Unrenamed,
+    Empty,
+    Orphan,
+}
+
+fn look_at_tile(
+    disk: &dyn Disk,
+    layout: &Layout,
+    tile: TileIndex,
+    version: Option<TileVersion>,
+    is_of_last_commit: bool,
+    removed: &mut u64,
+) -> Result<(State, BTreeSet<u64>)> {
+    let folder = layout.tile_folder(tile);
+    if kind(disk, &folder)? != Some(EntryKind::Folder) {
+        // A file or a link with a tile's name: reading the tile, if there is one, tells.
+        return Ok((State::Orphan, BTreeSet::new()));
+    }
+    let mut names = match disk.list(&folder) {
+        Err(error) if is_of_medium(&error) => {
+            log::warn!("{}: cannot list: {error}; the tile cannot be read", folder.display());
+            return Ok((
+                look_without_names(disk, layout, tile, version, is_of_last_commit)?,
+                BTreeSet::new(),
+            ));
+        }
+        names => names.map_err(|error| Error::io(&folder, "list", error))?,
+    };
+    let mut unrenamed = false;
+    for &file in layout.files() {
+        let next_name = file.next_name(layout.storage());
+        let Some(at) = names.iter().position(|name| name == next_name) else { continue };
+        let next = layout.next(tile, file);
+        if let Some(committed) = version.map(|version| version.of(file)) {
+            let waits = content_of(disk, &next, committed)?;
+            if waits == Content::Committed || is_of_last_commit {
+                let in_place = content_of(disk, &layout.current(tile, file), committed)?;
+                if in_place != Content::Committed {
+                    // If neither is what was committed: damage, which is reported when the tile is read. Keep both.
+                    unrenamed |= waits.is_committed_beside(in_place);
+                    continue;
+                }
+            }
+        }
+        // Never committed; also where it has the bytes of the committed file in place, for it may not be on the medium:
+        // octrees often stay the same while the evidence changes.
+        remove(disk, &next, removed)?;
+        names.swap_remove(at);
+    }
+    for name in names.extract_if(.., |name| name == SPILL) {
+        remove(disk, &folder.join(name), removed)?;
+    }
+    let is_kept = |name: &mut String| layout.flush_of_kept(name).is_some();
+    let kept = names.extract_if(.., is_kept).filter_map(|name| layout.flush_of_kept(&name)).collect();
+    let state = match version {
+        _ if names.is_empty() => State::Empty,
+        None => State::Orphan,
+        Some(_) if unrenamed => State::Unrenamed,
+        Some(_) => State::Whole,
+    };
+    Ok((state, kept))
+}
+
+/// The state of a tile of which nobody can list what there is: what was committed last may wait for its name all the same.
+fn look_without_names(
+    disk: &dyn Disk,
+    layout: &Layout,
+    tile: TileIndex,
+    version: Option<TileVersion>,
+    is_of_last_commit: bool,
+) -> Result<State> {
+    let Some(version) = version else { return Ok(State::Orphan) };
+    for &file in layout.files().iter().filter(|_| is_of_last_commit) {
+        let committed = version.of(file);
+        let waits = content_of(disk, &layout.next(tile, file), committed)?;
+        let in_place = content_of(disk, &layout.current(tile, file), committed)?;
+        if in_place != Content::Committed && waits.is_committed_beside(in_place) {
+            return Ok(State::Unrenamed);
+        }
+    }
+    Ok(State::Unreadable)
+}
+
+/// What has a name; something that is no part of a map where the medium does not tell.
+fn kind(disk: &dyn Disk, path: &Path) -> Result<Option<EntryKind>> {
+    match disk.kind(path) {
+        Err(error) if is_of_medium(&error) => Ok(Some(EntryKind::Other)),
+        kind => kind.map_err(|error| Error::io(path, "look at", error)),
+    }
+}
+
+/// Goes on where the medium refuses a step that another opening can make good.
+fn tolerate(result: io::Result<()>, path: &Path, action: &'static str) -> Result<()> {
+    match result {
+        Err(error) if is_of_medium(&error) => {
+            log::warn!("{}: cannot {action}: {error}", path.display());
+            Ok(())
+        }
+        result => result.map_err(|error| Error::io(path, action, error)),
+    }
+}
+
+fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
+    disk.list(folder).map_err(|error| Error::io(folder, "list", error))
+}
+
+/// Removes a file; what has its name and is none is not voxtile's, and stays.
+fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
+    if !matches!(kind(disk, path)?, Some(EntryKind::File(_))) {
+        return Ok(());
+    }
+    *removed += 1;
+    tolerate(disk.remove_file(path), path, "remove")
+}
+
+/// What a file has.
+#[derive(Clone, Copy, PartialEq)]
+enum Content {
+    /// What the log says of it.
+    Committed,
+    /// Something else, or it is not there.
+    Other,
+    /// Nobody can tell: the medium does not give it back.
+    Unreadable,
+}
+
+impl Content {
+    /// Whether a next version of the last commit is the committed one, beside what is in place and is not: also where it
+    /// cannot be read, for then nothing else can be what was committed.
+    fn is_committed_beside(self, in_place: Self) -> bool {
+        self == Self::Committed || self == Self::Unreadable && in_place == Self::Other
+    }
+}
+
+fn content_of(disk: &dyn Disk, path: &Path, checksum: FileChecksum) -> Result<Content> {
+    let is_none =
+        |error: &io::Error| matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput);
+    let input = match disk.open(path) {
+        Ok(input) if input.file_bytes() != checksum.bytes => return Ok(Content::Other),
+        Ok(input) => input,
+        Err(error) if is_none(&error) => return Ok(Content::Other),
+        Err(error) if is_of_medium(&error) => return Ok(Content::Unreadable),
+        Err(error) => return Err(Error::io(path, "open", error)),
+    };
+    let mut input = Checksumming::new(input);
+    match io::copy(&mut input, &mut io::sink()) {
+        Err(error) if is_of_medium(&error) => Ok(Content::Unreadable),
+        Err(error) => Err(Error::io(path, "read", error)),
+        Ok(_) => Ok(if input.finish().0 == checksum { Content::Committed } else { Content::Other }),
+    }
+}

@@ -1,0 +1,180 @@
+use crate::error::{Error, Result};
+use crate::store::commit::metadata::Metadata;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::{Layout, tile_of_folder};
+use crate::store::map_folder::{self, Lock};
+use crate::store::place;
+use crate::store::tile_store::TileStore;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A new map until it is finished: it lies in a folder beside its place, `MAP.unfinished`, and gets its name as the very
+/// last. So nothing unfinished is ever found where the map will be, by voxtile or by any other reader of the format,
+/// however the work ends; and the name, which comes at once or not at all, is the commit.
+///
+/// What an interrupted attempt left is removed by the next one, and when this value is dropped before
+/// [`StagedMap::finish`].
+#[derive(Debug)]
+pub struct StagedMap {
+    disk: Arc<dyn Disk>,
+    folder: PathBuf,
+    /// Holds the lock of the unfinished folder. `None` once the map has its name.
+    store: Option<TileStore>,
+}
+
+impl StagedMap {
+    /// Begins a map that will be in `folder`, which does not exist yet or is empty.
+    ///
+    /// # Errors
+    ///
+    /// A folder with other content, another process that makes the same map, a disk that refuses.
+    pub fn begin(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
+        place::check_place(&*disk, folder)?;
+        check_is_free(&*disk, folder)?;
+        let unfinished = staging_folder(folder)?;
+        remove_unfinished(&*disk, &unfinished)?;
+        let store = TileStore::create(disk.clone(), &unfinished, metadata, map_id)?;
+        Ok(Self { disk, folder: folder.to_owned(), store: Some(store) })
+    }
+
+    /// Where the map will be.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The map's tiles, to be written and committed; a commit makes them durable, and nothing else.
+    pub fn store(&mut self) -> &mut TileStore {
+        self.store.as_mut().expect("taken by finish alone, which takes the map")
+    }
+
+    /// Gives the map its name: all that was committed is there from then on, and durable when this returns.
+    ///
+    /// # Errors
+    ///
+    /// Something that has the name by now, or a disk that refuses. Only the last of all steps, to make the name durable,
+    /// can fail when the map has it.
+    pub fn finish(mut self) -> Result<()> {
+        check_is_free(&*self.disk, &self.folder)?;
+        let unfinished = staging_folder(&self.folder)?;
+        let is_there =
+            self.disk.kind(&self.folder).map_err(|error| Error::io(&self.folder, "look at", error))?;
+        if is_there.is_some() {
+            self.disk
+                .remove_folder(&self.folder)
+                .map_err(|error| Error::io(&self.folder, "replace", error))?;
+        }
+        if cfg!(windows) {
+            // A folder with an open file cannot be renamed there. Elsewhere nobody else begins meanwhile.
+            self.store = None;
+        }
+        if let Err(error) = self.disk.rename(&unfinished, &self.folder) {
+            return Err(Error::io(&unfinished, "rename", error));
+        }
+        self.store = None;
+        let parent = map_folder::parent_of(&self.folder);
+        self.disk.sync_folder(parent).map_err(|error| Error::io(parent, "sync", error))
+    }
+}
+
+impl Drop for StagedMap {
+    fn drop(&mut self) {
+        if let (Some(_lock), Ok(unfinished)) = (&self.store, staging_folder(&self.folder)) {
+            // What stays after all is removed by the next attempt.
+            let _ = remove_content(&*self.disk, &Layout::new(&unfinished), true);
+            let _ = self.disk.remove_folder(&unfinished);
+        }
+    }
+}
+
+/// Where a map is made that will be in `folder`.
+///
+/// # Errors
+///
+/// A path without a name, such as `..`.
+pub fn staging_folder(folder: &Path) -> Result<PathBuf> {
+    match folder.file_name() {
+        Some(_) => Ok(folder.with_added_extension("unfinished")),
+        None => {
+            let reason = format!("{} has no name of its own; name a folder to be made", folder.display());
+            Err(Error::argument("output", reason))
+        }
+    }
+}
+
+fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
+    let is_free = match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
+        None => true,
+        Some(EntryKind::Folder) => {
+            disk.list(folder).map_err(|error| Error::io(folder, "list", error))?.is_empty()
+        }
+        Some(_) => false,
+    };
+    if is_free {
+        return Ok(());
+    }
+    let hint = "choose a folder that does not exist yet, or remove it first";
+    Err(Error::AlreadyExists { path: folder.to_owned(), hint })
+}
+
+/// Removes what an interrupted attempt left; what is not of a map stays, and is an error.
+fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
+    match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
+        None => return Ok(()),
+        Some(EntryKind::Folder) => {}
+        Some(_) => return Err(not_of_a_map(folder)),
+    }
+    let layout = Layout::new(folder);
+    // Before the lock, which leaves a file behind.
+    check_content(disk, &layout)?;
+    let _lock = Lock::take(disk, &layout)?;
+    remove_content(disk, &layout, false)
+}
+
+/// The files that a map has beside its tiles, at any moment of its making.
+const OWN_FILES: [&str; 5] =
+    ["metadata.json", "metadata.json.next", "commits.log", "commits.log.next", "writer.lock"];
+
+fn check_content(disk: &dyn Disk, layout: &Layout) -> Result<()> {
+    for name in list(disk, layout.folder())? {
+        if !OWN_FILES.contains(&&*name) && tile_of_folder(&name).is_none() {
+            return Err(not_of_a_map(&layout.folder().join(name)));
+        }
+    }
+    Ok(())
+}
+
+/// Removes the files of a map and the folders of its tiles, those that tell what it is first.
+fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) -> Result<()> {
+    check_content(disk, layout)?;
+    let remove = |path: &Path| match disk.remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Error::io(path, "remove", error)),
+        _ => Ok(()),
+    };
+    for name in OWN_FILES.iter().filter(|&&name| name != "writer.lock") {
+        remove(&layout.folder().join(name))?;
+    }
+    for tile in list(disk, layout.folder())?.iter().filter_map(|name| tile_of_folder(name)) {
+        let folder = layout.tile_folder(tile);
+        if disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))?
+            != Some(EntryKind::Folder)
+        {
+            // A link could lead anywhere.
+            return Err(not_of_a_map(&folder));
+        }
+        for name in list(disk, &folder)? {
+            remove(&folder.join(name))?;
+        }
+        disk.remove_folder(&folder).map_err(|error| Error::io(&folder, "remove", error))?;
+    }
+    if with_lock { remove(&layout.lock()) } else { Ok(()) }
+}
+
+fn not_of_a_map(path: &Path) -> Error {
+    let hint = "it is in the way of a map that is to be made beside it; move or remove it";
+    Error::AlreadyExists { path: path.to_owned(), hint }
+}
+
+fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
+    disk.list(folder).map_err(|error| Error::io(folder, "list", error))
+}

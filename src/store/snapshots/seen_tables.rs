@@ -1,0 +1,162 @@
+use super::snapshot_file::Snapshot;
+use super::snapshot_list::SnapshotList;
+use crate::error::{Error, Result};
+use crate::space::{TileIndex, TileTable};
+use crate::store::commit::commit_log::Commits;
+use crate::store::disk::Disk;
+use crate::store::layout::Layout;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeSet;
+
+/// Tables that were kept when they were replaced: for each tile, the flushes that they were the last version of.
+pub(in crate::store) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
+
+/// Which tables a map's snapshots see, so that its writer keeps them.
+///
+/// A snapshot of flush `n` sees of each of its tiles the table that was kept as of the first flush not before `n`, and if
+/// none was, the one in place: it is readers' rule, and needs nothing but names.
+#[derive(Debug, Default)]
+pub(in crate::store) struct Snapshots {
+    /// Tiles of which a snapshot sees the table in place.
+    shared: TileTable<()>,
+    /// Kept tables that a snapshot sees.
+    pinned: KeptFlushes,
+    /// Whether there is a snapshot that cannot be read, and of which nothing is known: it may see anything.
+    see_all: bool,
+    /// The snapshots themselves.
+    found: SnapshotList,
+}
+
+impl Snapshots {
+    /// Looks which of the kept tables the snapshots of a map see, and which snapshots there are. One is in memory at a time.
+    ///
+    /// A snapshot that is missing or cannot be read is no error: it counts as one that saw every tile as of its flush, and
+    /// where nothing tells its flush, as one that sees everything.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses more than one file.
+    pub(in crate::store) fn look(
+        disk: &dyn Disk,
+        layout: &Layout,
+        map_id: [u8; 16],
+        map: &Commits,
+        listed: Option<&SnapshotList>,
+        kept: &KeptFlushes,
+    ) -> Result<Self> {
+        let mut snapshots = Self::default();
+        let names: Vec<_> = match (listed, Snapshot::list(disk, layout)) {
+            (Some(listed), _) => listed.names().cloned().collect(),
+            (None, Ok(names)) => names,
+            (None, Err(error)) => {
+                snapshots.cannot_read(error, None, map, kept)?;
+                return Ok(snapshots);
+            }
+        };
+        for name in names {
+            let flush_number = match Snapshot::read(disk, layout, &name, map_id, listed) {
+                Ok(snapshot) => {
+                    snapshots.take(&snapshot.commits, kept);
+                    Some(snapshot.commits.flush_number)
+                }
+                Err(error) => {
+                    let flush_number = listed.and_then(|listed| listed.flush_of(&name));
+                    snapshots.cannot_read(error, flush_number, map, kept)?;
+                    flush_number
+                }
+            };
+            snapshots.found.insert(name, flush_number);
+        }
+        Ok(snapshots)
+    }
+
+    fn cannot_read(
+        &mut self,
+        error: Error,
+        flush_number: Option<u64>,
+        map: &Commits,
+        kept: &KeptFlushes,
+    ) -> Result<()> {
+        if !matches!(error, Error::Damaged { .. }) && !error.is_of_medium() {
+            return Err(error);
+        }
+        match flush_number {
+            Some(flush_number) => {
+                log::warn!("{error}; until then every table as of flush {flush_number} is kept");
+                let tiles: FxHashSet<_> = map.tiles.tiles().chain(kept.keys().copied()).collect();
+                self.take_tiles(tiles.into_iter(), flush_number, kept);
+            }
+            None => {
+                log::warn!("{error}; until then every table is kept");
+                self.see_all = true;
+                for (&tile, flushes) in kept {
+                    self.pinned.entry(tile).or_default().extend(flushes);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The snapshots that were found, and the flushes that they are of.
+    pub(in crate::store) fn found(&self) -> &SnapshotList {
+        &self.found
+    }
+
+    fn take(&mut self, commits: &Commits, kept: &KeptFlushes) {
+        self.take_tiles(commits.tiles.tiles(), commits.flush_number, kept);
+    }
+
+    fn take_tiles(&mut self, tiles: impl Iterator<Item = TileIndex>, as_of_flush: u64, kept: &KeptFlushes) {
+        for tile in tiles {
+            match seen_by(kept.get(&tile), as_of_flush) {
+                Some(flush_number) => self.pin(tile, flush_number),
+                None => self.shared.insert(tile, ()),
+            }
+        }
+    }
+
+    /// Notes that there is a snapshot of the map as it is.
+    pub(in crate::store) fn share(&mut self, tiles: impl Iterator<Item = TileIndex>) {
+        self.shared.extend(tiles.map(|tile| (tile, ())));
+    }
+
+    /// Whether a snapshot sees the table in place.
+    pub(in crate::store) fn sees_present(&self, tile: TileIndex) -> bool {
+        self.see_all || self.shared.contains(tile)
+    }
+
+    /// Whether a snapshot sees the table that was kept as of a flush.
+    pub(in crate::store) fn sees_kept(&self, tile: TileIndex, flush_number: u64) -> bool {
+        self.pinned.get(&tile).is_some_and(|flushes| flushes.contains(&flush_number))
+    }
+
+    /// Notes that the table in place was kept as of a flush for the snapshots that see it.
+    pub(in crate::store) fn pin(&mut self, tile: TileIndex, flush_number: u64) {
+        self.pinned.entry(tile).or_default().insert(flush_number);
+    }
+
+    /// Notes that what was kept of the table in place is durable: what takes its place is seen by no snapshot yet.
+    pub(in crate::store) fn has_replaced(&mut self, tile: TileIndex) {
+        self.shared.remove(tile);
+    }
+
+    /// Every kept table that a snapshot sees.
+    pub(in crate::store) fn pinned(&self) -> &KeptFlushes {
+        &self.pinned
+    }
+
+    /// Bytes of memory, about.
+    pub(in crate::store) fn bytes(&self) -> usize {
+        // A set of few numbers takes a leaf of its tree.
+        const FLUSHES_BYTES: usize = 120;
+        let slot = size_of::<TileIndex>() + 1;
+        self.shared.bytes()
+            + self.pinned.capacity() * 8 / 7 * (slot + size_of::<BTreeSet<u64>>())
+            + self.pinned.len() * FLUSHES_BYTES
+    }
+}
+
+/// Which of a tile's kept tables a snapshot of a flush sees; `None` if the one in place.
+pub(in crate::store) fn seen_by(kept: Option<&BTreeSet<u64>>, flush_number: u64) -> Option<u64> {
+    kept?.range(flush_number..).next().copied()
+}

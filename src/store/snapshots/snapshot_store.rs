@@ -1,0 +1,275 @@
+//! Snapshots of a [`TileStore`]: made, deleted, and opened like the map itself.
+
+use super::seen_tables::Snapshots;
+use super::snapshot_file::Snapshot;
+use super::snapshot_list::{MOST_SNAPSHOTS, SnapshotList};
+use super::snapshot_name::SnapshotName;
+use crate::error::{Error, FormatError, Result};
+use crate::space::TileIndex;
+use crate::store::commit::commit_log::{CommitLog, Commits};
+use crate::store::commit::metadata::Metadata;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::Layout;
+use crate::store::layout::TileFile;
+use crate::store::map_folder;
+use crate::store::tile_store::{TileStore, id_from_hex};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+impl TileStore {
+    /// Opens a snapshot for reading, beside a writer too: takes no lock and writes nothing.
+    ///
+    /// # Errors
+    ///
+    /// No map or no snapshot of this name there; damage; a disk that refuses.
+    pub fn open_snapshot(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotName) -> Result<Self> {
+        let layout = Layout::new(folder);
+        let metadata = map_folder::read_metadata(&*disk, &layout)?;
+        let Some(map_id) = metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id)) else {
+            let map = folder.display();
+            let reason =
+                format!("{map} has none with the name {name}: a map of the seed's format has no snapshots");
+            return Err(Error::argument("snapshot", reason));
+        };
+        // The log may be ahead of the file; where it cannot be read, the file is what there is.
+        let listed = match Self::read(disk.clone(), layout.clone(), metadata.clone()) {
+            Ok(store) => store.committer.snapshots().cloned(),
+            Err(_) => metadata.ext.and_then(|ext| ext.snapshots),
+        };
+        let snapshot = Snapshot::read(&*disk, &layout, name, map_id, listed.as_ref())?;
+        Ok(Self::of_snapshot(disk, layout, snapshot))
+    }
+
+    fn of_snapshot(disk: Arc<dyn Disk>, layout: Layout, snapshot: Snapshot) -> Self {
+        let Snapshot { name, map_id, metadata, commits, .. } = snapshot;
+        let mut store = Self::new(disk, layout, metadata, Some(CommitLog::of_map(map_id)), commits);
+        store.opened_snapshot = Some(name);
+        store
+    }
+
+    /// The map as a snapshot of it says, for reading.
+    pub fn at(&self, snapshot: &Snapshot) -> Self {
+        Self::of_snapshot(self.disk().clone(), self.layout().clone(), snapshot.clone())
+    }
+
+    /// The snapshot that this store was opened as.
+    pub fn opened_snapshot(&self) -> Option<&SnapshotName> {
+        self.opened_snapshot.as_ref()
+    }
+
+    /// The names of the map's snapshots, in order, also of those whose file is missing.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn snapshot_names(&self) -> Result<Vec<SnapshotName>> {
+        match self.committer.snapshots() {
+            Some(listed) => Ok(listed.names().cloned().collect()),
+            None => Snapshot::list(&**self.disk(), self.layout()),
+        }
+    }
+
+    /// Which snapshots the map has, as its log says; `None` if it does not.
+    pub fn snapshot_list(&self) -> Option<&SnapshotList> {
+        self.committer.snapshots()
+    }
+
+    /// Reads what a snapshot of this map says.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Snapshot::read`].
+    pub fn snapshot(&self, name: &SnapshotName) -> Result<Snapshot> {
+        let map_id = self.map_id().unwrap_or_default();
+        Snapshot::read(&**self.disk(), self.layout(), name, map_id, self.committer.snapshots())
+    }
+
+    /// Keeps the last commit under a name, until the snapshot is deleted: from here on its tables stay when they are
+    /// replaced. What is written and not committed is no part of it. When this returns it is durable; after an error there
+    /// is none.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::AlreadyExists`] if there is one of this name; a map of the seed's format, which must be adopted first; a
+    /// disk that refuses.
+    pub fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
+        self.settle()?;
+        let map_id = self.committer.logged_map_id()?;
+        let (folder, path) = (self.layout().snapshots(), self.layout().snapshot(name));
+        let has_folder = Snapshot::has_folder(&**self.disk(), self.layout())?;
+        let mut listed = self.committer.snapshots().cloned().unwrap_or_default();
+        if listed.contains(name) || has_folder && self.files.kind(&path)?.is_some() {
+            let hint = "choose another name, or delete that snapshot first";
+            return Err(Error::AlreadyExists { path, hint });
+        }
+        if listed.len() >= MOST_SNAPSHOTS {
+            let (size, limit) = (listed.len() as u64 + 1, MOST_SNAPSHOTS as u64);
+            let hint = "delete some first";
+            return Err(Error::TooLarge { what: "the number of snapshots", size, limit, hint });
+        }
+        if !has_folder {
+            self.disk().create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
+        }
+        // Perhaps made by an attempt that could not.
+        self.files.sync_map_folder()?;
+        let next = self.layout().snapshot_next();
+        let flush_number = self.commits().flush_number;
+        self.write_next_snapshot(name, map_id, self.metadata(), self.commits())?;
+        self.files.sync_folder(&folder)?;
+        listed.insert(name.clone(), Some(flush_number));
+        if let Err(error) = self.commit_snapshots(listed) {
+            // Also if it stays, nothing names it.
+            let _ = self.disk().remove_file(&next);
+            return Err(error);
+        }
+        // Committed.
+        self.kept.share(self.versions.commits().tiles.tiles());
+        self.checkpoint.name_snapshot(name);
+        self.tidy_snapshots();
+        Ok(())
+    }
+
+    /// Writes what a snapshot says in place of what it said before.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn replace_snapshot(&self, snapshot: &Snapshot) -> Result<()> {
+        let Snapshot { name, map_id, metadata, commits, .. } = snapshot;
+        let (next, path) = (self.layout().snapshot_next(), self.layout().snapshot(name));
+        self.write_next_snapshot(name, *map_id, metadata, commits)?;
+        self.disk().rename(&next, &path).map_err(|error| Error::io(&path, "replace", error))?;
+        self.files.sync_folder(&self.layout().snapshots())
+    }
+
+    /// Commits which snapshots the map has, and nothing else: what is written of tiles stays uncommitted. It is a flush of its
+    /// own in the log, so that whatever ends the process is found like any other.
+    fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
+        self.committer.check_lock()?;
+        self.keep_for_late_readers();
+        match self.committer.append_snapshots(&self.files, &self.versions, listed) {
+            Ok(number) => self.versions.committed_nothing(number),
+            Err(error) => {
+                let _ = self.settle();
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the files of snapshots in order after a commit; what the disk refuses is made good by the next call.
+    fn tidy_snapshots(&mut self) {
+        if let Err(error) = self.tidy_up() {
+            log::warn!("{}: committed, but not tidied up: {error}", self.folder().display());
+        }
+    }
+
+    /// Every kept table that a snapshot sees; where one cannot be read, every kept table.
+    pub fn seen_by_snapshots(&self) -> impl Iterator<Item = (TileIndex, u64)> {
+        let pinned = self.kept.snapshots().pinned().iter();
+        pinned.flat_map(|(&tile, flushes)| flushes.iter().map(move |&flush_number| (tile, flush_number)))
+    }
+
+    fn write_next_snapshot(
+        &self,
+        name: &SnapshotName,
+        map_id: [u8; 16],
+        metadata: &Metadata,
+        commits: &Commits,
+    ) -> Result<()> {
+        let mut metadata = metadata.as_of(commits);
+        if let Some(ext) = &mut metadata.ext {
+            ext.snapshots = Some(SnapshotList::of(name.clone(), commits.flush_number));
+        }
+        let next = self.layout().snapshot_next();
+        CommitLog::write_whole(&**self.disk(), &next, map_id, commits, &metadata.to_text())
+            .map_err(|error| Error::io(&next, "write", error))?;
+        Ok(())
+    }
+
+    /// Deletes a snapshot, and the tables that no other one sees. One that is damaged, cannot be read or is missing can be
+    /// deleted too: from then on nothing is kept for it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses.
+    pub fn delete_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
+        self.settle()?;
+        let path = self.layout().snapshot(name);
+        let is_listed = self.committer.snapshots().is_some_and(|listed| listed.contains(name));
+        match self.disk().kind(&path) {
+            Ok(Some(EntryKind::File(_))) => {}
+            Ok(Some(_)) if Snapshot::has_folder(&**self.disk(), self.layout()).is_ok() => {
+                let reason = "no regular file; `voxtile repair` moves it out of the map";
+                return Err(FormatError::at_offset(0, reason).in_map(&path, None));
+            }
+            _ if is_listed => {}
+            // Says which ones there are.
+            Ok(_) => return self.snapshot(name).map(drop),
+            Err(error) => return Err(Error::io(&path, "look at", error)),
+        }
+        let mut listed = self.committer.snapshots().cloned().unwrap_or_default();
+        listed.remove(name);
+        if self.map_id().is_some() {
+            self.commit_snapshots(listed)?;
+        }
+        self.checkpoint.remove_snapshot(name);
+        self.tidy_snapshots();
+        if let Err(error) = self.release_unseen() {
+            log::warn!("deleted, but its tables stay until the map is opened again: {error}");
+        }
+        Ok(())
+    }
+
+    /// Takes snapshots off the list whose files are not there any more, and what was kept for them.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn give_up_snapshots(&mut self, names: &[SnapshotName]) -> Result<()> {
+        self.settle()?;
+        let mut listed = self.committer.snapshots().cloned().unwrap_or_default();
+        let mut is_changed = false;
+        for name in names {
+            is_changed |= listed.remove(name);
+        }
+        if is_changed {
+            self.commit_snapshots(listed)?;
+            self.tidy_snapshots();
+            self.release_unseen()?;
+        }
+        Ok(())
+    }
+
+    /// Removes the kept tables that no snapshot and no reader sees any more.
+    fn release_unseen(&mut self) -> Result<()> {
+        let Some(map_id) = self.map_id() else { return Ok(()) };
+        let (listed, pinned) = (self.committer.snapshots(), self.kept.snapshots().pinned());
+        let tiles: Vec<_> = pinned.keys().copied().collect();
+        let snapshots =
+            Snapshots::look(&**self.disk(), self.layout(), map_id, self.commits(), listed, pinned)?;
+        self.kept.set_snapshots(snapshots);
+        self.kept.release(&self.files);
+        for tile in tiles.into_iter().filter(|tile| !self.commits().tiles.contains(*tile)) {
+            // Of a removed tile: it goes if that was all that was in it.
+            let _ = self.disk().remove_folder(&self.layout().tile_folder(tile));
+        }
+        Ok(())
+    }
+
+    /// Makes a table of the tile that is whole under another name its next version: the same file where the file system
+    /// has hard links, else a copy.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn link_next(&mut self, tile: TileIndex, table: &Path) -> Result<()> {
+        self.settle()?;
+        if self.disk().link(table, &self.layout().next(tile, TileFile::Table)).is_ok() {
+            return Ok(());
+        }
+        let mut input = self.disk().open(table).map_err(|error| Error::io(table, "open", error))?;
+        self.write_next(tile, TileFile::Table, |out| io::copy(&mut input, out).map(drop)).map(drop)
+    }
+}

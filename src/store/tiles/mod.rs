@@ -1,0 +1,7 @@
+//! Tiles as the store sees them: which there are, where their files lie, and what the log records of them.
+
+pub(super) mod spill_file;
+pub(super) mod tile_location;
+pub(super) mod tile_version;
+pub(super) mod tile_versions;
+pub(super) mod tile_writer;

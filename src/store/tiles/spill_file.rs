@@ -1,0 +1,105 @@
+use super::tile_writer::make_folder;
+use crate::error::{Error, FormatError, Result};
+use crate::space::{TileIndex, TileValue, put_number, take_number, take_u32};
+use crate::store::tile_store::TileStore;
+use std::io::{BufRead, BufReader, Read, Write};
+
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// How much of a tile's spill file counts: so many bytes with this checksum. What stands behind them is left by an attempt
+/// that was given up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SpillFile {
+    /// Length in bytes.
+    pub bytes: u64,
+    crc: u32,
+}
+
+impl TileValue for SpillFile {
+    fn pack(self, _: Self, out: &mut Vec<u8>) {
+        put_number(self.bytes, out);
+        out.extend_from_slice(&self.crc.to_le_bytes());
+    }
+
+    fn unpack(_: Self, input: &mut &[u8]) -> Self {
+        let bytes = take_number(input);
+        Self { bytes, crc: take_u32(input) }
+    }
+}
+
+/// Updates of a tile in a file of its folder, because memory is short. They are no part of the map on disk: a commit does not
+/// know the file, and opening the map removes it.
+impl TileStore {
+    /// Appends updates to those of `file`, and returns what is there then. After an error `file` still counts.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn append_spill(&self, tile: TileIndex, file: SpillFile, updates: &[u8]) -> Result<SpillFile> {
+        let path = self.layout().spill(tile);
+        make_folder(&**self.disk(), &self.layout().tile_folder(tile))?;
+        let append = || {
+            let mut out = match file.bytes {
+                0 => self.disk().create(&path)?,
+                bytes => self.disk().append(&path, bytes)?,
+            };
+            out.write_all(updates)?;
+            out.flush()
+        };
+        append().map_err(|error| Error::io(&path, "append to", error))?;
+        let mut crc = crc32fast::Hasher::new_with_initial(file.crc);
+        crc.update(updates);
+        Ok(SpillFile { bytes: file.bytes + updates.len() as u64, crc: crc.finalize() })
+    }
+
+    /// Opens the updates in a tile's spill file, whose checksum was compared: there may be more than memory has room for.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses, and a file that is not what was written.
+    pub fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
+        let path = self.layout().spill(tile);
+        let open = || {
+            let input = self.disk().open(&path).map_err(|error| Error::io(&path, "open", error))?;
+            Ok(BufReader::with_capacity(BUFFER_BYTES, input).take(file.bytes))
+        };
+        let mut crc = crc32fast::Hasher::new();
+        let mut input = open()?;
+        let mut bytes = 0;
+        loop {
+            let some = input.fill_buf().map_err(|error| Error::io(&path, "read", error))?;
+            if some.is_empty() {
+                break;
+            }
+            crc.update(some);
+            let count = some.len();
+            bytes += count as u64;
+            input.consume(count);
+        }
+        if bytes != file.bytes || crc.finalize() != file.crc {
+            let reason = "the updates that wait here for their tile are not those written; \
+                          go on from the last flush";
+            return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
+        }
+        open()
+    }
+
+    /// Cuts off what stands behind the updates that count. A failure costs disk space and does no other harm.
+    pub fn cut_spill(&self, tile: TileIndex, file: SpillFile) {
+        if file.bytes == 0 {
+            return self.remove_spill(tile);
+        }
+        let path = self.layout().spill(tile);
+        if let Err(error) = self.disk().append(&path, file.bytes) {
+            log::debug!("{}: not cut: {error}", path.display());
+        }
+    }
+
+    /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no harm.
+    pub fn remove_spill(&self, tile: TileIndex) {
+        let path = self.layout().spill(tile);
+        if let Err(error) = self.disk().remove_file(&path) {
+            log::debug!("{}: not removed: {error}", path.display());
+        }
+    }
+}

@@ -1,0 +1,73 @@
+use super::tile_version::{Checksumming, TileVersion};
+use crate::config::Storage;
+use crate::error::{Error, FormatError, Result};
+use crate::space::TileIndex;
+use crate::store::disk::{Disk, DiskRead, EntryKind};
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Where a tile's table is, and what is known of it.
+#[derive(Clone, Debug)]
+pub struct TileLocation {
+    pub(in crate::store) disk: Arc<dyn Disk>,
+    pub(in crate::store) tile: TileIndex,
+    pub(in crate::store) folder: PathBuf,
+    pub(in crate::store) path: PathBuf,
+    pub(in crate::store) map_id: Option<[u8; 16]>,
+    pub(in crate::store) version: Option<TileVersion>,
+    pub(in crate::store) storage: Storage,
+}
+
+/// A tile's table as it is stored, ready to be read.
+pub struct StoredTile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The bytes; their checksum is computed as they pass.
+    pub input: Checksumming<Box<dyn DiskRead>>,
+    /// Length of the file in bytes.
+    pub bytes: u64,
+    /// Id of the map that the file must name; `None` if it is of the seed's format.
+    pub map_id: Option<[u8; 16]>,
+    /// What the log says of the tile, if it does.
+    pub version: Option<TileVersion>,
+    /// Of which form it is.
+    pub storage: Storage,
+}
+
+impl TileLocation {
+    /// Which tile.
+    pub fn tile(&self) -> TileIndex {
+        self.tile
+    }
+
+    /// Opens the table.
+    ///
+    /// # Errors
+    ///
+    /// A file or folder that is missing or none, and a disk that refuses.
+    pub fn open(self) -> Result<StoredTile> {
+        let Self { disk, tile, folder, path, map_id, version, storage } = self;
+        let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
+        match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
+            Some(EntryKind::Folder) => {}
+            Some(_) => {
+                return damaged("what has the name of the tile's folder is none; links are not followed");
+            }
+            None => return damaged("the tile's folder is missing, and the map holds this tile"),
+        }
+        match disk.open(&path) {
+            Ok(input) => {
+                let bytes = input.file_bytes();
+                Ok(StoredTile { path, input: Checksumming::new(input), bytes, map_id, version, storage })
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                damaged("the file is missing, and the map holds this tile")
+            }
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
+                damaged("no regular file; links inside a map are not followed")
+            }
+            Err(error) => Err(Error::io(&path, "open", error)),
+        }
+    }
+}

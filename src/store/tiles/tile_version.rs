@@ -1,0 +1,145 @@
+use crate::space::{TileValue, put_number, take_number, take_u32};
+use crate::store::layout::TileFile;
+use std::io::{self, Read, Write};
+
+/// What the log knows of one version of a tile: enough to recognise its files and to count without reading them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TileVersion {
+    /// Number of the last scan that the map had taken when the version was written.
+    pub scan_number: u64,
+    /// `iwlo_meta.bin`, whole.
+    pub table: FileChecksum,
+    /// `octree.bt`, whole.
+    pub octree: FileChecksum,
+    /// Observed voxels.
+    pub voxels: u64,
+    /// Occupied voxels.
+    pub occupied: u64,
+}
+
+/// Length and checksum of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FileChecksum {
+    /// Length in bytes.
+    pub bytes: u64,
+    /// CRC-32 of all bytes.
+    pub crc: u32,
+}
+
+/// The highest number of a scan or flush that is read: nobody counts that far, and one more always fits.
+pub(crate) const MAX_NUMBER: u64 = 1 << 62;
+
+impl TileVersion {
+    pub(in crate::store) const BYTES: usize = 48;
+
+    /// The checksum of one of the two files.
+    pub const fn of(&self, file: TileFile) -> FileChecksum {
+        match file {
+            TileFile::Table => self.table,
+            TileFile::Octree => self.octree,
+        }
+    }
+
+    pub(in crate::store) fn to_bytes(self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        bytes[0..8].copy_from_slice(&self.scan_number.to_le_bytes());
+        bytes[8..16].copy_from_slice(&self.table.bytes.to_le_bytes());
+        bytes[16..20].copy_from_slice(&self.table.crc.to_le_bytes());
+        bytes[20..28].copy_from_slice(&self.octree.bytes.to_le_bytes());
+        bytes[28..32].copy_from_slice(&self.octree.crc.to_le_bytes());
+        bytes[32..40].copy_from_slice(&self.voxels.to_le_bytes());
+        bytes[40..48].copy_from_slice(&self.occupied.to_le_bytes());
+        bytes
+    }
+
+    /// `None` for numbers that no tile has; sums over all tiles of a map fit those that a tile can have.
+    pub(in crate::store) fn from_bytes(bytes: &[u8; Self::BYTES]) -> Option<Self> {
+        const MAX_FILE_BYTES: u64 = 1 << 36;
+        const MAX_VOXELS: u64 = 1 << 30;
+        let version = Self::from_any_bytes(bytes);
+        let is_possible = version.scan_number <= MAX_NUMBER
+            && version.table.bytes <= MAX_FILE_BYTES
+            && version.octree.bytes <= MAX_FILE_BYTES
+            && version.occupied <= version.voxels
+            && version.voxels <= MAX_VOXELS;
+        is_possible.then_some(version)
+    }
+
+    fn from_any_bytes(bytes: &[u8; Self::BYTES]) -> Self {
+        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
+        let u64_at = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
+        Self {
+            scan_number: u64_at(0),
+            table: FileChecksum { bytes: u64_at(8), crc: u32_at(16) },
+            octree: FileChecksum { bytes: u64_at(20), crc: u32_at(28) },
+            voxels: u64_at(32),
+            occupied: u64_at(40),
+        }
+    }
+}
+
+impl TileValue for TileVersion {
+    fn pack(self, before: Self, out: &mut Vec<u8>) {
+        put_number(self.scan_number.wrapping_sub(before.scan_number) as i64, out);
+        for file in [self.table, self.octree] {
+            put_number(file.bytes, out);
+            out.extend_from_slice(&file.crc.to_le_bytes());
+        }
+        put_number(self.voxels, out);
+        put_number(self.occupied, out);
+    }
+
+    fn unpack(before: Self, input: &mut &[u8]) -> Self {
+        let scan_number = before.scan_number.wrapping_add(take_number::<i64>(input) as u64);
+        let file = |input: &mut &[u8]| {
+            let bytes = take_number(input);
+            FileChecksum { bytes, crc: take_u32(input) }
+        };
+        let (table, octree) = (file(input), file(input));
+        Self { scan_number, table, octree, voxels: take_number(input), occupied: take_number(input) }
+    }
+}
+
+/// A stream that versions what passes through it.
+pub struct Checksumming<S> {
+    stream: S,
+    bytes: u64,
+    crc: crc32fast::Hasher,
+}
+
+impl<S> Checksumming<S> {
+    /// Stamps what passes from here on.
+    pub fn new(stream: S) -> Self {
+        Self { stream, bytes: 0, crc: crc32fast::Hasher::new() }
+    }
+
+    /// The checksum of all that passed, and the stream.
+    pub fn finish(self) -> (FileChecksum, S) {
+        (FileChecksum { bytes: self.bytes, crc: self.crc.finalize() }, self.stream)
+    }
+
+    fn pass(&mut self, chunk: &[u8]) {
+        self.bytes += chunk.len() as u64;
+        self.crc.update(chunk);
+    }
+}
+
+impl<W: Write> Write for Checksumming<W> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let written = self.stream.write(buffer)?;
+        self.pass(&buffer[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+impl<R: Read> Read for Checksumming<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.stream.read(buffer)?;
+        self.pass(&buffer[..read]);
+        Ok(read)
+    }
+}

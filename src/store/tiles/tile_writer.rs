@@ -1,0 +1,66 @@
+use super::tile_version::{Checksumming, FileChecksum};
+use crate::config::Storage;
+use crate::error::{Error, Result};
+use crate::space::TileIndex;
+use crate::store::disk::{Disk, EntryKind};
+use crate::store::layout::TileFile;
+use crate::store::map_files::MapFiles;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// Writes next versions of tiles, beside the committed ones. Another thread may do so while the map goes on.
+///
+/// It is got from [`TileStore::writer`](super::TileStore::writer), which makes sure that no committed version still has
+/// the name that is written to. Not to be used any more once the map has committed.
+#[derive(Clone, Debug)]
+pub struct TileWriter {
+    pub(in crate::store) files: MapFiles,
+    pub(in crate::store) map_id: [u8; 16],
+}
+
+impl TileWriter {
+    /// The map's id; zeros for a map of the seed's format.
+    pub fn map_id(&self) -> [u8; 16] {
+        self.map_id
+    }
+
+    /// How the map's tiles are stored.
+    pub fn storage(&self) -> Storage {
+        self.files.layout().storage()
+    }
+
+    /// Writes the next version of one of a tile's files; the committed version stays as it is.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; what there was of an earlier next version is lost then.
+    pub fn write_next(
+        &self,
+        tile: TileIndex,
+        file: TileFile,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<FileChecksum> {
+        make_folder(&**self.files.disk(), &self.files.layout().tile_folder(tile))?;
+        let path = self.files.layout().next(tile, file);
+        let write_file = || {
+            let mut out =
+                Checksumming::new(BufWriter::with_capacity(1 << 16, self.files.disk().create(&path)?));
+            write(&mut out)?;
+            out.flush()?;
+            Ok(out.finish().0)
+        };
+        write_file().map_err(|error| Error::io(&path, "write", error))
+    }
+}
+
+/// Makes the folder of a tile if it is not there.
+pub(in crate::store) fn make_folder(disk: &dyn Disk, folder: &Path) -> Result<()> {
+    match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
+        Some(EntryKind::Folder) => Ok(()),
+        None => disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error)),
+        Some(_) => {
+            let cause = io::Error::new(io::ErrorKind::NotADirectory, "something else has the folder's name");
+            Err(Error::io(folder, "create", cause))
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! The octree of a tile, derived from the table, in the form that `OctreeConfig` names.
+//!
+//! [`BrickOctree`] is a view of the table's bricks, and the default. The other form, a tree of pointers with or
+//! without OctoCache's voxel cache, is in `tile/octocache/`.
+
+mod brick_octree;
+mod octree_factory;
+mod tile_octree;
+
+pub(crate) use brick_octree::{BrickOctree, max_in_table};
+pub use octree_factory::OctreeFactory;
+pub(crate) use tile_octree::TileOctree;

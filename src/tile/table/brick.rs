@@ -1,0 +1,171 @@
+use super::cells::{CELL_VOXELS, Cells};
+use super::palette::{Palette, StateId};
+use super::summary::{Summary, larger};
+use super::unpadded_evidence::UnpaddedEvidence;
+use crate::octree::BrickNodes;
+use crate::sensor::Evidence;
+use crate::space::{BrickCode, BrickMask, places};
+
+/// The evidence of the observed voxels of one brick.
+#[derive(Clone, Debug)]
+pub(crate) struct Brick {
+    code: BrickCode,
+    pub(crate) observed: BrickMask,
+    pub(crate) evidence: Storage,
+    pub(crate) summary: Summary,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum Storage {
+    /// The number of each voxel's state in the tile's palette; [`UNKNOWN`](super::palette::UNKNOWN) where nothing was
+    /// observed.
+    Interned(Cells<StateId>),
+    /// The evidence itself, if there are too many states for a palette; arbitrary where nothing was observed.
+    Plain(Cells<UnpaddedEvidence>),
+}
+
+impl Brick {
+    /// Stands for an absent brick.
+    pub(crate) const ABSENT_BRICK: &Self = &Self::new(BrickCode(0));
+
+    /// A brick without observed voxels.
+    pub(crate) const fn new(code: BrickCode) -> Self {
+        Self::with(code, [0; 8], Storage::Interned(Cells::empty()))
+    }
+
+    /// A brick with voxels.
+    pub(crate) const fn with(code: BrickCode, observed: BrickMask, evidence: Storage) -> Self {
+        Self { code, observed, evidence, summary: Summary::STALE }
+    }
+
+    pub(crate) fn code(&self) -> BrickCode {
+        self.code
+    }
+
+    /// Bytes of memory on the heap.
+    #[inline]
+    pub(crate) fn heap_bytes(&self) -> usize {
+        match &self.evidence {
+            Storage::Interned(cells) => cells.bytes(),
+            Storage::Plain(cells) => cells.bytes(),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn get(&self, place: usize, palette: &Palette) -> Option<Evidence> {
+        let (word, bit) = (place / 64, place % 64);
+        if self.observed[word] >> bit & 1 == 0 {
+            return None;
+        }
+        match &self.evidence {
+            Storage::Interned(cells) => cells.cell(word).map(|cell| palette.evidence(cell[bit])),
+            Storage::Plain(cells) => cells.cell(word).map(|cell| cell[bit].into()),
+        }
+    }
+
+    /// The observed voxels in Morton order: place and evidence.
+    pub(crate) fn iter(&self, palette: &Palette) -> impl Iterator<Item = (usize, Evidence)> {
+        places(self.observed).filter_map(|place| Some((place, self.get(place, palette)?)))
+    }
+
+    /// Visits the items of [`Brick::iter`], a cell at a time.
+    pub(crate) fn for_each(&self, palette: &Palette, mut visit: impl FnMut(usize, Evidence)) {
+        match &self.evidence {
+            Storage::Interned(cells) => {
+                cells.for_each(self.observed, |place, state| visit(place, palette.evidence(state)));
+            }
+            Storage::Plain(cells) => {
+                cells.for_each(self.observed, |place, evidence| visit(place, evidence.into()))
+            }
+        }
+    }
+
+    /// Makes the brick hold its evidence itself, without the palette.
+    pub(crate) fn make_plain(&mut self, palette: &Palette) {
+        if let Storage::Interned(cells) = &self.evidence {
+            self.evidence = Storage::Plain(cells.map(|state| palette.evidence(state).into()));
+        }
+    }
+
+    /// Largest log-odds of the observed voxels among `span` (a power of eight) places from `first` on.
+    pub(crate) fn max_of(&self, first: usize, span: usize, palette: &Palette) -> Option<f32> {
+        let run = if span < 64 { ((1 << span) - 1) << (first % 64) } else { u64::MAX };
+        let words = first / 64..(first + span).div_ceil(64);
+        let mask =
+            std::array::from_fn(|word| if words.contains(&word) { self.observed[word] & run } else { 0 });
+        let mut max: Option<f32> = None;
+        let mut take = |evidence: Evidence| {
+            let value = evidence.log_odds as f32;
+            max = Some(max.map_or(value, |max| larger(max, value)));
+        };
+        match &self.evidence {
+            Storage::Interned(cells) => cells.for_each(mask, |_, state| take(palette.evidence(state))),
+            Storage::Plain(cells) => cells.for_each(mask, |_, evidence| take(evidence.into())),
+        }
+        max
+    }
+
+    /// Largest log-odds of all observed voxels, of which there is at least one.
+    pub(crate) fn max(&self, palette: &Palette) -> Option<f32> {
+        if self.summary.is_stale { self.max_of(0, 512, palette) } else { Some(self.summary.max) }
+    }
+
+    /// The nodes of an octree under the brick, and the largest value. Voxels of at least the threshold are occupied.
+    pub(crate) fn nodes(&self, threshold: Option<f32>, palette: &Palette) -> (BrickNodes, f32) {
+        const NONE: f32 = f32::NEG_INFINITY;
+        match &self.evidence {
+            Storage::Interned(cells) => BrickNodes::of_values(self.code, self.observed, threshold, |word| {
+                cells.cell(word).map_or([NONE; CELL_VOXELS], |cell| palette.values(cell))
+            }),
+            Storage::Plain(cells) => BrickNodes::of_values(self.code, self.observed, threshold, |word| {
+                let mut values = [NONE; CELL_VOXELS];
+                let mut mask = [0; 8];
+                mask[word] = self.observed[word];
+                cells.for_each(mask, |place, evidence| {
+                    values[place % 64] = Evidence::from(evidence).log_odds as f32
+                });
+                values
+            }),
+        }
+    }
+
+    /// The summary of the brick, as of the last [`Brick::sum_up`].
+    pub(crate) fn summary(&self) -> Summary {
+        self.summary
+    }
+
+    /// Brings the summary up to date.
+    pub(crate) fn sum_up(&mut self, palette: &Palette) {
+        if self.summary.is_stale {
+            self.summary = self.nodes(None, palette).into();
+        }
+    }
+
+    /// Number of observed voxels whose state is one of `states`, or whose own evidence satisfies `holds`.
+    pub(crate) fn count(&self, states: &[bool], holds: impl Fn(Evidence) -> bool) -> usize {
+        match &self.evidence {
+            Storage::Interned(cells) => {
+                cells.all().iter().flatten().filter(|&&state| states[usize::from(state)]).count()
+            }
+            Storage::Plain(cells) => {
+                let mut count = 0;
+                cells.for_each(self.observed, |_, evidence| count += usize::from(holds(evidence.into())));
+                count
+            }
+        }
+    }
+
+    /// Marks the states that the brick's voxels are in.
+    pub(crate) fn mark_states(&self, in_use: &mut [bool]) {
+        if let Storage::Interned(cells) = &self.evidence {
+            cells.all().iter().flatten().for_each(|&state| in_use[usize::from(state)] = true);
+        }
+    }
+
+    /// Renumbers the states after a change of the palette.
+    pub(crate) fn renumber_states(&mut self, numbers: &[StateId]) {
+        if let Storage::Interned(cells) = &mut self.evidence {
+            cells.all_mut().iter_mut().flatten().for_each(|state| *state = numbers[usize::from(*state)]);
+        }
+    }
+}

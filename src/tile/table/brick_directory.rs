@@ -1,0 +1,84 @@
+use crate::space::{BrickCode, MortonCode, Torus, VoxelKey};
+
+/// Finds the bricks of a tile, by blocks of 4 x 4 x 4 bricks, of which a tile has few.
+#[derive(Clone, Debug)]
+pub(crate) struct BrickDirectory {
+    blocks: Torus,
+    /// The number of each brick of a block, in Morton order, counted from 1; 0 if it is absent. The first block stands
+    /// for all absent blocks.
+    numbers: Vec<[u32; BLOCK_BRICKS]>,
+}
+
+const BLOCK_BRICKS: usize = 64;
+
+impl Default for BrickDirectory {
+    fn default() -> Self {
+        Self { blocks: Torus::default(), numbers: vec![[0; BLOCK_BRICKS]] }
+    }
+}
+
+/// Where a voxel is: its block, the brick in the block, and the place in the brick.
+#[derive(Clone, Copy)]
+pub(crate) struct Address {
+    block: [i32; 3],
+    brick: usize,
+    pub(crate) place: usize,
+}
+
+impl Address {
+    #[inline]
+    pub(crate) fn of_key(key: VoxelKey) -> Self {
+        // Of the lowest five bits, the lower three are the place in a brick, the others the brick in its block.
+        let part = |k: usize| SPREAD[usize::from(key.0[k] & 31)] << k;
+        let code = usize::from(part(0) | part(1) | part(2));
+        Self { block: key.0.map(|k| i32::from(k >> 5)), brick: code >> 9, place: code & 511 }
+    }
+
+    #[inline]
+    pub(crate) fn of_code(code: MortonCode) -> Self {
+        Self::of_key(code.to_key())
+    }
+
+    #[inline]
+    pub(crate) fn of_brick(brick: BrickCode) -> Self {
+        Self::of_code(brick.voxel(0))
+    }
+}
+
+/// Bit `k` of an index at bit `3k`.
+const SPREAD: [u16; 32] = spread();
+
+const fn spread() -> [u16; 32] {
+    let mut spread = [0; 32];
+    let mut index = 0;
+    while index < 32 {
+        spread[index] = VoxelKey([index as u16, 0, 0]).morton().0 as u16;
+        index += 1;
+    }
+    spread
+}
+
+impl BrickDirectory {
+    /// Bytes of memory on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.blocks.bytes() + self.numbers.capacity() * size_of::<[u32; BLOCK_BRICKS]>()
+    }
+
+    /// The number of the brick at an address, or 0.
+    #[inline]
+    pub(crate) fn get(&self, at: Address) -> u32 {
+        // Without a branch: presence is unpredictable.
+        self.numbers[self.blocks.get(at.block) as usize][at.brick]
+    }
+
+    /// The entry for the brick at an address.
+    pub(crate) fn entry(&mut self, at: Address) -> &mut u32 {
+        let mut block = self.blocks.get(at.block);
+        if block == Torus::NONE {
+            block = self.numbers.len() as u32;
+            self.blocks.insert(at.block, block);
+            self.numbers.push([0; BLOCK_BRICKS]);
+        }
+        &mut self.numbers[block as usize][at.brick]
+    }
+}

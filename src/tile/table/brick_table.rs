@@ -1,0 +1,201 @@
+use super::brick::Brick;
+use super::brick_directory::{Address, BrickDirectory};
+use super::palette::Palette;
+use super::summary::{Summary, larger};
+use crate::octree::write_bt_of_bricks;
+use crate::sensor::Evidence;
+use crate::space::{BrickCode, BrickMask, MortonCode, VoxelKey, places};
+use std::io::{self, Write};
+use std::ops::Range;
+
+/// The exact evidence of every observed voxel of a tile: the truth, from which all else is derived.
+///
+/// It consists of bricks of 8 x 8 x 8 voxels, in which a voxel is the number of its state in the tile's palette: four
+/// to five bytes per observed voxel in total. If there are too many states for a palette (intensities that never
+/// repeat), bricks hold the evidence itself.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    /// In order of their first update.
+    pub(crate) bricks: Vec<Brick>,
+    pub(crate) directory: BrickDirectory,
+    /// The numbers of the bricks in Morton order, as of the last [`Table::sum_up`].
+    order: Vec<u32>,
+    pub(crate) palette: Palette,
+    pub(crate) len: usize,
+    /// Bytes of the bricks' cells; [`Table::bytes`] adds the rest.
+    pub(crate) cell_bytes: usize,
+    /// Bricks that stopped using the palette since its last clean-up.
+    pub(crate) made_plain: usize,
+}
+
+impl Table {
+    /// Number of observed voxels.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether no voxel was observed.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Bytes of memory on the heap.
+    pub fn bytes(&self) -> usize {
+        self.bricks.capacity() * size_of::<Brick>()
+            + self.directory.bytes()
+            + self.order.capacity() * size_of::<u32>()
+            + self.palette.bytes()
+            + self.cell_bytes
+    }
+
+    /// The evidence of a voxel; `None` if it was never observed.
+    #[inline]
+    pub fn get(&self, code: MortonCode) -> Option<Evidence> {
+        self.at(Address::of_code(code))
+    }
+
+    /// The evidence of the voxel with a key; `None` if it was never observed.
+    #[inline]
+    pub fn get_key(&self, key: VoxelKey) -> Option<Evidence> {
+        self.at(Address::of_key(key))
+    }
+
+    /// Whether any voxel of a brick was observed.
+    pub fn has_brick(&self, brick: BrickCode) -> bool {
+        self.brick(brick).is_some()
+    }
+
+    /// The bricks that hold an observed voxel, in Morton order.
+    pub fn bricks(&self) -> impl Iterator<Item = BrickCode> {
+        self.bricks_in_order().map(Brick::code)
+    }
+
+    /// The observed voxels of one brick, in Morton order.
+    pub fn voxels_of_brick(&self, brick: BrickCode) -> impl Iterator<Item = (MortonCode, Evidence)> {
+        self.brick(brick).into_iter().flat_map(|brick| self.voxels_in(brick))
+    }
+
+    /// Visits the observed voxels of one brick, in Morton order: place and evidence.
+    pub fn for_each_in(&self, brick: BrickCode, visit: impl FnMut(usize, Evidence)) {
+        if let Some(brick) = self.brick(brick) {
+            brick.for_each(&self.palette, visit);
+        }
+    }
+
+    /// The observed voxels among those of a mask, in Morton order.
+    pub fn voxels_of_mask(
+        &self,
+        brick: BrickCode,
+        mask: BrickMask,
+    ) -> impl Iterator<Item = (MortonCode, Evidence)> {
+        let found = self.brick(brick).into_iter();
+        found.flat_map(move |found| {
+            places(mask).filter_map(move |place| Some((brick.voxel(place), found.get(place, &self.palette)?)))
+        })
+    }
+
+    /// The observed voxels in Morton order.
+    pub fn iter(&self) -> impl Iterator<Item = (MortonCode, Evidence)> {
+        self.bricks_in_order().flat_map(|brick| self.voxels_in(brick))
+    }
+
+    /// Number of observed voxels whose log-odds are at least a threshold.
+    pub fn count_from(&self, threshold: f64) -> usize {
+        let holds = |evidence: Evidence| evidence.log_odds >= threshold;
+        let states = self.palette.states_with(holds);
+        self.bricks.iter().map(|brick| brick.count(&states, holds)).sum()
+    }
+
+    /// Writes the `.bt` file that OctoMap's `writeBinary` writes for the octree of the table. A voxel is occupied
+    /// if its log-odds as `f32` are at least the threshold.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`write_bt`](crate::octree::write_bt).
+    pub fn write_bt(&self, resolution_m: f64, threshold: f32, out: &mut impl Write) -> io::Result<()> {
+        let bricks: Vec<&Brick> = self.bricks_in_order().collect();
+        let codes: Vec<BrickCode> = bricks.iter().map(|brick| brick.code()).collect();
+        let nodes_of = |position: usize| bricks[position].nodes(Some(threshold), &self.palette).0;
+        write_bt_of_bricks(&codes, nodes_of, resolution_m, out)
+    }
+
+    /// Largest log-odds under the octree node at `depth` (13, a brick, to 16) that holds a voxel; `None` if all are
+    /// unknown.
+    pub(crate) fn max_under(&self, code: MortonCode, depth: u8) -> Option<f32> {
+        let brick = self.brick(code.brick())?;
+        let span = MortonCode::span(depth) as usize;
+        match span {
+            512 => brick.max(&self.palette),
+            _ => brick.max_of(code.ancestor(depth).place_in_brick(), span, &self.palette),
+        }
+    }
+
+    /// Largest log-odds in a range of bricks; `None` if all are unknown.
+    pub(crate) fn max_of_bricks(&self, range: Range<BrickCode>) -> Option<f32> {
+        if range.end.0 - range.start.0 <= self.bricks.len() as u64 {
+            let bricks = (range.start.0..range.end.0).filter_map(|code| self.brick(BrickCode(code)));
+            return bricks.filter_map(|brick| brick.max(&self.palette)).reduce(larger);
+        }
+        let bricks = self.bricks.iter().filter(|brick| range.contains(&brick.code()));
+        bricks.filter_map(|brick| brick.max(&self.palette)).reduce(larger)
+    }
+
+    /// Brings the bricks' summaries up to date, and their order.
+    pub(crate) fn sum_up(&mut self) {
+        self.bricks.iter_mut().for_each(|brick| brick.sum_up(&self.palette));
+        if !self.is_in_order() {
+            self.order = self.sorted_numbers();
+        }
+    }
+
+    /// The bricks' summaries in Morton order, as of the last [`Table::sum_up`].
+    pub(crate) fn summaries(&self) -> impl Iterator<Item = (BrickCode, Summary)> {
+        self.bricks_in_order().map(|brick| (brick.code(), brick.summary()))
+    }
+
+    fn voxels_in<'a>(&'a self, brick: &'a Brick) -> impl Iterator<Item = (MortonCode, Evidence)> {
+        brick.iter(&self.palette).map(|(place, evidence)| (brick.code().voxel(place), evidence))
+    }
+
+    pub(crate) fn bricks_in_order(&self) -> impl Iterator<Item = &Brick> {
+        let in_order = if self.is_in_order() { Vec::new() } else { self.sorted_numbers() };
+        let order = if self.is_in_order() { self.order.iter() } else { [].iter() };
+        order.copied().chain(in_order).map(|number| &self.bricks[number as usize])
+    }
+
+    fn is_in_order(&self) -> bool {
+        self.order.len() == self.bricks.len()
+    }
+
+    fn sorted_numbers(&self) -> Vec<u32> {
+        let mut numbers: Vec<u32> = (0..self.bricks.len() as u32).collect();
+        numbers.sort_unstable_by_key(|&number| self.bricks[number as usize].code());
+        numbers
+    }
+
+    #[inline]
+    fn at(&self, at: Address) -> Option<Evidence> {
+        self.brick_at(at).unwrap_or(Brick::ABSENT_BRICK).get(at.place, &self.palette)
+    }
+
+    #[inline]
+    fn brick(&self, code: BrickCode) -> Option<&Brick> {
+        self.brick_at(Address::of_brick(code))
+    }
+
+    #[inline]
+    fn brick_at(&self, at: Address) -> Option<&Brick> {
+        self.bricks.get((self.directory.get(at) as usize).wrapping_sub(1))
+    }
+
+    /// An empty table with a palette.
+    pub(crate) fn with_palette(palette: Palette) -> Self {
+        Self { palette, ..Self::default() }
+    }
+
+    /// The value of [`Table::bytes`], counted anew.
+    #[cfg(test)]
+    pub(crate) fn counted_bytes(&self) -> usize {
+        self.bytes() - self.cell_bytes + self.bricks.iter().map(Brick::heap_bytes).sum::<usize>()
+    }
+}

@@ -1,0 +1,90 @@
+use crate::space::BrickMask;
+
+/// Voxels of a cell: one word of a brick's mask.
+pub(crate) const CELL_VOXELS: usize = 64;
+
+/// A value for every voxel of a brick, in cells of 4 x 4 x 4. A cell takes memory once one of its voxels is set.
+///
+/// Smaller cells would save a third of the memory on a street, but every update would have to count bits.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells<T> {
+    /// The cell of each word of a mask, or [`ABSENT`].
+    places: [u8; 8],
+    cells: Vec<[T; CELL_VOXELS]>,
+}
+
+const ABSENT: u8 = u8::MAX;
+
+impl<T: Copy> Cells<T> {
+    pub(crate) const fn empty() -> Self {
+        Self { places: [ABSENT; 8], cells: Vec::new() }
+    }
+
+    /// Cells for the non-zero words of a mask, in their order, filled with `value`.
+    pub(crate) fn of_words(mask: &BrickMask, value: T) -> Self {
+        let mut places = [ABSENT; 8];
+        let mut count = 0;
+        for (place, _) in places.iter_mut().zip(mask).filter(|(_, word)| **word != 0) {
+            *place = count;
+            count += 1;
+        }
+        Self { places, cells: vec![[value; CELL_VOXELS]; count.into()] }
+    }
+
+    /// Bytes of memory on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.cells.capacity() * size_of::<[T; CELL_VOXELS]>()
+    }
+
+    /// The cell of a word, if it is there.
+    #[inline]
+    pub(crate) fn cell(&self, word: usize) -> Option<&[T; CELL_VOXELS]> {
+        self.cells.get(usize::from(self.places[word]))
+    }
+
+    /// The cell of a word, if it is there.
+    #[inline]
+    pub(crate) fn cell_mut(&mut self, word: usize) -> Option<&mut [T; CELL_VOXELS]> {
+        self.cells.get_mut(usize::from(self.places[word]))
+    }
+
+    /// Makes the missing cells of the given words (bit `k` for word `k`), filled with `value`.
+    pub(crate) fn make(&mut self, words: u8, value: T) {
+        let missing = (0..8).filter(|&word| words >> word & 1 == 1 && self.places[word] == ABSENT);
+        let missing: Vec<usize> = missing.collect();
+        // No slack: this happens at most eight times in a brick's life.
+        self.cells.reserve_exact(missing.len());
+        for word in missing {
+            self.places[word] = self.cells.len() as u8;
+            self.cells.push([value; CELL_VOXELS]);
+        }
+    }
+
+    /// Visits the values of a mask whose cells exist, in Morton order: place and value.
+    #[inline]
+    pub(crate) fn for_each(&self, mask: BrickMask, mut visit: impl FnMut(usize, T)) {
+        for (word, mut bits) in mask.into_iter().enumerate() {
+            let Some(cell) = self.cell(word) else { continue };
+            while bits != 0 {
+                let bit = bits.trailing_zeros() as usize;
+                visit(CELL_VOXELS * word + bit, cell[bit]);
+                bits &= bits - 1;
+            }
+        }
+    }
+
+    /// All cells, in no particular order.
+    pub(crate) fn all(&self) -> &[[T; CELL_VOXELS]] {
+        &self.cells
+    }
+
+    /// All cells, in no particular order.
+    pub(crate) fn all_mut(&mut self) -> &mut [[T; CELL_VOXELS]] {
+        &mut self.cells
+    }
+
+    /// The same cells with other values.
+    pub(crate) fn map<U: Copy>(&self, value: impl Fn(T) -> U) -> Cells<U> {
+        Cells { places: self.places, cells: self.cells.iter().map(|cell| cell.map(&value)).collect() }
+    }
+}

@@ -1,0 +1,26 @@
+//! The exact table of a tile: bricks of 8 x 8 x 8 voxels that number their states in the tile's palette.
+//!
+//! ```text
+//! BrickDirectory --brick's number--> Brick: mask of observed voxels, Cells of state numbers --> Palette: evidence
+//! ```
+//!
+//! A step (state, observation) -> state is computed once a palette; [`MissRuns`](miss_runs::MissRuns) caches long
+//! runs of them. A brick has a [`Summary`], from which the upper nodes of an octree are computed.
+
+mod brick;
+mod brick_directory;
+mod brick_table;
+mod brick_update;
+mod cells;
+mod miss_runs;
+mod palette;
+mod summary;
+mod table_update;
+mod unpadded_evidence;
+
+pub(crate) use brick::{Brick, Storage};
+pub use brick_table::Table;
+pub(crate) use cells::{CELL_VOXELS, Cells};
+pub(crate) use palette::{Full, Palette, StateId, UNKNOWN};
+pub(crate) use summary::larger;
+pub(crate) use unpadded_evidence::UnpaddedEvidence;

@@ -1,0 +1,208 @@
+use super::brick::Brick;
+use super::brick_directory::Address;
+use super::brick_table::Table;
+use super::brick_update::Rest;
+use super::miss_runs::MissRuns;
+use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdates};
+use crate::sensor::{Evidence, Observation, SensorModel};
+use crate::space::{BrickCode, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
+
+impl Table {
+    /// Applies updates of any form; `first` is the tile's lowest voxel.
+    pub fn apply(&mut self, model: &SensorModel, first: VoxelIndex, updates: &TileUpdates) {
+        match updates {
+            TileUpdates::Masks(bricks) => bricks.iter().for_each(|brick| self.update_brick(model, brick)),
+            TileUpdates::Runs(bricks) => self.update_runs(model, bricks),
+            TileUpdates::Ordered(updates) => self.update_in_order(model, first, updates),
+            TileUpdates::Packed(packed) => {
+                packed.iter().for_each(|updates| self.apply(model, first, &updates));
+            }
+        }
+    }
+
+    /// Applies the update of one brick, in insertion per scan.
+    pub fn update_brick(&mut self, model: &SensorModel, update: &BrickUpdate) {
+        self.palette.use_model(model);
+        let mut rest = Rest::of(update);
+        if update.hits != [0; 8] || update.misses != [0; 8] {
+            let number = self.number_of(update.brick);
+            self.update_rest(number, &mut rest);
+        }
+    }
+
+    /// Applies runs of updates of bricks, in insertion per ray.
+    pub fn update_runs(&mut self, model: &SensorModel, bricks: &[BrickRuns]) {
+        self.palette.use_model(model);
+        let mut known = MissRuns::new();
+        for BrickRuns { brick, runs } in bricks {
+            let number = self.number_of(*brick);
+            let mut left = &runs[..];
+            while !left.is_empty() {
+                let brick = &mut self.bricks[number];
+                let bytes = brick.heap_bytes();
+                let (new, done) = brick.update_runs(left, &mut self.palette, &mut known);
+                self.len += new;
+                self.cell_bytes += brick.heap_bytes() - bytes;
+                left = &left[done..];
+                if let Some((run, later)) = left.split_first() {
+                    let renumberings = self.palette.renumberings();
+                    self.update_run(number, run);
+                    left = later;
+                    if self.palette.renumberings() != renumberings {
+                        known.clear();
+                    }
+                }
+            }
+        }
+    }
+
+    /// Applies a run of updates one by one.
+    fn update_run(&mut self, number: usize, run: &Run) {
+        let hit = run.hit.map(Observation::Hit);
+        for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
+            self.step(number, run.place.into(), observation);
+        }
+    }
+
+    /// Applies one update of one voxel.
+    pub fn update(&mut self, model: &SensorModel, code: MortonCode, observation: Observation) {
+        self.palette.use_model(model);
+        let number = self.number_of(code.brick());
+        self.update_rest(number, &mut Rest::of_voxel(code.place_in_brick(), &observation));
+    }
+
+    /// Applies updates of single voxels in their order; `first` is the tile's lowest voxel.
+    pub fn update_in_order(&mut self, model: &SensorModel, first: VoxelIndex, updates: &OrderedUpdates) {
+        self.update_each(model, first, updates, |_, _, _| {});
+    }
+
+    /// The same; `visit` is given each update's voxel and resulting log-odds.
+    pub(crate) fn update_in_order_and_tell(
+        &mut self,
+        model: &SensorModel,
+        first: VoxelIndex,
+        updates: &OrderedUpdates,
+        mut tell: impl FnMut(MortonCode, f64),
+    ) {
+        self.update_each(model, first, updates, |table, number, place| {
+            let brick = &table.bricks[number];
+            if let Some(evidence) = brick.get(place, &table.palette) {
+                tell(brick.code().voxel(place), evidence.log_odds);
+            }
+        });
+    }
+
+    /// Applies updates of single voxels in their order; `visit` is given the brick's number and the place after each.
+    fn update_each(
+        &mut self,
+        model: &SensorModel,
+        first: VoxelIndex,
+        updates: &OrderedUpdates,
+        mut visit: impl FnMut(&Self, usize, usize),
+    ) {
+        self.palette.use_model(model);
+        let first = VoxelKey::from_index(first).0;
+        // Rays return to the same few bricks again and again; nearby bricks have different entries.
+        let mut recent = [(u64::MAX, 0); 512];
+        for (offset, observation) in updates.iter() {
+            let key: [u16; 3] = std::array::from_fn(|k| first[k].wrapping_add(offset[k] as u16));
+            let [x, y, z] = key.map(|k| u64::from(k / 8));
+            let entry = &mut recent[(x & 7 | (y & 7) << 3 | (z & 7) << 6) as usize];
+            let brick = x | y << 16 | z << 32;
+            if entry.0 != brick {
+                *entry = (brick, self.number_of(VoxelKey(key).morton().brick()));
+            }
+            let (number, place) = (entry.1, place_of_voxel(key.map(i32::from)));
+            self.step(number, place, observation);
+            visit(self, number, place);
+        }
+    }
+
+    /// Applies one update of a voxel of a brick.
+    #[inline]
+    fn step(&mut self, number: usize, place: usize, observation: Observation) {
+        match self.bricks[number].update_one(place, observation, &mut self.palette) {
+            Some(is_new) => self.len += usize::from(is_new),
+            None => self.update_rest(number, &mut Rest::of_voxel(place, &observation)),
+        }
+    }
+
+    /// Inserts voxels of a brick, in Morton order, none of which was observed before: place and evidence.
+    pub fn insert(&mut self, brick: BrickCode, mut voxels: &[(usize, Evidence)]) {
+        if voxels.is_empty() {
+            return;
+        }
+        let number = self.number_of(brick);
+        loop {
+            let brick = &mut self.bricks[number];
+            let bytes = brick.heap_bytes();
+            let done = brick.insert(voxels, &mut self.palette);
+            self.len += done;
+            self.cell_bytes += brick.heap_bytes() - bytes;
+            voxels = &voxels[done..];
+            if voxels.is_empty() {
+                return;
+            }
+            self.make_room_for(number);
+        }
+    }
+
+    /// Adds a brick that is absent so far, with the palette's state numbers.
+    pub(crate) fn add_brick(&mut self, brick: Brick) {
+        let number = self.number_of(brick.code());
+        self.len += brick.observed.iter().map(|word| word.count_ones() as usize).sum::<usize>();
+        self.cell_bytes += brick.heap_bytes();
+        self.bricks[number] = brick;
+    }
+
+    /// The number of a brick, made if it is absent.
+    fn number_of(&mut self, code: BrickCode) -> usize {
+        let number = self.directory.entry(Address::of_brick(code));
+        if *number == 0 {
+            if self.bricks.len() == self.bricks.capacity() {
+                // Less slack than the default growth of a vector.
+                self.bricks.reserve_exact((self.bricks.len() / 4).max(4));
+            }
+            self.bricks.push(Brick::new(code));
+            *number = self.bricks.len() as u32;
+        }
+        *number as usize - 1
+    }
+
+    fn update_rest(&mut self, number: usize, rest: &mut Rest<'_>) {
+        loop {
+            let brick = &mut self.bricks[number];
+            let bytes = brick.heap_bytes();
+            let (new, done) = brick.update(rest, &mut self.palette);
+            self.len += new;
+            self.cell_bytes += brick.heap_bytes() - bytes;
+            match done {
+                Ok(()) => return,
+                Err(_) => self.make_room_for(number),
+            }
+        }
+    }
+
+    /// Makes room for a brick's new states when the palette is full: drops unused states, or else makes the brick
+    /// plain.
+    #[cold]
+    fn make_room_for(&mut self, number: usize) {
+        // At the largest limit, unused states are searched for only after enough bricks became plain, so that the cost
+        // stays proportional.
+        if self.palette.can_grow() || self.made_plain * 8 >= self.bricks.len() {
+            let mut in_use = vec![false; self.palette.len()];
+            self.bricks.iter().for_each(|brick| brick.mark_states(&mut in_use));
+            let numbers = self.palette.retain(&in_use);
+            self.bricks.iter_mut().for_each(|brick| brick.renumber_states(&numbers));
+            self.made_plain = 0;
+            if self.palette.has_room() {
+                return;
+            }
+        }
+        let brick = &mut self.bricks[number];
+        self.cell_bytes -= brick.heap_bytes();
+        brick.make_plain(&self.palette);
+        self.cell_bytes += brick.heap_bytes();
+        self.made_plain += 1;
+    }
+}

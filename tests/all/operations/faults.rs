@@ -1,0 +1,170 @@
+use super::random_maps::{open, path};
+use std::path::PathBuf;
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
+use voxtile::operations::{self, Decay, Part, clear_on, decay_on};
+use voxtile::space::Aabb;
+use voxtile::{Error, MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Result, Storage};
+
+/// A disk with two maps, `a` and `b`.
+fn two_maps(storage: Storage) -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage);
+    for (name, seed) in [("a", 1), ("b", 2)] {
+        let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &path(name), config.clone()).unwrap();
+        let mut random = Random(seed);
+        for x in [0.0, 3.0] {
+            mapper.insert_scan(&random_scan(&mut random, [x, 0.0, 0.0], 4)).unwrap();
+            mapper.flush().unwrap();
+        }
+    }
+    disk.copy()
+}
+
+/// What is done to a map, again after a failure.
+type Work = fn(&FaultyDisk) -> Result<()>;
+
+fn region() -> Aabb {
+    Aabb { min: [-1.0, -1.0, -1.0], max: [4.1, 4.0, 4.0] }
+}
+
+fn merge(disk: &FaultyDisk) -> Result<()> {
+    let maps = [open(disk, &path("a"))?, open(disk, &path("b"))?];
+    operations::merge(&maps, path("out"), None, |_, _| {}).map(drop)
+}
+
+fn crop(disk: &FaultyDisk) -> Result<()> {
+    operations::crop(&open(disk, &path("a"))?, &Part::Inside(region()), path("out"), |_, _| {}).map(drop)
+}
+
+fn clear(disk: &FaultyDisk) -> Result<()> {
+    clear_on(disk.shared(), &path("a"), &Part::Outside(region()), |_, _| {}).map(drop)
+}
+
+fn decay(disk: &FaultyDisk) -> Result<()> {
+    decay_on(disk.shared(), &path("a"), &Decay::new(2.0).with_forget_below(0.25), |_, _| {}).map(drop)
+}
+
+/// The digest of a map, `None` if there is none; of a damaged one there is none either, and that is a failure.
+fn digest(disk: &FaultyDisk, name: &str, what: &str) -> Option<blake3::Hash> {
+    match MapReader::open_on(disk.shared(), &path(name), 1) {
+        Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{what}: {error}"))),
+        Err(Error::NoMap { .. }) => None,
+        Err(error) => panic!("{what}: {error}"),
+    }
+}
+
+/// The map that `work` changes or makes is as before or as after, whatever fails and wherever the power goes; and the same
+/// work, done again, ends as if nothing had happened.
+fn check(storage: Storage, name: &str, work: Work) {
+    check_from(&two_maps(storage), name, work);
+}
+
+fn check_from(start: &FaultyDisk, name: &str, work: Work) {
+    let done = start.copy();
+    work(&done).unwrap();
+    let (before, after) = (digest(start, name, "before"), digest(&done, name, "after").unwrap());
+    assert_ne!(before, Some(after));
+    let (operations, changes) = (done.operations(), done.changes());
+    // A map of the seed's own format goes on being adopted the next time.
+    let is_own = start.files().contains_key(&path("a").join("commits.log"));
+    println!("{name}: {operations} operations, {changes} of them changes");
+    let settle = |disk: &FaultyDisk, returned: bool, what: &str| {
+        let found = digest(disk, name, what);
+        assert!(found == Some(after) || (!returned && found == before), "{what}");
+        match work(disk) {
+            Ok(()) => {}
+            Err(Error::AlreadyExists { .. }) if found == Some(after) => {}
+            Err(error) => panic!("{what}: again: {error}"),
+        }
+        assert_eq!(digest(disk, name, what), Some(after), "{what}: again");
+        let left: Vec<_> = disk.files().into_keys().collect();
+        assert!(left.iter().all(|path| !path.to_string_lossy().ends_with(".next")), "{what}: {left:?}");
+        assert!(left.iter().all(|path| !path.to_string_lossy().contains("unfinished")), "{what}: {left:?}");
+    };
+    let faults = (0..operations).map(Fault::Fails);
+    let faults = faults.chain((0..changes).map(Fault::LosesSync));
+    for fault in faults.chain((0..changes).map(Fault::IsFull)).chain((0..changes).map(Fault::IsReadOnly)) {
+        let disk = start.copy();
+        disk.set_fault(fault);
+        let returned = work(&disk).is_ok();
+        let what = format!("{fault:?}");
+        if let (false, Fault::IsFull(_), true) = (returned, fault, is_own) {
+            // What was written in vain gives its room back.
+            let is_tile = |path: &PathBuf| path.to_string_lossy().contains("tile_");
+            let left =
+                disk.files().into_keys().filter(is_tile).find(|path| !start.files().contains_key(path));
+            assert_eq!(left, None, "{what}");
+        }
+        disk.make_room();
+        if returned {
+            settle(&disk.after_crash(Unsynced::Dropped), true, &what);
+        }
+        settle(&disk.after_crash(Unsynced::Shuffled(7)), returned, &what);
+        settle(&disk, returned, &what);
+    }
+    for at in 0..changes {
+        let disk = start.copy();
+        disk.set_fault(Fault::Crashes(at));
+        let returned = work(&disk).is_ok();
+        for unsynced in
+            [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(at + 99)]
+        {
+            settle(&disk.after_crash(unsynced), returned, &format!("crash at {at}, {unsynced:?}"));
+        }
+        settle(&disk.after_kill(), returned, &format!("killed at {at}"));
+    }
+}
+
+#[test]
+fn a_merge_is_there_whole_or_not_at_all() {
+    check(Storage::Seed, "out", merge);
+    check(Storage::Compact, "out", merge);
+}
+
+#[test]
+fn a_crop_is_there_whole_or_not_at_all() {
+    check(Storage::Seed, "out", crop);
+}
+
+#[test]
+fn a_part_is_cleared_whole_or_not_at_all() {
+    check(Storage::Seed, "a", clear);
+    check(Storage::Compact, "a", clear);
+}
+
+#[test]
+fn evidence_fades_whole_or_not_at_all_and_once() {
+    check(Storage::Seed, "a", decay);
+    check(Storage::Compact, "a", decay);
+}
+
+/// The same maps in the seed's own format.
+fn foreign() -> FaultyDisk {
+    let disk = two_maps(Storage::Seed);
+    for name in ["a", "b"] {
+        disk.take(&path(name).join("commits.log"));
+        let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
+        disk.put(&path(name).join("metadata.json"), metadata);
+    }
+    for (path, bytes) in disk.files() {
+        if path.ends_with("iwlo_meta.bin") {
+            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
+            disk.put(&path, &bytes[..16 + 18 * count]);
+        }
+    }
+    disk
+}
+
+#[test]
+fn maps_of_the_seeds_own_format_are_cut_and_cleared_too() {
+    check_from(&foreign(), "a", clear);
+    let disk = foreign();
+    crop(&disk).unwrap();
+    clear(&disk).unwrap();
+    // Both have gone to the same voxels, and only one of them is a new map.
+    assert_eq!(digest(&disk, "out", "cropped"), digest(&disk, "a", "cleared outside"));
+    disk.take(&path("out"));
+    // `a` is voxtile's own by now, `b` is not.
+    assert!(merge(&disk).unwrap_err().to_string().contains("seed's format"));
+}

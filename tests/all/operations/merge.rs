@@ -1,0 +1,174 @@
+use super::random_maps::{config, disk, open, path, random_voxels, read_map, write_map};
+use std::path::PathBuf;
+use testkit::faulty_disk::FaultyDisk;
+use testkit::random_scans::Random;
+use testkit::reference_map::Voxels;
+use voxtile::mapper::MapView;
+use voxtile::operations::{Merged, Prefer};
+use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
+use voxtile::{Error, MapConfig, MapReader, Result};
+
+/// The rule, voxel by voxel, with nothing clever.
+fn naive(maps: &[Voxels], prefer: Option<Prefer>) -> Voxels {
+    let mut merged = Voxels::new();
+    for &voxel in maps.iter().flat_map(|map| map.keys()) {
+        let known: Vec<(f64, i32)> = maps
+            .iter()
+            .filter_map(|map| map.get(&voxel))
+            .map(|&(bits, count)| (f64::from_bits(bits), count))
+            .collect();
+        let (log_odds, count) = match prefer {
+            Some(Prefer::First) => known[0],
+            Some(Prefer::Last) => known[known.len() - 1],
+            Some(Prefer::MoreObserved) => {
+                let most = known.iter().map(|&(_, count)| count).max().unwrap();
+                *known.iter().find(|&&(_, count)| count == most).unwrap()
+            }
+            None => {
+                let LogOdds { min, max, .. } = LogOdds::default();
+                let mut log_odds = known[0].0;
+                let mut count = i64::from(known[0].1);
+                for &(next, next_count) in &known[1..] {
+                    log_odds += next;
+                    count += i64::from(next_count);
+                }
+                let log_odds = if log_odds < min {
+                    min
+                } else if log_odds > max {
+                    max
+                } else {
+                    log_odds
+                };
+                (log_odds, count.min(i64::from(i32::MAX)) as i32)
+            }
+        };
+        merged.insert(voxel, (log_odds.to_bits(), count));
+    }
+    merged
+}
+
+fn merge(disk: &FaultyDisk, maps: &[PathBuf], prefer: Option<Prefer>) -> Result<Merged> {
+    let maps = maps.iter().map(|map| open(disk, map)).collect::<Result<Vec<_>>>()?;
+    voxtile::operations::merge(&maps, path("merged"), prefer, |_, _| {})
+}
+
+#[test]
+fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
+    let mut most_maps = 0;
+    for seed in 0..60 {
+        let mut random = Random(seed);
+        let config = config(&mut random);
+        let count = 2 + random.below(4) as usize;
+        let maps: Vec<Voxels> = (0..count).map(|_| random_voxels(&mut random, 200)).collect();
+        let paths: Vec<PathBuf> = (0..count).map(|k| path(&format!("map {k}"))).collect();
+        for prefer in [None, Some(Prefer::First), Some(Prefer::Last), Some(Prefer::MoreObserved)] {
+            let disk = disk();
+            for (path, voxels) in paths.iter().zip(&maps) {
+                write_map(&disk, path, &config, voxels);
+            }
+            let before = disk.files();
+            let is_iwlo = config.sensor_model.needs_intensity();
+            let merged = match merge(&disk, &paths, prefer) {
+                Err(Error::InvalidArgument { reason, .. }) if is_iwlo && prefer.is_none() => {
+                    assert!(reason.contains("iwlo") && reason.contains("--prefer"), "{reason}");
+                    continue;
+                }
+                merged => merged.unwrap_or_else(|error| panic!("seed {seed}: {error}")),
+            };
+            let expected = naive(&maps, prefer);
+            assert_eq!(read_map(&disk, &path("merged")), expected, "seed {seed}, {prefer:?}");
+            assert_eq!(merged.written.voxels, expected.len() as u64);
+            let in_several = expected
+                .keys()
+                .filter(|voxel| maps.iter().filter(|map| map.contains_key(*voxel)).count() > 1);
+            assert_eq!(merged.common_voxels, in_several.count() as u64);
+            assert!(merged.related.is_empty());
+            let reader = MapReader::open_on(disk.shared(), &path("merged"), 1).unwrap();
+            assert_eq!(reader.scan_number(), 0);
+            assert_eq!(reader.config().storage, config.storage);
+            let after = disk.files();
+            assert!(before.iter().all(|(path, bytes)| after[path] == *bytes), "the maps are as they were");
+            most_maps = most_maps.max(count);
+        }
+    }
+    assert_eq!(most_maps, 5);
+}
+
+/// Two maps in which the voxel (1, 2, 3) was seen occupied once.
+fn two(a: &MapConfig, b: &MapConfig) -> (FaultyDisk, [PathBuf; 2]) {
+    let (disk, maps) = (disk(), [path("a"), path("b")]);
+    let voxels = Voxels::from([([1, 2, 3], (0.85_f64.to_bits(), 1))]);
+    write_map(&disk, &maps[0], a, &voxels);
+    write_map(&disk, &maps[1], b, &voxels);
+    (disk, maps)
+}
+
+fn refusal(a: &MapConfig, b: &MapConfig, prefer: Option<Prefer>) -> String {
+    let (disk, maps) = two(a, b);
+    let refused = merge(&disk, &maps, prefer).expect_err("must be refused");
+    assert!(
+        disk.files()
+            .keys()
+            .all(|path| !path.starts_with("/maps/merged") && !path.to_string_lossy().contains("unfinished"))
+    );
+    refused.to_string()
+}
+
+#[test]
+fn maps_that_do_not_go_together_are_refused_with_what_differs() {
+    let usual = MapConfig::new(0.5, 2.5).unwrap();
+    let finer = MapConfig::new(0.25, 2.5).unwrap();
+    let larger = MapConfig::new(0.5, 5.0).unwrap();
+    let surer =
+        usual.clone().with_sensor_model(SensorModel::LogOdds(LogOdds { hit: 2.0, ..LogOdds::default() }));
+    let iwlo = usual.clone().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
+    let mut stricter = usual.clone();
+    stricter.occupancy_threshold = 0.7;
+    for prefer in [None, Some(Prefer::First)] {
+        let message = refusal(&usual, &finer, prefer);
+        assert!(message.contains("/maps/b") && message.contains("resolution 0.25 m, not 0.5 m"), "{message}");
+        let message = refusal(&usual, &larger, prefer);
+        assert!(message.contains("tile size 5 m, not 2.5 m"), "{message}");
+    }
+    for (other, what) in [(&surer, "hit 2,"), (&iwlo, "iwlo"), (&stricter, "0.7")] {
+        let message = refusal(&usual, other, None);
+        assert!(
+            message.contains("/maps/b") && message.contains(what) && message.contains("--prefer"),
+            "{message}"
+        );
+        let (disk, maps) = two(&usual, other);
+        merge(&disk, &maps, Some(Prefer::Last)).unwrap();
+        let reader = MapReader::open_on(disk.shared(), &path("merged"), 1).unwrap();
+        assert_eq!(reader.config().sensor_model, usual.sensor_model);
+    }
+    let (disk, maps) = two(&usual, &usual);
+    assert!(merge(&disk, &maps[..1], None).unwrap_err().to_string().contains("two maps"));
+    let nowhere = [maps[0].clone(), path("nowhere")];
+    assert!(matches!(merge(&disk, &nowhere, None), Err(Error::NoMap { .. })));
+}
+
+#[test]
+fn maps_that_go_back_to_the_same_one_are_named() {
+    let usual = MapConfig::new(0.5, 2.5).unwrap();
+    let (disk, [a, b]) = two(&usual, &usual);
+    let merged = merge(&disk, &[a.clone(), b, a], None).unwrap();
+    assert_eq!(merged.related, [(0, 2)]);
+    assert!(merged.is_added);
+    let twice = 0.85 + 0.85 + 0.85;
+    assert_eq!(read_map(&disk, &path("merged")), Voxels::from([([1, 2, 3], (f64::to_bits(twice), 3))]));
+}
+
+#[test]
+fn a_damaged_tile_is_named_and_there_is_no_map() {
+    let usual = MapConfig::new(0.5, 2.5).unwrap();
+    let (disk, maps) = two(&usual, &usual);
+    let table =
+        disk.files().into_keys().find(|path| path.ends_with("iwlo_meta.bin") && path.starts_with(&maps[1]));
+    let table = table.unwrap();
+    let mut bytes = disk.files()[&table].clone();
+    bytes[20] ^= 1;
+    disk.put(&table, &bytes);
+    let error = merge(&disk, &maps, None).unwrap_err();
+    assert!(matches!(&error, Error::Damaged { path, .. } if *path == table), "{error}");
+    assert!(disk.files().keys().all(|path| path.starts_with(&maps[0]) || path.starts_with(&maps[1])));
+}

@@ -1,0 +1,28 @@
+use crate::config::MemoryLimit;
+
+/// How much memory lives have: room for two or three tiles in use and for as many that are packed, so that tiles are on their
+/// way all the time.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::mapper) struct MemoryPlan {
+    pub(super) tiles: usize,
+    pub(super) bytes: usize,
+    pub(super) buffer_bytes: usize,
+    pub(super) least_scan_bytes: usize,
+    pub(super) is_kept: bool,
+    pub(super) spare_bytes: usize,
+    pub(super) compact_bytes: usize,
+}
+
+impl MemoryPlan {
+    pub(super) fn new(_: MemoryLimit) -> Self {
+        Self {
+            tiles: 3,
+            bytes: 26 << 10,
+            buffer_bytes: 2 << 10,
+            least_scan_bytes: 0,
+            is_kept: false,
+            spare_bytes: 2 << 10,
+            compact_bytes: 1 << 10,
+        }
+    }
+}
