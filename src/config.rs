@@ -24,7 +24,7 @@ pub struct MapConfig {
     pub occupancy_threshold: f64,
     /// Which part of a ray counts, and how often.
     pub rays: RayConfig,
-    /// What each tile keeps for coarse questions. Default: a view of the table's bricks.
+    /// What each tile keeps for coarse queries. Default: a view of the table's bricks.
     pub octree: OctreeConfig,
     /// How much an out-of-core mapper keeps in memory. Default: 16 tiles, and 32 MiB of updates for others.
     pub memory: MemoryLimit,
@@ -87,7 +87,7 @@ impl fmt::Display for InsertMode {
     }
 }
 
-/// What each tile keeps for coarse questions. The answers and the files are the same.
+/// What each tile keeps for coarse queries. The answers and the files are the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OctreeConfig {
@@ -254,7 +254,7 @@ impl MapConfig {
     /// Log-odds from which a voxel counts as occupied.
     #[inline]
     pub fn occupied_log_odds(&self) -> f64 {
-        // Asked with every question: the default needs no logarithm.
+        // Used by every query: the default needs no logarithm.
         if self.occupancy_threshold == 0.5 { 0.0 } else { logit(self.occupancy_threshold) }
     }
 }

@@ -6,8 +6,8 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
-    /// The original two files a tile: `iwlo_meta.bin`, 18 bytes a voxel, which any program that knows the original format can
-    /// read, and beside it `octree.bt` for those that read OctoMap's.
+    /// Two files per tile, the original format: `iwlo_meta.bin` (18 bytes per voxel) and `octree.bt`, which OctoMap programs
+    /// read.
     #[default]
     Seed,
     /// One file a tile, `tile.vxt`: the table in the compact form, in a twentieth to a fortieth of the bytes.

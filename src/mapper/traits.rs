@@ -5,8 +5,7 @@ use crate::scan::{PointBatch, Scan, ScanReport};
 use crate::sensor::Evidence;
 use crate::space::{TileIndex, VoxelIndex};
 
-/// A map that can be asked. Every question of [`Queries`](crate::query::Queries) is answered through these few
-/// methods.
+/// A map that can be queried. Every method of [`Queries`](crate::query::Queries) uses these few.
 ///
 /// Queries see whole scans, unsaved ones too.
 pub trait MapView {
@@ -88,6 +87,6 @@ pub trait Mapper: MapView + Send {
     /// A tile that cannot be read or written. Nothing is lost then: the call can be repeated.
     fn flush(&mut self) -> Result<()>;
 
-    /// Brings the octree of every tile in memory up to date, which questions do not need.
+    /// Brings the octree of every tile in memory up to date, which queries do not need.
     fn sync_octrees(&mut self);
 }

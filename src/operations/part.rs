@@ -1,7 +1,7 @@
 use crate::error::{Error, Result};
 use crate::space::{Aabb, Grid, VoxelBox};
 
-/// A part of space: the voxels whose center is in a box, half-open, as for questions about a region; or all others.
+/// A part of space: the voxels whose center is in a box, half-open, as for queries of a region; or all others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Part {
     /// What is in the box.

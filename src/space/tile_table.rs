@@ -287,7 +287,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    fn stamp(seed: u64) -> TileVersion {
+    fn version(seed: u64) -> TileVersion {
         let (bytes, crc) = (18 * (seed % 5000) + 96, (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as u32);
         let table = FileChecksum { bytes, crc };
         let octree = FileChecksum { bytes: bytes / 30, crc: !crc };
@@ -316,8 +316,8 @@ mod tests {
             for (number, &(tile, value)) in changes.iter().enumerate() {
                 match value {
                     Some(seed) => {
-                        table.insert(tile, stamp(seed));
-                        naive.insert(tile, stamp(seed));
+                        table.insert(tile, version(seed));
+                        naive.insert(tile, version(seed));
                     }
                     None => prop_assert_eq!(table.remove(tile), naive.remove(&tile).is_some()),
                 }
@@ -336,8 +336,8 @@ mod tests {
     #[test]
     fn a_tile_takes_some_thirty_bytes_and_its_index_ten() {
         let tiles = || (0..100_000).map(|k| TileIndex::new(k / 2500, k / 10 % 250, k % 10));
-        let stamps: TileTable<_> = (0..).map(stamp).zip(tiles()).map(|(stamp, tile)| (tile, stamp)).collect();
-        assert!(stamps.bytes() < 40 * stamps.len(), "{} bytes a tile", stamps.bytes() / stamps.len());
+        let versions: TileTable<_> = (0..).map(version).zip(tiles()).map(|(version, tile)| (tile, version)).collect();
+        assert!(versions.bytes() < 40 * versions.len(), "{} bytes a tile", versions.bytes() / versions.len());
         let indices: TileTable<()> = tiles().map(|tile| (tile, ())).collect();
         assert!(indices.bytes() < 10 * indices.len(), "{} bytes a tile", indices.bytes() / indices.len());
     }

@@ -145,8 +145,8 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
             return;
         }
         oracle.check(mapper, "after an error");
-        // A question that wants a tile in memory.
-        let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("questions go on");
+        // A query that wants a tile in memory.
+        let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("queries go on");
         assert_eq!(answer, oracle.answers[mapper.scan_number() as usize]);
     };
     let mut mapper = insist(disk, &mut (), nothing, |_| open_or_create(disk, oracle))?;

@@ -103,7 +103,7 @@ fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
 }
 
 /// Far more tiles are at work on than fit: what waits for them goes to files rather than that they are read for it, and
-/// counts all the same, for questions as for the map.
+/// counts all the same, for queries as for the map.
 #[test]
 fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
     let folder = TempDir::new().unwrap();

@@ -37,7 +37,7 @@ mod low_memory;
 mod map_life;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
-/// Random insert, question, eviction, flush, crash, reopen: always the naive map as of then.
+/// Random insert, query, eviction, flush, crash, reopen: always the naive map as of then.
 mod model;
 /// What the OctoCache paper says, where it can be tried.
 mod octocache;
@@ -48,7 +48,7 @@ mod octree_export;
 /// What is done with whole maps: made, merged, cropped, cleared, faded.
 mod operations;
 /// Queries against brute force.
-mod questions;
+mod queries;
 /// Scans from files, good and bad.
 mod readers;
 /// The stream of scans, in files and from standard input.

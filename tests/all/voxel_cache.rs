@@ -51,7 +51,7 @@ fn assert_coarse_answers(mapper: &impl Mapper, reference: &ReferenceMap, depth: 
     }
 }
 
-/// A seeded drive with coarse questions on the way.
+/// A seeded drive with coarse queries on the way.
 fn drive(mapper: &mut impl Mapper, reference: &mut ReferenceMap, seed: u64) {
     let mut random = Random(seed);
     for step in 0..6 {

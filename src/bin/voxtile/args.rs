@@ -148,11 +148,11 @@ pub struct BuildArgs {
     pub octree: OctreeArgs,
 }
 
-/// What tiles keep for coarse questions; no answer and no file depends on it.
+/// What tiles keep for coarse queries; no answer and no file depends on it.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Octrees (the map is the same with any)")]
 pub struct OctreeArgs {
-    /// What tiles keep for coarse questions [default: bricks, or pointers with a voxel cache]
+    /// What tiles keep for coarse queries [default: bricks, or pointers with a voxel cache]
     #[arg(long, value_name = "FORM")]
     pub octree: Option<OctreeName>,
     /// What stands between updates and the pointer octree; serial and parallel imply --octree pointers [default: off]

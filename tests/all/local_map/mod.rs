@@ -2,7 +2,7 @@ mod archive;
 #[cfg(feature = "cli")]
 mod command;
 mod mended;
-mod questions;
+mod queries;
 mod random_lives;
 mod readers;
 

@@ -218,6 +218,6 @@ fn a_collision_takes_no_longer_in_a_larger_sphere() {
         assert!(all.sphere_collision([0.0; 3], radius_m, UnknownAs::Free).is_err(), "{radius_m}");
     }
     assert!(all.sphere_collision([f64::NAN; 3], 1.0, UnknownAs::Free).is_err());
-    // Where unknown is an obstacle, its first voxel ends the question; a map that is asked for too many says so.
+    // Where unknown is an obstacle, its first voxel ends the query; a map that is asked for too many says so.
     assert!(all.sphere_collision([0.0; 3], 1e9, UnknownAs::Obstacle).is_err());
 }
