@@ -10,8 +10,8 @@ pub use storage::Storage;
 
 /// How a map is made and how much memory it may use.
 ///
-/// Resolution, tile size, sensor model and occupancy threshold belong to the map: they are stored with it, and
-/// opening it with others is an error. So does its storage, which an opened map keeps, whatever is asked for. The rest may
+/// Resolution, tile size, sensor model and occupancy threshold belong to the map: they are stored with it, and opening
+/// it with others is an error. So does its storage, which an opened map keeps, whatever is asked for. The rest may
 /// change from run to run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -45,9 +45,9 @@ pub enum MemoryLimit {
         /// Larger: fewer reads and writes.
         pending_bytes: usize,
     },
-    /// Most bytes of all that grows: tiles in use, others in the compact form, updates that wait for tiles, what a scan takes
-    /// while it is inserted, tiles on their way to and from disk, what is known of the tiles there (some 250 bytes a tile).
-    /// Tiles are written and fetched by threads of their own. At least [`MemoryLimit::least_bytes`].
+    /// Most bytes of all that grows: tiles in use, others in the compact form, updates that wait for tiles, what a scan
+    /// takes while it is inserted, tiles on their way to and from disk, what is known of the tiles there (some 250
+    /// bytes a tile). Tiles are written and fetched by threads of their own. At least [`MemoryLimit::least_bytes`].
     Bytes(usize),
     /// See [`MapConfig::with_tight_memory_bytes`].
     #[doc(hidden)]
@@ -291,9 +291,9 @@ impl VoxelCacheConfig {
 const DEFAULT_PENDING_BYTES: usize = 32 << 20;
 
 impl MemoryLimit {
-    /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles of `n` voxels and
-    /// `b = ceil(n / 8) + 1` bricks along their edge. That is two tiles of which every voxel is observed and no two alike, one at work and
-    /// one on its way in or out, and what a scan takes.
+    /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles of `n`
+    /// voxels and `b = ceil(n / 8) + 1` bricks along their edge. That is two tiles of which every voxel is observed and
+    /// no two alike, one at work and one on its way in or out, and what a scan takes.
     pub fn least_bytes(grid: &Grid) -> usize {
         least_bytes(grid.voxels_per_tile_edge() as usize)
     }

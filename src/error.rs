@@ -83,8 +83,8 @@ pub enum Error {
         /// The folder of the map.
         path: PathBuf,
     },
-    /// The file that keeps other writers out was removed or replaced, so that another may be at work: close the map, and open it
-    /// again to go on from its last flush.
+    /// The file that keeps other writers out was removed or replaced, so that another may be at work: close the map,
+    /// and open it again to go on from its last flush.
     #[error(
         "{}: the file was removed or replaced while this process held it locked, so another may be writing to the map; \
          nothing was written since; open the map again to go on from its last flush",
@@ -181,8 +181,8 @@ impl Error {
         Self::InvalidArgument { argument: argument.into(), reason: reason.into() }
     }
 
-    /// Whether the medium refused: a sector that cannot be read or written, or a damaged file system. It concerns one file, and
-    /// stays.
+    /// Whether the medium refused: a sector that cannot be read or written, or a damaged file system. It concerns one
+    /// file, and stays.
     pub fn is_of_medium(&self) -> bool {
         matches!(self, Self::Io { cause, .. } if is_of_medium(cause))
     }
@@ -237,8 +237,8 @@ fn of_tile(tile: &Option<TileIndex>) -> String {
     tile.map(|tile| format!("tile {tile} is ")).unwrap_or_default()
 }
 
-/// Whether an error is of the medium: a sector that cannot be read or written, or a file system that finds itself damaged.
-/// Such an error concerns one file and stays; others, such as too many open files, say nothing of the file.
+/// Whether an error is of the medium: a sector that cannot be read or written, or a file system that finds itself
+/// damaged. Such an error concerns one file and stays; others, such as too many open files, say nothing of the file.
 pub(crate) fn is_of_medium(error: &io::Error) -> bool {
     // EIO, ENXIO, ENODATA, EBADMSG, EUCLEAN and EREMOTEIO.
     #[cfg(unix)]

@@ -1,13 +1,13 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How the tiles of a map are stored. It belongs to the map from its beginning; content, answers and digest do not depend
-/// on it.
+/// How the tiles of a map are stored. It belongs to the map from its beginning; content, answers and digest do not
+/// depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
-    /// Two files per tile, the original format: `iwlo_meta.bin` (18 bytes per voxel) and `octree.bt`, which OctoMap programs
-    /// read.
+    /// Two files per tile, the original format: `iwlo_meta.bin` (18 bytes per voxel) and `octree.bt`, which OctoMap
+    /// programs read.
     #[default]
     Seed,
     /// One file a tile, `tile.vxt`: the table in the compact form, in a twentieth to a fortieth of the bytes.

@@ -108,8 +108,8 @@ fn index_from_tiles(
 }
 
 impl Index {
-    /// The snapshots that `metadata.json` names, and those that are there: a log that cannot be read does not tell which of
-    /// them were deleted, and without a list all of them count.
+    /// The snapshots that `metadata.json` names, and those that are there: a log that cannot be read does not tell
+    /// which of them were deleted, and without a list all of them count.
     fn join_snapshots(&mut self, disk: &dyn Disk, layout: &Layout, written: Option<&Metadata>) {
         let Some(ext) = &mut self.metadata.ext else { return };
         ext.snapshots = written.and_then(|metadata| metadata.ext.as_ref()?.snapshots.clone());

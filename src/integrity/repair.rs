@@ -38,7 +38,8 @@ pub enum ActionKind {
     Renamed,
     /// Removed, because the log proves that it was never committed or has been replaced.
     Removed,
-    /// No longer named by the log, because its files are missing; or by a snapshot, because they are missing or damaged.
+    /// No longer named by the log, because its files are missing; or by a snapshot, because they are missing or
+    /// damaged.
     Forgotten,
     /// Nothing: the medium refused.
     Left,

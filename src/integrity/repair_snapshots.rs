@@ -9,9 +9,9 @@ use crate::store::{Snapshot, SnapshotName, TileStore};
 use std::collections::BTreeMap;
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
-    /// Snapshots that are found under another name get their own again. Those that cannot be read go to quarantine, and with
-    /// them and with those that are missing the kept tables that no other one sees. Of the others, tiles go whose tables cannot
-    /// be read.
+    /// Snapshots that are found under another name get their own again. Those that cannot be read go to quarantine, and
+    /// with them and with those that are missing the kept tables that no other one sees. Of the others, tiles go whose
+    /// tables cannot be read.
     pub(super) fn repair_snapshots(&mut self, store: &mut TileStore, config: &MapConfig) -> Result<()> {
         if store.map_id().is_none() {
             return Ok(());

@@ -7,12 +7,12 @@ use crate::space::TileIndex;
 use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStore, TileVersion};
 use std::collections::BTreeMap;
 
-/// Kept tables that have been looked at and are whole, and as which version: several snapshots may see one. A snapshot whose
-/// own is lost is led to one that it does not mean.
+/// Kept tables that have been looked at and are whole, and as which version: several snapshots may see one. A snapshot
+/// whose own is lost is led to one that it does not mean.
 pub(super) type WholeTables = BTreeMap<(TileIndex, u64), TileVersion>;
 
-/// The tiles of a snapshot whose tables cannot be read as the snapshot names them. Tables that are the map's own too are left
-/// to whoever looks at the map.
+/// The tiles of a snapshot whose tables cannot be read as the snapshot names them. Tables that are the map's own too
+/// are left to whoever looks at the map.
 ///
 /// # Errors
 ///
@@ -45,7 +45,8 @@ pub(super) fn lost_tiles(
     Ok(lost)
 }
 
-/// The highest flush that snapshots and names of kept tables know of: flushes must go on from there, whatever else is lost.
+/// The highest flush that snapshots and names of kept tables know of: flushes must go on from there, whatever else is
+/// lost.
 pub(super) fn last_known_flush(
     disk: &dyn Disk,
     layout: &Layout,

@@ -52,8 +52,8 @@ impl Verification {
 ///
 /// # Errors
 ///
-/// No map there, or a disk that refuses more than single files. Damage is a finding, and so is a file or folder that the medium
-/// does not give back; the others are looked at all the same.
+/// No map there, or a disk that refuses more than single files. Damage is a finding, and so is a file or folder that
+/// the medium does not give back; the others are looked at all the same.
 pub fn verify(
     folder: impl AsRef<Path>,
     found: impl FnMut(&Finding),

@@ -78,16 +78,16 @@ impl MapReader {
         Ok(Self { config, octrees, store, disk, cache_tiles, cache: Mutex::new(cache) })
     }
 
-    /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not changed
-    /// stay there. From then on the writer need not keep what this reader saw before: a reader that lives long and is never
-    /// refreshed costs, for each tile that is flushed anew, the bytes of the version that it sees.
+    /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not
+    /// changed stay there. From then on the writer need not keep what this reader saw before: a reader that lives long
+    /// and is never refreshed costs, for each tile that is flushed anew, the bytes of the version that it sees.
     ///
     /// A reader of a snapshot, which does not change, stays where it is.
     ///
     /// # Errors
     ///
-    /// As for [`MapReader::open`], and [`Error::Mismatch`] if there is another map in the folder by now. The reader goes on seeing
-    /// what it saw then.
+    /// As for [`MapReader::open`], and [`Error::Mismatch`] if there is another map in the folder by now. The reader
+    /// goes on seeing what it saw then.
     pub fn refresh(&mut self) -> Result<bool> {
         if self.snapshot().is_some() {
             return Ok(false);

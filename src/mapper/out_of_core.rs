@@ -107,8 +107,8 @@ impl OutOfCoreTileMapper {
         self.lock().inputs().to_vec()
     }
 
-    /// Says what has been taken of the input that the map is being built from; the next flush keeps it. To be said after
-    /// each scan, so that every flush has what belongs to it.
+    /// Says what has been taken of the input that the map is being built from; the next flush keeps it. To be said
+    /// after each scan, so that every flush has what belongs to it.
     pub fn note_input_content(&mut self, content: InputContent) {
         if let Some(input) = self.pager_mut().last_input_mut() {
             input.content = Some(content);
@@ -140,8 +140,8 @@ impl OutOfCoreTileMapper {
         self.pager_mut().create_snapshot(name)
     }
 
-    /// [`Mapper::insert_scan`] for points wherever they lie, seen from `origin` in metres, world frame: a scan may be larger
-    /// than memory.
+    /// [`Mapper::insert_scan`] for points wherever they lie, seen from `origin` in metres, world frame: a scan may be
+    /// larger than memory.
     ///
     /// # Errors
     ///

@@ -3,8 +3,8 @@ use crate::error::Result;
 use crate::scan::{Overflow, ScanPoints, ScanTracer, ScanUpdates, UpdateOrder};
 use crate::space::Point;
 
-/// What a scan says about voxels, in the form that the map's tiles want. What there is no room for overflows, if there is a
-/// limit.
+/// What a scan says about voxels, in the form that the map's tiles want. What there is no room for overflows, if there
+/// is a limit.
 pub(super) fn trace(
     tracer: &mut ScanTracer,
     config: &MapConfig,

@@ -5,13 +5,13 @@ use crate::mapper::{MapReader, MapView};
 use crate::persistence::{new_map_id, new_metadata};
 use std::path::Path;
 
-/// Writes a map anew with another storage, or the same: a new map in `folder`, which does not exist yet or is empty, with
-/// the same content to the bit. In memory are one tile and some 200 bytes a tile.
+/// Writes a map anew with another storage, or the same: a new map in `folder`, which does not exist yet or is empty,
+/// with the same content to the bit. In memory are one tile and some 200 bytes a tile.
 ///
-/// It is the same map in another form: its id, its number of scans, each tile's, and the input that a build goes on with are
-/// kept, so that a build can be resumed on either, and a merge of both is warned of. Only flushes are counted anew; snapshots
-/// are not taken along. A map of the original format, which has no id, gets one, as it would before its first change. `progress` is told the tiles done
-/// and all.
+/// It is the same map in another form: its id, its number of scans, each tile's, and the input that a build goes on
+/// with are kept, so that a build can be resumed on either, and a merge of both is warned of. Only flushes are counted
+/// anew; snapshots are not taken along. A map of the original format, which has no id, gets one, as it would before its
+/// first change. `progress` is told the tiles done and all.
 ///
 /// # Errors
 ///

@@ -10,8 +10,8 @@ use std::path::Path;
 /// Makes a map of the voxels of another that are in a part of space.
 ///
 /// The new one has the parameters, storage and number of scans of the other, but an id of its own and no input to go on
-/// with: it is a part of what the scans have said. It is there as a whole or not at all, see [`MapWriter`]. `progress` is
-/// told the tiles done and all.
+/// with: it is a part of what the scans have said. It is there as a whole or not at all, see [`MapWriter`]. `progress`
+/// is told the tiles done and all.
 ///
 /// # Errors
 ///

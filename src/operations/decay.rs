@@ -8,12 +8,12 @@ use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
 
-/// How evidence fades: the log-odds of every voxel times `2^(-n / halflife)`, where `n` is the number of scans that the map
-/// has taken since its evidence last faded, or since its beginning. Counts of observations stay.
+/// How evidence fades: the log-odds of every voxel times `2^(-n / halflife)`, where `n` is the number of scans that the
+/// map has taken since its evidence last faded, or since its beginning. Counts of observations stay.
 ///
 /// So what was seen becomes less certain the more scans have come after, wherever they looked; new scans outweigh it
-/// sooner. The rule knows nothing of when a voxel was last seen, because a map does not: it depends on the number of scans
-/// alone, and not on how the map was kept in memory or when it was flushed.
+/// sooner. The rule knows nothing of when a voxel was last seen, because a map does not: it depends on the number of
+/// scans alone, and not on how the map was kept in memory or when it was flushed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Decay {

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 /// In what two maps, or two states of a map, differ: what became of the first on the way to the second.
 ///
-/// *Flipped* are voxels that were free and are occupied now, or the other way, each by its own map's threshold; *changed* are
-/// those whose log-odds or count differ and nothing more.
+/// *Flipped* are voxels that were free and are occupied now, or the other way, each by its own map's threshold;
+/// *changed* are those whose log-odds or count differ and nothing more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Diff {
@@ -69,9 +69,9 @@ pub enum TileChange {
     Changed,
 }
 
-/// Compares two maps, or states of a map, tile by tile. Tiles of which the index tells that they are the same version of the
-/// same map are not read. `found` is told each tile that differs, in order, `progress` the tiles done and all. Memory: the lists of
-/// tiles, and one tile of each.
+/// Compares two maps, or states of a map, tile by tile. Tiles of which the index tells that they are the same version
+/// of the same map are not read. `found` is told each tile that differs, in order, `progress` the tiles done and all.
+/// Memory: the lists of tiles, and one tile of each.
 ///
 /// # Errors
 ///

@@ -10,8 +10,8 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct KeptTables {
-    /// Tables that readers see and no snapshot does. They go with the flush after the last of these readers, or when the map
-    /// is next opened for writing.
+    /// Tables that readers see and no snapshot does. They go with the flush after the last of these readers, or when
+    /// the map is next opened for writing.
     pub reader_tables: u64,
     /// Their bytes.
     pub reader_bytes: u64,
@@ -21,8 +21,8 @@ pub struct KeptTables {
     pub snapshot_bytes: u64,
 }
 
-/// Counts the tables that are kept beside the map in `folder`. Looks into every tile's folder; takes no lock, and beside a writer
-/// the numbers may be those of a moment.
+/// Counts the tables that are kept beside the map in `folder`. Looks into every tile's folder; takes no lock, and
+/// beside a writer the numbers may be those of a moment.
 ///
 /// # Errors
 ///

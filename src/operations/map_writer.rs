@@ -9,11 +9,12 @@ use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Makes a new map from the tables of its tiles, one at a time: in memory are the table at hand and some 200 bytes a tile.
+/// Makes a new map from the tables of its tiles, one at a time: in memory are the table at hand and some 200 bytes a
+/// tile.
 ///
-/// Until [`MapWriter::finish`] the map lies beside its place, as `MAP.unfinished`, where no command takes it for the one
-/// that was asked for. A process that is killed leaves that folder behind, and the next attempt to make the same map removes
-/// it; so does a writer that is dropped.
+/// Until [`MapWriter::finish`] the map lies beside its place, as `MAP.unfinished`, where no command takes it for the
+/// one that was asked for. A process that is killed leaves that folder behind, and the next attempt to make the same
+/// map removes it; so does a writer that is dropped.
 #[derive(Debug)]
 pub struct MapWriter {
     map: StagedMap,
@@ -52,7 +53,8 @@ impl MapWriter {
     ///
     /// # Errors
     ///
-    /// A wrong configuration, a folder with other content, another process that makes the same map, a disk that refuses.
+    /// A wrong configuration, a folder with other content, another process that makes the same map, a disk that
+    /// refuses.
     pub fn create(folder: impl AsRef<Path>, config: &MapConfig) -> Result<Self> {
         Self::create_on(Arc::new(FsDisk), folder.as_ref(), config)
     }

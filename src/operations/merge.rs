@@ -29,12 +29,12 @@ pub struct Merged {
 ///
 /// Without a preference log-odds are added, in the order of the maps, and clamped once; counts are added, too. That is
 /// what one map of all scans would have, but for the clamps on the way and the order of additions. It takes maps of the
-/// model [`LogOdds`](crate::sensor::LogOdds) with equal parameters, because evidence of the other model depends on what was
-/// there before. With a preference any models go together; sensor model, occupancy threshold and storage are those of the
-/// first map.
+/// model [`LogOdds`](crate::sensor::LogOdds) with equal parameters, because evidence of the other model depends on what
+/// was there before. With a preference any models go together; sensor model, occupancy threshold and storage are those
+/// of the first map.
 ///
-/// The new map has an id of its own and no scans, and is there as a whole or not at all, see [`MapWriter`]; it is made on
-/// the disk of the first. `progress` is told the tiles done and all.
+/// The new map has an id of its own and no scans, and is there as a whole or not at all, see [`MapWriter`]; it is made
+/// on the disk of the first. `progress` is told the tiles done and all.
 ///
 /// # Errors
 ///

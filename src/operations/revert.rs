@@ -28,9 +28,9 @@ pub struct Reverted {
     pub tiles_removed: u64,
 }
 
-/// Makes the map in `folder` again what it was when a snapshot was made: tiles, scan number and input. It is one commit like
-/// any other, so that it has happened or not; flushes go on being counted upward. All snapshots stay, and readers go on
-/// seeing what they see.
+/// Makes the map in `folder` again what it was when a snapshot was made: tiles, scan number and input. It is one commit
+/// like any other, so that it has happened or not; flushes go on being counted upward. All snapshots stay, and readers
+/// go on seeing what they see.
 ///
 /// What came after the snapshot is in no map any more, unless `keep_as` names a snapshot to be made of it before.
 /// `progress` is told the tiles done and all. Memory: the lists of tiles of the map and of the snapshot, and one tile.

@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 /// A snapshot of a map: the map as of a flush, under a name.
 ///
-/// A snapshot is one small file that says which tiles the map had, and what a reader is that never leaves: the tables that it
-/// sees stay when they are replaced. So it costs next to nothing when it is made, and from then on the bytes of the tables
-/// that have changed since.
+/// A snapshot is one small file that says which tiles the map had, and what a reader is that never leaves: the tables
+/// that it sees stay when they are replaced. So it costs next to nothing when it is made, and from then on the bytes of
+/// the tables that have changed since.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct SnapshotInfo {
@@ -27,20 +27,20 @@ pub struct SnapshotInfo {
     pub voxels: u64,
     /// Bytes of the tables that it sees.
     pub table_bytes: u64,
-    /// Bytes that no other snapshot and not the present map names: at most so many are free when it is deleted. Fewer are where
-    /// a revert has linked a table, so that it is there under two names.
+    /// Bytes that no other snapshot and not the present map names: at most so many are free when it is deleted. Fewer
+    /// are where a revert has linked a table, so that it is there under two names.
     pub own_bytes: u64,
     /// Why it cannot be read, if it cannot; the numbers are 0 then.
     pub damage: Option<String>,
 }
 
-/// Keeps the last flush of the map in `folder` under a name. A map of the original format gets an id and checksums first, as
-/// before any change.
+/// Keeps the last flush of the map in `folder` under a name. A map of the original format gets an id and checksums
+/// first, as before any change.
 ///
 /// # Errors
 ///
-/// [`Error::AlreadyExists`] if there is a snapshot of this name; no map there, another writer, a disk that refuses: there is no
-/// such snapshot then.
+/// [`Error::AlreadyExists`] if there is a snapshot of this name; no map there, another writer, a disk that refuses:
+/// there is no such snapshot then.
 pub fn snapshot(folder: impl AsRef<Path>, name: &SnapshotName) -> Result<()> {
     snapshot_on(Arc::new(FsDisk), folder.as_ref(), name)
 }
@@ -78,8 +78,8 @@ pub fn delete_snapshot_on(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotNam
     TileStore::open(disk, folder)?.delete_snapshot(name)
 }
 
-/// The snapshots of a map, by flush and then by name, those that cannot be read first. Takes no lock; beside a writer the bytes
-/// may be those of a moment.
+/// The snapshots of a map, by flush and then by name, those that cannot be read first. Takes no lock; beside a writer
+/// the bytes may be those of a moment.
 ///
 /// # Errors
 ///

@@ -2,8 +2,8 @@ use crate::error::{Error, Result};
 use crate::tile::Table;
 use crate::tile::format::{CompactEffort, CompactWriter};
 
-/// Encodes tables in the compact form. Its buffers are made with the first table and kept: making them takes longer than
-/// encoding a small tile.
+/// Encodes tables in the compact form. Its buffers are made with the first table and kept: making them takes longer
+/// than encoding a small tile.
 #[derive(Debug, Default)]
 pub(crate) struct Packer(Option<CompactWriter>);
 

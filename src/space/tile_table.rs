@@ -336,7 +336,8 @@ mod tests {
     #[test]
     fn a_tile_takes_some_thirty_bytes_and_its_index_ten() {
         let tiles = || (0..100_000).map(|k| TileIndex::new(k / 2500, k / 10 % 250, k % 10));
-        let versions: TileTable<_> = (0..).map(version).zip(tiles()).map(|(version, tile)| (tile, version)).collect();
+        let versions: TileTable<_> =
+            (0..).map(version).zip(tiles()).map(|(version, tile)| (tile, version)).collect();
         assert!(versions.bytes() < 40 * versions.len(), "{} bytes a tile", versions.bytes() / versions.len());
         let indices: TileTable<()> = tiles().map(|tile| (tile, ())).collect();
         assert!(indices.bytes() < 10 * indices.len(), "{} bytes a tile", indices.bytes() / indices.len());

@@ -16,8 +16,8 @@ pub trait Disk: Debug + Send + Sync {
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
     /// Watches for readers of the file that has the name now, even after another file took its name.
     fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>>;
-    /// Creates a file, or empties it, for writing from the beginning. A file with other names too ([`Disk::link`]) keeps its
-    /// content under those.
+    /// Creates a file, or empties it, for writing from the beginning. A file with other names too ([`Disk::link`])
+    /// keeps its content under those.
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>>;
     /// Opens a file, which must be there and be that long, for writing from `offset` on; what stood there is cut off.
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>>;
@@ -55,8 +55,8 @@ pub trait Disk: Debug + Send + Sync {
     fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
         Ok(path.to_owned())
     }
-    /// Locks a file, made if missing, until the returned value is dropped; `None` if another holds it. Only who may write
-    /// the file can lock it.
+    /// Locks a file, made if missing, until the returned value is dropped; `None` if another holds it. Only who may
+    /// write the file can lock it.
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>>;
     /// Waits a moment for another process.
     fn pause(&self) {

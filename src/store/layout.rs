@@ -20,8 +20,8 @@ pub enum TileFile {
 }
 
 impl TileFile {
-    /// The files that a tile has, in the order in which they are written and renamed: the table, which names the octree's
-    /// checksum, comes last.
+    /// The files that a tile has, in the order in which they are written and renamed: the table, which names the
+    /// octree's checksum, comes last.
     pub const fn all(storage: Storage) -> &'static [Self] {
         match storage {
             Storage::Seed => &[Self::Octree, Self::Table],
@@ -99,7 +99,8 @@ impl Layout {
         self.tile_folder(tile).join(file.name(self.storage))
     }
 
-    /// The table of a tile as of a flush, kept beside newer ones for readers that opened the map then and for snapshots.
+    /// The table of a tile as of a flush, kept beside newer ones for readers that opened the map then and for
+    /// snapshots.
     pub fn kept(&self, tile: TileIndex, flush_number: u64) -> PathBuf {
         let table = TileFile::Table.name(self.storage);
         self.tile_folder(tile).join(format!("{table}{KEPT_SUFFIX}{flush_number}"))

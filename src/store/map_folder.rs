@@ -185,7 +185,8 @@ pub(super) fn list_foreign_tiles(disk: &dyn Disk, layout: &Layout) -> Result<FxH
     let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
     let mut tiles = FxHashSet::default();
     for tile in names.iter().filter_map(|name| tile_of_folder(name)) {
-        // A folder with any content is a tile, even without a table. An empty one belongs to a tile that was never flushed.
+        // A folder with any content is a tile, even without a table. An empty one belongs to a tile that was never
+        // flushed.
         let folder = layout.tile_folder(tile);
         match disk.list(&folder) {
             Ok(names) if names.is_empty() => {}

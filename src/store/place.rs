@@ -5,8 +5,8 @@ use super::map_folder::read_metadata;
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Whether a file or folder may be made at a path: not inside of a map, where it would be taken for a part of it, or where the
-/// map's next change could remove it. Links on the way there are followed.
+/// Whether a file or folder may be made at a path: not inside of a map, where it would be taken for a part of it, or
+/// where the map's next change could remove it. Links on the way there are followed.
 ///
 /// # Errors
 ///

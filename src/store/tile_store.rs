@@ -134,8 +134,8 @@ impl TileStore {
             let store = Self::read(disk.clone(), layout.clone(), metadata)?;
             // Only if it still is the present one has the writer seen, at its next flush, that it is read.
             let now = map_folder::read_metadata(&*disk, &layout)?;
-            // If the log is newer, the writer cannot tell which flush is read. Wait until it replaces metadata.json, unless it
-            // was killed.
+            // If the log is newer, the writer cannot tell which flush is read. Wait until it replaces metadata.json,
+            // unless it was killed.
             let is_known = !store.is_metadata_behind() || attempt + 1 >= OPEN_ATTEMPTS / 2;
             if now.ext.map(|ext| ext.flush_number) == store.committer.written_flush() && is_known {
                 return Ok(Self { shared_metadata: Some(SharedMetadata(shared)), ..store });
@@ -292,8 +292,8 @@ impl TileStore {
         self.versions.versions()
     }
 
-    /// Bytes of memory of what is known of the tiles without reading them: some thirty a tile, and as many more for one with
-    /// a version that is not committed.
+    /// Bytes of memory of what is known of the tiles without reading them: some thirty a tile, and as many more for one
+    /// with a version that is not committed.
     pub fn index_bytes(&self) -> usize {
         self.versions.bytes() + self.kept.bytes()
     }
@@ -381,8 +381,8 @@ impl TileStore {
         self.location_at(tile, path, version).open().map(Some)
     }
 
-    /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before the
-    /// next commit.
+    /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before
+    /// the next commit.
     pub fn location(&self, tile: TileIndex) -> Option<TileLocation> {
         let version = self.version(tile)?;
         Some(self.location_at(tile, self.latest_path(tile), Some(version)))

@@ -479,8 +479,8 @@ fn ctrl_c_flushes_and_says_how_far_it_got() {
 fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
     let folder = tempfile::tempdir().unwrap();
     let voxtile = folder.path().join("voxtile");
-    // By a process of its own: what this one writes cannot be run while a process that another test has just begun still
-    // holds it open.
+    // By a process of its own: what this one writes cannot be run while a process that another test has just begun
+    // still holds it open.
     let shell = |line: &str, path: &std::path::Path| {
         let program = env!("CARGO_BIN_EXE_voxtile");
         let status = std::process::Command::new("sh").args(["-c", line, program]).arg(path).status();

@@ -104,7 +104,8 @@ fn insist<S, T>(
         match attempt(subject) {
             Ok(done) => return Some(done),
             Err(_) if disk.has_crashed() => return None,
-            // Of what could not be read when the map was opened, nobody can tell what it was: not before it is opened again.
+            // Of what could not be read when the map was opened, nobody can tell what it was: not before it is opened
+            // again.
             Err(Error::Damaged { .. }) if disk.had_a_fault_that_stays() => return None,
             Err(error) => {
                 assert!(number < 3 && matches!(error, Error::Io { .. }), "attempt {number}: {error}");

@@ -13,9 +13,9 @@ fn distance(a: &Leaf, b: &Leaf) -> usize {
     (a.len() - common) + (b.len() - common)
 }
 
-/// The paper's F, the sum over neighbors in the sequence, and the ways from the root to the first and back from the last:
-/// these are the same for every order where all leaves are at one depth. Without them a pruned tree would reward an order
-/// for ending deep down.
+/// The paper's F, the sum over neighbors in the sequence, and the ways from the root to the first and back from the
+/// last: these are the same for every order where all leaves are at one depth. Without them a pruned tree would reward
+/// an order for ending deep down.
 fn cost(sequence: &[&Leaf]) -> usize {
     let ends = [sequence.first(), sequence.last()].map(|leaf| leaf.map_or(0, |leaf| leaf.len()));
     sequence.windows(2).map(|pair| distance(pair[0], pair[1])).sum::<usize>() + ends[0] + ends[1]
@@ -35,8 +35,8 @@ fn least_cost(leaves: &mut Vec<&Leaf>, fixed: usize) -> usize {
     least
 }
 
-/// Theorem A.1, by trying every order: Morton order is a cheapest one. In trees whose leaves are all at one depth, and in
-/// pruned ones, where the order is that of a dictionary.
+/// Theorem A.1, by trying every order: Morton order is a cheapest one. In trees whose leaves are all at one depth, and
+/// in pruned ones, where the order is that of a dictionary.
 #[test]
 fn morton_order_is_a_cheapest_order_of_updates() {
     let mut random = Random(11);

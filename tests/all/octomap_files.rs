@@ -41,7 +41,8 @@ fn refusal(bytes: &[u8]) -> (u64, String) {
     }
 }
 
-/// Maps that OctoMap wrote: small ones of our own (`tools/octomap_oracle/fixtures.cpp`), and large ones of others where they are.
+/// Maps that OctoMap wrote: small ones of our own (`tools/octomap_oracle/fixtures.cpp`), and large ones of others where
+/// they are.
 fn maps_of_octomap() -> Vec<PathBuf> {
     let is_map =
         |path: &PathBuf| path.extension().is_some_and(|extension| extension == "bt" || extension == "ot");

@@ -244,8 +244,8 @@ fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
     assert_eq!(digest_of(&disk, &map, Some("adopted")).unwrap(), digests[2]);
 }
 
-/// Every few bytes of a snapshot and of a table that only snapshots see, and these files gone: found, named, repaired; the map
-/// and what is whole of the snapshots stay as they were.
+/// Every few bytes of a snapshot and of a table that only snapshots see, and these files gone: found, named, repaired;
+/// the map and what is whole of the snapshots stay as they were.
 #[test]
 fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
     for storage in [Storage::Seed, Storage::Compact] {

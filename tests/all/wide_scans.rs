@@ -139,8 +139,8 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
     assert!(refusals > POINTS as usize / 4, "{refusals} scans were refused");
 }
 
-/// What is known of a tile takes memory, too. A scan that touches more tiles than there is room to know of is refused as a
-/// whole, and is no reason to refuse the next one.
+/// What is known of a tile takes memory, too. A scan that touches more tiles than there is room to know of is refused
+/// as a whole, and is no reason to refuse the next one.
 #[test]
 fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on() {
     let folder = tempfile::TempDir::new().unwrap();

@@ -76,8 +76,8 @@ fn falling_limits(seed: u64) -> impl Iterator<Item = u64> {
     })
 }
 
-/// Runs a command with so many KiB of addresses: it ends, in whatever way, but does not panic. Where a thread gets its stack
-/// and then not the pages for its signals, Rust itself does, and aborts: there is nothing to be done about that.
+/// Runs a command with so many KiB of addresses: it ends, in whatever way, but does not panic. Where a thread gets its
+/// stack and then not the pages for its signals, Rust itself does, and aborts: there is nothing to be done about that.
 fn run(command: &Command, limit_kib: u64, stdin: Stdio) -> Output {
     let mut command = limited(command, 'v', limit_kib);
     let mut child = command.stdin(stdin).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();

@@ -56,8 +56,8 @@ pub fn voxtile() -> Command {
     Command::new(env!("CARGO_BIN_EXE_voxtile"))
 }
 
-/// The same command, with a limit of the shell's (`ulimit`): files (`n`), KiB of addresses (`v`). What it aborts with stays
-/// short.
+/// The same command, with a limit of the shell's (`ulimit`): files (`n`), KiB of addresses (`v`). What it aborts with
+/// stays short.
 pub fn limited(command: &Command, of: char, limit: u64) -> Command {
     let mut limited = Command::new("sh");
     limited.args(["-c", &format!("ulimit -c 0; ulimit -{of} $0 && exec \"$@\"")]).arg(limit.to_string());
@@ -192,8 +192,8 @@ pub fn inputs(map: &Path) -> usize {
     inputs.unwrap_or(0)
 }
 
-/// Whether a process has said that it wants to hear of SIGINT and SIGTERM; where the system does not tell, it is waited for
-/// a while.
+/// Whether a process has said that it wants to hear of SIGINT and SIGTERM; where the system does not tell, it is waited
+/// for a while.
 pub fn signals_are_caught(process: u32) -> bool {
     let Ok(status) = fs::read_to_string(format!("/proc/{process}/status")) else {
         sleep(Duration::from_millis(500));

@@ -59,8 +59,8 @@ pub enum Command {
     Convert(ConvertArgs),
     /// Check every file of a map for damage; exit code 1 if there is any
     Verify(VerifyArgs),
-    /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted; exit code 1 if there is such
-    /// a thing
+    /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted; exit code 1 if
+    /// there is such a thing
     Repair(RepairArgs),
     /// Run scans through a local map, as a planner needs it: sizes and times in a table, and a picture
     Local(LocalArgs),
@@ -127,8 +127,8 @@ pub struct BuildArgs {
     /// Add the scans to an existing map, which must not have scans of this input yet
     #[arg(long)]
     pub append: bool,
-    /// Go on with a build that was interrupted, or with an input that has grown; or begin it, where there is no map or with
-    /// --append: every scan counts exactly once, however often the command is repeated
+    /// Go on with a build that was interrupted, or with an input that has grown; or begin it, where there is no map or
+    /// with --append: every scan counts exactly once, however often the command is repeated
     #[arg(long)]
     pub resume: bool,
     /// Add the scans even if the map has scans of this input: they count once more
@@ -286,8 +286,8 @@ pub struct RaycastArgs {
 pub struct ExportArgs {
     /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
-    /// File to write, or - for standard output; its extension says what: .ply .pcd .csv hold occupied voxels, .bt .ot the
-    /// whole octree
+    /// File to write, or - for standard output; its extension says what: .ply .pcd .csv hold occupied voxels, .bt .ot
+    /// the whole octree
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     pub output: PathBuf,
     /// What to write, whatever the extension
@@ -299,9 +299,9 @@ pub struct ExportArgs {
     /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,
-    /// Coordinates in the file are those of the map less this, in metres: the nearest corner of a voxel, said in the summary
-    /// and in FILE.origin.json. A map far from its origin needs it as .bt or .ot; a .pcd chooses one where float32 is too
-    /// coarse [default: 0 0 0]
+    /// Coordinates in the file are those of the map less this, in metres: the nearest corner of a voxel, said in the
+    /// summary and in FILE.origin.json. A map far from its origin needs it as .bt or .ot; a .pcd chooses one where
+    /// float32 is too coarse [default: 0 0 0]
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3)]
     pub origin: Option<Vec<f64>>,
     /// Memory for putting a .bt or .ot file together, beside that of one tile (64MiB, 1GiB)
@@ -434,8 +434,8 @@ pub struct LocalArgs {
     /// Take about so many points of each scan, evenly [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub points: Option<u32>,
-    /// Run the scans so many times, and count for each update the least of its times: what others do on the machine adds to
-    /// some, never to all
+    /// Run the scans so many times, and count for each update the least of its times: what others do on the machine
+    /// adds to some, never to all
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
     /// File of poses, as for build

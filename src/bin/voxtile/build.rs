@@ -230,8 +230,8 @@ fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
     Error::argument(args.scans.display().to_string(), reason).into()
 }
 
-/// Points of a scan that the limit of memory has no room for lie in the map's folder or, where that is still to be made,
-/// beside it: not where the system may keep files in memory.
+/// Points of a scan that the limit of memory has no room for lie in the map's folder or, where that is still to be
+/// made, beside it: not where the system may keep files in memory.
 fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
     let folder = match args.output.parent() {
         _ if args.output.is_dir() => &*args.output,

@@ -143,8 +143,8 @@ impl<'a> Export<'a> {
         })
     }
 
-    /// How many voxels there are to export: the headers name it before the first. In constant memory, and without reading
-    /// a tile where the log of the map knows.
+    /// How many voxels there are to export: the headers name it before the first. In constant memory, and without
+    /// reading a tile where the log of the map knows.
     fn count_voxels(&self, reader: &MapReader) -> voxtile::Result<u64> {
         let (min_probability, region) = (self.args.min_probability, self.region.as_ref());
         match (reader.voxel_counts(), min_probability, region) {

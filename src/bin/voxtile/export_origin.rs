@@ -47,8 +47,8 @@ impl ExportOrigin {
         Ok(Self { asked_m: (!is_corner).then_some(asked_m), ..origin })
     }
 
-    /// The origin of a PCD file of voxels in a box: the map's own where `f32` has room for the coordinates, else a round place
-    /// in their middle.
+    /// The origin of a PCD file of voxels in a box: the map's own where `f32` has room for the coordinates, else a
+    /// round place in their middle.
     ///
     /// # Errors
     ///

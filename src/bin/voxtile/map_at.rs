@@ -52,8 +52,8 @@ pub fn whole_map(path: &Path) -> Result<&Path> {
     Ok(path)
 }
 
-/// Answers from one state of a map, or from a snapshot of it (`MAP@SNAPSHOT`); if a writer flushes the map meanwhile, begins
-/// again with the new state.
+/// Answers from one state of a map, or from a snapshot of it (`MAP@SNAPSHOT`); if a writer flushes the map meanwhile,
+/// begins again with the new state.
 pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Result<T>) -> anyhow::Result<T> {
     let map = MapAt::of(map)?;
     again_if_changed(|| read(&map.open()?))

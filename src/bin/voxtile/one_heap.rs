@@ -6,8 +6,8 @@ const HEAPS: &str = "MALLOC_ARENA_MAX";
 
 /// Begins the process anew with one heap, unless its user has chosen a number of them.
 ///
-/// glibc gives threads heaps of their own, and what is free in one is of no use to the others: a build that keeps to
-/// 64 MiB took 133 MiB of the system with heaps for two threads, 89 MiB with one, and no more time. If it cannot be, the
+/// glibc gives threads heaps of their own, and what is free in one is of no use to the others: a build that keeps to 64
+/// MiB took 133 MiB of the system with heaps for two threads, 89 MiB with one, and no more time. If it cannot be, the
 /// build goes on as it is.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub fn begin_with_one_heap() {

@@ -7,9 +7,9 @@ use voxtile::{Error, Result};
 
 /// A file that a command makes: it is there whole or not at all.
 ///
-/// Its bytes go to a file of their own beside the target, with a name that nothing else has, which takes the target's name at
-/// the end. So two commands that write to one name leave the whole file of one of them, a link is never followed, and
-/// what a killed command leaves is in nobody's way.
+/// Its bytes go to a file of their own beside the target, with a name that nothing else has, which takes the target's
+/// name at the end. So two commands that write to one name leave the whole file of one of them, a link is never
+/// followed, and what a killed command leaves is in nobody's way.
 ///
 /// Standard output (`-`), a pipe or a device has no name to take: it gets all bytes at the end, from a temporary file.
 #[derive(Debug)]
@@ -124,8 +124,8 @@ impl Write for Unfinished {
     }
 }
 
-/// A file without a name for what is put together on the way to `target`, on the same disk where that is a file. It is gone
-/// with the process.
+/// A file without a name for what is put together on the way to `target`, on the same disk where that is a file. It is
+/// gone with the process.
 pub fn scratch_for(target: &Path) -> Result<File> {
     let file = match place_of(target)? {
         Place::File => tempfile::tempfile_in(folder_of(target)),

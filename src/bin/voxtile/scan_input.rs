@@ -23,8 +23,8 @@ pub fn open(scans: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource + S
     Ok(Box::new(read_scan_stream(input, Path::new("standard input"), false)?))
 }
 
-/// What a map calls an input, for people: the last part of its path (the last two, where that is `scans`), or the label of
-/// a stream.
+/// What a map calls an input, for people: the last part of its path (the last two, where that is `scans`), or the label
+/// of a stream.
 pub fn name_of(scans: &Path, source: &dyn ScanSource) -> String {
     if is_standard_input(scans) {
         return source.fingerprint().unwrap_or_else(|_| "standard input".to_owned());

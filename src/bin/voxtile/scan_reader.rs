@@ -11,8 +11,8 @@ use voxtile::scan::Stop;
 /// How long an input may keep us waiting before we look up.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Reads an input on a thread of its own, scan by scan and only when asked to: whoever asks can stop waiting, whatever the
-/// input does, and no scan lies about that was not asked for. Where the system gives no thread, it reads here.
+/// Reads an input on a thread of its own, scan by scan and only when asked to: whoever asks can stop waiting, whatever
+/// the input does, and no scan lies about that was not asked for. Where the system gives no thread, it reads here.
 pub struct ScanReader {
     place: Place,
     stop: Stop,

@@ -5,8 +5,8 @@ use std::io;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
-/// Runs `voxtile-share`, which lies beside this program or on the PATH: its network library would make this one six times
-/// as large.
+/// Runs `voxtile-share`, which lies beside this program or on the PATH: its network library would make this one six
+/// times as large.
 pub fn run(args: &ShareArgs) -> anyhow::Result<ExitCode> {
     let program = beside_this_program().unwrap_or_else(|| PathBuf::from(name()));
     let status = match Command::new(program).args(&args.arguments).status() {

@@ -4,11 +4,11 @@ use std::num::NonZero;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, available_parallelism};
 
-/// Starts the threads that scans are mapped with: so many, or one a core, or as many as the system gives; where it gives
-/// none, this one does all the work.
+/// Starts the threads that scans are mapped with: so many, or one a core, or as many as the system gives; where it
+/// gives none, this one does all the work.
 ///
-/// They are there before the pool is told of them. A pool that asks for a thread itself and gets none is no pool for the
-/// rest of the process.
+/// They are there before the pool is told of them. A pool that asks for a thread itself and gets none is no pool for
+/// the rest of the process.
 pub fn start(most: Option<u16>) -> anyhow::Result<()> {
     let wanted = most.map_or_else(default_threads, usize::from);
     let mut waiting: Vec<Sender<rayon::ThreadBuilder>> = Vec::new();

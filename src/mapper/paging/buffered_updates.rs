@@ -5,8 +5,8 @@ use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::hash_map::Entry;
 
-/// Updates of tiles that are not resident, in order and packed: the first of a tile's spilled to its file, if memory was
-/// short, the others in memory.
+/// Updates of tiles that are not resident, in order and packed: the first of a tile's spilled to its file, if memory
+/// was short, the others in memory.
 #[derive(Debug, Default)]
 pub(super) struct BufferedUpdates {
     in_memory: FxHashMap<TileIndex, PackedUpdates>,
@@ -118,8 +118,8 @@ impl BufferedUpdates {
         self.all_spilled.updates + in_memory as u64
     }
 
-    /// The tiles with a spill file of more than so many bytes, and `count` others with the longest files. The longest comes
-    /// first; of equals, the lowest tile.
+    /// The tiles with a spill file of more than so many bytes, and `count` others with the longest files. The longest
+    /// comes first; of equals, the lowest tile.
     pub(super) fn longest_files(&self, bytes: u64, count: usize) -> Vec<TileIndex> {
         let files = self.spilled.iter().map(|(tile, spilled)| (Reverse(spilled.file.bytes), tile));
         let least = if count > 0 { 0 } else { bytes };
@@ -130,8 +130,8 @@ impl BufferedUpdates {
         longest.into_iter().map(|(_, tile)| tile).collect()
     }
 
-    /// The tiles whose updates take the most memory, as many as make up so many bytes. The heaviest comes first; of equals,
-    /// the lowest tile.
+    /// The tiles whose updates take the most memory, as many as make up so many bytes. The heaviest comes first; of
+    /// equals, the lowest tile.
     pub(super) fn heaviest(&self, bytes: usize) -> Vec<TileIndex> {
         let mut heaviest: Vec<_> =
             self.in_memory.iter().map(|(tile, updates)| (Reverse(updates.bytes()), *tile)).collect();

@@ -11,8 +11,8 @@ pub(super) struct CompactTiles {
     tiles: LruCache<TileIndex, Entry>,
     packer: Packer,
     bytes: usize,
-    /// Dirty tiles that are not being saved, by number. Looking for one from the oldest tile on would pass all clean ones,
-    /// again and again.
+    /// Dirty tiles that are not being saved, by number. Looking for one from the oldest tile on would pass all clean
+    /// ones, again and again.
     to_save: BTreeMap<u64, TileIndex>,
     dirty: usize,
     /// How many tiles were ever put in.

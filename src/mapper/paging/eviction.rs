@@ -66,8 +66,8 @@ impl TilePager {
         self.make_room_for(tile.bytes(), self.cache.plan().tiles - 1)
     }
 
-    /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles in use are not evicted; if all are in use,
-    /// the limit is exceeded.
+    /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles in use are not evicted; if all are
+    /// in use, the limit is exceeded.
     pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize) -> Result<()> {
         while let Some(eviction) = self.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
             match eviction {

@@ -8,8 +8,8 @@ use crate::tile::Tile;
 use std::sync::Arc;
 
 impl TilePager {
-    /// Records a new input and flushes, so that the record is durable. It replaces an input without scans; the earliest of too
-    /// many is dropped.
+    /// Records a new input and flushes, so that the record is durable. It replaces an input without scans; the earliest
+    /// of too many is dropped.
     pub(in crate::mapper) fn begin_input(&mut self, input: InputRecord) -> Result<()> {
         let before = self.inputs.clone();
         if self.inputs.last().is_some_and(|last| last.first_scan == self.scan_number) {
@@ -40,8 +40,8 @@ impl TilePager {
         for index in buffered {
             self.flush_buffered(index)?;
         }
-        // Files are made from tables alone. Syncing keeps octree statistics up to date and puts bricks in order, which speeds
-        // up writing.
+        // Files are made from tables alone. Syncing keeps octree statistics up to date and puts bricks in order, which
+        // speeds up writing.
         self.cache.sync_octrees();
         let mut compact = self.cache.dirty_compact().into_iter();
         for index in self.cache.resident_indices() {
@@ -74,7 +74,8 @@ impl TilePager {
         let tile = Arc::new(self.read(index)?);
         let fits = self.has_room_for(tile.bytes());
         if !fits {
-            // The tile exceeds the limit while it is written. It stays in the cache until then, so that an error loses nothing.
+            // The tile exceeds the limit while it is written. It stays in the cache until then, so that an error loses
+            // nothing.
             self.make_room(&tile)?;
         }
         self.put(tile);

@@ -15,8 +15,8 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(in crate::mapper) updates_bytes: usize,
     /// Bytes that are kept free for inserting scans from the beginning.
     pub(super) least_scan_bytes: usize,
-    /// Whether the limit is enforced: a scan's memory counts, and a map whose index does not fit is refused. False only for
-    /// [`MemoryLimit::Tight`], which tests use.
+    /// Whether the limit is enforced: a scan's memory counts, and a map whose index does not fit is refused. False only
+    /// for [`MemoryLimit::Tight`], which tests use.
     pub(super) is_enforced: bool,
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,

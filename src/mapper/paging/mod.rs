@@ -7,8 +7,8 @@
 //!   TileDisk      the store, the threads that save and load, what was read and written, how long the mapper waited
 //! ```
 //!
-//! A tile is resident, compact, or neither. A resident tile has no buffered updates: they are applied when it is loaded.
-//! `eviction` moves tiles towards the disk, `prefetch` loads tiles ahead of use, `flush` commits.
+//! A tile is resident, compact, or neither. A resident tile has no buffered updates: they are applied when it is
+//! loaded. `eviction` moves tiles towards the disk, `prefetch` loads tiles ahead of use, `flush` commits.
 
 mod buffered_updates;
 mod compact_tiles;

@@ -1,4 +1,5 @@
-//! Tiles are fetched before they are needed: those with the most buffered updates, and those in the direction of travel.
+//! Tiles are fetched before they are needed: those with the most buffered updates, and those in the direction of
+//! travel.
 
 use super::tile_pager::TilePager;
 use super::tile_span::TileSpan;
@@ -9,8 +10,8 @@ use crate::tile::Table;
 use std::sync::Arc;
 
 impl TilePager {
-    /// Prefetches tiles that will be needed, as far as there is room for them. `updates` are those of the scan that is being
-    /// inserted.
+    /// Prefetches tiles that will be needed, as far as there is room for them. `updates` are those of the scan that is
+    /// being inserted.
     pub(in crate::mapper) fn prefetch(&mut self, updates: &[(TileIndex, TileUpdates)]) {
         if !self.cache.has_compact_tier() {
             return;

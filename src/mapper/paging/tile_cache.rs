@@ -10,8 +10,8 @@ use crate::tile::{OctreeFactory, Table, Tile};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// The tiles in memory: resident ones in LRU order, and below them those in the compact form; and how much memory all that
-/// grows may take.
+/// The tiles in memory: resident ones in LRU order, and below them those in the compact form; and how much memory all
+/// that grows may take.
 #[derive(Debug)]
 pub(super) struct TileCache {
     plan: MemoryPlan,
@@ -232,8 +232,8 @@ impl TileCache {
             && self.limited_bytes(outside).saturating_add(bytes) <= self.plan.bytes
     }
 
-    /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes. Tiles that somebody holds stay; if all
-    /// are held, nothing goes.
+    /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes. Tiles that somebody holds stay;
+    /// if all are held, nothing goes.
     pub(super) fn next_eviction(&self, bytes: usize, tiles: usize, outside: usize) -> Option<Eviction> {
         let is_short = self.limited_bytes(outside).saturating_add(bytes) > self.plan.bytes;
         if self.resident.len() <= tiles && !is_short {
@@ -249,8 +249,8 @@ impl TileCache {
         }
     }
 
-    /// Bytes that count towards the limit. The compact tier counts as full: resident tiles leave small free blocks that its
-    /// large ones cannot use.
+    /// Bytes that count towards the limit. The compact tier counts as full: resident tiles leave small free blocks that
+    /// its large ones cannot use.
     fn limited_bytes(&self, outside: usize) -> usize {
         let compact = self.compact.bytes().max(self.plan.compact_bytes);
         self.resident.bytes() + compact + self.scan_bytes + outside

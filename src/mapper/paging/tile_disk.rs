@@ -9,7 +9,8 @@ use crate::store::{InputRecord, Metadata, SnapshotName, SpillFile, TileStore, Ti
 use crate::tile::{Table, Tile};
 use std::time::Instant;
 
-/// The disk as the pager sees it: the map's store, the threads that save and load beside the mapper, and the counts of both.
+/// The disk as the pager sees it: the map's store, the threads that save and load beside the mapper, and the counts of
+/// both.
 #[derive(Debug)]
 pub(super) struct TileDisk {
     config: MapConfig,
@@ -107,8 +108,8 @@ impl TileDisk {
         }
     }
 
-    /// A prefetch that has ended, if there is one; without a table if it failed. The tile is read again when it is needed,
-    /// and the error reported then.
+    /// A prefetch that has ended, if there is one; without a table if it failed. The tile is read again when it is
+    /// needed, and the error reported then.
     pub(super) fn take_prefetched(&mut self) -> Option<(TileIndex, Option<Table>)> {
         let loaded = self.threads.take_loaded()?;
         Some(self.note_prefetched(loaded))
@@ -130,7 +131,8 @@ impl TileDisk {
 
     // Writing.
 
-    /// Writes a tile's next version. No save of the tile may be in flight: an older version must not come after this one.
+    /// Writes a tile's next version. No save of the tile may be in flight: an older version must not come after this
+    /// one.
     ///
     /// # Errors
     ///

@@ -15,8 +15,8 @@ use std::sync::Arc;
 
 /// The tiles of an out-of-core map: which are in memory, and what is buffered for the others.
 ///
-/// This file accepts scans and answers for tiles. `eviction` makes room, `prefetch` fetches tiles ahead, `flush` makes the map
-/// durable.
+/// This file accepts scans and answers for tiles. `eviction` makes room, `prefetch` fetches tiles ahead, `flush` makes
+/// the map durable.
 #[derive(Debug)]
 pub(in crate::mapper) struct TilePager {
     pub(super) config: MapConfig,
@@ -89,8 +89,8 @@ impl TilePager {
         self.drain_buffer()?;
         for (tile, _) in &updates.tiles {
             let is_wanted = self.disk.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
-            // The spill file of a staged tile holds buffered updates, then those of this scan. Applying only the former would
-            // reorder them.
+            // The spill file of a staged tile holds buffered updates, then those of this scan. Applying only the former
+            // would reorder them.
             if is_wanted && !self.cache.is_resident(*tile) && !self.buffer.is_staged(*tile) {
                 self.load(*tile)?;
             }
@@ -180,9 +180,9 @@ impl TilePager {
         Ok(())
     }
 
-    /// Whether spilling a tile's updates costs less than applying them. Applying reads and writes the tile, so it pays only
-    /// once the updates are as large as the tile. Disk traffic then stays proportional to the updates, as in a log-structured
-    /// merge tree (O'Neil et al., 1996).
+    /// Whether spilling a tile's updates costs less than applying them. Applying reads and writes the tile, so it pays
+    /// only once the updates are as large as the tile. Disk traffic then stays proportional to the updates, as in a
+    /// log-structured merge tree (O'Neil et al., 1996).
     pub(super) fn is_spilling_cheaper(&self, tile: TileIndex) -> bool {
         let is_near = self.cache.contains(tile) || self.disk.is_prefetching(tile);
         if !self.cache.has_compact_tier() || is_near {
@@ -249,7 +249,8 @@ impl TilePager {
         Ok(())
     }
 
-    /// Puts a tile into memory. Its buffered updates are applied already, so they are dropped. The caller has made room.
+    /// Puts a tile into memory. Its buffered updates are applied already, so they are dropped. The caller has made
+    /// room.
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
         self.buffer.forget(tile.index(), &self.disk);
         self.cache.put(tile);
@@ -276,8 +277,8 @@ impl TilePager {
         Ok(tile)
     }
 
-    /// The table of a tile that is not resident, without its buffered updates, and whether it differs from the one on disk; an
-    /// empty one if there is none yet.
+    /// The table of a tile that is not resident, without its buffered updates, and whether it differs from the one on
+    /// disk; an empty one if there is none yet.
     fn fetch(&mut self, index: TileIndex) -> Result<(Table, bool)> {
         if let Some(Cached::Compact(tile)) = self.cache.find(index) {
             return Ok((tile.decode(&self.config.grid, index)?, self.cache.is_dirty(index)));

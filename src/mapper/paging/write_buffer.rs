@@ -7,8 +7,8 @@ use crate::sensor::SensorModel;
 use crate::space::{TileIndex, TileTable};
 use crate::tile::Tile;
 
-/// Updates of tiles that are not resident, until these come in: in memory, spilled to files where memory is short, and those
-/// of the scan that is being inserted staged in files until it is accepted.
+/// Updates of tiles that are not resident, until these come in: in memory, spilled to files where memory is short, and
+/// those of the scan that is being inserted staged in files until it is accepted.
 #[derive(Debug, Default)]
 pub(super) struct WriteBuffer {
     buffered: BufferedUpdates,
@@ -132,7 +132,8 @@ impl WriteBuffer {
         }
     }
 
-    /// Takes the staged parts back out of the files: their scan was not accepted, and the next flush may need the space.
+    /// Takes the staged parts back out of the files: their scan was not accepted, and the next flush may need the
+    /// space.
     pub(super) fn discard_staged(&mut self, disk: &TileDisk) {
         for index in std::mem::take(&mut self.staged).tiles() {
             disk.cut_spill(index, self.buffered.spilled(index).file);

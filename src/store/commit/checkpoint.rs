@@ -10,7 +10,8 @@ use crate::store::tiles::tile_versions::TileVersions;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What the last commit left to do on disk: its tables get their names, removed tiles and deleted snapshots lose their files.
+/// What the last commit left to do on disk: its tables get their names, removed tiles and deleted snapshots lose their
+/// files.
 ///
 /// Until that is done and durable, nothing may be written under the names in question, which a crash could bring back.
 #[derive(Debug, Default)]
@@ -75,8 +76,8 @@ impl Checkpoint {
         self.finish_snapshots(files)
     }
 
-    /// Keeps the tables in place that the last commit replaces or removes, where a reader or a snapshot sees them. Those of
-    /// snapshots have their new names durably before other tables can take the old ones.
+    /// Keeps the tables in place that the last commit replaces or removes, where a reader or a snapshot sees them.
+    /// Those of snapshots have their new names durably before other tables can take the old ones.
     fn keep_replaced(&self, files: &MapFiles, flush_number: u64, kept: &mut KeptTables) -> Result<()> {
         let layout = files.layout();
         let tiles: Vec<_> = self.unrenamed.tiles().chain(self.unremoved.iter().copied()).collect();
@@ -104,8 +105,8 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Whether the table in place is the version before the last commit. An earlier attempt may have kept it already; what
-    /// is renamed then is not there, and nothing happens.
+    /// Whether the table in place is the version before the last commit. An earlier attempt may have kept it already;
+    /// what is renamed then is not there, and nothing happens.
     fn is_replaced_in_place(&self, files: &MapFiles, tile: TileIndex) -> Result<bool> {
         let is_there = |path: &Path| Ok(files.kind(path)?.is_some());
         match self.unrenamed.contains(tile) {

@@ -85,8 +85,8 @@ impl CommitLog {
         Ok(Self { map_id, bytes: HEADER_BYTES as u64 + record_bytes })
     }
 
-    /// Appends a record of changed and removed tiles and syncs it: when this returns, the flush is committed. After an error
-    /// the record may be in the file or not, until [`CommitLog::cut`] has taken it out.
+    /// Appends a record of changed and removed tiles and syncs it: when this returns, the flush is committed. After an
+    /// error the record may be in the file or not, until [`CommitLog::cut`] has taken it out.
     pub fn append(&mut self, disk: &dyn Disk, path: &Path, flush: &Flush<'_>) -> io::Result<()> {
         let mut out = disk.append(path, self.bytes)?;
         let record_bytes = flush.write(false, &[], &mut out)?;

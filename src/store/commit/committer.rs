@@ -40,8 +40,8 @@ impl Committer {
         Self { log, is_log_settled, metadata, written_flush, listed, is_list_logged, lock }
     }
 
-    /// Holds the lock from here on, so that the map may be written. `is_torn` tells whether the log ends with a record that
-    /// is not whole.
+    /// Holds the lock from here on, so that the map may be written. `is_torn` tells whether the log ends with a record
+    /// that is not whole.
     pub(in crate::store) fn begin_writing(&mut self, lock: Lock, is_torn: bool) {
         self.lock = Some(lock);
         self.is_log_settled = !is_torn;
@@ -145,8 +145,8 @@ impl Committer {
         Ok(())
     }
 
-    /// Truncates the log after a failed append. The failed record may still reach the disk, and it names `*.next` files that
-    /// must not change until it is gone.
+    /// Truncates the log after a failed append. The failed record may still reach the disk, and it names `*.next` files
+    /// that must not change until it is gone.
     pub(in crate::store) fn settle_log(&mut self, files: &MapFiles) -> Result<()> {
         if let (false, Some(log)) = (self.is_log_settled, self.log) {
             let path = files.layout().commit_log();
@@ -201,8 +201,8 @@ impl Committer {
         }
     }
 
-    /// Replaces `metadata.json`: written beside, synced, renamed. The caller syncs the folder, once it watches for readers of
-    /// the new file by what is returned.
+    /// Replaces `metadata.json`: written beside, synced, renamed. The caller syncs the folder, once it watches for
+    /// readers of the new file by what is returned.
     pub(in crate::store) fn write_metadata(
         &mut self,
         files: &MapFiles,
@@ -220,8 +220,8 @@ impl Committer {
         Ok(watch)
     }
 
-    /// Commits which snapshots the map has, and nothing else. It is a flush of its own in the log, so that whatever ends the
-    /// process is found like any other.
+    /// Commits which snapshots the map has, and nothing else. It is a flush of its own in the log, so that whatever
+    /// ends the process is found like any other.
     pub(in crate::store) fn append_snapshots(
         &mut self,
         files: &MapFiles,

@@ -45,8 +45,8 @@ impl TileStore {
         self.versions.note_next(tile, version);
     }
 
-    /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not hold
-    /// the tile, unless a next version of it is written later. What is not committed leaves the tile where it was.
+    /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not
+    /// hold the tile, unless a next version of it is written later. What is not committed leaves the tile where it was.
     ///
     /// Memory that holds the tile is the caller's to clear.
     ///
@@ -70,8 +70,8 @@ impl TileStore {
         self.versions.suspects()
     }
 
-    /// Commits every version written and every tile removed since the last commit. When this returns they are durable, and
-    /// only they.
+    /// Commits every version written and every tile removed since the last commit. When this returns they are durable,
+    /// and only they.
     ///
     /// `metadata` gives the map's parameters; bounds and numbers are filled in here. After an error nothing is
     /// committed, and calling again tries again. What comes after the commit only tidies up: if the disk refuses that,
@@ -117,8 +117,8 @@ impl TileStore {
         Ok(())
     }
 
-    /// Records the tiles that a commit adds. A reader of an earlier flush does not see them, so their tables need not be kept
-    /// for it. A reader that opens the map meanwhile may cause a table to be kept in vain.
+    /// Records the tiles that a commit adds. A reader of an earlier flush does not see them, so their tables need not
+    /// be kept for it. A reader that opens the map meanwhile may cause a table to be kept in vain.
     fn note_added(&mut self, number: u64) {
         if !self.kept.has_readers() {
             return;
@@ -150,8 +150,8 @@ impl TileStore {
         self.checkpoint.run(&self.files, &mut self.versions, &mut self.kept)
     }
 
-    /// Does the steps after the commit record: `metadata.json`, renames, removals, log compaction. The next call completes what
-    /// the disk refuses.
+    /// Does the steps after the commit record: `metadata.json`, renames, removals, log compaction. The next call
+    /// completes what the disk refuses.
     pub(in crate::store) fn finish_commit(&mut self) -> Result<()> {
         // At once: who opens the map in between cannot tell the writer which flush it reads.
         if self.committer.written_flush() != Some(self.commits().flush_number) {
@@ -190,8 +190,8 @@ impl TileStore {
         self.write_metadata()
     }
 
-    /// Gives a map of the original format an id and a log, so that it can be written to, and returns the id. Its tiles count
-    /// as unread until they have been written again. A map that has an id keeps it.
+    /// Gives a map of the original format an id and a log, so that it can be written to, and returns the id. Its tiles
+    /// count as unread until they have been written again. A map that has an id keeps it.
     ///
     /// # Errors
     ///
@@ -234,8 +234,8 @@ fn sync_next(files: &MapFiles, versions: &mut TileVersions) -> Result<()> {
     synced
 }
 
-/// Syncs the versions of some tiles, and adds the tiles of which that failed to `suspects`. With the last of them goes the map's
-/// own folder, which names the new tile folders.
+/// Syncs the versions of some tiles, and adds the tiles of which that failed to `suspects`. With the last of them goes
+/// the map's own folder, which names the new tile folders.
 fn sync_group(
     files: &MapFiles,
     changed: &[TileIndex],

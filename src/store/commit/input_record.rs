@@ -18,8 +18,8 @@ pub struct InputRecord {
 
 /// The scans of an input that a map has taken, from the input's beginning: how many, and what tells them from others.
 ///
-/// Scans and poses are told apart, each by a chain: the same beginnings have the same chain, and whoever has read so many
-/// scans can go on from it.
+/// Scans and poses are told apart, each by a chain: the same beginnings have the same chain, and whoever has read so
+/// many scans can go on from it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputContent {
     /// Number of scans, those that were skipped among them.

@@ -56,13 +56,14 @@ pub struct Extension {
     /// How the tiles are stored; maps of the original files do not say.
     #[serde(default, skip_serializing_if = "Storage::is_seed")]
     pub storage: Storage,
-    /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions that did
-    /// not list them: every file of the folder of snapshots is one then.
+    /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions
+    /// that did not list them: every file of the folder of snapshots is one then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snapshots: Option<SnapshotList>,
 }
 
-/// The parameters of a map that never change. Every tile repeats them, so that repair can rebuild the metadata. It stands in every tile, so that a map can be put together again from its tiles.
+/// The parameters of a map that never change. Every tile repeats them, so that repair can rebuild the metadata. It
+/// stands in every tile, so that a map can be put together again from its tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapParameters {
     /// Edge of a voxel in metres.

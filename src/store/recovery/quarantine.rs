@@ -32,8 +32,8 @@ impl<'a> Quarantine<'a> {
         Ok(to)
     }
 
-    /// Copies a file that is about to be replaced; returns where to, `None` if there is no file. What is none, or cannot be
-    /// read, is moved as it is.
+    /// Copies a file that is about to be replaced; returns where to, `None` if there is no file. What is none, or
+    /// cannot be read, is moved as it is.
     ///
     /// # Errors
     ///

@@ -125,7 +125,8 @@ fn settle_snapshots(
             }
         }
     }
-    // In a map that lists none, a deletion that a killed writer could not make durable would come back and miss its tables.
+    // In a map that lists none, a deletion that a killed writer could not make durable would come back and miss its
+    // tables.
     tolerate(disk.sync_folder(&folder), &folder, "sync")
 }
 
@@ -229,7 +230,8 @@ fn look_at_tile(
     Ok((state, kept))
 }
 
-/// The state of a tile of which nobody can list what there is: what was committed last may wait for its name all the same.
+/// The state of a tile of which nobody can list what there is: what was committed last may wait for its name all the
+/// same.
 fn look_without_names(
     disk: &dyn Disk,
     layout: &Layout,
@@ -293,8 +295,8 @@ enum Content {
 }
 
 impl Content {
-    /// Whether a `*.next` file is the committed version while the file in place is not. An unreadable one counts, since nothing
-    /// else can be.
+    /// Whether a `*.next` file is the committed version while the file in place is not. An unreadable one counts, since
+    /// nothing else can be.
     fn is_committed_beside(self, in_place: Self) -> bool {
         self == Self::Committed || self == Self::Unreadable && in_place == Self::Other
     }

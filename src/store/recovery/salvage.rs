@@ -59,8 +59,8 @@ impl Salvage {
         Ok(Self { metadata, log_error, log_map_id, commits })
     }
 
-    /// Where the files of the map in `folder` are: its tiles are stored as these two files say, or where they say nothing
-    /// or contradict each other, as most tiles are.
+    /// Where the files of the map in `folder` are: its tiles are stored as these two files say, or where they say
+    /// nothing or contradict each other, as most tiles are.
     pub fn layout_of_tiles(&self, disk: &dyn Disk, folder: &Path) -> Layout {
         let written = self.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
         let logged = self.commits.metadata.as_ref();

@@ -9,8 +9,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A new map in `MAP.unfinished` beside its final place. [`StagedMap::finish`] renames it, and the rename is the commit, so
-/// nobody finds an incomplete map.
+/// A new map in `MAP.unfinished` beside its final place. [`StagedMap::finish`] renames it, and the rename is the
+/// commit, so nobody finds an incomplete map.
 ///
 /// What an interrupted attempt left is removed by the next one, and when this value is dropped before
 /// [`StagedMap::finish`].
@@ -51,8 +51,8 @@ impl StagedMap {
     ///
     /// # Errors
     ///
-    /// Something that has the name by now, or a disk that refuses. Only the last of all steps, to make the name durable,
-    /// can fail when the map has it.
+    /// Something that has the name by now, or a disk that refuses. Only the last of all steps, to make the name
+    /// durable, can fail when the map has it.
     pub fn finish(mut self) -> Result<()> {
         check_is_free(&*self.disk, &self.folder)?;
         let unfinished = staging_folder(&self.folder)?;

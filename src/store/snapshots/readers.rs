@@ -5,7 +5,8 @@ use crate::store::layout::Layout;
 use rustc_hash::FxHashMap;
 use std::io;
 
-/// The readers of a map, and the replaced tables kept for them: for each tile, one version per flush that is being read.
+/// The readers of a map, and the replaced tables kept for them: for each tile, one version per flush that is being
+/// read.
 ///
 /// A reader holds `metadata.json` open as it was when it opened the map. Every flush puts another file in its place,
 /// so the writer, which watches over all of these files, knows which flushes are being read.
@@ -19,7 +20,8 @@ pub(in crate::store) struct Readers {
     added: FxHashMap<TileIndex, u64>,
 }
 
-/// A `metadata.json`, and the flushes that those who hold it may see: its own, and where it fell behind the log, later ones.
+/// A `metadata.json`, and the flushes that those who hold it may see: its own, and where it fell behind the log, later
+/// ones.
 struct Watched {
     first: u64,
     last: u64,
@@ -32,7 +34,8 @@ impl Readers {
         self.watched.push(Watched { first: flush_number, last: flush_number, watch: metadata });
     }
 
-    /// Notes that the present `metadata.json` could not be replaced after a flush, so that who holds it may see that one.
+    /// Notes that the present `metadata.json` could not be replaced after a flush, so that who holds it may see that
+    /// one.
     pub(in crate::store) fn may_see(&mut self, flush_number: u64) {
         if let Some(present) = self.watched.last_mut() {
             present.last = present.last.max(flush_number);

@@ -13,8 +13,8 @@ pub(in crate::store) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
 
 /// Which tables a map's snapshots see, so that its writer keeps them.
 ///
-/// A snapshot of flush `n` sees of each of its tiles the table that was kept as of the first flush not before `n`, and if
-/// none was, the one in place: it is readers' rule, and needs nothing but names.
+/// A snapshot of flush `n` sees of each of its tiles the table that was kept as of the first flush not before `n`, and
+/// if none was, the one in place: it is readers' rule, and needs nothing but names.
 #[derive(Debug, Default)]
 pub(in crate::store) struct SeenTables {
     /// Tiles of which a snapshot sees the table in place.
@@ -28,10 +28,11 @@ pub(in crate::store) struct SeenTables {
 }
 
 impl SeenTables {
-    /// Looks which of the kept tables the snapshots of a map see, and which snapshots there are. One is in memory at a time.
+    /// Looks which of the kept tables the snapshots of a map see, and which snapshots there are. One is in memory at a
+    /// time.
     ///
-    /// A snapshot that is missing or cannot be read is no error: it counts as one that saw every tile as of its flush, and
-    /// where nothing tells its flush, as one that sees everything.
+    /// A snapshot that is missing or cannot be read is no error: it counts as one that saw every tile as of its flush,
+    /// and where nothing tells its flush, as one that sees everything.
     ///
     /// # Errors
     ///

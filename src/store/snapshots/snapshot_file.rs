@@ -60,13 +60,13 @@ impl Snapshot {
         }
     }
 
-    /// Reads a snapshot of the map with this id. Where `listed` says which snapshots the map has, it must be the one that is
-    /// meant there.
+    /// Reads a snapshot of the map with this id. Where `listed` says which snapshots the map has, it must be the one
+    /// that is meant there.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is none of this name; damage, to which belongs a file that is missing or is another
-    /// snapshot's; a disk that refuses.
+    /// [`Error::InvalidArgument`] if there is none of this name; damage, to which belongs a file that is missing or is
+    /// another snapshot's; a disk that refuses.
     pub fn read(
         disk: &dyn Disk,
         layout: &Layout,

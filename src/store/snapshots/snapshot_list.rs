@@ -2,8 +2,8 @@ use super::snapshot_name::SnapshotName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Which snapshots a map has, by name, as its log says: a file of the folder of snapshots is none unless it is named here,
-/// and one that is named and has no file is missing.
+/// Which snapshots a map has, by name, as its log says: a file of the folder of snapshots is none unless it is named
+/// here, and one that is named and has no file is missing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct SnapshotList(BTreeMap<SnapshotName, Option<u64>>);

@@ -3,8 +3,8 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// The name of a snapshot, which is a file's name too: 1 to 64 letters of `A-Z a-z 0-9 . _ -`, the first of them no dot, and not
-/// `now`, which means the map as it is.
+/// The name of a snapshot, which is a file's name too: 1 to 64 letters of `A-Z a-z 0-9 . _ -`, the first of them no
+/// dot, and not `now`, which means the map as it is.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct SnapshotName(String);

@@ -86,13 +86,13 @@ impl TileStore {
     }
 
     /// Keeps the last commit under a name, until the snapshot is deleted: from here on its tables stay when they are
-    /// replaced. What is written and not committed is no part of it. When this returns it is durable; after an error there
-    /// is none.
+    /// replaced. What is written and not committed is no part of it. When this returns it is durable; after an error
+    /// there is none.
     ///
     /// # Errors
     ///
-    /// [`Error::AlreadyExists`] if there is one of this name; a map of the original format, which must be upgraded first; a
-    /// disk that refuses.
+    /// [`Error::AlreadyExists`] if there is one of this name; a map of the original format, which must be upgraded
+    /// first; a disk that refuses.
     pub fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.finish_earlier_work()?;
         let map_id = self.committer.logged_map_id()?;
@@ -143,8 +143,8 @@ impl TileStore {
         self.files.sync_folder(&self.layout().snapshots())
     }
 
-    /// Commits which snapshots the map has, and nothing else: what is written of tiles stays uncommitted. It is a flush of its
-    /// own in the log, so that whatever ends the process is found like any other.
+    /// Commits which snapshots the map has, and nothing else: what is written of tiles stays uncommitted. It is a flush
+    /// of its own in the log, so that whatever ends the process is found like any other.
     fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
         self.committer.check_lock()?;
         self.keep_for_late_readers();
@@ -188,8 +188,8 @@ impl TileStore {
         Ok(())
     }
 
-    /// Deletes a snapshot, and the tables that no other one sees. One that is damaged, cannot be read or is missing can be
-    /// deleted too: from then on nothing is kept for it.
+    /// Deletes a snapshot, and the tables that no other one sees. One that is damaged, cannot be read or is missing can
+    /// be deleted too: from then on nothing is kept for it.
     ///
     /// # Errors
     ///

@@ -6,8 +6,8 @@ use std::io::{BufRead, BufReader, Read, Write};
 
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// How much of a tile's spill file counts: so many bytes with this checksum. What stands behind them is left by an attempt
-/// that was given up.
+/// How much of a tile's spill file counts: so many bytes with this checksum. What stands behind them is left by an
+/// attempt that was given up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SpillFile {
     /// Length in bytes.
@@ -27,8 +27,8 @@ impl TileValue for SpillFile {
     }
 }
 
-/// Updates of a tile in a file of its folder, because memory is short. They are no part of the map on disk: a commit does not
-/// know the file, and opening the map removes it.
+/// Updates of a tile in a file of its folder, because memory is short. They are no part of the map on disk: a commit
+/// does not know the file, and opening the map removes it.
 impl TileStore {
     /// Appends updates to those of `file`, and returns what is there then. After an error `file` still counts.
     ///
@@ -52,7 +52,8 @@ impl TileStore {
         Ok(SpillFile { bytes: file.bytes + updates.len() as u64, crc: crc.finalize() })
     }
 
-    /// Opens the updates in a tile's spill file, whose checksum was compared: there may be more than memory has room for.
+    /// Opens the updates in a tile's spill file, whose checksum was compared: there may be more than memory has room
+    /// for.
     ///
     /// # Errors
     ///
@@ -95,7 +96,8 @@ impl TileStore {
         }
     }
 
-    /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no harm.
+    /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no
+    /// harm.
     pub fn remove_spill(&self, tile: TileIndex) {
         let path = self.layout().spill(tile);
         if let Err(error) = self.disk().remove_file(&path) {

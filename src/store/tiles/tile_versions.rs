@@ -3,8 +3,8 @@ use crate::space::{TileIndex, TileTable};
 use crate::store::commit::commit_log::Commits;
 use rustc_hash::FxHashSet;
 
-/// Which tiles a map has on disk and which version of each is the latest: the last commit, and what was written or removed
-/// since.
+/// Which tiles a map has on disk and which version of each is the latest: the last commit, and what was written or
+/// removed since.
 #[derive(Debug, Default)]
 pub(in crate::store) struct TileVersions {
     commits: Commits,
@@ -20,8 +20,8 @@ pub(in crate::store) struct TileVersions {
     foreign: FxHashSet<TileIndex>,
 }
 
-/// Bytes that a commit takes for each tile that it changes, beside the index: its place among those that the last record
-/// names and among those that wait for their names.
+/// Bytes that a commit takes for each tile that it changes, beside the index: its place among those that the last
+/// record names and among those that wait for their names.
 const COMMIT_BYTES_OF_TILE: usize = 30;
 
 impl TileVersions {

@@ -109,7 +109,8 @@ fn compact_tables() -> Seeds {
     let state = |log_odds, observation_count| Evidence { log_odds, observation_count };
     let (mut some, mut full) = (Table::default(), Table::default());
     for x in 0..3 {
-        // The first two bricks have their states in common, so that these take one and two bytes; the third has its own.
+        // The first two bricks have their states in common, so that these take one and two bytes; the third has its
+        // own.
         let voxels = (0..400).map(|place| (place, state(f64::from(x / 2 * 350 + place as i32), x / 2)));
         some.insert(brick(x), &voxels.collect::<Vec<_>>());
     }

@@ -354,8 +354,8 @@ fn in_order(mut packet: Packet) -> Packet {
     packet
 }
 
-/// A life of a sender and a receiver, whose voxels, losses, delays, repetitions, restarts and invented packets the bytes
-/// tell. Whatever it was, once the link is good the sets become equal.
+/// A life of a sender and a receiver, whose voxels, losses, delays, repetitions, restarts and invented packets the
+/// bytes tell. Whatever it was, once the link is good the sets become equal.
 pub fn share_life(data: &[u8]) -> bool {
     let grid = Grid::new(0.1, 0.8).expect("8 voxels along a tile");
     let mut config = SenderConfig::default();

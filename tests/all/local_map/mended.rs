@@ -64,8 +64,8 @@ fn misses_do_not_depend_on_the_order_of_the_points() {
     assert!(forward[0].1 < forward[1].1 && forward[1].1 < forward[2].1);
 }
 
-/// Algorithm 2, line 2 looks at voxels that changed in this step alone: what became occupied far away is not inflated when
-/// the robot comes near, and what was inflated stays so when it has gone.
+/// Algorithm 2, line 2 looks at voxels that changed in this step alone: what became occupied far away is not inflated
+/// when the robot comes near, and what was inflated stays so when it has gone.
 #[test]
 fn inflation_follows_the_robot() {
     let mut map = map(parameters().with_ranges(f64::INFINITY, 3.0));
@@ -115,8 +115,8 @@ fn what_is_forgotten_takes_its_inflation_with_it() {
     assert_eq!(map.view().state_at([0.05, 3.05, 0.05]), LocalState::Occupied);
 }
 
-/// Algorithm 3, lines 3 and 10 put occupied voxels alone into the history: those between occupied and free would never be
-/// removed, and line 9 would take them out of a history in which they are not.
+/// Algorithm 3, lines 3 and 10 put occupied voxels alone into the history: those between occupied and free would never
+/// be removed, and line 9 would take them out of a history in which they are not.
 #[test]
 fn voxels_that_are_neither_occupied_nor_free_count_and_are_forgotten() {
     let mut unsure = parameters().with_max_voxels(10);

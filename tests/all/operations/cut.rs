@@ -6,7 +6,8 @@ use voxtile::operations::{Part, Prefer, clear_on, crop, merge};
 use voxtile::space::Aabb;
 use voxtile::{Error, MapConfig, MapReader, Queries};
 
-/// A box around the voxels of [`random_voxels`]: bounds between voxels and on their borders and centers, some beyond all.
+/// A box around the voxels of [`random_voxels`]: bounds between voxels and on their borders and centers, some beyond
+/// all.
 fn random_box(random: &mut Random) -> Aabb {
     let center = [[0.0, -35.0, 16_383.0][random.below(3) as usize], 1.5, -1.0];
     let mut bound = |center: f64| match random.below(5) {

@@ -54,8 +54,8 @@ fn digest(disk: &FaultyDisk, name: &str, what: &str) -> Option<blake3::Hash> {
     }
 }
 
-/// The map that `work` changes or makes is as before or as after, whatever fails and wherever the power goes; and the same
-/// work, done again, ends as if nothing had happened.
+/// The map that `work` changes or makes is as before or as after, whatever fails and wherever the power goes; and the
+/// same work, done again, ends as if nothing had happened.
 fn check(storage: Storage, name: &str, work: Work) {
     check_from(&two_maps(storage), name, work);
 }

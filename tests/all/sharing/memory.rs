@@ -88,7 +88,8 @@ impl Hostile {
     }
 }
 
-/// Whatever comes: all receivers together keep to their memory, and a robot that stays below its part has an equal layer.
+/// Whatever comes: all receivers together keep to their memory, and a robot that stays below its part has an equal
+/// layer.
 #[test]
 fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
     const MEMORY: usize = Receivers::<u8>::LEAST_BYTES;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// One in so many of the moments at which something may go wrong, spread without a pattern; all of them where the environment
-/// says `VOXTILE_FAULTS=all`, which takes some ten minutes.
+/// One in so many of the moments at which something may go wrong, spread without a pattern; all of them where the
+/// environment says `VOXTILE_FAULTS=all`, which takes some ten minutes.
 pub fn some_of<T>(moments: impl IntoIterator<Item = T>, one_in: u64) -> impl Iterator<Item = T> {
     let is_every_one = std::env::var_os("VOXTILE_FAULTS").is_some_and(|wanted| wanted == "all");
     let one_in = if is_every_one { 1 } else { one_in };

@@ -44,8 +44,8 @@ pub struct RevertArgs {
     override_usage = "voxtile diff [OPTIONS] <FROM> <TO>\n       voxtile diff [OPTIONS] <MAP> <SNAPSHOT|now> <SNAPSHOT|now>"
 )]
 pub struct DiffArgs {
-    /// Two maps, each a folder or FOLDER@SNAPSHOT; or a folder and the names of two of its snapshots, `now` being the map as
-    /// it is
+    /// Two maps, each a folder or FOLDER@SNAPSHOT; or a folder and the names of two of its snapshots, `now` being the
+    /// map as it is
     #[arg(value_name = "MAP", num_args = 2..=3, required = true)]
     pub sides: Vec<PathBuf>,
     /// Print JSON, with every tile that differs
