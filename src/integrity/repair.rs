@@ -6,7 +6,9 @@ use crate::error::{Error, Result};
 use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::space::TileIndex;
-use crate::store::{Disk, EntryKind, FsDisk, Layout, Lock, Quarantine, Salvage, TileFile, TileStore, hex};
+use crate::store::{
+    Disk, EntryKind, FsDisk, Layout, Quarantine, Salvage, TileFile, TileStore, WriterLock, hex,
+};
 use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
 use std::fmt;
@@ -174,7 +176,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     /// Writes `commits.log` and `metadata.json` anew from what is left of them and from the tiles.
     fn repair_index(&mut self) -> Result<()> {
-        let _lock = Lock::take(self.disk, &self.layout)?;
+        let _lock = WriterLock::take(self.disk, &self.layout)?;
         let remains = Salvage::read(self.disk, &self.layout)?;
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;

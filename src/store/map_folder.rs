@@ -1,53 +1,15 @@
-//! The folder of a map as a whole: its lock, its two own files, its tile folders.
+//! The folder of a map as a whole: its two own files, its tile folders.
 
-use super::commit::commit_log::{CommitLog, Commits};
+use super::commit::commit_log::CommitLog;
+use super::commit::commits::Commits;
 use super::commit::metadata::Metadata;
-use super::disk::{Disk, DiskLock, DiskRead};
+use super::disk::{Disk, DiskRead};
 use super::layout::{Layout, tile_of_folder};
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::TileIndex;
 use rustc_hash::FxHashSet;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-
-/// Held while a store may write; a process that ends, however it ends, lets go of it.
-pub struct Lock {
-    lock: Box<dyn DiskLock>,
-    path: PathBuf,
-}
-
-impl Lock {
-    /// Takes the lock of a map.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Locked`] if another process has it.
-    pub fn take(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
-        let path = layout.lock();
-        match disk.lock(&path).map_err(|error| Error::io(&path, "lock", error))? {
-            Some(lock) => Ok(Self { lock, path }),
-            None => Err(Error::Locked { path: layout.folder().to_owned() }),
-        }
-    }
-
-    /// Looks whether the lock still keeps others out. It does not once somebody has removed its file.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::LockLost`] if it does not; a disk that refuses.
-    pub fn check(&self) -> Result<()> {
-        match self.lock.is_in_place().map_err(|error| Error::io(&self.path, "look at", error))? {
-            true => Ok(()),
-            false => Err(Error::LockLost { path: self.path.clone() }),
-        }
-    }
-}
-
-impl std::fmt::Debug for Lock {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Lock")
-    }
-}
+use std::path::Path;
 
 /// A folder for a new map holds nothing but what an interrupted creation may have left.
 pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {

@@ -1,11 +1,12 @@
 use super::commit::checkpoint::Checkpoint;
-use super::commit::commit_log::{CommitLog, Commits};
+use super::commit::commit_log::CommitLog;
+use super::commit::commits::Commits;
 use super::commit::committer::Committer;
 use super::commit::metadata::Metadata;
 use super::disk::{Disk, DiskRead};
 use super::layout::{Layout, TileFile};
 use super::map_files::MapFiles;
-use super::map_folder::{self, Lock};
+use super::map_folder;
 use super::place;
 use super::recovery::recover::{recover, remove_uncommitted};
 use super::snapshots::kept_tables::KeptTables;
@@ -16,6 +17,7 @@ use super::tiles::tile_version::TileVersion;
 use super::tiles::tile_versions::TileVersions;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
+use crate::store::WriterLock;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -60,7 +62,7 @@ impl TileStore {
         map_folder::create_folders(&*disk, folder)?;
         // Before the lock, which leaves a file behind, and after it, when nobody else can begin a map here.
         map_folder::check_is_free(&*disk, folder)?;
-        let lock = Lock::take(&*disk, &layout)?;
+        let lock = WriterLock::take(&*disk, &layout)?;
         map_folder::check_is_free(&*disk, folder)?;
         let mut metadata = metadata;
         if let Some(ext) = &mut metadata.ext {
@@ -82,7 +84,7 @@ impl TileStore {
         let layout = Layout::new(folder);
         // Before the lock, so that a folder without a map is left as it is.
         map_folder::read_metadata(&*disk, &layout)?;
-        let lock = Lock::take(&*disk, &layout)?;
+        let lock = WriterLock::take(&*disk, &layout)?;
         let metadata = map_folder::read_metadata(&*disk, &layout)?;
         let mut store = Self::read(disk, layout, metadata)?;
         let is_torn = store.committer.map_id().is_some() && store.commits().torn.is_some();

@@ -170,7 +170,7 @@ fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
         let readers_bytes = seen_bytes + later.as_ref().map_or(0, |later| later.disk_bytes().unwrap().0);
         let kept = kept_bytes(&path);
         assert!(kept <= readers_bytes, "after {seed} flushes: {kept} bytes kept, {readers_bytes} seen");
-        let told = voxtile::operations::kept_tables(&path).unwrap();
+        let told = voxtile::operations::kept_bytes(&path).unwrap();
         assert_eq!((told.reader_bytes, told.snapshot_bytes), (kept, 0));
     }
     assert_eq!(reader.digest().unwrap(), digest);

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
-use voxtile::operations::{KeptTables, kept_tables};
+use voxtile::operations::{KeptBytes, kept_bytes};
 use voxtile::sensor::SensorModel;
 use voxtile::store::{Bounds, InputRecord};
 use voxtile::{Queries, Result, Storage};
@@ -37,7 +37,7 @@ struct Info {
     table_bytes: u64,
     octree_bytes: u64,
     /// What is kept beside the map as it is; `None` for a snapshot.
-    kept: Option<KeptTables>,
+    kept: Option<KeptBytes>,
 }
 
 pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
@@ -86,7 +86,7 @@ impl Info {
             occupied,
             table_bytes,
             octree_bytes,
-            kept: reader.snapshot().is_none().then(|| kept_tables(reader.folder())).transpose()?,
+            kept: reader.snapshot().is_none().then(|| kept_bytes(reader.folder())).transpose()?,
         })
     }
 

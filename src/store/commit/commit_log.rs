@@ -1,9 +1,7 @@
 use super::commit_record::{Flush, Next, Record};
-use super::metadata::Metadata;
+use super::commits::Commits;
 use crate::error::{DecodeError, FormatError};
-use crate::space::{TileIndex, TileTable};
 use crate::store::disk::Disk;
-use crate::store::tiles::tile_version::TileVersion;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -22,26 +20,6 @@ pub struct CommitLog {
     map_id: [u8; 16],
     /// Length of the valid part in bytes: the next record goes here.
     bytes: u64,
-}
-
-/// All commits of a log, taken together.
-#[derive(Clone, Debug, Default)]
-pub struct Commits {
-    /// Number of the last flush; 0 before the first.
-    pub flush_number: u64,
-    /// Number of the last scan in the last flush; 0 before the first.
-    pub scan_number: u64,
-    /// Every tile of the map.
-    pub tiles: TileTable<TileVersion>,
-    /// The tiles that the last record names.
-    pub last_changed: TileTable<()>,
-    /// The tiles that the last record takes out of the map: their files may still be there.
-    pub last_removed: Vec<TileIndex>,
-    /// The last metadata in the log: its parameters are the map's, its bounds and numbers may be older ones.
-    pub metadata: Option<Metadata>,
-    /// What is wrong with the end of the log, where a flush may have been cut short: it never happened, unless
-    /// something else names it.
-    pub torn: Option<FormatError>,
 }
 
 const MAGIC: &[u8; 8] = b"VXTCOMIT";
@@ -185,7 +163,8 @@ fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], Decod
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{FileChecksum, FsDisk};
+    use crate::space::{TileIndex, TileTable};
+    use crate::store::{FileChecksum, FsDisk, TileVersion};
     use std::fs;
 
     fn version(number: u64) -> TileVersion {

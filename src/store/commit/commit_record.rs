@@ -1,7 +1,8 @@
 use super::metadata::Metadata;
 use crate::error::{DecodeError, FormatError};
 use crate::space::{TileIndex, TileTable};
-use crate::store::tiles::tile_version::{Checksumming, MAX_NUMBER, TileVersion};
+use crate::store::tiles::file_checksum::Checksumming;
+use crate::store::tiles::tile_version::{MAX_NUMBER, TileVersion};
 use std::io::{self, Read, Write};
 
 /// A flush to be appended to a log.
@@ -245,7 +246,7 @@ impl<R: Read> Payload<R> {
         Metadata::from_text(&text).map(Some).map_err(|_| unreadable().into())
     }
 
-    fn skip_rest(mut self) -> io::Result<(crate::store::tiles::tile_version::FileChecksum, R)> {
+    fn skip_rest(mut self) -> io::Result<(crate::store::tiles::file_checksum::FileChecksum, R)> {
         let skipped = io::copy(&mut (&mut self.input).take(self.left), &mut io::sink())?;
         if skipped < self.left {
             return Err(io::ErrorKind::UnexpectedEof.into());

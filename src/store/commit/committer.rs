@@ -1,10 +1,12 @@
-use super::commit_log::{CommitLog, Commits};
+use super::commit_log::CommitLog;
 use super::commit_record::{Flush, whole_map_bytes};
+use super::commits::Commits;
 use super::metadata::{Bounds, Metadata};
 use crate::error::{Error, Result};
+use crate::store::WriterLock;
 use crate::store::disk::ReaderWatch;
 use crate::store::map_files::MapFiles;
-use crate::store::map_folder::{self, Lock};
+use crate::store::map_folder;
 use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::tiles::tile_versions::TileVersions;
 
@@ -23,7 +25,7 @@ pub(in crate::store) struct Committer {
     /// Whether the log has the list of snapshots.
     is_list_logged: bool,
     /// Held while the store may write.
-    lock: Option<Lock>,
+    lock: Option<WriterLock>,
 }
 
 /// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
@@ -42,7 +44,7 @@ impl Committer {
 
     /// Holds the lock from here on, so that the map may be written. `is_torn` tells whether the log ends with a record
     /// that is not whole.
-    pub(in crate::store) fn begin_writing(&mut self, lock: Lock, is_torn: bool) {
+    pub(in crate::store) fn begin_writing(&mut self, lock: WriterLock, is_torn: bool) {
         self.lock = Some(lock);
         self.is_log_settled = !is_torn;
     }
@@ -54,7 +56,7 @@ impl Committer {
 
     /// Checks that the lock still keeps others from writing.
     pub(in crate::store) fn check_lock(&self) -> Result<()> {
-        self.lock.as_ref().map_or(Ok(()), Lock::check)
+        self.lock.as_ref().map_or(Ok(()), WriterLock::check)
     }
 
     /// The map's id; `None` for a map of the original format.

@@ -1,4 +1,4 @@
-use super::commit_log::Commits;
+use super::commits::Commits;
 use super::input_record::InputRecord;
 use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;

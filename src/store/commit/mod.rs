@@ -3,6 +3,7 @@
 pub(super) mod checkpoint;
 pub(super) mod commit_log;
 pub(super) mod commit_record;
+pub(super) mod commits;
 pub(super) mod committer;
 mod flush;
 pub(super) mod input_record;

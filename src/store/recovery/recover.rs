@@ -1,13 +1,14 @@
 use crate::error::{Error, Result, is_of_medium};
 use crate::space::{TileIndex, TileTable};
-use crate::store::commit::commit_log::Commits;
+use crate::store::commit::commits::Commits;
 use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::{Layout, SPILL, tile_of_folder};
 use crate::store::snapshots::seen_tables::{KeptFlushes, SeenTables};
 use crate::store::snapshots::snapshot_file::Snapshot;
 use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::snapshots::snapshot_name::SnapshotName;
-use crate::store::tiles::tile_version::{Checksumming, FileChecksum, TileVersion};
+use crate::store::tiles::file_checksum::{Checksumming, FileChecksum};
+use crate::store::tiles::tile_version::TileVersion;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::io;

@@ -1,6 +1,7 @@
 use crate::config::Storage;
 use crate::error::{DecodeError, Error, FormatError, Result, is_of_medium};
-use crate::store::commit::commit_log::{CommitLog, Commits};
+use crate::store::commit::commit_log::CommitLog;
+use crate::store::commit::commits::Commits;
 use crate::store::commit::metadata::Metadata;
 use crate::store::disk::Disk;
 use crate::store::layout::{Layout, TileFile, tile_of_folder};

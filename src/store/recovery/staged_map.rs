@@ -1,8 +1,9 @@
 use crate::error::{Error, Result};
+use crate::store::WriterLock;
 use crate::store::commit::metadata::Metadata;
 use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::{Layout, tile_of_folder};
-use crate::store::map_folder::{self, Lock};
+use crate::store::map_folder;
 use crate::store::place;
 use crate::store::tile_store::TileStore;
 use std::io;
@@ -126,7 +127,7 @@ fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
     let layout = Layout::new(folder);
     // Before the lock, which leaves a file behind.
     check_content(disk, &layout)?;
-    let _lock = Lock::take(disk, &layout)?;
+    let _lock = WriterLock::take(disk, &layout)?;
     remove_content(disk, &layout, false)
 }
 

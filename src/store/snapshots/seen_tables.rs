@@ -2,7 +2,7 @@ use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
 use crate::error::{Error, Result};
 use crate::space::{TileIndex, TileTable};
-use crate::store::commit::commit_log::Commits;
+use crate::store::commit::commits::Commits;
 use crate::store::disk::Disk;
 use crate::store::layout::Layout;
 use rustc_hash::{FxHashMap, FxHashSet};

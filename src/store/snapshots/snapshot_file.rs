@@ -3,7 +3,8 @@
 use super::snapshot_list::SnapshotList;
 use super::snapshot_name::SnapshotName;
 use crate::error::{Error, FormatError, Result};
-use crate::store::commit::commit_log::{CommitLog, Commits};
+use crate::store::commit::commit_log::CommitLog;
+use crate::store::commit::commits::Commits;
 use crate::store::commit::metadata::Metadata;
 use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::Layout;

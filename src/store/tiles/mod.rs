@@ -1,5 +1,6 @@
 //! Tiles as the store sees them: which there are, where their files lie, and what the log records of them.
 
+pub(super) mod file_checksum;
 pub(super) mod spill_file;
 pub(super) mod tile_location;
 pub(super) mod tile_version;

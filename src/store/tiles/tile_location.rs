@@ -1,4 +1,5 @@
-use super::tile_version::{Checksumming, TileVersion};
+use super::file_checksum::Checksumming;
+use super::tile_version::TileVersion;
 use crate::config::Storage;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;

@@ -1,6 +1,6 @@
+use super::file_checksum::FileChecksum;
 use crate::space::{TileValue, put_number, take_number, take_u32};
 use crate::store::layout::TileFile;
-use std::io::{self, Read, Write};
 
 /// What the log knows of one version of a tile: enough to recognise its files and to count without reading them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -15,15 +15,6 @@ pub struct TileVersion {
     pub voxels: u64,
     /// Occupied voxels.
     pub occupied: u64,
-}
-
-/// Length and checksum of a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FileChecksum {
-    /// Length in bytes.
-    pub bytes: u64,
-    /// CRC-32 of all bytes.
-    pub crc: u32,
 }
 
 /// The highest number of a scan or flush that is read: nobody counts that far, and one more always fits.
@@ -97,49 +88,5 @@ impl TileValue for TileVersion {
         };
         let (table, octree) = (file(input), file(input));
         Self { scan_number, table, octree, voxels: take_number(input), occupied: take_number(input) }
-    }
-}
-
-/// A stream that computes the checksum of the bytes that pass through it.
-pub struct Checksumming<S> {
-    stream: S,
-    bytes: u64,
-    crc: crc32fast::Hasher,
-}
-
-impl<S> Checksumming<S> {
-    /// Starts at the current position of the stream.
-    pub fn new(stream: S) -> Self {
-        Self { stream, bytes: 0, crc: crc32fast::Hasher::new() }
-    }
-
-    /// The checksum of all that passed, and the stream.
-    pub fn finish(self) -> (FileChecksum, S) {
-        (FileChecksum { bytes: self.bytes, crc: self.crc.finalize() }, self.stream)
-    }
-
-    fn pass(&mut self, chunk: &[u8]) {
-        self.bytes += chunk.len() as u64;
-        self.crc.update(chunk);
-    }
-}
-
-impl<W: Write> Write for Checksumming<W> {
-    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        let written = self.stream.write(buffer)?;
-        self.pass(&buffer[..written]);
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.stream.flush()
-    }
-}
-
-impl<R: Read> Read for Checksumming<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.stream.read(buffer)?;
-        self.pass(&buffer[..read]);
-        Ok(read)
     }
 }

@@ -1,6 +1,6 @@
 use super::tile_version::TileVersion;
 use crate::space::{TileIndex, TileTable};
-use crate::store::commit::commit_log::Commits;
+use crate::store::commit::commits::Commits;
 use rustc_hash::FxHashSet;
 
 /// Which tiles a map has on disk and which version of each is the latest: the last commit, and what was written or

@@ -1,4 +1,4 @@
-use super::tile_version::{Checksumming, FileChecksum};
+use super::file_checksum::{Checksumming, FileChecksum};
 use crate::config::Storage;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;

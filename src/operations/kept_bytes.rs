@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// What is on disk of a map beside the map as it is: tables that were replaced and that somebody still sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
-pub struct KeptTables {
+pub struct KeptBytes {
     /// Tables that readers see and no snapshot does. They go with the flush after the last of these readers, or when
     /// the map is next opened for writing.
     pub reader_tables: u64,
@@ -27,16 +27,16 @@ pub struct KeptTables {
 /// # Errors
 ///
 /// No map there, damage to what tells which tiles there are, a disk that refuses.
-pub fn kept_tables(folder: impl AsRef<Path>) -> Result<KeptTables> {
-    kept_tables_on(Arc::new(FsDisk), folder.as_ref())
+pub fn kept_bytes(folder: impl AsRef<Path>) -> Result<KeptBytes> {
+    kept_bytes_on(Arc::new(FsDisk), folder.as_ref())
 }
 
-/// [`kept_tables`] on another disk than the file system.
+/// [`kept_bytes`] on another disk than the file system.
 ///
 /// # Errors
 ///
-/// As for [`kept_tables`].
-pub fn kept_tables_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<KeptTables> {
+/// As for [`kept_bytes`].
+pub fn kept_bytes_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<KeptBytes> {
     let store = TileStore::open_read_only(disk.clone(), folder)?;
     let mut kept: BTreeMap<TileIndex, BTreeSet<u64>> = BTreeMap::new();
     for name in disk.list(folder).map_err(|error| Error::io(folder, "list", error))? {
@@ -47,7 +47,7 @@ pub fn kept_tables_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<KeptTables> 
         }
     }
     let seen = seen_by_snapshots(&store, &kept)?;
-    let mut counts = KeptTables::default();
+    let mut counts = KeptBytes::default();
     for (tile, flush_number) in kept.iter().flat_map(|(tile, flushes)| flushes.iter().map(|n| (*tile, *n))) {
         let path = store.layout().kept(tile, flush_number);
         // Gone since it was listed, or not to be told.

@@ -1,0 +1,54 @@
+use std::io::{self, Read, Write};
+
+/// Length and checksum of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FileChecksum {
+    /// Length in bytes.
+    pub bytes: u64,
+    /// CRC-32 of all bytes.
+    pub crc: u32,
+}
+
+/// A stream that computes the checksum of the bytes that pass through it.
+pub struct Checksumming<S> {
+    stream: S,
+    bytes: u64,
+    crc: crc32fast::Hasher,
+}
+
+impl<S> Checksumming<S> {
+    /// Starts at the current position of the stream.
+    pub fn new(stream: S) -> Self {
+        Self { stream, bytes: 0, crc: crc32fast::Hasher::new() }
+    }
+
+    /// The checksum of all that passed, and the stream.
+    pub fn finish(self) -> (FileChecksum, S) {
+        (FileChecksum { bytes: self.bytes, crc: self.crc.finalize() }, self.stream)
+    }
+
+    fn pass(&mut self, chunk: &[u8]) {
+        self.bytes += chunk.len() as u64;
+        self.crc.update(chunk);
+    }
+}
+
+impl<W: Write> Write for Checksumming<W> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let written = self.stream.write(buffer)?;
+        self.pass(&buffer[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+impl<R: Read> Read for Checksumming<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.stream.read(buffer)?;
+        self.pass(&buffer[..read]);
+        Ok(read)
+    }
+}
