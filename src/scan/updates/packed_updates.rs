@@ -99,7 +99,7 @@ impl PackedUpdates {
     ///
     /// # Errors
     ///
-    /// An `input` that cannot be read, or ends too soon.
+    /// An `input` that cannot be read, ends too soon, or was not written by [`PackedUpdates`].
     pub fn unpack(input: impl BufRead, mut take: impl FnMut(TileUpdates)) -> io::Result<()> {
         let mut input = Unpacker { input };
         while let Some(updates) = input.next()? {
@@ -193,10 +193,14 @@ impl<R: BufRead> Unpacker<R> {
         Ok(Some(match self.byte()? {
             MASKS => TileUpdates::Masks(self.bricks(Self::brick_update)?),
             RUNS => TileUpdates::Runs(self.bricks(Self::brick_runs)?),
-            _ => {
+            ORDERED => {
                 let voxels = self.many(|input| Ok(u32::from_le_bytes(input.take()?)))?;
                 let intensities = self.many(Self::float)?;
                 TileUpdates::Ordered(OrderedUpdates::from_parts(voxels, intensities))
+            }
+            other => {
+                let reason = format!("{other} is no kind of updates");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
             }
         }))
     }

@@ -183,7 +183,7 @@ impl TileUpdates {
             Self::Masks(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),
             Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).all(Run::is_empty),
             Self::Ordered(updates) => updates.is_empty(),
-            Self::Packed(updates) => updates.is_empty(),
+            Self::Packed(updates) => updates.len() == 0,
         }
     }
 
