@@ -5,7 +5,7 @@ use crate::config::MapConfig;
 use crate::error::Result;
 use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
-use crate::space::{TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, VoxelIndex};
 use crate::tile::{OctreeFactory, Tile};
 use rayon::prelude::*;
 
@@ -64,6 +64,14 @@ impl MapView for InMemoryMapper {
         let mut indices: Vec<_> = self.tiles.tiles().iter().map(Tile::index).collect();
         indices.sort_unstable();
         indices
+    }
+
+    fn tile_bounds(&self) -> Option<TileBox> {
+        self.tiles.bounds()
+    }
+
+    fn has_tile(&self, index: TileIndex) -> bool {
+        self.tiles.get(index).is_some()
     }
 
     fn cached_tile_indices(&self) -> Vec<TileIndex> {

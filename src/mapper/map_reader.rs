@@ -4,7 +4,7 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
-use crate::space::TileIndex;
+use crate::space::{TileBox, TileIndex};
 use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStore, TileVersion};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
@@ -21,6 +21,8 @@ pub struct MapReader {
     config: MapConfig,
     octrees: OctreeFactory,
     store: TileStore,
+    /// Around all tiles that this reader sees.
+    bounds: Option<TileBox>,
     disk: Arc<dyn Disk>,
     cache_tiles: usize,
     cache: Mutex<ReaderCache>,
@@ -75,7 +77,8 @@ impl MapReader {
         let config = config.with_cache_tiles(cache_tiles).validated()?;
         let cache = ReaderCache { tiles: LruCache::unbounded(), io: IoCounts::default() };
         let octrees = OctreeFactory::default();
-        Ok(Self { config, octrees, store, disk, cache_tiles, cache: Mutex::new(cache) })
+        let bounds = TileBox::of(store.tiles());
+        Ok(Self { config, octrees, store, bounds, disk, cache_tiles, cache: Mutex::new(cache) })
     }
 
     /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not
@@ -110,6 +113,7 @@ impl MapReader {
                 cache.tiles.pop(&index);
             }
         }
+        self.bounds = TileBox::of(store.tiles());
         (self.store, self.config) = (store, config);
         Ok(is_newer)
     }
@@ -234,6 +238,14 @@ impl MapView for MapReader {
         let mut indices: Vec<_> = self.store.tiles().collect();
         indices.sort_unstable();
         indices
+    }
+
+    fn tile_bounds(&self) -> Option<TileBox> {
+        self.bounds
+    }
+
+    fn has_tile(&self, index: TileIndex) -> bool {
+        self.store.contains(index)
     }
 
     fn cached_tile_indices(&self) -> Vec<TileIndex> {

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{Overflow, PointBatch, Scan, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
-use crate::space::{Point, TileIndex, VoxelIndex};
+use crate::space::{Point, TileBox, TileIndex, VoxelIndex};
 use crate::store::{Disk, FsDisk, InputContent, InputRecord, Metadata, SnapshotName, TileStore};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -250,6 +250,14 @@ impl MapView for OutOfCoreTileMapper {
 
     fn tile_indices(&self) -> Vec<TileIndex> {
         self.lock().tile_indices()
+    }
+
+    fn tile_bounds(&self) -> Option<TileBox> {
+        self.lock().bounds()
+    }
+
+    fn has_tile(&self, index: TileIndex) -> bool {
+        self.lock().exists(index)
     }
 
     fn cached_tile_indices(&self) -> Vec<TileIndex> {

@@ -3,7 +3,7 @@ use crate::config::MapConfig;
 use crate::error::Result;
 use crate::scan::{PointBatch, Scan, ScanReport};
 use crate::sensor::Evidence;
-use crate::space::{TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, VoxelIndex};
 
 /// A map that can be queried. Every method of [`Queries`](crate::query::Queries) uses these few.
 ///
@@ -17,6 +17,13 @@ pub trait MapView {
 
     /// The tiles in which something was observed, ordered by x, then y, then z.
     fn tile_indices(&self) -> Vec<TileIndex>;
+
+    /// A box around all tiles in which something was observed, and perhaps some more; `None` for an empty map. Its cost does not
+    /// depend on the number of tiles.
+    fn tile_bounds(&self) -> Option<TileBox>;
+
+    /// Whether something was observed in a tile. Its cost does not depend on the number of tiles.
+    fn has_tile(&self, index: TileIndex) -> bool;
 
     /// The tiles held in memory, ordered likewise.
     fn cached_tile_indices(&self) -> Vec<TileIndex>;
@@ -46,6 +53,7 @@ pub trait MapView {
         let tile = self.tile(self.config().grid.tile_of_voxel(voxel))?;
         Ok(tile.and_then(|tile| tile.evidence(voxel)))
     }
+
     /// About how many voxels were observed in a tile, where that is known without reading it.
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64>;
 

@@ -1,6 +1,6 @@
+use super::UnknownAs;
 use super::region::{tiles_in, voxels_around, voxels_in};
 use super::tile_cursor::TileCursor;
-use super::{Occupancy, UnknownAs};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
@@ -25,6 +25,7 @@ const MAX_UNKNOWN_VOXELS: u64 = 1 << 28;
 pub(super) fn collision(view: &impl MapView, body: &Shape, unknown: UnknownAs) -> Result<Option<VoxelIndex>> {
     let config = view.config();
     let around = voxels_around(&config.grid, &body.bounds()?);
+    let occupied_from = config.occupied_log_odds();
     let touches = |voxel: VoxelIndex| body.touches_voxel(&config.grid, voxel);
     if unknown == UnknownAs::Obstacle {
         return first_not_free(view, &around, touches);
@@ -32,7 +33,7 @@ pub(super) fn collision(view: &impl MapView, body: &Shape, unknown: UnknownAs) -
     for index in tiles_in(view, &around) {
         let Some(tile) = view.tile(index)? else { continue };
         let mut occupied = voxels_in(&tile, &around)
-            .filter(|voxel| Occupancy::of(config, Some(voxel.evidence)).is_occupied())
+            .filter(|voxel| voxel.evidence.log_odds >= occupied_from)
             .map(|voxel| voxel.index);
         if let Some(voxel) = occupied.find(|&voxel| touches(voxel)) {
             return Ok(Some(voxel));
@@ -57,6 +58,7 @@ fn first_not_free(
             hint,
         });
     }
+    let occupied_from = view.config().occupied_log_odds();
     let mut tiles = TileCursor::new(view);
     for x in around.min[0]..around.end[0] {
         for y in around.min[1]..around.end[1] {
@@ -64,7 +66,7 @@ fn first_not_free(
                 let voxel = [x, y, z];
                 if touches(voxel) {
                     let evidence = tiles.tile_of(voxel)?.and_then(|tile| tile.evidence(voxel));
-                    if !matches!(Occupancy::of(view.config(), evidence), Occupancy::Free(_)) {
+                    if evidence.is_none_or(|evidence| evidence.log_odds >= occupied_from) {
                         return Ok(Some(voxel));
                     }
                 }

@@ -15,6 +15,9 @@ pub struct Nearest {
     pub distance_m: f64,
 }
 
+/// Radii of the balls that are searched before the whole one, in edges of a tile.
+const NEAR_TILES: [f64; 2] = [1.0, 4.0];
+
 pub(super) fn nearest_occupied(
     view: &impl MapView,
     point: Point,
@@ -29,6 +32,19 @@ pub(super) fn nearest_occupied(
             "needs a finite point and a distance of at least 0 m",
         ));
     }
+    // Small balls first: what is near is found without a look at the rest of the map.
+    for tiles in NEAR_TILES {
+        let radius_m = tiles * view.config().grid.tile_size_m();
+        if radius_m < max_distance_m
+            && let Some(nearest) = nearest_in_ball(view, point, radius_m)?
+        {
+            return Ok(Some(nearest));
+        }
+    }
+    nearest_in_ball(view, point, max_distance_m)
+}
+
+fn nearest_in_ball(view: &impl MapView, point: Point, max_distance_m: f64) -> Result<Option<Nearest>> {
     let (grid, threshold) = (view.config().grid, view.config().occupied_log_odds());
     let ball = |radius_m: f64| Aabb { min: point.map(|c| c - radius_m), max: point.map(|c| c + radius_m) };
     let mut tiles: Vec<(f64, TileIndex)> = tiles_in(view, &voxels_around(&grid, &ball(max_distance_m)))

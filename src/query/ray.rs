@@ -4,7 +4,6 @@ use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::scan::RayWalk;
 use crate::space::{BRICK_EDGE, BrickCode, Point, VoxelBox, VoxelIndex};
-use crate::store::Bounds;
 use serde::Serialize;
 
 /// A ray to be cast through the map.
@@ -65,14 +64,19 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
         return Ok(blocked.then_some(hit));
     };
     let range_m = query.max_range_m.unwrap_or(f64::INFINITY);
+    let occupied_from = config.occupied_log_odds();
     let mut tiles = TileCursor::new(view);
     while walk.entry_time() <= range_m {
         let voxel = walk.voxel();
         let tile = tiles.tile_of(voxel)?;
-        let occupancy = Occupancy::of(config, tile.and_then(|tile| tile.evidence(voxel)));
-        let stops = occupancy.is_occupied()
-            || (occupancy == Occupancy::Unknown && query.unknown == UnknownAs::Obstacle);
+        let log_odds = tile.and_then(|tile| tile.evidence(voxel)).map(|evidence| evidence.log_odds);
+        let stops = match log_odds {
+            None => query.unknown == UnknownAs::Obstacle,
+            Some(log_odds) => log_odds >= occupied_from,
+        };
         if stops {
+            // The probability is computed for the answer alone.
+            let occupancy = Occupancy::of_log_odds(config, log_odds);
             let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time());
             return Ok(Some(RayHit { voxel, center_m, distance_m, probability: occupancy.probability() }));
         }
@@ -101,9 +105,9 @@ fn of_usable_size(direction: Point) -> Point {
 
 /// The voxels of a box around all tiles; `None` for an empty map.
 fn hull_of_map(view: &impl MapView) -> Option<VoxelBox> {
-    let Bounds { min, max } = Bounds::of(view.tile_indices().into_iter())?;
+    let bounds = view.tile_bounds()?;
     let grid = &view.config().grid;
-    let [low, high] = [min, max].map(|corner| grid.voxels_of_tile(corner.into()));
+    let [low, high] = [bounds.min(), bounds.max()].map(|corner| grid.voxels_of_tile(corner));
     Some(VoxelBox { min: low.min, end: high.end })
 }
 

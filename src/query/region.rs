@@ -2,7 +2,7 @@ use crate::config::MapConfig;
 use crate::error::Result;
 use crate::mapper::MapView;
 use crate::maths::logit;
-use crate::space::{Aabb, BRICK_EDGE, Grid, TileIndex, VoxelBox};
+use crate::space::{Aabb, BRICK_EDGE, Grid, TileBox, TileIndex, VoxelBox};
 use crate::tile::{Tile, Voxel};
 
 pub(super) fn for_each_voxel_in(
@@ -69,19 +69,26 @@ fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
 
 /// The tiles of the map that overlap a box of voxels, in order.
 pub(super) fn tiles_in(view: &impl MapView, voxels: &VoxelBox) -> Vec<TileIndex> {
+    /// Looking up so many is cheaper than listing all tiles of a large map.
+    const MOST_LOOKED_UP: u64 = 4096;
+    let Some(tiles) = tile_box_around(view, voxels) else { return Vec::new() };
+    if tiles.count() <= MOST_LOOKED_UP {
+        return tiles.tiles().filter(|&tile| view.has_tile(tile)).collect();
+    }
+    let mut all = view.tile_indices();
+    all.retain(|&tile| tiles.contains(tile));
+    all
+}
+
+/// The tiles, there or not, that overlap a box of voxels within the bounds of the map.
+fn tile_box_around(view: &impl MapView, voxels: &VoxelBox) -> Option<TileBox> {
     if voxels.is_empty() {
-        return Vec::new();
+        return None;
     }
     let grid = &view.config().grid;
-    let first = grid.tile_of_voxel(voxels.min).to_array();
-    let last = grid.tile_of_voxel(voxels.end.map(|end| end - 1)).to_array();
-    let is_inside = |tile: &TileIndex| {
-        let tile = tile.to_array();
-        (0..3).all(|k| first[k] <= tile[k] && tile[k] <= last[k])
-    };
-    let mut tiles = view.tile_indices();
-    tiles.retain(is_inside);
-    tiles
+    let (first, last) = (voxels.min, voxels.end.map(|end| end - 1));
+    let wanted = TileBox::new(grid.tile_of_voxel(first), grid.tile_of_voxel(last));
+    view.tile_bounds()?.intersection(wanted)
 }
 
 /// The observed voxels of a tile that lie in a box, by brick.

@@ -13,6 +13,7 @@ mod brick;
 mod grid;
 mod key;
 mod morton;
+mod tile_box;
 mod tile_index;
 mod tile_table;
 mod torus;
@@ -22,6 +23,7 @@ pub use brick::{BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, mask_of_box, pla
 pub use grid::{Grid, GridError, LAST_VOXEL_INDEX, MAX_VOXELS_PER_TILE_EDGE};
 pub use key::VoxelKey;
 pub use morton::MortonCode;
+pub use tile_box::TileBox;
 pub use tile_index::TileIndex;
 pub(crate) use tile_table::take_u32;
 pub use tile_table::{TileTable, TileValue, put_number, take_number};

@@ -21,7 +21,6 @@ mod stalls;
 mod tile_cache;
 mod tile_disk;
 mod tile_pager;
-mod tile_span;
 mod write_buffer;
 
 pub(super) use memory_plan::MemoryPlan;

@@ -2,10 +2,9 @@
 //! travel.
 
 use super::tile_pager::TilePager;
-use super::tile_span::TileSpan;
 use crate::error::Result;
 use crate::scan::TileUpdates;
-use crate::space::TileIndex;
+use crate::space::{TileBox, TileIndex};
 use crate::tile::Table;
 use std::sync::Arc;
 
@@ -25,9 +24,9 @@ impl TilePager {
                 }
             }
         }
-        let span = TileSpan::of(updates.iter().map(|(tile, _)| *tile));
-        let before = std::mem::replace(&mut self.last_span, span);
-        if let (Some(before), Some(now)) = (before, span) {
+        let now = TileBox::of(updates.iter().map(|(tile, _)| *tile));
+        let before = std::mem::replace(&mut self.last_scan, now);
+        if let (Some(before), Some(now)) = (before, now) {
             for tile in now.ahead(&before) {
                 if self.disk.is_unread(tile) && self.has_room_to_spare() {
                     self.begin_prefetch(tile);

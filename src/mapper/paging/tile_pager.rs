@@ -1,13 +1,12 @@
 use super::tile_cache::{Cached, TileCache};
 use super::tile_disk::TileDisk;
-use super::tile_span::TileSpan;
 use super::write_buffer::WriteBuffer;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{MapStatistics, MemoryCounts};
 use crate::scan::{PackedUpdates, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
-use crate::space::{TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, VoxelIndex};
 use crate::store::{InputRecord, SnapshotName, TileStore};
 use crate::tile::{Table, Tile};
 use rustc_hash::FxHashMap;
@@ -26,7 +25,9 @@ pub(in crate::mapper) struct TilePager {
     /// Number of scans in the map. Every tile file that is written records it.
     pub(super) scan_number: u64,
     /// The tiles that the last scan touched.
-    pub(super) last_span: Option<TileSpan>,
+    pub(super) last_scan: Option<TileBox>,
+    /// Around all tiles of the map, and perhaps some that it had.
+    bounds: Option<TileBox>,
     /// What the map was built from and, last, is being built from; kept with it at the next flush.
     pub(super) inputs: Vec<InputRecord>,
 }
@@ -55,13 +56,15 @@ fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
 
 impl TilePager {
     pub(in crate::mapper) fn new(config: MapConfig, store: TileStore) -> Self {
+        let bounds = TileBox::of(store.tiles().chain(store.orphans()));
         let inputs = store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone());
         Self {
             cache: TileCache::new(&config),
             buffer: WriteBuffer::default(),
             scan_number: store.commits().scan_number,
             disk: TileDisk::new(&config, store),
-            last_span: None,
+            last_scan: None,
+            bounds,
             inputs,
             config,
         }
@@ -103,6 +106,8 @@ impl TilePager {
     /// Accepts the updates, staged parts first: resident tiles take theirs at once, those of other tiles are buffered.
     /// Cannot fail.
     pub(in crate::mapper) fn accept(&mut self, updates: ScanUpdates) {
+        let touched = updates.tiles.iter().map(|(index, _)| *index).chain(self.buffer.staged_tiles());
+        self.bounds = TileBox::of(touched).into_iter().chain(self.bounds).reduce(TileBox::union);
         self.buffer.accept_staged();
         let mut resident = FxHashMap::default();
         // What new tiles take only when the updates are applied to them.
@@ -195,8 +200,13 @@ impl TilePager {
     // Tiles.
 
     /// Whether anything was observed in a tile.
-    pub(super) fn exists(&self, index: TileIndex) -> bool {
+    pub(in crate::mapper) fn exists(&self, index: TileIndex) -> bool {
         self.store().contains(index) || self.buffer.contains(index) || self.cache.contains(index)
+    }
+
+    /// A box around all tiles in which something was observed.
+    pub(in crate::mapper) fn bounds(&self) -> Option<TileBox> {
+        self.bounds
     }
 
     /// A tile, brought into memory; `None` if nothing was observed in it.

@@ -1,0 +1,129 @@
+use super::TileIndex;
+
+/// The tiles from one corner to another, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileBox {
+    min: [i32; 3],
+    max: [i32; 3],
+}
+
+/// Most tiles that lie ahead of a box; a scan that spans more is no vehicle's.
+const MOST_AHEAD: usize = 4096;
+
+impl TileBox {
+    /// The box from one corner to another, both included; `min` is not above `max` along any axis.
+    pub fn new(min: TileIndex, max: TileIndex) -> Self {
+        Self { min: min.to_array(), max: max.to_array() }
+    }
+
+    /// The smallest box around these tiles; `None` if there are none.
+    pub fn of(tiles: impl Iterator<Item = TileIndex>) -> Option<Self> {
+        tiles.map(|tile| Self::new(tile, tile)).reduce(Self::union)
+    }
+
+    /// Its lowest tile.
+    pub fn min(self) -> TileIndex {
+        self.min.into()
+    }
+
+    /// Its highest tile.
+    pub fn max(self) -> TileIndex {
+        self.max.into()
+    }
+
+    /// The smallest box around both.
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            min: std::array::from_fn(|k| self.min[k].min(other.min[k])),
+            max: std::array::from_fn(|k| self.max[k].max(other.max[k])),
+        }
+    }
+
+    /// The tiles that both have; `None` if there are none.
+    pub fn intersection(self, other: Self) -> Option<Self> {
+        let (min, max): ([i32; 3], [i32; 3]) = (
+            std::array::from_fn(|k| self.min[k].max(other.min[k])),
+            std::array::from_fn(|k| self.max[k].min(other.max[k])),
+        );
+        (0..3).all(|k| min[k] <= max[k]).then_some(Self { min, max })
+    }
+
+    /// Whether the box has a tile.
+    pub fn contains(self, tile: TileIndex) -> bool {
+        let tile = tile.to_array();
+        (0..3).all(|k| self.min[k] <= tile[k] && tile[k] <= self.max[k])
+    }
+
+    /// Number of tiles; `u64::MAX` if there are more.
+    pub fn count(self) -> u64 {
+        let edge = |k: usize| u64::from(self.max[k].abs_diff(self.min[k])) + 1;
+        edge(0).saturating_mul(edge(1)).saturating_mul(edge(2))
+    }
+
+    /// Its tiles, in order.
+    pub fn tiles(self) -> impl Iterator<Item = TileIndex> {
+        let Self { min, max } = self;
+        let of_column = move |x, y| (min[2]..=max[2]).map(move |z| TileIndex::new(x, y, z));
+        (min[0]..=max[0]).flat_map(move |x| (min[1]..=max[1]).flat_map(move |y| of_column(x, y)))
+    }
+
+    /// The tiles that this box would gain by going one tile further in the direction in which it came from `before`.
+    pub fn ahead(self, before: &Self) -> Vec<TileIndex> {
+        let doubled_center = |tiles: &Self, k: usize| i64::from(tiles.min[k]) + i64::from(tiles.max[k]);
+        let mut ahead = Vec::new();
+        for axis in 0..3 {
+            let gained = match doubled_center(&self, axis).cmp(&doubled_center(before, axis)) {
+                std::cmp::Ordering::Greater => self.max[axis].checked_add(1),
+                std::cmp::Ordering::Less => self.min[axis].checked_sub(1),
+                std::cmp::Ordering::Equal => None,
+            };
+            let Some(gained) = gained else { continue };
+            let mut slab = self;
+            (slab.min[axis], slab.max[axis]) = (gained, gained);
+            ahead.extend(slab.tiles().take(MOST_AHEAD - ahead.len()));
+        }
+        ahead
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_ahead_is_one_tile_further_in_the_direction_of_travel() {
+        let tiles = |min, max| TileBox { min, max };
+        let before = tiles([0, 0, 0], [2, 1, 0]);
+        assert_eq!(before.ahead(&before), []);
+        let east = tiles([1, 0, 0], [3, 1, 0]);
+        assert_eq!(east.ahead(&before), [TileIndex::new(4, 0, 0), TileIndex::new(4, 1, 0)]);
+        let down = tiles([0, 0, -1], [2, 0, 0]);
+        let below: Vec<_> = (0..3).map(|x| TileIndex::new(x, 0, -2)).collect();
+        // Down, and south as well: the center moved by half a tile.
+        let south = (0..3).flat_map(|x| [-1, 0].map(|z| TileIndex::new(x, -1, z)));
+        assert_eq!(down.ahead(&before), south.chain(below).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_end_of_the_world_and_the_widest_scan_are_no_trouble() {
+        let far = TileBox { min: [i32::MAX - 1; 3], max: [i32::MAX; 3] };
+        let near = TileBox { min: [0; 3], max: [1; 3] };
+        assert_eq!(far.ahead(&near), []);
+        let wide = TileBox { min: [-500; 3], max: [500; 3] };
+        assert_eq!(wide.ahead(&near).len(), MOST_AHEAD);
+    }
+
+    #[test]
+    fn boxes_unite_intersect_and_list_their_tiles_in_order() {
+        let tiles = |min: [i32; 3], max: [i32; 3]| TileBox::new(min.into(), max.into());
+        let (a, b) = (tiles([-1, 0, 0], [1, 2, 0]), tiles([1, 1, -3], [4, 1, 5]));
+        assert_eq!(a.union(b), tiles([-1, 0, -3], [4, 2, 5]));
+        assert_eq!(a.intersection(b), Some(tiles([1, 1, 0], [1, 1, 0])));
+        assert_eq!(a.intersection(tiles([2, 0, 0], [3, 0, 0])), None);
+        let listed: Vec<_> = a.tiles().collect();
+        assert!(listed.is_sorted() && listed.len() as u64 == a.count());
+        assert!(listed.iter().all(|tile| a.contains(*tile)) && !a.contains(TileIndex::new(0, 3, 0)));
+        assert_eq!(TileBox::of(listed.into_iter()), Some(a));
+        assert_eq!(tiles([i32::MIN; 3], [i32::MAX; 3]).count(), u64::MAX);
+    }
+}
