@@ -10,7 +10,7 @@ use voxtile::space::Point;
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries};
 
 const TILE_M: f64 = 10.0;
-/// Tiles along each edge of the square that all others lie in, beside the street.
+/// Tiles along each edge of the square that all others lie in, far from the scans.
 const EDGES: [usize; 3] = [10, 100, 1000];
 
 fn query(criterion: &mut Criterion) {
@@ -41,12 +41,12 @@ fn query(criterion: &mut Criterion) {
     }
 }
 
-/// A street, and far from it a square of tiles with one voxel each. Returns where the sensor was, too.
+/// A few blocks, and far from them a square of tiles with one voxel each. Returns where the sensor was, too.
 fn make_map(edge: usize) -> (InMemoryMapper, Point) {
     let config = MapConfig::new(0.2, TILE_M).expect("whole voxels").with_range(0.5, 60.0);
     let mut map = InMemoryMapper::new(config).expect("a configuration that holds");
     let mut eye = [0.0; 3];
-    for scan in Survey::drive(1, 8_000).take(4) {
+    for scan in Survey::tour(1, 8_000).take(4) {
         eye = scan.origin;
         map.insert_scan(&scan).expect("a scan that can be mapped");
     }

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 26] = [
+const SOURCES: [&str; 25] = [
     "tile/octocache/octree_statistics.rs",
     "tile/octocache/octree_worker.rs",
     "tile/octocache/shared_tree.rs",
@@ -20,7 +20,6 @@ const SOURCES: [&str; 26] = [
     "mapper/paging/tile_cache.rs",
     "mapper/paging/tile_disk.rs",
     "mapper/paging/tile_pager.rs",
-    "mapper/paging/tile_span.rs",
     "mapper/paging/write_buffer.rs",
     "persistence/compact_tile.rs",
     "persistence/io_threads.rs",

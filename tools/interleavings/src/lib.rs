@@ -41,7 +41,7 @@ mod sensor {
 
 mod space {
     pub(crate) use voxtile::space::{
-        Grid, MortonCode, TileIndex, TileTable, TileValue, VoxelIndex, put_number, take_number,
+        Grid, MortonCode, TileBox, TileIndex, TileTable, TileValue, VoxelIndex, put_number, take_number,
     };
 }
 
@@ -152,9 +152,6 @@ mod mapper {
         }
         mod tile_pager {
             source!("tile_pager.rs");
-        }
-        mod tile_span {
-            source!("tile_span.rs");
         }
         mod write_buffer {
             source!("write_buffer.rs");
