@@ -10,7 +10,7 @@
 //! insert_scan -> scan::trace -> updates by tile -> paging: resident tiles, write buffer -> persistence -> store
 //! ```
 //!
-//! How tiles move between memory and disk is in [`paging`].
+//! How tiles move between memory and disk is in `paging`.
 
 mod in_memory;
 mod map_reader;
