@@ -19,8 +19,9 @@ done
 # No repository, no cargo, no library of this machine: a root of its own, where that is allowed.
 run() { env --ignore-environment PATH="$place/bin" "$@"; }
 if unshare --map-root-user true 2>/dev/null; then
-    mkdir tmp
-    run() { unshare --map-root-user env --ignore-environment chroot "$place" "/bin/$1" "${@:2}"; }
+    mkdir --parents tmp
+    programs=("$(command -v unshare)" --map-root-user "$(command -v chroot)" "$place")
+    run() { env --ignore-environment "${programs[@]}" "/bin/$1" "${@:2}"; }
 fi
 run voxtile demo --out demo --length 20 >/dev/null
 run voxtile verify demo/map_tiles
