@@ -4,11 +4,11 @@ use voxtile::local::{LocalMap, LocalParameters, LocalView};
 use voxtile::space::{Grid, Point, VoxelIndex};
 use voxtile::{Result, Scan};
 
-/// A fixed window around the robot, as array-based planners have it: what is outside is not there, and what leaves it is
-/// forgotten.
+/// A fixed window around the robot, as array-based planners have it: what is outside is not there, and what leaves it
+/// is forgotten.
 ///
-/// The answers come from a local map that is made anew for every scan from what the window holds; its time is not that of
-/// an array, and is not measured.
+/// The answers come from a local map that is made anew for every scan from what the window holds; its time is not that
+/// of an array, and is not measured.
 pub struct Window {
     grid: Grid,
     occupied: HashSet<VoxelIndex>,

@@ -1,13 +1,14 @@
-//! The sensorless scenario of the voxel mapping paper (its section VII-B and table II): travellers without sensors follow
-//! the maps that two spotters share, around the trees of made-up forests; and, to compare, travellers with their own
-//! sensor and no sharing.
+//! The sensorless scenario of the voxel mapping paper (its section VII-B and table II): travellers without sensors
+//! follow the maps that two spotters share, around the trees of made-up forests; and, to compare, travellers with their
+//! own sensor and no sharing.
 //!
 //! ```text
 //! sensorless [FORESTS] [PICTURE.svg]
 //! ```
 //!
-//! Prints the paper's table, and draws the first forest from above. It is a simulation of points that fly at the paper's
-//! 3 m/s, not of drones, and they do not avoid each other: what it shows is that a shared map is enough to plan by.
+//! Prints the paper's table, and draws the first forest from above. It is a simulation of points that fly at the
+//! paper's 3 m/s, not of drones, and they do not avoid each other: what it shows is that a shared map is enough to plan
+//! by.
 
 mod forest;
 mod picture;

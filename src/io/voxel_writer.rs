@@ -20,8 +20,8 @@ pub struct VoxelRecord {
 pub enum VoxelFormat {
     /// PLY, binary little-endian: x y z as double, probability float, log_odds double, observation_count int.
     Ply,
-    /// PCD 0.7, binary, as PCL reads it: x y z as F4, intensity F4 holds the probability, observation_count I4. A file's
-    /// origin is its `VIEWPOINT`.
+    /// PCD 0.7, binary, as PCL reads it: x y z as F4, intensity F4 holds the probability, observation_count I4. A
+    /// file's origin is its `VIEWPOINT`.
     Pcd,
     /// Text with a header line; every number reads back to the same bits.
     Csv,

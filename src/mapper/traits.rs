@@ -18,8 +18,8 @@ pub trait MapView {
     /// The tiles in which something was observed, ordered by x, then y, then z.
     fn tile_indices(&self) -> Vec<TileIndex>;
 
-    /// A box around all tiles in which something was observed, and perhaps some more; `None` for an empty map. Its cost does not
-    /// depend on the number of tiles.
+    /// A box around all tiles in which something was observed, and perhaps some more; `None` for an empty map. Its cost
+    /// does not depend on the number of tiles.
     fn tile_bounds(&self) -> Option<TileBox>;
 
     /// Whether something was observed in a tile. Its cost does not depend on the number of tiles.

@@ -13,7 +13,8 @@ const MAX_PACKET_BYTES: usize = 60_000;
 /// Voxels per packet: far fewer bytes than that.
 const VOXELS_PER_PACKET: usize = MAX_VOXELS_PER_PACKET / 4;
 
-/// Writes a layer: label, resolution and tile size, packets of content with their lengths, an empty one, and the digest.
+/// Writes a layer: label, resolution and tile size, packets of content with their lengths, an empty one, and the
+/// digest.
 ///
 /// # Errors
 ///

@@ -57,8 +57,8 @@ impl Lidar {
         Self { beams: 16, rays_per_beam: 360, max_range_m: 40.0, ..Self::street() }
     }
 
-    /// The street lidar with about so many rays a turn (at least 1): 64 beams from 32 768 rays on, else 32 from 4096 on,
-    /// else 16.
+    /// The street lidar with about so many rays a turn (at least 1): 64 beams from 32 768 rays on, else 32 from 4096
+    /// on, else 16.
     pub fn of_rays(rays: u32) -> Self {
         let beams = match rays {
             32_768.. => 64,

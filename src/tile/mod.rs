@@ -5,8 +5,8 @@
 //!              \-> format/ (the bytes of the tile's files)
 //! ```
 //!
-//! The table answers every query about a finest voxel. The octree is derived from it and answers coarse queries. Nothing
-//! here knows a path.
+//! The table answers every query about a finest voxel. The octree is derived from it and answers coarse queries.
+//! Nothing here knows a path.
 
 pub mod format;
 mod octocache;

@@ -83,8 +83,8 @@ pub struct Args {
     /// Subscribing: leave MAP as it is; only keep the layers
     #[arg(long)]
     pub keep_apart: bool,
-    /// Memory for the layers of all robots. Once it is full, every robot has a right to an equal part: who has more forgets
-    /// voxels as others need theirs, and what a robot sends beyond its part is refused
+    /// Memory for the layers of all robots. Once it is full, every robot has a right to an equal part: who has more
+    /// forgets voxels as others need theirs, and what a robot sends beyond its part is refused
     #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Limits")]
     pub memory: ByteSize,
     /// Most robots that are listened to; robots that --robot names always are

@@ -8,8 +8,9 @@ pub struct Message {
     pub bytes: Vec<u8>,
 }
 
-/// Messages that wait to be taken in, fair between robots: next comes that of the robot that has taken least time so far, and
-/// where there is no room, the robot with most bytes waiting loses its oldest message. Catch-up mends what is lost.
+/// Messages that wait to be taken in, fair between robots: next comes that of the robot that has taken least time so
+/// far, and where there is no room, the robot with most bytes waiting loses its oldest message. Catch-up mends what is
+/// lost.
 ///
 /// Robots that nobody has admitted wait together, as one.
 #[derive(Default)]

@@ -1,5 +1,5 @@
-//! A real subscriber under hostile packets, damaged layers and a disk that refuses: it keeps to its memory and goes on with
-//! the others.
+//! A real subscriber under hostile packets, damaged layers and a disk that refuses: it keeps to its memory and goes on
+//! with the others.
 
 mod support;
 

@@ -10,8 +10,8 @@ use std::path::Path;
 
 /// Writes next versions of tiles, beside the committed ones. Another thread may do so while the map goes on.
 ///
-/// It is got from [`TileStore::writer`](crate::store::TileStore::writer), which makes sure that no committed version still has
-/// the name that is written to. Not to be used any more once the map has committed.
+/// It is got from [`TileStore::writer`](crate::store::TileStore::writer), which makes sure that no committed version
+/// still has the name that is written to. Not to be used any more once the map has committed.
 #[derive(Clone, Debug)]
 pub struct TileWriter {
     files: MapFiles,

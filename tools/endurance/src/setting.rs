@@ -32,7 +32,8 @@ impl Setting {
         Some(Case { name: "riverside".into(), input, resolution_m: 0.1, tile_size_m, max_range_m: 100.0 })
     }
 
-    /// A map to build on the disk as it is, whose digest is wanted. Where time is not looked at, the disk is not waited for.
+    /// A map to build on the disk as it is, whose digest is wanted. Where time is not looked at, the disk is not waited
+    /// for.
     pub fn build(&self, case: &Case, limit: Limit) -> Build {
         Build {
             case: case.clone(),

@@ -1,16 +1,16 @@
-//! The threads of the mapper under a scheduler that chooses who goes on at every lock, channel and wait: the thread that
-//! writes octrees with its queue and its trees, the threads that carry tiles to disk and back, and what they are carried for:
-//! the tiles of a map in little memory, on a disk in memory.
+//! The threads of the mapper under a scheduler that chooses who goes on at every lock, channel and wait: the thread
+//! that writes octrees with its queue and its trees, the threads that carry tiles to disk and back, and what they are
+//! carried for: the tiles of a map in little memory, on a disk in memory.
 //!
 //! ```text
 //! cargo test -p interleavings                            2,000 orders of each test
 //! INTERLEAVINGS=1000000 cargo test --release -p interleavings
 //! ```
 //!
-//! Without `unsafe` there are no data races to look for; what can go wrong is a deadlock, a wake-up that is lost, work that
-//! is lost or done twice, an answer that misses what was there. Half of the orders are random, half change few times at
-//! places chosen at random (PCT), which finds what needs few changes with a known probability. A failure prints its order,
-//! for `shuttle::replay`.
+//! Without `unsafe` there are no data races to look for; what can go wrong is a deadlock, a wake-up that is lost, work
+//! that is lost or done twice, an answer that misses what was there. Half of the orders are random, half change few
+//! times at places chosen at random (PCT), which finds what needs few changes with a known probability. A failure
+//! prints its order, for `shuttle::replay`.
 #![allow(dead_code, unused_imports)]
 
 macro_rules! source {

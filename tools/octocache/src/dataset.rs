@@ -71,7 +71,8 @@ fn recorded(folder: &Path, count: usize) -> Result<Vec<Scan>> {
     Ok(scans)
 }
 
-/// A map with voxels of this edge in metres, tiles of about 10 m, OctoMap's log-odds and the max range of all questions.
+/// A map with voxels of this edge in metres, tiles of about 10 m, OctoMap's log-odds and the max range of all
+/// questions.
 pub fn map_config(resolution_m: f64) -> Result<MapConfig> {
     let voxels_per_tile_edge = (TILE_SIZE_M / resolution_m).round();
     Ok(MapConfig::new(resolution_m, voxels_per_tile_edge * resolution_m)?.with_range(0.0, MAX_RANGE_M))

@@ -21,8 +21,8 @@ pub enum Fault {
     None,
     /// The operation fails; a write has written half.
     Fails(u64),
-    /// The operation fails, and from then on every operation on the same file or folder, until [`FaultyDisk::mend`]: what a disk
-    /// does with sectors that it cannot read or write.
+    /// The operation fails, and from then on every operation on the same file or folder, until [`FaultyDisk::mend`]:
+    /// what a disk does with sectors that it cannot read or write.
     Breaks(u64),
     /// The change fails; and a sync that fails leaves the file as it was on the medium, while later syncs of the same
     /// bytes report success, as Linux does.

@@ -29,8 +29,8 @@ impl SurveyName {
     /// Rays of a scan where nothing else is asked for.
     pub const RAYS: u32 = 8_000;
 
-    /// The scans from number `first` on, without end, those of city surveys of about `rays` rays (street and indoor have
-    /// their own number). The same seed gives the same scans on every platform.
+    /// The scans from number `first` on, without end, those of city surveys of about `rays` rays (street and indoor
+    /// have their own number). The same seed gives the same scans on every platform.
     pub fn scans(self, seed: u64, first: usize, rays: u32) -> Box<dyn Iterator<Item = Scan>> {
         match self {
             Self::Street => Box::new(Survey::street(seed).skip(first)),

@@ -25,8 +25,8 @@ fn what_is_given_comes_back_once_and_in_order() {
     });
 }
 
-/// Two threads that carry beside each other, for an owner that goes away in the middle: nobody waits for ever, and nothing
-/// is done after that.
+/// Two threads that carry beside each other, for an owner that goes away in the middle: nobody waits for ever, and
+/// nothing is done after that.
 #[test]
 fn an_owner_that_goes_away_leaves_nothing_running() {
     in_many_orders(|| {

@@ -165,8 +165,8 @@ fn live(storage: Storage) {
     life.begin_again().check_tiles();
 }
 
-/// Scans, questions, flushes and a disk that refuses now and then: no update is lost, none counts twice, no older version of
-/// a tile comes after a newer, and nobody waits for ever.
+/// Scans, questions, flushes and a disk that refuses now and then: no update is lost, none counts twice, no older
+/// version of a tile comes after a newer, and nobody waits for ever.
 #[test]
 fn tiles_on_their_way_to_disk_and_back_are_what_they_must_be() {
     in_many_orders(|| live(Storage::Compact));

@@ -1,7 +1,7 @@
 use crate::config::MemoryLimit;
 
-/// How much memory lives have: room for two or three tiles in use and for as many that are packed, so that tiles are on their
-/// way all the time.
+/// How much memory lives have: room for two or three tiles in use and for as many that are packed, so that tiles are on
+/// their way all the time.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::mapper) struct MemoryPlan {
     pub(super) tiles: usize,

@@ -7,8 +7,8 @@ use crate::space::MortonCode;
 use shuttle::sync::{Arc, Mutex};
 use shuttle::thread;
 
-/// Two threads put in more than there is room for: all of it is done, each thread's in its order, and who ends the worker
-/// waits for that.
+/// Two threads put in more than there is room for: all of it is done, each thread's in its order, and who ends the
+/// worker waits for that.
 #[test]
 fn all_jobs_are_done_in_order_before_the_worker_ends() {
     in_many_orders(|| {
