@@ -382,7 +382,7 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
         disk.put(log, &hostile);
         let error = MapReader::open_on(disk.shared(), map(), 1).unwrap_err().to_string();
         assert!(
-            error.contains("too high to be true") || error.contains("numbers that no tile has"),
+            error.contains("exceeds 2^62") || error.contains("tile sizes or counts out of range"),
             "{error}"
         );
         repair(&disk).unwrap();
