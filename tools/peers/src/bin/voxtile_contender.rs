@@ -41,7 +41,7 @@ enum Task {
     /// Write points to ask for: N anywhere in the bounding box of the known voxels, N centers of known voxels
     WritePoints(WritePointsArguments),
     /// Time the questions for points, one by one
-    Queries(QuestionsArguments),
+    Questions(QuestionsArguments),
     /// Write every known voxel to a file
     Dump(DumpArguments),
 }
@@ -129,7 +129,7 @@ fn main() -> ExitCode {
         Task::Build(arguments) => build(&arguments),
         Task::Memory(arguments) => memory(&arguments),
         Task::WritePoints(arguments) => write_points(&arguments),
-        Task::Queries(arguments) => questions(&arguments),
+        Task::Questions(arguments) => questions(&arguments),
         Task::Dump(arguments) => dump(&arguments),
     };
     match done {
