@@ -114,8 +114,7 @@ impl TilePager {
         let mut growth = 0;
         for (index, tile_updates) in updates.tiles {
             let with_it = growth + bytes_of_new_tile(&tile_updates);
-            // Many tiles that grow at once leave the allocator more small free blocks than tiles that come in one by one.
-            if !self.exists(index) && self.has_room_for(with_it + self.cache.plan().spare_bytes) {
+            if !self.exists(index) && self.has_room_for(with_it) {
                 growth = with_it;
                 self.cache.put_empty(index);
             }
