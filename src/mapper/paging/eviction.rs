@@ -51,14 +51,14 @@ impl TilePager {
         self.buffer.bytes() + self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes()
     }
 
-    /// Whether one more tile fits, and so many bytes with it.
-    pub(super) fn has_room_for(&self, bytes: usize) -> bool {
-        self.cache.has_room_for(bytes, self.outside_bytes())
+    /// Whether so many more tiles fit, and so many bytes with them.
+    pub(super) fn has_room_for(&self, tiles: usize, bytes: usize) -> bool {
+        self.cache.has_room_for(tiles, bytes, self.outside_bytes())
     }
 
     /// Whether there is room to load a tile ahead of use without evicting others soon.
     pub(super) fn has_room_to_spare(&self) -> bool {
-        self.has_room_for(self.cache.plan().spare_bytes)
+        self.has_room_for(1, self.cache.plan().spare_bytes)
     }
 
     /// Evicts tiles until this one fits.

@@ -72,7 +72,7 @@ impl TilePager {
             return self.load(index);
         }
         let tile = Arc::new(self.read(index)?);
-        let fits = self.has_room_for(tile.bytes());
+        let fits = self.has_room_for(1, tile.bytes());
         if !fits {
             // The tile exceeds the limit while it is written. It stays in the cache until then, so that an error loses
             // nothing.

@@ -7,6 +7,7 @@ use crate::mapper::statistics::{IoCounts, MapStatistics, MemoryCounts};
 use crate::persistence::CompactTile;
 use crate::space::{Grid, TileIndex};
 use crate::tile::{OctreeFactory, Table, Tile};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -101,9 +102,19 @@ impl TileCache {
         Tile::from_table(&self.grid, &self.octrees, index, table)
     }
 
-    /// Puts in a tile without voxels as the one used last.
-    pub(super) fn put_empty(&mut self, index: TileIndex) {
-        self.resident.put(Arc::new(Tile::empty(&self.grid, &self.octrees, index)));
+    /// Puts in new tiles, made on all cores of what is given for each; they become the ones used last.
+    pub(super) fn put_new<T: Send>(
+        &mut self,
+        given: Vec<(TileIndex, T)>,
+        fill: impl Fn(&mut Tile, T) + Sync,
+    ) {
+        let made = given.into_par_iter().map(|(index, given)| {
+            let mut tile = Tile::empty(&self.grid, &self.octrees, index);
+            fill(&mut tile, given);
+            Arc::new(tile)
+        });
+        let made: Vec<_> = made.collect();
+        made.into_iter().for_each(|tile| self.resident.put(tile));
     }
 
     /// Puts a tile in as the one used last, in place of its compact form.
@@ -226,9 +237,9 @@ impl TileCache {
         }
     }
 
-    /// Whether one more tile fits, and so many bytes with it.
-    pub(super) fn has_room_for(&self, bytes: usize, outside: usize) -> bool {
-        self.resident.len() < self.plan.tiles
+    /// Whether so many more tiles fit, and so many bytes with them.
+    pub(super) fn has_room_for(&self, tiles: usize, bytes: usize, outside: usize) -> bool {
+        self.resident.len() + tiles <= self.plan.tiles
             && self.limited_bytes(outside).saturating_add(bytes) <= self.plan.bytes
     }
 

@@ -41,6 +41,9 @@ const MOST_SPILLED_BYTES: u64 = 1 << 20;
 /// Below so many bytes of updates a tile is never read only to apply them.
 const LEAST_BYTES_TO_LOAD_FOR: u64 = 1 << 14;
 
+/// New tiles are made so many bytes at a time, about: then what they really take is known.
+const BYTES_OF_NEW_TILES: usize = 4 << 20;
+
 /// Bytes of memory that a new tile takes once it has these updates, about.
 fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     const TILE: usize = 2 << 10;
@@ -110,25 +113,38 @@ impl TilePager {
         self.bounds = TileBox::of(touched).into_iter().chain(self.bounds).reduce(TileBox::union);
         self.buffer.accept_staged();
         let mut resident = FxHashMap::default();
-        // What new tiles take only when the updates are applied to them.
-        let mut growth = 0;
+        let mut others = Vec::new();
         for (index, tile_updates) in updates.tiles {
-            let with_it = growth + bytes_of_new_tile(&tile_updates);
-            if !self.exists(index) && self.has_room_for(with_it) {
-                growth = with_it;
-                self.cache.put_empty(index);
-            }
             // The tile becomes the one used last.
             match self.cache.get(index) {
-                Some(_) => {
-                    resident.insert(index, tile_updates);
-                }
-                None => self.buffer.push(index, &tile_updates),
+                Some(_) => drop(resident.insert(index, tile_updates)),
+                None => others.push((index, tile_updates)),
             }
         }
         let model = &self.config.sensor_model;
         self.cache.change_all(resident, |tile, updates| tile.apply(model, &updates));
+        let (mut new, mut new_bytes) = (Vec::new(), 0);
+        for (index, tile_updates) in others {
+            let with_it = new_bytes + bytes_of_new_tile(&tile_updates);
+            if self.exists(index) || !self.has_room_for(new.len() + 1, with_it) {
+                self.buffer.push(index, &tile_updates);
+                continue;
+            }
+            new.push((index, tile_updates));
+            new_bytes = with_it;
+            if new_bytes > BYTES_OF_NEW_TILES {
+                self.make_tiles(std::mem::take(&mut new));
+                new_bytes = 0;
+            }
+        }
+        self.make_tiles(new);
         self.scan_number += 1;
+    }
+
+    /// Makes tiles of what was observed first in them.
+    fn make_tiles(&mut self, new: Vec<(TileIndex, TileUpdates)>) {
+        let model = &self.config.sensor_model;
+        self.cache.put_new(new, |tile, updates| tile.apply(model, &updates));
     }
 
     /// Stages a part of a scan in files, until the scan is accepted or given up.
