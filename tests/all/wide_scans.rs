@@ -6,7 +6,7 @@ use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper,
-    Queries, Scan,
+    Queries, Scan, Storage,
 };
 
 /// From masts here and there: every ray goes far, through many tiles.
@@ -160,4 +160,27 @@ fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on()
         assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
     }
     assert_eq!(mapper.statistics().pending_file_bytes, 0);
+}
+
+/// New tiles are made while there is room, and long level rays make each much larger than its updates are.
+#[test]
+fn many_new_tiles_at_once_stay_within_the_limit() {
+    const LIMIT_BYTES: u64 = 96 << 20;
+    const RAYS: u32 = 1_200;
+    let end = |ray: u32| {
+        let azimuth_rad = f64::from(ray) * 2.399_963;
+        [700.0 * azimuth_rad.cos(), 700.0 * azimuth_rad.sin(), 8.0 * f64::from(ray) / f64::from(RAYS)]
+    };
+    let scan = Scan { origin: [0.03, 0.04, 1.8], points: (0..RAYS).map(end).collect(), intensities: None };
+    let config = MapConfig::new(0.1, 10.0).unwrap();
+    let config = config.with_storage(Storage::Compact).with_memory_bytes(LIMIT_BYTES as usize);
+    let folder = tempfile::tempdir().unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
+    mapper.insert_scan(&scan).unwrap();
+    let statistics = mapper.statistics();
+    let memory = statistics.memory;
+    assert!(statistics.cached_tiles > 500 && memory.pending > 0, "{statistics:?}");
+    // Three eighths wait for tiles in the compact form. The last tiles that were made may be beyond.
+    let beyond = (memory.bytes() + LIMIT_BYTES / 8 * 3).saturating_sub(LIMIT_BYTES);
+    assert!(beyond < 14 << 20, "{beyond} bytes beyond: {memory:?}");
 }
