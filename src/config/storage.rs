@@ -9,7 +9,7 @@ pub enum Storage {
     /// Two files per tile, the original format: `iwlo_meta.bin` (18 bytes per voxel) and `octree.bt`, which OctoMap
     /// programs read.
     #[default]
-    Seed,
+    OctoMap,
     /// One file a tile, `tile.vxt`: the table in the compact form, in a twentieth to a fortieth of the bytes.
     Compact,
 }
@@ -17,7 +17,7 @@ pub enum Storage {
 impl fmt::Display for Storage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Seed => "seed",
+            Self::OctoMap => "octomap",
             Self::Compact => "compact",
         })
     }
@@ -25,7 +25,7 @@ impl fmt::Display for Storage {
 
 impl Storage {
     /// Whether this is the storage of a map that does not say.
-    pub(crate) fn is_seed(&self) -> bool {
-        *self == Self::Seed
+    pub(crate) fn is_octomap(&self) -> bool {
+        *self == Self::OctoMap
     }
 }

@@ -233,7 +233,7 @@ impl Trailers {
             let Ok(mut input) = disk.open(&path) else { continue };
             let bytes = input.file_bytes();
             let trailer = match layout.storage() {
-                Storage::Seed => read_trailer(&mut input, bytes),
+                Storage::OctoMap => read_trailer(&mut input, bytes),
                 Storage::Compact => read_compact_front(&mut input, bytes).map(Some),
             };
             if let Ok(Some(trailer)) = trailer {

@@ -160,7 +160,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     }
 
     pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
-        self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
+        self.disk.kind_at(path)
     }
 
     /// Makes way for the lock, which any file can be.

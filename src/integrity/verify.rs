@@ -360,7 +360,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     /// What has a name; nothing, and a finding, where the medium does not tell.
     fn kind(&mut self, path: &Path) -> Result<Option<EntryKind>> {
-        let kind = self.disk.kind(path).map_err(|error| Error::io(path, "look at", error));
+        let kind = self.disk.kind_at(path);
         self.unless_unreadable(kind)
     }
 

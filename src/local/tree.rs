@@ -2,7 +2,7 @@ use super::counts::{Counts, Tally};
 use super::place::{cell_at, place_of};
 use super::slab::Slab;
 use super::sparse::{IdLists, Sparse64};
-use crate::space::VoxelIndex;
+use crate::space::{VoxelIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
 
 /// No number.
@@ -276,7 +276,7 @@ impl Tree {
 
     /// Bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
-        self.by_index.capacity() * 8 / 7 * (size_of::<(VoxelIndex, u32)>() + 1)
+        hash_table_bytes::<(VoxelIndex, u32)>(self.by_index.capacity())
             + self.pages.bytes()
             + self.nodes.bytes()
             + self.blocks.bytes()

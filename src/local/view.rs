@@ -1,6 +1,6 @@
 use super::place::{cell_at, ones, place_of};
 use super::tree::{Page, Tree};
-use crate::space::{Grid, Point, VoxelIndex};
+use crate::space::{Grid, Point, VoxelIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -258,7 +258,7 @@ impl LocalView {
 
     /// Bytes of memory on the heap, without regard to sharing.
     pub(super) fn bytes(&self) -> usize {
-        self.pages.capacity() * 8 / 7 * (size_of::<(VoxelIndex, Arc<PageView>)>() + 1)
+        hash_table_bytes::<(VoxelIndex, Arc<PageView>)>(self.pages.capacity())
             + self.pages.values().map(|page| page.bytes()).sum::<usize>()
     }
 }

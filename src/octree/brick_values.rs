@@ -1,4 +1,4 @@
-use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
+use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, add_to_mask};
 use std::ops::Range;
 
 /// The values of many voxels, in parts of bricks: the input of an encoded block of an octree.
@@ -58,7 +58,7 @@ impl BrickValues {
     #[inline]
     pub fn add(&mut self, place: usize, value: f32) {
         if let Some(part) = self.parts.last_mut() {
-            part.known[place / 64] |= 1 << (place % 64);
+            add_to_mask(&mut part.known, place);
             self.values.push(value);
         }
     }

@@ -1,6 +1,6 @@
 use super::merge_rule::MergeRule;
 use crate::sensor::Evidence;
-use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, places};
+use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, add_to_mask, is_in_mask, places};
 use crate::tile::Table;
 use std::collections::BTreeSet;
 
@@ -49,7 +49,7 @@ impl TableMerge {
             let MapBrick { observed: own, evidence } = brick;
             *own = [0; 8];
             table.for_each_in(code, |place, now| {
-                own[place / 64] |= 1 << (place % 64);
+                add_to_mask(own, place);
                 evidence[place] = now;
             });
             (0..8).for_each(|word| observed[word] |= own[word]);
@@ -57,7 +57,7 @@ impl TableMerge {
         run.clear();
         for place in places(observed) {
             known.clear();
-            let knows = |brick: &&MapBrick| brick.observed[place / 64] >> (place % 64) & 1 == 1;
+            let knows = |brick: &&MapBrick| is_in_mask(&brick.observed, place);
             known.extend(bricks.iter().filter(knows).map(|brick| brick.evidence[place]));
             *common += u64::from(known.len() > 1);
             run.extend(rule.evidence(known).map(|evidence| (place, evidence)));

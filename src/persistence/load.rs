@@ -60,7 +60,7 @@ pub(crate) struct ReadTable {
 pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: StoredTile) -> Result<ReadTable> {
     let voxels = grid.voxels_of_tile(index);
     let decoded = match stored.storage {
-        Storage::Seed => read_table(&mut stored.input, stored.bytes, &voxels),
+        Storage::OctoMap => read_table(&mut stored.input, stored.bytes, &voxels),
         Storage::Compact => read_compact_file(&mut stored.input, stored.bytes, &voxels),
     };
     let decoded = decoded.map_err(|error| error.in_map(&stored.path, Some(index)))?;
@@ -87,7 +87,7 @@ fn check(
         return Err(FormatError::at_offset(file.bytes, "the trailer after the last entry is missing"));
     };
     let at = match storage {
-        Storage::Seed => file.bytes - trailer.bytes(),
+        Storage::OctoMap => file.bytes - trailer.bytes(),
         Storage::Compact => 0,
     };
     let damaged = |offset, reason: String| Err(FormatError::at_offset(at + offset, reason));

@@ -51,7 +51,7 @@ impl TileSaver {
         scan_number: u64,
     ) -> Result<TileVersion> {
         match writer.storage() {
-            Storage::Seed => self.write_seed(writer, index, table, scan_number),
+            Storage::OctoMap => self.write_octomap(writer, index, table, scan_number),
             Storage::Compact => {
                 let compact = self.packer.pack(table)?;
                 let (voxels, occupied) = (table.len() as u64, table.count_from(self.threshold) as u64);
@@ -73,7 +73,7 @@ impl TileSaver {
             Some(occupied) => {
                 self.write_encoded(writer, index, tile.bytes(), [tile.voxels(), occupied], scan_number)
             }
-            None => self.write_seed(writer, index, &tile.decode(grid, index)?, scan_number),
+            None => self.write_octomap(writer, index, &tile.decode(grid, index)?, scan_number),
         }
     }
 
@@ -92,7 +92,7 @@ impl TileSaver {
     }
 
     /// [`TileSaver::write`] in a map with the original storage.
-    fn write_seed(
+    fn write_octomap(
         &self,
         writer: &TileWriter,
         index: TileIndex,

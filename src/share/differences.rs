@@ -1,6 +1,6 @@
 use super::set::{VoxelSet, position_of};
 use super::set_range::{SetPosition, SetRange};
-use crate::space::{BrickCode, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex};
+use crate::space::{BrickCode, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, add_to_mask};
 use std::collections::BTreeMap;
 
 /// A brick of a tile, in the order of a set.
@@ -78,6 +78,6 @@ fn mask_inside(range: SetRange, (tile, brick): BrickPlace) -> BrickMask {
         return [u64::MAX; 8];
     }
     let mut mask = [0; 8];
-    (0..512).filter(|&place| contains(place)).for_each(|place| mask[place / 64] |= 1 << (place % 64));
+    (0..512).filter(|&place| contains(place)).for_each(|place| add_to_mask(&mut mask, place));
     mask
 }

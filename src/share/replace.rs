@@ -1,7 +1,7 @@
 use super::differences::{Content, Difference, brick_at};
 use super::receiver::Receiver;
 use super::set_range::{SetPosition, SetRange};
-use crate::space::{BrickCode, places};
+use crate::space::{BrickCode, is_in_mask, places};
 
 /// Most voxels that one packet may change. The rest of a larger packet is requested again.
 const MAX_CHANGES: usize = 1 << 20;
@@ -58,7 +58,7 @@ impl Receiver {
         for place in places(difference.differing) {
             work.0 = work.0.saturating_sub(1);
             let voxel = brick.voxel(place).to_key().to_index_from(min);
-            let is_in = difference.after[place / 64] >> (place % 64) & 1 == 1;
+            let is_in = is_in_mask(&difference.after, place);
             if !stream.versions.was_changed_after(voxel, as_of) && !self.limits.put(layer, voxel, is_in) {
                 self.counts.refused_voxels += 1;
                 self.is_over_limit = true;

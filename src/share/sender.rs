@@ -6,7 +6,7 @@ use super::sender_config::{SenderConfig, SenderCounts};
 use super::set::VoxelSet;
 use super::token_bucket::TokenBucket;
 use crate::error::{Error, Result};
-use crate::space::{BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, places};
+use crate::space::{BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, is_in_mask, places};
 use std::time::Duration;
 
 /// Identifies the receiver that sent a request; any number unique to it.
@@ -125,10 +125,9 @@ impl Sender {
         }
         let sent = self.sent.brick(tile, brick);
         let min = self.grid().voxels_of_tile(tile).min;
-        let has = |mask: &BrickMask, place: usize| mask[place / 64] >> (place % 64) & 1 == 1;
         for place in places(std::array::from_fn(|k| before[k] ^ mask[k])) {
             let voxel = brick.voxel(place).to_key().to_index_from(min);
-            self.send_buffer.put(voxel, has(&mask, place), has(&sent, place));
+            self.send_buffer.put(voxel, is_in_mask(&mask, place), is_in_mask(&sent, place));
         }
         self.wanted.put_brick(tile, brick, mask);
     }

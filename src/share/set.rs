@@ -1,7 +1,7 @@
 use super::set_range::{LAST_CODE, SetPosition, SetRange};
 use crate::space::{
     BRICK_VOXELS, BrickCode, BrickMask, Grid, LAST_VOXEL_INDEX, MortonCode, TileIndex, VoxelBox, VoxelIndex,
-    VoxelKey, places,
+    VoxelKey, is_in_mask, places,
 };
 use std::collections::BTreeMap;
 
@@ -65,7 +65,7 @@ impl VoxelSet {
         let code = VoxelKey::from_index(voxel).morton();
         let tile = self.tiles.get(&self.grid.tile_of_voxel(voxel));
         tile.and_then(|tile| tile.bricks.get(&code.brick()))
-            .is_some_and(|mask| has(mask, code.place_in_brick()))
+            .is_some_and(|mask| is_in_mask(mask, code.place_in_brick()))
     }
 
     /// Adds a voxel or removes it; returns whether that changed the set. No set holds an index above
@@ -78,7 +78,7 @@ impl VoxelSet {
         let (brick, place) = (code.brick(), code.place_in_brick());
         let tile = self.grid.tile_of_voxel(voxel);
         let mut mask = self.brick(tile, brick);
-        if has(&mask, place) == is_in {
+        if is_in_mask(&mask, place) == is_in {
             return false;
         }
         mask[place / 64] ^= 1 << (place % 64);
@@ -272,8 +272,4 @@ impl TileVoxels {
 
 pub(super) fn position_of(grid: &Grid, voxel: VoxelIndex) -> SetPosition {
     SetPosition { tile: grid.tile_of_voxel(voxel), code: VoxelKey::from_index(voxel).morton().0 }
-}
-
-fn has(mask: &BrickMask, place: usize) -> bool {
-    mask[place / 64] >> (place % 64) & 1 == 1
 }

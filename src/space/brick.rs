@@ -55,6 +55,18 @@ pub const fn place_of_voxel(voxel: VoxelIndex) -> usize {
     (SPREAD[(x & 7) as usize] | SPREAD[(y & 7) as usize] << 1 | SPREAD[(z & 7) as usize] << 2) as usize
 }
 
+/// Whether a set has the voxel at a place (0 to 511).
+#[inline]
+pub const fn is_in_mask(mask: &BrickMask, place: usize) -> bool {
+    mask[place / 64] >> (place % 64) & 1 == 1
+}
+
+/// Adds the voxel at a place (0 to 511) to a set.
+#[inline]
+pub const fn add_to_mask(mask: &mut BrickMask, place: usize) {
+    mask[place / 64] |= 1 << (place % 64);
+}
+
 /// The places of a brick whose voxel satisfies `min <= local < end` along every axis, each in 0..=8.
 pub fn mask_of_box(min: [i32; 3], end: [i32; 3]) -> BrickMask {
     let below = |axis: usize, k: i32| &BELOW[axis][k.clamp(0, BRICK_EDGE) as usize];
@@ -80,7 +92,7 @@ const fn below_masks() -> [[BrickMask; 9]; 3] {
         while axis < 3 {
             let mut k = voxel[axis] as usize + 1;
             while k <= 8 {
-                masks[axis][k][place / 64] |= 1 << (place % 64);
+                add_to_mask(&mut masks[axis][k], place);
                 k += 1;
             }
             axis += 1;

@@ -11,6 +11,7 @@
 mod aabb;
 mod brick;
 mod grid;
+mod hash_table;
 mod key;
 mod morton;
 mod tile_box;
@@ -19,8 +20,12 @@ mod tile_table;
 mod torus;
 
 pub use aabb::{Aabb, VoxelBox};
-pub use brick::{BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, mask_of_box, place_of_voxel, places};
+pub use brick::{
+    BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, add_to_mask, is_in_mask, mask_of_box, place_of_voxel,
+    places,
+};
 pub use grid::{Grid, GridError, LAST_VOXEL_INDEX, MAX_VOXELS_PER_TILE_EDGE};
+pub(crate) use hash_table::hash_table_bytes;
 pub use key::VoxelKey;
 pub use morton::MortonCode;
 pub use tile_box::TileBox;

@@ -1,4 +1,4 @@
-use super::TileIndex;
+use super::{TileIndex, hash_table_bytes};
 use integer_encoding::VarInt;
 use rustc_hash::FxHashMap;
 use std::fmt;
@@ -58,8 +58,7 @@ impl<V: TileValue> TileTable<V> {
 
     /// Bytes of memory.
     pub fn bytes(&self) -> usize {
-        // A hash map fills up to 7 of 8 slots, each with a byte of its own.
-        self.recent.capacity() * 8 / 7 * (size_of::<(TileIndex, Option<V>)>() + 1)
+        hash_table_bytes::<(TileIndex, Option<V>)>(self.recent.capacity())
             + self.blocks.capacity() * size_of::<Block>()
             + self.block_bytes
     }

@@ -1,3 +1,4 @@
+use super::hash_table_bytes;
 use rustc_hash::FxHashMap;
 use std::hint::select_unpredictable;
 
@@ -46,9 +47,7 @@ impl Torus {
 
     /// Bytes of memory on the heap.
     pub fn bytes(&self) -> usize {
-        // A slot of the hash map and its control byte; the map fills up to 7 of 8 slots.
-        self.slots.capacity() * size_of::<Slot>()
-            + self.far.capacity() * 8 / 7 * (size_of::<(Cell, u32)>() + 1)
+        self.slots.capacity() * size_of::<Slot>() + hash_table_bytes::<(Cell, u32)>(self.far.capacity())
     }
 
     /// The number of a cell, or [`Torus::NONE`].

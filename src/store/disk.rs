@@ -1,3 +1,4 @@
+use crate::error::{Error, Result};
 use crate::scratch::Scratch;
 use std::fmt::Debug;
 use std::io::{self, Read, Write};
@@ -61,6 +62,13 @@ pub trait Disk: Debug + Send + Sync {
     /// Waits a moment for another process.
     fn pause(&self) {
         thread::sleep(Duration::from_millis(2));
+    }
+}
+
+impl dyn Disk + '_ {
+    /// [`Disk::kind`], whose error names the path.
+    pub(crate) fn kind_at(&self, path: &Path) -> Result<Option<EntryKind>> {
+        self.kind(path).map_err(|error| Error::io(path, "look at", error))
     }
 }
 

@@ -24,7 +24,7 @@ impl TileFile {
     /// octree's checksum, comes last.
     pub const fn all(storage: Storage) -> &'static [Self] {
         match storage {
-            Storage::Seed => &[Self::Octree, Self::Table],
+            Storage::OctoMap => &[Self::Octree, Self::Table],
             Storage::Compact => &[Self::Table],
         }
     }
@@ -32,7 +32,7 @@ impl TileFile {
     /// The file's name.
     pub const fn name(self, storage: Storage) -> &'static str {
         match (self, storage) {
-            (Self::Table, Storage::Seed) => "iwlo_meta.bin",
+            (Self::Table, Storage::OctoMap) => "iwlo_meta.bin",
             (Self::Table, Storage::Compact) => "tile.vxt",
             (Self::Octree, _) => "octree.bt",
         }
@@ -41,7 +41,7 @@ impl TileFile {
     /// The name of the version that waits for the next commit.
     pub const fn next_name(self, storage: Storage) -> &'static str {
         match (self, storage) {
-            (Self::Table, Storage::Seed) => "iwlo_meta.bin.next",
+            (Self::Table, Storage::OctoMap) => "iwlo_meta.bin.next",
             (Self::Table, Storage::Compact) => "tile.vxt.next",
             (Self::Octree, _) => "octree.bt.next",
         }
@@ -51,7 +51,7 @@ impl TileFile {
 impl Layout {
     /// The layout of the map in `folder`, if its tiles are the original files.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
-        Self { folder: folder.into(), storage: Storage::Seed }
+        Self { folder: folder.into(), storage: Storage::OctoMap }
     }
 
     /// The same with tiles stored in this way.
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn a_kept_table_is_known_by_its_name() {
         let tile = TileIndex::new(0, 1, -1);
-        for storage in [Storage::Seed, Storage::Compact] {
+        for storage in [Storage::OctoMap, Storage::Compact] {
             let layout = Layout::new("map").with_storage(storage);
             let kept = layout.kept(tile, 12);
             let name = kept.file_name().unwrap().to_str().unwrap();

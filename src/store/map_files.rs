@@ -48,7 +48,7 @@ impl MapFiles {
 
     /// What has this name, if anything does.
     pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
-        self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
+        self.disk.kind_at(path)
     }
 
     pub(super) fn sync_folder(&self, folder: &Path) -> Result<()> {

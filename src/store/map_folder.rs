@@ -27,7 +27,7 @@ pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
     let Some(parent) = folder.parent() else { return Ok(()) };
     let is_relative_end = parent.as_os_str().is_empty();
     let parent = parent_of(folder);
-    let is_there = disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))?.is_some();
+    let is_there = disk.kind_at(folder)?.is_some();
     if !is_relative_end {
         create_folders(disk, parent)?;
     }

@@ -31,7 +31,7 @@ pub(super) fn check_place(disk: &dyn Disk, path: &Path) -> Result<()> {
 fn is_map(disk: &dyn Disk, folder: &Path) -> Result<bool> {
     let layout = Layout::new(folder);
     let metadata = layout.metadata();
-    let kind = disk.kind(&metadata).map_err(|error| Error::io(&metadata, "look at", error))?;
+    let kind = disk.kind_at(&metadata)?;
     if !matches!(kind, Some(EntryKind::File(_))) {
         return Ok(false);
     }

@@ -524,13 +524,13 @@ fn a_map_is_built_small_converted_and_gone_on_with() {
     let info = json(&["info", text(&small), "--json"]);
     assert_eq!((info["storage"].as_str(), info["octree_bytes"].as_u64()), (Some("compact"), Some(0)));
     assert!(output(&["info", text(&small)]).contains("in compact tables"));
-    assert_eq!(json(&["info", text(&map), "--json"])["storage"], "seed");
+    assert_eq!(json(&["info", text(&map), "--json"])["storage"], "octomap");
 
     let (to_small, to_seed) = (folder.path().join("to_small"), folder.path().join("to_seed"));
     let said = json(&["convert", text(&map), "-o", text(&to_small), "--storage", "compact", "--json"]);
     assert_eq!(said["from"]["octree_bytes"], json(&["info", text(&map), "--json"])["octree_bytes"]);
     assert!(said["to"]["table_bytes"].as_u64() < said["from"]["table_bytes"].as_u64());
-    let said = output(&["convert", text(&small), "-o", text(&to_seed), "--storage", "seed"]);
+    let said = output(&["convert", text(&small), "-o", text(&to_seed), "--storage", "octomap"]);
     assert!(said.contains("with compact storage"), "{said}");
     for map in [&to_small, &to_seed] {
         assert_eq!(output(&["digest", text(map)]), digest);
@@ -541,7 +541,7 @@ fn a_map_is_built_small_converted_and_gone_on_with() {
     assert_eq!(code, 2);
     assert!(message.contains("small") && message.contains("does not exist yet"), "{message}");
     let again = ["build", text(&scans), "-o", text(&small), "--resume", "--storage"];
-    let (code, message) = failure(&[&again[..], &["seed"]].concat());
+    let (code, message) = failure(&[&again[..], &["octomap"]].concat());
     assert_eq!(code, 2);
     assert!(message.contains("stored as compact"), "{message}");
     output(&[&again[..], &["compact"]].concat());

@@ -19,7 +19,7 @@ fn digest(map: &str) -> String {
 
 #[test]
 fn what_is_cropped_apart_is_merged_to_the_whole() {
-    for storage in ["seed", "compact"] {
+    for storage in ["octomap", "compact"] {
         let folder = TempDir::new().unwrap();
         let (map, out) = built(&folder, &["--storage", storage]);
         let (map, inside) = (text(&map), text(&out));

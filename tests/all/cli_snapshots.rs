@@ -7,7 +7,7 @@ fn a_bad_session_is_undone_and_the_past_can_be_looked_at() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = (scans(&folder), folder.path().join("map"));
     let map = text(&map);
-    for storage in ["seed", "compact"] {
+    for storage in ["octomap", "compact"] {
         output(&["build", text(&scans), "-o", map, "--storage", storage]);
         let before = output(&["digest", map]);
         let said = output(&["snapshot", map, "good"]);

@@ -60,8 +60,8 @@ fn there_and_back_the_content_stays_and_the_files_are_the_same() {
     let iwlo = SensorModel::Iwlo(Iwlo::default());
     for config in [config(), config().with_sensor_model(iwlo).with_storage(Storage::Compact)] {
         let (own, other) = match config.storage {
-            Storage::Seed => (Storage::Seed, Storage::Compact),
-            Storage::Compact => (Storage::Compact, Storage::Seed),
+            Storage::OctoMap => (Storage::OctoMap, Storage::Compact),
+            Storage::Compact => (Storage::Compact, Storage::OctoMap),
         };
         let disk = FaultyDisk::new(Fault::None);
         let digest = map(&disk, config);
@@ -81,7 +81,7 @@ fn there_and_back_the_content_stays_and_the_files_are_the_same() {
             assert!(verified.unwrap().is_whole() && found.is_empty(), "{found:?}");
         }
         let [seed, compact] = match own {
-            Storage::Seed => ["map", "other"],
+            Storage::OctoMap => ["map", "other"],
             Storage::Compact => ["other", "map"],
         };
         let [(seed_table, seed_octree), (table, octree)] =
@@ -183,7 +183,7 @@ fn whatever_fails_and_wherever_the_power_goes_there_is_no_new_map_or_the_whole_o
 
 #[test]
 fn a_damaged_tile_is_named_and_leaves_nothing_behind() {
-    for storage in [Storage::Seed, Storage::Compact] {
+    for storage in [Storage::OctoMap, Storage::Compact] {
         let disk = FaultyDisk::new(Fault::None);
         map(&disk, config().with_storage(storage));
         let (path, mut bytes) = tile_files(&disk, "map").pop_last().unwrap();

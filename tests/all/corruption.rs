@@ -22,7 +22,7 @@ fn scan(seed: u64) -> Scan {
     random_scan(&mut Random(seed), [0.5, 0.5, 1.0], 2)
 }
 
-const STORAGES: [Storage; 2] = [Storage::Seed, Storage::Compact];
+const STORAGES: [Storage; 2] = [Storage::OctoMap, Storage::Compact];
 
 /// The name of the table of a tile.
 fn table_name(storage: Storage) -> &'static str {
@@ -363,7 +363,7 @@ fn check_crashes_of_repairs(storage: Storage) {
 
 #[test]
 fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
-    let whole = small_map(Storage::Seed);
+    let whole = small_map(Storage::OctoMap);
     let log = Path::new("/map/commits.log");
     let bytes = whole.files()[log].clone();
     // The last record, its fields from the beginning of its payload: flush, scan, and of the first tile: scan,
@@ -393,11 +393,11 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
 #[test]
 fn a_damaged_index_does_not_keep_the_tiles_from_being_checked() {
     for (index, storage, name) in [
-        ("metadata.json", Storage::Seed, "iwlo_meta.bin"),
-        ("metadata.json", Storage::Seed, "octree.bt"),
+        ("metadata.json", Storage::OctoMap, "iwlo_meta.bin"),
+        ("metadata.json", Storage::OctoMap, "octree.bt"),
         ("metadata.json", Storage::Compact, "tile.vxt"),
-        ("commits.log", Storage::Seed, "iwlo_meta.bin"),
-        ("commits.log", Storage::Seed, "octree.bt"),
+        ("commits.log", Storage::OctoMap, "iwlo_meta.bin"),
+        ("commits.log", Storage::OctoMap, "octree.bt"),
         ("commits.log", Storage::Compact, "tile.vxt"),
     ] {
         let whole = small_map(storage);
@@ -484,7 +484,7 @@ fn repair_without_a_log(storage: Storage) {
 
 #[test]
 fn what_is_not_voxtiles_stays_and_keeps_nobody_from_opening_the_map() {
-    let whole = small_map(Storage::Seed);
+    let whole = small_map(Storage::OctoMap);
     let tile = whole.files().into_keys().find(|path| path.ends_with("octree.bt")).unwrap();
     let notes = Path::new("/map/notes.next");
     let disk = whole.copy();

@@ -274,7 +274,7 @@ fn crash_at_every_operation(oracle: &Oracle) {
 
 #[test]
 fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operation() {
-    for storage in [Storage::Seed, Storage::Compact] {
+    for storage in [Storage::OctoMap, Storage::Compact] {
         fail_and_crash_short_of_memory(&Oracle::of(short_of_memory().with_storage(storage)));
     }
 }

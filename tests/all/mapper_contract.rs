@@ -63,13 +63,13 @@ fn in_memory_equals_the_naive_map() {
 fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
     for (seed, config) in configs().into_iter().enumerate() {
         let mut digests = Vec::new();
-        use Storage::{Compact, Seed};
+        use Storage::{Compact, OctoMap};
         let kinds = [
-            (1, 0, Seed),
+            (1, 0, OctoMap),
             (1, 1 << 20, Compact),
-            (3, 20_000, Seed),
+            (3, 20_000, OctoMap),
             (3, 20_000, Compact),
-            (10_000, 0, Seed),
+            (10_000, 0, OctoMap),
             (10_000, 0, Compact),
         ];
         for (cache_tiles, pending_bytes, storage) in kinds {
@@ -99,7 +99,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
                 UnsyncedDisk::shared(),
                 &folder.path().join("map"),
                 // A map keeps its storage, whatever is asked for.
-                config.clone().with_storage(Seed),
+                config.clone().with_storage(OctoMap),
             )
             .unwrap();
             assert_eq!(mapper.config().storage, storage);

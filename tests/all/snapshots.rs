@@ -119,7 +119,7 @@ fn live(seed: u64, storage: Storage) {
 #[test]
 fn any_life_with_snapshots_equals_the_naive_one() {
     for seed in 0..10 {
-        live(seed, if seed % 2 == 0 { Storage::Seed } else { Storage::Compact });
+        live(seed, if seed % 2 == 0 { Storage::OctoMap } else { Storage::Compact });
     }
 }
 
@@ -152,7 +152,7 @@ fn digest_of(disk: &FaultyDisk, map: &Path, snapshot: Option<&str>) -> voxtile::
 
 #[test]
 fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
-    for storage in [Storage::Seed, Storage::Compact] {
+    for storage in [Storage::OctoMap, Storage::Compact] {
         for disk in [small(storage).0, small(storage).0.without_links()] {
             let (_, map, digests) = small(storage);
             let reader = MapReader::open_on(disk.shared(), &map, 1).unwrap();
@@ -186,7 +186,7 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
 
 #[test]
 fn own_bytes_are_what_deleting_frees() {
-    let (disk, map, _) = small(Storage::Seed);
+    let (disk, map, _) = small(Storage::OctoMap);
     // The log and `metadata.json` say what happened.
     let is_counted = |path: &Path| path.parent() != Some(&*map);
     let files = || disk.files().into_iter().filter(|(path, _)| is_counted(path));
@@ -203,7 +203,7 @@ fn own_bytes_are_what_deleting_frees() {
 
 #[test]
 fn wrong_names_and_other_refusals_say_what_to_do() {
-    let (disk, map, _) = small(Storage::Seed);
+    let (disk, map, _) = small(Storage::OctoMap);
     let error = snapshot_on(disk.shared(), &map, &name("first")).unwrap_err();
     assert!(matches!(error, Error::AlreadyExists { .. }), "{error}");
     let revert = |to, keep: Option<&str>| {
@@ -226,7 +226,7 @@ fn wrong_names_and_other_refusals_say_what_to_do() {
 /// A map of the original format gets its checksums first.
 #[test]
 fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
-    let (disk, map, digests) = small(Storage::Seed);
+    let (disk, map, digests) = small(Storage::OctoMap);
     disk.take(&map.join("commits.log"));
     disk.take(&map.join("snapshots"));
     let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
@@ -248,7 +248,7 @@ fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
 /// the map and what is whole of the snapshots stay as they were.
 #[test]
 fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
-    for storage in [Storage::Seed, Storage::Compact] {
+    for storage in [Storage::OctoMap, Storage::Compact] {
         let (whole, map, digests) = small(storage);
         let is_of_snapshots = |path: &Path| {
             path.parent().is_some_and(|folder| folder.ends_with("snapshots"))
@@ -310,7 +310,8 @@ fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, 
 fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
     for names in [["a", "b"], ["b", "a"]] {
         let (disk, map) = (FaultyDisk::new(Fault::None), PathBuf::from("/map"));
-        let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &map, config(Storage::Seed)).unwrap();
+        let mut mapper =
+            OutOfCoreTileMapper::create_on(disk.shared(), &map, config(Storage::OctoMap)).unwrap();
         for (seed, of) in (1..).zip([Some(names[0]), Some(names[1]), None]) {
             for number in 0..8 {
                 mapper.insert_scan(&scan(4 * (8 * seed + number))).unwrap();
@@ -333,7 +334,7 @@ fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
 #[test]
 fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
     let (disk, map) = (FaultyDisk::new(Fault::None), Path::new("/map"));
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map, config(Storage::Seed)).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map, config(Storage::OctoMap)).unwrap();
     let mut digests = BTreeMap::new();
     for names in [&["a", "b", "c"][..], &["d", "e"], &["f"], &[]] {
         // The same tiles each time.
@@ -371,12 +372,12 @@ fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
 /// Whatever is put together again from the tiles: snapshots see what they saw, also after what comes then.
 #[test]
 fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
-    let (whole, map, digests) = small(Storage::Seed);
+    let (whole, map, digests) = small(Storage::OctoMap);
     for lost in [&["commits.log"][..], &["commits.log", "metadata.json"]] {
         let disk = whole.copy();
         lost.iter().for_each(|file| disk.take(&map.join(file)));
         repair_on(disk.shared(), &map, |_| (), |_, _| ()).unwrap();
-        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &map, config(Storage::Seed));
+        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &map, config(Storage::OctoMap));
         for seed in 30..34 {
             // Without metadata.json the ranges of the rays are not known any more, which matters to no snapshot.
             let mapper = mapper.as_mut().unwrap();
@@ -431,8 +432,8 @@ fn a_diff_counts_what_a_naive_one_counts() {
         }
         path
     };
-    let (a, b) = (build("a", Storage::Seed, 0..6), build("b", Storage::Compact, 3..8));
-    let empty = build("empty", Storage::Seed, 0..0);
+    let (a, b) = (build("a", Storage::OctoMap, 0..6), build("b", Storage::Compact, 3..8));
+    let empty = build("empty", Storage::OctoMap, 0..0);
     let open = |map: &Path| MapReader::open(map, 2).unwrap();
     let at = |seed: u64| MapReader::open_snapshot(&a, &name(&format!("s{seed}")), 2).unwrap();
     let pairs = [

@@ -65,7 +65,7 @@ fn is_index(path: &Path) -> bool {
 
 #[test]
 fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_repaired() {
-    for storage in [Storage::Seed, Storage::Compact] {
+    for storage in [Storage::OctoMap, Storage::Compact] {
         let whole = small(storage);
         let before = digests(&whole).unwrap();
         for path in whole.files().keys().filter(|path| !path.ends_with("writer.lock")) {
@@ -112,7 +112,7 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
 
 #[test]
 fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
-    let whole = small(Storage::Seed);
+    let whole = small(Storage::OctoMap);
     let before = digests(&whole).unwrap();
     for path in whole.files().keys().filter(|path| !path.ends_with("writer.lock")) {
         let what = path.display().to_string();
@@ -120,7 +120,7 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
         disk.break_path(path);
         let found = damaged(&disk, &what);
         assert!(found.contains(path), "{what}: {found:?}");
-        match go_on(&disk, Storage::Seed) {
+        match go_on(&disk, Storage::OctoMap) {
             Ok(()) => assert!(!is_index(path), "{what}"),
             Err(error) => assert!(is_index(path) && error.to_string().contains(&what), "{what}: {error}"),
         }
@@ -139,7 +139,7 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
             disk.break_path(folder);
             let what = folder.display().to_string();
             assert!(!damaged(&disk, &what).is_empty(), "{what}");
-            go_on(&disk, Storage::Seed).unwrap_or_else(|error| panic!("{what}: {error}"));
+            go_on(&disk, Storage::OctoMap).unwrap_or_else(|error| panic!("{what}: {error}"));
             disk.mend();
             assert_eq!(digests(&disk).unwrap()[1], before[1], "{what}");
         }

@@ -101,7 +101,7 @@ fn copy(map: &Path, to: &Path) {
 #[test]
 fn a_build_whose_allocations_fail_leaves_what_it_flushed_and_goes_on_from_there() {
     let drive = Drive::new();
-    for (seed, storage) in (0..).zip(["seed", "compact"]) {
+    for (seed, storage) in (0..).zip(["octomap", "compact"]) {
         let (mut whole, mut cut, mut in_vain) = (0, 0, 0);
         for limit_kib in falling_limits(seed) {
             let (_folder, map) = folder_for_maps();
@@ -148,7 +148,7 @@ fn scans_of_build(drive: &Drive, map: &Path, storage: &str, limit_kib: u64) -> O
 #[test]
 fn verify_and_repair_whose_allocations_fail_tell_and_do_nothing_that_is_wrong() {
     let drive = Drive::new();
-    for (seed, storage) in (10..).zip(["seed", "compact"]) {
+    for (seed, storage) in (10..).zip(["octomap", "compact"]) {
         let (_folder, map) = folder_for_maps();
         drive.build_whole(&map, storage);
         let [damaged, repaired, tried] =
@@ -215,7 +215,7 @@ fn damage_a_tile(map: &Path) {
 fn an_export_whose_allocations_fail_leaves_the_old_file_or_the_whole_new_one() {
     const OLD: &[u8] = b"what was there before";
     let drive = Drive::new();
-    for (seed, storage) in (20..).zip(["seed", "compact"]) {
+    for (seed, storage) in (20..).zip(["octomap", "compact"]) {
         let (folder, map) = folder_for_maps();
         drive.build_whole(&map, storage);
         for (extension, how) in [("ply", None), ("bt", Some("2MiB")), ("ot", Some("8MiB"))] {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 #[test]
 fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
     let scans = Scans::new(24, 1);
-    let hows = ["seed", "compact"].map(|storage| ["--resume", "--flush-every", "2", "--storage", storage]);
+    let hows = ["octomap", "compact"].map(|storage| ["--resume", "--flush-every", "2", "--storage", storage]);
     let whole_us = {
         let (_folder, map) = folder_for_maps();
         let started = Instant::now();
@@ -69,7 +69,7 @@ fn a_conversion_that_is_killed_leaves_no_new_map_or_the_whole_one() {
     let mut random = Random(setting("VOXTILE_SEED", 1));
     let (mut in_vain, mut whole) = (0, 0);
     for number in 0..setting("VOXTILE_KILLS", 50) {
-        let storage = ["seed", "compact"][number as usize % 2];
+        let storage = ["octomap", "compact"][number as usize % 2];
         let mut child = convert(storage).spawn().unwrap();
         sleep(Duration::from_micros(random.below(whole_us * 5 / 4)));
         child.kill().unwrap();

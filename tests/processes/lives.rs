@@ -139,7 +139,7 @@ fn a_map_is_what_it_must_be_after_any_life_of_commands_kills_and_readers() {
     while Instant::now() < until {
         let (_folder, map) = folder_for_maps();
         let mut random = Random(seed + lives);
-        let storage = ["seed", "compact"][random.below(2) as usize];
+        let storage = ["octomap", "compact"][random.below(2) as usize];
         assert!(scans.build(&map, &["--storage", storage]).status().unwrap().success());
         let expected = Expected { scans: SCANS, ..Expected::default() };
         let mut life =

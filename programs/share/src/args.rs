@@ -11,7 +11,7 @@ use voxtile::share::{ExportPolicy, SenderConfig};
 /// One publisher and one subscriber on one machine need no options but --publish and --subscribe; anything else is said
 /// with --listen and --connect. Lengths are metres, times seconds.
 #[derive(Debug, Parser)]
-#[command(name = "voxtile share", bin_name = "voxtile share", version, max_term_width = 120)]
+#[command(name = "voxtile share", bin_name = "voxtile share", version, max_term_width = 80)]
 #[command(group = ArgGroup::new("what").required(true).args(["publish", "subscribe", "fold", "measure", "man"]))]
 pub struct Args {
     /// Share the occupied voxels of a map, or of scans while they are mapped (as for voxtile build)

@@ -6,6 +6,7 @@ use bytesize::ByteSize;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
+use log::LevelFilter;
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -15,13 +16,31 @@ use voxtile::Storage;
 ///
 /// Lengths are metres, coordinates are in the world frame.
 #[derive(Debug, Parser)]
-#[command(name = "voxtile", version, propagate_version = true, max_term_width = 120)]
+#[command(name = "voxtile", version, propagate_version = true, max_term_width = 80)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
     /// Most threads to work with; the result is the same for any number [default: one a core]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Say what is done: -v flushes and the like, -vv each tile that comes and goes. RUST_LOG chooses by module
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Say nothing but errors: no warnings, no progress bars
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+}
+
+impl Cli {
+    /// What the command line says of the log; warnings if nothing.
+    pub fn log_level(&self) -> LevelFilter {
+        match (self.quiet, self.verbose) {
+            (true, _) => LevelFilter::Error,
+            (false, 0) => LevelFilter::Warn,
+            (false, 1) => LevelFilter::Info,
+            (false, _) => LevelFilter::Debug,
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -91,7 +110,7 @@ pub struct BuildArgs {
     /// Edge of a tile in metres, 2 to 1024 whole voxels [default: 10, or the map's own]
     #[arg(long, value_name = "M")]
     pub tile_size: Option<f64>,
-    /// How the tiles of a new map are stored [default: seed, or the map's own]
+    /// How the tiles of a new map are stored [default: octomap, or the map's own]
     #[arg(long, value_name = "FORM")]
     pub storage: Option<StorageName>,
     /// Most memory for all that grows with the map or with a scan (256MiB, 1GB); some 40 MB for the rest come on top
@@ -188,7 +207,8 @@ pub enum VoxelCacheName {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum StorageName {
     /// Two files a tile that other programs read: iwlo_meta.bin, 18 bytes a voxel, and octree.bt
-    Seed,
+    #[value(name = "octomap")]
+    OctoMap,
     /// One file a tile, a twentieth to a fortieth of the bytes; convert makes the other form of it
     Compact,
 }
@@ -196,7 +216,7 @@ pub enum StorageName {
 impl From<StorageName> for Storage {
     fn from(name: StorageName) -> Self {
         match name {
-            StorageName::Seed => Self::Seed,
+            StorageName::OctoMap => Self::OctoMap,
             StorageName::Compact => Self::Compact,
         }
     }
@@ -385,7 +405,7 @@ pub struct DemoArgs {
     #[arg(long, value_name = "M", default_value_t = 0.2)]
     pub resolution: f64,
     /// How the tiles of the map are stored
-    #[arg(long, value_name = "FORM", default_value = "seed")]
+    #[arg(long, value_name = "FORM", default_value = "octomap")]
     pub storage: StorageName,
     /// What the colors of the picture show
     #[arg(long, value_name = "WHAT", default_value = "height")]

@@ -122,7 +122,7 @@ impl Info {
         writeln!(out, "voxels       {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;
         let (table, octree) = (HumanBytes(self.table_bytes), HumanBytes(self.octree_bytes));
         match self.storage {
-            Storage::Seed => writeln!(out, "on disk      {table} in tables, {octree} in octrees")?,
+            Storage::OctoMap => writeln!(out, "on disk      {table} in tables, {octree} in octrees")?,
             Storage::Compact => writeln!(out, "on disk      {table} in compact tables")?,
         }
         let Some(kept) = &self.kept else { return Ok(()) };

@@ -51,10 +51,18 @@ use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn"))
-        .format_timestamp(None)
-        .init();
-    let Cli { command, threads } = Cli::parse();
+    let cli = Cli::parse();
+    // The command line before the environment, where it says something.
+    let mut log = env_logger::Builder::new();
+    log.filter_level(cli.log_level()).format_timestamp(None);
+    if !cli.quiet && cli.verbose == 0 {
+        log.parse_default_env();
+    }
+    log.init();
+    let Cli { command, threads, quiet, .. } = cli;
+    if quiet {
+        progress::hide_all();
+    }
     if let Command::Build(args) = &command
         && args.cache_tiles.is_none()
     {

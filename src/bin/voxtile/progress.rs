@@ -1,11 +1,19 @@
 use crate::memory::resident_bytes;
-use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
+use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
 use voxtile::mapper::{MapStatistics, MapView};
 
 /// A bar on standard error for long work; nothing where that is no terminal.
 pub struct Progress {
     bar: ProgressBar,
+}
+
+static ARE_HIDDEN: AtomicBool = AtomicBool::new(false);
+
+/// Shows no bar from here on.
+pub fn hide_all() {
+    ARE_HIDDEN.store(true, Ordering::Relaxed);
 }
 
 impl Progress {
@@ -18,14 +26,19 @@ impl Progress {
             ),
             None => (ProgressBar::no_length(), "{spinner} {pos} scans  {per_sec:.0}  {msg}"),
         };
-        bar.set_style(style(template));
-        Self { bar }
+        Self::styled(bar, template)
     }
 
     /// A bar over tiles.
     pub fn over_tiles(tiles: usize) -> Self {
-        let bar = ProgressBar::new(tiles as u64);
-        bar.set_style(style("{bar:30} {pos}/{len} tiles  {eta} left"));
+        Self::styled(ProgressBar::new(tiles as u64), "{bar:30} {pos}/{len} tiles  {eta} left")
+    }
+
+    fn styled(bar: ProgressBar, template: &str) -> Self {
+        if ARE_HIDDEN.load(Ordering::Relaxed) {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        bar.set_style(style(template));
         Self { bar }
     }
 

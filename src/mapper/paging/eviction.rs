@@ -80,6 +80,7 @@ impl TilePager {
 
     /// Evicts a resident tile: into the compact form, or to disk where there is no such tier.
     pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
+        log::debug!("tile {index}: evicted");
         if self.cache.has_compact_tier() {
             return self.cache.make_compact(index);
         }

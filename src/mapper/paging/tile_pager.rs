@@ -178,6 +178,7 @@ impl TilePager {
                 continue;
             }
             if self.is_spilling_cheaper(tile) {
+                log::debug!("tile {tile}: buffered updates spilled");
                 self.upgrade()?;
                 self.buffer.spill(tile, &mut self.disk)?;
             } else {
@@ -266,6 +267,7 @@ impl TilePager {
 
     /// Brings a tile into memory, with its buffered updates.
     pub(super) fn load(&mut self, index: TileIndex) -> Result<()> {
+        log::debug!("tile {index}: loaded");
         // Read first: a tile that cannot be read evicts nothing.
         let tile = Arc::new(self.read(index)?);
         if !self.cache.is_resident(index) {

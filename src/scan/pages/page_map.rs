@@ -1,7 +1,7 @@
 use super::footprint::Footprint;
 use super::marked_page::MarkedPage;
 use super::window::{Local, PAGE_EDGE, Window};
-use crate::space::VoxelIndex;
+use crate::space::{VoxelIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
 
 /// The pages that the rays of a scan write to.
@@ -59,7 +59,7 @@ impl<F: Footprint> PageMap<F> {
     /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.directory.capacity() * size_of::<u32>()
-            + self.far.capacity() * 8 / 7 * (size_of::<(VoxelIndex, u32)>() + 1)
+            + hash_table_bytes::<(VoxelIndex, u32)>(self.far.capacity())
             + (self.pages.capacity() + self.spare.capacity()) * size_of::<F>()
             + self.pages.iter().chain(&self.spare).map(F::heap_bytes).sum::<usize>()
             + self.indices.capacity() * size_of::<VoxelIndex>()

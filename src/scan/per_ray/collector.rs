@@ -7,7 +7,7 @@ use crate::scan::trace::{Allowance, CollectorLimit};
 use crate::scan::updates::{
     BrickRuns, Run, ScanUpdates, TileUpdates, brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile,
 };
-use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex};
+use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex, is_in_mask};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -208,7 +208,7 @@ impl Brick<'_> {
             return passed.into();
         }
         let mut runs: Vec<Run> = Vec::with_capacity(self.ended.len() + count);
-        runs.extend(self.ended.iter().filter(|run| is_in(part, run.place)));
+        runs.extend(self.ended.iter().filter(|run| is_in_mask(part, run.place.into())));
         // Both sorts are stable: a voxel's runs stay in order, and the misses after its last hit come last.
         runs.sort_by_key(|run| run.place);
         runs.extend_from_slice(passed);
@@ -227,15 +227,11 @@ impl Brick<'_> {
             // Without a branch: it would be unpredictable.
             for (&misses, place) in chunk.iter().zip(first..) {
                 runs[count] = Run { place, misses, hit: None };
-                count += usize::from(misses > 0 && is_in(part, place));
+                count += usize::from(misses > 0 && is_in_mask(part, place.into()));
             }
         }
         count
     }
-}
-
-fn is_in(mask: &BrickMask, place: u16) -> bool {
-    mask[usize::from(place) / 64] >> (place % 64) & 1 == 1
 }
 
 /// Moves the updates of several collectors to `parts`; the first collector saw the first rays.

@@ -7,7 +7,7 @@ use crate::scan::ray::{RayEnd, RayOrigin, SlabRay};
 use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
 use crate::scan::updates::{ScanUpdates, TileUpdates, in_order_of_tiles};
-use crate::space::{Grid, VoxelIndex};
+use crate::space::{Grid, VoxelIndex, hash_table_bytes};
 use rayon::prelude::*;
 
 /// Most rays per call of [`PerScanCollector::take`].
@@ -51,7 +51,7 @@ impl PerScanCollector {
     }
 
     fn intensities_bytes(&self) -> usize {
-        self.intensities.capacity() * 8 / 7 * (size_of::<(VoxelIndex, f32)>() + 1)
+        hash_table_bytes::<(VoxelIndex, f32)>(self.intensities.capacity())
     }
 
     /// Bytes of the marks alone.
@@ -196,7 +196,7 @@ fn keep_largest(intensities: &mut Intensities, voxel: VoxelIndex, intensity: f32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::{BRICK_EDGE, BrickMask, Point};
+    use crate::space::{BRICK_EDGE, Point, is_in_mask};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -242,8 +242,7 @@ mod tests {
                         let bit = |level: usize| (place >> (3 * level + axis) & 1) << level;
                         brick.index[axis] * BRICK_EDGE + (bit(0) | bit(1) | bit(2)) as i32
                     });
-                    let is_set = |mask: &BrickMask| mask[place / 64] >> (place % 64) & 1 != 0;
-                    match (is_set(&brick.hits), is_set(&brick.passed)) {
+                    match (is_in_mask(&brick.hits, place), is_in_mask(&brick.passed, place)) {
                         (true, _) => marks[0].insert(voxel),
                         (false, true) => marks[1].insert(voxel),
                         (false, false) => false,

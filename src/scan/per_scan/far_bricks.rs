@@ -1,5 +1,5 @@
 use crate::scan::pages::MarkedBrick;
-use crate::space::{BRICK_EDGE, VoxelIndex, place_of_voxel};
+use crate::space::{BRICK_EDGE, VoxelIndex, hash_table_bytes, place_of_voxel};
 use rustc_hash::FxHashMap;
 
 /// Marks outside the window, brick by brick: a page for the few voxels of a stray ray would be too large.
@@ -81,7 +81,7 @@ impl FarBricks {
 
     /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        self.bricks.capacity() * 8 / 7 * (size_of::<(VoxelIndex, MarkedBrick)>() + 1)
+        hash_table_bytes::<(VoxelIndex, MarkedBrick)>(self.bricks.capacity())
     }
 }
 

@@ -1,6 +1,6 @@
 use crate::scan::{PackedUpdates, ScanReport};
 use crate::sensor::Observation;
-use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, places};
+use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, is_in_mask, places};
 
 /// All updates of one accepted call, grouped by tile in Morton order of the tiles.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -153,7 +153,7 @@ impl BrickUpdate {
     pub fn observations(&self) -> impl Iterator<Item = Observation> {
         let mut intensities = self.intensities.iter();
         places(self.touched()).map(move |place| {
-            if self.hits[place / 64] >> (place % 64) & 1 == 1 {
+            if is_in_mask(&self.hits, place) {
                 Observation::Hit(intensities.next().copied().unwrap_or_default())
             } else {
                 Observation::Miss

@@ -110,6 +110,12 @@ impl TileStore {
             // Committed.
             self.note_added(number);
             let changed = self.versions.committed(number, scan_number);
+            log::info!(
+                "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",
+                self.files.folder().display(),
+                changed.len(),
+                removed.len()
+            );
             self.checkpoint.add(changed.tiles(), &removed);
         }
         if let Err(error) = self.finish_commit() {

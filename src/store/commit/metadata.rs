@@ -54,7 +54,7 @@ pub struct Extension {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub decayed_scan: u64,
     /// How the tiles are stored; maps of the original files do not say.
-    #[serde(default, skip_serializing_if = "Storage::is_seed")]
+    #[serde(default, skip_serializing_if = "Storage::is_octomap")]
     pub storage: Storage,
     /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions
     /// that did not list them: every file of the folder of snapshots is one then.
@@ -153,7 +153,7 @@ impl Metadata {
 
     /// How the tiles are stored.
     pub fn storage(&self) -> Storage {
-        self.ext.as_ref().map_or(Storage::Seed, |ext| ext.storage)
+        self.ext.as_ref().map_or(Storage::OctoMap, |ext| ext.storage)
     }
 
     /// The same as of a commit: its tiles' hull and its numbers.
@@ -268,7 +268,7 @@ mod tests {
             rays: RayConfig::default(),
             inputs: vec![InputRecord { first_scan: 45, ..InputRecord::from("abc") }],
             decayed_scan: 0,
-            storage: Storage::Seed,
+            storage: Storage::OctoMap,
             snapshots: None,
         };
         let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());

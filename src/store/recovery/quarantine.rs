@@ -86,7 +86,7 @@ impl<'a> Quarantine<'a> {
     }
 
     fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
-        self.disk.kind(path).map_err(|error| Error::io(path, "look at", error))
+        self.disk.kind_at(path)
     }
 
     fn sync(&self, folder: &Path) -> Result<()> {

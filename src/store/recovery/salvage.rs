@@ -70,9 +70,9 @@ impl Salvage {
             (Some(written), Some(logged)) if written == logged => layout.with_storage(written),
             (Some(storage), None) | (None, Some(storage)) => layout.with_storage(storage),
             _ => {
-                let [seed, compact] = [Storage::Seed, Storage::Compact]
+                let [seed, compact] = [Storage::OctoMap, Storage::Compact]
                     .map(|storage| count_tables(disk, &layout.clone().with_storage(storage)));
-                layout.with_storage(if compact > seed { Storage::Compact } else { Storage::Seed })
+                layout.with_storage(if compact > seed { Storage::Compact } else { Storage::OctoMap })
             }
         }
     }

@@ -57,8 +57,7 @@ impl StagedMap {
     pub fn finish(mut self) -> Result<()> {
         check_is_free(&*self.disk, &self.folder)?;
         let unfinished = staging_folder(&self.folder)?;
-        let is_there =
-            self.disk.kind(&self.folder).map_err(|error| Error::io(&self.folder, "look at", error))?;
+        let is_there = self.disk.kind_at(&self.folder)?;
         if is_there.is_some() {
             self.disk
                 .remove_folder(&self.folder)
@@ -103,7 +102,7 @@ pub fn staging_folder(folder: &Path) -> Result<PathBuf> {
 }
 
 fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    let is_free = match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
+    let is_free = match disk.kind_at(folder)? {
         None => true,
         Some(EntryKind::Folder) => {
             disk.list(folder).map_err(|error| Error::io(folder, "list", error))?.is_empty()
@@ -119,7 +118,7 @@ fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
 
 /// Removes what an interrupted attempt left; what is not of a map stays, and is an error.
 fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
+    match disk.kind_at(folder)? {
         None => return Ok(()),
         Some(EntryKind::Folder) => {}
         Some(_) => return Err(not_of_a_map(folder)),
@@ -156,9 +155,7 @@ fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) -> Result<(
     }
     for tile in list(disk, layout.folder())?.iter().filter_map(|name| tile_of_folder(name)) {
         let folder = layout.tile_folder(tile);
-        if disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))?
-            != Some(EntryKind::Folder)
-        {
+        if disk.kind_at(&folder)? != Some(EntryKind::Folder) {
             // A link could lead anywhere.
             return Err(not_of_a_map(&folder));
         }

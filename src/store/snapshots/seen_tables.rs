@@ -1,7 +1,7 @@
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
 use crate::error::{Error, Result};
-use crate::space::{TileIndex, TileTable};
+use crate::space::{TileIndex, TileTable, hash_table_bytes};
 use crate::store::commit::commits::Commits;
 use crate::store::disk::Disk;
 use crate::store::layout::Layout;
@@ -152,9 +152,8 @@ impl SeenTables {
     pub(in crate::store) fn bytes(&self) -> usize {
         // A set of few numbers takes a leaf of its tree.
         const FLUSHES_BYTES: usize = 120;
-        let slot = size_of::<TileIndex>() + 1;
         self.shared.bytes()
-            + self.pinned.capacity() * 8 / 7 * (slot + size_of::<BTreeSet<u64>>())
+            + hash_table_bytes::<(TileIndex, BTreeSet<u64>)>(self.pinned.capacity())
             + self.pinned.len() * FLUSHES_BYTES
     }
 }

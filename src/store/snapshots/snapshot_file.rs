@@ -51,7 +51,7 @@ impl Snapshot {
     /// Something else that has the name of the folder; a disk that refuses.
     pub(in crate::store) fn has_folder(disk: &dyn Disk, layout: &Layout) -> Result<bool> {
         let folder = layout.snapshots();
-        match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
+        match disk.kind_at(&folder)? {
             Some(EntryKind::Folder) => Ok(true),
             None => Ok(false),
             Some(_) => {

@@ -50,7 +50,7 @@ impl TileLocation {
     pub fn open(self) -> Result<StoredTile> {
         let Self { disk, tile, folder, path, map_id, version, storage } = self;
         let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
-        match disk.kind(&folder).map_err(|error| Error::io(&folder, "look at", error))? {
+        match disk.kind_at(&folder)? {
             Some(EntryKind::Folder) => {}
             Some(_) => {
                 return damaged("the tile's folder is a file or a link, not a folder");

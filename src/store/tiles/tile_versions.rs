@@ -1,5 +1,5 @@
 use super::tile_version::TileVersion;
-use crate::space::{TileIndex, TileTable};
+use crate::space::{TileIndex, TileTable, hash_table_bytes};
 use crate::store::commit::commits::Commits;
 use rustc_hash::FxHashSet;
 
@@ -101,7 +101,7 @@ impl TileVersions {
         self.commits.tiles.bytes()
             + self.commits.last_changed.bytes()
             + self.next.bytes()
-            + (self.foreign.capacity() + self.orphans.capacity()) * 8 / 7 * (size_of::<TileIndex>() + 1)
+            + hash_table_bytes::<TileIndex>(self.foreign.capacity() + self.orphans.capacity())
     }
 
     /// Bytes of memory that the next commit takes on top.

@@ -59,7 +59,7 @@ impl TileWriter {
 
 /// Makes the folder of a tile if it is not there.
 pub(in crate::store) fn make_folder(disk: &dyn Disk, folder: &Path) -> Result<()> {
-    match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
+    match disk.kind_at(folder)? {
         Some(EntryKind::Folder) => Ok(()),
         None => disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error)),
         Some(_) => {

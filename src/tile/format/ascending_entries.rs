@@ -4,7 +4,7 @@ use super::{ENTRY_BYTES, EntryBytes};
 use crate::error::FormatError;
 use crate::sensor::Evidence;
 use crate::space::{
-    BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, VoxelBox, VoxelIndex, VoxelKey, mask_of_box,
+    BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, VoxelBox, VoxelIndex, VoxelKey, is_in_mask, mask_of_box,
     place_of_voxel,
 };
 use crate::tile::Table;
@@ -45,7 +45,7 @@ impl<'a> AscendingEntries<'a> {
             _ => self.open(Entry { key, evidence }, upper, offset)?,
         };
         let place = place_of_voxel(key.0.map(i32::from));
-        if brick.inside[place / 64] >> (place % 64) & 1 == 0 {
+        if !is_in_mask(&brick.inside, place) {
             return Err(of_another_tile(key, offset));
         }
         check_evidence(evidence, offset)?;

@@ -118,30 +118,30 @@ fn check_from(start: &FaultyDisk, name: &str, work: Work) {
 
 #[test]
 fn a_merge_is_there_whole_or_not_at_all() {
-    check(Storage::Seed, "out", merge);
+    check(Storage::OctoMap, "out", merge);
     check(Storage::Compact, "out", merge);
 }
 
 #[test]
 fn a_crop_is_there_whole_or_not_at_all() {
-    check(Storage::Seed, "out", crop);
+    check(Storage::OctoMap, "out", crop);
 }
 
 #[test]
 fn a_part_is_cleared_whole_or_not_at_all() {
-    check(Storage::Seed, "a", clear);
+    check(Storage::OctoMap, "a", clear);
     check(Storage::Compact, "a", clear);
 }
 
 #[test]
 fn evidence_fades_whole_or_not_at_all_and_once() {
-    check(Storage::Seed, "a", decay);
+    check(Storage::OctoMap, "a", decay);
     check(Storage::Compact, "a", decay);
 }
 
 /// The same maps in the original format.
 fn foreign() -> FaultyDisk {
-    let disk = two_maps(Storage::Seed);
+    let disk = two_maps(Storage::OctoMap);
     for name in ["a", "b"] {
         disk.take(&path(name).join("commits.log"));
         let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;

@@ -17,7 +17,7 @@ pub fn config(random: &mut Random) -> MapConfig {
     } else {
         config
     };
-    config.with_storage([Storage::Seed, Storage::Compact][random.below(2) as usize])
+    config.with_storage([Storage::OctoMap, Storage::Compact][random.below(2) as usize])
 }
 
 /// Up to `most` voxels around a place: few values many times, any values, those at and beyond the clamps.

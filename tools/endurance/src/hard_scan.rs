@@ -137,12 +137,14 @@ impl HardScan {
         let before = children_cpu_s()?;
         let output = command()?.args(arguments).arg(input).arg("-o").arg(map).output()?;
         let cpu_s = children_cpu_s()? - before;
-        ensure!(output.status.success(), "{}: {}", self.name, String::from_utf8_lossy(&output.stderr));
+        let said = String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.success(), "{}: {}: {said}", self.name, output.status);
         let built: serde_json::Value = serde_json::from_slice(&output.stdout)?;
         let number = |key: &str| built[key].as_u64().with_context(|| format!("the summary has no {key}"));
         let digest = command()?.arg("digest").arg(map).stderr(Stdio::inherit()).output()?;
+        ensure!(digest.status.success(), "{}: no digest: {}", self.name, digest.status);
         let digest = String::from_utf8(digest.stdout)?;
-        fs::remove_dir_all(map)?;
+        fs::remove_dir_all(map).with_context(|| format!("{}: cannot be removed", map.display()))?;
         Ok(Taken {
             peak_bytes: number("peak_rss_bytes")?,
             cpu_s,

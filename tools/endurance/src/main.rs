@@ -48,9 +48,10 @@ fn main() -> ExitCode {
 fn run(Arguments { options, json }: &Arguments) -> Result<bool> {
     let wanted = options.wanted(&QUESTIONS, |question| question.name.to_owned())?;
     let bench = Bench::open("endurance", options)?;
+    let work = options.work("endurance")?;
     let setting = Setting {
         data: options.data.clone(),
-        work: options.work("endurance"),
+        work: work.path().to_owned(),
         is_short: options.short,
         runs: options.runs_or(1) as usize,
     };

@@ -39,7 +39,7 @@ impl Setting {
             case: case.clone(),
             limit,
             disk: self.size(DiskSpeed::Own, DiskSpeed::Unsynced),
-            storage: Storage::Seed,
+            storage: Storage::OctoMap,
             scans_at_a_time: 1,
             folder: self.work.join("map"),
             is_kept: false,

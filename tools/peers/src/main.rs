@@ -6,7 +6,7 @@ mod measure;
 mod table;
 mod workloads;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::Parser;
 use contenders::Contenders;
 use report::Options;
@@ -58,13 +58,13 @@ fn run(arguments: &Arguments) -> Result<bool> {
         least_seconds: if options.short { 0.2 } else { 0.5 },
         points: if options.short { 100_000 } else { 1_000_000 },
     };
-    let work = WorkFolder::create(&options.work("peers"))?;
+    let work = options.work("peers")?;
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
     for workload in &workloads {
         let files = workload.write(work.path())?;
         rows.extend(measure::rows(workload, &files, &contenders, runs, &mut faults)?);
         rows.extend(exactness::rows(workload, &files, &contenders, &mut faults)?);
-        work.clear()?;
+        work.empty()?;
     }
     let text = format!("{}\n{}", head(arguments), table::markdown(&rows));
     print!("{text}");
@@ -94,46 +94,4 @@ fn write(folder: &Path, text: &str) -> Result<()> {
     let path = folder.join("peers.md");
     let written = fs::create_dir_all(folder).and_then(|()| fs::write(&path, text));
     written.with_context(|| format!("{}: cannot write", path.display()))
-}
-
-/// A folder that is removed in the end.
-struct WorkFolder(PathBuf);
-
-impl WorkFolder {
-    /// Takes a folder that does not exist yet or that an earlier run left.
-    fn create(path: &Path) -> Result<Self> {
-        let marker = path.join(".peers");
-        ensure!(
-            !path.exists() || marker.exists(),
-            "{}: there is something else already; remove it, or name another target folder",
-            path.display()
-        );
-        let folder = Self(path.to_owned());
-        folder.clear()?;
-        Ok(folder)
-    }
-
-    fn path(&self) -> &Path {
-        &self.0
-    }
-
-    fn clear(&self) -> Result<()> {
-        let path = &self.0;
-        let emptied = || {
-            if path.exists() {
-                fs::remove_dir_all(path)?;
-            }
-            fs::create_dir_all(path)?;
-            fs::write(path.join(".peers"), "")
-        };
-        emptied().with_context(|| format!("{}: cannot empty the folder", path.display()))
-    }
-}
-
-impl Drop for WorkFolder {
-    fn drop(&mut self) {
-        if let Err(error) = fs::remove_dir_all(&self.0) {
-            eprintln!("peers: {}: cannot remove the folder: {error}", self.0.display());
-        }
-    }
 }

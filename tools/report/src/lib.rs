@@ -13,6 +13,7 @@ pub mod plot;
 mod samples;
 mod stopwatch;
 mod table;
+mod work_folder;
 
 pub use answer::Answer;
 pub use bench::{Bench, exit_code};
@@ -22,3 +23,4 @@ pub use page::Page;
 pub use samples::Samples;
 pub use stopwatch::{Stopwatch, Took};
 pub use table::{Cell, Table};
+pub use work_folder::WorkFolder;

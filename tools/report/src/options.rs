@@ -1,4 +1,4 @@
-use crate::Page;
+use crate::{Page, WorkFolder};
 use anyhow::{Result, anyhow};
 use std::path::{Path, PathBuf};
 
@@ -32,9 +32,13 @@ impl Options {
         if self.short { 1 } else { self.runs.unwrap_or(default) }
     }
 
-    /// Folder for the maps and streams of a benchmark.
-    pub fn work(&self, benchmark: &str) -> PathBuf {
-        self.target.join(benchmark).join("work")
+    /// A folder for the maps and streams of a benchmark.
+    ///
+    /// # Errors
+    ///
+    /// As for [`WorkFolder::create`].
+    pub fn work(&self, benchmark: &str) -> Result<WorkFolder> {
+        WorkFolder::create(self.target.join(benchmark).join("work"))
     }
 
     /// The page `docs/BENCHMARK.md`, or its copy where the results are to go elsewhere.

@@ -5,7 +5,7 @@ use crate::findings::Findings;
 use crate::hard_scan::{HardScan, Points, Taken};
 use crate::promise::{Promise, Wanted};
 use crate::setting::{Setting, mib};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use report::{Cell, Table};
 use std::fs;
 use std::time::{Duration, Instant};
@@ -34,7 +34,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         "The command `voxtile build`, one process a map; CPU without a limit beside that within it.";
     let mut table = Table::new("hard_scans", caption, columns);
     for hard in cases(setting) {
-        let [limited, unlimited] = measured(setting, &hard)?;
+        let [limited, unlimited] = measured(setting, &hard).with_context(|| hard.description())?;
         findings.keep(&hard, &[&limited, &unlimited])?;
         let beyond_mib = mib(limited.peak_bytes as f64) - hard.limit_mib as f64;
         let times = limited.cpu_s / unlimited.cpu_s.max(0.1);
@@ -76,7 +76,6 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
 
 /// Within the limit, and without one.
 fn measured(setting: &Setting, hard: &HardScan) -> Result<[Taken; 2]> {
-    fs::create_dir_all(&setting.work)?;
     let input = hard.write(&setting.work)?;
     let map = setting.work.join("hard");
     let taken = [hard.build(&input, &map, true)?, hard.build(&input, &map, false)?];
@@ -124,7 +123,7 @@ fn cases(setting: &Setting) -> Vec<HardScan> {
 
 /// The worst peak of random inputs in random limits.
 fn search(setting: &Setting) -> Result<Promise> {
-    let until = Instant::now() + Duration::from_secs(setting.size(1_800, 25));
+    let until = Instant::now() + Duration::from_secs(setting.size(600, 25));
     let mut random = Random::of(u64::from(std::process::id()), &[15]);
     let (mut worst_mib, mut worst, mut tried) = (f64::NEG_INFINITY, String::new(), 0);
     while Instant::now() < until {

@@ -75,7 +75,7 @@ fn builds(
     disk: DiskSpeed,
     findings: &mut Findings,
 ) -> Result<[OfStorage; 2]> {
-    let mut builds = [Storage::Seed, Storage::Compact].map(|storage| OfStorage {
+    let mut builds = [Storage::OctoMap, Storage::Compact].map(|storage| OfStorage {
         storage,
         wall_s: Samples::default(),
         cpu_s: Samples::default(),
@@ -111,7 +111,7 @@ impl Measured {
         let differ = f64::from(u8::from(seed.built.digest != compact.built.digest));
         vec![
             Promise::new(
-                format!("{what}: the map's files, seed by compact"),
+                format!("{what}: the map's files, octomap by compact"),
                 smaller,
                 Wanted::AtLeast(LEAST_SMALLER),
                 "",

@@ -175,5 +175,5 @@ fn tiles_on_their_way_to_disk_and_back_are_what_they_must_be() {
 /// The same where the saving thread unpacks tiles.
 #[test]
 fn tiles_that_are_unpacked_on_their_way_are_too() {
-    in_many_orders(|| live(Storage::Seed));
+    in_many_orders(|| live(Storage::OctoMap));
 }
