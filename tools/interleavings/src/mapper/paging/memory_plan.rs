@@ -17,7 +17,7 @@ impl MemoryPlan {
     pub(super) fn new(_: MemoryLimit) -> Self {
         Self {
             tiles: 3,
-            bytes: 26 << 10,
+            bytes: 20 << 10,
             buffer_bytes: 2 << 10,
             least_scan_bytes: 0,
             is_enforced: false,
