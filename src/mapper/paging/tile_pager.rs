@@ -267,9 +267,9 @@ impl TilePager {
 
     /// Brings a tile into memory, with its buffered updates.
     pub(super) fn load(&mut self, index: TileIndex) -> Result<()> {
-        log::debug!("tile {index}: loaded");
         // Read first: a tile that cannot be read evicts nothing.
         let tile = Arc::new(self.read(index)?);
+        log::debug!("tile {index}: loaded");
         if !self.cache.is_resident(index) {
             self.make_room(&tile)?;
             self.put(tile);
