@@ -2,7 +2,7 @@
 
 use voxtile::query::{RayQuery, UnknownAs};
 use voxtile::simulation::Survey;
-use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries};
+use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::temp_dir().join(format!("voxtile_quickstart_{}", std::process::id()));

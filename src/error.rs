@@ -100,6 +100,9 @@ pub enum Error {
         /// The folder of the map.
         path: PathBuf,
     },
+    /// A view of the map was held while so much changed that what it saw had to be let go: take a new view.
+    #[error("the view of the map was held for too long: what it saw has changed; take a new one")]
+    Expired,
     /// What was under way was to be given up, and is: nothing of it is in the map.
     #[error("stopped as asked; the map is as before")]
     Stopped,

@@ -58,6 +58,8 @@
 //! `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
 //! it, and no feature changes a result.
 
+pub use nalgebra;
+
 mod config;
 mod error;
 pub mod integrity;
@@ -82,6 +84,6 @@ pub use config::{
     InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
 };
 pub use error::{DecodeError, Error, FormatError, Place, Result};
-pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
-pub use query::{Occupancy, Queries};
+pub use mapper::{InMemoryMapper, LiveReader, LiveView, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+pub use query::{Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy};
 pub use scan::Scan;

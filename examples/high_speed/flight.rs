@@ -3,9 +3,9 @@ use super::forest::{Forest, GOAL, START};
 use std::fmt;
 use std::time::Instant;
 use testkit::planner::{distance_m, plan};
-use voxtile::Result;
 use voxtile::local::{LocalView, Obstacle};
 use voxtile::space::Point;
+use voxtile::{Queries, Result, UnknownAs};
 
 /// The paper's limit.
 const MAX_SPEED_M_S: f64 = 9.3;
@@ -114,8 +114,9 @@ fn wanted_velocity(path: &[Point], at: Point, velocity: Point) -> Point {
 /// No faster than lets the drone stop before the first obstacle straight ahead.
 fn braked(view: &LocalView, wanted: Point, at: Point, velocity: Point) -> Point {
     let ahead = |m: f64| std::array::from_fn(|k| at[k] + velocity[k] / speed(velocity).max(1e-9) * m);
-    let clear_m = match view.first_on_segment(at, ahead(BRAKING_LOOK_M), Obstacle::Inflated) {
-        Ok(Some(voxel)) => distance_m(at, voxel.map(|k| (f64::from(k) + 0.5) * view.resolution_m())),
+    let obstacles = view.obstacles(Obstacle::Inflated);
+    let clear_m = match obstacles.cast_segment(at, ahead(BRAKING_LOOK_M), UnknownAs::Free) {
+        Ok(Some(hit)) => distance_m(at, hit.center_m),
         _ => BRAKING_LOOK_M,
     };
     // Part of the acceleration is left to steer.

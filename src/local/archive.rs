@@ -5,7 +5,7 @@ use super::view::{LocalState, LocalView};
 use super::voxels::{MAX_NUMBERED, Voxel};
 use crate::error::{Error, Result};
 use crate::mapper::{MapView, Mapper};
-use crate::query::{Occupancy, Queries};
+use crate::query::{MapQueries, Occupancy, Queries};
 use crate::scan::{Scan, ScanReport};
 use crate::space::{Aabb, Point, VoxelIndex};
 

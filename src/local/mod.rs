@@ -12,6 +12,7 @@
 //!
 //! ```
 //! use voxtile::local::{LocalMap, LocalParameters, LocalState, Obstacle};
+//! use voxtile::{Queries, UnknownAs};
 //!
 //! # fn main() -> voxtile::Result<()> {
 //! let mut map = LocalMap::new(0.1, LocalParameters::local_mapping())?;
@@ -20,7 +21,8 @@
 //! let view = reader.view();
 //! assert_eq!(view.state_at([4.25, 1.05, 0.35]), LocalState::Occupied);
 //! assert_eq!(view.state_at([4.25, 1.25, 0.35]), LocalState::Inflated);
-//! assert!(view.first_on_segment([0.0; 3], [5.0, 1.3, 0.4], Obstacle::Inflated)?.is_some());
+//! let obstacles = view.obstacles(Obstacle::Inflated);
+//! assert!(obstacles.cast_segment([0.0; 3], [5.0, 1.3, 0.4], UnknownAs::Free)?.is_some());
 //! # Ok(())
 //! # }
 //! ```
@@ -53,6 +55,7 @@ pub use archive::{LocalAnswer, WithLocalMap};
 pub use changes::VoxelChange;
 pub use map::LocalMap;
 pub use parameters::LocalParameters;
+pub use queries::LocalObstacles;
 pub use reader::LocalReader;
 pub use report::{LocalReport, StageTimes};
 pub use view::{LocalState, LocalView, Obstacle};

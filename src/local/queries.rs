@@ -1,37 +1,70 @@
 use super::place::{cell_at, ones, place_of};
-use super::view::{LocalView, Obstacle};
-use crate::error::{Error, Result};
-use crate::query::{Nearest, Shape};
-use crate::scan::{MAX_RAY_STEPS, RayWalk};
-use crate::space::{Aabb, Point, VoxelBox, VoxelIndex};
+use super::view::{LocalState, LocalView, Obstacle};
+use crate::query::occupied_set::{OccupiedSet, answer_as_occupied_set};
+use crate::query::voxels_around;
+use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 
-/// Queries of planners.
+/// Voxels of a local map as obstacles. Others are unknown: a local map does not tell free from unknown. Unite it with
+/// an archive ([`United`](crate::query::United)) to know.
+#[derive(Clone, Copy, Debug)]
+pub struct LocalObstacles<'a> {
+    view: &'a LocalView,
+    obstacle: Obstacle,
+}
+
+answer_as_occupied_set!(LocalObstacles<'_>);
+
+impl OccupiedSet for LocalObstacles<'_> {
+    fn grid_of_set(&self) -> Grid {
+        self.view.grid
+    }
+
+    fn holds(&self, voxel: VoxelIndex) -> bool {
+        self.obstacle.is(self.view.state(voxel))
+    }
+
+    fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox> {
+        self.view.empty_around(voxel)
+    }
+
+    fn hull(&self) -> Option<VoxelBox> {
+        self.view.hull()
+    }
+
+    fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool) {
+        self.view.for_each_obstacle_in(voxels, self.obstacle, visit);
+    }
+}
+
+/// Its occupied voxels answer; [`LocalView::obstacles`] takes the inflated ones too.
+impl OccupiedSet for LocalView {
+    fn grid_of_set(&self) -> Grid {
+        self.grid
+    }
+
+    fn holds(&self, voxel: VoxelIndex) -> bool {
+        self.state(voxel) == LocalState::Occupied
+    }
+
+    fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox> {
+        self.empty_around(voxel)
+    }
+
+    fn hull(&self) -> Option<VoxelBox> {
+        self.hull()
+    }
+
+    fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool) {
+        self.for_each_obstacle_in(voxels, Obstacle::Occupied, visit);
+    }
+}
+
+answer_as_occupied_set!(LocalView);
+
 impl LocalView {
-    /// The first obstacle on a segment between two points in metres, including both ends.
-    ///
-    /// # Errors
-    ///
-    /// An end without a voxel, or a segment through more than a million voxels.
-    pub fn first_on_segment(&self, from: Point, to: Point, obstacle: Obstacle) -> Result<Option<VoxelIndex>> {
-        let (Some(start), Some(last)) = (self.grid.voxel_of(from), self.grid.voxel_of(to)) else {
-            let reason = format!("{from:?} to {to:?} m is not finite or too far away for voxel indices");
-            return Err(Error::argument("segment", reason));
-        };
-        let (from, to) = (self.grid.to_voxel_units(from), self.grid.to_voxel_units(to));
-        let mut walk = RayWalk::between(from, start, to, last);
-        if walk.steps() > MAX_RAY_STEPS {
-            let reason = format!("meets {} voxels; ask for at most {MAX_RAY_STEPS}", walk.steps());
-            return Err(Error::argument("segment", reason));
-        }
-        loop {
-            let voxel = walk.voxel();
-            match self.empty_around(voxel) {
-                None if obstacle.is(self.state(voxel)) => return Ok(Some(voxel)),
-                _ if walk.is_at_end() => return Ok(None),
-                None => walk.advance(),
-                Some(empty) => walk.leave(&empty),
-            }
-        }
+    /// Occupied voxels, or inflated ones too, as obstacles to be asked about: for a planner.
+    pub fn obstacles(&self, obstacle: Obstacle) -> LocalObstacles<'_> {
+        LocalObstacles { view: self, obstacle }
     }
 
     /// The largest empty cell around a voxel.
@@ -46,60 +79,22 @@ impl LocalView {
         if node.block(place(2)).is_none() { cell(2) } else { None }
     }
 
-    /// An obstacle that a body touches; `None` if the body is free of collision.
-    ///
-    /// # Errors
-    ///
-    /// A body that is not finite, or with a negative radius.
-    pub fn collision(&self, body: &Shape, obstacle: Obstacle) -> Result<Option<VoxelIndex>> {
-        let around = self.voxels_around(&body.bounds()?);
-        let mut found = None;
-        self.for_each_obstacle_in(&around, obstacle, |voxel| {
-            if found.is_none() && body.touches_voxel(&self.grid, voxel) {
-                found = Some(voxel);
-            }
-            found.is_none()
+    /// A box around all voxels.
+    fn hull(&self) -> Option<VoxelBox> {
+        let pages = self.pages.keys().map(|page| {
+            let min = page.map(|k| k << 6);
+            VoxelBox { min, end: min.map(|k| k.saturating_add(1 << 6)) }
         });
-        Ok(found)
-    }
-
-    /// The obstacle whose center is nearest to a point and at most `radius_m` away; at equal distances the one with the
-    /// lowest index.
-    ///
-    /// # Errors
-    ///
-    /// A point that is not finite, an invalid radius.
-    pub fn nearest(&self, point: Point, radius_m: f64, obstacle: Obstacle) -> Result<Option<Nearest>> {
-        if !(radius_m >= 0.0 && point.iter().all(|x| x.is_finite())) {
-            let reason = "needs a finite point and a distance of at least 0 m";
-            return Err(Error::argument("nearest obstacle", reason));
-        }
-        let mut best: Option<Nearest> = None;
-        // Small balls first: the first that holds an obstacle holds the nearest.
-        let mut reach_m = self.resolution_m() * 4.0;
-        loop {
-            let ball_m = reach_m.min(radius_m);
-            let bounds = Aabb { min: point.map(|x| x - ball_m), max: point.map(|x| x + ball_m) };
-            self.for_each_obstacle_in(&self.voxels_around(&bounds), obstacle, |voxel| {
-                let center_m = self.grid.center_m(voxel);
-                let distance_m = (0..3).map(|k| (center_m[k] - point[k]).powi(2)).sum::<f64>().sqrt();
-                let is_nearer = best.is_none_or(|best| (distance_m, voxel) < (best.distance_m, best.voxel));
-                if distance_m <= ball_m && is_nearer {
-                    best = Some(Nearest { voxel, center_m, distance_m });
-                }
-                true
-            });
-            if best.is_some() || reach_m >= radius_m {
-                return Ok(best);
-            }
-            reach_m *= 2.0;
-        }
+        pages.reduce(|a, b| VoxelBox {
+            min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
+            end: std::array::from_fn(|k| a.end[k].max(b.end[k])),
+        })
     }
 
     /// The centers, in metres, of the obstacles whose center is in the half-open box, in no particular order.
     pub fn points_in(&self, window: &Aabb, obstacle: Obstacle) -> Vec<Point> {
         let mut points = Vec::new();
-        self.for_each_obstacle_in(&self.voxels_around(window), obstacle, |voxel| {
+        self.for_each_obstacle_in(&voxels_around(&self.grid, window), obstacle, |voxel| {
             let center_m = self.grid.center_m(voxel);
             if window.contains(center_m) {
                 points.push(center_m);
@@ -107,15 +102,6 @@ impl LocalView {
             true
         });
         points
-    }
-
-    /// The voxels whose center may be in a box, or that may touch it, and a few around; far corners saturate.
-    fn voxels_around(&self, bounds: &Aabb) -> VoxelBox {
-        let index = |x: f64| x.floor().clamp(-2e9, 2e9) as i32;
-        VoxelBox {
-            min: self.grid.to_voxel_units(bounds.min).map(|x| index(x) - 1),
-            end: self.grid.to_voxel_units(bounds.max).map(|x| index(x) + 2),
-        }
     }
 
     /// Visits the obstacles of a box until `visit` returns false.

@@ -13,6 +13,7 @@
 //! How tiles move between memory and disk is in `paging`.
 
 mod in_memory;
+mod live;
 mod map_reader;
 mod out_of_core;
 mod paging;
@@ -23,6 +24,7 @@ mod trace;
 mod traits;
 
 pub use in_memory::InMemoryMapper;
+pub use live::{LiveReader, LiveView};
 pub use map_reader::MapReader;
 pub use out_of_core::OutOfCoreTileMapper;
 pub use statistics::{IoCounts, MapStatistics, MemoryCounts, StallCounts};

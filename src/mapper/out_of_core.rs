@@ -1,6 +1,6 @@
-use super::paging::{MemoryPlan, TilePager};
+use super::paging::{MemoryPlan, PagedTiles, TilePager};
 use super::trace::trace;
-use super::{MapStatistics, MapView, Mapper, TileRef};
+use super::{LiveReader, MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
@@ -9,7 +9,7 @@ use crate::sensor::Evidence;
 use crate::space::{Point, TileBox, TileIndex, VoxelIndex};
 use crate::store::{Disk, FsDisk, InputContent, InputRecord, Metadata, SnapshotName, TileStore};
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 /// A map on disk with its active tiles in memory: bounded by the disk, never by memory.
 ///
@@ -17,8 +17,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[derive(Debug)]
 pub struct OutOfCoreTileMapper {
     config: MapConfig,
-    /// Queries take `&self` and may bring tiles in.
-    pager: Mutex<TilePager>,
+    tiles: PagedTiles,
+    /// What is given to other threads, once somebody asked for it.
+    live: OnceLock<LiveReader>,
     tracer: ScanTracer,
 }
 
@@ -61,8 +62,8 @@ impl OutOfCoreTileMapper {
 
     fn new(config: MapConfig, store: TileStore) -> Self {
         let scan_bytes = MemoryPlan::new(config.memory).scan_bytes;
-        let pager = Mutex::new(TilePager::new(config.clone(), store));
-        Self { pager, config, tracer: ScanTracer::with_memory_bytes(scan_bytes) }
+        let tiles = PagedTiles::new(config.clone(), store);
+        Self { tiles, live: OnceLock::new(), config, tracer: ScanTracer::with_memory_bytes(scan_bytes) }
     }
 
     /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
@@ -73,7 +74,7 @@ impl OutOfCoreTileMapper {
     /// As for [`Mapper::flush`].
     pub fn begin_input(&mut self, input: impl Into<InputRecord>) -> Result<()> {
         let input = InputRecord { first_scan: self.scan_number(), ..input.into() };
-        self.pager_mut().begin_input(input)
+        self.pager().begin_input(input)
     }
 
     /// Goes on with the input that the map was last built from, and returns how many of its scans are in the map: pass
@@ -85,13 +86,14 @@ impl OutOfCoreTileMapper {
     /// insert mode; and as for [`Mapper::flush`].
     pub fn resume_input(&mut self, name: &str) -> Result<u64> {
         let scan_number = self.scan_number();
-        let found = match self.pager_mut().inputs().last() {
+        let last = self.pager().inputs().last().cloned();
+        let found = match last {
             Some(input) if input.content.is_none() && input.name == name => {
                 let done = scan_number - input.first_scan.min(scan_number);
                 self.check_rays()?;
                 return Ok(done);
             }
-            Some(input) => input.name.clone(),
+            Some(input) => input.name,
             None if scan_number == 0 => {
                 self.begin_input(name)?;
                 return Ok(0);
@@ -104,13 +106,13 @@ impl OutOfCoreTileMapper {
 
     /// What the map was built from, the latest last.
     pub fn inputs(&self) -> Vec<InputRecord> {
-        self.lock().inputs().to_vec()
+        self.pager().inputs().to_vec()
     }
 
     /// Says what has been taken of the input that the map is being built from; the next flush keeps it. To be said
     /// after each scan, so that every flush has what belongs to it.
     pub fn note_input_content(&mut self, content: InputContent) {
-        if let Some(input) = self.pager_mut().last_input_mut() {
+        if let Some(input) = self.pager().last_input_mut() {
             input.content = Some(content);
         }
     }
@@ -121,7 +123,7 @@ impl OutOfCoreTileMapper {
     ///
     /// [`Error::Mismatch`] if the map was last built with others.
     pub fn check_rays(&self) -> Result<()> {
-        check_rays(self.lock().store(), &self.config.rays)
+        check_rays(self.pager().store(), &self.config.rays)
     }
 
     /// Lets a scan that is being inserted be given up: [`Mapper::insert_scan`] then ends with [`Error::Stopped`].
@@ -137,7 +139,7 @@ impl OutOfCoreTileMapper {
     /// [`Error::AlreadyExists`] if there is one of this name; as for [`Mapper::flush`].
     pub fn snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.flush()?;
-        self.pager_mut().create_snapshot(name)
+        self.pager().create_snapshot(name)
     }
 
     /// [`Mapper::insert_scan`] for points wherever they lie, seen from `origin` in metres, world frame: a scan may be
@@ -148,12 +150,13 @@ impl OutOfCoreTileMapper {
     /// As for [`Mapper::insert_scan`], and points that cannot be read.
     pub fn insert_points(&mut self, origin: Point, points: &dyn ScanPoints) -> Result<ScanReport> {
         let plan = MemoryPlan::new(self.config.memory);
-        let pager = self.pager.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let store = pager.store();
-        let (disk, folder) = (store.disk().clone(), store.folder().to_owned());
-        let max_tiles = pager.most_tiles_of_scan();
+        let tiles = &self.tiles;
+        let (disk, folder, max_tiles) = {
+            let pager = tiles.pager();
+            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.most_tiles_of_scan())
+        };
         let make_scratch = &|| disk.scratch(&folder);
-        let spill = &mut |part| pager.stage(part);
+        let spill = &mut |part| tiles.pager().stage(part);
         let max_bytes = plan.updates_bytes;
         let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
         let overflow = (max_bytes < usize::MAX).then_some(overflow);
@@ -161,40 +164,55 @@ impl OutOfCoreTileMapper {
         let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
         let inserted = traced.and_then(|updates| self.accept(updates));
         if inserted.is_err() {
-            self.pager_mut().discard_staged();
+            self.pager().discard_staged();
         }
         inserted
     }
 
+    /// A handle for other threads: it answers queries while this mapper inserts scans and flushes. See [`LiveReader`].
+    ///
+    /// # Errors
+    ///
+    /// A map of the original format is upgraded first, which fails if the disk refuses.
+    pub fn reader(&self) -> Result<LiveReader> {
+        if let Some(reader) = self.live.get() {
+            return Ok(reader.clone());
+        }
+        let bytes = MemoryPlan::new(self.config.memory).reader_bytes;
+        let files = self.pager().open_to_readers(bytes)?;
+        let new = || LiveReader::new(self.config.clone(), self.tiles.contents().clone(), files, bytes);
+        Ok(self.live.get_or_init(new).clone())
+    }
+
     /// The folder of the map.
     pub fn folder(&self) -> std::path::PathBuf {
-        self.lock().store().folder().to_owned()
+        self.pager().store().folder().to_owned()
     }
 
     /// The folder of a tile, whether it exists or not.
     pub fn tile_folder(&self, tile: TileIndex) -> std::path::PathBuf {
-        self.lock().store().layout().tile_folder(tile)
+        self.pager().store().layout().tile_folder(tile)
     }
 
     /// Whether the map has updates that no flush has made durable.
     pub fn is_dirty(&self) -> bool {
-        let pager = self.lock();
+        let pager = self.pager();
         pager.scan_number() != pager.store().commits().scan_number
     }
 
     /// Number of the last scan in the last flush: what a crash cannot take away.
     pub fn flushed_scan_number(&self) -> u64 {
-        self.lock().store().commits().scan_number
+        self.pager().store().commits().scan_number
     }
 
     /// Whether a tile has updates that are not on disk.
     pub fn is_tile_dirty(&self, tile: TileIndex) -> bool {
-        self.lock().is_dirty(tile)
+        self.pager().is_dirty(tile)
     }
 
     /// The tiles written, by eviction or flush, since the last call, in order; successful writes only.
     pub fn take_saved_tiles(&mut self) -> Vec<TileIndex> {
-        self.pager_mut().take_written()
+        self.pager().take_written()
     }
 
     /// Brings tiles into memory ahead of use; those that do not exist are left out. Returns how many came.
@@ -205,7 +223,7 @@ impl OutOfCoreTileMapper {
     pub fn preload(&mut self, tiles: impl IntoIterator<Item = TileIndex>) -> Result<usize> {
         let mut count = 0;
         for tile in tiles {
-            count += usize::from(self.pager_mut().tile(tile)?.is_some());
+            count += usize::from(self.pager().tile(tile)?.is_some());
         }
         Ok(count)
     }
@@ -216,26 +234,22 @@ impl OutOfCoreTileMapper {
     ///
     /// [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false; a tile that cannot be read.
     pub fn reload(&mut self, tile: TileIndex, discard_changes: bool) -> Result<bool> {
-        self.pager_mut().reload(tile, discard_changes)
+        self.pager().reload(tile, discard_changes)
     }
 
     fn accept(&mut self, updates: ScanUpdates) -> Result<ScanReport> {
         let report = updates.report;
         let scan_bytes = self.tracer.bytes() + updates.bytes();
-        let pager = self.pager_mut();
+        let mut pager = self.pager();
         pager.prepare(&updates, scan_bytes)?;
         pager.prefetch(&updates.tiles);
         pager.accept(updates);
         Ok(report)
     }
 
-    fn lock(&self) -> MutexGuard<'_, TilePager> {
-        // A panic in a query leaves no update half applied.
-        self.pager.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn pager_mut(&mut self) -> &mut TilePager {
-        self.pager.get_mut().unwrap_or_else(PoisonError::into_inner)
+    /// The pager, for one call. Queries take `&self` and may load tiles.
+    fn pager(&self) -> TilePager<'_> {
+        self.tiles.pager()
     }
 }
 
@@ -245,43 +259,43 @@ impl MapView for OutOfCoreTileMapper {
     }
 
     fn scan_number(&self) -> u64 {
-        self.lock().scan_number()
+        self.pager().scan_number()
     }
 
     fn tile_indices(&self) -> Vec<TileIndex> {
-        self.lock().tile_indices()
+        self.pager().tile_indices()
     }
 
     fn tile_bounds(&self) -> Option<TileBox> {
-        self.lock().bounds()
+        self.pager().bounds()
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {
-        self.lock().exists(index)
+        self.pager().exists(index)
     }
 
     fn cached_tile_indices(&self) -> Vec<TileIndex> {
-        self.lock().cached_tile_indices()
+        self.pager().cached_tile_indices()
     }
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        Ok(self.lock().tile(index)?.map(TileRef::shared))
+        Ok(self.pager().tile(index)?.map(TileRef::shared))
     }
 
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
-        self.lock().evidence(voxel)
+        self.pager().evidence(voxel)
     }
 
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        Ok(self.lock().tile_uncached(index)?.map(TileRef::shared))
+        Ok(self.pager().tile_uncached(index)?.map(TileRef::shared))
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
-        self.lock().voxels_of_tile_hint(index)
+        self.pager().voxels_of_tile_hint(index)
     }
 
     fn statistics(&self) -> MapStatistics {
-        self.lock().statistics()
+        self.pager().statistics()
     }
 }
 
@@ -297,11 +311,11 @@ impl Mapper for OutOfCoreTileMapper {
     }
 
     fn flush(&mut self) -> Result<()> {
-        self.pager_mut().flush()
+        self.pager().flush()
     }
 
     fn sync_octrees(&mut self) {
-        self.pager_mut().sync_octrees();
+        self.pager().sync_octrees();
     }
 }
 

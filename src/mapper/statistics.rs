@@ -55,6 +55,8 @@ pub struct MemoryCounts {
     pub on_the_way: u64,
     /// What is known of each tile without reading it.
     pub index: u64,
+    /// What is kept for readers in other threads.
+    pub readers: u64,
 }
 
 /// Waits of the mapping thread for the disk; times in microseconds, to two digits.
@@ -74,7 +76,13 @@ pub struct StallCounts {
 impl MemoryCounts {
     /// All together.
     pub fn bytes(&self) -> u64 {
-        self.tiles + self.compact_tiles + self.pending + self.scan + self.on_the_way + self.index
+        self.tiles
+            + self.compact_tiles
+            + self.pending
+            + self.scan
+            + self.on_the_way
+            + self.index
+            + self.readers
     }
 }
 

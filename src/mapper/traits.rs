@@ -5,10 +5,10 @@ use crate::scan::{PointBatch, Scan, ScanReport};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, VoxelIndex};
 
-/// A map that can be queried. Every method of [`Queries`](crate::query::Queries) uses these few.
+/// A map of tiles. All of [`Queries`](crate::query::Queries) and [`MapQueries`](crate::query::MapQueries) use these few.
 ///
 /// Queries see whole scans, unsaved ones too.
-pub trait MapView {
+pub trait MapView: Sync {
     /// How the map is made.
     fn config(&self) -> &MapConfig;
 

@@ -1,52 +1,58 @@
-use super::UnknownAs;
+use super::ray::brick_of;
 use super::region::{tiles_in, voxels_around, voxels_in};
 use super::tile_cursor::TileCursor;
+use super::{Hit, Occupancy, Shape, UnknownAs};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
-
-/// A solid body; touching counts as collision.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// A ball.
-    Sphere {
-        /// Its center in metres.
-        center: Point,
-        /// Its radius in metres.
-        radius_m: f64,
-    },
-    /// An axis-aligned box.
-    Box(Aabb),
-}
+use crate::space::{BRICK_EDGE, Grid, VoxelBox, VoxelIndex};
 
 /// Unknown space is searched voxel by voxel, up to this number.
 const MAX_UNKNOWN_VOXELS: u64 = 1 << 28;
 
-pub(super) fn collision(view: &impl MapView, body: &Shape, unknown: UnknownAs) -> Result<Option<VoxelIndex>> {
+pub(super) fn collision<V: MapView + ?Sized>(
+    view: &V,
+    body: &Shape,
+    unknown: UnknownAs,
+) -> Result<Option<Hit>> {
     let config = view.config();
-    let around = voxels_around(&config.grid, &body.bounds()?);
-    let occupied_from = config.occupied_log_odds();
-    let touches = |voxel: VoxelIndex| body.touches_voxel(&config.grid, voxel);
+    let grid = &config.grid;
+    let around = voxels_around(grid, &body.bounds()?);
     if unknown == UnknownAs::Obstacle {
-        return first_not_free(view, &around, touches);
+        let mut tiles = TileCursor::new(view);
+        return first_not_free(grid, body, |voxel| {
+            let evidence = tiles.tile_of(voxel)?.and_then(|tile| tile.evidence(voxel));
+            Ok(Occupancy::of(config, evidence))
+        });
     }
+    let occupied_from = config.occupied_log_odds();
     for index in tiles_in(view, &around) {
+        if !body.touches_voxels(grid, &grid.voxels_of_tile(index)) {
+            continue;
+        }
         let Some(tile) = view.tile(index)? else { continue };
-        let mut occupied = voxels_in(&tile, &around)
-            .filter(|voxel| voxel.evidence.log_odds >= occupied_from)
-            .map(|voxel| voxel.index);
-        if let Some(voxel) = occupied.find(|&voxel| touches(voxel)) {
-            return Ok(Some(voxel));
+        let mut touched = voxels_in(&tile, &around).filter(|voxel| {
+            voxel.evidence.log_odds >= occupied_from && body.touches_voxel(grid, voxel.index)
+        });
+        if let Some(voxel) = touched.next() {
+            let probability = Occupancy::of(config, Some(voxel.evidence)).probability();
+            return Ok(Some(Hit::from(grid, body.reference_point(), voxel.index, probability)));
         }
     }
     Ok(None)
 }
 
-fn first_not_free(
-    view: &impl MapView,
-    around: &VoxelBox,
-    touches: impl Fn(VoxelIndex) -> bool,
-) -> Result<Option<VoxelIndex>> {
+/// The first voxel that a body touches and that is not free, by `occupancy`. Bricks that the body does not touch are
+/// passed over.
+///
+/// # Errors
+///
+/// A wrong body, one around which there are too many voxels; errors of `occupancy`.
+pub(crate) fn first_not_free(
+    grid: &Grid,
+    body: &Shape,
+    mut occupancy: impl FnMut(VoxelIndex) -> Result<Occupancy>,
+) -> Result<Option<Hit>> {
+    let around = voxels_around(grid, &body.bounds()?);
     let size: u64 =
         (0..3).map(|k| u64::from(around.end[k].abs_diff(around.min[k]))).fold(1, u64::saturating_mul);
     if size > MAX_UNKNOWN_VOXELS {
@@ -58,17 +64,15 @@ fn first_not_free(
             hint,
         });
     }
-    let occupied_from = view.config().occupied_log_odds();
-    let mut tiles = TileCursor::new(view);
-    for x in around.min[0]..around.end[0] {
-        for y in around.min[1]..around.end[1] {
-            for z in around.min[2]..around.end[2] {
-                let voxel = [x, y, z];
-                if touches(voxel) {
-                    let evidence = tiles.tile_of(voxel)?.and_then(|tile| tile.evidence(voxel));
-                    if evidence.is_none_or(|evidence| evidence.log_odds >= occupied_from) {
-                        return Ok(Some(voxel));
-                    }
+    for brick in bricks_of(&around) {
+        if !body.touches_voxels(grid, &brick) {
+            continue;
+        }
+        for voxel in voxels_of(brick) {
+            if body.touches_voxel(grid, voxel) {
+                let found = occupancy(voxel)?;
+                if !matches!(found, Occupancy::Free(_)) {
+                    return Ok(Some(Hit::from(grid, body.reference_point(), voxel, found.probability())));
                 }
             }
         }
@@ -76,36 +80,19 @@ fn first_not_free(
     Ok(None)
 }
 
-impl Shape {
-    /// The smallest box around the body.
-    pub(crate) fn bounds(&self) -> Result<Aabb> {
-        let bounds = match *self {
-            Self::Sphere { radius_m, .. } if radius_m < 0.0 || radius_m.is_nan() => {
-                return Err(Error::argument("radius", format!("{radius_m} m is not a length of at least 0")));
-            }
-            Self::Sphere { center, radius_m } => {
-                Aabb { min: center.map(|c| c - radius_m), max: center.map(|c| c + radius_m) }
-            }
-            Self::Box(bounds) => bounds,
-        };
-        let finite = bounds.min.iter().chain(&bounds.max).all(|coordinate| coordinate.is_finite());
-        if finite { Ok(bounds) } else { Err(Error::argument("body", format!("{bounds} is not finite"))) }
-    }
-
-    /// Whether the body touches a voxel.
-    pub(crate) fn touches_voxel(&self, grid: &Grid, voxel: VoxelIndex) -> bool {
-        self.touches(&voxel_bounds(grid, voxel))
-    }
-
-    fn touches(&self, voxel: &Aabb) -> bool {
-        match self {
-            Self::Sphere { center, radius_m } => voxel.distance_squared(*center) <= radius_m * radius_m,
-            Self::Box(body) => (0..3).all(|k| body.min[k] <= voxel.max[k] && voxel.min[k] <= body.max[k]),
-        }
-    }
+/// The bricks that overlap a box, each cut to the box.
+fn bricks_of(voxels: &VoxelBox) -> impl Iterator<Item = VoxelBox> {
+    let voxels = *voxels;
+    let corners = move |k: usize| {
+        let first = voxels.min[k] & !(BRICK_EDGE - 1);
+        (first..voxels.end[k]).step_by(BRICK_EDGE as usize)
+    };
+    let corners =
+        corners(0).flat_map(move |x| corners(1).flat_map(move |y| corners(2).map(move |z| [x, y, z])));
+    corners.map(move |corner| brick_of(corner).intersection(&voxels))
 }
 
-fn voxel_bounds(grid: &Grid, voxel: VoxelIndex) -> Aabb {
-    let corner = |index: i32| f64::from(index) * grid.resolution_m();
-    Aabb { min: voxel.map(corner), max: voxel.map(|index| corner(index.saturating_add(1))) }
+fn voxels_of(VoxelBox { min, end }: VoxelBox) -> impl Iterator<Item = VoxelIndex> {
+    (min[0]..end[0])
+        .flat_map(move |x| (min[1]..end[1]).flat_map(move |y| (min[2]..end[2]).map(move |z| [x, y, z])))
 }

@@ -1,35 +1,52 @@
-//! Queries of maps. They work on any [`MapView`](crate::mapper::MapView), tile by tile.
+//! Queries of maps.
+//!
+//! | trait | of | answers |
+//! |---|---|---|
+//! | [`Queries`] | everything that can be asked, also as `dyn` | occupancy, rays, collisions, nearest voxels |
+//! | [`MapQueries`] | maps of tiles ([`MapView`](crate::mapper::MapView)) | exact evidence, digests, octrees |
 //!
 //! | query | answer |
 //! |---|---|
 //! | a point, many points | [`Occupancy`]: unknown, free or occupied, with the probability |
 //! | a point at a coarse depth | the same, for the largest log-odds under that octree node |
 //! | a region, the whole map | its voxels, streamed |
-//! | a ray, many rays | the first occupied voxel, exactly as single steps would find it |
-//! | a sphere, a box | the first occupied voxel that it touches |
-//! | nearest occupied | the occupied voxel with the nearest center |
+//! | a ray, many rays, a segment | [`Hit`]: the first occupied voxel, exactly as single steps would find it |
+//! | a sphere, a box, a swept sphere | [`Hit`]: an occupied voxel that it touches |
+//! | nearest occupied | [`Hit`]: the occupied voxel with the nearest center |
 //! | digest | one number for the whole content |
 //! | merged octree | OctoMap's tree of a region, or a `.bt` or `.ot` file of the whole map, streamed |
+//!
+//! `of_map` answers for maps of tiles, `occupied_set` for local maps and layers, [`United`] for several of both.
 
 mod coarse;
 mod collision;
 mod digest;
+mod hit;
+mod map_queries;
 mod merged;
 mod nearest;
 mod occupancy;
+pub(crate) mod occupied_set;
 mod octree_blocks;
 mod octree_reach;
 mod octree_shift;
+mod of_live_reader;
+mod of_map;
 mod point;
 mod queries;
 mod ray;
 mod region;
+mod shape;
 mod tile_cursor;
+mod united;
 
-pub use collision::Shape;
-pub use nearest::Nearest;
+pub use hit::Hit;
+pub use map_queries::MapQueries;
 pub use occupancy::{Occupancy, UnknownAs};
 pub use octree_blocks::OctreeExport;
-pub use queries::Queries;
-pub use ray::{RayHit, RayQuery};
+pub use queries::{Queries, VoxelOccupancy, Voxels};
+pub use ray::RayQuery;
+pub(crate) use ray::brick_of;
 pub(crate) use region::voxels_around;
+pub use shape::Shape;
+pub use united::United;

@@ -1,138 +1,111 @@
-use super::collision::{self, Shape};
-use super::nearest::{self, Nearest};
-use super::ray::{self, RayHit, RayQuery};
-use super::{Occupancy, OctreeExport, UnknownAs, coarse, digest, merged, octree_blocks, point, region};
-use crate::error::{Error, Result};
-use crate::mapper::MapView;
-use crate::octree::Octree;
-use crate::space::{Aabb, Point, VoxelIndex};
-use crate::tile::Voxel;
-use std::io::{self, Read, Seek, Write};
+use super::{Hit, Occupancy, RayQuery, Shape, UnknownAs};
+use crate::error::Result;
+use crate::space::{Aabb, Grid, Point, VoxelIndex};
+use rayon::prelude::*;
 
-/// The queries of a map; bring this trait into scope to use them.
+/// A voxel and its occupancy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelOccupancy {
+    /// The voxel's index; [`Grid::center_m`] has its place.
+    pub voxel: VoxelIndex,
+    /// Occupied or free.
+    pub occupancy: Occupancy,
+}
+
+/// The observed voxels of a region, one by one; take as many as wanted.
+pub type Voxels<'a> = Box<dyn Iterator<Item = Result<VoxelOccupancy>> + 'a>;
+
+/// What can be asked of everything that knows what is occupied: both mappers, a [`MapReader`](crate::MapReader) and its
+/// snapshots, a [`LiveReader`](crate::LiveReader) beside a mapper, the view of a local map, the layers of other robots,
+/// and several of these [`United`](super::United).
 ///
-/// Points are in metres in the world frame. A query fails only if a tile cannot be read, or if a tile that it evicts
-/// cannot be written.
-pub trait Queries: MapView + Sized {
-    /// The occupancy of the voxel that holds a point; unknown for a point that is not finite.
-    #[inline]
-    fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
-        Ok(Occupancy::of(self.config(), self.voxel_at(point)?.map(|voxel| voxel.evidence)))
-    }
+/// Points are in metres in the world frame. A planner takes `&dyn Queries` and works with any of them.
+///
+/// ```
+/// use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Scan, UnknownAs};
+///
+/// fn is_way_free(map: &dyn Queries, from: [f64; 3], to: [f64; 3]) -> voxtile::Result<bool> {
+///     Ok(map.cast_segment(from, to, UnknownAs::Free)?.is_none())
+/// }
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
+/// map.insert_scan(&Scan { origin: [0.0; 3], points: vec![[4.0, 0.0, 0.0]], intensities: None })?;
+/// assert!(is_way_free(&map, [0.0; 3], [3.5, 0.0, 0.0])?);
+/// assert!(!is_way_free(&map, [0.0; 3], [5.0, 0.0, 0.0])?);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+///
+/// Besides those that a method names: a tile that cannot be read; for a mapper, one that has to go for it and cannot be
+/// written; for a [`LiveView`](crate::LiveView), [`Error::Expired`](crate::Error::Expired).
+pub trait Queries: Sync {
+    /// The voxels of the map.
+    fn grid(&self) -> Grid;
 
-    /// The occupancy at many points, in their order; each tile is loaded once.
-    fn occupancy_at_points(&self, points: &[Point]) -> Result<Vec<Occupancy>> {
-        point::occupancy_at_points(self, points)
-    }
+    /// The occupancy of a voxel.
+    fn occupancy(&self, voxel: VoxelIndex) -> Result<Occupancy>;
 
-    /// The observed voxel that holds a point, with its exact evidence.
-    #[inline]
-    fn voxel_at(&self, point: Point) -> Result<Option<Voxel>> {
-        point::voxel_at(self, point)
-    }
+    /// The observed voxels whose center is in the half-open box, tile by tile; a tile is read when its first voxel is
+    /// taken. Of a local map and of layers, the occupied ones.
+    fn voxels_in(&self, region: &Aabb) -> Voxels<'_>;
 
-    /// The occupancy of the octree node at `depth` that holds a point: the largest log-odds under the node as `f32`,
-    /// OctoMap's precision. Depth 1 is half of OctoMap's space, depth 15 two voxels wide. At depth 16 the node is the
-    /// voxel, and the answer is bit-identical to [`Queries::occupancy_at`].
+    /// The first occupied voxel on a ray (or the first unknown one, if that is an obstacle), exactly as single steps
+    /// would find it; `None` if the ray ends first.
     ///
     /// # Errors
     ///
-    /// Another depth.
-    fn occupancy_at_depth(&self, point: Point, depth: u8) -> Result<Occupancy> {
-        coarse::occupancy_at_depth(self, point, depth)
-    }
+    /// An origin without a voxel, a zero direction, a wrong range.
+    fn cast_ray(&self, ray: &RayQuery) -> Result<Option<Hit>>;
 
-    /// Visits the observed voxels whose center is in the half-open box, tile by tile, in Morton order within each.
-    fn for_each_voxel_in(&self, region: &Aabb, visit: impl FnMut(Voxel)) -> Result<()> {
-        region::for_each_voxel_in(self, region, visit)
-    }
-
-    /// Visits the voxels of the whole map, or of a region, whose probability of being occupied is at least
-    /// `min_probability`; `None` takes the map's occupancy threshold.
-    fn for_each_occupied(
-        &self,
-        min_probability: Option<f64>,
-        region: Option<&Aabb>,
-        visit: impl FnMut(Voxel),
-    ) -> Result<()> {
-        region::for_each_occupied(self, min_probability, region, visit)
-    }
-
-    /// The occupied voxels of the whole map. For large maps use [`Queries::for_each_occupied`].
-    fn all_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
-        let mut voxels = Vec::new();
-        self.for_each_occupied(min_probability, None, |voxel| voxels.push(voxel))?;
-        Ok(voxels)
-    }
-
-    /// The occupied voxels of tiles in memory only; the answer depends on the cache.
-    fn cached_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
-        region::cached_occupied_voxels(self, min_probability)
-    }
-
-    /// The first occupied voxel on a ray (or the first unknown one, if that is an obstacle); `None` if the ray ends
-    /// first.
+    /// The same between two points, both of their voxels included.
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, a zero direction.
-    fn cast_ray(&self, query: &RayQuery) -> Result<Option<RayHit>> {
-        ray::cast_ray(self, query)
-    }
-
-    /// [`Queries::cast_ray`] for many rays, in their order.
-    fn cast_rays(&self, queries: &[RayQuery]) -> Result<Vec<Option<RayHit>>> {
-        queries.iter().map(|query| self.cast_ray(query)).collect()
-    }
+    /// An end without a voxel, a segment through more than a million voxels.
+    fn cast_segment(&self, from: Point, to: Point, unknown: UnknownAs) -> Result<Option<Hit>>;
 
     /// An occupied voxel that a body touches (or an unknown one, if that is an obstacle); `None` if the body is free of
     /// collision.
     ///
     /// # Errors
     ///
-    /// A body that is not finite, or so large that its voxels have no index.
-    fn collision(&self, body: &Shape, unknown: UnknownAs) -> Result<Option<VoxelIndex>> {
-        collision::collision(self, body, unknown)
-    }
+    /// A body that is not finite, or so large that its voxels have no index or, if the unknown is an obstacle, too many
+    /// to be searched.
+    fn collision(&self, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>>;
 
     /// The occupied voxel whose center is nearest to a point and at most `max_distance_m` away; at equal distances the
     /// one with the lowest index.
-    fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Nearest>> {
-        nearest::nearest_occupied(self, point, max_distance_m)
-    }
-
-    /// The digest of the map's content: equal for equal maps, however they were built. See `docs/format.md`.
-    fn digest(&self) -> Result<blake3::Hash> {
-        digest::digest(self)
-    }
-
-    /// One octree of the whole map or of a region, as in OctoMap, in memory. For larger maps use
-    /// [`Queries::write_octree`].
     ///
     /// # Errors
     ///
-    /// Voxels outside OctoMap's key range of 65536 voxels per axis around the origin; more than `max_voxels`.
-    fn merged_octree(&self, region: Option<&Aabb>, max_voxels: u64) -> Result<Octree> {
-        merged::merged_octree(self, region, max_voxels)
+    /// A point that is not finite, a wrong distance.
+    fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Hit>>;
+
+    /// The occupancy of the voxel that holds a point; unknown for a point that is not finite.
+    #[inline]
+    fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
+        self.grid().voxel_of(point).map_or(Ok(Occupancy::Unknown), |voxel| self.occupancy(voxel))
     }
 
-    /// Writes the `.bt` or `.ot` file of [`Queries::merged_octree`]'s tree without building the tree, whatever its
-    /// size. Returns the number of its voxels.
-    ///
-    /// The spool, an empty file or a [`Cursor`](std::io::Cursor), receives as many bytes as the file. `out` is written
-    /// only after all tiles were read.
-    ///
-    /// # Errors
-    ///
-    /// Voxels outside OctoMap's key range; errors of the spool or of `out`.
-    fn write_octree<E: From<Error> + From<io::Error>>(
-        &self,
-        export: &OctreeExport<'_>,
-        spool: &mut (impl Read + Write + Seek),
-        out: &mut impl Write,
-    ) -> std::result::Result<u64, E> {
-        octree_blocks::write_octree(self, export, spool, out)
+    /// The occupancy at many points, in their order, on all cores.
+    fn occupancy_at_points(&self, points: &[Point]) -> Result<Vec<Occupancy>> {
+        on_all_cores(points, |point| self.occupancy_at(*point))
+    }
+
+    /// [`Queries::cast_ray`] for many rays, in their order, on all cores.
+    fn cast_rays(&self, rays: &[RayQuery]) -> Result<Vec<Option<Hit>>> {
+        on_all_cores(rays, |ray| self.cast_ray(ray))
     }
 }
 
-impl<V: MapView> Queries for V {}
+/// Asks many questions; of several errors the one of the first question is returned.
+pub(super) fn on_all_cores<Q: Sync, A: Send>(
+    questions: &[Q],
+    ask: impl Fn(&Q) -> Result<A> + Sync,
+) -> Result<Vec<A>> {
+    let answers: Vec<Result<A>> = questions.par_iter().map(&ask).collect();
+    answers.into_iter().collect()
+}

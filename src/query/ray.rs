@@ -1,10 +1,9 @@
 use super::tile_cursor::TileCursor;
-use super::{Occupancy, UnknownAs};
+use super::{Hit, Occupancy, UnknownAs};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::scan::RayWalk;
-use crate::space::{BRICK_EDGE, BrickCode, Point, VoxelBox, VoxelIndex};
-use serde::Serialize;
+use crate::scan::{MAX_RAY_STEPS, RayWalk};
+use crate::space::{BRICK_EDGE, BrickCode, Grid, Point, VoxelBox, VoxelIndex};
 
 /// A ray to be cast through the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,22 +18,30 @@ pub struct RayQuery {
     pub unknown: UnknownAs,
 }
 
-/// Where a ray ended.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct RayHit {
-    /// The voxel that stopped the ray.
-    pub voxel: VoxelIndex,
-    /// Its center in metres.
-    pub center_m: Point,
-    /// How far from the origin the ray enters it, in metres; 0 if the ray begins in it.
-    pub distance_m: f64,
-    /// Probability of being occupied; `None` if the voxel is unknown.
-    pub probability: Option<f64>,
+/// What a ray meets in a voxel.
+pub(crate) enum Met {
+    /// Something that stops it, with the probability of being occupied; `None` for the unknown.
+    Obstacle(Option<f64>),
+    /// Nothing that stops it.
+    Free,
+    /// Nothing that stops it in this box around the voxel.
+    Empty(VoxelBox),
 }
 
-pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<RayHit>> {
-    let config = view.config();
-    let grid = &config.grid;
+/// All voxels.
+pub(crate) const EVERYWHERE: VoxelBox = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
+
+/// Walks a ray until it is stopped. Outside the hull everything is unknown; there is no hull around nothing.
+///
+/// # Errors
+///
+/// An origin without a voxel, a direction without a length, a wrong range; errors of `meet`.
+pub(crate) fn walk_ray(
+    grid: &Grid,
+    query: &RayQuery,
+    hull: Option<VoxelBox>,
+    mut meet: impl FnMut(VoxelIndex) -> Result<Met>,
+) -> Result<Option<Hit>> {
     let (origin, direction) = (query.origin, of_usable_size(query.direction));
     let start = grid
         .voxel_of(origin)
@@ -51,8 +58,6 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
         start,
         grid.to_voxel_units(direction.map(|d| d / length)), // Times come out in metres.
     );
-    // Outside the box around all tiles everything is unknown.
-    let hull = hull_of_map(view);
     let enters = hull.as_ref().is_some_and(|hull| match query.unknown {
         UnknownAs::Free => walk.enter(hull),
         UnknownAs::Obstacle => hull.contains(start),
@@ -60,32 +65,19 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
     let Some(hull) = hull.filter(|_| enters) else {
         // Only the unknown at the origin can be hit.
         let blocked = query.unknown == UnknownAs::Obstacle;
-        let hit = RayHit { voxel: start, center_m: grid.center_m(start), distance_m: 0.0, probability: None };
+        let hit = Hit { voxel: start, center_m: grid.center_m(start), distance_m: 0.0, probability: None };
         return Ok(blocked.then_some(hit));
     };
     let range_m = query.max_range_m.unwrap_or(f64::INFINITY);
-    let occupied_from = config.occupied_log_odds();
-    let mut tiles = TileCursor::new(view);
     while walk.entry_time() <= range_m {
         let voxel = walk.voxel();
-        let tile = tiles.tile_of(voxel)?;
-        let log_odds = tile.and_then(|tile| tile.evidence(voxel)).map(|evidence| evidence.log_odds);
-        let stops = match log_odds {
-            None => query.unknown == UnknownAs::Obstacle,
-            Some(log_odds) => log_odds >= occupied_from,
-        };
-        if stops {
-            // The probability is computed for the answer alone.
-            let occupancy = Occupancy::of_log_odds(config, log_odds);
-            let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time());
-            return Ok(Some(RayHit { voxel, center_m, distance_m, probability: occupancy.probability() }));
-        }
-        match tile {
-            None => walk.leave(&grid.voxels_of_tile(grid.tile_of_voxel(voxel))),
-            Some(tile) if !tile.table().has_brick(BrickCode::of_voxel(voxel)) => {
-                walk.leave(&brick_of(voxel).intersection(&tile.voxel_box()));
+        match meet(voxel)? {
+            Met::Obstacle(probability) => {
+                let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time());
+                return Ok(Some(Hit { voxel, center_m, distance_m, probability }));
             }
-            Some(_) => walk.advance(),
+            Met::Free => walk.advance(),
+            Met::Empty(empty) => walk.leave(&empty),
         }
         let is_over = query.unknown == UnknownAs::Free && !hull.contains(walk.voxel());
         if is_over || walk.voxel() == voxel {
@@ -96,6 +88,76 @@ pub(super) fn cast_ray(view: &impl MapView, query: &RayQuery) -> Result<Option<R
     Ok(None)
 }
 
+/// Walks from one point to another, both ends included, until it is stopped.
+///
+/// # Errors
+///
+/// An end without a voxel, a segment through more than a million voxels; errors of `meet`.
+pub(crate) fn walk_segment(
+    grid: &Grid,
+    [from, to]: [Point; 2],
+    mut meet: impl FnMut(VoxelIndex) -> Result<Met>,
+) -> Result<Option<Hit>> {
+    let (Some(start), Some(last)) = (grid.voxel_of(from), grid.voxel_of(to)) else {
+        let reason = format!("{from:?} to {to:?} m is not finite or too far away for voxel indices");
+        return Err(Error::argument("segment", reason));
+    };
+    let mut walk = RayWalk::between(grid.to_voxel_units(from), start, grid.to_voxel_units(to), last);
+    if walk.steps() > MAX_RAY_STEPS {
+        let reason = format!("meets {} voxels; ask for at most {MAX_RAY_STEPS}", walk.steps());
+        return Err(Error::argument("segment", reason));
+    }
+    let length_m = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
+    loop {
+        let voxel = walk.voxel();
+        match meet(voxel)? {
+            Met::Obstacle(probability) => {
+                let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time() * length_m);
+                return Ok(Some(Hit { voxel, center_m, distance_m, probability }));
+            }
+            _ if walk.is_at_end() => return Ok(None),
+            Met::Free => walk.advance(),
+            Met::Empty(empty) => walk.leave(&empty),
+        }
+    }
+}
+
+pub(super) fn cast_ray<V: MapView + ?Sized>(view: &V, query: &RayQuery) -> Result<Option<Hit>> {
+    walk_ray(&view.config().grid, query, hull_of_map(view), meet_map(view, query.unknown))
+}
+
+pub(super) fn cast_segment<V: MapView + ?Sized>(
+    view: &V,
+    ends: [Point; 2],
+    unknown: UnknownAs,
+) -> Result<Option<Hit>> {
+    walk_segment(&view.config().grid, ends, meet_map(view, unknown))
+}
+
+/// What a ray meets in the voxels of a map.
+fn meet_map<V: MapView + ?Sized>(view: &V, unknown: UnknownAs) -> impl FnMut(VoxelIndex) -> Result<Met> {
+    let config = view.config();
+    let (grid, occupied_from) = (config.grid, config.occupied_log_odds());
+    let mut tiles = TileCursor::new(view);
+    move |voxel| {
+        let tile = tiles.tile_of(voxel)?;
+        let log_odds = tile.and_then(|tile| tile.evidence(voxel)).map(|evidence| evidence.log_odds);
+        let stops = match log_odds {
+            None => unknown == UnknownAs::Obstacle,
+            Some(log_odds) => log_odds >= occupied_from,
+        };
+        Ok(match tile {
+            // The probability is computed for the answer alone.
+            _ if stops => Met::Obstacle(Occupancy::of_log_odds(config, log_odds).probability()),
+            None => Met::Empty(grid.voxels_of_tile(grid.tile_of_voxel(voxel))),
+            Some(tile) if !tile.table().has_brick(BrickCode::of_voxel(voxel)) => {
+                Met::Empty(brick_of(voxel).intersection(&tile.voxel_box()))
+            }
+            Some(_) => Met::Free,
+        })
+    }
+}
+
 /// The same direction, scaled if its squares would overflow or underflow.
 fn of_usable_size(direction: Point) -> Point {
     let longest = direction.iter().fold(0.0, |longest: f64, d| longest.max(d.abs()));
@@ -104,14 +166,15 @@ fn of_usable_size(direction: Point) -> Point {
 }
 
 /// The voxels of a box around all tiles; `None` for an empty map.
-fn hull_of_map(view: &impl MapView) -> Option<VoxelBox> {
+fn hull_of_map<V: MapView + ?Sized>(view: &V) -> Option<VoxelBox> {
     let bounds = view.tile_bounds()?;
     let grid = &view.config().grid;
     let [low, high] = [bounds.min(), bounds.max()].map(|corner| grid.voxels_of_tile(corner));
     Some(VoxelBox { min: low.min, end: high.end })
 }
 
-fn brick_of(voxel: VoxelIndex) -> VoxelBox {
+/// The voxels of the brick that holds a voxel.
+pub(crate) fn brick_of(voxel: VoxelIndex) -> VoxelBox {
     let min = voxel.map(|k| k & !(BRICK_EDGE - 1));
     VoxelBox { min, end: min.map(|k| k.saturating_add(BRICK_EDGE)) }
 }

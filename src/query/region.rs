@@ -1,25 +1,38 @@
 use crate::config::MapConfig;
 use crate::error::Result;
-use crate::mapper::MapView;
+use crate::mapper::{MapView, TileRef};
 use crate::maths::logit;
 use crate::space::{Aabb, BRICK_EDGE, Grid, TileBox, TileIndex, VoxelBox};
 use crate::tile::{Tile, Voxel};
 
-pub(super) fn for_each_voxel_in(
-    view: &impl MapView,
+pub(super) fn evidence_in<'a, V: MapView + ?Sized>(
+    view: &'a V,
+    region: &Aabb,
+) -> impl Iterator<Item = Result<Voxel>> + use<'a, V> {
+    let (grid, region) = (view.config().grid, *region);
+    let voxels = voxels_around(&grid, &region);
+    tiles_in(view, &voxels).into_iter().flat_map(move |index| {
+        let tile = match view.tile_uncached(index) {
+            Ok(tile) => tile,
+            Err(error) => return vec![Err(error)],
+        };
+        let inside = |tile: TileRef<'_>| {
+            let voxels = voxels_in(&tile, &voxels);
+            voxels.filter(|voxel| region.contains(grid.center_m(voxel.index))).map(Ok).collect()
+        };
+        tile.map_or(Vec::new(), inside)
+    })
+}
+
+pub(super) fn for_each_voxel_in<V: MapView + ?Sized>(
+    view: &V,
     region: &Aabb,
     mut visit: impl FnMut(Voxel),
 ) -> Result<()> {
-    let grid = view.config().grid;
-    let voxels = voxels_around(&grid, region);
-    for index in tiles_in(view, &voxels) {
-        if let Some(tile) = view.tile_uncached(index)? {
-            let inside =
-                voxels_in(&tile, &voxels).filter(|voxel| region.contains(grid.center_m(voxel.index)));
-            inside.for_each(&mut visit);
-        }
-    }
-    Ok(())
+    evidence_in(view, region).try_for_each(|voxel| {
+        visit(voxel?);
+        Ok(())
+    })
 }
 
 pub(super) fn for_each_occupied(
@@ -68,7 +81,7 @@ fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
 }
 
 /// The tiles of the map that overlap a box of voxels, in order.
-pub(super) fn tiles_in(view: &impl MapView, voxels: &VoxelBox) -> Vec<TileIndex> {
+pub(super) fn tiles_in<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Vec<TileIndex> {
     /// Looking up so many is cheaper than listing all tiles of a large map.
     const MOST_LOOKED_UP: u64 = 4096;
     let Some(tiles) = tile_box_around(view, voxels) else { return Vec::new() };
@@ -81,7 +94,7 @@ pub(super) fn tiles_in(view: &impl MapView, voxels: &VoxelBox) -> Vec<TileIndex>
 }
 
 /// The tiles, there or not, that overlap a box of voxels within the bounds of the map.
-fn tile_box_around(view: &impl MapView, voxels: &VoxelBox) -> Option<TileBox> {
+fn tile_box_around<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Option<TileBox> {
     if voxels.is_empty() {
         return None;
     }

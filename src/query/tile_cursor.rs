@@ -4,12 +4,12 @@ use crate::space::{TileIndex, VoxelIndex};
 use crate::tile::Tile;
 
 /// Keeps the last tile, so that neighbouring voxels load it once.
-pub(super) struct TileCursor<'a, V> {
+pub(super) struct TileCursor<'a, V: ?Sized> {
     view: &'a V,
     tile: Option<(TileIndex, Option<TileRef<'a>>)>,
 }
 
-impl<'a, V: MapView> TileCursor<'a, V> {
+impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
     pub(super) fn new(view: &'a V) -> Self {
         Self { view, tile: None }
     }

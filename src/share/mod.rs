@@ -6,7 +6,7 @@
 //! which sends newly occupied voxels and nothing more; `docs/sharing.md` has the protocol and its bytes.
 //!
 //! ```text
-//! mapper -> MapWatch -> Sender: buffer, frames, ring -> packets -> Receiver -> VoxelSet (a layer) -> WithLayers, merge
+//! mapper -> MapWatch -> Sender: buffer, frames, ring -> packets -> Receiver -> VoxelSet (a layer) -> query::United, merge
 //!                              ^                                     |
 //!                              +---- requests: status, missing, digests, content <----+
 //! ```
@@ -61,10 +61,10 @@ mod sender;
 mod sender_config;
 mod set;
 mod set_memory;
+mod set_queries;
 mod set_range;
 mod stream;
 mod token_bucket;
-mod union;
 mod voxel_versions;
 mod watch;
 
@@ -78,5 +78,4 @@ pub use sender::{Outgoing, ReceiverId, Sender};
 pub use sender_config::{SenderConfig, SenderCounts};
 pub use set::VoxelSet;
 pub use set_range::{SetPosition, SetRange};
-pub use union::WithLayers;
 pub use watch::{LocalWatch, MapWatch};

@@ -48,6 +48,7 @@ pub(crate) use tile_store::{hex, id_from_hex};
 pub use tiles::file_checksum::{Checksumming, FileChecksum};
 pub use tiles::spill_file::SpillFile;
 pub use tiles::tile_location::{StoredTile, TileLocation};
+pub use tiles::tile_reader::TileReader;
 pub(crate) use tiles::tile_version::MAX_NUMBER;
 pub use tiles::tile_version::TileVersion;
 pub use tiles::tile_writer::TileWriter;

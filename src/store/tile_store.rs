@@ -13,6 +13,7 @@ use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
 use super::snapshots::snapshot_name::SnapshotName;
 use super::tiles::tile_location::{StoredTile, TileLocation};
+use super::tiles::tile_reader::TileReader;
 use super::tiles::tile_version::TileVersion;
 use super::tiles::tile_versions::TileVersions;
 use crate::error::{Error, FormatError, Result};
@@ -21,7 +22,7 @@ use crate::store::WriterLock;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// The tiles of a map on disk, and the one commit point that makes a flush whole.
 ///
@@ -49,7 +50,7 @@ pub struct TileStore {
     shared_metadata: Option<SharedMetadata>,
 }
 
-struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Box<dyn DiskRead>);
+struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Mutex<Box<dyn DiskRead>>);
 
 /// How often a reader begins to open a map again because a flush came in between.
 const OPEN_ATTEMPTS: usize = 100;
@@ -140,7 +141,7 @@ impl TileStore {
             // unless it was killed.
             let is_known = !store.is_metadata_behind() || attempt + 1 >= OPEN_ATTEMPTS / 2;
             if now.ext.map(|ext| ext.flush_number) == store.committer.written_flush() && is_known {
-                return Ok(Self { shared_metadata: Some(SharedMetadata(shared)), ..store });
+                return Ok(Self { shared_metadata: Some(SharedMetadata(Mutex::new(shared))), ..store });
             }
             if !is_known {
                 disk.pause();
@@ -388,6 +389,18 @@ impl TileStore {
     pub fn location(&self, tile: TileIndex) -> Option<TileLocation> {
         let version = self.version(tile)?;
         Some(self.location_at(tile, self.latest_path(tile), Some(version)))
+    }
+
+    /// What finds tables beside this store; for a map with an id.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] for a map of the original format.
+    pub fn reader(&self) -> Result<TileReader> {
+        match self.map_id() {
+            Some(map_id) => Ok(TileReader::new(self.files.clone(), map_id)),
+            None => Err(Error::argument("map", "of the original format; its versions have no checksums")),
+        }
     }
 
     fn location_at(&self, tile: TileIndex, path: PathBuf, version: Option<TileVersion>) -> TileLocation {

@@ -7,7 +7,7 @@ use voxtile::operations::{Part, convert, crop};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Aabb;
 use voxtile::{
-    Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Result, Scan, Storage,
+    Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Scan, Storage,
 };
 
 const INPUT: &str = "random scans";

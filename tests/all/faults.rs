@@ -3,8 +3,8 @@ use std::path::PathBuf;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::{
-    Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries,
-    Result, Scan, Storage,
+    Error, InMemoryMapper, MapConfig, MapQueries, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper,
+    Queries, Result, Scan, Storage,
 };
 
 const INPUT: &str = "random scans";

@@ -18,7 +18,7 @@ use voxtile::share::codec::Packet;
 use voxtile::share::{Sender, SenderConfig, VoxelSet, read_layer, write_layer};
 use voxtile::space::Aabb;
 use voxtile::store::SnapshotName;
-use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Scan, Storage};
+use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 const MAPS: [&str; 4] = ["plain", "killed", "compact", "seed"];
 
@@ -49,7 +49,7 @@ fn scans() -> Vec<Scan> {
     (0..6).map(|k| random_scan(&mut random, [2.0 * f64::from(k), 0.0, 0.0], 40)).collect()
 }
 
-fn digest(map: &impl Queries) -> Value {
+fn digest(map: &impl MapQueries) -> Value {
     json!(map.digest().unwrap().to_string())
 }
 

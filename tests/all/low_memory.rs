@@ -4,7 +4,7 @@ use std::time::Duration;
 use tempfile::TempDir;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::Survey;
-use voxtile::{InMemoryMapper, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan};
 
 fn config() -> MapConfig {
     MapConfig::new(0.2, 6.4).unwrap().with_range(0.0, 20.0)

@@ -23,6 +23,8 @@ mod corruption;
 mod faults;
 /// Files of every kind, of every version.
 mod format_fixtures;
+/// One trait for everything that can be asked.
+mod front_door;
 /// Inputs that fuzzing found worth keeping, once more.
 mod fuzz_corpus;
 /// Builds that are resumed, maps that are verified and repaired, from the command line.
@@ -30,6 +32,8 @@ mod fuzz_corpus;
 mod interrupted;
 /// What each folder may know.
 mod layering;
+/// Readers in other threads beside the mapper.
+mod live_readers;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
 mod local_map;
 mod low_memory;

@@ -8,7 +8,7 @@ use voxtile::integrity::{Finding, Severity, Verification, verify_on};
 use voxtile::operations::{delete_snapshot_on, revert_on, snapshot_on, snapshots_on};
 use voxtile::space::TileIndex;
 use voxtile::store::{SnapshotName, TileStore, tile_of_folder};
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Result, Scan};
+use voxtile::{Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Scan};
 
 fn map() -> &'static Path {
     Path::new("/city/map")

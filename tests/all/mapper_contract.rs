@@ -4,7 +4,7 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
-use voxtile::query::Queries;
+use voxtile::query::{MapQueries, Queries};
 use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;

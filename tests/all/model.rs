@@ -3,7 +3,9 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::{InsertMode, MapConfig, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Queries, Storage};
+use voxtile::{
+    InsertMode, MapConfig, MapQueries, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Storage,
+};
 
 /// One random life of a map beside the naive one, which is set back to the last flush where the map crashes.
 fn live(seed: u64, config: &MapConfig) {

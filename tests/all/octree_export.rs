@@ -9,12 +9,12 @@ use voxtile::octree::{
 use voxtile::query::OctreeExport;
 use voxtile::scan::PointBatch;
 use voxtile::space::{Aabb, MortonCode, Point};
-use voxtile::{Error, InMemoryMapper, MapConfig, MapReader, Mapper, Queries, Result};
+use voxtile::{Error, InMemoryMapper, MapConfig, MapQueries, MapReader, Mapper, Result};
 
 const FORMATS: [OctreeFormat; 2] = [OctreeFormat::Bt, OctreeFormat::Ot];
 
 /// What is written from the tree in memory.
-fn whole(map: &impl Queries, format: OctreeFormat, region: Option<&Aabb>) -> Vec<u8> {
+fn whole(map: &impl MapQueries, format: OctreeFormat, region: Option<&Aabb>) -> Vec<u8> {
     let tree = map.merged_octree(region, u64::MAX).unwrap();
     let (config, mut bytes) = (map.config(), Vec::new());
     let resolution_m = config.grid.resolution_m();
@@ -27,7 +27,7 @@ fn whole(map: &impl Queries, format: OctreeFormat, region: Option<&Aabb>) -> Vec
 }
 
 fn streamed(
-    map: &impl Queries,
+    map: &impl MapQueries,
     format: OctreeFormat,
     region: Option<&Aabb>,
     memory_bytes: usize,
@@ -41,7 +41,7 @@ fn streamed(
 }
 
 /// The streamed files of a map are those of its whole tree, with any memory.
-fn check(map: &impl Queries, region: Option<&Aabb>) {
+fn check(map: &impl MapQueries, region: Option<&Aabb>) {
     let mut count = 0;
     match region {
         Some(region) => map.for_each_voxel_in(region, |_| count += 1).unwrap(),

@@ -8,7 +8,8 @@ use voxtile::query::{RayQuery, Shape, UnknownAs};
 use voxtile::scan::{PointBatch, RayWalk};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
 use voxtile::{
-    InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries,
+    InMemoryMapper, MapConfig, MapQueries, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper,
+    Queries,
 };
 
 fn config() -> MapConfig {
@@ -210,10 +211,10 @@ fn regions_collisions_and_nearest_are_those_of_a_search_of_every_voxel() {
             Aabb { min: corner, max: far }.distance_squared(center) <= radius_m * radius_m
         };
         let sphere = Shape::Sphere { center, radius_m };
-        let answer = out_of_core.collision(&sphere, UnknownAs::Free).unwrap();
+        let answer = out_of_core.collision(&sphere, UnknownAs::Free).unwrap().map(|hit| hit.voxel);
         assert_eq!(answer.is_some(), occupied.iter().any(touches));
         assert!(answer.is_none_or(|voxel| occupied.contains(&voxel) && touches(&voxel)));
-        let strict = map.collision(&sphere, UnknownAs::Obstacle).unwrap();
+        let strict = map.collision(&sphere, UnknownAs::Obstacle).unwrap().map(|hit| hit.voxel);
         assert!(answer.is_none() || strict.is_some());
         assert!(
             strict

@@ -4,7 +4,7 @@ use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::{Severity, repair_on, verify_on};
 use voxtile::operations::{delete_snapshot_on, revert_on, snapshots_on};
 use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
-use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Result};
+use voxtile::{MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result};
 
 fn map() -> &'static Path {
     Path::new("/map")

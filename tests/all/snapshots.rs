@@ -12,7 +12,7 @@ use voxtile::operations::{
     Diff, TileChange, TileDiff, delete_snapshot_on, diff, revert_on, snapshot_on, snapshots_on,
 };
 use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileStore};
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries, Scan, Storage};
+use voxtile::{Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()

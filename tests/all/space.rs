@@ -4,7 +4,7 @@ use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::scan::PointBatch;
 use voxtile::space::{Point, TileIndex};
-use voxtile::{InMemoryMapper, MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan};
 
 #[test]
 fn far_negative_and_border_tiles_come_back_to_the_bit() {

@@ -7,7 +7,7 @@ use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::verify;
 use voxtile::simulation::{City, Drive, Lidar, Survey};
 use voxtile::space::TileIndex;
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries};
+use voxtile::{Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 3.2).unwrap().with_cache_tiles(2).with_pending_bytes(1000)

@@ -5,7 +5,7 @@ use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::{Severity, repair_on, verify_on};
 use voxtile::operations::delete_snapshot_on;
 use voxtile::store::SnapshotName;
-use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Result, Storage};
+use voxtile::{MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
 
 fn map() -> &'static Path {
     Path::new("/map")

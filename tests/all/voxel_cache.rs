@@ -9,7 +9,7 @@ use voxtile::simulation::Survey;
 use voxtile::space::{MortonCode, TileIndex, VoxelIndex, VoxelKey};
 use voxtile::tile::{OctreeStatistics, VoxelCacheCounts};
 use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, OutOfCoreTileMapper};
-use voxtile::{Queries, VoxelCacheConfig, VoxelCacheMode};
+use voxtile::{MapQueries, VoxelCacheConfig, VoxelCacheMode};
 
 /// Every mode, with caches that hold nothing, little, and what they like.
 fn modes() -> Vec<VoxelCacheMode> {

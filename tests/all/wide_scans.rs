@@ -5,8 +5,8 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
-    InMemoryMapper, InsertMode, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper,
-    Queries, Scan, Storage,
+    InMemoryMapper, InsertMode, MapConfig, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
+    OutOfCoreTileMapper, Queries, Scan, Storage,
 };
 
 /// From masts here and there: every ray goes far, through many tiles.

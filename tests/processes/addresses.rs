@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use tempfile::NamedTempFile;
 use voxtile::io::{ScanStreamWriter, open_scans};
 use voxtile::simulation::Survey;
-use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries};
+use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper};
 
 const SCANS: usize = 16;
 const RESOLUTION_M: f64 = 0.2;

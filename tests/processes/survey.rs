@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use voxtile::io::{ScanStreamWriter, open_scans};
 use voxtile::simulation::{City, Drive, Lidar, Survey};
-use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper, Scan};
 
 /// A folder of scans, and the digest of their map after each number of them.
 pub struct Scans {

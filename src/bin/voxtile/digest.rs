@@ -3,7 +3,7 @@ use crate::map_at::read_map;
 use crate::memory;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::Queries;
+use voxtile::MapQueries;
 use voxtile::mapper::MapView;
 
 pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {

@@ -16,7 +16,7 @@ use voxtile::maths::logit;
 use voxtile::octree::{OctreeFormat, write_bt, write_ot};
 use voxtile::query::OctreeExport;
 use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
-use voxtile::{Error, Queries};
+use voxtile::{Error, MapQueries};
 
 #[derive(Clone, Copy)]
 enum ExportFormat {

@@ -9,7 +9,7 @@ use voxtile::mapper::{MapReader, MapView};
 use voxtile::operations::{KeptBytes, kept_bytes};
 use voxtile::sensor::SensorModel;
 use voxtile::store::{Bounds, InputRecord};
-use voxtile::{Queries, Result, Storage};
+use voxtile::{MapQueries, Result, Storage};
 
 /// Inputs that are shown to people; JSON has them all.
 const INPUTS_SHOWN: usize = 5;

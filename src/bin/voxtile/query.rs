@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use voxtile::io::read_points;
 use voxtile::mapper::MapView;
 use voxtile::space::Point;
-use voxtile::{Error, Occupancy, Queries};
+use voxtile::{Error, MapQueries, Occupancy};
 
 #[derive(Debug, Serialize)]
 struct Answer {

@@ -4,12 +4,13 @@ use crate::store::SpillFile;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 use std::collections::hash_map::Entry;
+use std::sync::Arc;
 
 /// Updates of tiles that are not resident, in order and packed: the first of a tile's spilled to its file, if memory
 /// was short, the others in memory.
 #[derive(Debug, Default)]
 pub(super) struct BufferedUpdates {
-    in_memory: FxHashMap<TileIndex, PackedUpdates>,
+    in_memory: FxHashMap<TileIndex, Arc<PackedUpdates>>,
     /// Bytes of memory of these.
     bytes: usize,
     spilled: TileTable<Spilled>,
@@ -26,7 +27,7 @@ pub(super) struct Spilled {
 
 impl BufferedUpdates {
     /// What a tile takes in memory beside its updates: its place in the table, which may be half empty.
-    const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, PackedUpdates)>();
+    const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, usize)>() + size_of::<PackedUpdates>() + 16;
     /// Bytes of memory that a tile with a spill file takes, about.
     pub(super) const BYTES_OF_FILE: usize = 24;
 
@@ -35,9 +36,10 @@ impl BufferedUpdates {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(place) => {
                 self.bytes += Self::SLOT_BYTES;
-                place.insert(PackedUpdates::default())
+                place.insert(Arc::default())
             }
         };
+        let updates_so_far = Arc::make_mut(updates_so_far);
         self.bytes -= updates_so_far.bytes();
         updates_so_far.push(updates);
         self.bytes += updates_so_far.bytes();
@@ -63,7 +65,7 @@ impl BufferedUpdates {
     }
 
     /// A tile's updates in memory.
-    pub(super) fn in_memory(&self, tile: TileIndex) -> Option<&PackedUpdates> {
+    pub(super) fn in_memory(&self, tile: TileIndex) -> Option<&Arc<PackedUpdates>> {
         self.in_memory.get(&tile)
     }
 
@@ -114,7 +116,7 @@ impl BufferedUpdates {
 
     /// Number of updates.
     pub(super) fn updates(&self) -> u64 {
-        let in_memory: usize = self.in_memory.values().map(PackedUpdates::len).sum();
+        let in_memory: usize = self.in_memory.values().map(|updates| updates.len()).sum();
         self.all_spilled.updates + in_memory as u64
     }
 

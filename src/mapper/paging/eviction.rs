@@ -11,17 +11,17 @@ use crate::tile::Tile;
 /// Bytes that a new tile takes besides its voxels while a scan creates it: scan parts, buffered updates and index.
 const BYTES_OF_NEW_TILE: usize = 120;
 
-impl TilePager {
+impl TilePager<'_> {
     /// Checks that the index of tiles takes at most half of the limit.
     ///
     /// # Errors
     ///
     /// [`Error::InvalidArgument`] with a sufficient limit.
     pub(super) fn check_index(&self, updates: &ScanUpdates) -> Result<()> {
-        let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.buffer.is_staged(**tile);
+        let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.contents.buffer.is_staged(**tile);
         let tiles = updates.tiles.iter().map(|(tile, _)| tile).filter(is_new).count();
-        let tiles = tiles + self.buffer.staged_tiles().filter(|tile| !self.exists(*tile)).count();
-        let plan = self.cache.plan();
+        let tiles = tiles + self.contents.buffer.staged_tiles().filter(|tile| !self.exists(*tile)).count();
+        let plan = self.contents.cache.plan();
         let index = self.disk.index_bytes() + BYTES_OF_NEW_TILE * tiles;
         if !plan.is_enforced || index <= plan.bytes / 2 {
             return Ok(());
@@ -39,7 +39,7 @@ impl TilePager {
 
     /// How many tiles one scan may touch.
     pub(in crate::mapper) fn most_tiles_of_scan(&self) -> usize {
-        let plan = self.cache.plan();
+        let plan = self.contents.cache.plan();
         match plan.is_enforced {
             true => (plan.bytes / 2).saturating_sub(self.memory().index as usize) / BYTES_OF_NEW_TILE,
             false => usize::MAX,
@@ -48,28 +48,29 @@ impl TilePager {
 
     /// Bytes of memory that grow outside of the cache.
     fn outside_bytes(&self) -> usize {
-        self.buffer.bytes() + self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes()
+        let disk = self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes();
+        self.contents.buffer.bytes() + self.contents.views.bytes() + disk
     }
 
     /// Whether so many more tiles fit, and so many bytes with them.
     pub(super) fn has_room_for(&self, tiles: usize, bytes: usize) -> bool {
-        self.cache.has_room_for(tiles, bytes, self.outside_bytes())
+        self.contents.cache.has_room_for(tiles, bytes, self.outside_bytes())
     }
 
     /// Whether there is room to load a tile ahead of use without evicting others soon.
     pub(super) fn has_room_to_spare(&self) -> bool {
-        self.has_room_for(1, self.cache.plan().spare_bytes)
+        self.has_room_for(1, self.contents.cache.plan().spare_bytes)
     }
 
     /// Evicts tiles until this one fits.
     pub(super) fn make_room(&mut self, tile: &Tile) -> Result<()> {
-        self.make_room_for(tile.bytes(), self.cache.plan().tiles - 1)
+        self.make_room_for(tile.bytes(), self.contents.cache.plan().tiles - 1)
     }
 
     /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles in use are not evicted; if all are
     /// in use, the limit is exceeded.
     pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize) -> Result<()> {
-        while let Some(eviction) = self.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
+        while let Some(eviction) = self.contents.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
             match eviction {
                 Eviction::Resident(index) => self.evict(index)?,
                 Eviction::Compact(index) => self.evict_compact(index)?,
@@ -81,33 +82,33 @@ impl TilePager {
     /// Evicts a resident tile: into the compact form, or to disk where there is no such tier.
     pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
         log::debug!("tile {index}: evicted");
-        if self.cache.has_compact_tier() {
-            return self.cache.make_compact(index);
+        if self.contents.cache.has_compact_tier() {
+            return self.contents.cache.make_compact(index);
         }
-        if self.cache.is_dirty(index) {
+        if self.contents.cache.is_dirty(index) {
             self.write(index)?;
         }
-        self.cache.drop_resident(index);
+        self.contents.cache.drop_resident(index);
         Ok(())
     }
 
     /// Drops a tile in the compact form, once it is on disk.
     fn evict_compact(&mut self, index: TileIndex) -> Result<()> {
-        while self.cache.is_dirty(index) {
+        while self.contents.cache.is_dirty(index) {
             self.begin_save(index)?;
             self.wait_for_save()?;
         }
-        self.cache.drop_compact(index);
+        self.contents.cache.drop_compact(index);
         Ok(())
     }
 
     /// Saves tiles before they have to go, as many as may be in flight.
     fn save_ahead(&mut self) -> Result<()> {
-        if !self.cache.has_compact_tier() || self.disk.has_save_error() {
+        if !self.contents.cache.has_compact_tier() || self.disk.has_save_error() {
             return Ok(());
         }
         while self.disk.can_save()
-            && let Some(index) = self.cache.next_to_save()
+            && let Some(index) = self.contents.cache.next_to_save()
         {
             self.begin_save(index)?;
         }
@@ -116,16 +117,17 @@ impl TilePager {
 
     /// Begins to save a tile in the compact form, if it is dirty and not being saved.
     pub(super) fn begin_save(&mut self, index: TileIndex) -> Result<()> {
-        if !self.cache.needs_save(index) {
+        if !self.contents.cache.needs_save(index) {
             return Ok(());
         }
         self.upgrade()?;
         while !self.disk.can_save() {
             self.wait_for_save()?;
         }
-        let writer = self.disk.writer()?;
-        if let Some(tile) = self.cache.begin_save(index) {
-            self.disk.save(writer, index, tile, self.scan_number);
+        let writer = self.wait(|disk| disk.writer())?;
+        if let Some(tile) = self.contents.cache.begin_save(index) {
+            let scan_number = self.contents.scan_number;
+            self.disk.save(writer, index, tile, scan_number);
         }
         Ok(())
     }
@@ -136,17 +138,20 @@ impl TilePager {
     ///
     /// Why a save has failed.
     fn wait_for_save(&mut self) -> Result<()> {
-        match self.disk.stall(|disk| disk.wait_saved()) {
+        match self.wait(|disk| disk.stall(|disk| disk.wait_saved())) {
             Some(saved) => self.note_saved(saved),
             // None is in flight any more, whatever happened to them.
-            None => self.cache.no_save_in_flight(),
+            None => self.contents.cache.no_save_in_flight(),
         }
         self.disk.take_save_error().map_or(Ok(()), Err)
     }
 
     fn note_saved(&mut self, saved: Saved) {
-        let is_current = self.cache.save_ended(saved.index, &saved.tile, saved.result.is_ok());
-        self.disk.note_saved(saved, is_current);
+        let is_current = self.contents.cache.save_ended(saved.index, &saved.tile, saved.result.is_ok());
+        let index = saved.index;
+        if let Some(version) = self.disk.note_saved(saved, is_current) {
+            self.contents.views.note_on_disk(index, version);
+        }
     }
 
     /// Takes note of saves that have ended.
@@ -159,7 +164,7 @@ impl TilePager {
     /// Waits until no version of a tile is being saved: an older one must not come after a newer.
     pub(super) fn end_saves_of(&mut self, index: TileIndex) {
         while self.disk.is_saving(index) {
-            if let Some(saved) = self.disk.stall(|disk| disk.wait_saved()) {
+            if let Some(saved) = self.wait(|disk| disk.stall(|disk| disk.wait_saved())) {
                 self.note_saved(saved);
             }
         }
@@ -171,10 +176,10 @@ impl TilePager {
     ///
     /// Why one of them failed.
     pub(super) fn end_saves(&mut self) -> Result<()> {
-        while let Some(saved) = self.disk.wait_saved() {
+        while let Some(saved) = self.wait(|disk| disk.wait_saved()) {
             self.note_saved(saved);
         }
-        self.cache.no_save_in_flight();
+        self.contents.cache.no_save_in_flight();
         self.disk.take_save_error().map_or(Ok(()), Err)
     }
 

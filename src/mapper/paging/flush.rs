@@ -7,20 +7,20 @@ use crate::store::{InputRecord, MOST_INPUTS};
 use crate::tile::Tile;
 use std::sync::Arc;
 
-impl TilePager {
+impl TilePager<'_> {
     /// Records a new input and flushes, so that the record is durable. It replaces an input without scans; the earliest
     /// of too many is dropped.
     pub(in crate::mapper) fn begin_input(&mut self, input: InputRecord) -> Result<()> {
-        let before = self.inputs.clone();
-        if self.inputs.last().is_some_and(|last| last.first_scan == self.scan_number) {
-            self.inputs.pop();
+        let before = self.contents.inputs.clone();
+        if self.contents.inputs.last().is_some_and(|last| last.first_scan == self.contents.scan_number) {
+            self.contents.inputs.pop();
         }
-        self.inputs.push(input);
-        let excess = self.inputs.len().saturating_sub(MOST_INPUTS);
-        self.inputs.drain(..excess);
+        self.contents.inputs.push(input);
+        let excess = self.contents.inputs.len().saturating_sub(MOST_INPUTS);
+        self.contents.inputs.drain(..excess);
         let flushed = self.flush();
         if flushed.is_err() {
-            self.inputs = before;
+            self.contents.inputs = before;
         }
         flushed
     }
@@ -30,28 +30,28 @@ impl TilePager {
         self.end_io()?;
         for index in self.store().suspects() {
             // Its file may not be on the medium; what can be read of it is checked as always.
-            if !self.cache.is_resident(index) {
+            if !self.contents.cache.is_resident(index) {
                 self.load(index)?;
             }
             self.write(index)?;
         }
-        let mut buffered: Vec<_> = self.buffer.tiles().collect();
+        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
         buffered.sort_unstable();
         for index in buffered {
             self.flush_buffered(index)?;
         }
         // Files are made from tables alone. Syncing keeps octree statistics up to date and puts bricks in order, which
         // speeds up writing.
-        self.cache.sync_octrees();
-        let mut compact = self.cache.dirty_compact().into_iter();
-        for index in self.cache.resident_indices() {
+        self.contents.cache.sync_octrees();
+        let mut compact = self.contents.cache.dirty_compact().into_iter();
+        for index in self.contents.cache.resident_indices() {
             // The saving thread writes tiles in the compact form meanwhile.
             while self.disk.can_save()
                 && let Some(index) = compact.next()
             {
                 self.begin_save(index)?;
             }
-            if self.cache.is_dirty(index) {
+            if self.contents.cache.is_dirty(index) {
                 self.write(index)?;
             }
             self.take_saved();
@@ -61,14 +61,15 @@ impl TilePager {
         }
         self.end_saves()?;
         // A commit of many tiles takes memory, too.
-        self.make_room_for(0, self.cache.plan().tiles)?;
+        self.make_room_for(0, self.contents.cache.plan().tiles)?;
         self.upgrade()?;
-        self.disk.commit(&self.inputs, self.scan_number)
+        let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
+        self.wait(|disk| disk.commit(&inputs, scan_number))
     }
 
     /// Applies a tile's buffered updates. Where there is no room for the tile it is written at once and not kept.
     fn flush_buffered(&mut self, index: TileIndex) -> Result<()> {
-        if !self.cache.has_compact_tier() {
+        if !self.contents.cache.has_compact_tier() {
             return self.load(index);
         }
         let tile = Arc::new(self.read(index)?);
@@ -80,10 +81,10 @@ impl TilePager {
         }
         self.put(tile);
         if !fits {
-            if self.cache.is_dirty(index) {
+            if self.contents.cache.is_dirty(index) {
                 self.write(index)?;
             }
-            self.cache.drop_resident(index);
+            self.contents.cache.drop_resident(index);
         }
         Ok(())
     }
@@ -93,15 +94,19 @@ impl TilePager {
         self.upgrade()?;
         self.end_saves_of(index);
         // Dirty until it is written: a failed attempt may cut short what is on disk of it.
-        self.cache.change(index, Tile::mark_dirty);
-        let Some(tile) = self.cache.peek(index) else { return Ok(()) };
-        self.disk.write(tile, self.scan_number)?;
-        self.cache.change(index, Tile::mark_clean);
+        self.contents.cache.change(index, Tile::mark_dirty);
+        let Some(tile) = self.contents.cache.peek(index).cloned() else { return Ok(()) };
+        let scan_number = self.contents.scan_number;
+        // The tile is dropped with what writes it: changing a tile that somebody else holds would copy it.
+        let version = self.wait(move |disk| disk.write(&tile, scan_number))?;
+        self.contents.views.note_on_disk(index, version);
+        self.contents.cache.change(index, Tile::mark_clean);
         Ok(())
     }
 
     /// Makes a map of the original format, before its first change, one of voxtile's own.
     pub(super) fn upgrade(&mut self) -> Result<()> {
-        self.disk.upgrade(&self.inputs)
+        let inputs = self.contents.inputs.clone();
+        self.wait(|disk| disk.upgrade(&inputs))
     }
 }

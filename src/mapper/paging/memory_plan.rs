@@ -22,6 +22,10 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) spare_bytes: usize,
     /// Most bytes of tiles in the compact form while others have to go.
     pub(super) compact_bytes: usize,
+    /// Most bytes of tiles that readers in other threads make, once there are any.
+    pub(in crate::mapper) reader_bytes: usize,
+    /// Most bytes of what views hold that has changed since.
+    pub(super) view_bytes: usize,
 }
 
 impl MemoryPlan {
@@ -37,6 +41,8 @@ impl MemoryPlan {
                 is_enforced: true,
                 spare_bytes: 0,
                 compact_bytes: 0,
+                reader_bytes: 64 << 20,
+                view_bytes: usize::MAX,
             },
             // Buffered updates are small beside their tiles; a larger buffer saves reads and writes.
             MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
@@ -58,6 +64,8 @@ impl MemoryPlan {
             is_enforced: true,
             spare_bytes: bytes / 4,
             compact_bytes: bytes / 8 * 3,
+            reader_bytes: bytes / 16,
+            view_bytes: bytes / 8,
         }
     }
 }

@@ -12,16 +12,25 @@
 
 mod buffered_updates;
 mod compact_tiles;
+mod contents;
 mod eviction;
 mod flush;
 mod memory_plan;
+mod paged_tiles;
 mod prefetch;
 mod resident_tiles;
+mod shared_contents;
 mod stalls;
 mod tile_cache;
 mod tile_disk;
 mod tile_pager;
+mod tile_state;
+mod views;
 mod write_buffer;
 
 pub(super) use memory_plan::MemoryPlan;
+pub(super) use paged_tiles::PagedTiles;
+pub(super) use shared_contents::SharedContents;
 pub(super) use tile_pager::TilePager;
+pub(super) use tile_state::{Base, StoredTileState, TileState};
+pub(super) use views::ViewId;

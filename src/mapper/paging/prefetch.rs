@@ -8,24 +8,25 @@ use crate::space::{TileBox, TileIndex};
 use crate::tile::Table;
 use std::sync::Arc;
 
-impl TilePager {
+impl TilePager<'_> {
     /// Prefetches tiles that will be needed, as far as there is room for them. `updates` are those of the scan that is
     /// being inserted.
     pub(in crate::mapper) fn prefetch(&mut self, updates: &[(TileIndex, TileUpdates)]) {
-        if !self.cache.has_compact_tier() {
+        if !self.contents.cache.has_compact_tier() {
             return;
         }
         // Soon these will have to come in.
-        let excess = self.buffer.bytes().saturating_sub(self.cache.plan().buffer_bytes / 4 * 3);
+        let excess =
+            self.contents.buffer.bytes().saturating_sub(self.contents.cache.plan().buffer_bytes / 4 * 3);
         if excess > 0 {
-            for tile in self.buffer.heaviest(excess) {
+            for tile in self.contents.buffer.heaviest(excess) {
                 if !self.is_spilling_cheaper(tile) {
                     self.begin_prefetch(tile);
                 }
             }
         }
         let now = TileBox::of(updates.iter().map(|(tile, _)| *tile));
-        let before = std::mem::replace(&mut self.last_scan, now);
+        let before = std::mem::replace(&mut self.contents.last_scan, now);
         if let (Some(before), Some(now)) = (before, now) {
             for tile in now.ahead(&before) {
                 if self.disk.is_unread(tile) && self.has_room_to_spare() {
@@ -36,7 +37,10 @@ impl TilePager {
     }
 
     fn begin_prefetch(&mut self, index: TileIndex) {
-        if !self.cache.contains(index) && !self.disk.is_prefetching(index) && self.disk.can_prefetch() {
+        if !self.contents.cache.contains(index)
+            && !self.disk.is_prefetching(index)
+            && self.disk.can_prefetch()
+        {
             self.disk.prefetch(index);
         }
     }
@@ -52,8 +56,8 @@ impl TilePager {
 
     fn put_prefetched(&mut self, index: TileIndex, table: Option<Table>) -> Result<()> {
         let Some(table) = table else { return Ok(()) };
-        let is_wanted = self.buffer.contains(index) || self.has_room_to_spare();
-        if !is_wanted || self.buffer.is_staged(index) || self.cache.contains(index) {
+        let is_wanted = self.contents.buffer.contains(index) || self.has_room_to_spare();
+        if !is_wanted || self.contents.buffer.is_staged(index) || self.contents.cache.contains(index) {
             return Ok(());
         }
         let tile = Arc::new(self.make_tile(index, table)?);
@@ -65,7 +69,7 @@ impl TilePager {
     /// Waits until a tile that is being prefetched is there.
     pub(super) fn end_prefetch_of(&mut self, index: TileIndex) -> Result<()> {
         while self.disk.is_prefetching(index) {
-            match self.disk.stall(|disk| disk.wait_prefetched()) {
+            match self.wait(|disk| disk.stall(|disk| disk.wait_prefetched())) {
                 Some((index, table)) => self.put_prefetched(index, table)?,
                 None => break,
             }
@@ -75,7 +79,7 @@ impl TilePager {
 
     /// Waits until all prefetches have ended.
     pub(super) fn end_prefetches(&mut self) -> Result<()> {
-        while let Some((index, table)) = self.disk.wait_prefetched() {
+        while let Some((index, table)) = self.wait(|disk| disk.wait_prefetched()) {
             self.put_prefetched(index, table)?;
         }
         Ok(())

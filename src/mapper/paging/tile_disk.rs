@@ -131,16 +131,16 @@ impl TileDisk {
 
     // Writing.
 
-    /// Writes a tile's next version. No save of the tile may be in flight: an older version must not come after this
+    /// Writes a tile's next version and returns it. No save of the tile may be in flight: an older version must not come after this
     /// one.
     ///
     /// # Errors
     ///
     /// A disk that refuses.
-    pub(super) fn write(&mut self, tile: &Tile, scan_number: u64) -> Result<()> {
+    pub(super) fn write(&mut self, tile: &Tile, scan_number: u64) -> Result<TileVersion> {
         let version = self.saver.save(&mut self.store, tile, scan_number)?;
         self.note_written(tile.index(), version);
-        Ok(())
+        Ok(version)
     }
 
     fn note_written(&mut self, index: TileIndex, version: TileVersion) {
@@ -189,18 +189,20 @@ impl TileDisk {
         self.threads.wait_saved()
     }
 
-    /// Takes note of a save that has ended. `is_current` tells whether the tile in memory still is the version that was
-    /// saved: otherwise it is written again, and an error does not matter.
-    pub(super) fn note_saved(&mut self, saved: Saved, is_current: bool) {
+    /// Takes note of a save that has ended; returns the version that is on disk now. `is_current` tells whether the tile
+    /// in memory still is the version that was saved: otherwise it is written again, and an error does not matter.
+    pub(super) fn note_saved(&mut self, saved: Saved, is_current: bool) -> Option<TileVersion> {
         let Saved { index, result, .. } = saved;
         match result {
             Ok(version) => {
                 self.store.note_next(index, version);
                 self.note_written(index, version);
+                return Some(version);
             }
             Err(error) if is_current => self.save_error = Some(error),
             Err(error) => log::debug!("an older version of tile {index} was not saved: {error}"),
         }
+        None
     }
 
     /// Whether a save beside the mapper has failed, and nobody was told.

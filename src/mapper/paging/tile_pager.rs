@@ -1,4 +1,5 @@
-use super::tile_cache::{Cached, TileCache};
+use super::shared_contents::{ContentsGuard, unlocked};
+use super::tile_cache::Cached;
 use super::tile_disk::TileDisk;
 use super::write_buffer::WriteBuffer;
 use crate::config::MapConfig;
@@ -7,29 +8,22 @@ use crate::mapper::statistics::{MapStatistics, MemoryCounts};
 use crate::scan::{PackedUpdates, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, VoxelIndex};
-use crate::store::{InputRecord, SnapshotName, TileStore};
+use crate::store::{InputRecord, SnapshotName, TileReader, TileStore};
 use crate::tile::{Table, Tile};
 use rustc_hash::FxHashMap;
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
 /// The tiles of an out-of-core map: which are in memory, and what is buffered for the others.
 ///
 /// This file accepts scans and answers for tiles. `eviction` makes room, `prefetch` fetches tiles ahead, `flush` makes
 /// the map durable.
+///
+/// It lets go of the contents while it waits for the disk, so that readers in other threads need not wait for it.
 #[derive(Debug)]
-pub(in crate::mapper) struct TilePager {
-    pub(super) config: MapConfig,
-    pub(super) cache: TileCache,
-    pub(super) buffer: WriteBuffer,
-    pub(super) disk: TileDisk,
-    /// Number of scans in the map. Every tile file that is written records it.
-    pub(super) scan_number: u64,
-    /// The tiles that the last scan touched.
-    pub(super) last_scan: Option<TileBox>,
-    /// Around all tiles of the map, and perhaps some that it had.
-    bounds: Option<TileBox>,
-    /// What the map was built from and, last, is being built from; kept with it at the next flush.
-    pub(super) inputs: Vec<InputRecord>,
+pub(in crate::mapper) struct TilePager<'a> {
+    pub(super) config: &'a MapConfig,
+    pub(super) contents: ContentsGuard<'a>,
+    pub(super) disk: MutexGuard<'a, TileDisk>,
 }
 
 /// Expected growth of a tile or of the write buffer per update, in bytes.
@@ -57,20 +51,11 @@ fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     }
 }
 
-impl TilePager {
-    pub(in crate::mapper) fn new(config: MapConfig, store: TileStore) -> Self {
-        let bounds = TileBox::of(store.tiles().chain(store.orphans()));
-        let inputs = store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone());
-        Self {
-            cache: TileCache::new(&config),
-            buffer: WriteBuffer::default(),
-            scan_number: store.commits().scan_number,
-            disk: TileDisk::new(&config, store),
-            last_scan: None,
-            bounds,
-            inputs,
-            config,
-        }
+impl TilePager<'_> {
+    /// Waits for the disk without the lock on the contents.
+    pub(super) fn wait<T>(&mut self, wait: impl FnOnce(&mut TileDisk) -> T) -> T {
+        let Self { contents, disk, .. } = self;
+        unlocked(contents, || wait(disk))
     }
 
     /// The store, for reading.
@@ -82,14 +67,14 @@ impl TilePager {
 
     /// Number of scans in the map.
     pub(in crate::mapper) fn scan_number(&self) -> u64 {
-        self.scan_number
+        self.contents.scan_number
     }
 
     /// Does all that may fail before the updates can be accepted. The map's content stays as it is.
     ///
     /// `scan_bytes` are the bytes of memory that inserting scans takes, with these updates.
     pub(in crate::mapper) fn prepare(&mut self, updates: &ScanUpdates, scan_bytes: usize) -> Result<()> {
-        self.cache.reserve_for_scan(scan_bytes);
+        self.contents.cache.reserve_for_scan(scan_bytes);
         self.check_index(updates)?;
         self.take_finished_io()?;
         self.drain_buffer()?;
@@ -97,37 +82,43 @@ impl TilePager {
             let is_wanted = self.disk.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
             // The spill file of a staged tile holds buffered updates, then those of this scan. Applying only the former
             // would reorder them.
-            if is_wanted && !self.cache.is_resident(*tile) && !self.buffer.is_staged(*tile) {
+            if is_wanted && !self.contents.cache.is_resident(*tile) && !self.contents.buffer.is_staged(*tile)
+            {
                 self.load(*tile)?;
             }
         }
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         // A tile that is made new by the updates is one tile more than there are.
-        self.make_room_for(BYTES_OF_UPDATE * all, self.cache.plan().tiles)
+        self.make_room_for(BYTES_OF_UPDATE * all, self.contents.cache.plan().tiles)
     }
 
     /// Accepts the updates, staged parts first: resident tiles take theirs at once, those of other tiles are buffered.
     /// Cannot fail.
     pub(in crate::mapper) fn accept(&mut self, updates: ScanUpdates) {
-        let touched = updates.tiles.iter().map(|(index, _)| *index).chain(self.buffer.staged_tiles());
-        self.bounds = TileBox::of(touched).into_iter().chain(self.bounds).reduce(TileBox::union);
-        self.buffer.accept_staged();
+        let touched =
+            updates.tiles.iter().map(|(index, _)| *index).chain(self.contents.buffer.staged_tiles());
+        let touched: Vec<_> = touched.collect();
+        self.contents.keep_for_views(touched.iter().copied());
+        let bounds =
+            TileBox::of(touched.into_iter()).into_iter().chain(self.contents.bounds).reduce(TileBox::union);
+        self.contents.bounds = bounds;
+        self.contents.buffer.accept_staged();
         let mut resident = FxHashMap::default();
         let mut others = Vec::new();
         for (index, tile_updates) in updates.tiles {
             // The tile becomes the one used last.
-            match self.cache.get(index) {
+            match self.contents.cache.get(index) {
                 Some(_) => drop(resident.insert(index, tile_updates)),
                 None => others.push((index, tile_updates)),
             }
         }
         let model = &self.config.sensor_model;
-        self.cache.change_all(resident, |tile, updates| tile.apply(model, &updates));
+        self.contents.cache.change_all(resident, |tile, updates| tile.apply(model, &updates));
         let (mut new, mut new_bytes) = (Vec::new(), 0);
         for (index, tile_updates) in others {
             let with_it = new_bytes + bytes_of_new_tile(&tile_updates);
             if self.exists(index) || !self.has_room_for(new.len() + 1, with_it) {
-                self.buffer.push(index, &tile_updates);
+                self.contents.buffer.push(index, &tile_updates);
                 continue;
             }
             new.push((index, tile_updates));
@@ -138,13 +129,13 @@ impl TilePager {
             }
         }
         self.make_tiles(new);
-        self.scan_number += 1;
+        self.contents.scan_number += 1;
     }
 
     /// Makes tiles of what was observed first in them.
     fn make_tiles(&mut self, new: Vec<(TileIndex, TileUpdates)>) {
         let model = &self.config.sensor_model;
-        self.cache.put_new(new, |tile, updates| tile.apply(model, &updates));
+        self.contents.cache.put_new(new, |tile, updates| tile.apply(model, &updates));
     }
 
     /// Stages a part of a scan in files, until the scan is accepted or given up.
@@ -155,48 +146,65 @@ impl TilePager {
                 self.load(index)?;
             }
             // Updates are buffered only for tiles that are not resident.
-            if self.cache.is_resident(index) {
+            if self.contents.cache.is_resident(index) {
                 self.evict(index)?;
             }
-            self.buffer.stage(index, &updates, &mut self.disk)?;
+            self.spill(index)?;
+            let before = self.contents.buffer.staged_file(index);
+            let spilled = self.wait(|disk| disk.spill(index, before, &updates))?;
+            self.contents.buffer.stage(index, spilled, updates.len());
         }
-        self.make_room_for(0, self.cache.plan().tiles)
+        self.make_room_for(0, self.contents.cache.plan().tiles)
     }
 
     /// Takes back what a scan that was not accepted has staged.
     pub(in crate::mapper) fn discard_staged(&mut self) {
-        self.buffer.discard_staged(&self.disk);
+        self.contents.buffer.discard_staged(&self.disk);
     }
 
     /// Shrinks the write buffer to its share of memory: updates are applied, or spilled where that is cheaper.
     fn drain_buffer(&mut self) -> Result<()> {
-        let most_bytes = self.cache.plan().buffer_bytes;
-        let excess = self.buffer.bytes().saturating_sub(most_bytes);
-        let heaviest = if excess > 0 { self.buffer.heaviest(excess) } else { Vec::new() };
+        let most_bytes = self.contents.cache.plan().buffer_bytes;
+        let excess = self.contents.buffer.bytes().saturating_sub(most_bytes);
+        let heaviest = if excess > 0 { self.contents.buffer.heaviest(excess) } else { Vec::new() };
         for tile in heaviest {
-            if self.buffer.is_staged(tile) {
+            if self.contents.buffer.is_staged(tile) {
                 continue;
             }
             if self.is_spilling_cheaper(tile) {
                 log::debug!("tile {tile}: buffered updates spilled");
                 self.upgrade()?;
-                self.buffer.spill(tile, &mut self.disk)?;
+                self.spill(tile)?;
             } else {
                 self.load_buffered(tile)?;
             }
         }
         // Even a short spill file has an entry in memory, so their number is limited.
         let most_files = most_bytes / 2 / WriteBuffer::BYTES_OF_FILE;
-        let too_many = self.buffer.spill_files().saturating_sub(most_files);
-        for tile in self.buffer.longest_files(MOST_SPILLED_BYTES, too_many) {
+        let too_many = self.contents.buffer.spill_files().saturating_sub(most_files);
+        for tile in self.contents.buffer.longest_files(MOST_SPILLED_BYTES, too_many) {
             self.load_buffered(tile)?;
+        }
+        Ok(())
+    }
+
+    /// Moves a tile's buffered updates from memory to the end of its spill file.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; the updates stay in memory.
+    fn spill(&mut self, index: TileIndex) -> Result<()> {
+        let (before, updates) = self.contents.buffer.of(index);
+        if let Some(updates) = updates.filter(|updates| !updates.is_empty()) {
+            let spilled = self.wait(|disk| disk.spill(index, before, &updates))?;
+            self.contents.buffer.note_spilled(index, spilled);
         }
         Ok(())
     }
 
     fn load_buffered(&mut self, tile: TileIndex) -> Result<()> {
         // It may have come in with another.
-        if self.buffer.contains(tile) && !self.buffer.is_staged(tile) {
+        if self.contents.buffer.contains(tile) && !self.contents.buffer.is_staged(tile) {
             self.load(tile)?;
         }
         Ok(())
@@ -206,29 +214,31 @@ impl TilePager {
     /// only once the updates are as large as the tile. Disk traffic then stays proportional to the updates, as in a
     /// log-structured merge tree (O'Neil et al., 1996).
     pub(super) fn is_spilling_cheaper(&self, tile: TileIndex) -> bool {
-        let is_near = self.cache.contains(tile) || self.disk.is_prefetching(tile);
-        if !self.cache.has_compact_tier() || is_near {
+        let is_near = self.contents.cache.contains(tile) || self.disk.is_prefetching(tile);
+        if !self.contents.cache.has_compact_tier() || is_near {
             return false;
         }
         let tile_bytes = self.store().version(tile).map_or(0, |version| version.table.bytes);
-        self.buffer.bytes_of(tile) < tile_bytes.max(LEAST_BYTES_TO_LOAD_FOR)
+        self.contents.buffer.bytes_of(tile) < tile_bytes.max(LEAST_BYTES_TO_LOAD_FOR)
     }
 
     // Tiles.
 
     /// Whether anything was observed in a tile.
     pub(in crate::mapper) fn exists(&self, index: TileIndex) -> bool {
-        self.store().contains(index) || self.buffer.contains(index) || self.cache.contains(index)
+        self.store().contains(index)
+            || self.contents.buffer.contains(index)
+            || self.contents.cache.contains(index)
     }
 
     /// A box around all tiles in which something was observed.
     pub(in crate::mapper) fn bounds(&self) -> Option<TileBox> {
-        self.bounds
+        self.contents.bounds
     }
 
     /// A tile, brought into memory; `None` if nothing was observed in it.
     pub(in crate::mapper) fn tile(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
-        if let Some(tile) = self.cache.get(index) {
+        if let Some(tile) = self.contents.cache.get(index) {
             return Ok(Some(tile.clone()));
         }
         if !self.exists(index) {
@@ -245,7 +255,7 @@ impl TilePager {
     /// The evidence of a voxel, whose tile is brought into memory.
     pub(in crate::mapper) fn evidence(&mut self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let index = self.config.grid.tile_of_voxel(voxel);
-        if let Some(tile) = self.cache.get(index) {
+        if let Some(tile) = self.contents.cache.get(index) {
             return Ok(tile.evidence_of_own(voxel));
         }
         Ok(self.tile(index)?.and_then(|tile| tile.evidence_of_own(voxel)))
@@ -253,7 +263,7 @@ impl TilePager {
 
     /// A tile as it is now, without bringing it into memory.
     pub(in crate::mapper) fn tile_uncached(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
-        if let Some(tile) = self.cache.peek(index) {
+        if let Some(tile) = self.contents.cache.peek(index) {
             return Ok(Some(tile.clone()));
         }
         if !self.exists(index) {
@@ -261,7 +271,7 @@ impl TilePager {
         }
         let (table, _) = self.fetch(index)?;
         let mut tile = Tile::uncached(&self.config.grid, index, table);
-        self.buffer.apply_to(&mut tile, &self.config.sensor_model, &mut self.disk)?;
+        self.apply_buffered(&mut tile)?;
         Ok(Some(Arc::new(tile)))
     }
 
@@ -270,7 +280,7 @@ impl TilePager {
         // Read first: a tile that cannot be read evicts nothing.
         let tile = Arc::new(self.read(index)?);
         log::debug!("tile {index}: loaded");
-        if !self.cache.is_resident(index) {
+        if !self.contents.cache.is_resident(index) {
             self.make_room(&tile)?;
             self.put(tile);
         }
@@ -280,14 +290,14 @@ impl TilePager {
     /// Puts a tile into memory. Its buffered updates are applied already, so they are dropped. The caller has made
     /// room.
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
-        self.buffer.forget(tile.index(), &self.disk);
-        self.cache.put(tile);
+        self.contents.buffer.forget(tile.index(), &self.disk);
+        self.contents.cache.put(tile);
     }
 
     /// A tile that is not resident, with its buffered updates applied.
     pub(super) fn read(&mut self, index: TileIndex) -> Result<Tile> {
         self.end_prefetch_of(index)?;
-        if let Some(tile) = self.cache.peek(index) {
+        if let Some(tile) = self.contents.cache.peek(index) {
             return Ok(Tile::clone(tile)); // It has just arrived.
         }
         let (table, is_dirty) = self.fetch(index)?;
@@ -300,23 +310,34 @@ impl TilePager {
 
     /// A tile made of its table, with its buffered updates applied.
     pub(super) fn make_tile(&mut self, index: TileIndex, table: Table) -> Result<Tile> {
-        let mut tile = self.cache.make_tile(index, table);
-        self.buffer.apply_to(&mut tile, &self.config.sensor_model, &mut self.disk)?;
+        let mut tile = self.contents.cache.make_tile(index, table);
+        self.apply_buffered(&mut tile)?;
         Ok(tile)
+    }
+
+    /// Applies a tile's buffered updates to it. They stay in the buffer.
+    fn apply_buffered(&mut self, tile: &mut Tile) -> Result<()> {
+        let (index, model) = (tile.index(), &self.config.sensor_model);
+        let (spilled, in_memory) = self.contents.buffer.of(index);
+        if spilled.bytes > 0 {
+            self.wait(|disk| disk.read_spill(index, spilled, |updates| tile.apply(model, &updates)))?;
+        }
+        in_memory.iter().flat_map(|updates| updates.iter()).for_each(|updates| tile.apply(model, &updates));
+        Ok(())
     }
 
     /// The table of a tile that is not resident, without its buffered updates, and whether it differs from the one on
     /// disk; an empty one if there is none yet.
     fn fetch(&mut self, index: TileIndex) -> Result<(Table, bool)> {
-        if let Some(Cached::Compact(tile)) = self.cache.find(index) {
-            return Ok((tile.decode(&self.config.grid, index)?, self.cache.is_dirty(index)));
+        if let Some(Cached::Compact(tile)) = self.contents.cache.find(index) {
+            return Ok((tile.decode(&self.config.grid, index)?, self.contents.cache.is_dirty(index)));
         }
-        Ok((self.disk.read(index)?.unwrap_or_default(), false))
+        Ok((self.wait(|disk| disk.read(index))?.unwrap_or_default(), false))
     }
 
     /// Number of voxels of a tile in memory, or of its latest version on disk; buffered updates are left out.
     pub(in crate::mapper) fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
-        match self.cache.find(index) {
+        match self.contents.cache.find(index) {
             Some(Cached::Resident(tile)) => Some(tile.table().len() as u64),
             Some(Cached::Compact(tile)) => Some(tile.voxels()),
             None => self.store().version(index).map(|version| version.voxels),
@@ -325,7 +346,7 @@ impl TilePager {
 
     /// Every tile in which something was observed, in order.
     pub(in crate::mapper) fn tile_indices(&self) -> Vec<TileIndex> {
-        let in_memory = self.cache.indices().chain(self.buffer.tiles());
+        let in_memory = self.contents.cache.indices().chain(self.contents.buffer.tiles());
         let mut indices: Vec<_> = self.store().tiles().chain(in_memory).collect();
         indices.sort_unstable();
         indices.dedup();
@@ -335,20 +356,24 @@ impl TilePager {
     /// Number of tiles in which something was observed.
     pub(super) fn count_tiles(&self) -> usize {
         let is_new = |index: &TileIndex| !self.store().contains(*index);
-        let cached = self.cache.indices().filter(is_new).count();
-        let buffered =
-            self.buffer.tiles().filter(|index| is_new(index) && !self.cache.contains(*index)).count();
+        let cached = self.contents.cache.indices().filter(is_new).count();
+        let buffered = self
+            .contents
+            .buffer
+            .tiles()
+            .filter(|index| is_new(index) && !self.contents.cache.contains(*index))
+            .count();
         self.store().count_tiles() + cached + buffered
     }
 
     /// The resident tiles, in order.
     pub(in crate::mapper) fn cached_tile_indices(&self) -> Vec<TileIndex> {
-        self.cache.resident_indices()
+        self.contents.cache.resident_indices()
     }
 
     /// Whether a tile has updates that are not on disk.
     pub(in crate::mapper) fn is_dirty(&self, index: TileIndex) -> bool {
-        self.buffer.contains(index) || self.cache.is_dirty(index)
+        self.contents.buffer.contains(index) || self.contents.cache.is_dirty(index)
     }
 
     /// Drops a tile from memory and reads it from disk again; tells whether it is there.
@@ -362,18 +387,19 @@ impl TilePager {
         }
         self.end_io()?;
         // All that may fail comes before anything is let go.
-        let table = self.disk.read(index)?;
-        let tile = table.map(|table| self.cache.make_tile(index, table));
+        let table = self.wait(|disk| disk.read(index))?;
+        let tile = table.map(|table| self.contents.cache.make_tile(index, table));
         if let Some(tile) = &tile
-            && !self.cache.is_resident(index)
+            && !self.contents.cache.is_resident(index)
         {
             self.make_room(tile)?;
         }
-        self.cache.discard(index);
-        self.buffer.forget(index, &self.disk);
+        self.contents.keep_for_views(std::iter::once(index));
+        self.contents.cache.discard(index);
+        self.contents.buffer.forget(index, &self.disk);
         let is_there = tile.is_some();
         if let Some(tile) = tile {
-            self.cache.put(Arc::new(tile));
+            self.contents.cache.put(Arc::new(tile));
         }
         Ok(is_there)
     }
@@ -383,8 +409,22 @@ impl TilePager {
         self.disk.take_written()
     }
 
+    /// Begins to note what is on disk for readers in other threads. They may take so many bytes of memory for tiles
+    /// that they make.
+    ///
+    /// # Errors
+    ///
+    /// For a map of the original format, as for [`TilePager::upgrade`].
+    pub(in crate::mapper) fn open_to_readers(&mut self, bytes: usize) -> Result<TileReader> {
+        self.upgrade()?;
+        let store = self.disk.store();
+        let versions = store.tiles().filter_map(|tile| Some((tile, store.version(tile)?)));
+        self.contents.views.watch_disk(bytes, versions, store.orphans().into_iter());
+        store.reader()
+    }
+
     pub(in crate::mapper) fn sync_octrees(&mut self) {
-        self.cache.sync_octrees();
+        self.contents.cache.sync_octrees();
     }
 
     /// Keeps the last flush under a name.
@@ -393,39 +433,40 @@ impl TilePager {
     ///
     /// A name that is taken, and a disk that refuses.
     pub(in crate::mapper) fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
-        self.disk.create_snapshot(name)
+        self.wait(|disk| disk.create_snapshot(name))
     }
 
     /// What the map was built from, the latest last.
     pub(in crate::mapper) fn inputs(&self) -> &[InputRecord] {
-        &self.inputs
+        &self.contents.inputs
     }
 
     /// The input that the map is being built from.
     pub(in crate::mapper) fn last_input_mut(&mut self) -> Option<&mut InputRecord> {
-        self.inputs.last_mut()
+        self.contents.inputs.last_mut()
     }
 
     /// Bytes of memory of all that grows, by what they hold.
     pub(super) fn memory(&self) -> MemoryCounts {
         MemoryCounts {
-            pending: self.buffer.bytes() as u64,
+            pending: self.contents.buffer.bytes() as u64,
             on_the_way: self.disk.in_flight_bytes() as u64,
             index: (self.disk.index_bytes() + self.disk.commit_bytes()) as u64,
-            ..self.cache.memory()
+            readers: self.contents.views.bytes() as u64,
+            ..self.contents.cache.memory()
         }
     }
 
     pub(in crate::mapper) fn statistics(&self) -> MapStatistics {
         let mut statistics = MapStatistics {
-            scan_number: self.scan_number,
+            scan_number: self.contents.scan_number,
             tiles: self.count_tiles() as u64,
             memory: self.memory(),
             ..MapStatistics::default()
         };
         self.disk.count_into(&mut statistics);
-        self.buffer.count_into(&mut statistics);
-        self.cache.count_into(&mut statistics);
+        self.contents.buffer.count_into(&mut statistics);
+        self.contents.cache.count_into(&mut statistics);
         statistics
     }
 }

@@ -1,11 +1,10 @@
 use super::buffered_updates::{BufferedUpdates, Spilled};
 use super::tile_disk::TileDisk;
-use crate::error::Result;
 use crate::mapper::statistics::MapStatistics;
 use crate::scan::{PackedUpdates, TileUpdates};
-use crate::sensor::SensorModel;
 use crate::space::{TileIndex, TileTable};
-use crate::tile::Tile;
+use crate::store::SpillFile;
+use std::sync::Arc;
 
 /// Updates of tiles that are not resident, until these come in: in memory, spilled to files where memory is short, and
 /// those of the scan that is being inserted staged in files until it is accepted.
@@ -61,20 +60,9 @@ impl WriteBuffer {
         self.buffered.longest_files(bytes, count)
     }
 
-    /// Applies a tile's updates to it. They stay here until [`WriteBuffer::forget`].
-    ///
-    /// # Errors
-    ///
-    /// A spill file that cannot be read.
-    pub(super) fn apply_to(&self, tile: &mut Tile, model: &SensorModel, disk: &mut TileDisk) -> Result<()> {
-        let index = tile.index();
-        let Spilled { file, .. } = self.buffered.spilled(index);
-        if file.bytes > 0 {
-            disk.read_spill(index, file, |updates| tile.apply(model, &updates))?;
-        }
-        let in_memory = self.buffered.in_memory(index).into_iter().flat_map(PackedUpdates::iter);
-        in_memory.for_each(|updates| tile.apply(model, &updates));
-        Ok(())
+    /// A tile's updates, in order: those in its spill file, then those in memory.
+    pub(super) fn of(&self, tile: TileIndex) -> (SpillFile, Option<Arc<PackedUpdates>>) {
+        (self.buffered.spilled(tile).file, self.buffered.in_memory(tile).cloned())
     }
 
     /// Forgets a tile's updates: they were applied, or nobody wants them any more.
@@ -84,35 +72,26 @@ impl WriteBuffer {
         }
     }
 
-    /// Moves a tile's updates from memory to the end of its spill file.
-    ///
-    /// # Errors
-    ///
-    /// A disk that refuses; the updates stay in memory.
-    pub(super) fn spill(&mut self, index: TileIndex, disk: &mut TileDisk) -> Result<()> {
-        if let Some(updates) = self.buffered.in_memory(index).filter(|updates| !updates.is_empty()) {
-            let spilled = append(index, self.buffered.spilled(index), updates, disk)?;
-            self.buffered.note_spilled(index, spilled);
-        }
-        Ok(())
+    /// Notes that a tile's updates in memory are in its spill file now.
+    pub(super) fn note_spilled(&mut self, index: TileIndex, file: SpillFile) {
+        let in_memory = self.buffered.in_memory(index).map_or(0, |updates| updates.len() as u64);
+        let updates = self.buffered.spilled(index).updates + in_memory;
+        self.buffered.note_spilled(index, Spilled { file, updates });
     }
 
-    /// Puts a part of a scan that is not accepted yet into a tile's spill file, behind the tile's other updates.
-    ///
-    /// # Errors
-    ///
-    /// A disk that refuses; what was staged before stays.
-    pub(super) fn stage(
-        &mut self,
-        index: TileIndex,
-        updates: &PackedUpdates,
-        disk: &mut TileDisk,
-    ) -> Result<()> {
-        self.spill(index, disk)?;
-        let before = self.staged.get(index).unwrap_or_else(|| self.buffered.spilled(index));
-        let spilled = append(index, before, updates, disk)?;
-        self.staged.insert(index, spilled);
-        Ok(())
+    /// The spill file of a tile that has no updates in memory, with what is staged in it.
+    pub(super) fn staged_file(&self, index: TileIndex) -> SpillFile {
+        self.staged_of(index).file
+    }
+
+    fn staged_of(&self, index: TileIndex) -> Spilled {
+        self.staged.get(index).unwrap_or_else(|| self.buffered.spilled(index))
+    }
+
+    /// Notes that a part of a scan that is not accepted yet is in a tile's spill file, behind the tile's other updates.
+    pub(super) fn stage(&mut self, index: TileIndex, file: SpillFile, updates: usize) {
+        let updates = self.staged_of(index).updates + updates as u64;
+        self.staged.insert(index, Spilled { file, updates });
     }
 
     /// Whether parts of the scan that is being inserted are staged for a tile.
@@ -147,14 +126,4 @@ impl WriteBuffer {
         statistics.pending_bytes = self.buffered.bytes() as u64;
         statistics.pending_file_bytes = self.buffered.file_bytes();
     }
-}
-
-fn append(
-    index: TileIndex,
-    before: Spilled,
-    updates: &PackedUpdates,
-    disk: &mut TileDisk,
-) -> Result<Spilled> {
-    let file = disk.spill(index, before.file, updates)?;
-    Ok(Spilled { file, updates: before.updates + updates.len() as u64 })
 }

@@ -1,6 +1,7 @@
 use super::tile_writer::make_folder;
 use crate::error::{Error, FormatError, Result};
 use crate::space::{TileIndex, TileValue, put_number, take_number, take_u32};
+use crate::store::map_files::MapFiles;
 use crate::store::tile_store::TileStore;
 use std::io::{BufRead, BufReader, Read, Write};
 
@@ -52,13 +53,44 @@ impl TileStore {
         Ok(SpillFile { bytes: file.bytes + updates.len() as u64, crc: crc.finalize() })
     }
 
+    /// See [`TileReader::open_spill`](super::tile_reader::TileReader::open_spill).
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses, and a file that is not what was written.
+    pub fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
+        self.files.open_spill(tile, file)
+    }
+
+    /// Cuts off what stands behind the updates that count. A failure costs disk space and does no other harm.
+    pub fn cut_spill(&self, tile: TileIndex, file: SpillFile) {
+        if file.bytes == 0 {
+            return self.remove_spill(tile);
+        }
+        let path = self.layout().spill(tile);
+        if let Err(error) = self.disk().append(&path, file.bytes) {
+            log::debug!("{}: not cut: {error}", path.display());
+        }
+    }
+
+    /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no
+    /// harm.
+    pub fn remove_spill(&self, tile: TileIndex) {
+        let path = self.layout().spill(tile);
+        if let Err(error) = self.disk().remove_file(&path) {
+            log::debug!("{}: not removed: {error}", path.display());
+        }
+    }
+}
+
+impl MapFiles {
     /// Opens the updates in a tile's spill file, whose checksum was compared: there may be more than memory has room
     /// for.
     ///
     /// # Errors
     ///
     /// A disk that refuses, and a file that is not what was written.
-    pub fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
+    pub(super) fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
         let path = self.layout().spill(tile);
         let open = || {
             let input = self.disk().open(&path).map_err(|error| Error::io(&path, "open", error))?;
@@ -83,25 +115,5 @@ impl TileStore {
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
         open()
-    }
-
-    /// Cuts off what stands behind the updates that count. A failure costs disk space and does no other harm.
-    pub fn cut_spill(&self, tile: TileIndex, file: SpillFile) {
-        if file.bytes == 0 {
-            return self.remove_spill(tile);
-        }
-        let path = self.layout().spill(tile);
-        if let Err(error) = self.disk().append(&path, file.bytes) {
-            log::debug!("{}: not cut: {error}", path.display());
-        }
-    }
-
-    /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no
-    /// harm.
-    pub fn remove_spill(&self, tile: TileIndex) {
-        let path = self.layout().spill(tile);
-        if let Err(error) = self.disk().remove_file(&path) {
-            log::debug!("{}: not removed: {error}", path.display());
-        }
     }
 }

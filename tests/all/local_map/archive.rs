@@ -4,7 +4,7 @@ use testkit::random_scans::Random;
 use testkit::reference_local::ReferenceLocal;
 use voxtile::local::{LocalAnswer, LocalMap, LocalParameters, LocalState, WithLocalMap};
 use voxtile::space::VoxelIndex;
-use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries};
+use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 6.4).unwrap()

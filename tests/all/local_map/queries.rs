@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use testkit::random_scans::Random;
 use testkit::reference_local::states_of;
 use voxtile::local::{LocalMap, LocalParameters, LocalState, Obstacle};
-use voxtile::query::Shape;
+use voxtile::query::{Queries, Shape, UnknownAs};
 use voxtile::scan::RayWalk;
 use voxtile::space::{Aabb, Grid, Point, VoxelIndex};
 
@@ -45,7 +45,9 @@ fn points_segments_bodies_and_windows_are_those_of_a_look_at_every_voxel() {
                 walk.advance();
             }
             let first = Some(walk.voxel()).filter(|voxel| all.contains(voxel));
-            assert_eq!(view.first_on_segment(a, b, obstacle).unwrap(), first);
+            let asked = view.obstacles(obstacle);
+            let hit = asked.cast_segment(a, b, UnknownAs::Free).unwrap();
+            assert_eq!(hit.map(|hit| hit.voxel), first);
             found[0] += usize::from(first.is_some());
 
             let radius_m = random.between(0.0, 0.8);
@@ -58,10 +60,11 @@ fn points_segments_bodies_and_windows_are_those_of_a_look_at_every_voxel() {
                         Shape::Sphere { center, radius_m } => {
                             voxel.distance_squared(center) <= radius_m * radius_m
                         }
+                        _ => unreachable!("the bodies above"),
                     }
                 };
                 let touched: BTreeSet<_> = all.iter().copied().filter(|voxel| touches(voxel)).collect();
-                let answer = view.collision(&body, obstacle).unwrap();
+                let answer = asked.collision(&body, UnknownAs::Free).unwrap().map(|hit| hit.voxel);
                 assert_eq!(answer.is_some(), !touched.is_empty());
                 assert!(answer.is_none_or(|voxel| touched.contains(&voxel)));
                 found[1] += touched.len();
@@ -75,7 +78,7 @@ fn points_segments_bodies_and_windows_are_those_of_a_look_at_every_voxel() {
             let nearest = all.iter().map(|&voxel| (distance_m(voxel), voxel));
             let nearest = nearest.filter(|(distance_m, _)| *distance_m <= radius_m);
             let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap());
-            let answer = view.nearest(a, radius_m, obstacle).unwrap();
+            let answer = asked.nearest_occupied(a, radius_m).unwrap();
             assert_eq!(answer.map(|nearest| (nearest.distance_m, nearest.voxel)), nearest);
             found[2] += usize::from(nearest.is_some());
 
@@ -101,16 +104,18 @@ fn questions_that_make_no_sense_are_refused_and_none_panics() {
             let (a, b) = ([x, y, 6.0], [y, 0.1, x]);
             view.state_at(a);
             for obstacle in OBSTACLES {
-                assert!(view.first_on_segment(a, b, obstacle).is_err() || x.max(y).abs() < 1e9);
-                let _ = view.collision(&Shape::Box(Aabb { min: a, max: b }), obstacle);
-                let _ = view.collision(&Shape::Sphere { center: a, radius_m: y }, obstacle);
-                let _ = view.nearest(a, y, obstacle);
+                let asked = view.obstacles(obstacle);
+                let segment = asked.cast_segment(a, b, UnknownAs::Free);
+                assert!(segment.is_err() || x.max(y).abs() < 1e9);
+                let _ = asked.collision(&Shape::Box(Aabb { min: a, max: b }), UnknownAs::Free);
+                let _ = asked.collision(&Shape::Sphere { center: a, radius_m: y }, UnknownAs::Free);
+                let _ = asked.nearest_occupied(a, y);
                 view.points_in(&Aabb { min: a, max: b }, obstacle);
             }
         }
     }
-    assert!(view.nearest([0.0; 3], -1.0, Obstacle::Occupied).is_err());
-    assert!(view.first_on_segment([0.0; 3], [2e5, 0.0, 0.0], Obstacle::Occupied).is_err());
+    assert!(view.nearest_occupied([0.0; 3], -1.0).is_err());
+    assert!(view.cast_segment([0.0; 3], [2e5, 0.0, 0.0], UnknownAs::Free).is_err());
     let all = view.points_in(&Aabb { min: [-1e9; 3], max: [1e9; 3] }, Obstacle::Inflated);
     assert_eq!(all.len(), states_of(&view).len());
 }

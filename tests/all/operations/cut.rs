@@ -4,7 +4,7 @@ use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
 use voxtile::operations::{Part, Prefer, clear_on, crop, merge};
 use voxtile::space::Aabb;
-use voxtile::{Error, MapConfig, MapReader, Queries};
+use voxtile::{Error, MapConfig, MapQueries, MapReader};
 
 /// A box around the voxels of [`random_voxels`]: bounds between voxels and on their borders and centers, some beyond
 /// all.

@@ -7,7 +7,7 @@ use voxtile::operations::{Decay, Decayed, decay_on, revert_on, snapshot_on};
 use voxtile::sensor::Evidence;
 use voxtile::store::SnapshotName;
 use voxtile::{
-    Error, MapConfig, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries, Result,
+    Error, MapConfig, MapQueries, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries, Result,
 };
 
 fn decay(disk: &FaultyDisk, rule: &Decay) -> Result<Decayed> {

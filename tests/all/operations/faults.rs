@@ -4,7 +4,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::operations::{self, Decay, Part, clear_on, decay_on};
 use voxtile::space::Aabb;
-use voxtile::{Error, MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Result, Storage};
+use voxtile::{Error, MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
 
 /// A disk with two maps, `a` and `b`.
 fn two_maps(storage: Storage) -> FaultyDisk {

@@ -4,7 +4,7 @@ use testkit::random_scans::{Random, random_scan};
 use voxtile::operations::{MapWriter, WrittenMap};
 use voxtile::space::TileIndex;
 use voxtile::tile::Table;
-use voxtile::{Error, InMemoryMapper, MapConfig, MapReader, MapView, Mapper, Queries, Result};
+use voxtile::{Error, InMemoryMapper, MapConfig, MapQueries, MapReader, MapView, Mapper, Result};
 
 fn folder() -> PathBuf {
     PathBuf::from("/city/new")

@@ -3,12 +3,12 @@ use std::time::Duration;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_local::states_of;
 use voxtile::local::{LocalMap, LocalParameters, LocalState};
-use voxtile::query::UnknownAs;
+use voxtile::query::{Shape, United, UnknownAs};
 use voxtile::share::{
-    LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, WithLayers, merge_layer, read_layer, write_layer,
+    LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, merge_layer, read_layer, write_layer,
 };
 use voxtile::space::VoxelIndex;
-use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Queries, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapQueries, MapView, Mapper, Queries, Scan};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 1.0).unwrap().with_range(0.0, 3.0)
@@ -131,8 +131,7 @@ fn questions_are_answered_from_all_maps_together() {
     let mut voxels =
         || (0..300).map(|_| std::array::from_fn(|_| random.below(60) as i32 - 30)).collect::<Vec<_>>();
     let layers = [layer(voxels()), layer(voxels())];
-    let layers = [&layers[0], &layers[1]];
-    let all = WithLayers::new(&map, &layers).unwrap();
+    let all = United::new(&[&map, &layers[0], &layers[1]]).unwrap();
     let own = occupied(&map, 0.5);
     let is_occupied =
         |voxel: VoxelIndex| own.contains(&voxel) || layers.iter().any(|layer| layer.contains(voxel));
@@ -142,7 +141,7 @@ fn questions_are_answered_from_all_maps_together() {
     for _ in 0..300 {
         let (from, to) = (random.point([0.0; 3], 3.5), random.point([0.0; 3], 3.5));
         assert_eq!(all.occupancy_at(from).unwrap().is_occupied(), is_occupied(grid.voxel_of(from).unwrap()));
-        let hit = all.first_on_segment(from, to, UnknownAs::Free).unwrap();
+        let hit = all.cast_segment(from, to, UnknownAs::Free).unwrap().map(|hit| hit.voxel);
         hits += usize::from(hit.is_some());
         assert!(hit.is_none_or(is_occupied));
         // No smaller step along the segment finds anything before the hit.
@@ -157,7 +156,8 @@ fn questions_are_answered_from_all_maps_together() {
                 break;
             }
         }
-        let collision = all.sphere_collision(from, 0.25, UnknownAs::Free).unwrap();
+        let collision =
+            all.collision(&Shape::Sphere { center: from, radius_m: 0.25 }, UnknownAs::Free).unwrap();
         collisions += usize::from(collision.is_some());
         let near = |voxel: &VoxelIndex| {
             let low = voxel.map(|k| f64::from(k) * 0.1);
@@ -171,8 +171,8 @@ fn questions_are_answered_from_all_maps_together() {
         }
     }
     assert!(hits > 20 && collisions > 20, "{hits} {collisions}");
-    let coarse = [&VoxelSet::new(MapConfig::new(0.2, 1.0).unwrap().grid)];
-    assert!(WithLayers::new(&map, &coarse).is_err());
+    let coarse = VoxelSet::new(MapConfig::new(0.2, 1.0).unwrap().grid);
+    assert!(United::new(&[&map, &coarse]).is_err());
 }
 
 #[test]
@@ -204,20 +204,20 @@ fn a_layer_comes_back_from_its_file_and_damage_is_told() {
 fn a_collision_takes_no_longer_in_a_larger_sphere() {
     let map = InMemoryMapper::new(config()).unwrap();
     let far = layer([[1_000_000, -5, 7], [i32::MAX - 1, i32::MIN, 0]]);
-    let layers = [&far];
-    let all = WithLayers::new(&map, &layers).unwrap();
-    let hit = |radius_m| all.sphere_collision([0.0; 3], radius_m, UnknownAs::Free).unwrap();
+    let all = United::new(&[&map, &far]).unwrap();
+    let collision = |center, radius_m, unknown| all.collision(&Shape::Sphere { center, radius_m }, unknown);
+    let hit = |radius_m| collision([0.0; 3], radius_m, UnknownAs::Free).unwrap().map(|hit| hit.voxel);
     assert_eq!(hit(99_000.0), None);
     assert_eq!(hit(101_000.0), Some([1_000_000, -5, 7]));
     assert!(hit(1e9).is_some() && hit(1e300).is_some());
     assert_eq!(hit(0.0), None);
     let near_the_end = [(f64::from(i32::MAX) - 0.5) * 0.1, f64::from(i32::MIN) * 0.1, 0.0];
-    let at_the_end = all.sphere_collision(near_the_end, 0.2, UnknownAs::Free).unwrap();
+    let at_the_end = collision(near_the_end, 0.2, UnknownAs::Free).unwrap().map(|hit| hit.voxel);
     assert_eq!(at_the_end, Some([i32::MAX - 1, i32::MIN, 0]));
     for radius_m in [f64::NAN, f64::INFINITY, -1.0] {
-        assert!(all.sphere_collision([0.0; 3], radius_m, UnknownAs::Free).is_err(), "{radius_m}");
+        assert!(collision([0.0; 3], radius_m, UnknownAs::Free).is_err(), "{radius_m}");
     }
-    assert!(all.sphere_collision([f64::NAN; 3], 1.0, UnknownAs::Free).is_err());
+    assert!(collision([f64::NAN; 3], 1.0, UnknownAs::Free).is_err());
     // Where unknown is an obstacle, its first voxel ends the query; a map that is asked for too many says so.
-    assert!(all.sphere_collision([0.0; 3], 1e9, UnknownAs::Obstacle).is_err());
+    assert!(collision([0.0; 3], 1e9, UnknownAs::Obstacle).is_err());
 }

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use voxtile::mapper::IoCounts;
-use voxtile::{InMemoryMapper, MapReader, Mapper, OutOfCoreTileMapper, Queries, Scan, Storage};
+use voxtile::{InMemoryMapper, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 /// A map to build, scan by scan and with one flush at the end.
 #[derive(Clone, Debug, Serialize, Deserialize)]

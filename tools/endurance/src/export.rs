@@ -9,7 +9,7 @@ use std::time::Instant;
 use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::octree::OctreeFormat;
 use voxtile::query::OctreeExport;
-use voxtile::{MapReader, MapView, Queries};
+use voxtile::{MapQueries, MapReader, MapView};
 
 /// A map to export in little memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]

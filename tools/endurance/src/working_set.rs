@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, VecDeque};
 use voxtile::scan::ScanTracer;
 use voxtile::space::TileIndex;
-use voxtile::{InMemoryMapper, MapView, Mapper, Queries};
+use voxtile::{InMemoryMapper, MapQueries, MapView, Mapper};
 
 /// The tiles that a mapper is at work on: those that the last [`WorkingSet::SCANS`] scans touched.
 #[derive(Clone, Debug, Serialize, Deserialize)]

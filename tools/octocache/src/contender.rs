@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::dataset::{datasets, map_config};
     use std::path::Path;
-    use voxtile::Queries;
+    use voxtile::MapQueries;
 
     #[test]
     fn all_contenders_build_the_same_map() {

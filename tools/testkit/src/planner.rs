@@ -2,6 +2,7 @@ use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 use voxtile::local::{LocalState, LocalView, Obstacle};
 use voxtile::space::Point;
+use voxtile::{Queries, UnknownAs};
 
 /// Between the nodes of the search.
 const STEP_M: f64 = 0.4;
@@ -80,7 +81,8 @@ fn tightened(view: &LocalView, path: Vec<Point>) -> Vec<Point> {
 
 /// Whether a straight line meets no inflated voxel.
 pub fn is_free(view: &LocalView, from: Point, to: Point) -> bool {
-    matches!(view.first_on_segment(from, to, Obstacle::Inflated), Ok(None))
+    let way = view.obstacles(Obstacle::Inflated).cast_segment(from, to, UnknownAs::Free);
+    matches!(way, Ok(None))
 }
 
 pub fn distance_m(a: Point, b: Point) -> f64 {

@@ -12,6 +12,8 @@ pub struct UnsyncedDisk {
     sync_time: Duration,
     /// How long it takes to begin a file on the thread that writes beside the mapping.
     beside_time: Duration,
+    /// How long it takes to open a file for reading on the thread of a name.
+    read_time: Option<(&'static str, Duration)>,
 }
 
 impl UnsyncedDisk {
@@ -21,13 +23,20 @@ impl UnsyncedDisk {
 
     /// A medium that takes so long for a sync, 16 of them at once, whatever has been written.
     pub fn taking(sync_time: Duration) -> Arc<dyn Disk> {
-        Arc::new(Self { sync_time, beside_time: Duration::ZERO })
+        Arc::new(Self { sync_time, beside_time: Duration::ZERO, read_time: None })
     }
 
     /// A disk that is slow for the thread that writes beside the mapping, so that the other thread gets ahead.
     #[allow(dead_code, reason = "benches share this file")]
     pub fn slow_beside(beside_time: Duration) -> Arc<dyn Disk> {
-        Arc::new(Self { sync_time: Duration::ZERO, beside_time })
+        Arc::new(Self { sync_time: Duration::ZERO, beside_time, read_time: None })
+    }
+
+    /// A disk from which the thread of a name reads slowly.
+    #[allow(dead_code, reason = "benches share this file")]
+    pub fn slow_to_read_for(thread: &'static str, read_time: Duration) -> Arc<dyn Disk> {
+        let (sync_time, beside_time) = (Duration::ZERO, Duration::ZERO);
+        Arc::new(Self { sync_time, beside_time, read_time: Some((thread, read_time)) })
     }
 }
 
@@ -58,6 +67,11 @@ impl DiskWrite for Unsynced {
 
 impl Disk for UnsyncedDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        if let Some((thread, time)) = self.read_time
+            && thread::current().name() == Some(thread)
+        {
+            wait(time);
+        }
         FsDisk.open(path)
     }
 

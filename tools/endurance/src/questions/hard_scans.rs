@@ -99,7 +99,7 @@ fn cases(setting: &Setting) -> Vec<HardScan> {
         limit_mib,
         per_ray: false,
     };
-    let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(12, 2) };
+    let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(4, 2) };
     let mut cases = vec![
         hard("long rays", fan([20_000, 1_500], [450.0, 300.0], 0.3, false), 0.1, 10.0, setting.size(512, 64)),
         hard(
@@ -135,8 +135,8 @@ fn search(setting: &Setting) -> Result<Promise> {
         let voxels = random.between(1e5, setting.size(2e8, 1e7));
         let rays = 10_f64.powf(random.between(1.0, 5.3)).min(voxels);
         let reach_m = (voxels / rays).clamp(10.0, 100_000.0) * resolution_m;
-        // A folder a tile: of millions of small tiles the file system takes most of the time.
-        let reach_m = reach_m.min(tile_size_m * 3_000_000.0 / rays).max(2.0 * resolution_m);
+        // A folder a tile: of hundreds of thousands of small tiles the file system takes most of the time.
+        let reach_m = reach_m.min(tile_size_m * 300_000.0 / rays).max(2.0 * resolution_m);
         let points = Points::Fan {
             rays: rays as u32,
             reach_m,

@@ -12,7 +12,7 @@ use report::{Cell, Table};
 use std::hint::black_box;
 use voxtile::space::{Aabb, Grid, Point};
 use voxtile::{
-    InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, Occupancy, Queries, Scan, VoxelCacheConfig,
+    InMemoryMapper, InsertMode, MapConfig, MapQueries, MapView, Mapper, Occupancy, Scan, VoxelCacheConfig,
 };
 
 /// Depth of the nodes that are asked for: 8 x 8 x 8 voxels.

@@ -1,0 +1,146 @@
+use super::live_reader::Shared;
+use crate::config::MapConfig;
+use crate::error::{Error, FormatError, Result};
+use crate::mapper::paging::{Base, StoredTileState, TileState, ViewId};
+use crate::mapper::{MapStatistics, MapView, TileRef};
+use crate::persistence::load::read_stored_table;
+use crate::scan::PackedUpdates;
+use crate::space::{TileBox, TileIndex};
+use crate::store::TileVersion;
+use crate::tile::{Table, Tile};
+use std::sync::Arc;
+
+/// The map as it was after one scan, while its mapper goes on.
+///
+/// It waits for no flush and for no disk but its own reads. What changes while it is held is kept for it, in memory
+/// that counts in the mapper's limit. Its queries fail with [`Error::Expired`] when that is more than an eighth of the
+/// limit, or when a tile that had no room in memory was written anew. Hold it as long as one decision takes, not for a
+/// mission.
+#[derive(Debug)]
+pub struct LiveView {
+    shared: Arc<Shared>,
+    id: ViewId,
+    scan_number: u64,
+    bounds: Option<TileBox>,
+}
+
+/// How often a tile is looked for again because it moved while it was being read.
+const ATTEMPTS: usize = 8;
+
+impl LiveView {
+    pub(super) fn open(shared: Arc<Shared>) -> Self {
+        let mut contents = shared.contents.lock_to_read();
+        let (id, scan_number, bounds) = (contents.open_view(), contents.scan_number(), contents.bounds());
+        drop(contents);
+        Self { shared, id, scan_number, bounds }
+    }
+
+    fn read(&self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
+        let state = || self.shared.contents.lock_to_read().state_for(self.id, index);
+        let mut moved = None;
+        for _ in 0..ATTEMPTS {
+            let (stored, is_past) = match state()? {
+                (TileState::Nothing, _) => return Ok(None),
+                (TileState::Resident(tile), _) => return Ok(Some(tile)),
+                (TileState::Stored(stored), is_past) => (stored, is_past),
+            };
+            match self.shared.tile_of(index, &stored) {
+                Ok(tile) => return Ok(Some(tile)),
+                Err(_) if is_past => return Err(Error::Expired),
+                // Written anew, renamed or removed meanwhile, if it is not damaged.
+                Err(error) => moved = Some(error),
+            }
+        }
+        Err(moved.unwrap_or(Error::Expired))
+    }
+}
+
+impl Drop for LiveView {
+    fn drop(&mut self) {
+        self.shared.contents.lock_to_read().close_view(self.id);
+    }
+}
+
+impl Shared {
+    /// Makes a tile of its stored form, or finds it among those made before.
+    fn tile_of(&self, index: TileIndex, stored: &StoredTileState) -> Result<Arc<Tile>> {
+        let StoredTileState { base, spilled, updates } = stored;
+        let is_base_alone = spilled.bytes == 0 && updates.is_none();
+        if is_base_alone && let Some(tile) = self.read_tiles.lock().get(index, base) {
+            return Ok(tile);
+        }
+        let (grid, model) = (&self.config.grid, &self.config.sensor_model);
+        let table = match base {
+            Base::Nothing => Table::default(),
+            Base::Compact(tile) => tile.decode(grid, index)?,
+            Base::OnDisk(version) => self.read_version(index, *version)?,
+            Base::Orphan => {
+                let reason = "commits.log does not name this tile";
+                return Err(FormatError::at_offset(0, reason).in_map(self.files.folder(), Some(index)));
+            }
+        };
+        let mut tile = Tile::uncached(grid, index, table);
+        if spilled.bytes > 0 {
+            let input = self.files.open_spill(index, *spilled)?;
+            PackedUpdates::unpack(input, |updates| tile.apply(model, &updates))
+                .map_err(|error| Error::io(self.files.folder(), "read buffered updates in", error))?;
+        }
+        updates.iter().flat_map(|updates| updates.iter()).for_each(|updates| tile.apply(model, &updates));
+        let tile = Arc::new(tile);
+        if is_base_alone {
+            self.read_tiles.lock().put(base.clone(), tile.clone());
+        }
+        Ok(tile)
+    }
+
+    /// Reads a version of a table from wherever it is.
+    fn read_version(&self, index: TileIndex, version: TileVersion) -> Result<Table> {
+        let [next, current] = self.files.places(index, version);
+        let read =
+            |place: crate::store::TileLocation| read_stored_table(&self.config.grid, index, place.open()?);
+        read(current).or_else(|error| read(next).map_err(|_| error)).map(|read| read.table)
+    }
+}
+
+impl MapView for LiveView {
+    fn config(&self) -> &MapConfig {
+        &self.shared.config
+    }
+
+    fn scan_number(&self) -> u64 {
+        self.scan_number
+    }
+
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        self.shared.contents.lock_to_read().tiles()
+    }
+
+    fn tile_bounds(&self) -> Option<TileBox> {
+        self.bounds
+    }
+
+    fn has_tile(&self, index: TileIndex) -> bool {
+        self.shared.contents.lock_to_read().may_hold(index)
+    }
+
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        self.shared.contents.lock_to_read().resident_tiles()
+    }
+
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        Ok(self.read(index)?.map(TileRef::shared))
+    }
+
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        self.tile(index)
+    }
+
+    fn voxels_of_tile_hint(&self, _: TileIndex) -> Option<u64> {
+        None
+    }
+
+    fn statistics(&self) -> MapStatistics {
+        let tiles = self.tile_indices().len() as u64;
+        MapStatistics { scan_number: self.scan_number, tiles, ..MapStatistics::default() }
+    }
+}

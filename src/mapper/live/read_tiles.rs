@@ -1,0 +1,47 @@
+use crate::mapper::paging::Base;
+use crate::space::TileIndex;
+use crate::tile::Tile;
+use lru::LruCache;
+use std::sync::Arc;
+
+/// Tiles that readers made of a stored form without updates, in the order of their last use.
+#[derive(Debug)]
+pub(super) struct ReadTiles {
+    tiles: LruCache<TileIndex, ReadTile>,
+    bytes: usize,
+    most_bytes: usize,
+}
+
+#[derive(Debug)]
+struct ReadTile {
+    made_of: Base,
+    tile: Arc<Tile>,
+    bytes: usize,
+}
+
+impl ReadTiles {
+    pub(super) fn new(most_bytes: usize) -> Self {
+        Self { tiles: LruCache::unbounded(), bytes: 0, most_bytes }
+    }
+
+    /// The tile made of this form, if it is here.
+    pub(super) fn get(&mut self, index: TileIndex, base: &Base) -> Option<Arc<Tile>> {
+        let read = self.tiles.get(&index).filter(|read| read.made_of.is_same(base))?;
+        Some(read.tile.clone())
+    }
+
+    pub(super) fn put(&mut self, made_of: Base, tile: Arc<Tile>) {
+        let (index, bytes) = (tile.index(), tile.bytes());
+        if bytes > self.most_bytes {
+            return;
+        }
+        self.bytes += bytes;
+        let replaced = self.tiles.put(index, ReadTile { made_of, tile, bytes });
+        self.bytes -= replaced.map_or(0, |replaced| replaced.bytes);
+        while self.bytes > self.most_bytes
+            && let Some((_, dropped)) = self.tiles.pop_lru()
+        {
+            self.bytes -= dropped.bytes;
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Queries of sets of voxels that are occupied, of which all others are unknown: local maps and layers.
+
+use super::collision::first_not_free;
+use super::ray::{Met, walk_ray, walk_segment};
+use super::region::voxels_around;
+use super::{Hit, Occupancy, RayQuery, Shape, UnknownAs, VoxelOccupancy};
+use crate::error::{Error, Result};
+use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
+
+/// Probability of a voxel that is known to be occupied, and nothing more.
+const OCCUPIED: f64 = 1.0;
+
+/// Voxels that are occupied; all others are unknown.
+pub(crate) trait OccupiedSet: Sync {
+    fn grid_of_set(&self) -> Grid;
+
+    fn holds(&self, voxel: VoxelIndex) -> bool;
+
+    /// A box around a voxel in which there are none; `None` if it is not known of one.
+    fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox>;
+
+    /// A box around all of them.
+    fn hull(&self) -> Option<VoxelBox>;
+
+    /// Visits those in a box until `visit` returns false.
+    fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool);
+}
+
+pub(crate) fn occupancy(set: &impl OccupiedSet, voxel: VoxelIndex) -> Occupancy {
+    if set.holds(voxel) { Occupancy::Occupied(OCCUPIED) } else { Occupancy::Unknown }
+}
+
+pub(crate) fn voxels_in(set: &impl OccupiedSet, region: &Aabb) -> Vec<VoxelOccupancy> {
+    let (grid, mut found) = (set.grid_of_set(), Vec::new());
+    set.visit_in(&voxels_around(&grid, region), &mut |voxel| {
+        if region.contains(grid.center_m(voxel)) {
+            found.push(VoxelOccupancy { voxel, occupancy: Occupancy::Occupied(OCCUPIED) });
+        }
+        true
+    });
+    found
+}
+
+fn meet(set: &impl OccupiedSet, unknown: UnknownAs) -> impl FnMut(VoxelIndex) -> Result<Met> {
+    move |voxel| {
+        Ok(match set.empty_around(voxel) {
+            _ if unknown == UnknownAs::Obstacle => Met::Obstacle(occupancy(set, voxel).probability()),
+            Some(empty) => Met::Empty(empty),
+            None if set.holds(voxel) => Met::Obstacle(Some(OCCUPIED)),
+            None => Met::Free,
+        })
+    }
+}
+
+pub(crate) fn cast_ray(set: &impl OccupiedSet, query: &RayQuery) -> Result<Option<Hit>> {
+    walk_ray(&set.grid_of_set(), query, set.hull(), meet(set, query.unknown))
+}
+
+pub(crate) fn cast_segment(
+    set: &impl OccupiedSet,
+    ends: [Point; 2],
+    unknown: UnknownAs,
+) -> Result<Option<Hit>> {
+    walk_segment(&set.grid_of_set(), ends, meet(set, unknown))
+}
+
+pub(crate) fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>> {
+    let grid = set.grid_of_set();
+    if unknown == UnknownAs::Obstacle {
+        return first_not_free(&grid, body, |voxel| Ok(occupancy(set, voxel)));
+    }
+    let mut found = None;
+    set.visit_in(&voxels_around(&grid, &body.bounds()?), &mut |voxel| {
+        if body.touches_voxel(&grid, voxel) {
+            found = Some(Hit::from(&grid, body.reference_point(), voxel, Some(OCCUPIED)));
+        }
+        found.is_none()
+    });
+    Ok(found)
+}
+
+pub(crate) fn nearest_occupied(
+    set: &impl OccupiedSet,
+    point: Point,
+    max_distance_m: f64,
+) -> Result<Option<Hit>> {
+    super::nearest::check(point, max_distance_m)?;
+    let grid = set.grid_of_set();
+    let Some(hull) = set.hull() else { return Ok(None) };
+    // All are in a ball around the point that reaches the corners of the hull.
+    let farthest_m = (0..3)
+        .map(|k| [hull.min[k], hull.end[k]].map(|index| (grid.corner_m(index) - point[k]).abs()))
+        .map(|[low, high]| low.max(high).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    let max_distance_m = max_distance_m.min(farthest_m);
+    let mut best: Option<Hit> = None;
+    // Small balls first: the first that holds a voxel holds the nearest.
+    let mut reach_m = grid.resolution_m() * 4.0;
+    loop {
+        let ball_m = reach_m.min(max_distance_m);
+        let bounds = Aabb { min: point.map(|x| x - ball_m), max: point.map(|x| x + ball_m) };
+        set.visit_in(&voxels_around(&grid, &bounds), &mut |voxel| {
+            let hit = Hit::from(&grid, point, voxel, Some(OCCUPIED));
+            if hit.distance_m <= ball_m && hit.is_nearer_than(best.as_ref()) {
+                best = Some(hit);
+            }
+            true
+        });
+        if best.is_some() || reach_m >= max_distance_m {
+            return Ok(best);
+        }
+        reach_m *= 2.0;
+    }
+}
+
+/// Checks that maps have voxels of one size.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] with both sizes.
+pub(crate) fn check_resolutions(resolutions_m: impl Iterator<Item = f64>) -> Result<()> {
+    let mut first: Option<f64> = None;
+    for resolution_m in resolutions_m {
+        let first = *first.get_or_insert(resolution_m);
+        if first.to_bits() != resolution_m.to_bits() {
+            let reason =
+                format!("{first} m in one map, {resolution_m} m in another; unite maps of one resolution");
+            return Err(Error::argument("resolution", reason));
+        }
+    }
+    Ok(())
+}
+
+/// Makes a set of occupied voxels answer [`Queries`](crate::query::Queries).
+macro_rules! answer_as_occupied_set {
+    ($set:ty) => {
+        impl $crate::query::Queries for $set {
+            fn grid(&self) -> $crate::space::Grid {
+                $crate::query::occupied_set::OccupiedSet::grid_of_set(self)
+            }
+
+            fn occupancy(
+                &self,
+                voxel: $crate::space::VoxelIndex,
+            ) -> $crate::error::Result<$crate::query::Occupancy> {
+                Ok($crate::query::occupied_set::occupancy(self, voxel))
+            }
+
+            fn voxels_in(&self, region: &$crate::space::Aabb) -> $crate::query::Voxels<'_> {
+                Box::new($crate::query::occupied_set::voxels_in(self, region).into_iter().map(Ok))
+            }
+
+            fn cast_ray(
+                &self,
+                ray: &$crate::query::RayQuery,
+            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+                $crate::query::occupied_set::cast_ray(self, ray)
+            }
+
+            fn cast_segment(
+                &self,
+                from: $crate::space::Point,
+                to: $crate::space::Point,
+                unknown: $crate::query::UnknownAs,
+            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+                $crate::query::occupied_set::cast_segment(self, [from, to], unknown)
+            }
+
+            fn collision(
+                &self,
+                body: &$crate::query::Shape,
+                unknown: $crate::query::UnknownAs,
+            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+                $crate::query::occupied_set::collision(self, body, unknown)
+            }
+
+            fn nearest_occupied(
+                &self,
+                point: $crate::space::Point,
+                max_distance_m: f64,
+            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+                $crate::query::occupied_set::nearest_occupied(self, point, max_distance_m)
+            }
+        }
+    };
+}
+pub(crate) use answer_as_occupied_set;

@@ -1,0 +1,38 @@
+use super::set::VoxelSet;
+use crate::query::brick_of;
+use crate::query::occupied_set::{OccupiedSet, answer_as_occupied_set};
+use crate::space::{BrickCode, Grid, TileBox, VoxelBox, VoxelIndex};
+
+/// The voxels of a layer are occupied, and nothing is known of others. A robot's own map
+/// [`United`](crate::query::United) with the layers of other robots knows both.
+impl OccupiedSet for VoxelSet {
+    fn grid_of_set(&self) -> Grid {
+        *self.grid()
+    }
+
+    fn holds(&self, voxel: VoxelIndex) -> bool {
+        self.contains(voxel)
+    }
+
+    fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox> {
+        let tile = self.grid().tile_of_voxel(voxel);
+        let voxels = self.grid().voxels_of_tile(tile);
+        if !self.has_tile(tile) {
+            return Some(voxels);
+        }
+        let is_empty = self.brick(tile, BrickCode::of_voxel(voxel)) == [0; 8];
+        is_empty.then(|| brick_of(voxel).intersection(&voxels))
+    }
+
+    fn hull(&self) -> Option<VoxelBox> {
+        let tiles = TileBox::of(self.tiles())?;
+        let [low, high] = [tiles.min(), tiles.max()].map(|tile| self.grid().voxels_of_tile(tile));
+        Some(VoxelBox { min: low.min, end: high.end })
+    }
+
+    fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool) {
+        let _ = self.in_box(voxels).all(visit);
+    }
+}
+
+answer_as_occupied_set!(VoxelSet);
