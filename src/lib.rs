@@ -83,5 +83,7 @@ pub use config::{
 };
 pub use error::{DecodeError, Error, FormatError, Place, Result};
 pub use mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+/// The crate of [`Pose::isometry`], in the version that voxtile uses.
+pub use nalgebra;
 pub use query::{Occupancy, Queries};
-pub use scan::Scan;
+pub use scan::{Pose, Scan, ScanPoints, ScanRef};
