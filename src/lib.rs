@@ -5,15 +5,16 @@
 //! flushed survives a crash, and the map is the same to the bit whatever the cache.
 //!
 //! ```
-//! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Scan};
+//! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Pose, Queries, ScanRef};
 //!
 //! # fn main() -> voxtile::Result<()> {
 //! # let folder = tempfile::tempdir().unwrap();
 //! # let folder = folder.path().join("map_tiles");
 //! let config = MapConfig::new(0.1, 10.0)?.with_range(0.5, 60.0).with_cache_tiles(64);
 //! let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
-//! let scan = Scan { origin: [0.0, 0.0, 1.8], points: vec![[4.2, 1.0, 0.3]], intensities: None };
-//! mapper.insert_scan(&scan)?;
+//! let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
+//! let points: Vec<[f32; 3]> = vec![[4.2, 1.0, -1.5]]; // In the sensor's frame.
+//! mapper.insert_points(&ScanRef::in_sensor(pose, &points))?;
 //! mapper.flush()?; // From here on it survives a crash.
 //!
 //! let map = MapReader::open(&folder, 16)?;
@@ -25,8 +26,8 @@
 //! # The flow
 //!
 //! ```text
-//! io::ScanSource -> Scan -> rays -> updates by tile        io, scan
-//!   -> mapper::insert_scan                                 mapper
+//! Scan, ScanRef, io::StoredScan -> Mapper::insert_points   io, scan, mapper
+//!   -> rays -> updates by tile                             scan
 //!      -> resident tiles: table, octree                    tile, octree, sensor
 //!      -> pending updates for tiles on disk                mapper
 //!      -> eviction and flush: bytes, one commit            tile::format, store

@@ -6,11 +6,11 @@ use crate::error::{Error, Result};
 use crate::space::Point;
 use std::ops::Range;
 
-/// A scan whose points lie elsewhere: borrowed lists of `[f32; 3]` or `[f64; 3]` in metres, in the sensor's frame or the
-/// world's.
+/// A scan whose points lie elsewhere: borrowed lists of `[f32; 3]` or `[f64; 3]` in metres, in the sensor's frame or
+/// the world's.
 ///
-/// Nothing is copied to make one. Points that are `f64` in the world frame are used where they lie; others are converted
-/// chunk by chunk while they are traced. The map is the same to the bit as by a [`Scan`](super::Scan).
+/// Nothing is copied to make one. Points that are `f64` in the world frame are used where they lie; others are
+/// converted chunk by chunk while they are traced. The map is the same to the bit as by a [`Scan`](super::Scan).
 ///
 /// ```
 /// use voxtile::{InMemoryMapper, MapConfig, Mapper, Pose, Queries, ScanRef};
