@@ -13,12 +13,12 @@
 //! let config = MapConfig::new(0.1, 10.0)?.with_range(0.5, 60.0).with_cache_tiles(64);
 //! let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
 //! let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
-//! let points: Vec<[f32; 3]> = vec![[4.2, 1.0, -1.5]]; // In the sensor's frame.
+//! let points: Vec<[f32; 3]> = vec![[4.25, 1.05, -1.45]]; // In the sensor's frame.
 //! mapper.insert_points(&ScanRef::in_sensor(pose, &points))?;
 //! mapper.flush()?; // From here on it survives a crash.
 //!
 //! let map = MapReader::open(&folder, 16)?;
-//! assert!(map.occupancy_at([4.2, 1.0, 0.3])?.is_occupied());
+//! assert!(map.occupancy_at([4.25, 1.05, 0.35])?.is_occupied());
 //! # Ok(())
 //! # }
 //! ```

@@ -19,15 +19,15 @@ use std::ops::Range;
 /// let mut mapper = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
 ///
 /// // As a driver hands them out; (0, 0, 0) is a ray without return.
-/// let points: Vec<[f32; 3]> = vec![[4.2, 1.0, -1.5], [0.0; 3]];
+/// let points: Vec<[f32; 3]> = vec![[4.25, 1.05, -1.45], [0.0; 3]];
 /// let intensities = [17.0, 0.0];
 /// let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
 /// let report = mapper.insert_points(&ScanRef::in_sensor(pose, &points).with_intensities(&intensities)?)?;
 /// assert_eq!((report.points, report.skipped.no_return), (2, 1));
-/// assert!(mapper.occupancy_at([4.2, 1.0, 0.3])?.is_occupied());
+/// assert!(mapper.occupancy_at([4.25, 1.05, 0.35])?.is_occupied());
 ///
 /// // In the world frame.
-/// let points = [[6.0, 2.0, 0.3], [6.0, 2.1, 0.3]];
+/// let points = [[6.05, 2.05, 0.35], [6.05, 2.15, 0.35]];
 /// mapper.insert_points(&ScanRef::in_world([0.0, 0.0, 1.8], &points))?;
 /// # Ok(())
 /// # }

@@ -120,7 +120,7 @@ impl<M: Mapper> AnyMapper for M {
 fn mappers(config: &MapConfig, folder: &TempDir) -> Vec<Box<dyn AnyMapper>> {
     let mut mappers: Vec<Box<dyn AnyMapper>> = vec![Box::new(InMemoryMapper::new(config.clone()).unwrap())];
     let little = [
-        config.clone().with_cache_tiles(2).with_pending_bytes(5_000),
+        config.clone().with_cache_tiles(4).with_pending_bytes(5_000),
         config.clone().with_tight_memory_bytes(100_000),
     ];
     for config in little {
@@ -138,7 +138,7 @@ fn configs() -> impl Iterator<Item = (MapConfig, bool)> {
         (SensorModel::default(), true),
         (SensorModel::Iwlo(Iwlo::default()), true),
     ];
-    let config = MapConfig::new(0.2, 3.2).unwrap().with_range(0.3, 6.0);
+    let config = MapConfig::new(0.2, 6.4).unwrap().with_range(0.3, 6.0);
     modes.into_iter().flat_map(move |mode| {
         let config = config.clone().with_insert_mode(mode);
         models.map(|(model, has_intensities)| (config.clone().with_sensor_model(model), has_intensities))
@@ -151,7 +151,6 @@ fn mapped(config: &MapConfig, scans: &[Measured], form: usize) -> (String, Vec<S
     let mut outcomes = mappers(config, &folder).into_iter().map(|mut mapper| {
         let insert = |scan| with_form(scan, form, |scan| mapper.insert_points(scan).unwrap());
         let reports: Vec<ScanReport> = scans.iter().map(insert).collect();
-        mapper.flush().unwrap();
         assert_eq!(mapper.scan_number(), scans.len() as u64);
         (mapper.digest_text(), reports)
     });
