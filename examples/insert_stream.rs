@@ -10,8 +10,10 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::time::Instant;
 use voxtile::mapper::{MapView, Mapper};
-use voxtile::space::Point;
-use voxtile::{MapConfig, OutOfCoreTileMapper, Scan};
+use voxtile::{MapConfig, OutOfCoreTileMapper, ScanRef};
+
+type Point = [f32; 3];
+type Points = Vec<Point>;
 
 /// What OctoMap is given too.
 const MAX_RANGE_M: f64 = 60.0;
@@ -28,25 +30,25 @@ fn main() -> Result<(), Box<dyn Error>> {
         .with_cache_tiles(1 << 20);
     let mut mapper = OutOfCoreTileMapper::create(folder, config)?;
     let mut input = BufReader::new(File::open(stream)?);
-    let (mut points, mut skipped, mut seconds) = (0, 0, 0.0);
-    while let Some(scan) = read_scan(&mut input)? {
+    let (mut points_seen, mut skipped, mut seconds) = (0, 0, 0.0);
+    while let Some((origin, points)) = read_scan(&mut input)? {
         let start = Instant::now();
-        let report = mapper.insert_scan(&scan)?;
+        let report = mapper.insert_points(&ScanRef::in_world(origin.map(f64::from), &points))?;
         seconds += start.elapsed().as_secs_f64();
-        points += report.points;
+        points_seen += report.points;
         skipped += report.skipped.total();
     }
     mapper.flush()?;
     println!(
-        "{{\"scans\":{},\"points\":{points},\"skipped\":{skipped},\"tiles\":{},\"voxtile_seconds\":{seconds:.2}}}",
+        "{{\"scans\":{},\"points\":{points_seen},\"skipped\":{skipped},\"tiles\":{},\"voxtile_seconds\":{seconds:.2}}}",
         mapper.scan_number(),
         mapper.tile_indices().len()
     );
     Ok(())
 }
 
-/// The next scan; `None` at the end of the stream.
-fn read_scan(input: &mut impl Read) -> io::Result<Option<Scan>> {
+/// Origin and points of the next scan; `None` at the end of the stream.
+fn read_scan(input: &mut impl Read) -> io::Result<Option<(Point, Points)>> {
     let mut count = [0; 4];
     match input.read_exact(&mut count) {
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
@@ -54,14 +56,11 @@ fn read_scan(input: &mut impl Read) -> io::Result<Option<Scan>> {
     }
     let origin = read_point(input)?;
     let points = (0..u32::from_le_bytes(count)).map(|_| read_point(input)).collect::<io::Result<_>>()?;
-    Ok(Some(Scan { origin, points, intensities: None }))
+    Ok(Some((origin, points)))
 }
 
-/// Three `f32`, widened.
 fn read_point(input: &mut impl Read) -> io::Result<Point> {
     let mut bytes = [0; 12];
     input.read_exact(&mut bytes)?;
-    Ok(std::array::from_fn(|k| {
-        f64::from(f32::from_le_bytes(std::array::from_fn(|byte| bytes[4 * k + byte])))
-    }))
+    Ok(std::array::from_fn(|k| f32::from_le_bytes(std::array::from_fn(|byte| bytes[4 * k + byte]))))
 }

@@ -5,19 +5,20 @@
 //! flushed survives a crash, and the map is the same to the bit whatever the cache.
 //!
 //! ```
-//! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Queries, Scan};
+//! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Pose, Queries, ScanRef};
 //!
 //! # fn main() -> voxtile::Result<()> {
 //! # let folder = tempfile::tempdir().unwrap();
 //! # let folder = folder.path().join("map_tiles");
 //! let config = MapConfig::new(0.1, 10.0)?.with_range(0.5, 60.0).with_cache_tiles(64);
 //! let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
-//! let scan = Scan { origin: [0.0, 0.0, 1.8], points: vec![[4.2, 1.0, 0.3]], intensities: None };
-//! mapper.insert_scan(&scan)?;
+//! let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
+//! let points: Vec<[f32; 3]> = vec![[4.25, 1.05, -1.45]]; // In the sensor's frame.
+//! mapper.insert_points(&ScanRef::in_sensor(pose, &points))?;
 //! mapper.flush()?; // From here on it survives a crash.
 //!
 //! let map = MapReader::open(&folder, 16)?;
-//! assert!(map.occupancy_at([4.2, 1.0, 0.3])?.is_occupied());
+//! assert!(map.occupancy_at([4.25, 1.05, 0.35])?.is_occupied());
 //! # Ok(())
 //! # }
 //! ```
@@ -25,8 +26,8 @@
 //! # The flow
 //!
 //! ```text
-//! io::ScanSource -> Scan -> rays -> updates by tile        io, scan
-//!   -> mapper::insert_scan                                 mapper
+//! Scan, ScanRef, io::StoredScan -> Mapper::insert_points   io, scan, mapper
+//!   -> rays -> updates by tile                             scan
 //!      -> resident tiles: table, octree                    tile, octree, sensor
 //!      -> pending updates for tiles on disk                mapper
 //!      -> eviction and flush: bytes, one commit            tile::format, store
@@ -58,8 +59,6 @@
 //! `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
 //! it, and no feature changes a result.
 
-pub use nalgebra;
-
 mod config;
 mod error;
 pub mod integrity;
@@ -85,5 +84,7 @@ pub use config::{
 };
 pub use error::{DecodeError, Error, FormatError, Place, Result};
 pub use mapper::{InMemoryMapper, LiveReader, LiveView, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+/// The crate of [`Pose::isometry`], in the version that voxtile uses.
+pub use nalgebra;
 pub use query::{Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy};
-pub use scan::Scan;
+pub use scan::{Pose, Scan, ScanPoints, ScanRef};

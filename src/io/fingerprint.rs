@@ -1,5 +1,5 @@
 use crate::error::{Error, Result};
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 use std::fs::File;
 use std::path::Path;
 
@@ -28,8 +28,8 @@ impl Fingerprint {
         Ok(())
     }
 
-    pub(super) fn add_pose(&mut self, world_from_sensor: &Isometry3<f64>) {
-        for value in world_from_sensor.to_homogeneous().iter() {
+    pub(super) fn add_pose(&mut self, world_from_sensor: &Pose) {
+        for value in world_from_sensor.isometry().to_homogeneous().iter() {
             self.hasher.update(&value.to_bits().to_le_bytes());
         }
     }

@@ -2,8 +2,8 @@ use super::lzf;
 use super::pcd_header::{Encoding, Header, MOST_HEADER_BYTES};
 use super::point_store::{PointRoom, PointStore};
 use crate::error::{Error, FormatError};
+use crate::scan::Pose;
 use crate::space::Point;
-use nalgebra::Isometry3;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -16,7 +16,7 @@ pub struct PcdCloud {
     /// Intensities, from the field `intensity`, `i` or `reflectivity`.
     pub intensities: Option<Vec<f32>>,
     /// The `VIEWPOINT`.
-    pub world_from_sensor: Isometry3<f64>,
+    pub world_from_sensor: Pose,
 }
 
 /// Reads a PCD file (versions 0.5 to 0.7; `ascii`, `binary` or `binary_compressed`). Bytes after the last point are
@@ -39,7 +39,7 @@ pub fn read_pcd(file: &[u8]) -> Result<PcdCloud, FormatError> {
 }
 
 /// The same from a file of any size; returns the `VIEWPOINT`.
-pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::error::Result<Isometry3<f64>> {
+pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::error::Result<Pose> {
     let open = || {
         let file = File::open(path)?;
         let bytes = file.metadata()?.len();
@@ -81,7 +81,7 @@ impl From<Error> for PcdError {
 
 type Result<T, E = PcdError> = std::result::Result<T, E>;
 
-fn read(mut input: impl BufRead + Seek, file_bytes: u64, points: &mut PointStore) -> Result<Isometry3<f64>> {
+fn read(mut input: impl BufRead + Seek, file_bytes: u64, points: &mut PointStore) -> Result<Pose> {
     let mut start = Vec::new();
     (&mut input).take(MOST_HEADER_BYTES as u64).read_to_end(&mut start)?;
     let header = Header::parse(&start)?;

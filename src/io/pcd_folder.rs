@@ -6,7 +6,7 @@ use super::point_store::PointStore;
 use super::pose_source::{PoseSource, poses_of};
 use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct PcdFolder {
     files: Vec<PathBuf>,
     /// One per file; `None` takes each file's `VIEWPOINT`.
-    poses: Option<Vec<Isometry3<f64>>>,
+    poses: Option<Vec<Pose>>,
     pose_source: PoseSource,
     next: usize,
 }

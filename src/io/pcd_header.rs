@@ -1,6 +1,5 @@
-use super::poses::unit_quaternion;
 use crate::error::FormatError;
-use nalgebra::{Isometry3, Quaternion, Translation3};
+use crate::scan::Pose;
 
 type Result<T> = std::result::Result<T, FormatError>;
 
@@ -31,7 +30,7 @@ pub(super) struct Header {
     pub(super) points: usize,
     pub(super) point_bytes: usize,
     pub(super) encoding: Encoding,
-    pub(super) world_from_sensor: Isometry3<f64>,
+    pub(super) world_from_sensor: Pose,
     pub(super) data_at: usize,
     pub(super) data_line: u64,
 }
@@ -122,7 +121,7 @@ impl Header {
         }
         let points = number_of_points(&find, data_line)?;
         let world_from_sensor = match find("VIEWPOINT") {
-            None => Isometry3::identity(),
+            None => Pose::identity(),
             Some((words, line)) => viewpoint(words, line)?,
         };
         let (encoding, line) = need("DATA")?;
@@ -165,13 +164,12 @@ fn number_of_points<'a>(
     }
 }
 
-fn viewpoint(words: &[String], line: u64) -> Result<Isometry3<f64>> {
+fn viewpoint(words: &[String], line: u64) -> Result<Pose> {
     let numbers = words.iter().map(|word| parse(word, line)).collect::<Result<Vec<f64>>>()?;
     match numbers[..] {
         [x, y, z, qw, qx, qy, qz] if numbers.iter().all(|number| number.is_finite()) => {
-            let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz))
-                .map_err(|reason| FormatError::at_line(line, format!("VIEWPOINT has {reason}")))?;
-            Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+            Pose::of_quaternion([x, y, z], [qx, qy, qz, qw])
+                .map_err(|reason| FormatError::at_line(line, format!("VIEWPOINT has {reason}")))
         }
         _ => Err(FormatError::at_line(line, "VIEWPOINT needs seven finite numbers: tx ty tz qw qx qy qz")),
     }

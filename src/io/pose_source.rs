@@ -1,7 +1,7 @@
 use super::pcd_viewpoint::viewpoint_of_file;
 use super::poses::{Poses, looks_like_poses};
 use crate::error::{Error, Result};
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -48,10 +48,10 @@ pub(super) fn poses_of(
     files: &[PathBuf],
     asked_for: Option<&Path>,
     folder: Option<&Path>,
-) -> Result<(PoseSource, Option<Vec<Isometry3<f64>>>)> {
+) -> Result<(PoseSource, Option<Vec<Pose>>)> {
     let path = match asked_for {
         Some(path) if path == Path::new(IDENTITY) => {
-            return Ok((PoseSource::Identity, Some(vec![Isometry3::identity(); files.len()])));
+            return Ok((PoseSource::Identity, Some(vec![Pose::identity(); files.len()])));
         }
         Some(path) => Some(path.to_owned()),
         None => folder.and_then(pose_file_for),

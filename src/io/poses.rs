@@ -1,12 +1,12 @@
 use crate::error::{Error, FormatError, Result};
-use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use crate::scan::Pose;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The poses of a file, with their time stamps if it has any.
 pub(super) struct Poses {
-    poses: Vec<Isometry3<f64>>,
+    poses: Vec<Pose>,
     /// Seconds, each with its line number; TUM files only.
     stamps: Vec<(u64, f64)>,
 }
@@ -61,7 +61,7 @@ impl Poses {
         Ok(())
     }
 
-    pub(super) fn into_poses(self) -> Vec<Isometry3<f64>> {
+    pub(super) fn into_poses(self) -> Vec<Pose> {
         self.poses
     }
 
@@ -113,7 +113,7 @@ fn number_in(path: &Path) -> Option<f64> {
 /// # Errors
 ///
 /// An invalid line, numbers that are not finite, a zero quaternion, a matrix that is not a rotation.
-pub fn read_poses(path: &Path) -> Result<Vec<Isometry3<f64>>> {
+pub fn read_poses(path: &Path) -> Result<Vec<Pose>> {
     let text = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
     parse_poses(&String::from_utf8_lossy(&text)).map_err(|error| error.in_input(path))
 }
@@ -123,7 +123,7 @@ pub fn read_poses(path: &Path) -> Result<Vec<Isometry3<f64>>> {
 /// # Errors
 ///
 /// Those of [`read_poses`] that are about a line.
-pub fn parse_poses(text: &str) -> std::result::Result<Vec<Isometry3<f64>>, FormatError> {
+pub fn parse_poses(text: &str) -> std::result::Result<Vec<Pose>, FormatError> {
     lines(text).map(|line| line.map(|(_, pose)| pose.world_from_sensor)).collect()
 }
 
@@ -131,7 +131,7 @@ pub fn parse_poses(text: &str) -> std::result::Result<Vec<Isometry3<f64>>, Forma
 struct StampedPose {
     /// Seconds, in a TUM file.
     stamp_s: Option<f64>,
-    world_from_sensor: Isometry3<f64>,
+    world_from_sensor: Pose,
 }
 
 /// The poses of a text, each with its line number.
@@ -153,37 +153,10 @@ fn parse(line: &str) -> std::result::Result<StampedPose, String> {
     // The time is only for checks; everything else must be finite.
     let stamp_s = (numbers.len() == 8).then(|| numbers[0]).filter(|stamp| stamp.is_finite());
     let pose = if numbers.len() == 8 { &numbers[1..] } else { &numbers[..] };
-    if let Some(number) = pose.iter().find(|number| !number.is_finite()) {
-        return Err(format!("{number} in a pose"));
-    }
-    match *pose {
-        [x, y, z, qx, qy, qz, qw] => {
-            let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz))?;
-            let world_from_sensor = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
-            Ok(StampedPose { stamp_s, world_from_sensor })
-        }
-        [a, b, c, x, d, e, f, y, g, h, i, z] => {
-            let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
-            let deviation = (matrix * matrix.transpose() - Matrix3::identity()).abs().max();
-            if deviation > 1e-3 || matrix.determinant() < 0.0 {
-                return Err("the 3x3 part of the matrix is not a rotation".into());
-            }
-            let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
-            // The matrix is a rotation only to a few digits; a pose must not scale.
-            let rotation = UnitQuaternion::new_normalize(rotation.into_inner());
-            let world_from_sensor = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
-            Ok(StampedPose { stamp_s, world_from_sensor })
-        }
-        _ => Err(format!("{} numbers; a pose has 8 (TUM) or 12 (KITTI)", numbers.len())),
-    }
-}
-
-/// The rotation of a quaternion, which is normalized; its squared length must be finite and not 0.
-pub(super) fn unit_quaternion(
-    quaternion: Quaternion<f64>,
-) -> std::result::Result<UnitQuaternion<f64>, String> {
-    if !quaternion.norm_squared().is_finite() {
-        return Err("a quaternion too long to be a rotation".to_owned());
-    }
-    UnitQuaternion::try_new(quaternion, 1e-9).ok_or_else(|| "a quaternion of no length".to_owned())
+    let world_from_sensor = match *pose {
+        [x, y, z, qx, qy, qz, qw] => Pose::of_quaternion([x, y, z], [qx, qy, qz, qw])?,
+        _ if pose.len() == 12 => Pose::of_matrix(pose.as_chunks().0)?,
+        _ => return Err(format!("{} numbers; a pose has 8 (TUM) or 12 (KITTI)", numbers.len())),
+    };
+    Ok(StampedPose { stamp_s, world_from_sensor })
 }

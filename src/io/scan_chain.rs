@@ -1,6 +1,6 @@
 use super::stored_scan::StoredScan;
 use crate::error::Result;
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 
 /// Identifies a scan: a hash of its points and intensities, and another of its pose. Storage format and name do not
 /// matter.
@@ -122,10 +122,9 @@ fn mark(hasher: &blake3::Hasher) -> [u8; MARK_BYTES] {
     mark
 }
 
-fn pose_mark(pose: &Isometry3<f64>) -> [u8; MARK_BYTES] {
+fn pose_mark(pose: &Pose) -> [u8; MARK_BYTES] {
     let mut hasher = hasher("voxtile 1 pose");
-    let (t, q) = (pose.translation.vector, pose.rotation.coords);
-    for number in [t.x, t.y, t.z, q.x, q.y, q.z, q.w] {
+    for number in pose.position_m().into_iter().chain(pose.quaternion()) {
         hasher.update(&bits(number).to_le_bytes());
     }
     mark(&hasher)
@@ -155,6 +154,7 @@ fn from_text(text: &str) -> Option<[u8; MARK_BYTES]> {
 mod tests {
     use super::*;
     use crate::io::PointStore;
+    use nalgebra::Isometry3;
 
     fn scan(points: &[[f64; 3]], intensity: Option<f32>, x_m: f64) -> StoredScan {
         let mut points_in_sensor = PointStore::default();
@@ -163,7 +163,7 @@ mod tests {
         StoredScan {
             name: "any".into(),
             points_in_sensor,
-            world_from_sensor: Isometry3::translation(x_m, 0.0, 0.0),
+            world_from_sensor: Isometry3::translation(x_m, 0.0, 0.0).into(),
         }
     }
 
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(on, whole);
 
         let mut moved = scans();
-        moved[1].world_from_sensor = Isometry3::translation(1.5, 0.0, 0.0);
+        moved[1].world_from_sensor = Isometry3::translation(1.5, 0.0, 0.0).into();
         let moved = chain_of(&moved);
         assert_eq!(moved.scan_text(), whole.scan_text());
         assert_ne!(moved.pose_text(), whole.pose_text());

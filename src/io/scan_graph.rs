@@ -1,9 +1,8 @@
 use super::fingerprint::Fingerprint;
 use super::point_store::PointStore;
-use super::poses::unit_quaternion;
 use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
-use nalgebra::{Isometry3, Quaternion, Translation3};
+use crate::scan::Pose;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -103,13 +102,10 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         if ![x, y, z, qw, qx, qy, qz].iter().all(|number| number.is_finite()) {
             return Err(FormatError::at_offset(at, "a pose that is not finite").in_input(&self.path));
         }
-        let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz))
+        let world_from_sensor = Pose::of_quaternion([x, y, z], [qx, qy, qz, qw])
             .map_err(|reason| FormatError::at_offset(at, reason).in_input(&self.path))?;
         self.is_past_error = false;
-        Ok(Some(ScanHead {
-            name: id.to_string(),
-            world_from_sensor: Isometry3::from_parts(Translation3::new(x, y, z), rotation),
-        }))
+        Ok(Some(ScanHead { name: id.to_string(), world_from_sensor }))
     }
 
     fn pass_unread(&mut self) -> bool {

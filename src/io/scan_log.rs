@@ -3,6 +3,7 @@ use super::point_store::PointStore;
 use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
 use crate::maths::sin_cos;
+use crate::scan::Pose;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ struct ScanLog<R> {
     input: R,
     line: u64,
     /// Pose of the scan whose points follow.
-    pose: Option<Isometry3<f64>>,
+    pose: Option<Pose>,
     done: usize,
 }
 
@@ -62,12 +63,12 @@ impl<R: BufRead> ScanLog<R> {
         Ok(numbers)
     }
 
-    fn pose(&self, words: &str) -> Result<Isometry3<f64>> {
+    fn pose(&self, words: &str) -> Result<Pose> {
         let [x, y, z, roll, pitch, yaw] = self.numbers(words)?;
         if ![x, y, z, roll, pitch, yaw].iter().all(|number| number.is_finite()) {
             return Err(self.wrong("a pose that is not finite"));
         }
-        Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation(roll, pitch, yaw)))
+        Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation(roll, pitch, yaw)).into())
     }
 
     fn wrong(&self, reason: impl Into<String>) -> Error {

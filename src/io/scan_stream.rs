@@ -1,10 +1,9 @@
 use super::fingerprint::Fingerprint;
 use super::point_store::PointStore;
-use super::poses::unit_quaternion;
 use super::scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
 use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
-use nalgebra::{Isometry3, Quaternion, Translation3};
+use crate::scan::Pose;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
@@ -113,14 +112,12 @@ impl<R: Read> ScanStream<R> {
     }
 
     /// The pose from the numbers that start at an offset.
-    fn pose(&self, numbers: [f64; 7], at: u64) -> Result<Isometry3<f64>> {
+    fn pose(&self, numbers: [f64; 7], at: u64) -> Result<Pose> {
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(self.wrong(at, "a pose that is not finite"));
         }
         let [x, y, z, qx, qy, qz, qw] = numbers;
-        let rotation =
-            unit_quaternion(Quaternion::new(qw, qx, qy, qz)).map_err(|reason| self.wrong(at + 24, reason))?;
-        Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+        Pose::of_quaternion([x, y, z], [qx, qy, qz, qw]).map_err(|reason| self.wrong(at + 24, reason))
     }
 
     fn wrong(&self, offset: u64, reason: impl Into<String>) -> Error {

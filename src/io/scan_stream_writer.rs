@@ -1,7 +1,7 @@
 use super::sensor_scan::SensorScan;
-use crate::scan::Scan;
+use crate::scan::{Pose, Scan};
 use crate::space::Point;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::Isometry3;
 use std::io::{self, ErrorKind, Write};
 
 pub(super) const MAGIC: &[u8; 8] = b"VXSCANS\n";
@@ -59,14 +59,14 @@ impl<W: Write> ScanStreamWriter<W> {
     /// As for [`ScanStreamWriter::write`].
     pub fn write_world(&mut self, scan: &Scan) -> io::Result<()> {
         let [x, y, z] = scan.origin;
-        let pose = Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::identity());
+        let pose = Isometry3::translation(x, y, z).into();
         let points = scan.points.iter().map(|point| std::array::from_fn(|k| point[k] - scan.origin[k]));
         self.write_points(&pose, points, scan.intensities.as_deref())
     }
 
     fn write_points(
         &mut self,
-        pose: &Isometry3<f64>,
+        pose: &Pose,
         points: impl ExactSizeIterator<Item = Point>,
         intensities: Option<&[f32]>,
     ) -> io::Result<()> {
@@ -76,8 +76,7 @@ impl<W: Write> ScanStreamWriter<W> {
         }
         self.scan.clear();
         self.scan.extend(count.to_le_bytes());
-        let (t, q) = (pose.translation.vector, pose.rotation.coords);
-        for number in [t.x, t.y, t.z, q.x, q.y, q.z, q.w] {
+        for number in pose.position_m().into_iter().chain(pose.quaternion()) {
             self.scan.extend(number.to_le_bytes());
         }
         let mut intensities = intensities.filter(|_| self.has_intensities).unwrap_or_default().iter();

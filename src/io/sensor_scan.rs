@@ -1,6 +1,5 @@
-use crate::scan::Scan;
+use crate::scan::{Pose, Scan};
 use crate::space::Point;
-use nalgebra::Isometry3;
 
 /// A scan in the sensor's frame, and the sensor's pose.
 #[derive(Clone, Debug)]
@@ -12,12 +11,12 @@ pub struct SensorScan {
     /// Intensity of each point, if the source has it.
     pub intensities: Option<Vec<f32>>,
     /// Pose of the sensor: `world = R * p + t`.
-    pub world_from_sensor: Isometry3<f64>,
+    pub world_from_sensor: Pose,
 }
 
 impl SensorScan {
     /// The scan in the world frame.
     pub fn into_scan(self) -> Scan {
-        Scan::from_sensor_frame(&self.points_in_sensor, self.intensities, &self.world_from_sensor)
+        Scan::from_sensor_frame(&self.points_in_sensor, self.intensities, self.world_from_sensor)
     }
 }

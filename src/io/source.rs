@@ -7,7 +7,7 @@ use super::scan_stream::read_scan_stream;
 use super::sensor_scan::SensorScan;
 use super::stored_scan::StoredScan;
 use crate::error::{Error, Result};
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
@@ -18,7 +18,7 @@ pub struct ScanHead {
     /// Name of the scan in its source: a file name or a number.
     pub name: String,
     /// Pose of the sensor: `world = R * p + t`.
-    pub world_from_sensor: Isometry3<f64>,
+    pub world_from_sensor: Pose,
 }
 
 /// Scans one at a time, in order.

@@ -1,8 +1,7 @@
 use super::point_store::PointStore;
 use crate::error::Result;
-use crate::scan::{Scan, ScanPoints, TakePoints};
+use crate::scan::{Pose, ScanPoints, TakePoints};
 use crate::space::Point;
-use nalgebra::Isometry3;
 use std::ops::Range;
 
 /// A scan of any size in the sensor's frame, and the sensor's pose.
@@ -15,17 +14,14 @@ pub struct StoredScan {
     /// End points in metres, sensor frame.
     pub points_in_sensor: PointStore,
     /// Pose of the sensor: `world = R * p + t`.
-    pub world_from_sensor: Isometry3<f64>,
-}
-
-impl StoredScan {
-    /// Position of the sensor in metres, world frame.
-    pub fn origin(&self) -> Point {
-        self.world_from_sensor.translation.vector.into()
-    }
+    pub world_from_sensor: Pose,
 }
 
 impl ScanPoints for StoredScan {
+    fn origin(&self) -> Point {
+        self.world_from_sensor.position_m()
+    }
+
     fn len(&self) -> usize {
         self.points_in_sensor.len()
     }
@@ -35,9 +31,11 @@ impl ScanPoints for StoredScan {
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        let (to_world, mut in_world) = (self.world_from_sensor.to_world(), Vec::new());
         self.points_in_sensor.for_each_chunk(range, &mut |points, intensities| {
-            let scan = Scan::from_sensor_frame(points, None, &self.world_from_sensor);
-            take(&scan.points, intensities)
+            in_world.clear();
+            in_world.extend(points.iter().copied().map(to_world));
+            take(&in_world, intensities)
         })
     }
 }

@@ -6,7 +6,7 @@ use super::voxels::{MAX_NUMBERED, Voxel};
 use crate::error::{Error, Result};
 use crate::mapper::{MapView, Mapper};
 use crate::query::{MapQueries, Occupancy, Queries};
-use crate::scan::{Scan, ScanReport};
+use crate::scan::{Scan, ScanPoints, ScanReport};
 use crate::space::{Aabb, Point, VoxelIndex};
 
 /// The combined answer of a local map and an archive.
@@ -142,12 +142,21 @@ impl<M: Mapper> WithLocalMap<M> {
     ///
     /// # Errors
     ///
-    /// As for [`Mapper::insert_scan`] and [`LocalMap::insert_scan`]; then both are as before the call.
-    pub fn insert_scan(&mut self, scan: &Scan) -> Result<(ScanReport, LocalReport)> {
+    /// As for [`Mapper::insert_points`] and [`LocalMap::insert_points`]; then both are as before the call.
+    pub fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<(ScanReport, LocalReport)> {
+        let Self { archive, local } = self;
         // First everything that can fail in the local map; after that only the archive can fail.
-        self.local.check_scan(scan.origin, &scan.points)?;
-        let report = self.archive.insert_scan(scan)?;
-        Ok((report, self.local.insert_scan(scan)?))
+        let (local_report, report) = local.insert_after(scan, || archive.insert_points(scan))?;
+        Ok((report, local_report))
+    }
+
+    /// [`WithLocalMap::insert_points`] for a [`Scan`].
+    ///
+    /// # Errors
+    ///
+    /// As for [`WithLocalMap::insert_points`].
+    pub fn insert_scan(&mut self, scan: &Scan) -> Result<(ScanReport, LocalReport)> {
+        self.insert_points(scan)
     }
 
     /// Primes the local map from the archive; see [`LocalMap::prime`].

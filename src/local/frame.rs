@@ -14,6 +14,8 @@ use crate::space::{Grid, Point, VoxelIndex};
 pub(super) struct Frame {
     /// Voxels with evidence, in order of arrival.
     touches: Vec<Touch>,
+    /// The points in the world frame, where the scan has them otherwise.
+    pub(super) points: Vec<Point>,
     /// The indices of the points that are used.
     counting: Vec<u32>,
     pages: PageTable,
@@ -33,6 +35,7 @@ struct Touch {
 impl Frame {
     pub(super) fn bytes(&self) -> usize {
         self.touches.capacity() * size_of::<Touch>()
+            + self.points.capacity() * size_of::<Point>()
             + self.counting.capacity() * size_of::<u32>()
             + self.pages.bytes()
     }

@@ -8,7 +8,7 @@ use super::tree::Tree;
 use super::view::LocalView;
 use super::voxels::{MAX_NUMBERED, Voxels};
 use crate::error::{Error, Result};
-use crate::scan::Scan;
+use crate::scan::{Scan, ScanPoints};
 use crate::space::{Grid, Point, VoxelIndex};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -87,13 +87,41 @@ impl LocalMap {
         Ok(())
     }
 
-    /// Inserts a scan: hits at its points, misses on the rays to them.
+    /// Inserts a scan: hits at its points, misses on the rays to them. Intensities are not used.
+    ///
+    /// Points that do not lie in memory in the world frame are copied there first.
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, more than 67 million voxels and points: the map is unchanged.
+    /// An origin without a voxel, more than 67 million voxels and points, points that cannot be read: the map is
+    /// unchanged.
+    pub fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<LocalReport> {
+        self.insert_after(scan, || Ok(())).map(|(report, ())| report)
+    }
+
+    /// [`LocalMap::insert_points`] for a [`Scan`].
+    ///
+    /// # Errors
+    ///
+    /// As for [`LocalMap::insert_points`].
     pub fn insert_scan(&mut self, scan: &Scan) -> Result<LocalReport> {
-        self.update(scan.origin, &scan.points, true)
+        self.insert_points(scan)
+    }
+
+    /// Inserts a scan after everything that can fail and `first` have succeeded.
+    pub(super) fn insert_after<T>(
+        &mut self,
+        scan: &dyn ScanPoints,
+        first: impl FnOnce() -> Result<T>,
+    ) -> Result<(LocalReport, T)> {
+        self.check_scan(scan.origin(), scan.len())?;
+        let mut buffer = std::mem::take(&mut self.frame.points);
+        let inserted = points_in_world(scan, &mut buffer).and_then(|points| {
+            let done = first()?;
+            Ok((self.update(scan.origin(), points, true)?, done))
+        });
+        self.frame.points = buffer;
+        inserted
     }
 
     /// Inserts points in metres, world frame, from another map: hits without rays. The robot is at `position`.
@@ -106,7 +134,7 @@ impl LocalMap {
     }
 
     fn update(&mut self, origin: Point, points: &[Point], has_rays: bool) -> Result<LocalReport> {
-        let start = self.check_scan(origin, points)?;
+        let start = self.check_scan(origin, points.len())?;
         let mut report = LocalReport { points: points.len() as u64, ..LocalReport::default() };
         let mut clock = Clock::start();
         self.take_over_parameters(&mut report);
@@ -149,8 +177,8 @@ impl LocalMap {
     }
 
     /// The voxel of a scan's origin, if the map can take the scan; after this check nothing can fail.
-    pub(super) fn check_scan(&self, origin: Point, points: &[Point]) -> Result<VoxelIndex> {
-        check_room(self.voxels.len(), points.len())?;
+    fn check_scan(&self, origin: Point, points: usize) -> Result<VoxelIndex> {
+        check_room(self.voxels.len(), points)?;
         self.check_position(origin)
     }
 
@@ -251,6 +279,19 @@ impl Clock {
         let now = Instant::now();
         now - std::mem::replace(&mut self.0, now)
     }
+}
+
+/// The points of a scan where they lie, or else copied to a buffer.
+fn points_in_world<'p>(scan: &'p dyn ScanPoints, buffer: &'p mut Vec<Point>) -> Result<&'p [Point]> {
+    if let Some(points) = scan.in_memory() {
+        return Ok(points);
+    }
+    buffer.clear();
+    scan.for_each_chunk(0..scan.len(), &mut |points, _| {
+        buffer.extend_from_slice(points);
+        true
+    })?;
+    Ok(buffer)
 }
 
 /// Checks that so many points fit as new voxels beside those stored.

@@ -3,7 +3,7 @@ use super::trace::trace;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
-use crate::scan::{PointBatch, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates};
+use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, VoxelIndex};
 use crate::tile::{OctreeFactory, Tile};
@@ -113,11 +113,8 @@ impl MapView for InMemoryMapper {
 }
 
 impl Mapper for InMemoryMapper {
-    fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        let updates = {
-            ScanTracer::check(&self.config.grid, &self.config.sensor_model, scan)?;
-            trace(&mut self.tracer, &self.config, scan.origin, scan, None)?
-        };
+    fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
+        let updates = trace(&mut self.tracer, &self.config, scan, None)?;
         Ok(self.accept(updates))
     }
 

@@ -7,7 +7,7 @@
 //! | writes | yes | yes, one at a time | never |
 //!
 //! ```text
-//! insert_scan -> scan::trace -> updates by tile -> paging: resident tiles, write buffer -> persistence -> store
+//! insert_points -> scan::trace -> updates by tile -> paging: resident tiles, write buffer -> persistence -> store
 //! ```
 //!
 //! How tiles move between memory and disk is in `paging`.

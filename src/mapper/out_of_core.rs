@@ -4,9 +4,9 @@ use super::{LiveReader, MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
-use crate::scan::{Overflow, PointBatch, Scan, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
+use crate::scan::{Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
-use crate::space::{Point, TileBox, TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, VoxelIndex};
 use crate::store::{Disk, FsDisk, InputContent, InputRecord, Metadata, SnapshotName, TileStore};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -126,7 +126,7 @@ impl OutOfCoreTileMapper {
         check_rays(self.pager().store(), &self.config.rays)
     }
 
-    /// Lets a scan that is being inserted be given up: [`Mapper::insert_scan`] then ends with [`Error::Stopped`].
+    /// Lets a scan that is being inserted be given up: [`Mapper::insert_points`] then ends with [`Error::Stopped`].
     pub fn stop_with(&mut self, stop: Stop) {
         self.tracer.stop_with(stop);
     }
@@ -140,33 +140,6 @@ impl OutOfCoreTileMapper {
     pub fn snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.flush()?;
         self.pager().create_snapshot(name)
-    }
-
-    /// [`Mapper::insert_scan`] for points wherever they lie, seen from `origin` in metres, world frame: a scan may be
-    /// larger than memory.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Mapper::insert_scan`], and points that cannot be read.
-    pub fn insert_points(&mut self, origin: Point, points: &dyn ScanPoints) -> Result<ScanReport> {
-        let plan = MemoryPlan::new(self.config.memory);
-        let tiles = &self.tiles;
-        let (disk, folder, max_tiles) = {
-            let pager = tiles.pager();
-            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.most_tiles_of_scan())
-        };
-        let make_scratch = &|| disk.scratch(&folder);
-        let spill = &mut |part| tiles.pager().stage(part);
-        let max_bytes = plan.updates_bytes;
-        let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
-        let overflow = (max_bytes < usize::MAX).then_some(overflow);
-        let traced = trace(&mut self.tracer, &self.config, origin, points, overflow);
-        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
-        let inserted = traced.and_then(|updates| self.accept(updates));
-        if inserted.is_err() {
-            self.pager().discard_staged();
-        }
-        inserted
     }
 
     /// A handle for other threads: it answers queries while this mapper inserts scans and flushes. See [`LiveReader`].
@@ -300,9 +273,25 @@ impl MapView for OutOfCoreTileMapper {
 }
 
 impl Mapper for OutOfCoreTileMapper {
-    fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
-        ScanTracer::check(&self.config.grid, &self.config.sensor_model, scan)?;
-        self.insert_points(scan.origin, scan)
+    fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
+        let plan = MemoryPlan::new(self.config.memory);
+        let tiles = &self.tiles;
+        let (disk, folder, max_tiles) = {
+            let pager = tiles.pager();
+            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.most_tiles_of_scan())
+        };
+        let make_scratch = &|| disk.scratch(&folder);
+        let spill = &mut |part| tiles.pager().stage(part);
+        let max_bytes = plan.updates_bytes;
+        let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
+        let overflow = (max_bytes < usize::MAX).then_some(overflow);
+        let traced = trace(&mut self.tracer, &self.config, scan, overflow);
+        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
+        let inserted = traced.and_then(|updates| self.accept(updates));
+        if inserted.is_err() {
+            self.pager().discard_staged();
+        }
+        inserted
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {

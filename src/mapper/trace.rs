@@ -1,15 +1,13 @@
 use crate::config::{MapConfig, OctreeConfig};
 use crate::error::Result;
 use crate::scan::{Overflow, ScanPoints, ScanTracer, ScanUpdates, UpdateOrder};
-use crate::space::Point;
 
 /// What a scan says about voxels, in the form that the map's tiles want. What there is no room for overflows, if there
 /// is a limit.
 pub(super) fn trace(
     tracer: &mut ScanTracer,
     config: &MapConfig,
-    origin: Point,
-    points: &dyn ScanPoints,
+    scan: &dyn ScanPoints,
     overflow: Option<Overflow<'_>>,
 ) -> Result<ScanUpdates> {
     let MapConfig { grid, sensor_model, rays, .. } = config;
@@ -18,5 +16,5 @@ pub(super) fn trace(
         // A voxel cache is about the order in which rays update voxels, and so is what it is compared with.
         OctreeConfig::Pointers(_) => UpdateOrder::OfRays,
     };
-    tracer.trace_points(grid, sensor_model, rays, origin, points, order, overflow)
+    tracer.trace_points(grid, sensor_model, rays, scan, order, overflow)
 }

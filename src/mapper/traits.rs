@@ -1,7 +1,7 @@
 use super::{MapStatistics, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
-use crate::scan::{PointBatch, Scan, ScanReport};
+use crate::scan::{PointBatch, Scan, ScanPoints, ScanReport};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, VoxelIndex};
 
@@ -74,12 +74,23 @@ pub trait MapView: Sync {
 /// An accepted call gets the next scan number. After an error the map is as it was before the call, and the number
 /// is not used.
 pub trait Mapper: MapView + Send {
-    /// Adds a scan: rays from its origin to its points.
+    /// Adds a scan: rays from its origin to its points, wherever these lie: borrowed
+    /// ([`ScanRef`](crate::scan::ScanRef)), in a file ([`StoredScan`](crate::io::StoredScan)), or in a [`Scan`].
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, intensities that are missing or too few, a tile that cannot be read or written.
-    fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport>;
+    /// An origin without a voxel, intensities that are missing or not one a point, points that cannot be read, a tile
+    /// that cannot be read or written.
+    fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport>;
+
+    /// [`Mapper::insert_points`] for a [`Scan`].
+    ///
+    /// # Errors
+    ///
+    /// As for [`Mapper::insert_points`].
+    fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
+        self.insert_points(scan)
+    }
 
     /// Adds observations of single points, without rays, in order.
     ///

@@ -1,20 +1,23 @@
 //! A scan of a sensor, and the updates of voxels that follow from it.
 //!
 //! ```text
-//! Scan -> rays -> marks or counts in pages -> updates, grouped by tile
-//!         ray     pages, coherence            per_scan or per_ray, updates; spill if memory is short
+//! Scan, ScanRef -> rays -> marks or counts in pages -> updates, grouped by tile
+//!                  ray     pages, coherence            per_scan or per_ray, updates; spill if memory is short
 //! ```
 //!
 //! `trace` drives all of it. The updates do not depend on what a tile holds: they can be stored and applied later.
 
 mod coherence;
+mod coordinate;
 mod pages;
 mod per_ray;
 mod per_scan;
 mod point_batch;
+mod pose;
 mod ray;
 mod report;
 mod scan_points;
+mod scan_ref;
 mod spill;
 mod stop;
 #[cfg(test)]
@@ -23,10 +26,13 @@ mod trace;
 mod updates;
 mod world_scan;
 
+pub use coordinate::Coordinate;
 pub use point_batch::PointBatch;
+pub use pose::Pose;
 pub use ray::{MAX_RAY_STEPS, RayWalk};
 pub use report::{ScanReport, SkippedPoints};
 pub use scan_points::{ScanPoints, TakePoints};
+pub use scan_ref::ScanRef;
 pub(crate) use spill::Overflow;
 pub use stop::Stop;
 pub use trace::ScanTracer;

@@ -1,4 +1,4 @@
-use super::Scan;
+use super::{Scan, ScanRef};
 use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
@@ -6,8 +6,11 @@ use std::ops::Range;
 /// Takes a chunk of a scan's points, in metres, with their intensities if they have any. Returns whether to continue.
 pub type TakePoints<'a> = dyn FnMut(&[Point], Option<&[f32]>) -> bool + 'a;
 
-/// The points of a scan, in memory or in a file larger than memory.
+/// The points of a scan, in memory or in a file larger than memory, and where they were seen from.
 pub trait ScanPoints: Sync {
+    /// Position of the sensor in metres, world frame: every ray starts here.
+    fn origin(&self) -> Point;
+
     /// Number of points.
     fn len(&self) -> usize;
 
@@ -24,11 +27,20 @@ pub trait ScanPoints: Sync {
     ///
     /// # Errors
     ///
-    /// A file that cannot be read.
+    /// A file that cannot be read, intensities that do not match the points.
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()>;
+
+    /// All points at once, if they lie in memory as [`ScanPoints::for_each_chunk`] passes them.
+    fn in_memory(&self) -> Option<&[Point]> {
+        None
+    }
 }
 
 impl ScanPoints for Scan {
+    fn origin(&self) -> Point {
+        self.origin
+    }
+
     fn len(&self) -> usize {
         self.points.len()
     }
@@ -38,8 +50,14 @@ impl ScanPoints for Scan {
     }
 
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
-        let intensities = self.intensities.as_ref().map(|intensities| &intensities[range.clone()]);
-        take(&self.points[range], intensities);
-        Ok(())
+        let scan = ScanRef::in_world(self.origin, &self.points);
+        match &self.intensities {
+            Some(intensities) => scan.with_intensities(intensities)?.for_each_chunk(range, take),
+            None => scan.for_each_chunk(range, take),
+        }
+    }
+
+    fn in_memory(&self) -> Option<&[Point]> {
+        Some(&self.points)
     }
 }

@@ -70,7 +70,7 @@ impl Setting {
     fn whole(&self, scan: &Scan) -> (Said, ScanReport) {
         let Self { grid, model, rays, order } = self;
         let tracer = &mut ScanTracer::default();
-        let updates = tracer.trace_points(grid, model, rays, scan.origin, scan, *order, None).unwrap();
+        let updates = tracer.trace_points(grid, model, rays, scan, *order, None).unwrap();
         let mut said = Said::new();
         updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         (said, updates.report)
@@ -96,7 +96,7 @@ impl Setting {
         let folder = Path::new("map");
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =
-            tracer.trace_points(grid, model, rays, scan.origin, scan, *order, Some(overflow))?;
+            tracer.trace_points(grid, model, rays, scan, *order, Some(overflow))?;
         tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         Ok((said, report, times))
     }
@@ -169,7 +169,7 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
         let (folder, spill) = (Path::new("some_map"), &mut |_| Ok(()));
         let overflow = Overflow { max_bytes: 1 << 16, max_tiles: usize::MAX, folder, make_scratch, spill };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
-        let traced = tracer.trace_points(grid, model, rays, scan.origin, &scan, *order, Some(overflow));
+        let traced = tracer.trace_points(grid, model, rays, &scan, *order, Some(overflow));
         assert!(traced.unwrap_err().to_string().contains("some_map"));
     }
 }

@@ -1,5 +1,5 @@
+use super::Pose;
 use crate::space::Point;
-use nalgebra::Isometry3;
 
 /// A scan: where the sensor was and what it hit, in the world frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,16 +20,11 @@ impl Scan {
     pub fn from_sensor_frame(
         points_in_sensor: &[Point],
         intensities: Option<Vec<f32>>,
-        world_from_sensor: &Isometry3<f64>,
+        world_from_sensor: impl Into<Pose>,
     ) -> Self {
-        let rotation = world_from_sensor.rotation.to_rotation_matrix();
-        let r = rotation.matrix();
-        let t = world_from_sensor.translation.vector;
-        // Spelled out, so that the order of operations, and with it the last bit, does not depend on a library.
-        let to_world = |p: &Point| {
-            std::array::from_fn(|i| r[(i, 0)] * p[0] + r[(i, 1)] * p[1] + r[(i, 2)] * p[2] + t[i])
-        };
-        Self { origin: [t.x, t.y, t.z], points: points_in_sensor.iter().map(to_world).collect(), intensities }
+        let world_from_sensor = world_from_sensor.into();
+        let points = points_in_sensor.iter().copied().map(world_from_sensor.to_world()).collect();
+        Self { origin: world_from_sensor.position_m(), points, intensities }
     }
 
     /// The same scan moved by a vector in metres.

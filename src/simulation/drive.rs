@@ -1,7 +1,7 @@
 use super::leg::Leg;
 use super::plan::Plan;
 use super::route::{Route, sound_spacing};
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 
 /// An endless seeded drive through the streets of a [`City`](super::City), on the right.
 ///
@@ -59,7 +59,7 @@ impl Drive {
 }
 
 impl Route for Drive {
-    fn pose(&mut self, index: u64) -> Isometry3<f64> {
+    fn pose(&mut self, index: u64) -> Pose {
         let driven_m = (index as f64 * self.spacing_m).min(FARTHEST_M);
         if driven_m < self.start_m {
             let next = self.next;
@@ -74,7 +74,7 @@ impl Route for Drive {
 }
 
 impl Iterator for Drive {
-    type Item = Isometry3<f64>;
+    type Item = Pose;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.nth(0)
@@ -105,10 +105,14 @@ mod tests {
     fn check_spacing(drive: Drive) {
         let poses: Vec<_> = drive.take(3_000).collect();
         for (index, pair) in poses.windows(2).enumerate() {
-            let step_m = (pair[1].translation.vector - pair[0].translation.vector).norm();
+            let step_m =
+                (pair[1].isometry().translation.vector - pair[0].isometry().translation.vector).norm();
             assert!((0.98..1.0 + 1e-9).contains(&step_m), "{step_m} m after {index}");
-            let ahead = pair[0].rotation * nalgebra::Vector3::x();
-            assert!((pair[1].translation.vector - pair[0].translation.vector).dot(&ahead) > 0.9);
+            let ahead = pair[0].isometry().rotation * nalgebra::Vector3::x();
+            assert!(
+                (pair[1].isometry().translation.vector - pair[0].isometry().translation.vector).dot(&ahead)
+                    > 0.9
+            );
         }
     }
 
@@ -128,7 +132,9 @@ mod tests {
     fn new_streets(drive: Drive, streets: usize) -> usize {
         let mut seen = BTreeSet::new();
         let mut taken = 0;
-        let places = drive.map(|pose| [pose.translation.x, pose.translation.y].map(|x| x / City::BLOCK_M));
+        let places = drive.map(|pose| {
+            [pose.isometry().translation.x, pose.isometry().translation.y].map(|x| x / City::BLOCK_M)
+        });
         let mut before = None;
         for place in places {
             // A street is named by the middle between its crossings, in half blocks.
@@ -173,7 +179,7 @@ mod tests {
     fn a_drive_never_touches_anything() {
         let city = City::new(6);
         for pose in drives(6, 2.0).into_iter().flat_map(|drive| drive.take(1_000)) {
-            let at = pose.translation;
+            let at = pose.isometry().translation;
             let scene = city.scene([at.x, at.y, at.z], 5.0);
             for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
                 for z in [0.1, 1.0, 1.8] {

@@ -1,7 +1,7 @@
 use super::City;
 use super::route::level_pose;
 use crate::maths;
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 use std::f64::consts::FRAC_PI_2;
 
 /// From one crossing's far side, along a street of a [`City`], through the next crossing; on the right.
@@ -59,7 +59,7 @@ impl Leg {
     }
 
     /// The pose so many metres after the leg's beginning.
-    pub(super) fn pose(&self, driven_m: f64) -> Isometry3<f64> {
+    pub(super) fn pose(&self, driven_m: f64) -> Pose {
         let [hx, hy] = self.heading.map(|h| h as f64);
         let in_crossing_m = driven_m - Self::STREET_M;
         // Ahead and to the right of the crossing that the leg begins at, and how far it has turned left.

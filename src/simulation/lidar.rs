@@ -1,8 +1,7 @@
 use super::{Hit, Random, World};
 use crate::maths;
-use crate::scan::Scan;
+use crate::scan::{Pose, Scan};
 use crate::space::Point;
-use nalgebra::Isometry3;
 use std::f64::consts::PI;
 
 /// A spinning lidar: beams at fixed elevations, each fired at even steps around the full circle.
@@ -81,16 +80,9 @@ impl Lidar {
     ///
     /// The points come in the order of a turn, all beams of one direction together. The noise is that of
     /// `seed` and `scan_number`, so it is another one at the next visit.
-    pub fn scan(
-        &self,
-        world: &impl World,
-        world_from_sensor: &Isometry3<f64>,
-        seed: u64,
-        scan_number: u64,
-    ) -> Scan {
-        let at = world_from_sensor.translation;
-        let origin = [at.x, at.y, at.z];
-        let rotation = world_from_sensor.rotation.to_rotation_matrix();
+    pub fn scan(&self, world: &impl World, world_from_sensor: &Pose, seed: u64, scan_number: u64) -> Scan {
+        let origin = world_from_sensor.position_m();
+        let rotation = world_from_sensor.isometry().rotation.to_rotation_matrix();
         let r = rotation.matrix();
         let scene = world.scene(origin, self.max_range_m);
         let mut noise = Random::of(seed, &[scan_number as i64]);

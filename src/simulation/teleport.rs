@@ -1,6 +1,6 @@
 use super::leg::{Leg, SENSOR_HEIGHT_M, Turn};
 use super::{City, Random, Route};
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 
 /// A sensor that is somewhere else at every step: in any street within some distance of the world's origin.
 ///
@@ -33,19 +33,20 @@ impl Teleport {
 }
 
 impl Route for Teleport {
-    fn pose(&mut self, index: u64) -> Isometry3<f64> {
+    fn pose(&mut self, index: u64) -> Pose {
         let mut random = Random::of(self.seed, &[6, index as i64]);
         let mut crossing = || random.below(2 * self.reach_blocks as u64 + 1) as i64 - self.reach_blocks;
         let from = [crossing(), crossing()];
         let heading = [[1, 0], [-1, 0], [0, 1], [0, -1]][random.below(4) as usize];
-        let mut pose = Leg::new(from, heading, Turn::Ahead).pose(random.between(0.0, Leg::STREET_M));
+        let pose = Leg::new(from, heading, Turn::Ahead).pose(random.between(0.0, Leg::STREET_M));
+        let mut pose = *pose.isometry();
         pose.translation.z = self.height_m;
-        pose
+        pose.into()
     }
 }
 
 impl Iterator for Teleport {
-    type Item = Isometry3<f64>;
+    type Item = Pose;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.nth(0)
@@ -68,7 +69,7 @@ mod tests {
         let city = City::new(6);
         let mut farthest_m = 0.0_f64;
         for pose in Teleport::new(6, 3_000.0).take(500) {
-            let at = pose.translation;
+            let at = pose.isometry().translation;
             assert!(!city.scene([at.x, at.y, at.z], 5.0).is_solid([at.x, at.y, at.z]), "at {at}");
             farthest_m = farthest_m.max(at.x.abs()).max(at.y.abs());
         }
@@ -82,14 +83,14 @@ mod tests {
         for index in [49, 0, 17] {
             assert_eq!(teleport.pose(index), sequence[index as usize]);
         }
-        assert_eq!(teleport.at_height(60.0).pose(3).translation.z, 60.0);
+        assert_eq!(teleport.at_height(60.0).pose(3).isometry().translation.z, 60.0);
     }
 
     #[test]
     fn odd_reaches_have_a_place() {
         for reach_m in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
             let pose = Teleport::new(1, reach_m).pose(u64::MAX);
-            assert!(pose.translation.vector.iter().all(|x| x.is_finite()));
+            assert!(pose.isometry().translation.vector.iter().all(|x| x.is_finite()));
         }
     }
 }

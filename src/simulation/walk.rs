@@ -1,7 +1,7 @@
 use super::building::{Building, Room};
 use super::route::{Route, level_pose, sound_spacing};
 use crate::maths;
-use nalgebra::Isometry3;
+use crate::scan::Pose;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// An endless walk through a [`Building`]: along the corridor, through every door, around every pillar, and again.
@@ -43,7 +43,7 @@ impl Walk {
 }
 
 impl Route for Walk {
-    fn pose(&mut self, index: u64) -> Isometry3<f64> {
+    fn pose(&mut self, index: u64) -> Pose {
         let walked_m = (index as f64 * self.spacing_m).min(f64::MAX);
         let mut rest_m = walked_m % self.round_m;
         let mut piece = [self.corners[0]; 2];
@@ -71,7 +71,7 @@ impl Route for Walk {
 }
 
 impl Iterator for Walk {
-    type Item = Isometry3<f64>;
+    type Item = Pose;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.nth(0)
@@ -104,7 +104,7 @@ mod tests {
         let building = Building::new(6);
         let scene = building.scene([20.0, 10.0, 1.0], 60.0);
         for pose in Walk::new(building, 0.25).take(2_500) {
-            let at = pose.translation;
+            let at = pose.isometry().translation;
             for (dx, dy) in [(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25)] {
                 for z in [0.1, 0.7, 1.4] {
                     assert!(!scene.is_solid([at.x + dx, at.y + dy, z]), "at {at}");
@@ -119,21 +119,21 @@ mod tests {
         let round = (walk.round_m / 0.5) as usize;
         let (mut seen, columns) = ([[false; 2]; 8], Building::SIZE_M[0] / 8.0);
         for pose in walk.clone().take(round) {
-            let (x, y) = (pose.translation.x, pose.translation.y);
+            let (x, y) = (pose.isometry().translation.x, pose.isometry().translation.y);
             if (y - 10.0).abs() > 2.0 {
                 seen[(x / columns) as usize][usize::from(y > 10.0)] = true;
             }
         }
         assert_eq!(seen, [[true; 2]; 8]);
         let again = walk.nth(round + 1).expect("no end");
-        assert!((again.translation.x - 0.9).abs() < 0.6, "{again}");
+        assert!((again.isometry().translation.x - 0.9).abs() < 0.6, "{again:?}");
     }
 
     #[test]
     fn steps_are_as_long_as_asked() {
         let poses: Vec<_> = Walk::new(Building::new(1), 0.2).take(4_000).collect();
         for pair in poses.windows(2) {
-            let step = pair[1].translation.vector - pair[0].translation.vector;
+            let step = pair[1].isometry().translation.vector - pair[0].isometry().translation.vector;
             let length_m = step.x.abs() + step.y.abs();
             assert!(length_m < 0.2 + 1e-9, "{length_m}");
         }
@@ -143,7 +143,7 @@ mod tests {
     fn odd_spacings_and_indices_have_a_pose() {
         for spacing_m in [0.0, -1.0, f64::NAN, 1e300, f64::MIN_POSITIVE] {
             let pose = Walk::new(Building::new(1), spacing_m).pose(u64::MAX);
-            assert!(pose.translation.vector.iter().all(|x| x.is_finite()));
+            assert!(pose.isometry().translation.vector.iter().all(|x| x.is_finite()));
         }
     }
 }

@@ -336,7 +336,7 @@ fn points_of_a_pcd_are_float32_and_come_back_to_their_voxels_wherever_the_map_is
         assert_eq!(header.contains("# origin "), is_moved, "{header}");
         assert_eq!(origin_beside(&cloud).is_some(), is_moved);
         let read = read_pcd(&bytes).unwrap();
-        let origin: [f64; 3] = read.world_from_sensor.translation.vector.into();
+        let origin = read.world_from_sensor.position_m();
         assert_eq!(serde_json::json!(origin), summary["origin_m"]);
         // PCL has VIEWPOINT as float32, too.
         assert_eq!(origin.map(|x| f64::from(x as f32)), origin);

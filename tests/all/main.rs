@@ -1,5 +1,7 @@
 //! All integration tests in one binary, a module a subject.
 
+/// Scans as people have them: borrowed, narrow, in either frame; poses of every form.
+mod borrowed_scans;
 /// The command as a person types it.
 #[cfg(feature = "cli")]
 mod cli;

@@ -62,7 +62,7 @@ fn the_three_encodings_of_a_cloud_are_one_cloud() {
         assert_eq!(cloud.points[7], [0, 1, 2].map(|k| f64::from(points[7][k])));
         assert_eq!(cloud.points, clouds[0].points);
         assert_eq!(cloud.intensities, clouds[0].intensities);
-        assert_eq!(<[f64; 3]>::from(cloud.world_from_sensor.translation.vector), [1.0, 2.0, 3.0]);
+        assert_eq!(cloud.world_from_sensor.position_m(), [1.0, 2.0, 3.0]);
     }
 }
 
@@ -137,12 +137,12 @@ fn poses_match_the_files_or_both_counts_are_told() {
     for number in 0..3 {
         fs::write(scans.join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
     }
-    assert_eq!(all_scans(folder.path())[1].world_from_sensor.translation.vector.y, 2.0, "from VIEWPOINT");
+    assert_eq!(all_scans(folder.path())[1].world_from_sensor.position_m()[1], 2.0, "from VIEWPOINT");
     let write = |text: &str| fs::write(folder.path().join("poses_tum.txt"), text).unwrap();
     write("# t x y z qx qy qz qw\n0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n\n2 3 0 0 0 0 0.6 0.8\n");
     let read = all_scans(folder.path());
     assert_eq!(
-        read.iter().map(|scan| scan.world_from_sensor.translation.x).collect::<Vec<_>>(),
+        read.iter().map(|scan| scan.world_from_sensor.position_m()[0]).collect::<Vec<_>>(),
         [1.0, 2.0, 3.0]
     );
     let fingerprint = open_scans(&scans, None).unwrap().fingerprint().unwrap();
@@ -220,8 +220,8 @@ fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
 #[test]
 fn a_matrix_that_is_a_rotation_to_a_few_digits_gives_a_pose_that_does_not_scale() {
     let poses = parse_poses("0.6004 -0.8 0 1 0.8 0.6004 0 2 0 0 1.0004 3\n").unwrap();
-    assert!((poses[0].rotation.norm() - 1.0).abs() < 1e-15);
-    assert!(((poses[0] * nalgebra::Point3::new(1.0, 0.0, 0.0)).x - 1.6).abs() < 1e-3);
+    assert!((poses[0].isometry().rotation.norm() - 1.0).abs() < 1e-15);
+    assert!((poses[0].to_world()([1.0, 0.0, 0.0])[0] - 1.6).abs() < 1e-3);
 }
 
 #[test]
@@ -240,7 +240,10 @@ fn folders_of_other_programs_have_the_scans_and_points_that_their_notes_say() {
         let tum = read_poses(&folder.join("poses_tum.txt")).unwrap();
         let kitti = read_poses(&folder.join("poses_kitti.txt")).unwrap();
         for (a, b) in tum.iter().zip(&kitti) {
-            assert!((a.to_homogeneous() - b.to_homogeneous()).abs().max() < 1e-5, "{name}");
+            assert!(
+                (a.isometry().to_homogeneous() - b.isometry().to_homogeneous()).abs().max() < 1e-5,
+                "{name}"
+            );
         }
     }
 }
@@ -292,7 +295,7 @@ fn graphs_and_logs_are_read_and_hostile_ones_are_errors() {
     .unwrap();
     let from_log = all_scans(&log);
     assert_eq!(from_log.iter().map(|scan| scan.points_in_sensor.len()).collect::<Vec<_>>(), [2, 0]);
-    let [a, b] = [&scans[0], &from_log[0]].map(|scan| scan.world_from_sensor.to_homogeneous());
+    let [a, b] = [&scans[0], &from_log[0]].map(|scan| scan.world_from_sensor.isometry().to_homogeneous());
     assert!((a - b).abs().max() < 1e-6);
 
     let read = |path: &Path| {

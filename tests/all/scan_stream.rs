@@ -1,18 +1,16 @@
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::path::Path;
 use tempfile::TempDir;
 use voxtile::io::{ScanSource, ScanStreamWriter, SensorScan, open_scans, read_scan_stream};
 use voxtile::simulation::Survey;
-use voxtile::{Error, Scan};
+use voxtile::{Error, Pose, Scan};
 
 fn sensor_scan(number: u32) -> SensorScan {
     let point = |k: u32| [f64::from(k) * 0.25, -1.5, f64::from(number)];
-    let rotation = UnitQuaternion::new_normalize(Quaternion::new(0.5, 0.5, -0.5, 0.5));
     SensorScan {
         name: number.to_string(),
         points_in_sensor: (0..number).map(point).collect(),
         intensities: Some((0..number).map(|k| k as f32).collect()),
-        world_from_sensor: Isometry3::from_parts(Translation3::new(6_378_137.0, -2.0, 0.1), rotation),
+        world_from_sensor: Pose::from_quaternion([6_378_137.0, -2.0, 0.1], [0.5, -0.5, 0.5, 0.5]).unwrap(),
     }
 }
 

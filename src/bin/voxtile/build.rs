@@ -109,7 +109,7 @@ impl Build<'_> {
                         return Ok(());
                     }
                 };
-            match mapper.insert_points(scan.origin(), &scan) {
+            match mapper.insert_points(&scan) {
                 Ok(report) => self.report += report,
                 Err(Error::Stopped) => return Ok(()),
                 Err(error) => return Err(error.into()),
@@ -246,7 +246,7 @@ fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
 
 fn check(scan: Option<&StoredScan>, config: &MapConfig) -> voxtile::Result<()> {
     let Some(scan) = scan else { return Ok(()) };
-    ScanTracer::check_points(&config.grid, &config.sensor_model, scan.origin(), scan)
+    ScanTracer::check(&config.grid, &config.sensor_model, scan)
 }
 
 /// Free space alone is rarely what was wanted.

@@ -5,5 +5,5 @@ mod scan_tracer;
 mod trace_limit;
 
 pub use scan_tracer::ScanTracer;
-pub(crate) use scan_tracer::{UpdateOrder, check_intensities};
+pub(crate) use scan_tracer::{UpdateOrder, check_count, check_intensities};
 pub(crate) use trace_limit::{Allowance, CollectorLimit};

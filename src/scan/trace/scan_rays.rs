@@ -49,10 +49,10 @@ impl<'a> ScanRays<'a> {
         grid: &'a Grid,
         model: &'a SensorModel,
         rays: &'a RayConfig,
-        origin_m: Point,
         points: &'a dyn ScanPoints,
         stop: &'a Stop,
     ) -> Result<Self> {
+        let origin_m = points.origin();
         let voxel = origin_voxel(grid, origin_m)?;
         let origin = RayOrigin::new(grid.to_voxel_units(origin_m), voxel);
         let range = RangeRule::new(rays, origin_m);

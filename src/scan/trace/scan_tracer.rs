@@ -32,31 +32,17 @@ pub(crate) enum UpdateOrder {
 }
 
 impl ScanTracer {
-    /// Checks that a scan can be traced, without tracing it.
+    /// Checks that a scan can be traced, without reading its points: its origin, and that it has intensities if they are
+    /// needed.
     ///
     /// # Errors
     ///
     /// As for [`ScanTracer::trace`].
-    pub fn check(grid: &Grid, model: &SensorModel, scan: &Scan) -> Result<()> {
-        check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
-        Self::check_points(grid, model, scan.origin, scan)
-    }
-
-    /// The same for any source of points, seen from `origin` in metres, world frame.
-    ///
-    /// # Errors
-    ///
-    /// As for [`ScanTracer::trace`].
-    pub fn check_points(
-        grid: &Grid,
-        model: &SensorModel,
-        origin: Point,
-        points: &dyn ScanPoints,
-    ) -> Result<()> {
-        if model.needs_intensity() && !points.has_intensities() {
+    pub fn check(grid: &Grid, model: &SensorModel, scan: &dyn ScanPoints) -> Result<()> {
+        if model.needs_intensity() && !scan.has_intensities() {
             return Err(no_intensities());
         }
-        origin_voxel(grid, origin).map(drop)
+        origin_voxel(grid, scan.origin()).map(drop)
     }
 
     /// Walks the rays of a scan; returns the updates, grouped by tile.
@@ -73,8 +59,7 @@ impl ScanTracer {
         rays: &RayConfig,
         scan: &Scan,
     ) -> Result<ScanUpdates> {
-        check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
-        self.trace_points(grid, model, rays, scan.origin, scan, UpdateOrder::OfVoxels, None)
+        self.trace_points(grid, model, rays, scan, UpdateOrder::OfVoxels, None)
     }
 
     /// The same, but in insertion per ray a tile's updates are in the order of the rays, one by one: for octrees whose
@@ -90,8 +75,7 @@ impl ScanTracer {
         rays: &RayConfig,
         scan: &Scan,
     ) -> Result<ScanUpdates> {
-        check_intensities(model, scan.points.len(), scan.intensities.as_deref())?;
-        self.trace_points(grid, model, rays, scan.origin, scan, UpdateOrder::OfRays, None)
+        self.trace_points(grid, model, rays, scan, UpdateOrder::OfRays, None)
     }
 
     /// The same for any source of points. With `overflow`, updates that exceed the memory limit are spilled and the
@@ -100,24 +84,17 @@ impl ScanTracer {
     /// # Errors
     ///
     /// As for [`ScanTracer::trace`], points that cannot be read, and errors of the spill.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "what a map is, what a scan is, and where there is no room, where to"
-    )]
     pub(crate) fn trace_points(
         &mut self,
         grid: &Grid,
         model: &SensorModel,
         rays: &RayConfig,
-        origin: Point,
-        points: &dyn ScanPoints,
+        scan: &dyn ScanPoints,
         order: UpdateOrder,
         overflow: Option<Overflow<'_>>,
     ) -> Result<ScanUpdates> {
-        if model.needs_intensity() && !points.has_intensities() {
-            return Err(no_intensities());
-        }
-        let scan_rays = ScanRays::new(grid, model, rays, origin, points, &self.stop)?;
+        Self::check(grid, model, scan)?;
+        let scan_rays = ScanRays::new(grid, model, rays, scan, &self.stop)?;
         let is_per_scan = rays.insert_mode == InsertMode::PerScan;
         let in_order = !is_per_scan && order == UpdateOrder::OfRays;
         let Some(mut overflow) = overflow else {
@@ -170,13 +147,19 @@ pub(crate) fn check_intensities(
     intensities: Option<&[f32]>,
 ) -> Result<()> {
     match intensities {
-        Some(given) if given.len() != points => Err(Error::argument(
-            "intensities",
-            format!("{} for {points} points; give one a point", given.len()),
-        )),
+        Some(given) => check_count(points, given),
         None if model.needs_intensity() => Err(no_intensities()),
-        _ => Ok(()),
+        None => Ok(()),
     }
+}
+
+/// Checks that there is one intensity per point.
+pub(crate) fn check_count(points: usize, intensities: &[f32]) -> Result<()> {
+    if intensities.len() == points {
+        return Ok(());
+    }
+    let reason = format!("{} for {points} points; give one a point", intensities.len());
+    Err(Error::argument("intensities", reason))
 }
 
 fn no_intensities() -> Error {

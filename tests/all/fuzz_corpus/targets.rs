@@ -4,9 +4,9 @@
 //! In formats with checksums the first byte of the input chooses: where its lowest bit is set, the checksums are
 //! made right before the rest is read, so that what lies behind them is reached.
 
-use nalgebra::Isometry3;
 use std::path::Path;
 use std::time::Duration;
+use voxtile::Pose;
 use voxtile::io::{
     PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log,
     read_scan_stream,
@@ -424,7 +424,7 @@ pub fn share_life(data: &[u8]) -> bool {
     !sender.sent().is_empty()
 }
 
-fn assert_is_pose(pose: &Isometry3<f64>) {
-    assert!(pose.translation.vector.iter().all(|number| number.is_finite()), "{pose}");
-    assert!((pose.rotation.norm() - 1.0).abs() < 1e-6, "{pose}");
+fn assert_is_pose(pose: &Pose) {
+    assert!(pose.position_m().iter().all(|number| number.is_finite()), "{pose:?}");
+    assert!((pose.isometry().rotation.norm() - 1.0).abs() < 1e-6, "{pose:?}");
 }

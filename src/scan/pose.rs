@@ -1,0 +1,153 @@
+use crate::error::{Error, Result};
+use crate::space::Point;
+use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+
+/// The pose of a sensor, `world_from_sensor`: it takes points from the sensor's frame to the world's,
+/// `world = R * p + t`.
+///
+/// ```
+/// use voxtile::{Pose, nalgebra};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// // 1.8 m above the ground, turned by 90 degrees to the left.
+/// let half = 0.5_f64.sqrt();
+/// let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, half, half])?;
+/// let same = Pose::from_matrix(&[[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.8]])?;
+/// let [x, y, z] = same.to_world()([2.0, 0.0, 0.5]);
+/// assert!(x.abs() < 1e-12 && (y - 2.0).abs() < 1e-12 && z == 2.3);
+/// assert!((pose.isometry().inv_mul(same.isometry()).rotation.angle()) < 1e-7);
+///
+/// let level = Pose::from(nalgebra::Isometry3::translation(0.0, 0.0, 1.8));
+/// assert_eq!(level.position_m(), pose.position_m());
+///
+/// let error = Pose::from_quaternion([0.0; 3], [0.0; 4]).unwrap_err();
+/// assert_eq!(error.to_string(), "pose: a quaternion of no length");
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    world_from_sensor: Isometry3<f64>,
+}
+
+/// How far the entries of `M * transpose(M)` may be from the identity's.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+/// How far the entries of the last row of a 4x4 matrix may be from 0 0 0 1.
+const LAST_ROW_TOLERANCE: f64 = 1e-6;
+
+impl Pose {
+    /// The sensor's frame is the world's.
+    pub fn identity() -> Self {
+        Self { world_from_sensor: Isometry3::identity() }
+    }
+
+    /// The pose of a sensor at `position_m` metres whose rotation is the quaternion x, y, z, w, in this order. The
+    /// quaternion is normalized.
+    ///
+    /// # Errors
+    ///
+    /// Numbers that are not finite, a zero quaternion.
+    pub fn from_quaternion(position_m: Point, xyzw: [f64; 4]) -> Result<Self> {
+        Self::of_quaternion(position_m, xyzw).map_err(wrong)
+    }
+
+    /// The pose of a row-major matrix of 3 or 4 rows, the rotation left and the position in metres right. The rotation
+    /// may be exact to a few digits only: the pose does not scale.
+    ///
+    /// Numbers in one list are rows by `Pose::from_matrix(numbers.as_chunks().0)`.
+    ///
+    /// # Errors
+    ///
+    /// Numbers that are not finite, a 3x3 part that is not a rotation, a fourth row other than 0 0 0 1, another number
+    /// of rows.
+    pub fn from_matrix(rows: &[[f64; 4]]) -> Result<Self> {
+        Self::of_matrix(rows).map_err(wrong)
+    }
+
+    /// [`Pose::from_quaternion`], whose error is only the reason.
+    pub(crate) fn of_quaternion(
+        position_m: Point,
+        [x, y, z, w]: [f64; 4],
+    ) -> std::result::Result<Self, String> {
+        check_finite(position_m.iter().chain(&[x, y, z, w]))?;
+        let quaternion = Quaternion::new(w, x, y, z);
+        if !quaternion.norm_squared().is_finite() {
+            return Err("a quaternion too long to be a rotation".to_owned());
+        }
+        let rotation = UnitQuaternion::try_new(quaternion, 1e-9).ok_or("a quaternion of no length")?;
+        Ok(Self { world_from_sensor: Isometry3::from_parts(Translation3::from(position_m), rotation) })
+    }
+
+    /// [`Pose::from_matrix`], whose error is only the reason.
+    pub(crate) fn of_matrix(rows: &[[f64; 4]]) -> std::result::Result<Self, String> {
+        check_finite(rows.iter().flatten())?;
+        let ([[a, b, c, x], [d, e, f, y], [g, h, i, z]], last) = match *rows {
+            [first, second, third] => ([first, second, third], None),
+            [first, second, third, last] => ([first, second, third], Some(last)),
+            _ => return Err(format!("a matrix of {} rows; a pose has 3 or 4", rows.len())),
+        };
+        let is_near = |(number, wanted): (&f64, f64)| (number - wanted).abs() <= LAST_ROW_TOLERANCE;
+        if last.is_some_and(|last| !last.iter().zip([0.0, 0.0, 0.0, 1.0]).all(is_near)) {
+            return Err("the last row of the matrix is not 0 0 0 1; rows come first, not columns".to_owned());
+        }
+        let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
+        let deviation = matrix * matrix.transpose() - Matrix3::identity();
+        // Numbers too large to be squared deviate by infinity, or by what is not a number.
+        let is_rotation = deviation.iter().all(|by| by.abs() <= ROTATION_TOLERANCE);
+        if !is_rotation || matrix.determinant() < 0.0 {
+            return Err("the 3x3 part of the matrix is not a rotation".to_owned());
+        }
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+        // The matrix is a rotation only to a few digits; a pose must not scale.
+        let rotation = UnitQuaternion::new_normalize(rotation.into_inner());
+        Ok(Self { world_from_sensor: Isometry3::from_parts(Translation3::new(x, y, z), rotation) })
+    }
+
+    /// Position of the sensor in metres, world frame.
+    pub fn position_m(&self) -> Point {
+        self.world_from_sensor.translation.vector.into()
+    }
+
+    /// The rotation as a quaternion x, y, z, w, in this order.
+    pub fn quaternion(&self) -> [f64; 4] {
+        self.world_from_sensor.rotation.coords.into()
+    }
+
+    /// The pose for calculations with [`nalgebra`].
+    pub fn isometry(&self) -> &Isometry3<f64> {
+        &self.world_from_sensor
+    }
+
+    /// Takes points in metres from the sensor's frame to the world's.
+    pub fn to_world(&self) -> impl Fn(Point) -> Point + Copy + use<> {
+        let rotation = self.world_from_sensor.rotation.to_rotation_matrix();
+        let r: [Point; 3] = std::array::from_fn(|i| std::array::from_fn(|k| rotation[(i, k)]));
+        let t = self.position_m();
+        // Spelled out, so that the order of operations, and with it the last bit, does not depend on a library.
+        move |p: Point| std::array::from_fn(|i| r[i][0] * p[0] + r[i][1] * p[1] + r[i][2] * p[2] + t[i])
+    }
+}
+
+impl From<Isometry3<f64>> for Pose {
+    /// Takes the pose as it is; nothing is checked.
+    fn from(world_from_sensor: Isometry3<f64>) -> Self {
+        Self { world_from_sensor }
+    }
+}
+
+impl From<Pose> for Isometry3<f64> {
+    fn from(pose: Pose) -> Self {
+        pose.world_from_sensor
+    }
+}
+
+fn check_finite<'a>(mut numbers: impl Iterator<Item = &'a f64>) -> std::result::Result<(), String> {
+    match numbers.find(|number| !number.is_finite()) {
+        Some(number) => Err(format!("{number} in a pose")),
+        None => Ok(()),
+    }
+}
+
+fn wrong(reason: String) -> Error {
+    Error::argument("pose", reason)
+}

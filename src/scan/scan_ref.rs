@@ -1,0 +1,185 @@
+use super::coordinate::Coordinate;
+use super::coordinate::sealed::PointSlice;
+use super::trace::check_count;
+use super::{Pose, ScanPoints, TakePoints};
+use crate::error::{Error, Result};
+use crate::space::Point;
+use std::ops::Range;
+
+/// A scan whose points lie elsewhere: borrowed lists of `[f32; 3]` or `[f64; 3]` in metres, in the sensor's frame or
+/// the world's.
+///
+/// Nothing is copied to make one. Points that are `f64` in the world frame are used where they lie; others are
+/// converted chunk by chunk while they are traced. The map is the same to the bit as by a [`Scan`](super::Scan).
+///
+/// ```
+/// use voxtile::{InMemoryMapper, MapConfig, Mapper, Pose, Queries, ScanRef};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let mut mapper = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
+///
+/// // As a driver hands them out; (0, 0, 0) is a ray without return.
+/// let points: Vec<[f32; 3]> = vec![[4.25, 1.05, -1.45], [0.0; 3]];
+/// let intensities = [17.0, 0.0];
+/// let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
+/// let report = mapper.insert_points(&ScanRef::in_sensor(pose, &points).with_intensities(&intensities)?)?;
+/// assert_eq!((report.points, report.skipped.no_return), (2, 1));
+/// assert!(mapper.occupancy_at([4.25, 1.05, 0.35])?.is_occupied());
+///
+/// // In the world frame.
+/// let points = [[6.05, 2.05, 0.35], [6.05, 2.15, 0.35]];
+/// mapper.insert_points(&ScanRef::in_world([0.0, 0.0, 1.8], &points))?;
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct ScanRef<'a> {
+    frame: Frame,
+    points: PointSlice<'a>,
+    /// One a point.
+    intensities: Option<&'a [f32]>,
+}
+
+/// The frame of the points.
+#[derive(Clone, Copy, Debug)]
+enum Frame {
+    /// The world's; the sensor is at this position.
+    World(Point),
+    Sensor(Pose),
+}
+
+/// Points that are converted at a time, 6 MiB. Beam coherence works within one chunk, which should be a whole scan of
+/// most sensors.
+const POINTS_AT_A_TIME: usize = 1 << 18;
+
+impl<'a> ScanRef<'a> {
+    /// Points in the world frame, seen from `origin`. A point equal to the origin means "no return" and is skipped.
+    pub fn in_world<C: Coordinate>(origin: Point, points: &'a [[C; 3]]) -> Self {
+        Self { frame: Frame::World(origin), points: C::slice(points), intensities: None }
+    }
+
+    /// Points in the sensor's frame, and the pose of the sensor. The exact point (0, 0, 0) means "no return" and is
+    /// skipped.
+    pub fn in_sensor<C: Coordinate>(world_from_sensor: impl Into<Pose>, points: &'a [[C; 3]]) -> Self {
+        Self { frame: Frame::Sensor(world_from_sensor.into()), points: C::slice(points), intensities: None }
+    }
+
+    /// The same with an intensity per point.
+    ///
+    /// # Errors
+    ///
+    /// Another number of intensities than of points.
+    pub fn with_intensities(self, intensities: &'a [f32]) -> Result<Self> {
+        check_count(self.len(), intensities)?;
+        Ok(Self { intensities: Some(intensities), ..self })
+    }
+}
+
+impl ScanPoints for ScanRef<'_> {
+    fn origin(&self) -> Point {
+        match &self.frame {
+            Frame::World(origin) => *origin,
+            Frame::Sensor(pose) => pose.position_m(),
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self.points {
+            PointSlice::F32(points) => points.len(),
+            PointSlice::F64(points) => points.len(),
+        }
+    }
+
+    fn has_intensities(&self) -> bool {
+        self.intensities.is_some()
+    }
+
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        let intensities = self.intensities.map(|all| part(all, &range)).transpose()?;
+        match (self.points, &self.frame) {
+            (PointSlice::F64(points), Frame::World(_)) => {
+                take(part(points, &range)?, intensities);
+            }
+            (PointSlice::F64(points), Frame::Sensor(pose)) => {
+                convert(part(points, &range)?, intensities, pose.to_world(), take);
+            }
+            (PointSlice::F32(points), Frame::World(_)) => {
+                convert(part(points, &range)?, intensities, widened, take);
+            }
+            (PointSlice::F32(points), Frame::Sensor(pose)) => {
+                let to_world = pose.to_world();
+                convert(part(points, &range)?, intensities, |point| to_world(widened(point)), take);
+            }
+        }
+        Ok(())
+    }
+
+    fn in_memory(&self) -> Option<&[Point]> {
+        match (self.points, &self.frame) {
+            (PointSlice::F64(points), Frame::World(_)) => Some(points),
+            _ => None,
+        }
+    }
+}
+
+fn widened(point: [f32; 3]) -> Point {
+    point.map(f64::from)
+}
+
+/// Passes points on in the world frame, chunk by chunk.
+fn convert<P: Copy>(
+    points: &[P],
+    intensities: Option<&[f32]>,
+    to_world: impl Fn(P) -> Point,
+    take: &mut TakePoints<'_>,
+) {
+    let mut in_world = Vec::with_capacity(points.len().min(POINTS_AT_A_TIME));
+    for (number, chunk) in points.chunks(POINTS_AT_A_TIME).enumerate() {
+        in_world.clear();
+        in_world.extend(chunk.iter().map(|&point| to_world(point)));
+        let first = number * POINTS_AT_A_TIME;
+        if !take(&in_world, intensities.map(|all| &all[first..first + chunk.len()])) {
+            return;
+        }
+    }
+}
+
+fn part<'s, T>(all: &'s [T], range: &Range<usize>) -> Result<&'s [T]> {
+    let part = all.get(range.clone());
+    part.ok_or_else(|| Error::argument("points", format!("{range:?} of {}; there are no such", all.len())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_come_in_chunks_with_their_intensities() {
+        let count = POINTS_AT_A_TIME + 77;
+        let points: Vec<[f32; 3]> = (0..count).map(|k| [k as f32, 0.5, -1.5]).collect();
+        let intensities: Vec<f32> = (0..count).map(|k| k as f32).collect();
+        let scan = ScanRef::in_world([0.0; 3], &points).with_intensities(&intensities).unwrap();
+        for range in [0..count, 5..6, 7..7, POINTS_AT_A_TIME - 1..count, 0..POINTS_AT_A_TIME] {
+            let mut next = range.start;
+            let mut take = |points: &[Point], intensities: Option<&[f32]>| {
+                assert_eq!(intensities.map(<[f32]>::len), Some(points.len()));
+                for (point, &intensity) in points.iter().zip(intensities.unwrap()) {
+                    assert!(*point == [next as f64, 0.5, -1.5] && intensity == next as f32);
+                    next += 1;
+                }
+                true
+            };
+            scan.for_each_chunk(range.clone(), &mut take).unwrap();
+            assert_eq!(next, range.end);
+        }
+        let mut chunks = 0;
+        let mut stop_at_once = |_: &[Point], _: Option<&[f32]>| {
+            chunks += 1;
+            false
+        };
+        scan.for_each_chunk(0..count, &mut stop_at_once).unwrap();
+        assert_eq!(chunks, 1);
+        let error = scan.for_each_chunk(0..count + 1, &mut |_, _| true).unwrap_err().to_string();
+        assert!(error.starts_with("points: "), "{error}");
+    }
+}
