@@ -428,7 +428,7 @@ fn octomaps_files_are_told_and_exported_and_a_bomb_is_refused() {
     assert!(code == 1 && stderr.contains("281474976710656, more than the limit of 268435456"), "{stderr}");
     fs::write(&bomb, header).unwrap();
     let (code, stderr) = failure(&["info", text(&bomb)]);
-    assert!(code == 1 && stderr.contains("bomb.bt: offset"), "{stderr}");
+    assert!(code == 1 && stderr.contains("bomb.bt: malformed: offset"), "{stderr}");
 }
 
 #[test]

@@ -19,6 +19,9 @@ mod cli_snapshots;
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
 mod corruption;
+/// Errors: what they say, their causes, what they are about.
+#[cfg(feature = "cli")]
+mod errors;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
 mod faults;
 /// Files of every kind, of every version.

@@ -134,10 +134,11 @@ fn exit_code_of(error: &anyhow::Error) -> ExitCode {
     }
 }
 
-/// `voxtile ... | head` is no error.
+/// `voxtile ... | head` is no error; a reader of another pipe, which the error names, is.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error
         .chain()
+        .take_while(|cause| !cause.is::<voxtile::Error>())
         .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
         .any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
 }

@@ -199,7 +199,7 @@ impl TileDisk {
                 self.note_written(index, version);
             }
             Err(error) if is_current => self.save_error = Some(error),
-            Err(error) => log::debug!("an older version of tile {index} was not saved: {error}"),
+            Err(error) => log::debug!("an older version of tile {index} was not saved: {error:#}"),
         }
     }
 
