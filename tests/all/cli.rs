@@ -20,7 +20,9 @@ pub fn output(arguments: &[&str]) -> String {
 }
 
 pub fn json(arguments: &[&str]) -> Value {
-    serde_json::from_str(&output(arguments)).unwrap()
+    let object: Value = serde_json::from_str(&output(arguments)).unwrap();
+    assert_eq!(object["version"], 1, "{arguments:?}: {object}");
+    object
 }
 
 /// Exit code and standard error of a run that must fail.

@@ -12,6 +12,9 @@ mod cli_export;
 /// Help, man pages and completion scripts.
 #[cfg(feature = "cli")]
 mod cli_help;
+/// What `--json` prints: the version, shapes of places and boxes, failures.
+#[cfg(feature = "cli")]
+mod cli_json;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;
