@@ -15,6 +15,9 @@ mod cli_help;
 /// What `--json` prints: the version, shapes of places and boxes, failures.
 #[cfg(feature = "cli")]
 mod cli_json;
+/// What `-q`, `-v` and `RUST_LOG` say beside the answer.
+#[cfg(feature = "cli")]
+mod cli_log;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;
