@@ -1,6 +1,11 @@
+mod decode_error;
+mod format_error;
+
 use crate::space::{GridError, TileIndex};
-use std::io;
+pub use decode_error::DecodeError;
+pub use format_error::{FormatError, Place};
 use std::path::{Path, PathBuf};
+use std::{fmt, io};
 use thiserror::Error;
 
 /// A result whose error is voxtile's [`Error`](enum@Error).
@@ -9,6 +14,11 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// What went wrong, one variant for each thing a caller can do about it.
 ///
 /// Every message names the path, tile, offset or argument it is about and says what to do.
+///
+/// Some have a cause, the operating system's or the place in a file:
+/// [`source`](std::error::Error::source) gives it, so that a program need not look for it in a text. `{error}` is the
+/// message without it and `{error:#}` the one with it, `message: cause`. So whoever prints a chain of errors, as `{:#}`
+/// of anyhow does, tells each cause once; whoever prints one of these by itself wants `{error:#}`.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -24,31 +34,34 @@ pub enum Error {
     #[error(transparent)]
     Grid(#[from] GridError),
     /// The operating system refused: look at the path, the disk, the rights; then try again.
-    #[error("{}: cannot {action}: {cause}", path.display())]
+    #[error(fmt = fmt_io)]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What was tried, as a verb with its object.
         action: &'static str,
         /// The refusal.
+        #[source]
         cause: io::Error,
     },
     /// A file of a map is damaged or not the one that belongs there: restore or repair it.
-    #[error("{}: {}damaged: {cause}; see `voxtile verify` and `voxtile repair`", path.display(), of_tile(tile))]
+    #[error(fmt = fmt_damaged)]
     Damaged {
         /// The file.
         path: PathBuf,
         /// The tile it belongs to, if to one.
         tile: Option<TileIndex>,
         /// Where and what.
+        #[source]
         cause: FormatError,
     },
     /// A file that was given to be read is not what it should be: give another.
-    #[error("{}: {cause}", path.display())]
+    #[error(fmt = fmt_malformed)]
     Malformed {
         /// The file.
         path: PathBuf,
         /// Where and what.
+        #[source]
         cause: FormatError,
     },
     /// There is no map at the path: create one or name another path.
@@ -126,58 +139,6 @@ pub enum Error {
     },
 }
 
-/// Bytes or text that do not keep to their format: where, and what.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{place} {at}: {reason}")]
-pub struct FormatError {
-    /// What `at` counts.
-    pub place: Place,
-    /// Byte offset or line number (from 1).
-    pub at: u64,
-    /// What is wrong there, and what is right.
-    pub reason: String,
-}
-
-/// What the position of a [`FormatError`] counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// Bytes from the beginning of the file.
-    Offset,
-    /// Lines, the first being 1.
-    Line,
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Offset => "offset",
-            Self::Line => "line",
-        })
-    }
-}
-
-impl FormatError {
-    /// Something wrong at a byte offset.
-    pub fn at_offset(offset: u64, reason: impl Into<String>) -> Self {
-        Self { place: Place::Offset, at: offset, reason: reason.into() }
-    }
-
-    /// Something wrong in a line, the first being 1.
-    pub fn at_line(line: u64, reason: impl Into<String>) -> Self {
-        Self { place: Place::Line, at: line, reason: reason.into() }
-    }
-
-    /// The error of a file that was given to be read.
-    pub fn in_input(self, path: &Path) -> Error {
-        Error::Malformed { path: path.to_owned(), cause: self }
-    }
-
-    /// The error of a file of a map.
-    pub fn in_map(self, path: &Path, tile: Option<TileIndex>) -> Error {
-        Error::Damaged { path: path.to_owned(), tile, cause: self }
-    }
-}
-
 impl Error {
     /// A wrong argument.
     pub fn argument(argument: impl Into<String>, reason: impl Into<String>) -> Self {
@@ -190,54 +151,96 @@ impl Error {
         matches!(self, Self::Io { cause, .. } if is_of_medium(cause))
     }
 
+    /// The variant in one word that later versions keep: its name in snake case, `no_map` for [`Error::NoMap`].
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::InvalidArgument { .. } => "invalid_argument",
+            Self::Grid(_) => "grid",
+            Self::Io { .. } => "io",
+            Self::Damaged { .. } => "damaged",
+            Self::Malformed { .. } => "malformed",
+            Self::NoMap { .. } => "no_map",
+            Self::AlreadyExists { .. } => "already_exists",
+            Self::Mismatch { .. } => "mismatch",
+            Self::Locked { .. } => "locked",
+            Self::LockLost { .. } => "lock_lost",
+            Self::Changed { .. } => "changed",
+            Self::Stopped => "stopped",
+            Self::UnsavedChanges { .. } => "unsaved_changes",
+            Self::TooLarge { .. } => "too_large",
+        }
+    }
+
+    /// The file or folder that it is about, if it is about one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Io { path, .. }
+            | Self::Damaged { path, .. }
+            | Self::Malformed { path, .. }
+            | Self::NoMap { path }
+            | Self::AlreadyExists { path, .. }
+            | Self::Mismatch { path, .. }
+            | Self::Locked { path }
+            | Self::LockLost { path }
+            | Self::Changed { path } => Some(path),
+            Self::InvalidArgument { .. }
+            | Self::Grid(_)
+            | Self::Stopped
+            | Self::UnsavedChanges { .. }
+            | Self::TooLarge { .. } => None,
+        }
+    }
+
+    /// The tile that it is about, if it is about one.
+    pub fn tile(&self) -> Option<TileIndex> {
+        match *self {
+            Self::Damaged { tile, .. } => tile,
+            Self::UnsavedChanges { tile } => Some(tile),
+            _ => None,
+        }
+    }
+
+    /// The place in the file that it is about, if it is about one.
+    pub fn place(&self) -> Option<(Place, u64)> {
+        match self {
+            Self::Damaged { cause, .. } | Self::Malformed { cause, .. } => Some((cause.place, cause.at)),
+            _ => None,
+        }
+    }
+
     /// A refusal of the operating system about a path.
     pub fn io(path: &Path, action: &'static str, cause: io::Error) -> Self {
         Self::Io { path: path.to_owned(), action, cause }
     }
 }
 
-/// Why a stream could not be decoded: the stream failed, or its content is wrong.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum DecodeError {
-    /// Reading failed.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// What was read is wrong.
-    #[error(transparent)]
-    Format(#[from] FormatError),
+fn fmt_io(path: &Path, action: &str, cause: &io::Error, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "{}: cannot {action}", path.display())?;
+    fmt_cause(cause, f)
 }
 
-impl DecodeError {
-    /// The same of a part that begins so many bytes into the file.
-    pub(crate) fn further_by(self, bytes: u64) -> Self {
-        match self {
-            Self::Format(FormatError { place: Place::Offset, at, reason }) => {
-                FormatError::at_offset(at.saturating_add(bytes), reason).into()
-            }
-            error => error,
-        }
+fn fmt_damaged(
+    path: &Path,
+    tile: &Option<TileIndex>,
+    cause: &FormatError,
+    f: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    write!(f, "{}: ", path.display())?;
+    if let Some(tile) = tile {
+        write!(f, "tile {tile} is ")?;
     }
-
-    /// The error of a file that was given to be read.
-    pub fn in_input(self, path: &Path) -> Error {
-        match self {
-            Self::Io(source) => Error::io(path, "read", source),
-            Self::Format(source) => source.in_input(path),
-        }
-    }
-
-    /// The error of a file of a map.
-    pub fn in_map(self, path: &Path, tile: Option<TileIndex>) -> Error {
-        match self {
-            Self::Io(source) => Error::io(path, "read", source),
-            Self::Format(source) => source.in_map(path, tile),
-        }
-    }
+    f.write_str("damaged (see `voxtile verify` and `voxtile repair`)")?;
+    fmt_cause(cause, f)
 }
 
-fn of_tile(tile: &Option<TileIndex>) -> String {
-    tile.map(|tile| format!("tile {tile} is ")).unwrap_or_default()
+fn fmt_malformed(path: &Path, cause: &FormatError, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    write!(f, "{}: malformed", path.display())?;
+    fmt_cause(cause, f)
+}
+
+/// With `{:#}` the cause is part of the message; printers of chains ask for `{}` and tell it themselves.
+fn fmt_cause(cause: &impl fmt::Display, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    if f.alternate() { write!(f, ": {cause:#}") } else { Ok(()) }
 }
 
 /// Whether an error is of the medium: a sector that cannot be read or written, or a file system that finds itself

@@ -71,7 +71,7 @@ impl Finding {
     /// The finding that an error of the medium stands for.
     fn unreadable(error: &Error, tile: Option<TileIndex>) -> Self {
         let Error::Io { path, action, cause } = error else {
-            return Self::damage(Path::new(""), tile, &FormatError::at_offset(0, error.to_string()));
+            return Self::damage(Path::new(""), tile, &FormatError::at_offset(0, format!("{error:#}")));
         };
         let reason = format!("cannot {action}: {cause}; the medium refuses, or its file system is damaged");
         let mut finding = Self::damage(path, tile, &FormatError::at_offset(0, reason));

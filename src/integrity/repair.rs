@@ -185,7 +185,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             return self.quarantine(&self.layout.commit_log(), "metadata.json is of the original format");
         };
         for (tile, error) in damaged {
-            self.quarantine_tile(tile, &error.to_string())?;
+            self.quarantine_tile(tile, &format!("{error:#}"))?;
             self.counts.tiles_lost += 1;
         }
         if is_from_tiles {
@@ -193,14 +193,14 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         let paths = [self.layout.commit_log(), self.layout.metadata()];
         if is_from_tiles {
-            let why = remains.log_error.as_ref().map(Error::to_string);
+            let why = remains.log_error.as_ref().map(|error| format!("{error:#}"));
             let why = why.unwrap_or("it does not lead to the flush that metadata.json names".into());
             self.quarantine_copy(&paths[0], &why)?;
         }
         let written_id =
             remains.metadata.as_ref().map(|metadata| metadata.ext.as_ref().map(|ext| &*ext.map_id));
         match written_id {
-            Err(error) => self.quarantine_copy(&paths[1], &error.to_string())?,
+            Err(error) => self.quarantine_copy(&paths[1], &format!("{error:#}"))?,
             Ok(id) if id != Some(&hex(&map_id)) => self.quarantine_copy(&paths[1], "it is of another map")?,
             Ok(_) => {}
         }
@@ -266,7 +266,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 Ok(false) => lost.push(tile),
                 Err(error) if error.is_of_medium() => {
                     self.counts.left += 1;
-                    self.note(ActionKind::Left, &self.layout.tile_folder(tile), error.to_string());
+                    self.note(ActionKind::Left, &self.layout.tile_folder(tile), format!("{error:#}"));
                 }
                 Err(error) => return Err(error),
             }

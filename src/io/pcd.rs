@@ -34,7 +34,7 @@ pub fn read_pcd(file: &[u8]) -> Result<PcdCloud, FormatError> {
         }
         Err(PcdError::Format(error)) => Err(error),
         Err(PcdError::Read(error)) => Err(FormatError::at_offset(0, error.to_string())),
-        Err(PcdError::Store(error)) => Err(FormatError::at_offset(0, error.to_string())),
+        Err(PcdError::Store(error)) => Err(FormatError::at_offset(0, format!("{error:#}"))),
     }
 }
 

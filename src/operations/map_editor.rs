@@ -35,7 +35,7 @@ pub(super) fn edit<T>(
     let leaves_something = editor.is_written_to && outcome.is_err();
     drop(editor);
     if leaves_something && let Err(error) = TileStore::open(disk, folder) {
-        log::warn!("{}: not tidied up after an error: {error}", folder.display());
+        log::warn!("{}: not tidied up after an error: {error:#}", folder.display());
     }
     outcome
 }

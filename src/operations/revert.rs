@@ -74,7 +74,7 @@ pub fn revert_on(
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)
     {
-        log::warn!("{}: not tidied up after an error: {error}", folder.display());
+        log::warn!("{}: not tidied up after an error: {error:#}", folder.display());
     }
     outcome
 }

@@ -171,7 +171,7 @@ impl SnapshotInfo {
 
     fn damaged(name: &SnapshotName, error: &Error) -> Self {
         let (flush_number, scan_number, tiles, voxels, table_bytes, own_bytes) = Default::default();
-        let (name, damage) = (name.to_string(), Some(error.to_string()));
+        let (name, damage) = (name.to_string(), Some(format!("{error:#}")));
         Self { name, flush_number, scan_number, tiles, voxels, table_bytes, own_bytes, damage }
     }
 }

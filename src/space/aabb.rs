@@ -1,8 +1,9 @@
 use super::{Point, VoxelIndex};
+use serde::Serialize;
 use std::fmt;
 
 /// An axis-aligned box in metres, half-open: `min <= p < max` along every axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Aabb {
     /// Lower corner in metres, included.
     pub min: Point,

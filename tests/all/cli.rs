@@ -20,7 +20,9 @@ pub fn output(arguments: &[&str]) -> String {
 }
 
 pub fn json(arguments: &[&str]) -> Value {
-    serde_json::from_str(&output(arguments)).unwrap()
+    let object: Value = serde_json::from_str(&output(arguments)).unwrap();
+    assert_eq!(object["version"], 1, "{arguments:?}: {object}");
+    object
 }
 
 /// Exit code and standard error of a run that must fail.
@@ -428,7 +430,7 @@ fn octomaps_files_are_told_and_exported_and_a_bomb_is_refused() {
     assert!(code == 1 && stderr.contains("281474976710656, more than the limit of 268435456"), "{stderr}");
     fs::write(&bomb, header).unwrap();
     let (code, stderr) = failure(&["info", text(&bomb)]);
-    assert!(code == 1 && stderr.contains("bomb.bt: offset"), "{stderr}");
+    assert!(code == 1 && stderr.contains("bomb.bt: malformed: offset"), "{stderr}");
 }
 
 #[test]

@@ -143,18 +143,18 @@ fn whatever_fails_and_wherever_the_power_goes_there_is_no_new_map_or_the_whole_o
     println!("{operations} operations, {changes} of them changes");
     let is_there = |disk: &FaultyDisk, what: &str| match reader(disk, "small") {
         Ok(reader) => {
-            assert_eq!(reader.digest().unwrap_or_else(|error| panic!("{what}: {error}")), digest, "{what}");
+            assert_eq!(reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}")), digest, "{what}");
             true
         }
         Err(Error::NoMap { .. }) => false,
-        Err(error) => panic!("{what}: {error}"),
+        Err(error) => panic!("{what}: {error:#}"),
     };
     let again = |disk: &FaultyDisk, what: &str| {
         let was_there = is_there(disk, what);
         match converted(disk, "map", "small", Storage::Compact) {
             Ok(()) => assert!(!was_there, "{what}"),
             Err(Error::AlreadyExists { .. }) => assert!(was_there, "{what}"),
-            Err(error) => panic!("{what}: {error}"),
+            Err(error) => panic!("{what}: {error:#}"),
         }
         assert!(is_there(disk, what), "{what}");
         assert!(tile_files(disk, "map") == first, "{what}");

@@ -1,4 +1,4 @@
-use crate::support::some_of;
+use crate::support::{message_of, some_of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
@@ -129,7 +129,7 @@ fn check_every_damage(storage: Storage) {
             assert_eq!(disk.files()[&path], bytes, "{what}");
         }
 
-        let repaired = repair(&disk).unwrap_or_else(|error| panic!("{what}: {error}"));
+        let repaired = repair(&disk).unwrap_or_else(|error| panic!("{what}: {error:#}"));
         assert_eq!(repaired.tiles_lost, u64::from(tile.is_some()), "{what}");
         let mut expected = before.clone();
         expected.retain(|index, _| Some(*index) != tile);
@@ -289,7 +289,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
         let (verification, found) = findings(&disk);
         assert!(!verification.is_whole(), "{what}");
         assert!(found.iter().any(|finding| finding.reason.contains(reason)), "{what}: {found:?}");
-        let repaired = repair(&disk).unwrap_or_else(|error| panic!("{what}: {error}"));
+        let repaired = repair(&disk).unwrap_or_else(|error| panic!("{what}: {error:#}"));
         assert_eq!(repaired.tiles_lost, u64::from(loses_tile), "{what}");
         let mut expected = before.clone();
         expected.retain(|index, _| !loses_tile || *index != tile);
@@ -338,7 +338,7 @@ fn check_crashes_of_repairs(storage: Storage) {
                 let what = format!("{paths:?}, crash at {at}, {unsynced:?}");
                 assert!(repaired.is_err(), "{what}");
                 let disk = disk.after_crash(unsynced);
-                repair(&disk).unwrap_or_else(|error| panic!("{what}: {error}"));
+                repair(&disk).unwrap_or_else(|error| panic!("{what}: {error:#}"));
                 let mut expected = before.clone();
                 expected
                     .retain(|index, _| !paths.contains(&table.as_path()) || Some(*index) != tile_of(table));
@@ -380,10 +380,10 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
         hostile[payload.end..payload.end + 4].copy_from_slice(&crc.to_le_bytes());
         let disk = whole.copy();
         disk.put(log, &hostile);
-        let error = MapReader::open_on(disk.shared(), map(), 1).unwrap_err().to_string();
+        let error = message_of(MapReader::open_on(disk.shared(), map(), 1));
         assert!(
             error.contains("exceeds 2^62") || error.contains("tile sizes or counts out of range"),
-            "{error}"
+            "{error:#}"
         );
         repair(&disk).unwrap();
         assert_eq!(contents(&disk).unwrap(), contents(&whole).unwrap());

@@ -68,7 +68,7 @@ impl Oracle {
 
     fn check(&self, map: &impl MapView, what: &str) {
         let number = map.scan_number() as usize;
-        let digest = map.digest().unwrap_or_else(|error| panic!("{what}: after {number} scans: {error}"));
+        let digest = map.digest().unwrap_or_else(|error| panic!("{what}: after {number} scans: {error:#}"));
         assert_eq!(digest, self.digests[number], "{what}: after {number} scans");
     }
 }
@@ -108,7 +108,7 @@ fn insist<S, T>(
             // again.
             Err(Error::Damaged { .. }) if disk.had_a_fault_that_stays() => return None,
             Err(error) => {
-                assert!(number < 3 && matches!(error, Error::Io { .. }), "attempt {number}: {error}");
+                assert!(number < 3 && matches!(error, Error::Io { .. }), "attempt {number}: {error:#}");
                 look(subject);
             }
         }
@@ -141,7 +141,7 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
             // What is not to be had is an error; what is had is right.
             match mapper.digest() {
                 Ok(digest) => assert_eq!(digest, oracle.digests[mapper.scan_number() as usize]),
-                Err(error) => assert!(error.is_of_medium(), "{error}"),
+                Err(error) => assert!(error.is_of_medium(), "{error:#}"),
             }
             return;
         }
@@ -199,7 +199,7 @@ fn check_after_crash(disk: &FaultyDisk, oracle: &Oracle, reached: Reached, what:
             oracle.check(&reader, what);
         }
         Err(Error::NoMap { .. }) if reached.safe == 0 => {}
-        Err(error) => panic!("{what}: {reached:?}: {error}"),
+        Err(error) => panic!("{what}: {reached:?}: {error:#}"),
     }
     let end = live(disk, oracle);
     assert!(end.finished, "{what}");
@@ -226,8 +226,8 @@ fn fail_once_at_every_operation(oracle: &Oracle) {
         assert!(reached.finished, "{fault:?}");
         // What was said to be safe is on the medium.
         let left = disk.after_crash(Unsynced::Dropped);
-        let reader =
-            MapReader::open_on(left.shared(), &map(), 1).unwrap_or_else(|error| panic!("{fault:?}: {error}"));
+        let reader = MapReader::open_on(left.shared(), &map(), 1)
+            .unwrap_or_else(|error| panic!("{fault:?}: {error:#}"));
         assert_eq!(reader.scan_number() as usize, oracle.scans.len(), "{fault:?}");
         oracle.check(&reader, &format!("{fault:?}"));
     }
@@ -288,7 +288,7 @@ fn fail_and_crash_short_of_memory(oracle: &Oracle) {
             let left = disk.after_crash(Unsynced::Shuffled(at));
             if reached.finished {
                 let reader = MapReader::open_on(left.shared(), &map(), 1);
-                oracle.check(&reader.unwrap_or_else(|error| panic!("{fault:?}: {error}")), "at the end");
+                oracle.check(&reader.unwrap_or_else(|error| panic!("{fault:?}: {error:#}")), "at the end");
             } else {
                 assert!(disk.has_crashed(), "{fault:?}");
                 check_after_crash(&left, oracle, reached, &format!("{fault:?}, short of memory"));
@@ -350,12 +350,12 @@ fn crash_again_while_opening(oracle: &Oracle) {
                         oracle.check(&reader, &what);
                     }
                     Err(Error::NoMap { .. }) if reached.safe == 0 => {}
-                    Err(error) => panic!("{what}: {error}"),
+                    Err(error) => panic!("{what}: {error:#}"),
                 }
                 match open(&left, oracle) {
                     Ok(mapper) => oracle.check(&mapper, &what),
                     Err(Error::NoMap { .. }) if reached.safe == 0 => {}
-                    Err(error) => panic!("{what}: {error}"),
+                    Err(error) => panic!("{what}: {error:#}"),
                 }
             }
         }
@@ -488,7 +488,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
             for tile in mapper.tile_indices() {
                 mapper.tile(tile).unwrap();
             }
-            mapper.flush().unwrap_or_else(|error| panic!("at {at}, full {full}: {error}"));
+            mapper.flush().unwrap_or_else(|error| panic!("at {at}, full {full}: {error:#}"));
             oracle.check(&mapper, "with room");
             let left = disk.after_crash(Unsynced::Dropped);
             oracle.check(&MapReader::open_on(left.shared(), &map(), 1).unwrap(), "after a crash");
@@ -568,10 +568,10 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
             let left = disk.after_crash(unsynced);
             let what = format!("crash at {at}, {unsynced:?}");
             let reader = MapReader::open_on(left.shared(), &map(), 1)
-                .unwrap_or_else(|error| panic!("{what}: {error}"));
-            let digest = reader.digest().unwrap_or_else(|error| panic!("{what}: {error}"));
+                .unwrap_or_else(|error| panic!("{what}: {error:#}"));
+            let digest = reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"));
             assert!(digest == after || (!done && digest == before), "{what}");
-            let mapper = open(&left, &oracle).unwrap_or_else(|error| panic!("{what}: {error}"));
+            let mapper = open(&left, &oracle).unwrap_or_else(|error| panic!("{what}: {error:#}"));
             assert_eq!(mapper.digest().unwrap(), digest, "{what}");
         }
         if !disk.has_crashed() {
@@ -589,7 +589,7 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
                 let _ = mapper.flush();
             }
             disk.make_room();
-            mapper.flush().unwrap_or_else(|error| panic!("full at {first}, at {second}: {error}"));
+            mapper.flush().unwrap_or_else(|error| panic!("full at {first}, at {second}: {error:#}"));
             assert_eq!(mapper.digest().unwrap(), after);
         }
     }

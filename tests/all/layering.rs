@@ -28,10 +28,11 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
 }
 
 /// Every folder and file of the library, and what of ours it may name.
-const LAYERS: [(&str, &[&str]); 21] = [
+const LAYERS: [(&str, &[&str]); 22] = [
     ("maths.rs", &[]),
     ("scratch.rs", &[]),
     ("error.rs", &["space"]),
+    ("error", &["space"]),
     ("space", &[]),
     ("sensor", &["error", "maths"]),
     ("config.rs", &["error", "maths", "sensor", "space"]),

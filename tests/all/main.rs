@@ -14,6 +14,12 @@ mod cli_export;
 /// Help, man pages and completion scripts.
 #[cfg(feature = "cli")]
 mod cli_help;
+/// What `--json` prints: the version, shapes of places and boxes, failures.
+#[cfg(feature = "cli")]
+mod cli_json;
+/// What `-q`, `-v` and `RUST_LOG` say beside the answer.
+#[cfg(feature = "cli")]
+mod cli_log;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;
@@ -21,6 +27,9 @@ mod cli_snapshots;
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
 mod corruption;
+/// Errors: what they say, their causes, what they are about.
+#[cfg(feature = "cli")]
+mod errors;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
 mod faults;
 /// Files of every kind, of every version.

@@ -63,7 +63,7 @@ impl Life {
     fn state_of(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
         let reader = match MapReader::open_on(disk.shared(), map(), 1) {
             Err(Error::NoMap { .. }) if among.contains(&0) => return 0,
-            opened => opened.unwrap_or_else(|error| panic!("{what}: {error}")),
+            opened => opened.unwrap_or_else(|error| panic!("{what}: {error:#}")),
         };
         let found = state_seen(disk, &reader);
         let number = among.iter().copied().find(|&number| self.states[number] == found);
@@ -101,7 +101,8 @@ impl Life {
         if from > 0 {
             check_whole(disk, what);
         }
-        self.live(disk, from).unwrap_or_else(|(number, error)| panic!("{what}: then act {number}: {error}"));
+        self.live(disk, from)
+            .unwrap_or_else(|(number, error)| panic!("{what}: then act {number}: {error:#}"));
         self.check_end(disk, what);
     }
 

@@ -1,4 +1,4 @@
-use crate::support::{fixtures, shared_data};
+use crate::support::{fixtures, message_of, shared_data};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -159,7 +159,7 @@ fn poses_match_the_files_or_both_counts_are_told() {
         ("0 1 0 zero 0 0 0 1\n", "`zero` is not a number"),
     ] {
         write(text);
-        let error = open_scans(folder.path(), None).err().unwrap().to_string();
+        let error = message_of(open_scans(folder.path(), None));
         assert!(error.contains(message), "{error}");
     }
 }
@@ -180,7 +180,7 @@ fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
     let names: Vec<String> = (0..12).map(|number| format!("full{number}.pcd")).collect();
     unplaced(folder.path(), &names.iter().map(String::as_str).collect::<Vec<_>>());
     fs::write(folder.path().join("trajectory.txt"), "0 0 0 0 0 0 0 1\n".repeat(12)).unwrap();
-    let error = open_scans(folder.path(), None).err().unwrap().to_string();
+    let error = message_of(open_scans(folder.path(), None));
     assert!(error.contains("12 scans and no poses"), "{error}");
     assert!(error.contains("trajectory.txt looks like one") && error.contains("--poses identity"), "{error}");
 
@@ -199,7 +199,7 @@ fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
     );
     let lines = (0..12).map(|number| format!("{} 0 0 0 0 0 0 1\n", if number == 7 { 3 } else { number }));
     fs::write(&poses, lines.collect::<String>()).unwrap();
-    let error = open_scans(folder.path(), Some(&poses)).err().unwrap().to_string();
+    let error = message_of(open_scans(folder.path(), Some(&poses)));
     assert!(error.contains("line 8: time stamp 3 comes after 6"), "{error}");
 }
 
@@ -213,7 +213,7 @@ fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
     let mut source = open_scans(folder.path(), None).unwrap();
     assert_eq!(source.pose_source(), voxtile::io::PoseSource::Viewpoint);
     assert!(source.next_scan().unwrap().is_some() && source.next_scan().unwrap().is_some());
-    assert!(source.next_scan().unwrap_err().to_string().contains("no VIEWPOINT in this file"));
+    assert!(message_of(source.next_scan()).contains("no VIEWPOINT in this file"));
     assert!(source.pass_unread() && source.next_scan().unwrap().is_none());
 }
 
@@ -311,11 +311,11 @@ fn graphs_and_logs_are_read_and_hostile_ones_are_errors() {
     let qx = endless.len() - 4 - 4 - 24;
     endless[qx..qx + 8].copy_from_slice(&1e300_f64.to_le_bytes());
     fs::write(&path, endless).unwrap();
-    assert!(read(&path).unwrap_err().to_string().contains("a quaternion too long to be a rotation"));
+    assert!(message_of(read(&path)).contains("a quaternion too long to be a rotation"));
     let mut bomb = graph();
     bomb[4..8].copy_from_slice(&u32::MAX.to_le_bytes());
     fs::write(&path, bomb).unwrap();
-    assert!(read(&path).unwrap_err().to_string().contains("4294967295 points announced"));
+    assert!(message_of(read(&path)).contains("4294967295 points announced"));
     for (text, message) in [
         ("1 2 3\n", "line 1: points before the first line NODE"),
         ("NODE 1 2 3\n", "line 1: fewer than 6 numbers"),
@@ -323,7 +323,7 @@ fn graphs_and_logs_are_read_and_hostile_ones_are_errors() {
         ("NODE 0 0 0 0 0 nan\n", "a pose that is not finite"),
     ] {
         fs::write(&log, text).unwrap();
-        let error = read(&log).unwrap_err().to_string();
+        let error = message_of(read(&log));
         assert!(error.contains(message), "{error}");
     }
 }

@@ -70,7 +70,7 @@ fn a_stream_that_ends_or_is_wrong_anywhere_is_an_error_with_its_place() {
     let header = written("label", true, &[]).len();
     for end in (0..bytes.len()).filter(|&end| end != header) {
         let error = read(&bytes[..end]).unwrap_err();
-        assert!(matches!(error, Error::Malformed { .. }), "{end}: {error}");
+        assert!(matches!(error, Error::Malformed { .. }), "{end}: {error:#}");
     }
     let nan = f64::NAN.to_le_bytes();
     for (at, patch) in
@@ -79,7 +79,7 @@ fn a_stream_that_ends_or_is_wrong_anywhere_is_an_error_with_its_place() {
         let mut wrong = bytes.clone();
         wrong[at..at + patch.len()].copy_from_slice(patch);
         let error = read(&wrong).unwrap_err();
-        assert!(matches!(error, Error::Malformed { .. }), "{at}: {error}");
+        assert!(matches!(error, Error::Malformed { .. }), "{at}: {error:#}");
     }
     // A quaternion of no length.
     let mut wrong = bytes.clone();

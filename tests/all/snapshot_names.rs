@@ -1,3 +1,4 @@
+use crate::support::message_of;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
@@ -80,7 +81,7 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
     let now = digest_of(&disk, None).unwrap();
     swap(&disk);
     assert_eq!(damaged(&disk), [path("s1"), path("s2")]);
-    let error = revert_on(disk.shared(), map(), &name("s1"), None, |_, _| ()).unwrap_err().to_string();
+    let error = message_of(revert_on(disk.shared(), map(), &name("s1"), None, |_, _| ()));
     assert!(error.contains("that of the snapshot s2"), "{error}");
     assert!(digest_of(&disk, Some("s2")).is_err());
     assert_eq!(digest_of(&disk, None).unwrap(), now);

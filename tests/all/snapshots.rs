@@ -205,7 +205,7 @@ fn own_bytes_are_what_deleting_frees() {
 fn wrong_names_and_other_refusals_say_what_to_do() {
     let (disk, map, _) = small(Storage::OctoMap);
     let error = snapshot_on(disk.shared(), &map, &name("first")).unwrap_err();
-    assert!(matches!(error, Error::AlreadyExists { .. }), "{error}");
+    assert!(matches!(error, Error::AlreadyExists { .. }), "{error:#}");
     let revert = |to, keep: Option<&str>| {
         revert_on(disk.shared(), &map, &name(to), keep.map(name).as_ref(), |_, _| ()).unwrap_err()
     };
@@ -215,7 +215,7 @@ fn wrong_names_and_other_refusals_say_what_to_do() {
         delete_snapshot_on(disk.shared(), &map, &name("none")).unwrap_err(),
         MapReader::open_snapshot_on(disk.shared(), &map, &name("none"), 1).unwrap_err(),
     ] {
-        assert!(error.to_string().contains("`voxtile snapshots /map` lists them"), "{error}");
+        assert!(error.to_string().contains("`voxtile snapshots /map` lists them"), "{error:#}");
     }
     assert_eq!(snapshots_on(disk.shared(), &map).unwrap().len(), 2, "nothing was kept in vain");
     let writer = TileStore::open(disk.shared(), &map).unwrap();
@@ -483,7 +483,7 @@ fn a_diff_counts_what_a_naive_one_counts() {
     let path = folder.path().join("other");
     drop(OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, other).unwrap());
     let error = diff(&open(&a), &open(&path), |_| (), |_, _| ()).unwrap_err();
-    assert!(matches!(error, Error::Mismatch { what: "resolution", .. }), "{error}");
+    assert!(matches!(error, Error::Mismatch { what: "resolution", .. }), "{error:#}");
 }
 
 /// A file of two names is not written to through one of them.

@@ -1,3 +1,4 @@
+use crate::support::message_of;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -221,7 +222,7 @@ fn a_lock_that_is_taken_away_or_taken_by_a_stranger_lets_no_two_write() {
     // What is no file is named, found and moved away.
     fs::remove_file(&lock).unwrap();
     fs::create_dir(&lock).unwrap();
-    assert!(open(&path).unwrap_err().to_string().contains("writer.lock"));
+    assert!(message_of(open(&path)).contains("writer.lock"));
     let mut found = Vec::new();
     verify(&path, |finding| found.push(finding.path.clone()), |_, _| ()).unwrap();
     assert_eq!(found, [lock]);
@@ -293,8 +294,8 @@ fn damage_is_named_when_read_and_a_damaged_tile_is_never_overwritten() {
         fs::write(&file, &damaged).unwrap();
         let reader = MapReader::open(&path, 4).unwrap();
         let error = reader.tile(tile).unwrap_err();
-        assert!(matches!(&error, Error::Damaged { tile: Some(named), .. } if *named == tile), "{error}");
-        assert!(error.to_string().contains("tile_0_0_0"), "{error}");
+        assert!(matches!(&error, Error::Damaged { tile: Some(named), .. } if *named == tile), "{error:#}");
+        assert!(error.to_string().contains("tile_0_0_0"), "{error:#}");
         assert!(reader.tile(TileIndex::new(-1, 0, 0)).unwrap().is_some(), "the others go on working");
         // A scan that touches it is refused as a whole, and the file stays.
         let mut mapper = open(&path).unwrap();
@@ -305,7 +306,7 @@ fn damage_is_named_when_read_and_a_damaged_tile_is_never_overwritten() {
         assert_eq!(fs::read(&file).unwrap(), damaged);
     }
     fs::remove_file(&file).unwrap();
-    let error = MapReader::open(&path, 4).unwrap().tile(tile).unwrap_err().to_string();
+    let error = message_of(MapReader::open(&path, 4).unwrap().tile(tile));
     assert!(error.contains("the file is missing"), "{error}");
 }
 
@@ -320,7 +321,7 @@ fn an_older_version_of_a_tile_is_damage() {
     mapper.flush().unwrap();
     drop(mapper);
     fs::write(&file, old).unwrap();
-    let error = MapReader::open(&path, 4).unwrap().digest().unwrap_err().to_string();
+    let error = message_of(MapReader::open(&path, 4).unwrap().digest());
     assert!(error.contains("the file is of scan 3, commits.log names the version of scan 4"), "{error}");
 }
 
@@ -330,7 +331,7 @@ fn a_stray_tile_folder_is_neither_read_nor_overwritten() {
     let path = map(&folder);
     copy(&path.join("tile_0_0_0"), &path.join("tile_0_0_7"));
     let mapper = open(&path).unwrap();
-    let error = mapper.tile(TileIndex::new(0, 0, 7)).unwrap_err().to_string();
+    let error = message_of(mapper.tile(TileIndex::new(0, 0, 7)));
     assert!(error.contains("commits.log does not name this tile"), "{error}");
 }
 

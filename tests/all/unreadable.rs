@@ -48,7 +48,7 @@ fn damaged(disk: &FaultyDisk, what: &str) -> BTreeSet<PathBuf> {
             damaged.insert(finding.path.clone());
         }
     };
-    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error}"));
+    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error:#}"));
     damaged
 }
 
@@ -75,7 +75,7 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
             let found = damaged(&disk, &what);
             assert!(found.contains(path) && found.len() == 1, "{what}: {found:?}");
             if !is_index(path) {
-                go_on(&disk, storage).unwrap_or_else(|error| panic!("{what}: {error}"));
+                go_on(&disk, storage).unwrap_or_else(|error| panic!("{what}: {error:#}"));
             }
             if path.ends_with("s") {
                 // What it sees stays, and it can be deleted.
@@ -91,7 +91,7 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
             disk.make_unreadable(path);
             let octree = whole.files()[path].clone();
             let repair = repair_on(disk.shared(), map(), |_| (), |_, _| ())
-                .unwrap_or_else(|error| panic!("{what}: {error}"));
+                .unwrap_or_else(|error| panic!("{what}: {error:#}"));
             assert!(repair.actions > 0, "{what}");
             assert_eq!(damaged(&disk, &what), BTreeSet::new(), "{what}");
             if path.ends_with("octree.bt") {
@@ -122,11 +122,13 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
         assert!(found.contains(path), "{what}: {found:?}");
         match go_on(&disk, Storage::OctoMap) {
             Ok(()) => assert!(!is_index(path), "{what}"),
-            Err(error) => assert!(is_index(path) && error.to_string().contains(&what), "{what}: {error}"),
+            Err(error) => {
+                assert!(is_index(path) && format!("{error:#}").contains(&what), "{what}: {error:#}")
+            }
         }
         // A repair does what it can, or says which file stops it; nothing is lost.
         if let Err(error) = repair_on(disk.shared(), map(), |_| (), |_, _| ()) {
-            assert!(error.to_string().contains(&what), "{what}: {error}");
+            assert!(format!("{error:#}").contains(&what), "{what}: {error:#}");
         }
         disk.mend();
         if is_index(path) {
@@ -139,7 +141,7 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
             disk.break_path(folder);
             let what = folder.display().to_string();
             assert!(!damaged(&disk, &what).is_empty(), "{what}");
-            go_on(&disk, Storage::OctoMap).unwrap_or_else(|error| panic!("{what}: {error}"));
+            go_on(&disk, Storage::OctoMap).unwrap_or_else(|error| panic!("{what}: {error:#}"));
             disk.mend();
             assert_eq!(digests(&disk).unwrap()[1], before[1], "{what}");
         }

@@ -1,5 +1,6 @@
 use crate::args::Args;
 use crate::files::{load_layer, open_map};
+use crate::json;
 use std::path::Path;
 use voxtile::Mapper;
 use voxtile::share::merge_layer;
@@ -10,7 +11,7 @@ pub fn run(args: &Args, layer: &Path, map: &Path) -> anyhow::Result<()> {
     let report = merge_layer(&layer, &mut mapper)?;
     mapper.flush()?;
     if args.json {
-        println!("{}", serde_json::to_string(&report)?);
+        json::print(&report)?;
     } else {
         println!(
             "folded    {} voxels: {} got a hit, {} were known",

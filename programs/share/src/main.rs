@@ -6,6 +6,7 @@ mod args;
 mod files;
 mod fold;
 mod inbox;
+mod json;
 mod layer_store;
 mod link;
 mod measure;
@@ -27,6 +28,10 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("voxtile share: {error:#}");
+            if args.json {
+                // There is nobody to tell that it is refused.
+                let _ = json::print(&json::failure(&error));
+            }
             ExitCode::from(if error.is::<voxtile::Error>() { 2 } else { 1 })
         }
     }

@@ -1,4 +1,5 @@
 use crate::args::{Args, seconds};
+use crate::json;
 use crate::publish::next;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -29,8 +30,7 @@ pub fn run(args: &Args, scans: &[PathBuf]) -> anyhow::Result<()> {
         std::fs::write(file, table).with_context(|| format!("{}: cannot write", file.display()))?;
     }
     if args.json {
-        rows.iter().try_for_each(|row| serde_json::to_string(row).map(|line| println!("{line}")))?;
-        return Ok(());
+        return rows.iter().try_for_each(json::print);
     }
     println!(
         "set                    points  voxels  sent B  again  status    asks answers   total B  of 16 B  of 46 B  most/frame  at receiver"

@@ -1,4 +1,5 @@
 use crate::args::{Args, seconds};
+use crate::json;
 use crate::link::{Link, answers_key, packets_key, parse_key};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -131,7 +132,7 @@ fn say(args: &Args, scans: u64, sender: &mut Sender) -> anyhow::Result<()> {
         let line = serde_json::json!({
             "robot": robot, "scans": scans, "voxels": voxels, "digest": digest.to_string(), "counts": counts,
         });
-        println!("{line}");
+        json::print(&line)?;
     } else {
         println!("{robot}: {voxels} voxels, digest {digest}");
         println!(

@@ -1,5 +1,6 @@
 use crate::args::{Args, seconds};
 use crate::files::{layers_folder, lengths, load_layer, open_map};
+use crate::json;
 use crate::layer_store::{LayerRoom, LayerStore};
 use crate::link::{Link, asks_key, parse_key};
 use crate::publish::random_number;
@@ -271,7 +272,7 @@ impl Subscriber<'_> {
                     "robot": name.to_string(), "voxels": voxels, "digest": digest, "is_equal": is_equal,
                     "is_saved": is_saved, "faults": faults, "counts": counts,
                 });
-                println!("{line}");
+                json::print(&line)?;
             } else {
                 let state = if is_equal { "equal to the robot's" } else { "not known to be equal" };
                 println!("{name}: {voxels} voxels, digest {digest}, {state}");

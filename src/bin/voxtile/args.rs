@@ -94,6 +94,35 @@ pub enum Command {
     Man(ManArgs),
 }
 
+impl Command {
+    /// Whether it was asked for JSON.
+    pub fn is_json(&self) -> bool {
+        match self {
+            Self::Build(args) => args.json,
+            Self::Info(args) => args.json,
+            Self::Query(args) => args.json,
+            Self::Raycast(args) => args.json,
+            Self::Export(args) => args.json,
+            Self::Digest(args) => args.json,
+            Self::Snapshot(args) => args.json,
+            Self::Snapshots(args) => args.json,
+            Self::Diff(args) => args.json,
+            Self::Revert(args) => args.json,
+            Self::Merge(args) => args.json,
+            Self::Crop(args) => args.json,
+            Self::Clear(args) => args.json,
+            Self::Decay(args) => args.json,
+            Self::Convert(args) => args.json,
+            Self::Verify(args) => args.json,
+            Self::Repair(args) => args.json,
+            Self::Local(args) => args.json,
+            Self::Demo(args) => args.json,
+            // What voxtile-share is asked for is its own to say.
+            Self::Share(_) | Self::Completions(_) | Self::Man(_) => false,
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct BuildArgs {

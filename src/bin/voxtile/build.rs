@@ -1,6 +1,6 @@
-use crate::INTERRUPTED;
 use crate::args::BuildArgs;
 use crate::build_config::{config_to_create, config_to_go_on};
+use crate::failure::JsonTo;
 use crate::flush_schedule::FlushSchedule;
 use crate::intake::{Intake, Next};
 use crate::map_at::whole_map;
@@ -8,6 +8,7 @@ use crate::progress::Progress;
 use crate::scan_reader::ScanReader;
 use crate::stop_signal;
 use crate::summary::Summary;
+use crate::{INTERRUPTED, say};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -26,14 +27,14 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
     let opened = ScanReader::open(args.scans.clone(), args.poses.clone(), room(args, &config), stop.clone())?;
-    let Some((reader, input)) = opened else { return Ok(stopped_early()) };
+    let Some((reader, input)) = opened else { return Ok(stopped_early(args)) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
     let mut mapper = match exists {
         true => Some(OutOfCoreTileMapper::open(&args.output, config.clone())?),
         false => None,
     };
     if !intake.read_lead()? {
-        return Ok(stopped_early());
+        return Ok(stopped_early(args));
     }
     let mapper = match &mut mapper {
         Some(mapper) => mapper,
@@ -46,7 +47,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     };
     mapper.stop_with(stop.clone());
     let Some(resumed_after) = begin(args, mapper, &mut intake, &input.name)? else {
-        return Ok(stopped_early());
+        return Ok(stopped_early(args));
     };
 
     let progress = Progress::over_scans(input.scans);
@@ -79,7 +80,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     Summary { interrupted, resumed_after, poses, unread, ..summary }.print(args.json)?;
     if interrupted {
         let all = resumed_after + scans;
-        eprintln!("voxtile: stopped after {all} scans; all of them are in the map; --resume goes on");
+        say(format_args!("stopped after {all} scans; all of them are in the map; --resume goes on"));
         return Ok(ExitCode::from(INTERRUPTED));
     }
     Ok(ExitCode::SUCCESS)
@@ -145,8 +146,9 @@ fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error
 }
 
 /// It was asked to stop while nothing had been mapped.
-fn stopped_early() -> ExitCode {
-    eprintln!("voxtile: stopped before the first scan; the map is as it was");
+fn stopped_early(args: &BuildArgs) -> ExitCode {
+    let message = "stopped before the first scan; the map is as it was";
+    JsonTo::output_if(args.json).tell_stopped(message);
     ExitCode::from(INTERRUPTED)
 }
 

@@ -1,4 +1,5 @@
 use crate::args::ClearArgs;
+use crate::json;
 use crate::map_at::whole_map;
 use crate::memory;
 use crate::part::part_of;
@@ -26,7 +27,7 @@ pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.json {
         let summary = Summary { map: &args.map, cleared, peak_rss_bytes: memory::peak_bytes() };
-        writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+        json::print(&summary, &mut out)?;
     } else {
         let Cleared { voxels_cleared, tiles_changed, tiles_removed, tiles, .. } = cleared;
         writeln!(

@@ -1,4 +1,5 @@
 use crate::args::ConvertArgs;
+use crate::json;
 use crate::map_at::{read_map, whole_map};
 use crate::memory;
 use crate::progress::Progress;
@@ -50,7 +51,7 @@ pub fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
     conversion.peak_rss_bytes = memory::peak_bytes();
     let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(out, "{}", serde_json::to_string(&conversion)?)?;
+        json::print(&conversion, &mut out)?;
     } else {
         conversion.print(&mut out)?;
     }

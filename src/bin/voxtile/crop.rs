@@ -1,11 +1,11 @@
 use crate::args::CropArgs;
+use crate::json;
 use crate::map_at::{read_map, whole_map};
 use crate::memory;
 use crate::part::part_of;
 use crate::progress::Progress;
 use crate::written::print_written;
 use serde::Serialize;
-use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile::operations::{WrittenMap, crop};
@@ -28,7 +28,7 @@ pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.json {
         let summary = Summary { map: &args.output, written, peak_rss_bytes: memory::peak_bytes() };
-        writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+        json::print(&summary, &mut out)?;
     } else {
         print_written(&args.output, &written, &mut out)?;
     }

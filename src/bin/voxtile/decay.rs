@@ -1,4 +1,5 @@
 use crate::args::DecayArgs;
+use crate::json;
 use crate::map_at::whole_map;
 use crate::memory;
 use crate::progress::Progress;
@@ -27,7 +28,7 @@ pub fn run(args: &DecayArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.json {
         let summary = Summary { map: &args.map, decayed, peak_rss_bytes: memory::peak_bytes() };
-        writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+        json::print(&summary, &mut out)?;
     } else {
         let Decayed { scans, factor, voxels, voxels_forgotten, tiles, tiles_removed, .. } = decayed;
         writeln!(out, "decayed   by {} scans: log-odds times {factor:.6}", HumanCount(scans))?;

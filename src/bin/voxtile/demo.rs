@@ -1,5 +1,6 @@
 use crate::INTERRUPTED;
 use crate::args::{ColorName, DemoArgs};
+use crate::failure::JsonTo;
 use crate::octree_choice::octree_config;
 use crate::picture::{ColorBy, TopDown, View};
 use crate::progress::Progress;
@@ -59,7 +60,9 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     drop(progress);
     if stop.is_set() {
         let all = done + inserted;
-        eprintln!("voxtile: stopped after {all} scans; all of them are in the map; the same command goes on");
+        let message =
+            format!("stopped after {all} scans; all of them are in the map; the same command goes on");
+        JsonTo::output_if(args.json).tell_stopped(&message);
         return Ok(ExitCode::from(INTERRUPTED));
     }
     let summary = Summary::of(&map, inserted, report, &mapper, started.elapsed())?;

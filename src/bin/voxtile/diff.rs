@@ -1,4 +1,5 @@
 use crate::args::DiffArgs;
+use crate::json;
 use crate::map_at::{MapAt, read_maps};
 use crate::memory;
 use crate::progress::Progress;
@@ -48,7 +49,7 @@ pub fn run(args: &DiffArgs) -> anyhow::Result<ExitCode> {
     report.peak_rss_bytes = memory::peak_bytes();
     let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(out, "{}", serde_json::to_string(&report)?)?;
+        json::print(&report, &mut out)?;
     } else {
         report.print(&mut out)?;
     }

@@ -1,4 +1,5 @@
 use crate::args::DigestArgs;
+use crate::json;
 use crate::map_at::read_map;
 use crate::memory;
 use std::io::Write;
@@ -14,7 +15,7 @@ pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {
         let peak = memory::peak_bytes();
         let answer =
             serde_json::json!({ "digest": digest, "scan_number": scan_number, "peak_rss_bytes": peak });
-        writeln!(out, "{answer}")?;
+        json::print(&answer, &mut out)?;
     } else {
         writeln!(out, "{digest}")?;
     }

@@ -1,5 +1,6 @@
 use crate::args::{ExportArgs, ExportFormatName};
 use crate::export_origin::{ExportOrigin, OriginFile};
+use crate::json;
 use crate::map_at::{point_of, read_map};
 use crate::memory;
 use crate::octree_file;
@@ -39,7 +40,8 @@ struct Exported {
     origin: ExportOrigin,
 }
 
-pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
+/// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
+pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let export = Export::of(args)?;
     let exported = if octree_file::is_octree_file(&args.map) {
         export.octree_file()?
@@ -49,10 +51,10 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
             ExportFormat::Octree(format) => export.octree(format, reader),
         })?
     };
-    if is_standard_output(&args.output) {
-        export.say(&exported, &mut io::stderr().lock())?;
-    } else {
+    if !is_standard_output(&args.output) {
         export.say(&exported, &mut io::stdout().lock())?;
+    } else if args.json || !is_quiet {
+        export.say(&exported, &mut io::stderr().lock())?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -241,8 +243,7 @@ impl<'a> Export<'a> {
                 "origin_file": beside.map(|path| path.display().to_string()),
                 "peak_rss_bytes": memory::peak_bytes(),
             });
-            writeln!(out, "{summary}")?;
-            return Ok(());
+            return json::print(&summary, out);
         }
         let file = if is_standard_output(&self.args.output) { "standard output" } else { &file };
         writeln!(out, "{} voxels in {file}", HumanCount(*voxels))?;

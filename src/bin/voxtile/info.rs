@@ -1,4 +1,5 @@
 use crate::args::InfoArgs;
+use crate::json;
 use crate::map_at::read_map;
 use crate::octree_file;
 use indicatif::{HumanBytes, HumanCount};
@@ -8,6 +9,7 @@ use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::operations::{KeptBytes, kept_bytes};
 use voxtile::sensor::SensorModel;
+use voxtile::space::Aabb;
 use voxtile::store::{Bounds, InputRecord};
 use voxtile::{MapQueries, Result, Storage};
 
@@ -31,7 +33,7 @@ struct Info {
     decayed_scan: u64,
     tiles: u64,
     tile_bounds: Option<Bounds>,
-    bounds_m: Option<[[f64; 3]; 2]>,
+    bounds_m: Option<Aabb>,
     voxels: u64,
     occupied: u64,
     table_bytes: u64,
@@ -48,7 +50,7 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     }
     let info = read_map(&args.map, |reader| Ok(Info::of(reader)?))?;
     if args.json {
-        writeln!(out, "{}", serde_json::to_string(&info)?)?;
+        json::print(&info, &mut out)?;
     } else {
         info.print(&mut out)?;
     }
@@ -81,7 +83,8 @@ impl Info {
             decayed_scan: ext.map_or(0, |ext| ext.decayed_scan),
             tiles: reader.tile_indices().len() as u64,
             tile_bounds,
-            bounds_m: tile_bounds.map(|bounds| [corner(bounds.min, 0), corner(bounds.max, 1)]),
+            bounds_m: tile_bounds
+                .map(|bounds| Aabb { min: corner(bounds.min, 0), max: corner(bounds.max, 1) }),
             voxels,
             occupied,
             table_bytes,
@@ -116,7 +119,7 @@ impl Info {
             writeln!(out, "faded        last after scan {}", HumanCount(self.decayed_scan))?;
         }
         writeln!(out, "tiles        {}", HumanCount(self.tiles))?;
-        if let Some([min, max]) = self.bounds_m {
+        if let Some(Aabb { min, max }) = self.bounds_m {
             writeln!(out, "bounds       {min:?} to {max:?} m")?;
         }
         writeln!(out, "voxels       {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;

@@ -171,8 +171,8 @@ impl Intake {
             return Err(anyhow::Error::new(error).context(context));
         }
         let number = self.chain.scans();
-        log::warn!("scan {number} is skipped: {error}");
-        self.unread.push(format!("scan {number}: {error}"));
+        log::warn!("scan {number} is skipped: {error:#}");
+        self.unread.push(format!("scan {number}: {error:#}"));
         self.skipped.push(number);
         self.chain.add_unread();
         Ok(())

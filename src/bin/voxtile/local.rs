@@ -1,4 +1,5 @@
 use crate::args::{LocalArgs, PresetName};
+use crate::json;
 use crate::local_table::{Row, print_table};
 use crate::output_file::check_picture;
 use crate::picture::{OverTime, Panel};
@@ -50,7 +51,7 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.json {
         for row in &rows {
-            writeln!(out, "{}", serde_json::to_string(row)?)?;
+            json::print(row, &mut out)?;
         }
     } else {
         print_table(&mut out, &rows)?;

@@ -13,9 +13,11 @@ mod diff;
 mod digest;
 mod export;
 mod export_origin;
+mod failure;
 mod flush_schedule;
 mod info;
 mod intake;
+mod json;
 mod local;
 mod local_table;
 mod man;
@@ -47,6 +49,7 @@ mod written;
 
 use args::{Cli, Command};
 use clap::Parser;
+use failure::JsonTo;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -60,6 +63,7 @@ fn main() -> ExitCode {
     }
     log.init();
     let Cli { command, threads, quiet, .. } = cli;
+    let json_to = JsonTo::of(&command);
     if quiet {
         progress::hide_all();
     }
@@ -72,15 +76,14 @@ fn main() -> ExitCode {
     if matches!(command, Command::Build(_) | Command::Local(_) | Command::Demo(_))
         && let Err(error) = threads::start(threads)
     {
-        say(format_args!("{error:#}"));
-        return ExitCode::FAILURE;
+        return json_to.tell(&error);
     }
     let outcome = match command {
         Command::Build(args) => build::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Query(args) => query::run(&args),
         Command::Raycast(args) => raycast::run(&args),
-        Command::Export(args) => export::run(&args),
+        Command::Export(args) => export::run(&args, quiet),
         Command::Digest(args) => digest::run(&args),
         Command::Snapshot(args) => snapshot::run(&args),
         Command::Snapshots(args) => snapshots::run(&args),
@@ -99,17 +102,7 @@ fn main() -> ExitCode {
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
     };
-    outcome.unwrap_or_else(|error| {
-        if is_closed_pipe(&error) {
-            return ExitCode::SUCCESS;
-        }
-        // Of files and programs, errors tell the name.
-        match error.chain().next().and_then(|first| first.downcast_ref::<std::io::Error>()) {
-            Some(error) => say(format_args!("standard output: cannot write: {error}")),
-            None => say(format_args!("{error:#}")),
-        }
-        exit_code_of(&error)
-    })
+    outcome.unwrap_or_else(|error| json_to.tell(&error))
 }
 
 /// One line for a person. Where standard error refuses it there is nobody to tell.
@@ -119,25 +112,3 @@ pub fn say(line: std::fmt::Arguments<'_>) {
 
 /// Ended by Ctrl-C or SIGTERM, after everything so far was flushed.
 pub const INTERRUPTED: u8 = 130;
-
-/// 2 for what the user can put right on the command line, 1 for everything else.
-fn exit_code_of(error: &anyhow::Error) -> ExitCode {
-    use voxtile::Error;
-    match error.downcast_ref() {
-        Some(
-            Error::InvalidArgument { .. }
-            | Error::Grid(_)
-            | Error::AlreadyExists { .. }
-            | Error::Mismatch { .. },
-        ) => ExitCode::from(2),
-        _ => ExitCode::FAILURE,
-    }
-}
-
-/// `voxtile ... | head` is no error.
-fn is_closed_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
-        .any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
-}

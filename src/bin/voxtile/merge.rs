@@ -1,4 +1,5 @@
 use crate::args::MergeArgs;
+use crate::json;
 use crate::map_at::{read_all_maps, whole_map};
 use crate::memory;
 use crate::progress::Progress;
@@ -29,13 +30,13 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     drop(progress);
     let warnings = warnings_of(&args.maps, &merged);
     for warning in &warnings {
-        crate::say(format_args!("warning: {warning}"));
+        log::warn!("{warning}");
     }
     let mut out = std::io::stdout().lock();
     if args.json {
         let peak_rss_bytes = memory::peak_bytes();
         let summary = Summary { map: &args.output, merged, warnings, peak_rss_bytes };
-        writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+        json::print(&summary, &mut out)?;
     } else {
         print_written(&args.output, &merged.written, &mut out)?;
         writeln!(

@@ -1,5 +1,6 @@
 //! OctoMap's files in place of a map: what they hold, and their voxels.
 
+use crate::json;
 use serde::Serialize;
 use std::fs::File;
 use std::io::{BufReader, Write};
@@ -47,8 +48,7 @@ pub fn print_info(path: &Path, json: bool, out: &mut impl Write) -> anyhow::Resu
         occupied_voxels: voxels.occupied,
     };
     if json {
-        writeln!(out, "{}", serde_json::to_string(&info)?)?;
-        return Ok(());
+        return json::print(&info, out);
     }
     let Info { id, nodes, leaves, free_voxels, occupied_voxels, .. } = info;
     writeln!(out, "file         OctoMap's {id}, resolution {resolution_m} m")?;

@@ -1,4 +1,5 @@
 use crate::args::QueryArgs;
+use crate::json;
 use crate::map_at::{point_of, read_map};
 use anyhow::Context;
 use serde::Serialize;
@@ -54,7 +55,7 @@ pub fn run(args: &QueryArgs) -> anyhow::Result<ExitCode> {
     let mut out = BufWriter::new(std::io::stdout().lock());
     for (_, answer) in &answers {
         if args.json {
-            writeln!(out, "{}", serde_json::to_string(answer)?)?;
+            json::print(answer, &mut out)?;
         } else {
             let [x, y, z] = answer.point_m;
             write!(out, "{x} {y} {z}  {}", answer.state)?;

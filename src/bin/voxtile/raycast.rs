@@ -1,4 +1,5 @@
 use crate::args::RaycastArgs;
+use crate::json;
 use crate::map_at::{point_of, read_map};
 use std::io::Write;
 use std::process::ExitCode;
@@ -15,7 +16,7 @@ pub fn run(args: &RaycastArgs) -> anyhow::Result<ExitCode> {
     let hit = read_map(&args.map, |reader| Ok(reader.cast_ray(&query)?))?;
     let mut out = std::io::stdout().lock();
     match hit {
-        _ if args.json => writeln!(out, "{}", serde_json::to_string(&serde_json::json!({ "hit": hit }))?)?,
+        _ if args.json => json::print(&serde_json::json!({ "hit": hit }), &mut out)?,
         None => writeln!(out, "no hit")?,
         Some(hit) => {
             let [x, y, z] = hit.center_m;

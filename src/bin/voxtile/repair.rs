@@ -1,4 +1,5 @@
 use crate::args::RepairArgs;
+use crate::json;
 use crate::map_at::whole_map;
 use crate::progress::Progress;
 use indicatif::HumanCount;
@@ -37,7 +38,7 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
     let is_complete = repair.is_complete();
     let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(out, "{}", serde_json::to_string(&Report { map: &args.map, repair, done })?)?;
+        json::print(&Report { map: &args.map, repair, done }, &mut out)?;
     } else if repair.actions == 0 {
         writeln!(out, "nothing to repair in {} tiles", HumanCount(repair.tiles))?;
     } else {

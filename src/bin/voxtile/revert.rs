@@ -1,4 +1,5 @@
 use crate::args::RevertArgs;
+use crate::json;
 use crate::map_at::whole_map;
 use crate::memory;
 use crate::progress::Progress;
@@ -30,7 +31,7 @@ pub fn run(args: &RevertArgs) -> anyhow::Result<ExitCode> {
         let (snapshot, kept_as) = (args.name.as_str(), keep_as.map(|name| name.as_str()));
         let summary =
             Summary { map: &args.map, snapshot, kept_as, reverted, peak_rss_bytes: memory::peak_bytes() };
-        writeln!(out, "{}", serde_json::to_string(&summary)?)?;
+        json::print(&summary, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }
     let Reverted { scan_number_before, scan_number, tiles, tiles_restored, tiles_removed, .. } = reverted;

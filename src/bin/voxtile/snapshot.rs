@@ -1,4 +1,5 @@
 use crate::args::SnapshotArgs;
+use crate::json;
 use crate::map_at::whole_map;
 use std::io::Write;
 use std::process::ExitCode;
@@ -20,7 +21,7 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.json {
         let answer = serde_json::json!({ "map": args.map.display().to_string(), "deleted": args.delete, "snapshot": info });
-        writeln!(out, "{answer}")?;
+        json::print(&answer, &mut out)?;
     } else if args.delete {
         writeln!(out, "deleted   {}", args.name)?;
     } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {

@@ -1,4 +1,5 @@
 use crate::args::SnapshotsArgs;
+use crate::json;
 use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
 use std::process::ExitCode;
@@ -8,11 +9,8 @@ pub fn run(args: &SnapshotsArgs) -> anyhow::Result<ExitCode> {
     let infos = snapshots(&args.map)?;
     let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(
-            out,
-            "{}",
-            serde_json::json!({ "map": args.map.display().to_string(), "snapshots": infos })
-        )?;
+        let answer = serde_json::json!({ "map": args.map.display().to_string(), "snapshots": infos });
+        json::print(&answer, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }
     if infos.is_empty() {

@@ -1,3 +1,4 @@
+use crate::json;
 use crate::memory;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -102,8 +103,7 @@ impl Summary {
     pub fn print(&self, json: bool) -> anyhow::Result<()> {
         let mut out = std::io::stdout().lock();
         if json {
-            writeln!(out, "{}", serde_json::to_string(self)?)?;
-            return Ok(());
+            return json::print(self, &mut out);
         }
         let ScanReport { points, skipped, cut_at_max_range, .. } = self.report;
         let rate = self.scans as f64 / self.seconds.max(1e-9);

@@ -1,4 +1,5 @@
 use crate::args::VerifyArgs;
+use crate::json;
 use crate::map_at::whole_map;
 use crate::memory;
 use crate::progress::Progress;
@@ -42,7 +43,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     if args.json {
         let peak_rss_bytes = memory::peak_bytes();
         let report = Report { map: &args.map, whole, verification, findings, peak_rss_bytes };
-        writeln!(out, "{}", serde_json::to_string(&report)?)?;
+        json::print(&report, &mut out)?;
     } else {
         print(args, &verification, &mut out)?;
     }

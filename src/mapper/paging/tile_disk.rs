@@ -200,7 +200,7 @@ impl TileDisk {
                 return Some(version);
             }
             Err(error) if is_current => self.save_error = Some(error),
-            Err(error) => log::debug!("an older version of tile {index} was not saved: {error}"),
+            Err(error) => log::debug!("an older version of tile {index} was not saved: {error:#}"),
         }
         None
     }

@@ -119,7 +119,7 @@ impl TileStore {
             self.checkpoint.add(changed.tiles(), &removed);
         }
         if let Err(error) = self.finish_commit() {
-            log::warn!("flushed, but not tidied up: {error}");
+            log::warn!("flushed, but not tidied up: {error:#}");
         }
         Ok(())
     }

@@ -84,13 +84,13 @@ impl SeenTables {
         match flush_number {
             Some(flush_number) => {
                 log::warn!(
-                    "{error}; every table of flush {flush_number} is kept until the snapshot is repaired or deleted"
+                    "{error:#}; every table of flush {flush_number} is kept until the snapshot is repaired or deleted"
                 );
                 let tiles: FxHashSet<_> = map.tiles.tiles().chain(kept.keys().copied()).collect();
                 self.take_tiles(tiles.into_iter(), flush_number, kept);
             }
             None => {
-                log::warn!("{error}; every table is kept until the snapshot is repaired or deleted");
+                log::warn!("{error:#}; every table is kept until the snapshot is repaired or deleted");
                 self.see_all = true;
                 for (&tile, flushes) in kept {
                     self.pinned.entry(tile).or_default().extend(flushes);

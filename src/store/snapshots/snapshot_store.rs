@@ -162,7 +162,7 @@ impl TileStore {
     /// Puts the files of snapshots in order after a commit; what the disk refuses is made good by the next call.
     fn finish_snapshot_commit(&mut self) {
         if let Err(error) = self.finish_commit() {
-            log::warn!("{}: committed, but not tidied up: {error}", self.folder().display());
+            log::warn!("{}: committed, but not tidied up: {error:#}", self.folder().display());
         }
     }
 
@@ -218,7 +218,7 @@ impl TileStore {
         self.checkpoint.remove_snapshot(name);
         self.finish_snapshot_commit();
         if let Err(error) = self.release_unseen() {
-            log::warn!("deleted, but its tables stay until the map is opened again: {error}");
+            log::warn!("deleted, but its tables stay until the map is opened again: {error:#}");
         }
         Ok(())
     }

@@ -48,9 +48,9 @@ fn decay(disk: &FaultyDisk) -> Result<()> {
 /// The digest of a map, `None` if there is none; of a damaged one there is none either, and that is a failure.
 fn digest(disk: &FaultyDisk, name: &str, what: &str) -> Option<blake3::Hash> {
     match MapReader::open_on(disk.shared(), &path(name), 1) {
-        Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{what}: {error}"))),
+        Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"))),
         Err(Error::NoMap { .. }) => None,
-        Err(error) => panic!("{what}: {error}"),
+        Err(error) => panic!("{what}: {error:#}"),
     }
 }
 
@@ -75,7 +75,7 @@ fn check_from(start: &FaultyDisk, name: &str, work: Work) {
         match work(disk) {
             Ok(()) => {}
             Err(Error::AlreadyExists { .. }) if found == Some(after) => {}
-            Err(error) => panic!("{what}: again: {error}"),
+            Err(error) => panic!("{what}: again: {error:#}"),
         }
         assert_eq!(digest(disk, name, what), Some(after), "{what}: again");
         let left: Vec<_> = disk.files().into_keys().collect();

@@ -36,7 +36,7 @@ fn is_there(disk: &FaultyDisk, source: &InMemoryMapper, what: &str) -> bool {
             true
         }
         Err(Error::NoMap { .. }) => false,
-        Err(error) => panic!("{what}: {error}"),
+        Err(error) => panic!("{what}: {error:#}"),
     }
 }
 
@@ -46,7 +46,7 @@ fn again(disk: &FaultyDisk, source: &InMemoryMapper, what: &str) {
     match write(disk, source) {
         Ok(_) => assert!(!was_there, "{what}"),
         Err(Error::AlreadyExists { .. }) => assert!(was_there, "{what}"),
-        Err(error) => panic!("{what}: {error}"),
+        Err(error) => panic!("{what}: {error:#}"),
     }
     assert!(is_there(disk, source, what), "{what}");
     let left = disk.files();

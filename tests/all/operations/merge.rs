@@ -73,7 +73,7 @@ fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
                     assert!(reason.contains("iwlo") && reason.contains("--prefer"), "{reason}");
                     continue;
                 }
-                merged => merged.unwrap_or_else(|error| panic!("seed {seed}: {error}")),
+                merged => merged.unwrap_or_else(|error| panic!("seed {seed}: {error:#}")),
             };
             let expected = naive(&maps, prefer);
             assert_eq!(read_map(&disk, &path("merged")), expected, "seed {seed}, {prefer:?}");
@@ -169,6 +169,6 @@ fn a_damaged_tile_is_named_and_there_is_no_map() {
     bytes[20] ^= 1;
     disk.put(&table, &bytes);
     let error = merge(&disk, &maps, None).unwrap_err();
-    assert!(matches!(&error, Error::Damaged { path, .. } if *path == table), "{error}");
+    assert!(matches!(&error, Error::Damaged { path, .. } if *path == table), "{error:#}");
     assert!(disk.files().keys().all(|path| path.starts_with(&maps[0]) || path.starts_with(&maps[1])));
 }

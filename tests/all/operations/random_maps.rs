@@ -73,7 +73,7 @@ pub fn open(disk: &FaultyDisk, folder: &Path) -> Result<MapReader> {
 
 /// The voxels of a map on disk.
 pub fn read_map(disk: &FaultyDisk, folder: &Path) -> Voxels {
-    voxels_of(&open(disk, folder).unwrap_or_else(|error| panic!("{error}")))
+    voxels_of(&open(disk, folder).unwrap_or_else(|error| panic!("{error:#}")))
 }
 
 pub fn path(name: &str) -> PathBuf {

@@ -2,6 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+/// What an operation that must fail says, with its cause.
+pub fn message_of<T>(result: voxtile::Result<T>) -> String {
+    match result {
+        Ok(_) => panic!("it should have failed"),
+        Err(error) => format!("{error:#}"),
+    }
+}
+
 /// One in so many of the moments at which something may go wrong, spread without a pattern; all of them where the
 /// environment says `VOXTILE_FAULTS=all`, which takes some ten minutes.
 pub fn some_of<T>(moments: impl IntoIterator<Item = T>, one_in: u64) -> impl Iterator<Item = T> {

@@ -103,12 +103,17 @@ pub fn layers_and_success(subscriber: &mut Process) -> (Vec<Layer>, bool) {
     (summaries.iter().map(layer).collect(), is_success)
 }
 
-/// All that a subscriber says of each layer in the end, and whether it ends well.
+/// All that a subscriber says of each layer in the end, and whether it ends well; if not, the last line is the error.
 pub fn summaries_and_success(subscriber: &mut Process) -> (Vec<Value>, bool) {
     let mut out = String::new();
     subscriber.0.stdout.as_mut().unwrap().read_to_string(&mut out).unwrap();
     let is_success = subscriber.0.wait().unwrap().success();
-    (out.lines().map(|line| serde_json::from_str(line).unwrap()).collect(), is_success)
+    let mut lines: Vec<Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(lines.iter().all(|line| line["version"] == 1));
+    if !is_success {
+        assert_eq!(lines.pop().unwrap()["error"]["kind"], "other");
+    }
+    (lines, is_success)
 }
 
 pub fn run(args: &[&str]) -> Output {

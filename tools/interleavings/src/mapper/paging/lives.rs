@@ -99,7 +99,7 @@ impl Life {
             Ok(()) => self.flushed = self.expected.clone(),
             Err(error) => {
                 // What could not be saved before is saved now, and no older trouble is told of.
-                assert!(refuses, "{error}");
+                assert!(refuses, "{error:#}");
                 self.errors += 1;
             }
         }

@@ -1,0 +1,121 @@
+use crate::cli::{scans, text, voxtile};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// How much a run is asked to say, and what of it must be there and must not.
+struct Case {
+    options: &'static [&'static str],
+    rust_log: Option<&'static str>,
+    flushes: bool,
+    tiles: bool,
+}
+
+const fn case(options: &'static [&'static str], rust_log: Option<&'static str>, said: [bool; 2]) -> Case {
+    Case { options, rust_log, flushes: said[0], tiles: said[1] }
+}
+
+const CASES: [Case; 11] = [
+    case(&[], None, [false, false]),
+    case(&["-q"], None, [false, false]),
+    case(&["--quiet"], Some("debug"), [false, false]),
+    case(&["-v"], None, [true, false]),
+    case(&["--verbose"], Some("off"), [true, false]),
+    case(&["-vv"], None, [true, true]),
+    case(&["-v", "-v"], None, [true, true]),
+    case(&["-vvv"], Some("error"), [true, true]),
+    case(&[], Some("info"), [true, false]),
+    case(&[], Some("debug"), [true, true]),
+    case(&[], Some("voxtile::mapper=debug"), [false, true]),
+];
+
+/// Exit code, standard output and standard error.
+fn run(arguments: &[&str], case: &Case) -> (i32, String, String) {
+    let mut command = voxtile(&[arguments, case.options].concat());
+    command.env_remove("RUST_LOG");
+    if let Some(filter) = case.rust_log {
+        command.env("RUST_LOG", filter);
+    }
+    let output = command.output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+/// Tiles of two metres of which two are in memory, so that they come and go.
+fn build(scans: &Path, map: &Path, case: &Case) -> (String, String) {
+    let small = ["--resolution", "0.1", "--tile-size", "2", "--cache-tiles", "2", "--flush-every", "1"];
+    let build = [&["build", text(scans), "-o", text(map)][..], &small].concat();
+    let (code, out, said) = run(&build, case);
+    assert_eq!(code, 0, "{said}");
+    (out, said)
+}
+
+/// What a build prints, less times and the name of the map.
+fn lasting(out: &str) -> Vec<&str> {
+    let is_lasting =
+        |line: &&str| ["points", "skipped", "voxels", "tiles "].iter().any(|word| line.starts_with(word));
+    let lines: Vec<&str> = out.lines().filter(is_lasting).collect();
+    assert!(lines.len() > 3, "{out}");
+    lines
+}
+
+#[test]
+fn options_and_environment_choose_what_is_said_and_nothing_else() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let mut before: Option<(String, PathBuf)> = None;
+    for (number, case) in CASES.iter().enumerate() {
+        let what = format!("{:?}, RUST_LOG {:?}", case.options, case.rust_log);
+        let map = folder.path().join(format!("map{number}"));
+        let (out, said) = build(&scans, &map, case);
+        for (word, is_said) in
+            [(": flush ", case.flushes), (": loaded", case.tiles), (": evicted", case.tiles)]
+        {
+            assert_eq!(said.contains(word), is_said, "{what}: {word}: {said}");
+        }
+        assert!(case.flushes || case.tiles || said.is_empty(), "{what}: {said}");
+        let (earlier, earlier_map) = before.get_or_insert_with(|| (out.clone(), map.clone()));
+        assert_eq!(lasting(&out), lasting(earlier), "{what}");
+        // A command whose answer has no times says the same to the byte.
+        let ask = |map: &Path, case| {
+            let (code, out, said) = run(&["query", text(map), "4.1", "-0.5", "0.6", "--json"], case);
+            assert_eq!((code, said.as_str()), (0, ""), "{what}");
+            out
+        };
+        assert_eq!(ask(&map, case), ask(earlier_map, &CASES[0]), "{what}");
+        let digest = |map: &Path| run(&["digest", text(map)], case).1;
+        assert_eq!(digest(&map), digest(earlier_map), "{what}");
+    }
+}
+
+#[test]
+fn quiet_leaves_out_warnings_and_summaries_beside_a_file_and_no_error() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let map = folder.path().join("map");
+    let [loud, quiet] = [&CASES[0], &CASES[1]];
+    build(&scans, &map, loud);
+    let merged = |name: &str| folder.path().join(name);
+    let merge = |into: &Path, case| run(&["merge", text(&map), text(&map), "-o", text(into), "--json"], case);
+    let (_, out, said) = merge(&merged("loud"), loud);
+    assert!(said.contains("counts twice") && out.contains("counts twice"), "{said}");
+    let (_, out, said) = merge(&merged("quiet"), quiet);
+    assert!(said.is_empty() && out.contains("counts twice"), "{said}");
+
+    let export = ["export", text(&map), "-o", "-", "--format", "csv"];
+    let [(_, file, said), (_, same, nothing)] = [loud, quiet].map(|case| run(&export, case));
+    assert!(said.contains("voxels in standard output") && nothing.is_empty(), "{said}{nothing}");
+    assert!(!file.is_empty() && file == same);
+
+    for case in [loud, quiet] {
+        let (code, out, said) = run(&["info", "/no/map"], case);
+        assert_eq!((code, out.as_str()), (1, ""));
+        assert!(said.starts_with("voxtile: /no/map: no map here"), "{said}");
+    }
+}
+
+#[test]
+fn quiet_and_verbose_exclude_each_other() {
+    let (code, out, said) = run(&["info", "/no/map", "-q", "-v"], &CASES[0]);
+    assert_eq!((code, out.as_str()), (2, ""));
+    assert!(said.contains("cannot be used with"), "{said}");
+}
