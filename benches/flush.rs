@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::Survey;
 use voxtile::store::{Disk, FsDisk};
-use voxtile::{MapConfig, MapView, Mapper, OutOfCoreTileMapper, Scan};
+use voxtile::{MapConfig, MapPath, MapView, Mapper, OutOfCoreTileMapper, Scan};
 
 fn disks() -> [(&'static str, Arc<dyn Disk>); 3] {
     [
@@ -29,7 +29,7 @@ fn temporary_folder() -> TempDir {
 
 fn new_mapper(disk: &Arc<dyn Disk>, folder: &TempDir) -> OutOfCoreTileMapper {
     let path = folder.path().join("map");
-    OutOfCoreTileMapper::create_on(disk.clone(), &path, config()).expect("an empty folder")
+    OutOfCoreTileMapper::create(MapPath::on(disk.clone(), &path), config()).expect("an empty folder")
 }
 
 fn build(criterion: &mut Criterion) {

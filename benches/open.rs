@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::scan::PointBatch;
 use voxtile::space::Point;
-use voxtile::{MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+use voxtile::{MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 
 const TILES: i32 = 100_000;
 const TILES_A_FLUSH: i32 = 10_000;
@@ -40,7 +40,8 @@ fn make_map(path: &Path) -> MapConfig {
     // All updates of a flush wait, so that each tile comes in once.
     let config = MapConfig::new(0.2, 10.0).expect("whole voxels").with_pending_bytes(1 << 30);
     let disk = UnsyncedDisk::shared();
-    let mut mapper = OutOfCoreTileMapper::create_on(disk, path, config.clone()).expect("an empty folder");
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(disk, path), config.clone()).expect("an empty folder");
     for first in (0..TILES).step_by(TILES_A_FLUSH as usize) {
         let center = |index: i32| 10.0 * f64::from(index) + 5.0;
         let tiles = first..first + TILES_A_FLUSH;

@@ -136,7 +136,7 @@ impl Default for MapConfig {
 
 impl Default for MemoryLimit {
     fn default() -> Self {
-        Self::Tiles { tiles: 16, pending_bytes: DEFAULT_PENDING_BYTES }
+        Self::tiles(16)
     }
 }
 
@@ -291,6 +291,11 @@ impl VoxelCacheConfig {
 const DEFAULT_PENDING_BYTES: usize = 32 << 20;
 
 impl MemoryLimit {
+    /// So many tiles, however large they are.
+    pub fn tiles(tiles: usize) -> Self {
+        Self::Tiles { tiles, pending_bytes: DEFAULT_PENDING_BYTES }
+    }
+
     /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles of `n`
     /// voxels and `b = ceil(n / 8) + 1` bricks along their edge. That is two tiles of which every voxel is observed and
     /// no two alike, one at work and one on its way in or out, and what a scan takes.

@@ -165,6 +165,7 @@ impl Error {
             Self::Locked { .. } => "locked",
             Self::LockLost { .. } => "lock_lost",
             Self::Changed { .. } => "changed",
+            Self::Expired => "expired",
             Self::Stopped => "stopped",
             Self::UnsavedChanges { .. } => "unsaved_changes",
             Self::TooLarge { .. } => "too_large",
@@ -185,6 +186,7 @@ impl Error {
             | Self::Changed { path } => Some(path),
             Self::InvalidArgument { .. }
             | Self::Grid(_)
+            | Self::Expired
             | Self::Stopped
             | Self::UnsavedChanges { .. }
             | Self::TooLarge { .. } => None,

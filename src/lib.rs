@@ -68,6 +68,8 @@ pub mod mapper;
 pub mod maths;
 pub mod octree;
 pub mod operations;
+#[doc(hidden)]
+pub mod path_text;
 mod persistence;
 pub mod query;
 pub mod scan;
@@ -83,8 +85,11 @@ pub use config::{
     InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
 };
 pub use error::{DecodeError, Error, FormatError, Place, Result};
-pub use mapper::{InMemoryMapper, LiveReader, LiveView, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+pub use mapper::{
+    InMemoryMapper, LiveReader, LiveView, MapOptions, MapReader, MapView, Mapper, OutOfCoreTileMapper,
+};
 /// The crate of [`Pose::isometry`], in the version that voxtile uses.
 pub use nalgebra;
 pub use query::{Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy};
 pub use scan::{Pose, Scan, ScanPoints, ScanRef};
+pub use store::MapPath;

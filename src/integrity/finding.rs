@@ -11,6 +11,7 @@ pub struct Finding {
     /// How bad it is.
     pub severity: Severity,
     /// The file or folder.
+    #[serde(serialize_with = "crate::path_text::serialize")]
     pub path: PathBuf,
     /// The tile it belongs to, if to one.
     pub tile: Option<[i32; 3]>,

@@ -17,5 +17,5 @@ mod tile_check;
 mod verify;
 
 pub use finding::{Finding, Severity};
-pub use repair::{Action, ActionKind, Repair, repair, repair_on};
-pub use verify::{Verification, verify, verify_on};
+pub use repair::{Action, ActionKind, Repair, repair};
+pub use verify::{Verification, verify};

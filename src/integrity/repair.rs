@@ -7,13 +7,12 @@ use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, Quarantine, Salvage, TileFile, TileStore, WriterLock, hex,
+    Disk, EntryKind, Layout, MapPath, Quarantine, Salvage, TileFile, TileStore, WriterLock, hex,
 };
 use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// One thing that a repair did.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -22,6 +21,7 @@ pub struct Action {
     /// What was done.
     pub kind: ActionKind,
     /// To which file or folder.
+    #[serde(serialize_with = "crate::path_text::serialize")]
     pub path: PathBuf,
     /// Why, and where something was put.
     pub reason: String,
@@ -81,24 +81,12 @@ impl Repair {
 ///
 /// No map there, another writer, a disk that refuses, or too little left to tell what the map is.
 pub fn repair(
-    folder: impl AsRef<Path>,
+    folder: impl Into<MapPath>,
     done: impl FnMut(&Action),
     progress: impl FnMut(u64, u64),
 ) -> Result<Repair> {
-    repair_on(Arc::new(FsDisk), folder.as_ref(), done, progress)
-}
-
-/// [`repair`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`repair`].
-pub fn repair_on(
-    disk: Arc<dyn Disk>,
-    folder: &Path,
-    done: impl FnMut(&Action),
-    progress: impl FnMut(u64, u64),
-) -> Result<Repair> {
+    let (disk, folder) = folder.into().into_parts();
+    let folder = &*folder;
     let layout = Layout::new(folder);
     let mut repairer = Repairer { disk: &*disk, layout, done, progress, counts: Repair::default() };
     repairer.repair_lock()?;

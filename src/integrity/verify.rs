@@ -7,7 +7,7 @@ use crate::error::{Error, FormatError, Result};
 use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, FsDisk, Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage, SnapshotList,
+    Disk, EntryKind, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage, SnapshotList,
     SnapshotName, TileFile, TileStore, TileVersion, read_log, tile_of_folder,
 };
 use serde::Serialize;
@@ -55,24 +55,12 @@ impl Verification {
 /// No map there, or a disk that refuses more than single files. Damage is a finding, and so is a file or folder that
 /// the medium does not give back; the others are looked at all the same.
 pub fn verify(
-    folder: impl AsRef<Path>,
+    folder: impl Into<MapPath>,
     found: impl FnMut(&Finding),
     progress: impl FnMut(u64, u64),
 ) -> Result<Verification> {
-    verify_on(Arc::new(FsDisk), folder.as_ref(), found, progress)
-}
-
-/// [`verify`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`verify`].
-pub fn verify_on(
-    disk: Arc<dyn Disk>,
-    folder: &Path,
-    found: impl FnMut(&Finding),
-    progress: impl FnMut(u64, u64),
-) -> Result<Verification> {
+    let (disk, folder) = folder.into().into_parts();
+    let folder = &*folder;
     let layout = Layout::new(folder);
     let mut verifier = Verifier {
         listed: None,

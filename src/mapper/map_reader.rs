@@ -1,11 +1,11 @@
 use super::statistics::IoCounts;
 use super::{MapStatistics, MapView, TileRef};
-use crate::config::MapConfig;
+use crate::config::{MapConfig, MemoryLimit};
 use crate::error::{Error, Result};
 use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
 use crate::space::{TileBox, TileIndex};
-use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileStore, TileVersion};
+use crate::store::{Disk, MapPath, Metadata, SnapshotName, TileStore, TileVersion};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
@@ -24,29 +24,74 @@ pub struct MapReader {
     /// Around all tiles that this reader sees.
     bounds: Option<TileBox>,
     disk: Arc<dyn Disk>,
-    cache_tiles: usize,
     cache: Mutex<ReaderCache>,
 }
 
+/// The tiles in memory, in the order of their last use.
 #[derive(Debug)]
 struct ReaderCache {
-    tiles: LruCache<TileIndex, Arc<Tile>>,
+    /// With their bytes.
+    tiles: LruCache<TileIndex, (Arc<Tile>, usize)>,
+    bytes: usize,
     io: IoCounts,
 }
 
+impl Default for ReaderCache {
+    fn default() -> Self {
+        Self { tiles: LruCache::unbounded(), bytes: 0, io: IoCounts::default() }
+    }
+}
+
+impl ReaderCache {
+    fn get(&mut self, index: TileIndex) -> Option<Arc<Tile>> {
+        self.tiles.get(&index).map(|(tile, _)| tile.clone())
+    }
+
+    fn remove(&mut self, index: TileIndex) {
+        self.bytes -= self.tiles.pop(&index).map_or(0, |(_, bytes)| bytes);
+    }
+
+    /// Puts a tile in and drops others, those used longest ago first, until all fit. One always does.
+    fn put(&mut self, tile: Arc<Tile>, memory: MemoryLimit) {
+        let (index, bytes) = (tile.index(), tile.bytes());
+        let (most_tiles, most_bytes) = match memory {
+            MemoryLimit::Tiles { tiles, .. } => (tiles, usize::MAX),
+            MemoryLimit::Bytes(bytes) | MemoryLimit::Tight(bytes) => (usize::MAX, bytes),
+        };
+        self.remove(index);
+        while (self.tiles.len() >= most_tiles || self.bytes.saturating_add(bytes) > most_bytes)
+            && let Some((_, (_, dropped))) = self.tiles.pop_lru()
+        {
+            self.bytes -= dropped;
+        }
+        self.tiles.put(index, (tile, bytes));
+        self.bytes += bytes;
+    }
+}
+
+fn config_of_store(store: &TileStore, memory: MemoryLimit) -> Result<MapConfig> {
+    let config = config_from(store.metadata(), &store.layout().metadata())?;
+    match memory {
+        // The least number of bytes is that of a mapper; a reader always has room for one tile.
+        MemoryLimit::Bytes(_) => Ok(MapConfig { memory, ..config.validated()? }),
+        _ => MapConfig { memory, ..config }.validated(),
+    }
+}
+
 impl MapReader {
-    /// Opens the map in a folder, keeping up to `cache_tiles` tiles in memory.
+    /// Opens the map in a folder, keeping up to `cache_tiles` tiles in memory. [`MapOptions`](super::MapOptions) take a
+    /// number of bytes instead.
     ///
     /// # Errors
     ///
     /// No map there, or damage to what tells which tiles there are.
-    pub fn open(folder: impl AsRef<Path>, cache_tiles: usize) -> Result<Self> {
-        Self::open_on(Arc::new(FsDisk), folder.as_ref(), cache_tiles)
+    pub fn open(folder: impl Into<MapPath>, cache_tiles: usize) -> Result<Self> {
+        Self::open_within(folder.into(), MemoryLimit::tiles(cache_tiles))
     }
 
-    /// [`MapReader::open`] on another disk than the file system.
-    pub fn open_on(disk: Arc<dyn Disk>, folder: &Path, cache_tiles: usize) -> Result<Self> {
-        Self::of_store(TileStore::open_read_only(disk.clone(), folder)?, disk, cache_tiles)
+    pub(super) fn open_within(map: MapPath, memory: MemoryLimit) -> Result<Self> {
+        let (disk, folder) = map.into_parts();
+        Self::of_store(TileStore::open_read_only(disk.clone(), &folder)?, disk, memory)
     }
 
     /// Opens a snapshot of the map in a folder: it is read like the map, as of then.
@@ -54,31 +99,28 @@ impl MapReader {
     /// # Errors
     ///
     /// No map or no snapshot of this name there; a damaged snapshot.
-    pub fn open_snapshot(folder: impl AsRef<Path>, name: &SnapshotName, cache_tiles: usize) -> Result<Self> {
-        Self::open_snapshot_on(Arc::new(FsDisk), folder.as_ref(), name, cache_tiles)
-    }
-
-    /// [`MapReader::open_snapshot`] on another disk than the file system.
-    ///
-    /// # Errors
-    ///
-    /// As for [`MapReader::open_snapshot`].
-    pub fn open_snapshot_on(
-        disk: Arc<dyn Disk>,
-        folder: &Path,
+    pub fn open_snapshot(
+        folder: impl Into<MapPath>,
         name: &SnapshotName,
         cache_tiles: usize,
     ) -> Result<Self> {
-        Self::of_store(TileStore::open_snapshot(disk.clone(), folder, name)?, disk, cache_tiles)
+        Self::open_snapshot_within(folder.into(), name, MemoryLimit::tiles(cache_tiles))
     }
 
-    fn of_store(store: TileStore, disk: Arc<dyn Disk>, cache_tiles: usize) -> Result<Self> {
-        let config = config_from(store.metadata(), &store.layout().metadata())?;
-        let config = config.with_cache_tiles(cache_tiles).validated()?;
-        let cache = ReaderCache { tiles: LruCache::unbounded(), io: IoCounts::default() };
+    pub(super) fn open_snapshot_within(
+        map: MapPath,
+        name: &SnapshotName,
+        memory: MemoryLimit,
+    ) -> Result<Self> {
+        let (disk, folder) = map.into_parts();
+        Self::of_store(TileStore::open_snapshot(disk.clone(), &folder, name)?, disk, memory)
+    }
+
+    fn of_store(store: TileStore, disk: Arc<dyn Disk>, memory: MemoryLimit) -> Result<Self> {
+        let config = config_of_store(&store, memory)?;
         let octrees = OctreeFactory::default();
         let bounds = TileBox::of(store.tiles());
-        Ok(Self { config, octrees, store, bounds, disk, cache_tiles, cache: Mutex::new(cache) })
+        Ok(Self { config, octrees, store, bounds, disk, cache: Mutex::default() })
     }
 
     /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not
@@ -103,14 +145,13 @@ impl MapReader {
             let [wanted, found] = [seen, found].map(|id| id.unwrap_or_else(|| "none".into()));
             return Err(Error::Mismatch { path: folder, what: "the id", found, wanted });
         }
-        let config = config_from(store.metadata(), &store.layout().metadata())?;
-        let config = config.with_cache_tiles(self.cache_tiles).validated()?;
+        let config = config_of_store(&store, self.config.memory)?;
         let is_newer = seen != found || store.commits().flush_number != self.flush_number();
         let cache = self.cache.get_mut().unwrap_or_else(PoisonError::into_inner);
         let tiles: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
         for index in tiles {
             if store.version(index).is_none() || store.version(index) != self.store.version(index) {
-                cache.tiles.pop(&index);
+                cache.remove(index);
             }
         }
         self.bounds = TileBox::of(store.tiles());
@@ -123,17 +164,10 @@ impl MapReader {
     /// # Errors
     ///
     /// No map there, or metadata that cannot be read.
-    pub fn config_of(folder: impl AsRef<Path>) -> Result<MapConfig> {
-        Self::config_of_on(Arc::new(FsDisk), folder.as_ref())
-    }
-
-    /// [`MapReader::config_of`] on another disk than the file system.
-    ///
-    /// # Errors
-    ///
-    /// As for [`MapReader::config_of`].
-    pub fn config_of_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<MapConfig> {
-        Ok(Self::open_on(disk, folder, 1)?.config)
+    pub fn config_of(folder: impl Into<MapPath>) -> Result<MapConfig> {
+        let (disk, folder) = folder.into().into_parts();
+        let folder = &*folder;
+        Ok(Self::open(MapPath::on(disk, folder), 1)?.config)
     }
 
     /// What `metadata.json` says.
@@ -206,6 +240,11 @@ impl MapReader {
         load::load(&self.store, &self.config.grid, &self.octrees, index).map_err(|error| self.explain(error))
     }
 
+    /// Looks into the cache.
+    fn found<T>(&self, look: impl FnOnce(&mut ReaderCache) -> T) -> T {
+        look(&mut self.cache.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// A tile that does not match the log is damage, unless a writer has flushed since and did not see this reader.
     fn explain(&self, error: Error) -> Error {
         if !matches!(error, Error::Damaged { .. }) {
@@ -256,25 +295,26 @@ impl MapView for MapReader {
     }
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(tile) = cache.tiles.get(&index).cloned() {
+        if let Some(tile) = self.found(|cache| {
+            let tile = cache.get(index)?;
             cache.io.hits += 1;
+            Some(tile)
+        }) {
             return Ok(Some(TileRef::shared(tile)));
         }
+        // Other threads find theirs meanwhile.
         let Some((tile, bytes)) = self.load(index)? else { return Ok(None) };
-        cache.io.loads += 1;
-        cache.io.bytes_read += bytes;
-        while cache.tiles.len() >= self.cache_tiles {
-            cache.tiles.pop_lru();
-        }
         let tile = Arc::new(tile);
-        cache.tiles.put(index, tile.clone());
+        self.found(|cache| {
+            cache.io.loads += 1;
+            cache.io.bytes_read += bytes;
+            cache.put(tile.clone(), self.config.memory);
+        });
         Ok(Some(TileRef::shared(tile)))
     }
 
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        let cached = self.cache.lock().unwrap_or_else(PoisonError::into_inner).tiles.peek(&index).cloned();
-        if let Some(tile) = cached {
+        if let Some((tile, _)) = self.found(|cache| cache.tiles.peek(&index).cloned()) {
             return Ok(Some(TileRef::shared(tile)));
         }
         let loaded = load::load_uncached(&self.store, &self.config.grid, index);
@@ -297,7 +337,7 @@ impl MapView for MapReader {
             io: cache.io,
             ..MapStatistics::default()
         };
-        cache.tiles.iter().for_each(|(_, tile)| statistics.cached += tile.counts());
+        cache.tiles.iter().for_each(|(_, (tile, _))| statistics.cached += tile.counts());
         statistics
     }
 }

@@ -15,6 +15,7 @@
 mod in_memory;
 mod live;
 mod map_reader;
+mod options;
 mod out_of_core;
 mod paging;
 mod statistics;
@@ -26,6 +27,7 @@ mod traits;
 pub use in_memory::InMemoryMapper;
 pub use live::{LiveReader, LiveView};
 pub use map_reader::MapReader;
+pub use options::MapOptions;
 pub use out_of_core::OutOfCoreTileMapper;
 pub use statistics::{IoCounts, MapStatistics, MemoryCounts, StallCounts};
 pub use tile_ref::TileRef;

@@ -7,9 +7,9 @@ use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, VoxelIndex};
-use crate::store::{Disk, FsDisk, InputContent, InputRecord, Metadata, SnapshotName, TileStore};
+use crate::store::{InputContent, InputRecord, MapPath, Metadata, SnapshotName, TileStore};
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 /// A map on disk with its active tiles in memory: bounded by the disk, never by memory.
 ///
@@ -29,8 +29,13 @@ impl OutOfCoreTileMapper {
     /// # Errors
     ///
     /// A wrong configuration, a folder with other content, a disk that refuses.
-    pub fn create(folder: impl AsRef<Path>, config: MapConfig) -> Result<Self> {
-        Self::create_on(Arc::new(FsDisk), folder.as_ref(), config)
+    pub fn create(folder: impl Into<MapPath>, config: MapConfig) -> Result<Self> {
+        let (disk, folder) = folder.into().into_parts();
+        let folder = &*folder;
+        let config = config.validated()?;
+        let map_id = new_map_id();
+        let store = TileStore::create(disk, folder, new_metadata(&config, map_id, &[]), map_id)?;
+        Ok(Self::new(config, store))
     }
 
     /// Opens a map to go on with it. Of `config`, grid, sensor model and occupancy threshold must be the map's own;
@@ -39,20 +44,9 @@ impl OutOfCoreTileMapper {
     /// # Errors
     ///
     /// No map there, another writer, other parameters, damage to what tells which tiles there are.
-    pub fn open(folder: impl AsRef<Path>, config: MapConfig) -> Result<Self> {
-        Self::open_on(Arc::new(FsDisk), folder.as_ref(), config)
-    }
-
-    /// [`OutOfCoreTileMapper::create`] on another disk than the file system.
-    pub fn create_on(disk: Arc<dyn Disk>, folder: &Path, config: MapConfig) -> Result<Self> {
-        let config = config.validated()?;
-        let map_id = new_map_id();
-        let store = TileStore::create(disk, folder, new_metadata(&config, map_id, &[]), map_id)?;
-        Ok(Self::new(config, store))
-    }
-
-    /// [`OutOfCoreTileMapper::open`] on another disk than the file system.
-    pub fn open_on(disk: Arc<dyn Disk>, folder: &Path, config: MapConfig) -> Result<Self> {
+    pub fn open(folder: impl Into<MapPath>, config: MapConfig) -> Result<Self> {
+        let (disk, folder) = folder.into().into_parts();
+        let folder = &*folder;
         let config = config.validated()?;
         let store = TileStore::open(disk, folder)?;
         check_parameters(folder, store.metadata(), &config)?;

@@ -3,10 +3,8 @@ use super::part::{Part, Share, VoxelPart};
 use super::table_change::voxels_of_part;
 use crate::error::Result;
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk};
+use crate::store::MapPath;
 use serde::Serialize;
-use std::path::Path;
-use std::sync::Arc;
 
 /// What clearing a part of a map did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -29,21 +27,9 @@ pub struct Cleared {
 /// # Errors
 ///
 /// No map there, another writer, a box that is none, a damaged tile, a disk that refuses; the map is as before then.
-pub fn clear(map: impl AsRef<Path>, part: &Part, progress: impl FnMut(u64, u64)) -> Result<Cleared> {
-    clear_on(Arc::new(FsDisk), map.as_ref(), part, progress)
-}
-
-/// [`clear`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`clear`].
-pub fn clear_on(
-    disk: Arc<dyn Disk>,
-    map: &Path,
-    part: &Part,
-    mut progress: impl FnMut(u64, u64),
-) -> Result<Cleared> {
+pub fn clear(map: impl Into<MapPath>, part: &Part, mut progress: impl FnMut(u64, u64)) -> Result<Cleared> {
+    let (disk, map) = map.into().into_parts();
+    let map = &*map;
     edit(disk, map, |editor| {
         let grid = editor.config().grid;
         let part = part.voxels(&grid)?;

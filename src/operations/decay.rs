@@ -3,10 +3,8 @@ use super::table_change::changed;
 use crate::error::{Error, Result};
 use crate::maths::exp2;
 use crate::sensor::Evidence;
-use crate::store::{Disk, FsDisk};
+use crate::store::MapPath;
 use serde::Serialize;
-use std::path::Path;
-use std::sync::Arc;
 
 /// How evidence fades: the log-odds of every voxel times `2^(-n / halflife)`, where `n` is the number of scans that the
 /// map has taken since its evidence last faded, or since its beginning. Counts of observations stay.
@@ -99,21 +97,9 @@ impl Decay {
 ///
 /// No map there, another writer, a rule that makes no sense, a damaged tile, a disk that refuses; the map is as before
 /// then.
-pub fn decay(map: impl AsRef<Path>, decay: &Decay, progress: impl FnMut(u64, u64)) -> Result<Decayed> {
-    decay_on(Arc::new(FsDisk), map.as_ref(), decay, progress)
-}
-
-/// [`decay`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`decay`].
-pub fn decay_on(
-    disk: Arc<dyn Disk>,
-    map: &Path,
-    decay: &Decay,
-    mut progress: impl FnMut(u64, u64),
-) -> Result<Decayed> {
+pub fn decay(map: impl Into<MapPath>, decay: &Decay, mut progress: impl FnMut(u64, u64)) -> Result<Decayed> {
+    let (disk, map) = map.into().into_parts();
+    let map = &*map;
     decay.check()?;
     edit(disk, map, |editor| {
         let now = editor.scan_number();

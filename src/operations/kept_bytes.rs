@@ -1,10 +1,8 @@
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
-use crate::store::{Disk, EntryKind, FsDisk, TileStore, tile_of_folder};
+use crate::store::{EntryKind, MapPath, TileStore, tile_of_folder};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
-use std::sync::Arc;
 
 /// What is on disk of a map beside the map as it is: tables that were replaced and that somebody still sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -27,16 +25,9 @@ pub struct KeptBytes {
 /// # Errors
 ///
 /// No map there, damage to what tells which tiles there are, a disk that refuses.
-pub fn kept_bytes(folder: impl AsRef<Path>) -> Result<KeptBytes> {
-    kept_bytes_on(Arc::new(FsDisk), folder.as_ref())
-}
-
-/// [`kept_bytes`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`kept_bytes`].
-pub fn kept_bytes_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<KeptBytes> {
+pub fn kept_bytes(folder: impl Into<MapPath>) -> Result<KeptBytes> {
+    let (disk, folder) = folder.into().into_parts();
+    let folder = &*folder;
     let store = TileStore::open_read_only(disk.clone(), folder)?;
     let mut kept: BTreeMap<TileIndex, BTreeSet<u64>> = BTreeMap::new();
     for name in disk.list(folder).map_err(|error| Error::io(folder, "list", error))? {

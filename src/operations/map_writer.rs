@@ -3,7 +3,7 @@ use crate::error::{Error, Result};
 use crate::persistence::TileSaver;
 use crate::persistence::{config_from, new_map_id, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk, Metadata, StagedMap, id_from_hex};
+use crate::store::{Disk, MapPath, Metadata, StagedMap, id_from_hex};
 use crate::tile::Table;
 use serde::Serialize;
 use std::path::Path;
@@ -55,16 +55,9 @@ impl MapWriter {
     ///
     /// A wrong configuration, a folder with other content, another process that makes the same map, a disk that
     /// refuses.
-    pub fn create(folder: impl AsRef<Path>, config: &MapConfig) -> Result<Self> {
-        Self::create_on(Arc::new(FsDisk), folder.as_ref(), config)
-    }
-
-    /// [`MapWriter::create`] on another disk than the file system.
-    ///
-    /// # Errors
-    ///
-    /// As for [`MapWriter::create`].
-    pub fn create_on(disk: Arc<dyn Disk>, folder: &Path, config: &MapConfig) -> Result<Self> {
+    pub fn create(folder: impl Into<MapPath>, config: &MapConfig) -> Result<Self> {
+        let (disk, folder) = folder.into().into_parts();
+        let folder = &*folder;
         let config = config.clone().validated()?;
         Self::create_as(disk, folder, new_metadata(&config, new_map_id(), &[]))
     }

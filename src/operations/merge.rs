@@ -4,6 +4,7 @@ use super::table_merge::TableMerge;
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView, TileRef};
 use crate::space::TileIndex;
+use crate::store::MapPath;
 use crate::tile::Table;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -64,7 +65,7 @@ pub fn merge(
         );
         return Err(Error::argument("maps", reason));
     };
-    let mut writer = MapWriter::create_on(first.disk(), output.as_ref(), &config)?;
+    let mut writer = MapWriter::create(MapPath::on(first.disk(), output.as_ref()), &config)?;
     let tiles: BTreeSet<TileIndex> = maps.iter().flat_map(MapView::tile_indices).collect();
     let mut merge = TableMerge::new(rule);
     for (done, &tile) in (0..).zip(&tiles) {

@@ -28,17 +28,15 @@ mod snapshot;
 mod table_change;
 mod table_merge;
 
-pub use clear::{Cleared, clear, clear_on};
+pub use clear::{Cleared, clear};
 pub use convert::convert;
 pub use crop::crop;
-pub use decay::{Decay, Decayed, decay, decay_on};
+pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
-pub use kept_bytes::{KeptBytes, kept_bytes, kept_bytes_on};
+pub use kept_bytes::{KeptBytes, kept_bytes};
 pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::Part;
-pub use revert::{Reverted, revert, revert_on};
-pub use snapshot::{
-    SnapshotInfo, delete_snapshot, delete_snapshot_on, snapshot, snapshot_on, snapshots, snapshots_on,
-};
+pub use revert::{Reverted, revert};
+pub use snapshot::{SnapshotInfo, delete_snapshot, snapshot, snapshots};

@@ -5,10 +5,8 @@ use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::persistence::load::read_stored_table;
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk, Metadata, SnapshotName, TileFile, TileStore, TileVersion};
+use crate::store::{MapPath, Metadata, SnapshotName, TileFile, TileStore, TileVersion};
 use serde::Serialize;
-use std::path::Path;
-use std::sync::Arc;
 
 /// What a revert did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -41,26 +39,13 @@ pub struct Reverted {
 /// `keep_as`; no map there, another writer, a damaged table, a disk that refuses. The map is as it was then; a snapshot
 /// `keep_as` may have been made.
 pub fn revert(
-    folder: impl AsRef<Path>,
+    folder: impl Into<MapPath>,
     name: &SnapshotName,
     keep_as: Option<&SnapshotName>,
     progress: impl FnMut(u64, u64),
 ) -> Result<Reverted> {
-    revert_on(Arc::new(FsDisk), folder.as_ref(), name, keep_as, progress)
-}
-
-/// [`revert`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`revert`].
-pub fn revert_on(
-    disk: Arc<dyn Disk>,
-    folder: &Path,
-    name: &SnapshotName,
-    keep_as: Option<&SnapshotName>,
-    progress: impl FnMut(u64, u64),
-) -> Result<Reverted> {
+    let (disk, folder) = folder.into().into_parts();
+    let folder = &*folder;
     let mut store = TileStore::open(disk.clone(), folder)?;
     let past = TileStore::open_snapshot(disk.clone(), folder, name)?;
     check_is_of_map(&store, &past)?;

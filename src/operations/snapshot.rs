@@ -1,11 +1,9 @@
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, OutOfCoreTileMapper};
 use crate::space::TileIndex;
-use crate::store::{Disk, FsDisk, Layout, Snapshot, SnapshotName, TileStore};
+use crate::store::{Layout, MapPath, Snapshot, SnapshotName, TileStore};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
-use std::path::Path;
-use std::sync::Arc;
 
 /// A snapshot of a map: the map as of a flush, under a name.
 ///
@@ -41,23 +39,16 @@ pub struct SnapshotInfo {
 ///
 /// [`Error::AlreadyExists`] if there is a snapshot of this name; no map there, another writer, a disk that refuses:
 /// there is no such snapshot then.
-pub fn snapshot(folder: impl AsRef<Path>, name: &SnapshotName) -> Result<()> {
-    snapshot_on(Arc::new(FsDisk), folder.as_ref(), name)
-}
-
-/// [`snapshot`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`snapshot`].
-pub fn snapshot_on(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotName) -> Result<()> {
+pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
+    let (disk, folder) = folder.into().into_parts();
+    let folder = &*folder;
     let mut store = TileStore::open(disk.clone(), folder)?;
     if store.metadata().ext.is_some() {
         return store.create_snapshot(name);
     }
     drop(store);
-    let config = MapReader::config_of_on(disk.clone(), folder)?;
-    OutOfCoreTileMapper::open_on(disk, folder, config)?.snapshot(name)
+    let config = MapReader::config_of(MapPath::on(disk.clone(), folder))?;
+    OutOfCoreTileMapper::open(MapPath::on(disk, folder), config)?.snapshot(name)
 }
 
 /// Deletes a snapshot, and the tables that no other one and no reader sees.
@@ -65,16 +56,9 @@ pub fn snapshot_on(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotName) -> R
 /// # Errors
 ///
 /// [`Error::InvalidArgument`] if there is none of this name; no map there, another writer, a disk that refuses.
-pub fn delete_snapshot(folder: impl AsRef<Path>, name: &SnapshotName) -> Result<()> {
-    delete_snapshot_on(Arc::new(FsDisk), folder.as_ref(), name)
-}
-
-/// [`delete_snapshot`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`delete_snapshot`].
-pub fn delete_snapshot_on(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotName) -> Result<()> {
+pub fn delete_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
+    let (disk, folder) = folder.into().into_parts();
+    let folder = &*folder;
     TileStore::open(disk, folder)?.delete_snapshot(name)
 }
 
@@ -84,16 +68,9 @@ pub fn delete_snapshot_on(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotNam
 /// # Errors
 ///
 /// No map there, or a disk that refuses. Damage is part of the answer.
-pub fn snapshots(folder: impl AsRef<Path>) -> Result<Vec<SnapshotInfo>> {
-    snapshots_on(Arc::new(FsDisk), folder.as_ref())
-}
-
-/// [`snapshots`] on another disk than the file system.
-///
-/// # Errors
-///
-/// As for [`snapshots`].
-pub fn snapshots_on(disk: Arc<dyn Disk>, folder: &Path) -> Result<Vec<SnapshotInfo>> {
+pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
+    let (disk, folder) = folder.into().into_parts();
+    let folder = &*folder;
     let store = TileStore::open_read_only(disk, folder)?;
     let (mut infos, mut owners) = (Vec::new(), Owners::default());
     for name in store.snapshot_names()? {

@@ -25,7 +25,8 @@ pub use brick::{
     places,
 };
 pub use grid::{Grid, GridError, LAST_VOXEL_INDEX, MAX_VOXELS_PER_TILE_EDGE};
-pub(crate) use hash_table::hash_table_bytes;
+#[doc(hidden)]
+pub use hash_table::hash_table_bytes;
 pub use key::VoxelKey;
 pub use morton::MortonCode;
 pub use tile_box::TileBox;

@@ -9,8 +9,8 @@ use voxtile::scan::{ScanReport, TakePoints};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::{Point, VoxelIndex};
 use voxtile::{
-    Error, InMemoryMapper, InsertMode, MapConfig, Mapper, OutOfCoreTileMapper, Pose, Queries, Scan,
-    ScanPoints, ScanRef,
+    Error, InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, Mapper, OutOfCoreTileMapper, Pose,
+    Scan, ScanPoints, ScanRef,
 };
 
 /// What a driver hands out: `f32` in the sensor's frame, intensities, and a pose from elsewhere.
@@ -125,7 +125,7 @@ fn mappers(config: &MapConfig, folder: &TempDir) -> Vec<Box<dyn AnyMapper>> {
     ];
     for config in little {
         let path = folder.path().join(mappers.len().to_string());
-        let mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config).unwrap();
+        let mapper = OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config).unwrap();
         mappers.push(Box::new(mapper));
     }
     mappers

@@ -2,12 +2,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::integrity::verify_on;
+use voxtile::integrity::verify;
 use voxtile::operations::{Part, convert, crop};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Aabb;
 use voxtile::{
-    Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Scan, Storage,
+    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Scan,
+    Storage,
 };
 
 const INPUT: &str = "random scans";
@@ -26,7 +27,7 @@ fn scan(number: u64) -> Scan {
 
 /// A map of two scans, flushed after each, so that tiles are of different scans.
 fn map(disk: &FaultyDisk, config: MapConfig) -> blake3::Hash {
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &place("map"), config).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &place("map")), config).unwrap();
     mapper.begin_input(INPUT).unwrap();
     for number in 0..2 {
         mapper.insert_scan(&scan(number)).unwrap();
@@ -36,7 +37,7 @@ fn map(disk: &FaultyDisk, config: MapConfig) -> blake3::Hash {
 }
 
 fn reader(disk: &FaultyDisk, name: &str) -> Result<MapReader> {
-    MapReader::open_on(disk.shared(), &place(name), 1)
+    MapReader::open(MapPath::on(disk.shared(), &place(name)), 1)
 }
 
 fn converted(disk: &FaultyDisk, from: &str, to: &str, storage: Storage) -> Result<()> {
@@ -76,8 +77,11 @@ fn there_and_back_the_content_stays_and_the_files_are_the_same() {
             let ids = [&first, &reader].map(|map| map.metadata().ext.clone().unwrap().map_id);
             assert_eq!(ids[0], ids[1]);
             let mut found = Vec::new();
-            let verified =
-                verify_on(disk.shared(), &place(name), |finding| found.push(finding.clone()), |_, _| ());
+            let verified = verify(
+                MapPath::on(disk.shared(), &place(name)),
+                |finding| found.push(finding.clone()),
+                |_, _| (),
+            );
             assert!(verified.unwrap().is_whole() && found.is_empty(), "{found:?}");
         }
         let [seed, compact] = match own {
@@ -98,7 +102,8 @@ fn a_build_goes_on_with_the_other_form_as_with_the_first() {
     map(&disk, config());
     converted(&disk, "map", "small", Storage::Compact).unwrap();
     let digests = ["map", "small"].map(|name| {
-        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &place(name), config()).unwrap();
+        let mut mapper =
+            OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &place(name)), config()).unwrap();
         assert_eq!(mapper.resume_input(INPUT).unwrap(), 2);
         for number in [1, 2] {
             mapper.insert_scan(&scan(number)).unwrap();
@@ -113,7 +118,8 @@ fn a_build_goes_on_with_the_other_form_as_with_the_first() {
 #[test]
 fn a_map_made_of_one_whose_metadata_is_behind_has_its_scans_all_the_same() {
     let disk = FaultyDisk::new(Fault::None);
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &place("map"), config()).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &place("map")), config()).unwrap();
     mapper.begin_input(INPUT).unwrap();
     let metadata = place("map/metadata.json");
     let behind = disk.files()[&metadata].clone();
@@ -127,7 +133,8 @@ fn a_map_made_of_one_whose_metadata_is_behind_has_its_scans_all_the_same() {
     for made in ["map", "small", "part"] {
         assert_eq!(reader(&disk, made).unwrap().scan_number(), 1, "{made}");
     }
-    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &place("small"), config()).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &place("small")), config()).unwrap();
     assert_eq!(mapper.resume_input(INPUT).unwrap(), 1);
 }
 

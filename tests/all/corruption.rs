@@ -3,10 +3,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::integrity::{Finding, Repair, Severity, Verification, repair_on, verify_on};
+use voxtile::integrity::{Finding, Repair, Severity, Verification, verify};
 use voxtile::space::TileIndex;
 use voxtile::store::{TileFile, tile_of_folder};
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
+use voxtile::{Error, MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 type Digests = BTreeMap<TileIndex, Vec<(u64, i32)>>;
 
@@ -33,7 +33,7 @@ fn table_name(storage: Storage) -> &'static str {
 fn small_map(storage: Storage) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let config = config().with_storage(storage);
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map(), config).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config).unwrap();
     mapper.begin_input("random scans").unwrap();
     for seed in [1, 4] {
         mapper.insert_scan(&scan(seed)).unwrap();
@@ -44,7 +44,7 @@ fn small_map(storage: Storage) -> FaultyDisk {
 
 /// What can be read of each tile.
 fn contents(disk: &FaultyDisk) -> voxtile::Result<Digests> {
-    let reader = MapReader::open_on(disk.shared(), map(), 4)?;
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 4)?;
     let mut contents = Digests::new();
     for index in reader.tile_indices() {
         if let Some(tile) = reader.tile(index)? {
@@ -59,12 +59,13 @@ fn contents(disk: &FaultyDisk) -> voxtile::Result<Digests> {
 fn findings(disk: &FaultyDisk) -> (Verification, Vec<Finding>) {
     let mut findings = Vec::new();
     let verification =
-        verify_on(disk.shared(), map(), |finding| findings.push(finding.clone()), |_, _| ()).unwrap();
+        verify(MapPath::on(disk.shared(), map()), |finding| findings.push(finding.clone()), |_, _| ())
+            .unwrap();
     (verification, findings)
 }
 
 fn repair(disk: &FaultyDisk) -> voxtile::Result<Repair> {
-    repair_on(disk.shared(), map(), |_| (), |_, _| ())
+    voxtile::integrity::repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ())
 }
 
 fn tile_of(path: &Path) -> Option<TileIndex> {
@@ -121,7 +122,7 @@ fn check_every_damage(storage: Storage) {
         let tile = tile_of(&path).filter(|_| !is_derived);
         check_reading(&disk, &before, tile, is_derived, &what);
         // A writer at work does not overwrite what it cannot read.
-        if let Ok(mut mapper) = OutOfCoreTileMapper::open_on(disk.shared(), map(), config()) {
+        if let Ok(mut mapper) = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()) {
             let refused = [1, 4].map(|seed| mapper.insert_scan(&scan(seed)).is_err());
             assert_eq!(refused.contains(&true), tile.is_some(), "{what}");
         }
@@ -145,7 +146,7 @@ fn check_every_damage(storage: Storage) {
 
 /// Reading says what is damaged, and the rest goes on.
 fn check_reading(disk: &FaultyDisk, before: &Digests, tile: Option<TileIndex>, is_derived: bool, what: &str) {
-    let reader = MapReader::open_on(disk.shared(), map(), 4);
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 4);
     let Ok(reader) = reader else {
         assert!(tile.is_none() && !is_derived, "{what}");
         assert!(matches!(reader, Err(Error::Damaged { .. })), "{what}: {reader:?}");
@@ -179,7 +180,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
     let older = {
         let disk = FaultyDisk::new(Fault::None);
         let config = config().with_storage(storage);
-        let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map(), config).unwrap();
+        let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config).unwrap();
         mapper.insert_scan(&scan(1)).unwrap();
         mapper.flush().unwrap();
         disk
@@ -296,7 +297,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
         assert_eq!(contents(&disk).unwrap(), expected, "{what}");
         let (verification, found) = findings(&disk);
         assert!(verification.is_whole(), "{what}: {found:?}");
-        let config = MapReader::config_of_on(disk.shared(), map()).unwrap();
+        let config = MapReader::config_of(MapPath::on(disk.shared(), map())).unwrap();
         assert_eq!((config.grid, config.sensor_model), (self::config().grid, self::config().sensor_model));
         assert_eq!(config.storage, storage, "{what}");
     }
@@ -380,7 +381,7 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
         hostile[payload.end..payload.end + 4].copy_from_slice(&crc.to_le_bytes());
         let disk = whole.copy();
         disk.put(log, &hostile);
-        let error = message_of(MapReader::open_on(disk.shared(), map(), 1));
+        let error = message_of(MapReader::open(MapPath::on(disk.shared(), map()), 1));
         assert!(
             error.contains("exceeds 2^62") || error.contains("tile sizes or counts out of range"),
             "{error:#}"
@@ -425,8 +426,8 @@ fn verify_beside_writers_finds_no_damage() {
 
 fn verify_beside_writers(storage: Storage) {
     let disk = small_map(storage);
-    let config = || MapReader::config_of_on(disk.shared(), map()).unwrap();
-    let open = || OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap();
+    let config = || MapReader::config_of(MapPath::on(disk.shared(), map())).unwrap();
+    let open = || OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
     let (mut writer, mut seed) = (Some(open()), 10);
     let found = &mut Vec::new();
     let work = |_, _| {
@@ -440,7 +441,8 @@ fn verify_beside_writers(storage: Storage) {
         drop(mapper);
         writer = Some(open());
     };
-    let verification = verify_on(disk.shared(), map(), |finding| found.push(finding.clone()), work).unwrap();
+    let verification =
+        verify(MapPath::on(disk.shared(), map()), |finding| found.push(finding.clone()), work).unwrap();
     assert!(verification.is_whole(), "{found:?}");
 }
 
@@ -460,7 +462,7 @@ fn repair_without_a_log(storage: Storage) {
     let mut crashes = 0;
     for at in 0.. {
         let disk = small_map(storage);
-        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap();
+        let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
         // Tiles that are there, and new ones.
         for seed in [1, 5, 6] {
             mapper.insert_scan(&scan(seed)).unwrap();
@@ -492,7 +494,7 @@ fn what_is_not_voxtiles_stays_and_keeps_nobody_from_opening_the_map() {
     disk.shared().create_folder(Path::new("/map/old.next")).unwrap();
     disk.shared().create_folder(&tile.with_file_name("octree.bt.next")).unwrap();
     assert!(!findings(&disk).1.is_empty());
-    drop(OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap());
+    drop(OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap());
     repair(&disk).unwrap();
     assert_eq!(disk.files()[notes], b"somebody's notes");
     assert_eq!(contents(&disk).unwrap(), contents(&whole).unwrap());
@@ -504,7 +506,7 @@ fn what_is_not_voxtiles_stays_and_keeps_nobody_from_opening_the_map() {
     assert_eq!((verification.damage, verification.notes), (0, 1), "{found:?}");
     // Gone while it is written to.
     let disk = whole.copy();
-    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
     mapper.insert_scan(&scan(1)).unwrap();
     disk.take(log);
     assert!(mapper.flush().is_err());

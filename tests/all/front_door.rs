@@ -12,8 +12,8 @@ use voxtile::share::VoxelSet;
 use voxtile::space::{Aabb, Grid, Point, VoxelIndex};
 use voxtile::store::SnapshotName;
 use voxtile::{
-    InMemoryMapper, MapConfig, MapQueries, MapReader, Mapper, Occupancy, OutOfCoreTileMapper, Queries,
-    RayQuery, Shape, United, UnknownAs,
+    InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, Mapper, Occupancy, OutOfCoreTileMapper,
+    Queries, RayQuery, Shape, United, UnknownAs,
 };
 
 type Voxels = BTreeMap<VoxelIndex, Occupancy>;
@@ -205,7 +205,8 @@ fn whatever_holds_a_map_gives_its_answers() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map");
     let mut in_memory = InMemoryMapper::new(config()).unwrap();
-    let mut out_of_core = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config()).unwrap();
+    let mut out_of_core =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config()).unwrap();
     for seed in 0..4 {
         let scan = random_scan(&mut Random(seed), [0.2, 0.1, -0.3], 40);
         in_memory.insert_scan(&scan).unwrap();

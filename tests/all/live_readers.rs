@@ -11,7 +11,8 @@ use voxtile::mapper::{LiveReader, LiveView};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::tile::Voxel;
 use voxtile::{
-    Error, InsertMode, MapConfig, MapQueries, MapView, Mapper, OutOfCoreTileMapper, Result, Scan, Storage,
+    Error, InsertMode, MapConfig, MapPath, MapQueries, MapView, Mapper, OutOfCoreTileMapper, Result, Scan,
+    Storage,
 };
 
 const SCANS: usize = 80;
@@ -95,7 +96,8 @@ fn beside_each_other(seed: u64, config: &MapConfig) -> (u64, u64) {
     let path = folder.path().join("map");
     let scans = scans(seed);
     let naive = naive_maps(config, &scans);
-    let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()).unwrap();
     let is_over = AtomicBool::new(false);
     let reader = mapper.reader().unwrap();
     let counts = thread::scope(|scope| {
@@ -155,7 +157,7 @@ fn a_view_that_holds_too_much_expires_and_the_next_does_not() {
     let config = MapConfig::new(0.2, 1.6).unwrap().with_tight_memory_bytes(40_000);
     let disk = UnsyncedDisk::shared();
     let mut mapper =
-        OutOfCoreTileMapper::create_on(disk, &folder.path().join("map"), config.clone()).unwrap();
+        OutOfCoreTileMapper::create(MapPath::on(disk, &folder.path().join("map")), config.clone()).unwrap();
     let scans = scans(1);
     mapper.insert_scan(&scans[0]).unwrap();
     let reader = mapper.reader().unwrap();
@@ -205,7 +207,8 @@ fn a_reader_waits_for_no_flush() {
     let folder = TempDir::new().unwrap();
     let config = MapConfig::new(0.2, 1.6).unwrap();
     let disk = UnsyncedDisk::taking(Duration::from_millis(150));
-    let mut mapper = OutOfCoreTileMapper::create_on(disk, &folder.path().join("map"), config).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(disk, &folder.path().join("map")), config).unwrap();
     scans(2)[..5].iter().for_each(|scan| insert(&mut mapper, scan));
     let reader = mapper.reader().unwrap();
     // One that waited would answer once or twice.
@@ -223,7 +226,7 @@ fn a_reader_waits_for_no_disk_read_of_the_mapper() {
     mapper.flush().unwrap();
     drop(mapper);
     let disk = UnsyncedDisk::slow_to_read_for("mapper", Duration::from_millis(100));
-    let mut mapper = OutOfCoreTileMapper::open_on(disk, &path, config).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk, &path), config).unwrap();
     let reader = mapper.reader().unwrap();
     let tiles = mapper.tile_indices();
     let answers = answers_during(&reader, || {

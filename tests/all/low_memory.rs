@@ -4,7 +4,9 @@ use std::time::Duration;
 use tempfile::TempDir;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::Survey;
-use voxtile::{InMemoryMapper, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan};
+use voxtile::{
+    InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan,
+};
 
 fn config() -> MapConfig {
     MapConfig::new(0.2, 6.4).unwrap().with_range(0.0, 20.0)
@@ -23,8 +25,8 @@ fn tiles_ahead_are_fetched_before_they_are_needed() {
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
     for _ in 0..2 {
         let mut mapper = match path.exists() {
-            false => OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()),
-            true => OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config.clone()),
+            false => OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()),
+            true => OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()),
         }
         .unwrap();
         for scan in &scans {
@@ -37,7 +39,7 @@ fn tiles_ahead_are_fetched_before_they_are_needed() {
         assert_eq!(io.prefetches > 0, io.loads > 0, "{io:?}");
         assert_eq!(io.prefetches > 10, mapper.scan_number() > scans.len() as u64, "{io:?}");
     }
-    let mapper = OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config).unwrap();
+    let mapper = OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &path), config).unwrap();
     assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
 }
 
@@ -50,7 +52,8 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     const BYTES: usize = 900_000;
     let tight = config().with_tight_memory_bytes(BYTES);
     let disk = UnsyncedDisk::taking(Duration::ZERO);
-    let mut mapper = OutOfCoreTileMapper::create_on(disk, &folder.path().join("map"), tight).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(disk, &folder.path().join("map")), tight).unwrap();
     let mut most = 0;
     for scan in &scans {
         mapper.insert_scan(scan).unwrap();
@@ -88,14 +91,14 @@ fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
         let path = folder.path().join("map");
         let tight = config().with_tight_memory_bytes(bytes);
         let disk = UnsyncedDisk::slow_beside(Duration::from_millis(3));
-        let mut mapper = OutOfCoreTileMapper::create_on(disk.clone(), &path, tight).unwrap();
+        let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.clone(), &path), tight).unwrap();
         let mut expected = InMemoryMapper::new(config()).unwrap();
         for (number, scan) in scans.iter().chain(&scans).enumerate() {
             mapper.insert_scan(scan).unwrap();
             expected.insert_scan(scan).unwrap();
             if number % 6 == 5 {
                 mapper.flush().unwrap();
-                let reader = MapReader::open_on(disk.clone(), &path, 2).unwrap();
+                let reader = MapReader::open(MapPath::on(disk.clone(), &path), 2).unwrap();
                 assert_eq!(reader.digest().unwrap(), expected.digest().unwrap(), "after scan {number}");
             }
         }
@@ -118,7 +121,8 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
     for (bytes, most_loads_of_tile) in [(100_000, 2.0), (2_000_000, 0.25)] {
         let path = folder.path().join(format!("map_{bytes}"));
         let tight = config.clone().with_tight_memory_bytes(bytes);
-        let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, tight).unwrap();
+        let mut mapper =
+            OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), tight).unwrap();
         let mut most_in_files = 0;
         for scan in &scans {
             mapper.insert_scan(scan).unwrap();

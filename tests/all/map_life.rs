@@ -4,11 +4,13 @@ use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
-use voxtile::integrity::{Finding, Severity, Verification, verify_on};
-use voxtile::operations::{delete_snapshot_on, revert_on, snapshot_on, snapshots_on};
+use voxtile::integrity::{Finding, Severity, Verification, verify};
+use voxtile::operations::{delete_snapshot, revert, snapshot};
 use voxtile::space::TileIndex;
 use voxtile::store::{SnapshotName, TileStore, tile_of_folder};
-use voxtile::{Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Scan};
+use voxtile::{
+    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Scan,
+};
 
 fn map() -> &'static Path {
     Path::new("/city/map")
@@ -61,7 +63,7 @@ impl Life {
 
     /// The number of the state that a map is in, among these.
     fn state_of(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
-        let reader = match MapReader::open_on(disk.shared(), map(), 1) {
+        let reader = match MapReader::open(MapPath::on(disk.shared(), map()), 1) {
             Err(Error::NoMap { .. }) if among.contains(&0) => return 0,
             opened => opened.unwrap_or_else(|error| panic!("{what}: {error:#}")),
         };
@@ -108,7 +110,7 @@ impl Life {
 
     fn check_end(&self, disk: &FaultyDisk, what: &str) {
         // What a crash in the last act left goes when the map is opened.
-        drop(OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap());
+        drop(OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap());
         self.state_of(disk, &[self.acts.len()], what);
         check_files(disk, what);
     }
@@ -120,8 +122,8 @@ fn name(name: &str) -> SnapshotName {
 
 fn state_seen(disk: &FaultyDisk, reader: &MapReader) -> State {
     let (voxels, scan_number) = (voxels_of(reader), reader.scan_number());
-    let open = |name| MapReader::open_snapshot_on(disk.shared(), map(), &name, 1).unwrap();
-    let infos = snapshots_on(disk.shared(), map()).unwrap().into_iter();
+    let open = |name| MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &name, 1).unwrap();
+    let infos = voxtile::operations::snapshots(MapPath::on(disk.shared(), map())).unwrap().into_iter();
     let readers = infos.map(|info| open(name(&info.name)));
     let snapshots = readers.map(|reader| {
         let name = reader.snapshot().unwrap().to_string();
@@ -133,13 +135,13 @@ fn state_seen(disk: &FaultyDisk, reader: &MapReader) -> State {
 fn check_whole(disk: &FaultyDisk, what: &str) -> Verification {
     let is_damage = |finding: &Finding| finding.severity == Severity::Damage;
     let found = |finding: &Finding| assert!(!is_damage(finding), "{what}: {finding}");
-    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap()
+    verify(MapPath::on(disk.shared(), map()), found, |_, _| ()).unwrap()
 }
 
 /// Nothing is damaged, and nothing lies around.
 fn check_files(disk: &FaultyDisk, what: &str) {
     assert_eq!(check_whole(disk, what).notes, 0, "{what}");
-    let reader = MapReader::open_on(disk.shared(), map(), 1).unwrap();
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap();
     let tiles = reader.tile_indices();
     for path in disk.files().into_keys() {
         let folder = path.parent().and_then(|folder| folder.file_name()?.to_str()).unwrap();
@@ -187,8 +189,10 @@ fn naive(before: State, act: &Act) -> State {
 fn act(disk: &FaultyDisk, act: &Act) -> Result<()> {
     match act {
         Act::Scans(numbers) => {
-            let mut mapper = match OutOfCoreTileMapper::open_on(disk.shared(), map(), config()) {
-                Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create_on(disk.shared(), map(), config()),
+            let mut mapper = match OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()) {
+                Err(Error::NoMap { .. }) => {
+                    OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config())
+                }
                 opened => opened,
             }?;
             for number in numbers.clone() {
@@ -203,9 +207,9 @@ fn act(disk: &FaultyDisk, act: &Act) -> Result<()> {
             }
             store.commit(store.metadata().clone(), store.commits().scan_number)
         }
-        Act::Snapshot(of) => snapshot_on(disk.shared(), map(), &name(of)),
-        Act::Delete(of) => delete_snapshot_on(disk.shared(), map(), &name(of)),
-        Act::Revert(to) => revert_on(disk.shared(), map(), &name(to), None, |_, _| ()).map(drop),
+        Act::Snapshot(of) => snapshot(MapPath::on(disk.shared(), map()), &name(of)),
+        Act::Delete(of) => delete_snapshot(MapPath::on(disk.shared(), map()), &name(of)),
+        Act::Revert(to) => revert(MapPath::on(disk.shared(), map()), &name(to), None, |_, _| ()).map(drop),
     }
 }
 
@@ -340,7 +344,7 @@ fn a_reader_goes_on_seeing_removed_tiles() {
     let life = removals();
     let disk = FaultyDisk::new(Fault::None);
     for (number, action) in life.acts.iter().enumerate() {
-        let reader = MapReader::open_on(disk.shared(), map(), 1);
+        let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1);
         let digest = reader.as_ref().ok().map(|reader| reader.digest().unwrap());
         act(&disk, action).unwrap();
         if let Ok(reader) = reader {

@@ -9,7 +9,7 @@ use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
 use voxtile::space::{TileIndex, VoxelKey};
-use voxtile::{InsertMode, MapConfig, Storage, VoxelCacheConfig, VoxelCacheMode};
+use voxtile::{InsertMode, MapConfig, MapPath, Storage, VoxelCacheConfig, VoxelCacheMode};
 
 /// Small tiles, so that a scan of a few metres touches many.
 fn config() -> MapConfig {
@@ -77,9 +77,8 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             let config = config.clone().with_cache_tiles(cache_tiles).with_pending_bytes(pending_bytes);
             let config = config.with_storage(storage);
             let mut reference = ReferenceMap::new(&config);
-            let mut mapper = OutOfCoreTileMapper::create_on(
-                UnsyncedDisk::shared(),
-                &folder.path().join("map"),
+            let mut mapper = OutOfCoreTileMapper::create(
+                MapPath::on(UnsyncedDisk::shared(), &folder.path().join("map")),
                 config.clone(),
             )
             .unwrap();
@@ -95,10 +94,8 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             assert_eq!(voxels_of(&mapper), reference.voxels, "after flush");
             drop(mapper);
 
-            let mut mapper = OutOfCoreTileMapper::open_on(
-                UnsyncedDisk::shared(),
-                &folder.path().join("map"),
-                // A map keeps its storage, whatever is asked for.
+            let mut mapper = OutOfCoreTileMapper::open(
+                MapPath::on(UnsyncedDisk::shared(), &folder.path().join("map")), // A map keeps its storage, whatever is asked for.
                 config.clone().with_storage(OctoMap),
             )
             .unwrap();
@@ -302,7 +299,8 @@ fn tiles_in_use_stay_and_others_leave() {
     let folder = TempDir::new().unwrap();
     let config = config().with_cache_tiles(2);
     let mut mapper =
-        OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &folder.path().join("map"), config).unwrap();
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &folder.path().join("map")), config)
+            .unwrap();
     let points: Vec<_> = (0..5).map(|k| [1.6 * f64::from(k) + 0.6, 0.6, 0.6]).collect();
     mapper.batch_update(&PointBatch { points: &points, intensities: None, is_occupied: &[true; 5] }).unwrap();
     mapper.flush().unwrap();

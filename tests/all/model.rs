@@ -4,7 +4,7 @@ use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
-    InsertMode, MapConfig, MapQueries, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Storage,
+    InsertMode, MapConfig, MapPath, MapQueries, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Storage,
 };
 
 /// One random life of a map beside the naive one, which is set back to the last flush where the map crashes.
@@ -12,7 +12,8 @@ fn live(seed: u64, config: &MapConfig) {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map");
     let mut random = Random(seed);
-    let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()).unwrap();
     let mut reference = ReferenceMap::new(config);
     let most_tiles = match config.memory {
         MemoryLimit::Tiles { tiles, .. } => tiles,
@@ -42,7 +43,9 @@ fn live(seed: u64, config: &MapConfig) {
             8 => {
                 // Whatever was evicted since the last flush is on disk, and must not count.
                 drop(mapper);
-                mapper = OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+                mapper =
+                    OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &path), config.clone())
+                        .unwrap();
                 (reference.voxels, scans) = flushed.clone();
             }
             _ => assert_eq!(voxels_of(&mapper), reference.voxels, "seed {seed}"),

@@ -8,8 +8,8 @@ use voxtile::query::{RayQuery, Shape, UnknownAs};
 use voxtile::scan::{PointBatch, RayWalk};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
 use voxtile::{
-    InMemoryMapper, MapConfig, MapQueries, MapReader, MapView, Mapper, Occupancy, OutOfCoreTileMapper,
-    Queries,
+    InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, Occupancy,
+    OutOfCoreTileMapper, Queries,
 };
 
 fn config() -> MapConfig {
@@ -20,7 +20,8 @@ fn config() -> MapConfig {
 fn maps(folder: &TempDir) -> (InMemoryMapper, OutOfCoreTileMapper) {
     let mut in_memory = InMemoryMapper::new(config()).unwrap();
     let path = folder.path().join("map");
-    let mut out_of_core = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config()).unwrap();
+    let mut out_of_core =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config()).unwrap();
     for seed in 0..4 {
         let scan = random_scan(&mut Random(seed), [0.2, 0.1, -0.3], 40);
         in_memory.insert_scan(&scan).unwrap();

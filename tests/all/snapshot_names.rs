@@ -2,10 +2,10 @@ use crate::support::message_of;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::integrity::{Severity, repair_on, verify_on};
-use voxtile::operations::{delete_snapshot_on, revert_on, snapshots_on};
+use voxtile::integrity::{Severity, repair, verify};
+use voxtile::operations::{delete_snapshot, revert, snapshots};
 use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
-use voxtile::{MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result};
+use voxtile::{MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result};
 
 fn map() -> &'static Path {
     Path::new("/map")
@@ -21,7 +21,7 @@ fn config() -> MapConfig {
 
 /// Inserts scans into the same tiles each time, and flushes.
 fn go_on(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
-    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config())?;
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config())?;
     for seed in seeds {
         mapper.insert_scan(&random_scan(&mut Random(seed), [0.0; 3], 5))?;
         mapper.flush()?;
@@ -32,10 +32,13 @@ fn go_on(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
 /// A map with two snapshots of different flushes, which has changed since; and their digests.
 fn with_two() -> (FaultyDisk, [String; 2]) {
     let disk = FaultyDisk::new(Fault::None);
-    drop(OutOfCoreTileMapper::create_on(disk.shared(), map(), config()).unwrap());
+    drop(OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config()).unwrap());
     let digests = ["s1", "s2"].map(|of| {
         go_on(&disk, if of == "s1" { 0..2 } else { 2..4 }).unwrap();
-        OutOfCoreTileMapper::open_on(disk.shared(), map(), config()).unwrap().snapshot(&name(of)).unwrap();
+        OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config())
+            .unwrap()
+            .snapshot(&name(of))
+            .unwrap();
         digest_of(&disk, Some(of)).unwrap()
     });
     go_on(&disk, 4..6).unwrap();
@@ -44,8 +47,8 @@ fn with_two() -> (FaultyDisk, [String; 2]) {
 
 fn digest_of(disk: &FaultyDisk, snapshot: Option<&str>) -> Result<String> {
     let reader = match snapshot {
-        Some(of) => MapReader::open_snapshot_on(disk.shared(), map(), &name(of), 2)?,
-        None => MapReader::open_on(disk.shared(), map(), 2)?,
+        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &name(of), 2)?,
+        None => MapReader::open(MapPath::on(disk.shared(), map()), 2)?,
     };
     Ok(reader.digest()?.to_string())
 }
@@ -57,7 +60,7 @@ fn damaged(disk: &FaultyDisk) -> Vec<PathBuf> {
             damaged.push(finding.path.clone());
         }
     };
-    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap();
+    verify(MapPath::on(disk.shared(), map()), found, |_, _| ()).unwrap();
     damaged
 }
 
@@ -81,7 +84,7 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
     let now = digest_of(&disk, None).unwrap();
     swap(&disk);
     assert_eq!(damaged(&disk), [path("s1"), path("s2")]);
-    let error = message_of(revert_on(disk.shared(), map(), &name("s1"), None, |_, _| ()));
+    let error = message_of(revert(MapPath::on(disk.shared(), map()), &name("s1"), None, |_, _| ()));
     assert!(error.contains("that of the snapshot s2"), "{error}");
     assert!(digest_of(&disk, Some("s2")).is_err());
     assert_eq!(digest_of(&disk, None).unwrap(), now);
@@ -90,7 +93,7 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
     let repaired = disk.copy();
     swap(&disk);
     for disk in [&disk, &repaired] {
-        let repair = repair_on(disk.shared(), map(), |_| (), |_, _| ()).unwrap();
+        let repair = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
         assert!(repair.is_complete());
         assert_eq!(damaged(disk), Vec::<PathBuf>::new());
         for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
@@ -106,14 +109,14 @@ fn a_repair_of_swapped_snapshots_can_be_cut_short_anywhere() {
     for at in 0.. {
         let cut = disk.copy();
         cut.set_fault(Fault::Crashes(at));
-        let _ = repair_on(cut.shared(), map(), |_| (), |_, _| ());
+        let _ = repair(MapPath::on(cut.shared(), map()), |_| (), |_, _| ());
         if !cut.has_crashed() {
             assert!(at > 5);
             break;
         }
         for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
             let left = cut.after_crash(unsynced);
-            repair_on(left.shared(), map(), |_| (), |_, _| ()).unwrap();
+            repair(MapPath::on(left.shared(), map()), |_| (), |_, _| ()).unwrap();
             for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
                 assert_eq!(digest_of(&left, Some(of)).unwrap(), *digest, "crash at {at}, {unsynced:?}: {of}");
             }
@@ -127,7 +130,7 @@ fn a_snapshot_that_is_missing_is_a_finding_and_its_tables_stay_until_a_person_de
     let file = disk.files()[&path("s1")].clone();
     disk.take(&path("s1"));
     assert_eq!(damaged(&disk), [path("s1")]);
-    assert!(snapshots_on(disk.shared(), map()).unwrap().iter().any(|info| info.damage.is_some()));
+    assert!(snapshots(MapPath::on(disk.shared(), map())).unwrap().iter().any(|info| info.damage.is_some()));
     go_on(&disk, 6..9).unwrap();
     assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
     // Put back.
@@ -137,12 +140,12 @@ fn a_snapshot_that_is_missing_is_a_finding_and_its_tables_stay_until_a_person_de
     assert_eq!(digest_of(&again, Some("s1")).unwrap(), digests[0]);
     // Given up by name.
     let given_up = disk.copy();
-    delete_snapshot_on(given_up.shared(), map(), &name("s1")).unwrap();
+    delete_snapshot(MapPath::on(given_up.shared(), map()), &name("s1")).unwrap();
     assert_eq!(damaged(&given_up), Vec::<PathBuf>::new());
     assert!(kept(&given_up) < kept(&disk));
     assert_eq!(digest_of(&given_up, Some("s2")).unwrap(), digests[1]);
     // Or by a repair, which deletes nothing.
-    let repair = repair_on(disk.shared(), map(), |_| (), |_, _| ()).unwrap();
+    let repair = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
     assert_eq!((repair.snapshots_lost, repair.tiles_lost, repair.is_complete()), (1, 0, false));
     assert_eq!(damaged(&disk), Vec::<PathBuf>::new());
     assert_eq!(kept(&disk), kept(&again), "in quarantine");
@@ -185,8 +188,8 @@ fn snapshots_of_maps_that_do_not_list_them_are_read_and_listed_at_the_next_commi
     swap(&disk);
     assert_eq!(damaged(&disk), [path("s1"), path("s2")], "by the flushes that the log names");
     swap(&disk);
-    delete_snapshot_on(disk.shared(), map(), &name("s1")).unwrap();
+    delete_snapshot(MapPath::on(disk.shared(), map()), &name("s1")).unwrap();
     assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
-    delete_snapshot_on(disk.shared(), map(), &name("s2")).unwrap();
+    delete_snapshot(MapPath::on(disk.shared(), map()), &name("s2")).unwrap();
     assert_eq!((kept(&disk), damaged(&disk).len()), (0, 0));
 }

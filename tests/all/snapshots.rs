@@ -7,12 +7,12 @@ use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
-use voxtile::integrity::{Severity, repair_on, verify_on};
-use voxtile::operations::{
-    Diff, TileChange, TileDiff, delete_snapshot_on, diff, revert_on, snapshot_on, snapshots_on,
-};
+use voxtile::integrity::{Severity, repair, verify};
+use voxtile::operations::{Diff, TileChange, TileDiff, delete_snapshot, diff, revert, snapshot, snapshots};
 use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileStore};
-use voxtile::{Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
+use voxtile::{
+    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage,
+};
 
 fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()
@@ -36,10 +36,10 @@ struct Naive {
 }
 
 fn check_snapshots(disk: &Arc<dyn Disk>, map: &Path, naive: &Naive, what: &str) {
-    let infos = snapshots_on(disk.clone(), map).unwrap();
+    let infos = snapshots(MapPath::on(disk.clone(), map)).unwrap();
     assert_eq!(infos.len(), naive.snapshots.len(), "{what}");
     for (of, (voxels, scans)) in &naive.snapshots {
-        let reader = MapReader::open_snapshot_on(disk.clone(), map, &name(of), 2).unwrap();
+        let reader = MapReader::open_snapshot(MapPath::on(disk.clone(), map), &name(of), 2).unwrap();
         assert_eq!((voxels_of(&reader), reader.scan_number()), (voxels.clone(), *scans), "{what}: {of}");
         let info = infos.iter().find(|info| info.name == *of).unwrap();
         assert_eq!((info.voxels, info.scan_number), (voxels.len() as u64, *scans), "{what}: {of}");
@@ -51,8 +51,9 @@ fn live(seed: u64, storage: Storage) {
     let map = folder.path().join("map");
     let config = config(storage);
     let mut random = Random(seed);
-    let open = || OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &map, config.clone()).unwrap();
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.clone(), &map, config.clone()).unwrap();
+    let open =
+        || OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &map), config.clone()).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.clone(), &map), config.clone()).unwrap();
     let now = ReferenceMap::new(&config);
     let mut naive = Naive { now, scans: 0, flushed: Default::default(), snapshots: BTreeMap::new() };
     for step in 0..80 {
@@ -80,11 +81,11 @@ fn live(seed: u64, storage: Storage) {
                 drop(mapper);
                 match choice {
                     8 if exists => {
-                        delete_snapshot_on(disk.clone(), &map, &name(snapshot)).unwrap();
+                        delete_snapshot(MapPath::on(disk.clone(), &map), &name(snapshot)).unwrap();
                         naive.snapshots.remove(snapshot);
                     }
                     9 | 10 if exists => {
-                        revert_on(disk.clone(), &map, &name(snapshot), None, |_, _| ()).unwrap();
+                        revert(MapPath::on(disk.clone(), &map), &name(snapshot), None, |_, _| ()).unwrap();
                         naive.flushed = naive.snapshots[snapshot].clone();
                     }
                     11 => {
@@ -112,7 +113,7 @@ fn live(seed: u64, storage: Storage) {
     drop(mapper);
     check_snapshots(&disk, &map, &naive, "at the end");
     drop(open());
-    let verification = verify_on(disk, &map, |finding| panic!("{finding}"), |_, _| ()).unwrap();
+    let verification = verify(MapPath::on(disk, &map), |finding| panic!("{finding}"), |_, _| ()).unwrap();
     assert_eq!(verification.snapshots, naive.snapshots.len() as u64);
 }
 
@@ -126,7 +127,7 @@ fn any_life_with_snapshots_equals_the_naive_one() {
 /// A map in memory with three scans flushed one by one, a snapshot after the first and the second, and the digests.
 fn small(storage: Storage) -> (FaultyDisk, PathBuf, Vec<String>) {
     let (disk, map) = (FaultyDisk::new(Fault::None), PathBuf::from("/map"));
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &map, config(storage)).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &map), config(storage)).unwrap();
     mapper.begin_input("scans").unwrap();
     let mut digests = Vec::new();
     for (seed, of) in (1..).zip([Some("first"), Some("second"), None]) {
@@ -144,8 +145,8 @@ fn small(storage: Storage) -> (FaultyDisk, PathBuf, Vec<String>) {
 
 fn digest_of(disk: &FaultyDisk, map: &Path, snapshot: Option<&str>) -> voxtile::Result<String> {
     let reader = match snapshot {
-        Some(of) => MapReader::open_snapshot_on(disk.shared(), map, &name(of), 2)?,
-        None => MapReader::open_on(disk.shared(), map, 2)?,
+        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map), &name(of), 2)?,
+        None => MapReader::open(MapPath::on(disk.shared(), map), 2)?,
     };
     Ok(reader.digest()?.to_string())
 }
@@ -155,9 +156,10 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         for disk in [small(storage).0, small(storage).0.without_links()] {
             let (_, map, digests) = small(storage);
-            let reader = MapReader::open_on(disk.shared(), &map, 1).unwrap();
+            let reader = MapReader::open(MapPath::on(disk.shared(), &map), 1).unwrap();
             let reverted =
-                revert_on(disk.shared(), &map, &name("first"), Some(&name("third")), |_, _| ()).unwrap();
+                revert(MapPath::on(disk.shared(), &map), &name("first"), Some(&name("third")), |_, _| ())
+                    .unwrap();
             assert_eq!((reverted.scan_number_before, reverted.scan_number), (6, 2));
             assert!(reverted.flush_number > reader.flush_number());
             assert_eq!(reader.digest().unwrap().to_string(), digests[2], "a reader across the revert");
@@ -166,7 +168,8 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
             }
             drop(reader);
             // The input is that of the snapshot, and the same scans lead to the same maps again.
-            let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &map, config(storage)).unwrap();
+            let mut mapper =
+                OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &map), config(storage)).unwrap();
             assert_eq!(mapper.resume_input("scans").unwrap(), 2);
             for seed in 2..4 {
                 mapper.insert_scan(&scan(4 * seed)).unwrap();
@@ -176,7 +179,7 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
             assert_eq!(mapper.digest().unwrap().to_string(), digests[2]);
             drop(mapper);
             for of in ["first", "second", "third"] {
-                delete_snapshot_on(disk.shared(), &map, &name(of)).unwrap();
+                delete_snapshot(MapPath::on(disk.shared(), &map), &name(of)).unwrap();
             }
             let kept = disk.files().into_keys().filter(|path| path.to_string_lossy().contains(".flush"));
             assert_eq!(kept.count(), 0, "nobody sees any kept table");
@@ -192,10 +195,10 @@ fn own_bytes_are_what_deleting_frees() {
     let files = || disk.files().into_iter().filter(|(path, _)| is_counted(path));
     let bytes = || files().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
     for of in ["second", "first"] {
-        let infos = snapshots_on(disk.shared(), &map).unwrap();
+        let infos = snapshots(MapPath::on(disk.shared(), &map)).unwrap();
         let info = infos.iter().find(|info| info.name == of).unwrap();
         let before = bytes();
-        delete_snapshot_on(disk.shared(), &map, &name(of)).unwrap();
+        delete_snapshot(MapPath::on(disk.shared(), &map), &name(of)).unwrap();
         assert_eq!(before - bytes(), info.own_bytes, "{of}");
         assert!(info.own_bytes > 500, "{of}");
     }
@@ -204,22 +207,22 @@ fn own_bytes_are_what_deleting_frees() {
 #[test]
 fn wrong_names_and_other_refusals_say_what_to_do() {
     let (disk, map, _) = small(Storage::OctoMap);
-    let error = snapshot_on(disk.shared(), &map, &name("first")).unwrap_err();
+    let error = snapshot(MapPath::on(disk.shared(), &map), &name("first")).unwrap_err();
     assert!(matches!(error, Error::AlreadyExists { .. }), "{error:#}");
     let revert = |to, keep: Option<&str>| {
-        revert_on(disk.shared(), &map, &name(to), keep.map(name).as_ref(), |_, _| ()).unwrap_err()
+        revert(MapPath::on(disk.shared(), &map), &name(to), keep.map(name).as_ref(), |_, _| ()).unwrap_err()
     };
     assert!(matches!(revert("first", Some("second")), Error::AlreadyExists { .. }));
     for error in [
         revert("none", Some("kept")),
-        delete_snapshot_on(disk.shared(), &map, &name("none")).unwrap_err(),
-        MapReader::open_snapshot_on(disk.shared(), &map, &name("none"), 1).unwrap_err(),
+        delete_snapshot(MapPath::on(disk.shared(), &map), &name("none")).unwrap_err(),
+        MapReader::open_snapshot(MapPath::on(disk.shared(), &map), &name("none"), 1).unwrap_err(),
     ] {
         assert!(error.to_string().contains("`voxtile snapshots /map` lists them"), "{error:#}");
     }
-    assert_eq!(snapshots_on(disk.shared(), &map).unwrap().len(), 2, "nothing was kept in vain");
+    assert_eq!(snapshots(MapPath::on(disk.shared(), &map)).unwrap().len(), 2, "nothing was kept in vain");
     let writer = TileStore::open(disk.shared(), &map).unwrap();
-    assert!(matches!(snapshot_on(disk.shared(), &map, &name("x")), Err(Error::Locked { .. })));
+    assert!(matches!(snapshot(MapPath::on(disk.shared(), &map), &name("x")), Err(Error::Locked { .. })));
     drop(writer);
 }
 
@@ -239,8 +242,8 @@ fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
             disk.take(&path);
         }
     }
-    snapshot_on(disk.shared(), &map, &name("adopted")).unwrap();
-    assert!(MapReader::open_on(disk.shared(), &map, 1).unwrap().is_verified());
+    snapshot(MapPath::on(disk.shared(), &map), &name("adopted")).unwrap();
+    assert!(MapReader::open(MapPath::on(disk.shared(), &map), 1).unwrap().is_verified());
     assert_eq!(digest_of(&disk, &map, Some("adopted")).unwrap(), digests[2]);
 }
 
@@ -281,7 +284,7 @@ fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, 
     let found = |finding: &voxtile::integrity::Finding| {
         named |= finding.severity == Severity::Damage && finding.path == path;
     };
-    assert!(!verify_on(disk.shared(), map, found, |_, _| ()).unwrap().is_whole(), "{what}");
+    assert!(!verify(MapPath::on(disk.shared(), map), found, |_, _| ()).unwrap().is_whole(), "{what}");
     let is_missing = !disk.files().contains_key(path);
     assert!(named || is_missing, "{what}: the file is not named");
     assert_eq!(digest_of(disk, map, None).unwrap(), digests[2], "{what}");
@@ -289,14 +292,14 @@ fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, 
     let files = disk.files();
     drop(TileStore::open(disk.shared(), map).unwrap());
     assert_eq!(disk.files(), files, "{what}");
-    let repair = repair_on(disk.shared(), map, |_| (), |_, _| ()).unwrap();
+    let repair = repair(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap();
     assert!(repair.actions > 0 && repair.tiles_lost == 0, "{what}");
     let lost: u64 = disk.files().keys().filter(|path| path.starts_with("/map/quarantine")).count() as u64;
     assert!(lost > 0 || is_missing, "{what}: nothing is deleted");
-    let verification = verify_on(disk.shared(), map, |_| (), |_, _| ()).unwrap();
+    let verification = verify(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap();
     assert!(verification.is_whole(), "{what}");
     assert_eq!(digest_of(disk, map, None).unwrap(), digests[2], "{what}");
-    for info in snapshots_on(disk.shared(), map).unwrap() {
+    for info in snapshots(MapPath::on(disk.shared(), map)).unwrap() {
         assert!(info.damage.is_none(), "{what}");
         let digest = digest_of(disk, map, Some(&info.name)).unwrap();
         let was = &digests[usize::from(info.name == "second")];
@@ -311,7 +314,7 @@ fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
     for names in [["a", "b"], ["b", "a"]] {
         let (disk, map) = (FaultyDisk::new(Fault::None), PathBuf::from("/map"));
         let mut mapper =
-            OutOfCoreTileMapper::create_on(disk.shared(), &map, config(Storage::OctoMap)).unwrap();
+            OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &map), config(Storage::OctoMap)).unwrap();
         for (seed, of) in (1..).zip([Some(names[0]), Some(names[1]), None]) {
             for number in 0..8 {
                 mapper.insert_scan(&scan(4 * (8 * seed + number))).unwrap();
@@ -325,7 +328,7 @@ fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
         let twice = tables.windows(2).find(|two| two[0].parent() == two[1].parent()).unwrap();
         disk.take(&twice[0]);
         let mut found = Vec::new();
-        verify_on(disk.shared(), &map, |finding| found.push(finding.clone()), |_, _| ()).unwrap();
+        verify(MapPath::on(disk.shared(), &map), |finding| found.push(finding.clone()), |_, _| ()).unwrap();
         assert!(found.iter().any(|finding| finding.severity == Severity::Damage), "{names:?}: {found:?}");
         assert!(digest_of(&disk, &map, Some(names[0])).is_err());
     }
@@ -334,7 +337,8 @@ fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
 #[test]
 fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
     let (disk, map) = (FaultyDisk::new(Fault::None), Path::new("/map"));
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map, config(Storage::OctoMap)).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map), config(Storage::OctoMap)).unwrap();
     let mut digests = BTreeMap::new();
     for names in [&["a", "b", "c"][..], &["d", "e"], &["f"], &[]] {
         // The same tiles each time.
@@ -356,8 +360,8 @@ fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
                 true => damaged.take(path),
                 false => damaged.put(path, b"damaged"),
             }
-            repair_on(damaged.shared(), map, |_| (), |_, _| ()).unwrap();
-            assert!(verify_on(damaged.shared(), map, |_| (), |_, _| ()).unwrap().is_whole());
+            repair(MapPath::on(damaged.shared(), map), |_| (), |_, _| ()).unwrap();
+            assert!(verify(MapPath::on(damaged.shared(), map), |_| (), |_, _| ()).unwrap().is_whole());
             let flush = path.to_string_lossy().rsplit_once(".flush").unwrap().1.to_owned();
             let hit = [("4", &["a", "b", "c"][..]), ("7", &["d", "e"]), ("9", &["f"])];
             let (_, hit) = hit.iter().find(|(number, _)| *number == flush).unwrap();
@@ -376,8 +380,9 @@ fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
     for lost in [&["commits.log"][..], &["commits.log", "metadata.json"]] {
         let disk = whole.copy();
         lost.iter().for_each(|file| disk.take(&map.join(file)));
-        repair_on(disk.shared(), &map, |_| (), |_, _| ()).unwrap();
-        let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), &map, config(Storage::OctoMap));
+        repair(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap();
+        let mut mapper =
+            OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &map), config(Storage::OctoMap));
         for seed in 30..34 {
             // Without metadata.json the ranges of the rays are not known any more, which matters to no snapshot.
             let mapper = mapper.as_mut().unwrap();
@@ -393,11 +398,11 @@ fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
     let files = disk.files();
     let kept = files.keys().find(|path| path.to_string_lossy().contains(".flush")).unwrap();
     disk.put(&kept.with_file_name("iwlo_meta.bin"), b"damaged");
-    let repair = repair_on(disk.shared(), &map, |_| (), |_, _| ()).unwrap();
+    let repair = repair(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap();
     assert_eq!(repair.tiles_lost, 1);
-    assert!(verify_on(disk.shared(), &map, |_| (), |_, _| ()).unwrap().is_whole());
+    assert!(verify(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap().is_whole());
     assert_eq!(digest_of(&disk, &map, Some("first")).unwrap(), digests[0]);
-    revert_on(disk.shared(), &map, &name("first"), None, |_, _| ()).unwrap();
+    revert(MapPath::on(disk.shared(), &map), &name("first"), None, |_, _| ()).unwrap();
     assert_eq!(digest_of(&disk, &map, None).unwrap(), digests[0], "the tile is back");
 }
 
@@ -425,7 +430,7 @@ fn a_diff_counts_what_a_naive_one_counts() {
     let build = |map: &str, storage, seeds: std::ops::Range<u64>| {
         let path = folder.path().join(map);
         let mut mapper =
-            OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config(storage)).unwrap();
+            OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config(storage)).unwrap();
         for seed in seeds {
             mapper.insert_scan(&scan(seed)).unwrap();
             mapper.snapshot(&name(&format!("s{seed}"))).unwrap();
@@ -481,7 +486,7 @@ fn a_diff_counts_what_a_naive_one_counts() {
     }
     let other = MapConfig::new(0.2, 3.2).unwrap();
     let path = folder.path().join("other");
-    drop(OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, other).unwrap());
+    drop(OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), other).unwrap());
     let error = diff(&open(&a), &open(&path), |_| (), |_, _| ()).unwrap_err();
     assert!(matches!(error, Error::Mismatch { what: "resolution", .. }), "{error:#}");
 }

@@ -4,7 +4,7 @@ use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::scan::PointBatch;
 use voxtile::space::{Point, TileIndex};
-use voxtile::{InMemoryMapper, MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan};
+use voxtile::{InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan};
 
 #[test]
 fn far_negative_and_border_tiles_come_back_to_the_bit() {
@@ -20,7 +20,8 @@ fn far_negative_and_border_tiles_come_back_to_the_bit() {
     let folder = TempDir::new().unwrap();
     let config = MapConfig::new(0.1, 1.6).unwrap().with_cache_tiles(3).with_pending_bytes(10_000);
     let path = folder.path().join("map");
-    let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()).unwrap();
     let mut reference = ReferenceMap::new(&config);
     let mut random = Random(17);
     for center in centers {

@@ -8,7 +8,7 @@ use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::verify;
 use voxtile::simulation::{City, Drive, Lidar, Survey};
 use voxtile::space::TileIndex;
-use voxtile::{Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+use voxtile::{Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 3.2).unwrap().with_cache_tiles(2).with_pending_bytes(1000)
@@ -17,7 +17,8 @@ fn config() -> MapConfig {
 /// A flushed map of a few tiles.
 fn map(folder: &TempDir) -> PathBuf {
     let path = folder.path().join("map");
-    let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config()).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config()).unwrap();
     for seed in 0..3 {
         mapper.insert_scan(&random_scan(&mut Random(seed), [0.0; 3], 20)).unwrap();
     }
@@ -26,7 +27,7 @@ fn map(folder: &TempDir) -> PathBuf {
 }
 
 fn open(path: &Path) -> voxtile::Result<OutOfCoreTileMapper> {
-    OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), path, config())
+    OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), path), config())
 }
 
 fn copy(from: &Path, to: &Path) {

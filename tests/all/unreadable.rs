@@ -2,10 +2,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::integrity::{Severity, repair_on, verify_on};
-use voxtile::operations::delete_snapshot_on;
+use voxtile::integrity::{Severity, repair, verify};
+use voxtile::operations::delete_snapshot;
 use voxtile::store::SnapshotName;
-use voxtile::{MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
+use voxtile::{MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
 
 fn map() -> &'static Path {
     Path::new("/map")
@@ -22,7 +22,7 @@ fn snapshot() -> SnapshotName {
 /// A map of a few tiles with a snapshot that sees tables of its own.
 fn small(storage: Storage) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
-    let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), map(), config(storage)).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config(storage)).unwrap();
     for seed in 0..4 {
         let x = 3.0 * (seed % 2) as f64;
         mapper.insert_scan(&random_scan(&mut Random(seed), [x, 0.0, 0.0], 5)).unwrap();
@@ -36,8 +36,8 @@ fn small(storage: Storage) -> FaultyDisk {
 }
 
 fn digests(disk: &FaultyDisk) -> Result<[String; 2]> {
-    let now = MapReader::open_on(disk.shared(), map(), 2)?.digest()?;
-    let then = MapReader::open_snapshot_on(disk.shared(), map(), &snapshot(), 2)?.digest()?;
+    let now = MapReader::open(MapPath::on(disk.shared(), map()), 2)?.digest()?;
+    let then = MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &snapshot(), 2)?.digest()?;
     Ok([now, then].map(|digest| digest.to_string()))
 }
 
@@ -48,13 +48,14 @@ fn damaged(disk: &FaultyDisk, what: &str) -> BTreeSet<PathBuf> {
             damaged.insert(finding.path.clone());
         }
     };
-    verify_on(disk.shared(), map(), found, |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error:#}"));
+    verify(MapPath::on(disk.shared(), map()), found, |_, _| ())
+        .unwrap_or_else(|error| panic!("{what}: {error:#}"));
     damaged
 }
 
 /// A scan far from all tiles, flushed.
 fn go_on(disk: &FaultyDisk, storage: Storage) -> Result<()> {
-    let mut mapper = OutOfCoreTileMapper::open_on(disk.shared(), map(), config(storage))?;
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config(storage))?;
     mapper.insert_scan(&random_scan(&mut Random(9), [300.0, 0.0, 0.0], 5))?;
     mapper.flush()
 }
@@ -83,14 +84,14 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
                 deleted.mend();
                 assert_eq!(digests(&deleted).unwrap()[1], before[1], "{what}");
                 disk.make_unreadable(path);
-                delete_snapshot_on(disk.shared(), map(), &snapshot()).unwrap();
+                delete_snapshot(MapPath::on(disk.shared(), map()), &snapshot()).unwrap();
                 assert_eq!(damaged(&disk, &what).len(), 0);
                 continue;
             }
             let disk = whole.copy();
             disk.make_unreadable(path);
             let octree = whole.files()[path].clone();
-            let repair = repair_on(disk.shared(), map(), |_| (), |_, _| ())
+            let repair = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ())
                 .unwrap_or_else(|error| panic!("{what}: {error:#}"));
             assert!(repair.actions > 0, "{what}");
             assert_eq!(damaged(&disk, &what), BTreeSet::new(), "{what}");
@@ -127,7 +128,7 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
             }
         }
         // A repair does what it can, or says which file stops it; nothing is lost.
-        if let Err(error) = repair_on(disk.shared(), map(), |_| (), |_, _| ()) {
+        if let Err(error) = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()) {
             assert!(format!("{error:#}").contains(&what), "{what}: {error:#}");
         }
         disk.mend();

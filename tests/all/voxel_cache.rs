@@ -8,7 +8,7 @@ use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
 use voxtile::space::{MortonCode, TileIndex, VoxelIndex, VoxelKey};
 use voxtile::tile::{OctreeStatistics, VoxelCacheCounts};
-use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, OutOfCoreTileMapper};
+use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapPath, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::{MapQueries, VoxelCacheConfig, VoxelCacheMode};
 
 /// Every mode, with caches that hold nothing, little, and what they like.
@@ -85,12 +85,14 @@ fn every_mode_gives_the_naive_map_and_its_maxima_whatever_the_threads_and_the_ma
                 let config = config.clone().with_cache_tiles(3).with_pending_bytes(3000);
                 let mut reference = ReferenceMap::new(&config);
                 let mut mapper =
-                    OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+                    OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone())
+                        .unwrap();
                 drive(&mut mapper, &mut reference, 3);
                 mapper.flush().unwrap();
                 assert_eq!(mapper.digest().unwrap(), in_memory.digest().unwrap(), "{mode:?}");
                 drop(mapper);
-                let mut mapper = OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config).unwrap();
+                let mut mapper =
+                    OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &path), config).unwrap();
                 drive(&mut mapper, &mut reference, 4);
                 assert_eq!(voxels_of(&mapper), reference.voxels, "{mode:?}");
             });
@@ -134,7 +136,8 @@ fn live(seed: u64, mode: VoxelCacheMode) {
         .with_cache_tiles(1 + seed as usize * 7 % 40)
         .with_pending_bytes(seed as usize % 3 * 4000);
     let mut random = Random(seed);
-    let mut mapper = OutOfCoreTileMapper::create_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()).unwrap();
     let mut reference = ReferenceMap::new(&config);
     for _ in 0..40 {
         match random.below(10) {
@@ -156,7 +159,9 @@ fn live(seed: u64, mode: VoxelCacheMode) {
             7 => {
                 mapper.flush().unwrap();
                 drop(mapper);
-                mapper = OutOfCoreTileMapper::open_on(UnsyncedDisk::shared(), &path, config.clone()).unwrap();
+                mapper =
+                    OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &path), config.clone())
+                        .unwrap();
             }
             _ => assert_coarse_answers(&mapper, &reference, 1 + random.below(16) as u8, 29),
         }

@@ -5,7 +5,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
-    InMemoryMapper, InsertMode, MapConfig, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
+    InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
     OutOfCoreTileMapper, Queries, Scan, Storage,
 };
 
@@ -37,7 +37,8 @@ fn a_scan_of_more_updates_than_memory_is_taken_whole() {
         for bytes in [0, 100_000] {
             let disk = FaultyDisk::new(Fault::None);
             let tight = config.clone().with_tight_memory_bytes(bytes);
-            let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), Path::new("/map"), tight).unwrap();
+            let mut mapper =
+                OutOfCoreTileMapper::create(MapPath::on(disk.shared(), Path::new("/map")), tight).unwrap();
             let mut in_files = 0;
             for (number, scan) in scans.iter().enumerate() {
                 let report = mapper.insert_scan(scan).unwrap();
@@ -59,7 +60,7 @@ fn a_scan_of_more_updates_than_memory_is_taken_whole() {
             }
             mapper.flush().unwrap();
             drop(mapper);
-            let reader = MapReader::open_on(disk.shared(), Path::new("/map"), 4).unwrap();
+            let reader = MapReader::open(MapPath::on(disk.shared(), Path::new("/map")), 4).unwrap();
             assert_eq!(reader.digest().unwrap(), digest);
             assert!(disk.files().keys().all(|path| path.extension().is_none_or(|last| last != "next")));
         }
@@ -84,7 +85,8 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
     }
     let begin = |disk: &FaultyDisk| {
         let mut mapper =
-            OutOfCoreTileMapper::create_on(disk.shared(), Path::new("/map"), tight.clone()).unwrap();
+            OutOfCoreTileMapper::create(MapPath::on(disk.shared(), Path::new("/map")), tight.clone())
+                .unwrap();
         mapper.insert_scan(&scans[0]).unwrap();
         mapper.flush().unwrap();
         mapper.insert_scan(&scans[1]).unwrap();
@@ -110,7 +112,8 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
             drop(mapper);
             let left = disk.after_crash(Unsynced::Shuffled(at));
             let mut mapper =
-                OutOfCoreTileMapper::open_on(left.shared(), Path::new("/map"), tight.clone()).unwrap();
+                OutOfCoreTileMapper::open(MapPath::on(left.shared(), Path::new("/map")), tight.clone())
+                    .unwrap();
             assert_eq!(mapper.digest().unwrap(), digests[0], "crash at {at}");
             for scan in &scans[1..] {
                 mapper.insert_scan(scan).unwrap();

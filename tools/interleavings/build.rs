@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 25] = [
+const SOURCES: [&str; 29] = [
     "tile/octocache/octree_statistics.rs",
     "tile/octocache/octree_worker.rs",
     "tile/octocache/shared_tree.rs",
@@ -12,14 +12,18 @@ const SOURCES: [&str; 25] = [
     "mapper/statistics.rs",
     "mapper/paging/buffered_updates.rs",
     "mapper/paging/compact_tiles.rs",
+    "mapper/paging/contents.rs",
     "mapper/paging/eviction.rs",
     "mapper/paging/flush.rs",
+    "mapper/paging/paged_tiles.rs",
     "mapper/paging/prefetch.rs",
     "mapper/paging/resident_tiles.rs",
     "mapper/paging/stalls.rs",
     "mapper/paging/tile_cache.rs",
     "mapper/paging/tile_disk.rs",
     "mapper/paging/tile_pager.rs",
+    "mapper/paging/tile_state.rs",
+    "mapper/paging/views.rs",
     "mapper/paging/write_buffer.rs",
     "persistence/compact_tile.rs",
     "persistence/io_threads.rs",

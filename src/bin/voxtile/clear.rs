@@ -13,7 +13,7 @@ use voxtile::operations::{Cleared, clear};
 
 #[derive(Serialize)]
 struct Summary<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     cleared: Cleared,

@@ -29,7 +29,7 @@ struct Conversion<'a> {
 /// A map, and how it is stored.
 #[derive(Serialize)]
 struct Form<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     storage: Storage,
     /// `None` for a map of the original format, which does not say.

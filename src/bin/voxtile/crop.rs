@@ -12,7 +12,7 @@ use voxtile::operations::{WrittenMap, crop};
 
 #[derive(Serialize)]
 struct Summary<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     written: WrittenMap,

@@ -12,7 +12,7 @@ use voxtile::operations::{Decay, Decayed, decay};
 
 #[derive(Serialize)]
 struct Summary<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     decayed: Decayed,

@@ -25,7 +25,7 @@ struct Report {
 /// One of the two.
 #[derive(Serialize)]
 struct Side {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: PathBuf,
     snapshot: Option<String>,
     flush_number: u64,

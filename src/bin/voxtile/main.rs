@@ -29,7 +29,6 @@ mod octree_file;
 mod one_heap;
 mod output_file;
 mod part;
-mod path_text;
 mod picture;
 mod progress;
 mod query;

@@ -13,7 +13,7 @@ use voxtile::operations::{Merged, merge};
 
 #[derive(Serialize)]
 struct Summary<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     #[serde(flatten)]
     merged: Merged,

@@ -13,7 +13,7 @@ const MAX_ACTIONS: usize = 10_000;
 
 #[derive(Serialize)]
 struct Report<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a std::path::Path,
     #[serde(flatten)]
     repair: Repair,

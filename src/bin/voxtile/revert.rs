@@ -12,7 +12,7 @@ use voxtile::operations::{Reverted, revert};
 
 #[derive(Serialize)]
 struct Summary<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     snapshot: &'a str,
     kept_as: Option<&'a str>,

@@ -13,7 +13,7 @@ use voxtile::tile::{OctreeStatistics, TileCounts};
 /// What a build did, and what the map now is.
 #[derive(Debug, Serialize)]
 pub struct Summary {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     pub map: PathBuf,
     pub scans: u64,
     /// Scans of the same input that were in the map before.

@@ -14,7 +14,7 @@ const MAX_FINDINGS: usize = 10_000;
 
 #[derive(Serialize)]
 struct Report<'a> {
-    #[serde(serialize_with = "crate::path_text::serialize")]
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a std::path::Path,
     whole: bool,
     #[serde(flatten)]

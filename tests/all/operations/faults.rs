@@ -2,16 +2,19 @@ use super::random_maps::{open, path};
 use std::path::PathBuf;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::operations::{self, Decay, Part, clear_on, decay_on};
+use voxtile::operations::{self, Decay, Part};
 use voxtile::space::Aabb;
-use voxtile::{Error, MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
+use voxtile::{
+    Error, MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage,
+};
 
 /// A disk with two maps, `a` and `b`.
 fn two_maps(storage: Storage) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage);
     for (name, seed) in [("a", 1), ("b", 2)] {
-        let mut mapper = OutOfCoreTileMapper::create_on(disk.shared(), &path(name), config.clone()).unwrap();
+        let mut mapper =
+            OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &path(name)), config.clone()).unwrap();
         let mut random = Random(seed);
         for x in [0.0, 3.0] {
             mapper.insert_scan(&random_scan(&mut random, [x, 0.0, 0.0], 4)).unwrap();
@@ -38,16 +41,21 @@ fn crop(disk: &FaultyDisk) -> Result<()> {
 }
 
 fn clear(disk: &FaultyDisk) -> Result<()> {
-    clear_on(disk.shared(), &path("a"), &Part::Outside(region()), |_, _| {}).map(drop)
+    operations::clear(MapPath::on(disk.shared(), &path("a")), &Part::Outside(region()), |_, _| {}).map(drop)
 }
 
 fn decay(disk: &FaultyDisk) -> Result<()> {
-    decay_on(disk.shared(), &path("a"), &Decay::new(2.0).with_forget_below(0.25), |_, _| {}).map(drop)
+    operations::decay(
+        MapPath::on(disk.shared(), &path("a")),
+        &Decay::new(2.0).with_forget_below(0.25),
+        |_, _| {},
+    )
+    .map(drop)
 }
 
 /// The digest of a map, `None` if there is none; of a damaged one there is none either, and that is a failure.
 fn digest(disk: &FaultyDisk, name: &str, what: &str) -> Option<blake3::Hash> {
-    match MapReader::open_on(disk.shared(), &path(name), 1) {
+    match MapReader::open(MapPath::on(disk.shared(), &path(name)), 1) {
         Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"))),
         Err(Error::NoMap { .. }) => None,
         Err(error) => panic!("{what}: {error:#}"),

@@ -7,7 +7,7 @@ use voxtile::operations::MapWriter;
 use voxtile::sensor::{Evidence, Iwlo, SensorModel};
 use voxtile::space::VoxelKey;
 use voxtile::tile::Table;
-use voxtile::{MapConfig, MapReader, Result, Storage};
+use voxtile::{MapConfig, MapPath, MapReader, Result, Storage};
 
 /// Tiles of 5 voxels, so that bricks of 8 reach across their borders.
 pub fn config(random: &mut Random) -> MapConfig {
@@ -48,7 +48,7 @@ pub fn write_map(disk: &FaultyDisk, folder: &Path, config: &MapConfig, voxels: &
     for (&voxel, &evidence) in voxels {
         tiles.entry(config.grid.tile_of_voxel(voxel)).or_default().insert(voxel, evidence);
     }
-    let mut writer = MapWriter::create_on(disk.shared(), folder, config).unwrap();
+    let mut writer = MapWriter::create(MapPath::on(disk.shared(), folder), config).unwrap();
     for (tile, voxels) in tiles {
         writer.put(tile, &table_of(&voxels)).unwrap();
     }
@@ -68,7 +68,7 @@ fn table_of(voxels: &Voxels) -> Table {
 }
 
 pub fn open(disk: &FaultyDisk, folder: &Path) -> Result<MapReader> {
-    MapReader::open_on(disk.shared(), folder, 2)
+    MapReader::open(MapPath::on(disk.shared(), folder), 2)
 }
 
 /// The voxels of a map on disk.

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use voxtile::mapper::IoCounts;
-use voxtile::{InMemoryMapper, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan, Storage};
+use voxtile::{InMemoryMapper, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 /// A map to build, scan by scan and with one flush at the end.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -97,7 +97,7 @@ impl Build {
             return Ok(built);
         }
         replace_folder(&self.folder)?;
-        let mut mapper = OutOfCoreTileMapper::create_on(Arc::new(disk), &self.folder, config)?;
+        let mut mapper = OutOfCoreTileMapper::create(MapPath::on(Arc::new(disk), &self.folder), config)?;
         let mut built = self.insert_all(&mut mapper, &meter)?;
         built.map_file_bytes = file_bytes(&self.folder)?;
         drop(mapper);

@@ -41,7 +41,8 @@ mod sensor {
 
 mod space {
     pub(crate) use voxtile::space::{
-        Grid, MortonCode, TileBox, TileIndex, TileTable, TileValue, VoxelIndex, put_number, take_number,
+        Grid, MortonCode, TileBox, TileIndex, TileTable, TileValue, VoxelIndex, hash_table_bytes, put_number,
+        take_number,
     };
 }
 
@@ -128,6 +129,9 @@ mod mapper {
         mod compact_tiles {
             source!("compact_tiles.rs");
         }
+        mod contents {
+            source!("contents.rs");
+        }
         mod eviction {
             source!("eviction.rs");
         }
@@ -135,6 +139,16 @@ mod mapper {
             source!("flush.rs");
         }
         mod memory_plan;
+        mod paged_tiles {
+            source!("paged_tiles.rs");
+        }
+        mod shared_contents;
+        mod tile_state {
+            source!("tile_state.rs");
+        }
+        mod views {
+            source!("views.rs");
+        }
         mod prefetch {
             source!("prefetch.rs");
         }

@@ -8,10 +8,6 @@ use crate::setting::{Setting, mib};
 use anyhow::{Context, Result};
 use report::{Cell, Table};
 use std::fs;
-use std::time::{Duration, Instant};
-use voxtile::MemoryLimit;
-use voxtile::simulation::Random;
-use voxtile::space::Grid;
 use workload::SurveyName;
 
 /// How many times the CPU time without a limit a map may take within one.
@@ -70,7 +66,6 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         ]);
     }
     findings.answer.tables = vec![table];
-    findings.promises.push(search(setting)?);
     Ok(findings)
 }
 
@@ -119,52 +114,4 @@ fn cases(setting: &Setting) -> Vec<HardScan> {
     let every_ray = cases[0].clone();
     cases.push(HardScan { name: "every long ray".to_owned(), per_ray: true, ..every_ray });
     cases
-}
-
-/// The worst peak of random inputs in random limits.
-fn search(setting: &Setting) -> Result<Promise> {
-    let until = Instant::now() + Duration::from_secs(setting.size(600, 25));
-    let mut random = Random::of(u64::from(std::process::id()), &[15]);
-    let (mut worst_mib, mut worst, mut tried) = (f64::NEG_INFINITY, String::new(), 0);
-    while Instant::now() < until {
-        let resolution_m = [0.05, 0.1, 0.2, 0.5][random.below(4) as usize];
-        let tile_voxels = [4.0, 16.0, 50.0, 64.0][random.below(4) as usize];
-        let tile_size_m = tile_voxels * resolution_m;
-        let least = MemoryLimit::least_bytes(&Grid::new(resolution_m, tile_size_m)?).div_ceil(1 << 20);
-        // Voxels of all rays, so that each takes a second or two.
-        let voxels = random.between(1e5, setting.size(2e8, 1e7));
-        let rays = 10_f64.powf(random.between(1.0, 5.3)).min(voxels);
-        let reach_m = (voxels / rays).clamp(10.0, 100_000.0) * resolution_m;
-        // A folder a tile: of hundreds of thousands of small tiles the file system takes most of the time.
-        let reach_m = reach_m.min(tile_size_m * 300_000.0 / rays).max(2.0 * resolution_m);
-        let points = Points::Fan {
-            rays: rays as u32,
-            reach_m,
-            opening: random.between(0.0, 1.0),
-            is_sky: random.below(4) == 0,
-        };
-        let limit_mib = least + random.below(setting.size(200, 60)) as usize + 40;
-        let name = format!("random {tried}");
-        let hard =
-            HardScan { name, points, resolution_m, tile_size_m, limit_mib, per_ray: random.below(3) == 0 };
-        let input = hard.write(&setting.work)?;
-        let taken = match hard.build(&input, &setting.work.join("hard"), true) {
-            Ok(taken) => taken,
-            // Too many tiles for the limit is an answer, too.
-            Err(error) if error.to_string().contains("too few for a") => {
-                let _ = fs::remove_dir_all(setting.work.join("hard"));
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
-        let beyond_mib = mib(taken.peak_bytes as f64) - limit_mib as f64;
-        if beyond_mib > worst_mib {
-            worst = format!("{}, {limit_mib} MiB", hard.description());
-            worst_mib = beyond_mib;
-            eprintln!("  search, {worst}: {beyond_mib:.0} MiB beyond");
-        }
-        tried += 1;
-    }
-    let what = format!("worst of {tried} random inputs ({worst}): peak of memory beyond the limit");
-    Ok(Promise::new(what, worst_mib, Wanted::AtMost(BESIDE_MIB), "MiB"))
 }

@@ -5,6 +5,7 @@ mod flat_cost;
 mod hard_scans;
 mod idle;
 mod memory;
+mod random_scans;
 mod storage;
 mod throughput;
 
@@ -23,9 +24,10 @@ pub struct Question {
 }
 
 /// All of them, in the order of the page.
-pub const QUESTIONS: [Question; 7] = [
+pub const QUESTIONS: [Question; 8] = [
     Question { name: "memory", promises: "memory_promises", answer: memory::answer },
     Question { name: "hard-scans", promises: "hard_scans_promises", answer: hard_scans::answer },
+    Question { name: "random-scans", promises: "random_scans_promises", answer: random_scans::answer },
     Question { name: "throughput", promises: "throughput_promises", answer: throughput::answer },
     Question { name: "storage", promises: "storage_promises", answer: storage::answer },
     Question { name: "flat-cost", promises: "flat_cost_promises", answer: flat_cost::answer },

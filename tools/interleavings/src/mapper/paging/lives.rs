@@ -1,7 +1,7 @@
 //! Lives of the mapper's tiles in little memory: what is in use, packed, on its way to disk and from there.
 
 use super::memory_disk::MemoryDisk;
-use super::tile_pager::TilePager;
+use super::paged_tiles::PagedTiles;
 use crate::config::{MapConfig, Storage};
 use crate::in_many_orders;
 use crate::persistence::{new_map_id, new_metadata};
@@ -20,7 +20,7 @@ const TILE_M: f64 = 4.0;
 
 /// The tiles of a map under way, and what they must be.
 struct Life {
-    pager: TilePager,
+    tiles: PagedTiles,
     disk: MemoryDisk,
     config: MapConfig,
     /// Every tile, in memory and beyond doubt.
@@ -45,9 +45,9 @@ impl Life {
         let (disk, config, map_id) = (MemoryDisk::new(), config(storage), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
         let store = TileStore::create(Arc::new(disk.clone()), Path::new("/map"), metadata, map_id).unwrap();
-        let pager = TilePager::new(config.clone(), store);
+        let tiles = PagedTiles::new(config.clone(), store);
         let (expected, flushed, touched) = Default::default();
-        Self { pager, disk, config, expected, flushed, touched, errors: 0 }
+        Self { tiles, disk, config, expected, flushed, touched, errors: 0 }
     }
 
     /// A batch of points in some tiles: taken whole, or refused and nothing of it taken.
@@ -64,25 +64,25 @@ impl Life {
         let batch = PointBatch { points: &points, intensities: None, is_occupied: &is_occupied };
         let updates = batch.updates(&self.config.grid, &self.config.sensor_model).unwrap();
         updates.tiles.iter().for_each(|(index, _)| self.touch(*index));
-        let prepared = self.pager.prepare(&updates, 0);
+        let prepared = self.tiles.pager().prepare(&updates, 0);
         if prepared.is_err() {
             self.errors += 1;
             return;
         }
-        self.pager.prefetch(&updates.tiles);
+        self.tiles.pager().prefetch(&updates.tiles);
         for (index, updates) in &updates.tiles {
             let empty = || Tile::empty(&self.config.grid, &OctreeFactory::default(), *index);
             let tile = self.expected.entry(*index).or_insert_with(empty);
             tile.apply(&self.config.sensor_model, updates);
         }
-        self.pager.accept(updates);
+        self.tiles.pager().accept(updates);
     }
 
     /// Asks for a tile, wherever it is.
     fn ask(&mut self) {
         let index = TileIndex::new(thread_rng().gen_range(0..TILES), 0, 0);
         self.touch(index);
-        match self.pager.tile(index) {
+        match self.tiles.pager().tile(index) {
             Ok(found) => {
                 assert_eq!(found.as_deref().map(voxels), self.expected.get(&index).map(voxels), "{index}");
             }
@@ -95,7 +95,7 @@ impl Life {
     }
 
     fn flush(&mut self, refuses: bool) {
-        match self.pager.flush() {
+        match self.tiles.pager().flush() {
             Ok(()) => self.flushed = self.expected.clone(),
             Err(error) => {
                 // What could not be saved before is saved now, and no older trouble is told of.
@@ -107,11 +107,11 @@ impl Life {
 
     /// Goes away in the middle of everything, and begins again with what was flushed.
     fn begin_again(self) -> Self {
-        let Self { pager, disk, config, flushed, touched, errors, .. } = self;
-        drop(pager);
+        let Self { tiles, disk, config, flushed, touched, errors, .. } = self;
+        drop(tiles);
         let store = TileStore::open(Arc::new(disk.clone()), Path::new("/map")).unwrap();
-        let pager = TilePager::new(config.clone(), store);
-        Self { pager, disk, config, expected: flushed.clone(), flushed, touched, errors }
+        let tiles = PagedTiles::new(config.clone(), store);
+        Self { tiles, disk, config, expected: flushed.clone(), flushed, touched, errors }
     }
 
     fn run(&mut self, steps: usize) {
@@ -134,7 +134,7 @@ impl Life {
 
     /// Nothing goes to disk more often than it was changed or wanted.
     fn check_saves(&self) {
-        let layout = self.pager.store().layout();
+        let layout = self.tiles.pager().store().layout().clone();
         for (index, touched) in &self.touched {
             let begun = self.disk.begun(&layout.next(*index, TileFile::Table));
             assert!(begun <= *touched, "{index} was begun {begun} times and touched {touched} times");
@@ -142,9 +142,9 @@ impl Life {
     }
 
     fn check_tiles(&mut self) {
-        assert_eq!(self.pager.tile_indices(), self.expected.keys().copied().collect::<Vec<_>>());
+        assert_eq!(self.tiles.pager().tile_indices(), self.expected.keys().copied().collect::<Vec<_>>());
         for (index, tile) in &self.expected {
-            let found = self.pager.tile_uncached(*index).unwrap().unwrap();
+            let found = self.tiles.pager().tile_uncached(*index).unwrap().unwrap();
             assert_eq!(voxels(&found), voxels(tile), "{index}");
         }
     }

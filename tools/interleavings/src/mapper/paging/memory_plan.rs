@@ -11,6 +11,7 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) is_enforced: bool,
     pub(super) spare_bytes: usize,
     pub(super) compact_bytes: usize,
+    pub(super) view_bytes: usize,
 }
 
 impl MemoryPlan {
@@ -23,6 +24,7 @@ impl MemoryPlan {
             is_enforced: false,
             spare_bytes: 2 << 10,
             compact_bytes: 1 << 10,
+            view_bytes: 2 << 10,
         }
     }
 }

@@ -1,0 +1,48 @@
+use super::contents::TileContents;
+use shuttle::sync::{Mutex, MutexGuard};
+use std::ops::{Deref, DerefMut};
+
+/// The contents behind the scheduler's lock, which knows no way to let go of a guard for a while.
+#[derive(Debug)]
+pub(in crate::mapper) struct SharedContents(Mutex<TileContents>);
+
+#[derive(Debug)]
+pub(in crate::mapper) struct ContentsGuard<'a> {
+    contents: &'a Mutex<TileContents>,
+    guard: Option<MutexGuard<'a, TileContents>>,
+}
+
+impl SharedContents {
+    pub(super) fn new(contents: TileContents) -> Self {
+        Self(Mutex::new(contents))
+    }
+
+    pub(super) fn lock(&self) -> ContentsGuard<'_> {
+        ContentsGuard { contents: &self.0, guard: Some(self.0.lock().unwrap()) }
+    }
+
+    pub(in crate::mapper) fn lock_to_read(&self) -> ContentsGuard<'_> {
+        self.lock()
+    }
+}
+
+impl Deref for ContentsGuard<'_> {
+    type Target = TileContents;
+
+    fn deref(&self) -> &TileContents {
+        self.guard.as_ref().expect("nobody looks while it is unlocked")
+    }
+}
+
+impl DerefMut for ContentsGuard<'_> {
+    fn deref_mut(&mut self) -> &mut TileContents {
+        self.guard.as_mut().expect("nobody looks while it is unlocked")
+    }
+}
+
+pub(super) fn unlocked<T>(contents: &mut ContentsGuard<'_>, wait: impl FnOnce() -> T) -> T {
+    contents.guard = None;
+    let answer = wait();
+    contents.guard = Some(contents.contents.lock().unwrap());
+    answer
+}
