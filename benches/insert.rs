@@ -29,9 +29,9 @@ fn street(criterion: &mut Criterion) {
             bencher.iter_batched_ref(mapper, |mapper| insert_all(mapper, &scans), BatchSize::PerIteration);
         });
     }
-    for (name, cache_tiles, pending_bytes) in [("with room", 1000, 0), ("four tiles", 4, 1 << 20)] {
+    for (name, cache_tiles, write_buffer_bytes) in [("with room", 1000, 0), ("four tiles", 4, 1 << 20)] {
         group.bench_function(format!("out of core, {name}, flushed"), |bencher| {
-            let config = config().with_cache_tiles(cache_tiles).with_pending_bytes(pending_bytes);
+            let config = config().with_cache_tiles(cache_tiles).with_write_buffer_bytes(write_buffer_bytes);
             let folder = || tempfile::tempdir().expect("room for a map");
             let build = |folder: &mut tempfile::TempDir| {
                 let path = folder.path().join("map");

@@ -38,7 +38,7 @@ fn open(criterion: &mut Criterion) {
 /// A map whose tiles hold one voxel each.
 fn make_map(path: &Path) -> MapConfig {
     // All updates of a flush wait, so that each tile comes in once.
-    let config = MapConfig::new(0.2, 10.0).expect("whole voxels").with_pending_bytes(1 << 30);
+    let config = MapConfig::new(0.2, 10.0).expect("whole voxels").with_write_buffer_bytes(1 << 30);
     let disk = UnsyncedDisk::shared();
     let mut mapper =
         OutOfCoreTileMapper::create(MapPath::on(disk, path), config.clone()).expect("an empty folder");

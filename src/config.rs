@@ -13,6 +13,19 @@ pub use storage::Storage;
 /// Resolution, tile size, sensor model and occupancy threshold belong to the map: they are stored with it, and opening
 /// it with others is an error. So does its storage, which an opened map keeps, whatever is asked for. The rest may
 /// change from run to run.
+///
+/// ```
+/// use voxtile::{InsertMode, MapConfig};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let config = MapConfig::new(0.1, 10.0)? // Voxels of 0.1 m in tiles of 10 m.
+///     .with_range(0.5, 60.0)
+///     .with_insert_mode(InsertMode::PerRay)
+///     .with_memory_bytes(256 << 20);
+/// assert_eq!(config.grid.voxels_per_tile_edge(), 100);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MapConfig {
@@ -43,7 +56,7 @@ pub enum MemoryLimit {
         tiles: usize,
         /// Most bytes of updates that wait for tiles on disk before those are fetched; one scan may come on top.
         /// Larger: fewer reads and writes.
-        pending_bytes: usize,
+        write_buffer_bytes: usize,
     },
     /// Most bytes of all that grows: tiles in use, others in the compact form, updates that wait for tiles, what a scan
     /// takes while it is inserted, tiles on their way to and from disk, what is known of the tiles there (some 250
@@ -177,17 +190,17 @@ impl MapConfig {
 
     /// The same with at most so many tiles in memory.
     pub fn with_cache_tiles(self, cache_tiles: usize) -> Self {
-        let pending_bytes = self.pending_bytes();
-        Self { memory: MemoryLimit::Tiles { tiles: cache_tiles, pending_bytes }, ..self }
+        let write_buffer_bytes = self.write_buffer_bytes();
+        Self { memory: MemoryLimit::Tiles { tiles: cache_tiles, write_buffer_bytes }, ..self }
     }
 
     /// The same with at most so many bytes of updates waiting for tiles on disk.
-    pub fn with_pending_bytes(self, pending_bytes: usize) -> Self {
+    pub fn with_write_buffer_bytes(self, write_buffer_bytes: usize) -> Self {
         let tiles = match self.memory {
             MemoryLimit::Tiles { tiles, .. } => tiles,
             MemoryLimit::Bytes(_) | MemoryLimit::Tight(_) => usize::MAX,
         };
-        Self { memory: MemoryLimit::Tiles { tiles, pending_bytes }, ..self }
+        Self { memory: MemoryLimit::Tiles { tiles, write_buffer_bytes }, ..self }
     }
 
     /// The same with at most so many bytes for all that grows.
@@ -207,10 +220,10 @@ impl MapConfig {
         Self { storage, ..self }
     }
 
-    fn pending_bytes(&self) -> usize {
+    fn write_buffer_bytes(&self) -> usize {
         match self.memory {
-            MemoryLimit::Tiles { pending_bytes, .. } => pending_bytes,
-            MemoryLimit::Bytes(_) | MemoryLimit::Tight(_) => DEFAULT_PENDING_BYTES,
+            MemoryLimit::Tiles { write_buffer_bytes, .. } => write_buffer_bytes,
+            MemoryLimit::Bytes(_) | MemoryLimit::Tight(_) => DEFAULT_WRITE_BUFFER_BYTES,
         }
     }
 
@@ -288,12 +301,12 @@ impl VoxelCacheConfig {
 }
 
 /// Bytes of updates that wait, unless something else is asked for.
-const DEFAULT_PENDING_BYTES: usize = 32 << 20;
+const DEFAULT_WRITE_BUFFER_BYTES: usize = 32 << 20;
 
 impl MemoryLimit {
     /// So many tiles, however large they are.
     pub fn tiles(tiles: usize) -> Self {
-        Self::Tiles { tiles, pending_bytes: DEFAULT_PENDING_BYTES }
+        Self::Tiles { tiles, write_buffer_bytes: DEFAULT_WRITE_BUFFER_BYTES }
     }
 
     /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles of `n`

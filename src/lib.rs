@@ -10,7 +10,7 @@
 //! # fn main() -> voxtile::Result<()> {
 //! # let folder = tempfile::tempdir().unwrap();
 //! # let folder = folder.path().join("map_tiles");
-//! let config = MapConfig::new(0.1, 10.0)?.with_range(0.5, 60.0).with_cache_tiles(64);
+//! let config = MapConfig::new(0.1, 10.0)?.with_range(0.5, 60.0);
 //! let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
 //! let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
 //! let points: Vec<[f32; 3]> = vec![[4.25, 1.05, -1.45]]; // In the sensor's frame.
@@ -65,7 +65,9 @@ pub mod integrity;
 pub mod io;
 pub mod local;
 pub mod mapper;
+#[doc(hidden)]
 pub mod maths;
+#[doc(hidden)]
 pub mod octree;
 pub mod operations;
 #[doc(hidden)]
@@ -78,7 +80,9 @@ pub mod sensor;
 pub mod share;
 pub mod simulation;
 pub mod space;
+#[doc(hidden)]
 pub mod store;
+#[doc(hidden)]
 pub mod tile;
 
 pub use config::{
@@ -91,5 +95,8 @@ pub use mapper::{
 /// The crate of [`Pose::isometry`], in the version that voxtile uses.
 pub use nalgebra;
 pub use query::{Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy};
-pub use scan::{Pose, Scan, ScanPoints, ScanRef};
-pub use store::MapPath;
+pub use scan::{Pose, Scan, ScanPoints, ScanRef, ScanReport, Stop};
+pub use sensor::{Evidence, SensorModel};
+pub use space::{Aabb, Grid, Point, TileIndex, VoxelIndex};
+pub use store::{MapPath, SnapshotName};
+pub use tile::Voxel;

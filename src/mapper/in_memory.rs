@@ -11,6 +11,18 @@ use rayon::prelude::*;
 
 /// A map that lives in memory and ends with it. It has tiles too, and gives the answers of an
 /// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper) to the bit.
+///
+/// ```
+/// use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Scan};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
+/// map.insert_scan(&Scan { origin: [0.0; 3], points: vec![[4.0, 0.0, 0.0]], intensities: None })?;
+/// let nearest = map.nearest_occupied([3.0, 0.0, 0.0], 5.0)?;
+/// assert_eq!(nearest.map(|hit| hit.voxel), Some([40, 0, 0]));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct InMemoryMapper {
     config: MapConfig,

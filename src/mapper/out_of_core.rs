@@ -14,6 +14,23 @@ use std::sync::OnceLock;
 /// A map on disk with its active tiles in memory: bounded by the disk, never by memory.
 ///
 /// What was flushed survives a crash; what came after the last flush does not. Dropping a mapper does not flush.
+///
+/// ```
+/// use voxtile::{MapConfig, MapOptions, Mapper, Queries, Scan};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// # let folder = tempfile::tempdir().unwrap();
+/// # let city = folder.path().join("city");
+/// let options = MapOptions::new().config(MapConfig::new(0.1, 10.0)?).create_if_missing(true);
+/// let mut mapper = options.open(&city)?;
+/// mapper.insert_scan(&Scan { origin: [0.0; 3], points: vec![[4.0, 0.0, 0.0]], intensities: None })?;
+/// mapper.flush()?;
+/// drop(mapper);
+/// let mapper = options.open(&city)?;
+/// assert!(mapper.occupancy_at([4.05, 0.05, 0.05])?.is_occupied());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct OutOfCoreTileMapper {
     config: MapConfig,

@@ -16,13 +16,13 @@ pub struct MapStatistics {
     /// Sizes of the tiles in memory.
     pub cached: TileCounts,
     /// Tiles with buffered updates.
-    pub pending_tiles: u64,
+    pub buffered_tiles: u64,
     /// Buffered updates of voxels.
-    pub pending_updates: u64,
+    pub buffered_updates: u64,
     /// Bytes of memory that these updates occupy.
-    pub pending_bytes: u64,
+    pub buffered_bytes: u64,
     /// Bytes of such updates in files, because memory was short.
-    pub pending_file_bytes: u64,
+    pub spilled_bytes: u64,
     /// Tiles in memory in the compact form: not in use, and not counted above.
     pub compact_tiles: u64,
     /// Such tiles that are not on disk as they are.
@@ -48,11 +48,11 @@ pub struct MemoryCounts {
     /// Tiles in the compact form.
     pub compact_tiles: u64,
     /// Buffered updates.
-    pub pending: u64,
+    pub write_buffer: u64,
     /// Kept free for inserting scans: what the largest so far took.
     pub scan: u64,
     /// Tiles on their way to and from disk.
-    pub on_the_way: u64,
+    pub in_flight: u64,
     /// What is known of each tile without reading it.
     pub index: u64,
     /// What is kept for readers in other threads.
@@ -78,9 +78,9 @@ impl MemoryCounts {
     pub fn bytes(&self) -> u64 {
         self.tiles
             + self.compact_tiles
-            + self.pending
+            + self.write_buffer
             + self.scan
-            + self.on_the_way
+            + self.in_flight
             + self.index
             + self.readers
     }
@@ -97,9 +97,9 @@ pub struct IoCounts {
     /// Tiles written.
     pub saves: u64,
     /// Tiles that were brought into the compact form.
-    pub packed: u64,
+    pub encoded: u64,
     /// Tiles that came back from the compact form.
-    pub unpacked: u64,
+    pub decoded: u64,
     /// Queries and updates that found their tile in memory.
     pub hits: u64,
     /// Bytes read.

@@ -7,7 +7,7 @@ use crate::octree::{BrickValues, BtPruning, OctreeFormat, OctreeStream, StreamOu
 use crate::space::{Aabb, BRICK_EDGE, MortonCode, TileIndex, VoxelBox, VoxelIndex};
 use std::io::{self, Read, Seek, Write};
 
-/// Parameters of [`Queries::write_octree`](super::Queries::write_octree).
+/// Parameters of [`MapQueries::write_octree`](super::MapQueries::write_octree).
 #[derive(Clone, Copy, Debug)]
 pub struct OctreeExport<'a> {
     /// `.bt` or `.ot`. In `.bt` a voxel is occupied from the map's occupancy threshold on.

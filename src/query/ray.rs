@@ -6,6 +6,19 @@ use crate::scan::{MAX_RAY_STEPS, RayWalk};
 use crate::space::{BRICK_EDGE, BrickCode, Grid, Point, VoxelBox, VoxelIndex};
 
 /// A ray to be cast through the map.
+///
+/// ```
+/// use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, RayQuery, Scan, UnknownAs};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let mut map = InMemoryMapper::new(MapConfig::new(0.5, 10.0)?)?;
+/// map.insert_scan(&Scan { origin: [0.25; 3], points: vec![[4.25, 0.25, 0.25]], intensities: None })?;
+/// let (origin, direction) = ([0.25; 3], [1.0, 0.0, 0.0]);
+/// let ray = RayQuery { origin, direction, max_range_m: Some(50.0), unknown: UnknownAs::Free };
+/// assert_eq!(map.cast_ray(&ray)?.map(|hit| hit.distance_m), Some(3.75));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayQuery {
     /// Where the ray begins, in metres.

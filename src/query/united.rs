@@ -2,7 +2,7 @@ use super::collision::first_not_free;
 use super::occupied_set::check_resolutions;
 use super::ray::{EVERYWHERE, Met, walk_ray, walk_segment};
 use super::{Hit, Occupancy, Queries, RayQuery, Shape, UnknownAs, VoxelOccupancy, Voxels};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::space::{Aabb, Grid, Point, VoxelIndex};
 
 /// Several maps asked as one: a robot's archive with its local map, or with the layers of other robots.
@@ -45,10 +45,10 @@ impl<'a> United<'a> {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for no map, and for maps of different resolutions.
+    /// [`Error::InvalidArgument`] for no map, and for maps of different resolutions.
     pub fn new(maps: &[&'a dyn Queries]) -> Result<Self> {
         let Some(first) = maps.first() else {
-            return Err(crate::Error::argument("maps", "there are none; unite at least one"));
+            return Err(Error::argument("maps", "there are none; unite at least one"));
         };
         check_resolutions(maps.iter().map(|map| map.grid().resolution_m()))?;
         Ok(Self { maps: maps.to_vec(), grid: first.grid() })

@@ -120,7 +120,7 @@ impl<M: Mapper> AnyMapper for M {
 fn mappers(config: &MapConfig, folder: &TempDir) -> Vec<Box<dyn AnyMapper>> {
     let mut mappers: Vec<Box<dyn AnyMapper>> = vec![Box::new(InMemoryMapper::new(config.clone()).unwrap())];
     let little = [
-        config.clone().with_cache_tiles(4).with_pending_bytes(5_000),
+        config.clone().with_cache_tiles(4).with_write_buffer_bytes(5_000),
         config.clone().with_tight_memory_bytes(100_000),
     ];
     for config in little {

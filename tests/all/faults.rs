@@ -18,7 +18,7 @@ fn map() -> PathBuf {
 
 /// Room for two tiles and next to nothing that waits: every scan evicts.
 fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_pending_bytes(600)
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
 /// The same map with compact storage.
@@ -500,7 +500,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
 fn a_reload_that_fails_changes_nothing() {
     let oracle = Oracle::new();
     let disk = FaultyDisk::new(Fault::None);
-    let roomy = config().with_pending_bytes(1 << 20);
+    let roomy = config().with_write_buffer_bytes(1 << 20);
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &map()), roomy).unwrap();
     for (scan, number) in oracle.scans.iter().zip(1..) {
         mapper.insert_scan(scan).unwrap();

@@ -41,7 +41,7 @@ fn copy(from: &Path, to: &Path) {
 }
 
 fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 5.0).with_cache_tiles(2).with_pending_bytes(600)
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 5.0).with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
 fn scans() -> Vec<Scan> {

@@ -19,7 +19,7 @@ use voxtile::{
 type Voxels = BTreeMap<VoxelIndex, Occupancy>;
 
 fn config() -> MapConfig {
-    MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_pending_bytes(5_000)
+    MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_write_buffer_bytes(5_000)
 }
 
 fn everything() -> Aabb {

@@ -28,8 +28,9 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
 }
 
 /// Every folder and file of the library, and what of ours it may name.
-const LAYERS: [(&str, &[&str]); 22] = [
+const LAYERS: [(&str, &[&str]); 23] = [
     ("maths.rs", &[]),
+    ("path_text.rs", &[]),
     ("scratch.rs", &[]),
     ("error.rs", &["space"]),
     ("error", &["space"]),
@@ -55,10 +56,10 @@ const LAYERS: [(&str, &[&str]); 22] = [
         "operations",
         &["config", "error", "mapper", "maths", "persistence", "sensor", "space", "store", "tile"],
     ),
-    ("integrity", &["config", "error", "persistence", "space", "store", "tile"]),
+    ("integrity", &["config", "error", "path_text", "persistence", "space", "store", "tile"]),
     ("simulation", &["maths", "scan", "space"]),
     // It explains, and names what callers use.
-    ("lib.rs", &["config", "error", "mapper", "query", "scan"]),
+    ("lib.rs", &["config", "error", "mapper", "query", "scan", "sensor", "space", "store", "tile"]),
 ];
 
 #[test]

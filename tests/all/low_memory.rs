@@ -60,7 +60,7 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
         expected.insert_scan(scan).unwrap();
         let statistics = mapper.statistics();
         most = most.max(statistics.memory.bytes());
-        assert_eq!(statistics.memory.pending, statistics.pending_bytes);
+        assert_eq!(statistics.memory.write_buffer, statistics.buffered_bytes);
         assert!(statistics.dirty_compact_tiles <= statistics.compact_tiles);
         assert!(statistics.cached_tiles + statistics.compact_tiles <= statistics.tiles);
     }
@@ -70,12 +70,12 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     assert!(in_memory > 4 * BYTES as u64, "{in_memory} bytes do not need more than the limit");
     // A scan's updates are counted before they are known to the byte.
     assert!(most < 2 * BYTES as u64, "{most} bytes");
-    assert!(statistics.io.packed > 20 && statistics.io.unpacked > 0, "{:?}", statistics.io);
+    assert!(statistics.io.encoded > 20 && statistics.io.decoded > 0, "{:?}", statistics.io);
     assert!(statistics.compact_tiles > 0 && statistics.memory.compact_tiles > 0);
     mapper.flush().unwrap();
     let flushed = mapper.statistics();
-    assert_eq!((flushed.dirty_tiles, flushed.dirty_compact_tiles, flushed.pending_tiles), (0, 0, 0));
-    assert_eq!(flushed.memory.on_the_way, 0);
+    assert_eq!((flushed.dirty_tiles, flushed.dirty_compact_tiles, flushed.buffered_tiles), (0, 0, 0));
+    assert_eq!(flushed.memory.in_flight, 0);
     let written = flushed.io.bytes_written as f64 / flushed.disk_bytes as f64;
     assert!(written < 4.0, "{written} bytes written for each of the map's");
     assert_eq!(flushed.stalls.count == 0, flushed.stalls.worst_us == 0);
@@ -126,7 +126,7 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
         let mut most_in_files = 0;
         for scan in &scans {
             mapper.insert_scan(scan).unwrap();
-            most_in_files = most_in_files.max(mapper.statistics().pending_file_bytes);
+            most_in_files = most_in_files.max(mapper.statistics().spilled_bytes);
         }
         let statistics = mapper.statistics();
         assert!(most_in_files > 100_000, "{most_in_files} bytes in files");
@@ -136,7 +136,7 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
         mapper.flush().unwrap();
         assert_eq!(MapReader::open(&path, 2).unwrap().digest().unwrap(), digest);
         let statistics = mapper.statistics();
-        assert_eq!(statistics.pending_file_bytes, 0);
+        assert_eq!(statistics.spilled_bytes, 0);
         let written = statistics.io.bytes_written as f64 / statistics.disk_bytes as f64;
         assert!(written < 4.0, "{written} bytes written for each of the map's");
     }

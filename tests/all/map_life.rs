@@ -17,7 +17,7 @@ fn map() -> &'static Path {
 }
 
 fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_pending_bytes(600)
+    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
 /// What people do with a map, each in a process of its own.

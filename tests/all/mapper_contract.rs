@@ -72,9 +72,10 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             (10_000, 0, OctoMap),
             (10_000, 0, Compact),
         ];
-        for (cache_tiles, pending_bytes, storage) in kinds {
+        for (cache_tiles, write_buffer_bytes, storage) in kinds {
             let folder = TempDir::new().unwrap();
-            let config = config.clone().with_cache_tiles(cache_tiles).with_pending_bytes(pending_bytes);
+            let config =
+                config.clone().with_cache_tiles(cache_tiles).with_write_buffer_bytes(write_buffer_bytes);
             let config = config.with_storage(storage);
             let mut reference = ReferenceMap::new(&config);
             let mut mapper = OutOfCoreTileMapper::create(

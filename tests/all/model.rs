@@ -65,7 +65,7 @@ fn any_life_of_a_map_equals_the_naive_map_as_of_then() {
             .clone()
             .with_insert_mode(mode)
             .with_cache_tiles(1 + (seed as usize * 5) % 17)
-            .with_pending_bytes((seed as usize % 4) * 3000);
+            .with_write_buffer_bytes((seed as usize % 4) * 3000);
         if seed % 2 == 1 {
             config = config.with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
         }

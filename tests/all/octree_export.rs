@@ -92,7 +92,7 @@ fn dirty_tiles_and_waiting_updates_are_in_the_file_and_the_tiles_in_memory_stay(
         }
     }
     let before = (map.statistics(), map.cached_tile_indices());
-    assert!(before.0.pending_tiles > 0 && before.0.dirty_tiles > 0);
+    assert!(before.0.buffered_tiles > 0 && before.0.dirty_tiles > 0);
     for format in FORMATS {
         let (_, bytes) = streamed(&map, format, None, 10_000).unwrap();
         assert!(bytes == whole(&naive, format, None), "{format:?}");
@@ -100,7 +100,7 @@ fn dirty_tiles_and_waiting_updates_are_in_the_file_and_the_tiles_in_memory_stay(
     assert_eq!(map.digest().unwrap(), naive.digest().unwrap());
     assert_eq!(map.all_occupied_voxels(None).unwrap(), naive.all_occupied_voxels(None).unwrap());
     let after = map.statistics();
-    assert_eq!((after.pending_updates, map.cached_tile_indices()), (before.0.pending_updates, before.1));
+    assert_eq!((after.buffered_updates, map.cached_tile_indices()), (before.0.buffered_updates, before.1));
     assert_eq!((after.dirty_tiles, after.io.saves), (before.0.dirty_tiles, before.0.io.saves));
     map.flush().unwrap();
     check(&MapReader::open(folder.path().join("map"), 1).unwrap(), None);

@@ -13,7 +13,7 @@ use voxtile::{
 };
 
 fn config() -> MapConfig {
-    MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_pending_bytes(5_000)
+    MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_write_buffer_bytes(5_000)
 }
 
 /// The same map in memory and out of core with updates still waiting.

@@ -20,7 +20,7 @@ fn name(name: &str) -> SnapshotName {
 
 fn config(storage: Storage) -> MapConfig {
     let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage);
-    config.with_cache_tiles(2).with_pending_bytes(600)
+    config.with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
 fn scan(seed: u64) -> Scan {

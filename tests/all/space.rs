@@ -18,7 +18,7 @@ fn far_negative_and_border_tiles_come_back_to_the_bit() {
         [-1e7, 1e7, -1e7],
     ];
     let folder = TempDir::new().unwrap();
-    let config = MapConfig::new(0.1, 1.6).unwrap().with_cache_tiles(3).with_pending_bytes(10_000);
+    let config = MapConfig::new(0.1, 1.6).unwrap().with_cache_tiles(3).with_write_buffer_bytes(10_000);
     let path = folder.path().join("map");
     let mut mapper =
         OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()).unwrap();

@@ -11,7 +11,7 @@ use voxtile::space::TileIndex;
 use voxtile::{Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 
 fn config() -> MapConfig {
-    MapConfig::new(0.1, 3.2).unwrap().with_cache_tiles(2).with_pending_bytes(1000)
+    MapConfig::new(0.1, 3.2).unwrap().with_cache_tiles(2).with_write_buffer_bytes(1000)
 }
 
 /// A flushed map of a few tiles.

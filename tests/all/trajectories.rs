@@ -7,7 +7,7 @@ use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper, Scan};
 fn check(name: &str, resolution_m: f64, scans: impl Iterator<Item = Scan>) -> u64 {
     let folder = TempDir::new().unwrap();
     let config = MapConfig::new(resolution_m, 8.0 * resolution_m).unwrap();
-    let small = config.clone().with_cache_tiles(4).with_pending_bytes(1 << 20);
+    let small = config.clone().with_cache_tiles(4).with_write_buffer_bytes(1 << 20);
     let mut naive = InMemoryMapper::new(config).unwrap();
     let mut map = OutOfCoreTileMapper::create(folder.path().join("map"), small).unwrap();
     for scan in scans {

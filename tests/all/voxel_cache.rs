@@ -82,7 +82,7 @@ fn every_mode_gives_the_naive_map_and_its_maxima_whatever_the_threads_and_the_ma
 
                 let folder = TempDir::new().unwrap();
                 let path = folder.path().join("map");
-                let config = config.clone().with_cache_tiles(3).with_pending_bytes(3000);
+                let config = config.clone().with_cache_tiles(3).with_write_buffer_bytes(3000);
                 let mut reference = ReferenceMap::new(&config);
                 let mut mapper =
                     OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone())
@@ -134,7 +134,7 @@ fn live(seed: u64, mode: VoxelCacheMode) {
         .with_insert_mode(insert_mode)
         .with_voxel_cache(mode)
         .with_cache_tiles(1 + seed as usize * 7 % 40)
-        .with_pending_bytes(seed as usize % 3 * 4000);
+        .with_write_buffer_bytes(seed as usize % 3 * 4000);
     let mut random = Random(seed);
     let mut mapper =
         OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config.clone()).unwrap();

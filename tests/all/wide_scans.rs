@@ -45,10 +45,10 @@ fn a_scan_of_more_updates_than_memory_is_taken_whole() {
                 if bytes == 0 {
                     assert_eq!(expected.insert_scan(scan).unwrap(), report);
                 }
-                in_files = in_files.max(mapper.statistics().pending_file_bytes);
+                in_files = in_files.max(mapper.statistics().spilled_bytes);
                 if number == 3 {
                     mapper.flush().unwrap();
-                    assert_eq!(mapper.statistics().pending_file_bytes, 0);
+                    assert_eq!(mapper.statistics().spilled_bytes, 0);
                 }
                 let point = scan.points[7];
                 mapper.occupancy_at(point).unwrap();
@@ -127,11 +127,7 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
             let waits = |path: &PathBuf| path.ends_with("updates.next");
             let bytes: usize =
                 disk.files().iter().filter(|(path, _)| waits(path)).map(|(_, bytes)| bytes.len()).sum();
-            assert_eq!(
-                mapper.statistics().pending_file_bytes,
-                bytes as u64,
-                "of a scan that is not in the map"
-            );
+            assert_eq!(mapper.statistics().spilled_bytes, bytes as u64, "of a scan that is not in the map");
             assert_eq!(mapper.digest().unwrap(), digests[1], "refused at {at}");
             mapper.insert_scan(&scans[2]).unwrap();
         }
@@ -162,7 +158,7 @@ fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on()
         assert_eq!(mapper.insert_scan(&scan).unwrap(), expected.insert_scan(&scan).unwrap());
         assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
     }
-    assert_eq!(mapper.statistics().pending_file_bytes, 0);
+    assert_eq!(mapper.statistics().spilled_bytes, 0);
 }
 
 /// New tiles are made while there is room, and long level rays make each much larger than its updates are.
@@ -182,7 +178,7 @@ fn many_new_tiles_at_once_stay_within_the_limit() {
     mapper.insert_scan(&scan).unwrap();
     let statistics = mapper.statistics();
     let memory = statistics.memory;
-    assert!(statistics.cached_tiles > 500 && memory.pending > 0, "{statistics:?}");
+    assert!(statistics.cached_tiles > 500 && memory.write_buffer > 0, "{statistics:?}");
     // Three eighths wait for tiles in the compact form. The last tiles that were made may be beyond.
     let beyond = (memory.bytes() + LIMIT_BYTES / 8 * 3).saturating_sub(LIMIT_BYTES);
     assert!(beyond < 14 << 20, "{beyond} bytes beyond: {memory:?}");

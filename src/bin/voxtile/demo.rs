@@ -29,7 +29,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         .with_range(0.0, 40.0)
         .with_octree(octree_config(&args.octree)?)
         .with_cache_tiles(args.cache_tiles)
-        .with_pending_bytes(4 << 20)
+        .with_write_buffer_bytes(4 << 20)
         .with_storage(args.storage.into());
     let (mut mapper, done) = begin(args, &map, config)?;
     mapper.stop_with(stop.clone());

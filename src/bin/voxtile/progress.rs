@@ -70,9 +70,9 @@ impl Progress {
         if self.bar.is_hidden() || !self.bar.position().is_multiple_of(8) {
             return;
         }
-        let MapStatistics { tiles, cached_tiles, pending_tiles, stalls, .. } = mapper.statistics();
+        let MapStatistics { tiles, cached_tiles, buffered_tiles, stalls, .. } = mapper.statistics();
         let memory = resident_bytes().map_or(String::new(), |bytes| format!(", {}", HumanBytes(bytes)));
-        let waiting = match pending_tiles {
+        let waiting = match buffered_tiles {
             0 => String::new(),
             tiles => format!(", updates wait for {tiles}"),
         };

@@ -152,7 +152,7 @@ impl Summary {
 
 impl Summary {
     fn print_io(&self, out: &mut impl Write) -> std::io::Result<()> {
-        let IoCounts { bytes_read, bytes_written, packed, unpacked, .. } = self.io;
+        let IoCounts { bytes_read, bytes_written, encoded, decoded, .. } = self.io;
         writeln!(
             out,
             "tile I/O  {} read ({}), {} written ({})",
@@ -161,8 +161,13 @@ impl Summary {
             HumanCount(self.saves),
             HumanBytes(bytes_written)
         )?;
-        if packed > 0 {
-            writeln!(out, "packed    {} tiles, {} unpacked", HumanCount(packed), HumanCount(unpacked))?;
+        if encoded > 0 {
+            writeln!(
+                out,
+                "compact   {} tiles encoded, {} decoded",
+                HumanCount(encoded),
+                HumanCount(decoded)
+            )?;
         }
         let StallCounts { count, p50_us, p99_us, worst_us, .. } = self.stalls;
         if count > 0 {

@@ -13,6 +13,25 @@ use std::sync::Arc;
 /// together ask a [`LiveView`].
 ///
 /// After the mapper is dropped it goes on seeing the last scan, until another writer opens the map.
+///
+/// ```
+/// use voxtile::{MapOptions, Mapper, Queries, Scan, Shape, UnknownAs};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// # let folder = tempfile::tempdir().unwrap();
+/// let mut mapper = MapOptions::new().create_if_missing(true).open(folder.path().join("map"))?;
+/// let reader = mapper.reader()?;
+/// let planner = std::thread::spawn(move || {
+///     let view = reader.view(); // Several questions about one scan.
+///     let body = Shape::Sphere { center: [2.0, 0.0, 0.0], radius_m: 0.4 };
+///     view.collision(&body, UnknownAs::Free)
+/// });
+/// mapper.insert_scan(&Scan { origin: [0.0; 3], points: vec![[4.0, 0.0, 0.0]], intensities: None })?;
+/// mapper.flush()?;
+/// assert_eq!(planner.join().unwrap()?, None);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct LiveReader(Arc<Shared>);
 

@@ -57,7 +57,7 @@ impl LiveView {
 
 impl Drop for LiveView {
     fn drop(&mut self) {
-        self.shared.contents.lock_to_read().close_view(self.id);
+        self.shared.contents.close_view(self.id);
     }
 }
 

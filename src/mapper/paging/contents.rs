@@ -75,11 +75,6 @@ impl TileContents {
         self.views.open()
     }
 
-    /// Ends a look at the map.
-    pub(in crate::mapper) fn close_view(&mut self, view: ViewId) {
-        self.views.close(view);
-    }
-
     /// A tile as a view sees it, and whether it has changed since: then nobody keeps the files that it is made of.
     ///
     /// # Errors

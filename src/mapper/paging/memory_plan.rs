@@ -31,10 +31,10 @@ pub(in crate::mapper) struct MemoryPlan {
 impl MemoryPlan {
     pub(in crate::mapper) fn new(limit: MemoryLimit) -> Self {
         match limit {
-            MemoryLimit::Tiles { tiles, pending_bytes } => Self {
+            MemoryLimit::Tiles { tiles, write_buffer_bytes } => Self {
                 tiles,
                 bytes: usize::MAX,
-                buffer_bytes: pending_bytes,
+                buffer_bytes: write_buffer_bytes,
                 scan_bytes: usize::MAX,
                 updates_bytes: usize::MAX,
                 least_scan_bytes: 0,

@@ -37,7 +37,7 @@ impl PagedTiles {
     pub(in crate::mapper) fn pager(&self) -> TilePager<'_> {
         // A panic in a query leaves no update half applied.
         let disk = self.disk.lock().unwrap_or_else(PoisonError::into_inner);
-        TilePager { config: &self.config, contents: self.contents.lock(), disk }
+        TilePager { config: &self.config, shared: &self.contents, contents: self.contents.lock(), disk }
     }
 
     /// What readers share with the mapper.

@@ -284,8 +284,8 @@ impl TileCache {
         statistics.compact_tiles = self.compact.len() as u64;
         statistics.dirty_compact_tiles = self.compact.dirty() as u64;
         statistics.octrees = self.octrees.statistics();
-        let IoCounts { packed, unpacked, hits, .. } = &mut statistics.io;
-        (*packed, *unpacked, *hits) = (self.encoded, self.decoded, self.hits);
+        let IoCounts { encoded, decoded, hits, .. } = &mut statistics.io;
+        (*encoded, *decoded, *hits) = (self.encoded, self.decoded, self.hits);
         self.resident.iter().for_each(|tile| statistics.cached += tile.counts());
     }
 }

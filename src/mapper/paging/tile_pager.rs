@@ -1,4 +1,4 @@
-use super::shared_contents::{ContentsGuard, unlocked};
+use super::shared_contents::{ContentsGuard, SharedContents, unlocked};
 use super::tile_cache::Cached;
 use super::tile_disk::TileDisk;
 use super::write_buffer::WriteBuffer;
@@ -22,6 +22,7 @@ use std::sync::{Arc, MutexGuard};
 #[derive(Debug)]
 pub(in crate::mapper) struct TilePager<'a> {
     pub(super) config: &'a MapConfig,
+    pub(super) shared: &'a SharedContents,
     pub(super) contents: ContentsGuard<'a>,
     pub(super) disk: MutexGuard<'a, TileDisk>,
 }
@@ -98,6 +99,7 @@ impl TilePager<'_> {
         let touched =
             updates.tiles.iter().map(|(index, _)| *index).chain(self.contents.buffer.staged_tiles());
         let touched: Vec<_> = touched.collect();
+        self.shared.wait_for_views(&mut self.contents);
         self.contents.keep_for_views(touched.iter().copied());
         let bounds =
             TileBox::of(touched.into_iter()).into_iter().chain(self.contents.bounds).reduce(TileBox::union);
@@ -449,8 +451,8 @@ impl TilePager<'_> {
     /// Bytes of memory of all that grows, by what they hold.
     pub(super) fn memory(&self) -> MemoryCounts {
         MemoryCounts {
-            pending: self.contents.buffer.bytes() as u64,
-            on_the_way: self.disk.in_flight_bytes() as u64,
+            write_buffer: self.contents.buffer.bytes() as u64,
+            in_flight: self.disk.in_flight_bytes() as u64,
             index: (self.disk.index_bytes() + self.disk.commit_bytes()) as u64,
             readers: self.contents.views.bytes() as u64,
             ..self.contents.cache.memory()

@@ -20,6 +20,8 @@ pub(super) struct Views {
     past_bytes: usize,
     /// Views opened before have expired.
     kept_since: u64,
+    /// Views opened before last: nobody waits for them any more.
+    lasting_before: u64,
     /// Which version of each tile is on disk, from the first reader on: the store belongs to the mapper.
     disk: Option<DiskIndex>,
 }
@@ -42,36 +44,48 @@ impl Views {
         !self.open.is_empty()
     }
 
+    /// Whether there are any that may be closed soon.
+    pub(super) fn may_close_soon(&self) -> bool {
+        self.open.last_key_value().is_some_and(|(newest, _)| *newest >= self.lasting_before)
+    }
+
+    /// Notes that those which are open will last.
+    pub(super) fn expect_no_close(&mut self) {
+        self.lasting_before = self.now + 1;
+    }
+
     pub(super) fn open(&mut self) -> ViewId {
         *self.open.entry(self.now).or_default() += 1;
         ViewId(self.now)
     }
 
-    pub(super) fn close(&mut self, ViewId(view): ViewId) {
-        if let Some(count) = self.open.get_mut(&view) {
-            *count -= 1;
-            if *count == 0 {
-                self.open.remove(&view);
-                self.release();
-            }
+    /// Closes a view; returns what nobody can ask for any more.
+    pub(super) fn close(&mut self, ViewId(view): ViewId) -> Vec<TileState> {
+        let Some(count) = self.open.get_mut(&view) else { return Vec::new() };
+        *count -= 1;
+        if *count > 0 {
+            return Vec::new();
         }
+        self.open.remove(&view);
+        self.release()
     }
 
-    /// Drops what no view can ask for any more.
-    fn release(&mut self) {
+    /// Lets go of what no view can ask for any more.
+    fn release(&mut self) -> Vec<TileState> {
         let Some((&oldest, _)) = self.open.first_key_value() else { return self.forget() };
-        let mut dropped = 0;
+        let mut released = Vec::new();
         self.past.retain(|_, states| {
             let kept = states.partition_point(|(until, _)| *until < oldest);
-            dropped += states.drain(..kept).map(|(_, state)| state.bytes()).sum::<usize>();
+            released.extend(states.drain(..kept).map(|(_, state)| state));
             !states.is_empty()
         });
-        self.past_bytes -= dropped;
+        self.past_bytes -= released.iter().map(TileState::bytes).sum::<usize>();
+        released
     }
 
-    fn forget(&mut self) {
-        self.past = FxHashMap::default();
+    fn forget(&mut self) -> Vec<TileState> {
         self.past_bytes = 0;
+        std::mem::take(&mut self.past).into_values().flatten().map(|(_, state)| state).collect()
     }
 
     /// Whether somebody may ask for a tile as it is now, once it has changed.
@@ -91,7 +105,7 @@ impl Views {
     pub(super) fn expire(&mut self) {
         log::debug!("views of the map expired: what they held took too much memory");
         self.kept_since = self.now + 1;
-        self.forget();
+        drop(self.forget());
     }
 
     /// Notes that what the tiles hold is about to change.

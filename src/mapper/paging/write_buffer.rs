@@ -121,9 +121,9 @@ impl WriteBuffer {
 
     /// Adds the buffer's part of the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
-        statistics.pending_tiles = self.buffered.len() as u64;
-        statistics.pending_updates = self.buffered.updates();
-        statistics.pending_bytes = self.buffered.bytes() as u64;
-        statistics.pending_file_bytes = self.buffered.file_bytes();
+        statistics.buffered_tiles = self.buffered.len() as u64;
+        statistics.buffered_updates = self.buffered.updates();
+        statistics.buffered_bytes = self.buffered.bytes() as u64;
+        statistics.spilled_bytes = self.buffered.file_bytes();
     }
 }

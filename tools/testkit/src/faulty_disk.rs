@@ -744,11 +744,11 @@ impl Disk for FaultyDisk {
             return Err(io::ErrorKind::DirectoryNotEmpty.into());
         }
         let on_medium = state.names_on_medium.iter();
-        let on_the_way = state.unsynced_names.iter().filter_map(|change| match change {
+        let in_flight = state.unsynced_names.iter().filter_map(|change| match change {
             NameChange::Put(name, entry) => Some((name, entry)),
             _ => None,
         });
-        let in_it = on_medium.chain(on_the_way).filter(|(name, _)| name.starts_with(path));
+        let in_it = on_medium.chain(in_flight).filter(|(name, _)| name.starts_with(path));
         let files = in_it.filter_map(|(_, entry)| match entry {
             Entry::File(inode) => Some(*inode),
             Entry::Folder => None,

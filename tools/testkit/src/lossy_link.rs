@@ -9,7 +9,7 @@ pub struct LossyLink {
     /// Every packet takes between nothing and so long.
     pub max_delay: Duration,
     pub is_cut: bool,
-    on_the_way: Vec<(Duration, Vec<u8>)>,
+    in_flight: Vec<(Duration, Vec<u8>)>,
     /// Bytes that were sent, whether or not they arrive.
     pub bytes: u64,
     pub packets: u64,
@@ -19,14 +19,14 @@ pub struct LossyLink {
 impl LossyLink {
     pub fn new(seed: u64, loss: f64, repetition: f64, max_delay: Duration) -> Self {
         let random = Random::of(seed, &[]);
-        let on_the_way = Vec::new();
+        let in_flight = Vec::new();
         Self {
             random,
             loss,
             repetition,
             max_delay,
             is_cut: false,
-            on_the_way,
+            in_flight,
             bytes: 0,
             packets: 0,
             max_packet: 0,
@@ -41,16 +41,16 @@ impl LossyLink {
         for _ in 0..copies {
             let delay = self.max_delay.mul_f64(self.random.between(0.0, 1.0));
             if !self.is_cut && !self.random.chance(self.loss) {
-                self.on_the_way.push((now + delay, packet.to_vec()));
+                self.in_flight.push((now + delay, packet.to_vec()));
             }
         }
     }
 
     /// What has arrived by now, in the order of arrival.
     pub fn arrived(&mut self, now: Duration) -> Vec<Vec<u8>> {
-        let all = std::mem::take(&mut self.on_the_way);
+        let all = std::mem::take(&mut self.in_flight);
         let (mut arrived, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|(at, _)| *at <= now);
-        self.on_the_way = rest;
+        self.in_flight = rest;
         arrived.sort_by_key(|(at, _)| *at);
         arrived.into_iter().map(|(_, packet)| packet).collect()
     }

@@ -21,6 +21,8 @@ impl SharedContents {
         ContentsGuard { contents: &self.0, guard: Some(self.0.lock().unwrap()) }
     }
 
+    pub(super) fn wait_for_views(&self, _: &mut ContentsGuard<'_>) {}
+
     pub(in crate::mapper) fn lock_to_read(&self) -> ContentsGuard<'_> {
         self.lock()
     }

@@ -1,0 +1,56 @@
+//! Writes the occupied voxels of a map as PLY, with progress and a way to stop:
+//! `cargo run --release --example exporter -- map_tiles_example occupied.ply`.
+
+use std::error::Error;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
+use voxtile::{MapOptions, MapView, Occupancy};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [map, file] = arguments.as_slice() else {
+        return Err("usage: exporter MAP FILE.ply; Enter stops it".into());
+    };
+    let map = MapOptions::new().memory_bytes(64 << 20).open_read_only(map)?;
+    let (_, occupied) =
+        map.voxel_counts().ok_or("a map of the original format; `voxtile build` upgrades it")?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = stop.clone();
+    thread::spawn(move || {
+        // An end of the input is no wish to stop.
+        let is_line = std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0);
+        asked.store(is_line, Ordering::Relaxed);
+    });
+
+    let (grid, origin_m) = (map.config().grid, [0.0; 3]);
+    let header =
+        VoxelFile { format: VoxelFormat::Ply, voxels: occupied, resolution_m: grid.resolution_m(), origin_m };
+    let mut out = VoxelWriter::new(header, BufWriter::new(File::create(file)?))?;
+    let all = map.tile_indices().len();
+    for (done, tile) in map.tiles().enumerate() {
+        if stop.load(Ordering::Relaxed) {
+            drop(out);
+            std::fs::remove_file(file)?;
+            return Err("stopped as asked; nothing is written".into());
+        }
+        for voxel in tile?.voxels() {
+            let found = Occupancy::of(map.config(), Some(voxel.evidence));
+            if let Occupancy::Occupied(probability) = found {
+                out.write(&VoxelRecord {
+                    center_m: grid.center_m(voxel.index),
+                    probability,
+                    log_odds: voxel.evidence.log_odds,
+                    observation_count: voxel.evidence.observation_count,
+                })?;
+            }
+        }
+        eprint!("\r{} of {all} tiles", done + 1);
+    }
+    out.finish()?.flush()?;
+    eprintln!("; {occupied} voxels");
+    Ok(())
+}

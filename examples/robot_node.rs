@@ -1,0 +1,55 @@
+//! A robot's node: scans come in one thread, a planner asks in another: `cargo run --release --example robot_node`.
+
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
+use voxtile::simulation::Survey;
+use voxtile::{MapConfig, MapOptions, Mapper, Queries, Scan, Shape, UnknownAs};
+
+const SCANS: usize = 40;
+
+fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    let folder = std::env::temp_dir().join(format!("voxtile_robot_node_{}", std::process::id()));
+    let config = MapConfig::new(0.2, 10.0)?.with_range(0.5, 60.0);
+    let options = MapOptions::new().config(config).create_if_missing(true).memory_bytes(128 << 20);
+    let mut mapper = options.open(&folder)?;
+    let reader = mapper.reader()?;
+    let (sensor, scans) = mpsc::sync_channel::<Scan>(4);
+    let (goal, goals) = mpsc::channel();
+
+    thread::scope(|scope| {
+        // The lidar's driver. It waits if mapping falls behind.
+        scope.spawn(move || Survey::demo(1).take(SCANS).try_for_each(|scan| sensor.send(scan)));
+
+        // The planner, 40 times a second: it waits for no flush.
+        let planner = scope.spawn(move || -> voxtile::Result<(u32, u32)> {
+            let (mut asked, mut blocked) = (0, 0);
+            while let Some(at) = goals.iter().next() {
+                let at: [f64; 3] = at;
+                let view = reader.view(); // One scan for all questions of this round.
+                for ahead_m in [2.0, 5.0, 10.0] {
+                    let body =
+                        Shape::SweptSphere { from: at, to: [at[0], at[1] + ahead_m, at[2]], radius_m: 0.4 };
+                    asked += 1;
+                    blocked += u32::from(view.collision(&body, UnknownAs::Free)?.is_some());
+                }
+                thread::sleep(Duration::from_millis(25));
+            }
+            Ok((asked, blocked))
+        });
+
+        for (number, scan) in scans.iter().enumerate() {
+            mapper.insert_scan(&scan)?;
+            goal.send(scan.origin)?;
+            if number % 10 == 9 {
+                mapper.flush()?; // What is mapped up to here survives a crash.
+            }
+        }
+        drop(goal);
+        let (asked, blocked) = planner.join().map_err(|_| "the planner panicked")??;
+        println!("{SCANS} scans mapped; {blocked} of {asked} ways blocked");
+        Ok::<_, Box<dyn std::error::Error + Send + Sync>>(())
+    })?;
+    std::fs::remove_dir_all(&folder)?;
+    Ok(())
+}
