@@ -27,7 +27,7 @@ fn scan(number: u64) -> Scan {
 
 /// A map of two scans, flushed after each, so that tiles are of different scans.
 fn map(disk: &FaultyDisk, config: MapConfig) -> blake3::Hash {
-    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &place("map")), config).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), place("map")), config).unwrap();
     mapper.begin_input(INPUT).unwrap();
     for number in 0..2 {
         mapper.insert_scan(&scan(number)).unwrap();
@@ -37,7 +37,7 @@ fn map(disk: &FaultyDisk, config: MapConfig) -> blake3::Hash {
 }
 
 fn reader(disk: &FaultyDisk, name: &str) -> Result<MapReader> {
-    MapReader::open(MapPath::on(disk.shared(), &place(name)), 1)
+    MapReader::open(MapPath::on(disk.shared(), place(name)), 1)
 }
 
 fn converted(disk: &FaultyDisk, from: &str, to: &str, storage: Storage) -> Result<()> {
@@ -78,7 +78,7 @@ fn there_and_back_the_content_stays_and_the_files_are_the_same() {
             assert_eq!(ids[0], ids[1]);
             let mut found = Vec::new();
             let verified = verify(
-                MapPath::on(disk.shared(), &place(name)),
+                MapPath::on(disk.shared(), place(name)),
                 |finding| found.push(finding.clone()),
                 |_, _| (),
             );
@@ -103,7 +103,7 @@ fn a_build_goes_on_with_the_other_form_as_with_the_first() {
     converted(&disk, "map", "small", Storage::Compact).unwrap();
     let digests = ["map", "small"].map(|name| {
         let mut mapper =
-            OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &place(name)), config()).unwrap();
+            OutOfCoreTileMapper::open(MapPath::on(disk.shared(), place(name)), config()).unwrap();
         assert_eq!(mapper.resume_input(INPUT).unwrap(), 2);
         for number in [1, 2] {
             mapper.insert_scan(&scan(number)).unwrap();
@@ -118,8 +118,7 @@ fn a_build_goes_on_with_the_other_form_as_with_the_first() {
 #[test]
 fn a_map_made_of_one_whose_metadata_is_behind_has_its_scans_all_the_same() {
     let disk = FaultyDisk::new(Fault::None);
-    let mut mapper =
-        OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &place("map")), config()).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), place("map")), config()).unwrap();
     mapper.begin_input(INPUT).unwrap();
     let metadata = place("map/metadata.json");
     let behind = disk.files()[&metadata].clone();
@@ -133,8 +132,7 @@ fn a_map_made_of_one_whose_metadata_is_behind_has_its_scans_all_the_same() {
     for made in ["map", "small", "part"] {
         assert_eq!(reader(&disk, made).unwrap().scan_number(), 1, "{made}");
     }
-    let mut mapper =
-        OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &place("small")), config()).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), place("small")), config()).unwrap();
     assert_eq!(mapper.resume_input(INPUT).unwrap(), 1);
 }
 

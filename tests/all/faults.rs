@@ -74,7 +74,7 @@ impl Oracle {
 }
 
 fn create(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
-    match OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &map()), oracle.config.clone()) {
+    match OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), oracle.config.clone()) {
         // An attempt that failed at its very end has made the map.
         Err(Error::AlreadyExists { .. }) => open(disk, oracle),
         created => created,
@@ -82,7 +82,7 @@ fn create(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
 }
 
 fn open(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
-    OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &map()), oracle.config.clone())
+    OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), oracle.config.clone())
 }
 
 fn open_or_create(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
@@ -162,7 +162,7 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
         if !FLUSHED.contains(&number) {
             continue;
         }
-        let reader = || MapReader::open(MapPath::on(disk.shared(), &map()), 1);
+        let reader = || MapReader::open(MapPath::on(disk.shared(), map()), 1);
         readers.push(insist(disk, &mut (), nothing, |_| reader())?);
         reached.tried = number;
         insist(disk, &mut mapper, look, |mapper| mapper.flush())?;
@@ -193,7 +193,7 @@ fn undisturbed(oracle: &Oracle) -> FaultyDisk {
 /// on from there to the same end.
 fn check_after_crash(disk: &FaultyDisk, oracle: &Oracle, reached: Reached, what: &str) {
     let allowed = [reached.safe, reached.tried];
-    match MapReader::open(MapPath::on(disk.shared(), &map()), 1) {
+    match MapReader::open(MapPath::on(disk.shared(), map()), 1) {
         Ok(reader) => {
             assert!(allowed.contains(&(reader.scan_number() as usize)), "{what}: {reached:?}");
             oracle.check(&reader, what);
@@ -226,7 +226,7 @@ fn fail_once_at_every_operation(oracle: &Oracle) {
         assert!(reached.finished, "{fault:?}");
         // What was said to be safe is on the medium.
         let left = disk.after_crash(Unsynced::Dropped);
-        let reader = MapReader::open(MapPath::on(left.shared(), &map()), 1)
+        let reader = MapReader::open(MapPath::on(left.shared(), map()), 1)
             .unwrap_or_else(|error| panic!("{fault:?}: {error:#}"));
         assert_eq!(reader.scan_number() as usize, oracle.scans.len(), "{fault:?}");
         oracle.check(&reader, &format!("{fault:?}"));
@@ -245,7 +245,7 @@ fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_o
                 reached = live(&disk, &oracle);
             }
             assert!(reached.finished, "{operation}");
-            let reader = MapReader::open(MapPath::on(disk.shared(), &map()), 1).unwrap();
+            let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap();
             oracle.check(&reader, &format!("operation {operation}"));
         }
     }
@@ -287,7 +287,7 @@ fn fail_and_crash_short_of_memory(oracle: &Oracle) {
             let reached = live(&disk, oracle);
             let left = disk.after_crash(Unsynced::Shuffled(at));
             if reached.finished {
-                let reader = MapReader::open(MapPath::on(left.shared(), &map()), 1);
+                let reader = MapReader::open(MapPath::on(left.shared(), map()), 1);
                 oracle.check(&reader.unwrap_or_else(|error| panic!("{fault:?}: {error:#}")), "at the end");
             } else {
                 assert!(disk.has_crashed(), "{fault:?}");
@@ -343,7 +343,7 @@ fn crash_again_while_opening(oracle: &Oracle) {
                 assert!(opened.is_err());
                 let what = format!("crash at {at}, {unsynced:?}, again at {again} of opening");
                 let left = recovering.after_crash(Unsynced::Shuffled(again));
-                match MapReader::open(MapPath::on(left.shared(), &map()), 1) {
+                match MapReader::open(MapPath::on(left.shared(), map()), 1) {
                     Ok(reader) => {
                         let found = reader.scan_number() as usize;
                         assert!([reached.safe, reached.tried].contains(&found), "{what}");
@@ -491,7 +491,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
             mapper.flush().unwrap_or_else(|error| panic!("at {at}, full {full}: {error:#}"));
             oracle.check(&mapper, "with room");
             let left = disk.after_crash(Unsynced::Dropped);
-            oracle.check(&MapReader::open(MapPath::on(left.shared(), &map()), 1).unwrap(), "after a crash");
+            oracle.check(&MapReader::open(MapPath::on(left.shared(), map()), 1).unwrap(), "after a crash");
         }
     }
 }
@@ -501,7 +501,7 @@ fn a_reload_that_fails_changes_nothing() {
     let oracle = Oracle::new();
     let disk = FaultyDisk::new(Fault::None);
     let roomy = config().with_write_buffer_bytes(1 << 20);
-    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &map()), roomy).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), roomy).unwrap();
     for (scan, number) in oracle.scans.iter().zip(1..) {
         mapper.insert_scan(scan).unwrap();
         if number == 3 {
@@ -567,7 +567,7 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
         {
             let left = disk.after_crash(unsynced);
             let what = format!("crash at {at}, {unsynced:?}");
-            let reader = MapReader::open(MapPath::on(left.shared(), &map()), 1)
+            let reader = MapReader::open(MapPath::on(left.shared(), map()), 1)
                 .unwrap_or_else(|error| panic!("{what}: {error:#}"));
             let digest = reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"));
             assert!(digest == after || (!done && digest == before), "{what}");
@@ -595,7 +595,7 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
     }
     // A reader that opened it before sees what it was.
     let disk = foreign.copy();
-    let reader = MapReader::open(MapPath::on(disk.shared(), &map()), 1).unwrap();
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap();
     adopt(&disk).unwrap();
     assert_eq!(reader.digest().unwrap(), before);
 }

@@ -157,7 +157,7 @@ fn a_view_that_holds_too_much_expires_and_the_next_does_not() {
     let config = MapConfig::new(0.2, 1.6).unwrap().with_tight_memory_bytes(40_000);
     let disk = UnsyncedDisk::shared();
     let mut mapper =
-        OutOfCoreTileMapper::create(MapPath::on(disk, &folder.path().join("map")), config.clone()).unwrap();
+        OutOfCoreTileMapper::create(MapPath::on(disk, folder.path().join("map")), config.clone()).unwrap();
     let scans = scans(1);
     mapper.insert_scan(&scans[0]).unwrap();
     let reader = mapper.reader().unwrap();
@@ -208,7 +208,7 @@ fn a_reader_waits_for_no_flush() {
     let config = MapConfig::new(0.2, 1.6).unwrap();
     let disk = UnsyncedDisk::taking(Duration::from_millis(150));
     let mut mapper =
-        OutOfCoreTileMapper::create(MapPath::on(disk, &folder.path().join("map")), config).unwrap();
+        OutOfCoreTileMapper::create(MapPath::on(disk, folder.path().join("map")), config).unwrap();
     scans(2)[..5].iter().for_each(|scan| insert(&mut mapper, scan));
     let reader = mapper.reader().unwrap();
     // One that waited would answer once or twice.

@@ -53,7 +53,7 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     let tight = config().with_tight_memory_bytes(BYTES);
     let disk = UnsyncedDisk::taking(Duration::ZERO);
     let mut mapper =
-        OutOfCoreTileMapper::create(MapPath::on(disk, &folder.path().join("map")), tight).unwrap();
+        OutOfCoreTileMapper::create(MapPath::on(disk, folder.path().join("map")), tight).unwrap();
     let mut most = 0;
     for scan in &scans {
         mapper.insert_scan(scan).unwrap();

@@ -79,7 +79,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             let config = config.with_storage(storage);
             let mut reference = ReferenceMap::new(&config);
             let mut mapper = OutOfCoreTileMapper::create(
-                MapPath::on(UnsyncedDisk::shared(), &folder.path().join("map")),
+                MapPath::on(UnsyncedDisk::shared(), folder.path().join("map")),
                 config.clone(),
             )
             .unwrap();
@@ -96,7 +96,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             drop(mapper);
 
             let mut mapper = OutOfCoreTileMapper::open(
-                MapPath::on(UnsyncedDisk::shared(), &folder.path().join("map")), // A map keeps its storage, whatever is asked for.
+                MapPath::on(UnsyncedDisk::shared(), folder.path().join("map")), // A map keeps its storage, whatever is asked for.
                 config.clone().with_storage(OctoMap),
             )
             .unwrap();
@@ -300,7 +300,7 @@ fn tiles_in_use_stay_and_others_leave() {
     let folder = TempDir::new().unwrap();
     let config = config().with_cache_tiles(2);
     let mut mapper =
-        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &folder.path().join("map")), config)
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), folder.path().join("map")), config)
             .unwrap();
     let points: Vec<_> = (0..5).map(|k| [1.6 * f64::from(k) + 0.6, 0.6, 0.6]).collect();
     mapper.batch_update(&PointBatch { points: &points, intensities: None, is_occupied: &[true; 5] }).unwrap();

@@ -61,7 +61,7 @@ impl LiveReader {
         &self.0.config
     }
 
-    /// The map after its latest scan. [`Queries`] of the reader itself take a new view each.
+    /// The map after its latest scan. [`Queries`](crate::Queries) of the reader itself take a new view each.
     pub fn view(&self) -> LiveView {
         LiveView::open(self.0.clone())
     }

@@ -41,7 +41,7 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
         let (disk, config) = (disk(), config(&mut random));
         let voxels = random_voxels(&mut random, 400);
         write_map(&disk, &path("whole"), &config, &voxels);
-        let whole = MapReader::open(MapPath::on(disk.shared(), &path("whole")), 1).unwrap().digest().unwrap();
+        let whole = MapReader::open(MapPath::on(disk.shared(), path("whole")), 1).unwrap().digest().unwrap();
         let region = random_box(&mut random);
         if config.grid.voxels_in(&region).is_empty() {
             let refused =
@@ -59,15 +59,15 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
         }
         let halves = ["inside", "outside"].map(|half| open(&disk, &path(half)).unwrap());
         merge(&halves, path("again"), Some(Prefer::First), |_, _| {}).unwrap();
-        let again = MapReader::open(MapPath::on(disk.shared(), &path("again")), 1).unwrap();
+        let again = MapReader::open(MapPath::on(disk.shared(), path("again")), 1).unwrap();
         assert_eq!(again.digest().unwrap(), whole, "seed {seed}");
         for (part, name) in parts {
             let copy = disk.copy();
-            let cleared = clear(MapPath::on(copy.shared(), &path("whole")), &part, |_, _| {}).unwrap();
+            let cleared = clear(MapPath::on(copy.shared(), path("whole")), &part, |_, _| {}).unwrap();
             let other = read_map(&disk, &path(if name == "inside" { "outside" } else { "inside" }));
             assert_eq!(read_map(&copy, &path("whole")), other, "seed {seed}, cleared {name}");
             assert_eq!(cleared.voxels_cleared, (voxels.len() - other.len()) as u64);
-            let reader = MapReader::open(MapPath::on(copy.shared(), &path("whole")), 1).unwrap();
+            let reader = MapReader::open(MapPath::on(copy.shared(), path("whole")), 1).unwrap();
             assert_eq!(cleared.tiles, reader.tile_indices().len() as u64);
             assert_eq!(reader.voxel_counts().unwrap().0, other.len() as u64);
             removed += cleared.tiles_removed;
@@ -104,7 +104,7 @@ fn a_box_that_is_none_is_refused() {
         for part in [Part::Inside(region), Part::Outside(region)] {
             let cropped = crop(&open(&disk, &path("whole")).unwrap(), &part, path("part"), |_, _| {});
             assert!(matches!(cropped, Err(Error::InvalidArgument { .. })));
-            let cleared = clear(MapPath::on(disk.shared(), &path("whole")), &part, |_, _| {});
+            let cleared = clear(MapPath::on(disk.shared(), path("whole")), &part, |_, _| {});
             assert!(matches!(cleared, Err(Error::InvalidArgument { .. })));
         }
     }

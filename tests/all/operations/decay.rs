@@ -12,7 +12,7 @@ use voxtile::{
 };
 
 fn decay(disk: &FaultyDisk, rule: &Decay) -> Result<Decayed> {
-    voxtile::operations::decay(MapPath::on(disk.shared(), &path("map")), rule, |_, _| {})
+    voxtile::operations::decay(MapPath::on(disk.shared(), path("map")), rule, |_, _| {})
 }
 
 fn naive(voxels: &Voxels, halflife: f64, scans: u64, forget_below: f64) -> Voxels {
@@ -48,7 +48,7 @@ fn log_odds_fade_by_the_rule_and_counts_stay() {
         let decayed = decay(&disk, &rule).unwrap();
         let expected = naive(&voxels, halflife, scans, forget_below);
         assert_eq!(read_map(&disk, &path("map")), expected, "seed {seed}: {rule:?}");
-        let reader = MapReader::open(MapPath::on(disk.shared(), &path("map")), 1).unwrap();
+        let reader = MapReader::open(MapPath::on(disk.shared(), path("map")), 1).unwrap();
         assert_eq!((decayed.scans, decayed.voxels), (scans, expected.len() as u64));
         assert_eq!(decayed.voxels_forgotten, (voxels.len() - expected.len()) as u64);
         assert_eq!(decayed.tiles, reader.tile_indices().len() as u64);
@@ -64,7 +64,7 @@ fn what_is_free_stays_free_however_much_has_faded() {
     let voxels = Voxels::from([([0, 0, 0], ((-2.0_f64).to_bits(), 5)), ([9, 0, 0], (3.0_f64.to_bits(), 5))]);
     write_map(&disk, &path("map"), &MapConfig::new(0.5, 2.5).unwrap(), &voxels);
     decay(&disk, &Decay::new(1.0).with_scans(1_000_000)).unwrap();
-    let reader = MapReader::open(MapPath::on(disk.shared(), &path("map")), 1).unwrap();
+    let reader = MapReader::open(MapPath::on(disk.shared(), path("map")), 1).unwrap();
     assert!(matches!(reader.occupancy_at([0.25; 3]).unwrap(), Occupancy::Free(_)));
     assert!(matches!(reader.occupancy_at([4.75, 0.25, 0.25]).unwrap(), Occupancy::Occupied(_)));
     let tree = reader.merged_octree(None, 1 << 20).unwrap();
@@ -76,7 +76,7 @@ fn what_is_free_stays_free_however_much_has_faded() {
 fn mapped(scans: usize) -> (FaultyDisk, OutOfCoreTileMapper) {
     let (disk, mut random) = (disk(), Random(4));
     let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2);
-    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &path("map")), config).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), path("map")), config).unwrap();
     insert(&mut mapper, &mut random, scans);
     (disk, mapper)
 }
@@ -102,7 +102,7 @@ fn the_scans_since_the_last_time_count_once() {
     assert_eq!(decay(&disk, &Decay::new(4.0)).unwrap().scans, 0);
     assert_eq!(disk.files(), files, "nothing came since");
     // Mapping goes on, in several flushes, which the number outlives.
-    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &path("map")), config).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), path("map")), config).unwrap();
     insert(&mut mapper, &mut Random(9), 2);
     mapper.begin_input("more").unwrap();
     insert(&mut mapper, &mut Random(10), 1);
@@ -119,14 +119,14 @@ fn a_snapshot_does_not_fade_and_a_revert_brings_back_what_has() {
     let (disk, mapper) = mapped(6);
     drop(mapper);
     let name = SnapshotName::new("before").unwrap();
-    snapshot(MapPath::on(disk.shared(), &path("map")), &name).unwrap();
+    snapshot(MapPath::on(disk.shared(), path("map")), &name).unwrap();
     let before = read_map(&disk, &path("map"));
     decay(&disk, &Decay::new(4.0).with_forget_below(0.3)).unwrap();
     let once = read_map(&disk, &path("map"));
     assert!(once.len() < before.len());
-    let kept = MapReader::open_snapshot(MapPath::on(disk.shared(), &path("map")), &name, 1).unwrap();
+    let kept = MapReader::open_snapshot(MapPath::on(disk.shared(), path("map")), &name, 1).unwrap();
     assert_eq!(voxels_of(&kept), before);
-    revert(MapPath::on(disk.shared(), &path("map")), &name, None, |_, _| {}).unwrap();
+    revert(MapPath::on(disk.shared(), path("map")), &name, None, |_, _| {}).unwrap();
     assert_eq!(read_map(&disk, &path("map")), before);
     assert_eq!(decay(&disk, &Decay::new(4.0).with_forget_below(0.3)).unwrap().scans, 6);
     assert_eq!(read_map(&disk, &path("map")), once);
@@ -140,7 +140,7 @@ fn a_map_that_was_put_together_from_its_tiles_does_not_fade_twice() {
     let once = read_map(&disk, &path("map"));
     disk.take(&path("map").join("commits.log"));
     disk.take(&path("map").join("metadata.json"));
-    repair(MapPath::on(disk.shared(), &path("map")), |_| {}, |_, _| {}).unwrap();
+    repair(MapPath::on(disk.shared(), path("map")), |_| {}, |_, _| {}).unwrap();
     assert_eq!(decay(&disk, &Decay::new(4.0)).unwrap().scans, 0);
     assert_eq!(read_map(&disk, &path("map")), once);
 }

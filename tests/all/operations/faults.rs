@@ -14,7 +14,7 @@ fn two_maps(storage: Storage) -> FaultyDisk {
     let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage);
     for (name, seed) in [("a", 1), ("b", 2)] {
         let mut mapper =
-            OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &path(name)), config.clone()).unwrap();
+            OutOfCoreTileMapper::create(MapPath::on(disk.shared(), path(name)), config.clone()).unwrap();
         let mut random = Random(seed);
         for x in [0.0, 3.0] {
             mapper.insert_scan(&random_scan(&mut random, [x, 0.0, 0.0], 4)).unwrap();
@@ -41,12 +41,12 @@ fn crop(disk: &FaultyDisk) -> Result<()> {
 }
 
 fn clear(disk: &FaultyDisk) -> Result<()> {
-    operations::clear(MapPath::on(disk.shared(), &path("a")), &Part::Outside(region()), |_, _| {}).map(drop)
+    operations::clear(MapPath::on(disk.shared(), path("a")), &Part::Outside(region()), |_, _| {}).map(drop)
 }
 
 fn decay(disk: &FaultyDisk) -> Result<()> {
     operations::decay(
-        MapPath::on(disk.shared(), &path("a")),
+        MapPath::on(disk.shared(), path("a")),
         &Decay::new(2.0).with_forget_below(0.25),
         |_, _| {},
     )
@@ -55,7 +55,7 @@ fn decay(disk: &FaultyDisk) -> Result<()> {
 
 /// The digest of a map, `None` if there is none; of a damaged one there is none either, and that is a failure.
 fn digest(disk: &FaultyDisk, name: &str, what: &str) -> Option<blake3::Hash> {
-    match MapReader::open(MapPath::on(disk.shared(), &path(name)), 1) {
+    match MapReader::open(MapPath::on(disk.shared(), path(name)), 1) {
         Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"))),
         Err(Error::NoMap { .. }) => None,
         Err(error) => panic!("{what}: {error:#}"),

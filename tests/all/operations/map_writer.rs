@@ -20,7 +20,7 @@ fn source() -> InMemoryMapper {
 }
 
 fn write(disk: &FaultyDisk, source: &InMemoryMapper) -> Result<WrittenMap> {
-    let mut writer = MapWriter::create(MapPath::on(disk.shared(), &folder()), source.config())?;
+    let mut writer = MapWriter::create(MapPath::on(disk.shared(), folder()), source.config())?;
     for tile in source.tiles() {
         let tile = tile?;
         writer.put(tile.index(), tile.table())?;
@@ -30,7 +30,7 @@ fn write(disk: &FaultyDisk, source: &InMemoryMapper) -> Result<WrittenMap> {
 
 /// Whether the map is there; if so it must be whole.
 fn is_there(disk: &FaultyDisk, source: &InMemoryMapper, what: &str) -> bool {
-    match MapReader::open(MapPath::on(disk.shared(), &folder()), 1) {
+    match MapReader::open(MapPath::on(disk.shared(), folder()), 1) {
         Ok(reader) => {
             assert_eq!(reader.digest().unwrap(), source.digest().unwrap(), "{what}");
             true
@@ -102,7 +102,7 @@ fn what_is_not_of_a_map_stays_and_is_in_the_way() {
     let refused = |disk: &FaultyDisk| matches!(write(disk, &source), Err(Error::AlreadyExists { .. }));
     assert!(refused(&disk), "a map");
     let disk = FaultyDisk::new(Fault::None);
-    drop(MapWriter::create(MapPath::on(disk.shared(), &folder()), source.config()).unwrap());
+    drop(MapWriter::create(MapPath::on(disk.shared(), folder()), source.config()).unwrap());
     assert!(disk.files().is_empty(), "{:?}", disk.files().keys());
     let stray = Path::new("/city/new.unfinished/notes.txt");
     voxtile::store::Disk::create_folder(&disk, stray.parent().unwrap()).unwrap();
@@ -115,7 +115,7 @@ fn what_is_not_of_a_map_stays_and_is_in_the_way() {
 fn nobody_else_makes_the_same_map_meanwhile_and_tiles_come_in_order() {
     let source = source();
     let disk = FaultyDisk::new(Fault::None);
-    let mut writer = MapWriter::create(MapPath::on(disk.shared(), &folder()), source.config()).unwrap();
+    let mut writer = MapWriter::create(MapPath::on(disk.shared(), folder()), source.config()).unwrap();
     assert!(matches!(write(&disk, &source), Err(Error::Locked { .. })));
     let tile = source.tile_uncached(source.tile_indices()[1]).unwrap().unwrap();
     writer.put(tile.index(), tile.table()).unwrap();
@@ -124,7 +124,7 @@ fn nobody_else_makes_the_same_map_meanwhile_and_tiles_come_in_order() {
     }
     writer.put(TileIndex::new(i32::MAX, 0, 0), &Table::default()).unwrap();
     assert_eq!(writer.finish().unwrap().tiles, 1);
-    let reader = MapReader::open(MapPath::on(disk.shared(), &folder()), 1).unwrap();
+    let reader = MapReader::open(MapPath::on(disk.shared(), folder()), 1).unwrap();
     assert_eq!(reader.tile_indices(), [tile.index()]);
     assert_eq!(reader.scan_number(), 0);
 }
