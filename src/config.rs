@@ -167,6 +167,10 @@ impl Default for VoxelCacheConfig {
 
 impl MapConfig {
     /// The defaults with another resolution and tile size, both in metres.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Grid::new`].
     pub fn new(resolution_m: f64, tile_size_m: f64) -> Result<Self> {
         Ok(Self { grid: Grid::new(resolution_m, tile_size_m)?, ..Self::default() })
     }
@@ -238,6 +242,10 @@ impl MapConfig {
     }
 
     /// The configuration, or the first argument that is wrong.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] with the argument's name.
     pub fn validated(self) -> Result<Self> {
         self.sensor_model.validated()?;
         let RayConfig { min_range_m, max_range_m, .. } = self.rays;

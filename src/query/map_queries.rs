@@ -11,6 +11,10 @@ use std::io::{self, Read, Seek, Write};
 /// A query fails only if a tile cannot be read, or if a tile that has to go for it cannot be written.
 pub trait MapQueries: MapView + Sized {
     /// The observed voxel that holds a point, with its exact evidence.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read; for a mapper, one that has to go for it and cannot be written.
     #[inline]
     fn voxel_at(&self, point: Point) -> Result<Option<Voxel>> {
         point::voxel_at(self, point)
@@ -34,12 +38,20 @@ pub trait MapQueries: MapView + Sized {
     }
 
     /// Visits the observed voxels whose center is in the half-open box, in the order of [`MapQueries::evidence_in`].
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read; for a mapper, one that has to go for it and cannot be written.
     fn for_each_voxel_in(&self, region: &Aabb, visit: impl FnMut(Voxel)) -> Result<()> {
         region::for_each_voxel_in(self, region, visit)
     }
 
     /// Visits the voxels of the whole map, or of a region, whose probability of being occupied is at least
     /// `min_probability`; `None` takes the map's occupancy threshold.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
     fn for_each_occupied(
         &self,
         min_probability: Option<f64>,
@@ -50,6 +62,10 @@ pub trait MapQueries: MapView + Sized {
     }
 
     /// The occupied voxels of the whole map. For large maps use [`MapQueries::for_each_occupied`].
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
     fn all_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
         let mut voxels = Vec::new();
         self.for_each_occupied(min_probability, None, |voxel| voxels.push(voxel))?;
@@ -57,11 +73,19 @@ pub trait MapQueries: MapView + Sized {
     }
 
     /// The occupied voxels of tiles in memory only; the answer depends on the cache.
+    ///
+    /// # Errors
+    ///
+    /// None for what is in memory; the tile that another thread evicts meanwhile is read again.
     fn cached_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
         region::cached_occupied_voxels(self, min_probability)
     }
 
     /// The digest of the map's content: equal for equal maps, however they were built. See `docs/format.md`.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
     fn digest(&self) -> Result<blake3::Hash> {
         digest::digest(self)
     }

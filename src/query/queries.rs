@@ -46,6 +46,10 @@ pub trait Queries: Sync {
     fn grid(&self) -> Grid;
 
     /// The occupancy of a voxel.
+    ///
+    /// # Errors
+    ///
+    /// As for all queries.
     fn occupancy(&self, voxel: VoxelIndex) -> Result<Occupancy>;
 
     /// The observed voxels whose center is in the half-open box, tile by tile; a tile is read when its first voxel is
@@ -85,17 +89,29 @@ pub trait Queries: Sync {
     fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Hit>>;
 
     /// The occupancy of the voxel that holds a point; unknown for a point that is not finite.
+    ///
+    /// # Errors
+    ///
+    /// As for all queries.
     #[inline]
     fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
         self.grid().voxel_of(point).map_or(Ok(Occupancy::Unknown), |voxel| self.occupancy(voxel))
     }
 
     /// The occupancy at many points, in their order, on all cores.
+    ///
+    /// # Errors
+    ///
+    /// As for all queries; of several, that of the first point.
     fn occupancy_at_points(&self, points: &[Point]) -> Result<Vec<Occupancy>> {
         on_all_cores(points, |point| self.occupancy_at(*point))
     }
 
     /// [`Queries::cast_ray`] for many rays, in their order, on all cores.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Queries::cast_ray`]; of several, that of the first ray.
     fn cast_rays(&self, rays: &[RayQuery]) -> Result<Vec<Option<Hit>>> {
         on_all_cores(rays, |ray| self.cast_ray(ray))
     }

@@ -89,6 +89,10 @@ impl fmt::Display for Iwlo {
 
 impl Iwlo {
     /// The model, if its parameters are valid.
+    ///
+    /// # Errors
+    ///
+    /// [`InvalidArgument`](crate::Error::InvalidArgument) with the first parameter that is not.
     pub fn validated(self) -> Result<Self> {
         let Self { occupied, free, sharpness, decay_rate, min_alpha, min, max, .. } = self;
         let numbers = [

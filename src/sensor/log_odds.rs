@@ -42,11 +42,19 @@ impl fmt::Display for LogOdds {
 
 impl LogOdds {
     /// A model from probabilities, each in (0, 1).
+    ///
+    /// # Errors
+    ///
+    /// [`InvalidArgument`](crate::Error::InvalidArgument) for other numbers, and as for [`LogOdds::validated`].
     pub fn from_probabilities(hit: f64, miss: f64, min: f64, max: f64) -> Result<Self> {
         Self { hit: logit(hit), miss: logit(miss), min: logit(min), max: logit(max) }.validated()
     }
 
     /// The model, if its parameters are valid.
+    ///
+    /// # Errors
+    ///
+    /// [`InvalidArgument`](crate::Error::InvalidArgument) with what is wrong.
     pub fn validated(self) -> Result<Self> {
         let finite = [self.hit, self.miss, self.min, self.max].iter().all(|value| value.is_finite());
         if !(finite && self.hit > 0.0 && self.miss < 0.0 && self.min < self.max) {

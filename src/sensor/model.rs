@@ -40,6 +40,10 @@ impl fmt::Display for SensorModel {
 
 impl SensorModel {
     /// The model, if its parameters are valid.
+    ///
+    /// # Errors
+    ///
+    /// As for [`LogOdds::validated`] and [`Iwlo::validated`].
     pub fn validated(self) -> Result<Self> {
         Ok(match self {
             Self::LogOdds(model) => Self::LogOdds(model.validated()?),

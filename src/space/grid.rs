@@ -59,6 +59,10 @@ impl fmt::Display for Grid {
 
 impl Grid {
     /// A grid of voxels of `resolution_m` and tiles of `tile_size_m`, both in metres.
+    ///
+    /// # Errors
+    ///
+    /// Lengths that are none, and a tile that is not 2 to 1024 whole voxels.
     pub fn new(resolution_m: f64, tile_size_m: f64) -> Result<Self, GridError> {
         if !(resolution_m.is_normal() && resolution_m > 0.0 && (1.0 / resolution_m).is_finite()) {
             return Err(GridError::Resolution(resolution_m));

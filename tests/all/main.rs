@@ -62,6 +62,8 @@ mod octomap_files;
 mod octree_export;
 /// What is done with whole maps: made, merged, cropped, cleared, faded.
 mod operations;
+/// Maps opened and created by options.
+mod options;
 /// Queries against brute force.
 mod queries;
 /// Scans from files, good and bad.
