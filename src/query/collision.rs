@@ -1,5 +1,5 @@
 use super::ray::brick_of;
-use super::region::{tiles_in, voxels_around, voxels_in};
+use super::region::{bricks_in, tiles_in, voxels_around};
 use super::tile_cursor::TileCursor;
 use super::{Hit, Occupancy, Shape, UnknownAs};
 use crate::error::{Error, Result};
@@ -30,9 +30,10 @@ pub(super) fn collision<V: MapView + ?Sized>(
             continue;
         }
         let Some(tile) = view.tile(index)? else { continue };
-        let mut touched = voxels_in(&tile, &around).filter(|voxel| {
-            voxel.evidence.log_odds >= occupied_from && body.touches_voxel(grid, voxel.index)
-        });
+        let mut touched = bricks_in(&tile, &around)
+            .filter(|brick| body.touches_voxels(grid, &brick.voxels))
+            .flat_map(|brick| brick.voxels_from(&tile, occupied_from))
+            .filter(|voxel| body.touches_voxel(grid, voxel.index));
         if let Some(voxel) = touched.next() {
             let probability = Occupancy::of(config, Some(voxel.evidence)).probability();
             return Ok(Some(Hit::from(grid, body.reference_point(), voxel.index, probability)));

@@ -1,10 +1,11 @@
-use super::region::{tiles_in, voxels_around, voxels_in};
+use super::region::{bricks_in, tiles_in, voxels_around};
 use super::{Hit, Occupancy};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::{Aabb, Point, TileIndex};
+use crate::space::{Aabb, BRICK_EDGE, Grid, Point, TileIndex, VoxelBox};
 
-/// Radii of the balls that are searched before the whole one, in edges of a tile.
+/// Radii of the balls that are searched before the whole one, in edges of a brick and of a tile.
+const NEAR_BRICKS: [f64; 2] = [0.5, 2.0];
 const NEAR_TILES: [f64; 2] = [1.0, 4.0];
 
 pub(super) fn nearest_occupied<V: MapView + ?Sized>(
@@ -14,8 +15,10 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
 ) -> Result<Option<Hit>> {
     check(point, max_distance_m)?;
     // Small balls first: what is near is found without a look at the rest of the map.
-    for tiles in NEAR_TILES {
-        let radius_m = tiles * view.config().grid.tile_size_m();
+    let grid = &view.config().grid;
+    let brick_m = f64::from(BRICK_EDGE) * grid.resolution_m();
+    let radii_m = NEAR_BRICKS.map(|bricks| bricks * brick_m).into_iter();
+    for radius_m in radii_m.chain(NEAR_TILES.map(|tiles| tiles * grid.tile_size_m())) {
         if radius_m < max_distance_m
             && let Some(nearest) = nearest_in_ball(view, point, radius_m)?
         {
@@ -41,7 +44,7 @@ fn nearest_in_ball<V: MapView + ?Sized>(view: &V, point: Point, max_distance_m: 
     let ball = |radius_m: f64| Aabb { min: point.map(|c| c - radius_m), max: point.map(|c| c + radius_m) };
     let mut tiles: Vec<(f64, TileIndex)> = tiles_in(view, &voxels_around(&grid, &ball(max_distance_m)))
         .into_iter()
-        .map(|index| (distance_to_tile_m(&grid, index, point), index))
+        .map(|index| (distance_to_voxels_m(&grid, &grid.voxels_of_tile(index), point), index))
         .collect();
     tiles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut best: Option<Hit> = None;
@@ -51,23 +54,26 @@ fn nearest_in_ball<V: MapView + ?Sized>(view: &V, point: Point, max_distance_m: 
             break;
         }
         let Some(tile) = view.tile(index)? else { continue };
-        for voxel in voxels_in(&tile, &voxels_around(&grid, &ball(limit_m))) {
-            if voxel.evidence.log_odds < threshold {
+        for brick in bricks_in(&tile, &voxels_around(&grid, &ball(limit_m))) {
+            let limit_m = best.map_or(max_distance_m, |best| best.distance_m);
+            if distance_to_voxels_m(&grid, &brick.voxels, point) > limit_m {
                 continue;
             }
-            let hit = Hit::from(&grid, point, voxel.index, None);
-            if hit.distance_m <= max_distance_m && hit.is_nearer_than(best.as_ref()) {
-                // The probability of one that is not the nearest is never looked at, and costs little here.
-                let probability = Occupancy::of(config, Some(voxel.evidence)).probability();
-                best = Some(Hit { probability, ..hit });
+            for voxel in brick.voxels_from(&tile, threshold) {
+                let hit = Hit::from(&grid, point, voxel.index, None);
+                if hit.distance_m <= max_distance_m && hit.is_nearer_than(best.as_ref()) {
+                    // The probability of one that is not the nearest is never looked at, and costs little here.
+                    let probability = Occupancy::of(config, Some(voxel.evidence)).probability();
+                    best = Some(Hit { probability, ..hit });
+                }
             }
         }
     }
     Ok(best)
 }
 
-fn distance_to_tile_m(grid: &crate::space::Grid, index: TileIndex, point: Point) -> f64 {
-    let voxels = grid.voxels_of_tile(index);
+/// A distance from which on there may be voxels of a box.
+fn distance_to_voxels_m(grid: &Grid, voxels: &VoxelBox, point: Point) -> f64 {
     // A margin of a voxel for the rounding between voxel borders and multiples of the resolution.
     let bounds = Aabb {
         min: voxels.min.map(|k| (f64::from(k) - 1.0) * grid.resolution_m()),

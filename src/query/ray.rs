@@ -1,9 +1,9 @@
-use super::tile_cursor::TileCursor;
+use super::tile_cursor::{Found, TileCursor};
 use super::{Hit, Occupancy, UnknownAs};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::scan::{MAX_RAY_STEPS, RayWalk};
-use crate::space::{BRICK_EDGE, BrickCode, Grid, Point, VoxelBox, VoxelIndex};
+use crate::space::{BRICK_EDGE, Grid, Point, VoxelBox, VoxelIndex};
 
 /// A ray to be cast through the map.
 ///
@@ -150,23 +150,22 @@ pub(super) fn cast_segment<V: MapView + ?Sized>(
 /// What a ray meets in the voxels of a map.
 fn meet_map<V: MapView + ?Sized>(view: &V, unknown: UnknownAs) -> impl FnMut(VoxelIndex) -> Result<Met> {
     let config = view.config();
-    let (grid, occupied_from) = (config.grid, config.occupied_log_odds());
+    let occupied_from = config.occupied_log_odds();
     let mut tiles = TileCursor::new(view);
     move |voxel| {
-        let tile = tiles.tile_of(voxel)?;
-        let log_odds = tile.and_then(|tile| tile.evidence(voxel)).map(|evidence| evidence.log_odds);
+        let (log_odds, empty) = match tiles.find(voxel)? {
+            Found::NothingIn(empty) => (None, Some(empty)),
+            Found::InBrick(evidence) => (evidence.map(|evidence| evidence.log_odds), None),
+        };
         let stops = match log_odds {
             None => unknown == UnknownAs::Obstacle,
             Some(log_odds) => log_odds >= occupied_from,
         };
-        Ok(match tile {
+        Ok(match empty {
             // The probability is computed for the answer alone.
             _ if stops => Met::Obstacle(Occupancy::of_log_odds(config, log_odds).probability()),
-            None => Met::Empty(grid.voxels_of_tile(grid.tile_of_voxel(voxel))),
-            Some(tile) if !tile.table().has_brick(BrickCode::of_voxel(voxel)) => {
-                Met::Empty(brick_of(voxel).intersection(&tile.voxel_box()))
-            }
-            Some(_) => Met::Free,
+            Some(empty) => Met::Empty(empty),
+            None => Met::Free,
         })
     }
 }

@@ -1,8 +1,11 @@
+use super::ray::brick_of;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
 use crate::maths::logit;
-use crate::space::{Aabb, BRICK_EDGE, Grid, TileBox, TileIndex, VoxelBox};
+use crate::space::{
+    Aabb, BRICK_EDGE, BrickCode, BrickMask, Grid, TileBox, TileIndex, VoxelBox, VoxelIndex, mask_of_box,
+};
 use crate::tile::{Tile, Voxel};
 
 pub(super) fn evidence_in<'a, V: MapView + ?Sized>(
@@ -104,15 +107,63 @@ fn tile_box_around<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Option<T
     view.tile_bounds()?.intersection(wanted)
 }
 
-/// The observed voxels of a tile that lie in a box, by brick.
+/// The observed voxels of a tile that lie in a box, in Morton order.
 pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = Voxel> {
-    let bricks = tile.table().bricks().filter(move |&brick| {
-        // A brick may extend beyond the tile: place it by a voxel inside.
-        let Some(voxel) = tile.voxels_of_brick(brick).next() else { return false };
-        let min = voxel.index.map(|k| k & !(BRICK_EDGE - 1));
-        (0..3).all(|k| min[k] < voxels.end[k] && voxels.min[k].saturating_sub(BRICK_EDGE) < min[k])
+    bricks_in(tile, voxels).flat_map(move |brick| brick.voxels_from(tile, f64::NEG_INFINITY))
+}
+
+/// A brick of a tile, with those of its voxels that lie in a box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BrickPart {
+    code: BrickCode,
+    /// All its voxels, beyond the box and the tile too.
+    pub(super) voxels: VoxelBox,
+    mask: BrickMask,
+}
+
+impl BrickPart {
+    fn of(voxel: VoxelIndex, within: &VoxelBox) -> Self {
+        let voxels = brick_of(voxel);
+        let local = |corner: VoxelIndex| {
+            std::array::from_fn(|k| corner[k].saturating_sub(voxels.min[k]).clamp(0, BRICK_EDGE))
+        };
+        let mask = mask_of_box(local(within.min), local(within.end));
+        Self { code: BrickCode::of_voxel(voxel), voxels, mask }
+    }
+
+    /// The observed voxels whose log-odds are at least a threshold, in Morton order.
+    pub(super) fn voxels_from(self, tile: &Tile, threshold: f64) -> impl Iterator<Item = Voxel> {
+        let found = tile.table().voxels_of_mask(self.code, self.mask);
+        found
+            .filter(move |(_, evidence)| evidence.log_odds >= threshold)
+            .map(|(code, evidence)| Voxel { index: tile.index_of(code), evidence })
+    }
+}
+
+/// The bricks of a tile that may have voxels in a box, in Morton order.
+pub(super) fn bricks_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = BrickPart> {
+    let within = tile.voxel_box().intersection(voxels);
+    let corners: [Vec<i32>; 3] = std::array::from_fn(|k| {
+        let first = within.min[k] & !(BRICK_EDGE - 1);
+        (first..within.end[k]).step_by(BRICK_EDGE as usize).collect()
     });
-    bricks.flat_map(|brick| tile.voxels_of_brick(brick)).filter(|voxel| voxels.contains(voxel.index))
+    let count = corners.iter().map(|corners| corners.len()).product::<usize>();
+    let mut parts: Vec<BrickPart> = if count <= tile.table().brick_count() {
+        let [x, y, z] = &corners;
+        let corners = x.iter().flat_map(|x| y.iter().flat_map(move |y| z.iter().map(move |z| [*x, *y, *z])));
+        let parts = corners.map(|corner| {
+            // A brick may extend beyond the tile: it is named by a voxel inside.
+            let inside = std::array::from_fn(|k| corner[k].max(within.min[k]));
+            BrickPart::of(inside, &within)
+        });
+        parts.filter(|part| tile.table().has_brick(part.code)).collect()
+    } else {
+        let firsts = tile.table().bricks().filter_map(|brick| tile.voxels_of_brick(brick).next());
+        let parts = firsts.map(|voxel| BrickPart::of(voxel.index, &within));
+        parts.filter(|part| part.mask != [0; 8]).collect()
+    };
+    parts.sort_unstable_by_key(|part| part.code);
+    parts.into_iter()
 }
 
 /// The voxels whose center may lie in a box, and a few around.

@@ -60,9 +60,26 @@ impl Table {
         self.at(Address::of_key(key))
     }
 
+    /// Number of bricks that hold an observed voxel.
+    pub(crate) fn brick_count(&self) -> usize {
+        self.bricks.len()
+    }
+
     /// Whether any voxel of a brick was observed.
     pub fn has_brick(&self, brick: BrickCode) -> bool {
         self.brick(brick).is_some()
+    }
+
+    /// The number of a brick that holds an observed voxel. It stays until the table changes.
+    #[inline]
+    pub(crate) fn number_of_brick(&self, brick: BrickCode) -> Option<u32> {
+        self.directory.get(Address::of_brick(brick)).checked_sub(1)
+    }
+
+    /// The evidence of the voxel at a place of the brick with a number.
+    #[inline]
+    pub(crate) fn get_in(&self, number: u32, place: usize) -> Option<Evidence> {
+        self.bricks.get(number as usize)?.get(place, &self.palette)
     }
 
     /// The bricks that hold an observed voxel, in Morton order.
