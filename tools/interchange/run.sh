@@ -6,7 +6,8 @@
 #
 # Needs python3 with venv, and of Debian: g++, libeigen3-dev, libboost-dev, libpcl-io (the library alone; PCL's headers are
 # unpacked to a temporary folder, for libpcl-dev brings a gigabyte), liboctomap-dev; without --short cloudcompare and
-# python3-open3d too. Installs nothing but plyfile and pypcd4, into a temporary folder. Exits with 1 if a comparison fails.
+# python3-open3d too. Installs nothing but plyfile and pypcd4, into a temporary folder. VOXTILE_BIN is a
+# folder of programs that are built already. Exits with 1 if a comparison fails.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/interchange
@@ -14,8 +15,8 @@ target=${CARGO_TARGET_DIR:-target}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-cargo build --release --quiet --bin voxtile
-voxtile=$target/release/voxtile
+[ -n "${VOXTILE_BIN-}" ] || cargo build --release --quiet --bin voxtile
+voxtile=${VOXTILE_BIN:-$target/release}/voxtile
 
 python3 -m venv "$work/venv"
 "$work/venv/bin/pip" install --quiet --disable-pip-version-check plyfile pypcd4

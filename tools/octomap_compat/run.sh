@@ -4,16 +4,18 @@
 #   tools/octomap_compat/run.sh [--short]
 #
 # Needs g++, python3 and liboctomap-dev, and data below ${VOXTILE_DATA:-../shared/data}; a data set that is absent is
-# skipped. --short: the first scans of two data sets at 0.2 m. Exits with 1 if a comparison fails.
+# skipped. --short: the first scans of two data sets at 0.2 m. VOXTILE_BIN is a
+# folder of programs that are built already. Exits with 1 if a comparison fails.
 set -eu
 cd "$(dirname "$0")/../.."
 here=tools/octomap_compat
 data=${VOXTILE_DATA:-../shared/data}
 target=${CARGO_TARGET_DIR:-target}
+bin=${VOXTILE_BIN:-$target/release}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-cargo build --release --quiet --example insert_stream --bin voxtile
+[ -n "${VOXTILE_BIN-}" ] || cargo build --release --quiet --example insert_stream --bin voxtile
 for tool in insert tiles merged; do
     # Without contracted operations, like Debian's library: fused multiply-add visits slightly other voxels.
     # OctoMap's headers hold the ray walk, so it is compiled here, not only in the library. NDEBUG silences it.
@@ -29,12 +31,12 @@ compare() { # data set, resolution in metres, most scans
     fi
     echo "$1 at $2 m"
     python3 "$here/points.py" "$data/$1" $3 > "$work/stream"
-    "$target/release/examples/insert_stream" "$work/stream" "$2" "$work/map"
+    "$bin/examples/insert_stream" "$work/stream" "$2" "$work/map"
     "$work/insert" "$work/stream" "$2" "$work/map" || failed=1
     "$work/tiles" "$work/map" "$2" || failed=1
     # In little memory, so that the files are put together from many blocks.
     for format in bt ot; do
-        "$target/release/voxtile" export "$work/map" -o "$work/whole.$format" --memory 1MiB > /dev/null
+        "$bin/voxtile" export "$work/map" -o "$work/whole.$format" --memory 1MiB > /dev/null
     done
     "$work/merged" "$work/map" "$2" "$work/whole.bt" "$work/whole.ot" || failed=1
     rm -r "$work/map"

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Compares voxtile's .bt and .ot files with those of the real OctoMap (Debian: liboctomap-dev, g++).
 #
-#   tools/octomap_oracle/run.sh [COUNT]      COUNT random trees, 500 by default
+#   tools/octomap_oracle/run.sh [COUNT]      COUNT random trees, 500 by default; VOXTILE_BIN is a folder of programs that are built already
 set -eu
 
 count=${1:-500}
@@ -11,8 +11,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 g++ -std=c++17 -O1 "$here/roundtrip.cpp" -o "$work/roundtrip" -loctomap -loctomath
-cargo build --quiet --release --manifest-path "$here/../../Cargo.toml" --no-default-features --example octree_files
-ours=${CARGO_TARGET_DIR:-$here/../../target}/release/examples/octree_files
+[ -n "${VOXTILE_BIN-}" ] || cargo build --quiet --release --manifest-path "$here/../../Cargo.toml" --example octree_files
+ours=${VOXTILE_BIN:-${CARGO_TARGET_DIR:-$here/../../target}/release}/examples/octree_files
 
 "$work/roundtrip" make "$work" "$count" 2>"$work/octomap.log"
 n=0
