@@ -1,0 +1,21 @@
+//! What people record, as clouds of points with poses, and voxels as files that other programs open. Knows no map.
+//!
+//! ```text
+//! file or folder -> CloudSource -> CloudHead, then CloudPoint after CloudPoint
+//! file of poses  -> Trajectory  -> RigidPose at a time
+//! VoxelRow after VoxelRow -> VoxelSink -> file
+//! ```
+//!
+//! Formats that need many crates stand behind features: `las`, `e57`, `ros`, `sqlite`.
+
+mod cloud;
+mod error;
+mod pose;
+pub mod read;
+#[cfg(feature = "ros")]
+pub mod ros;
+pub mod write;
+
+pub use cloud::{CloudHead, CloudPoint, CloudSource};
+pub use error::{Error, Place, Result};
+pub use pose::RigidPose;
