@@ -76,6 +76,10 @@ pub struct RayConfig {
     pub min_range_m: f64,
     /// Rays are cut at this many metres: what lies before is free, nothing is hit. Default: no limit.
     pub max_range_m: Option<f64>,
+    /// Rays without a return are free up to so many metres, or up to the max range if that is less. Such a ray is a
+    /// point 1e9 m away or more: see [`no_return`](crate::scan::no_return). Default: they are treated as other points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_return_range_m: Option<f64>,
     /// How often a voxel is updated by one scan. Default: once.
     pub insert_mode: InsertMode,
 }
@@ -155,7 +159,12 @@ impl Default for MemoryLimit {
 
 impl Default for RayConfig {
     fn default() -> Self {
-        Self { min_range_m: 0.0, max_range_m: None, insert_mode: InsertMode::PerScan }
+        Self {
+            min_range_m: 0.0,
+            max_range_m: None,
+            no_return_range_m: None,
+            insert_mode: InsertMode::PerScan,
+        }
     }
 }
 
@@ -178,6 +187,12 @@ impl MapConfig {
     /// The same with another sensor model.
     pub fn with_sensor_model(self, sensor_model: SensorModel) -> Self {
         Self { sensor_model, ..self }
+    }
+
+    /// The same with rays without a return, which are free up to so many metres.
+    pub fn with_no_return_range(mut self, range_m: impl Into<Option<f64>>) -> Self {
+        self.rays.no_return_range_m = range_m.into();
+        self
     }
 
     /// The same with rays from `min_range_m` to `max_range_m`, in metres.
@@ -248,7 +263,7 @@ impl MapConfig {
     /// [`Error::InvalidArgument`] with the argument's name.
     pub fn validated(self) -> Result<Self> {
         self.sensor_model.validated()?;
-        let RayConfig { min_range_m, max_range_m, .. } = self.rays;
+        let RayConfig { min_range_m, max_range_m, no_return_range_m, .. } = self.rays;
         if !(self.occupancy_threshold > 0.0 && self.occupancy_threshold < 1.0) {
             return Err(wrong(
                 "occupancy threshold",
@@ -258,6 +273,10 @@ impl MapConfig {
         }
         if !(min_range_m >= 0.0 && min_range_m.is_finite()) {
             return Err(wrong("min range", min_range_m, "a length of at least 0 m"));
+        }
+        if no_return_range_m.is_some_and(|range| !(range > 0.0 && range <= 1e6)) {
+            let range = no_return_range_m.unwrap_or_default();
+            return Err(wrong("no return range", range, "a length above 0 and up to 1000000 m"));
         }
         if max_range_m.is_some_and(|max| !(max > min_range_m && max.is_finite())) {
             let max = max_range_m.unwrap_or_default();

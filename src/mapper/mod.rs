@@ -10,11 +10,14 @@
 //! insert_points -> scan::trace -> updates by tile -> paging: resident tiles, write buffer -> persistence -> store
 //! ```
 //!
+//! A file of OctoMap is a map to be asked, too: [`OctreeMap`].
+//!
 //! How tiles move between memory and disk is in `paging`.
 
 mod in_memory;
 mod live;
 mod map_reader;
+mod octree_map;
 mod options;
 mod out_of_core;
 mod paging;
@@ -27,6 +30,7 @@ mod traits;
 pub use in_memory::InMemoryMapper;
 pub use live::{LiveReader, LiveView};
 pub use map_reader::MapReader;
+pub use octree_map::OctreeMap;
 pub use options::MapOptions;
 pub use out_of_core::OutOfCoreTileMapper;
 pub use statistics::{IoCounts, MapStatistics, MemoryCounts, StallCounts};

@@ -4,6 +4,7 @@
 //! tables, in tile order -> MapWriter -> MAP.unfinished -> MAP
 //! merge   k readers, the tiles of one place at a time -> MapWriter
 //! crop    one reader -> MapWriter
+//! import  a file of OctoMap -> MapWriter
 //! clear, decay   MapEditor: tiles read, changed, written beside -> one commit
 //! a flush  -> snapshot -> snapshots/NAME, and the tables that it sees stay
 //! snapshot -> revert   -> one commit
@@ -17,6 +18,7 @@ mod convert;
 mod crop;
 mod decay;
 mod diff;
+mod import;
 mod kept_bytes;
 mod map_editor;
 mod map_writer;
@@ -33,6 +35,7 @@ pub use convert::convert;
 pub use crop::crop;
 pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
+pub use import::import;
 pub use kept_bytes::{KeptBytes, kept_bytes};
 pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge};

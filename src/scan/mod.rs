@@ -29,7 +29,7 @@ mod world_scan;
 pub use coordinate::Coordinate;
 pub use point_batch::PointBatch;
 pub use pose::Pose;
-pub use ray::{MAX_RAY_STEPS, RayWalk};
+pub use ray::{MAX_RAY_STEPS, RayWalk, no_return};
 pub use report::{ScanReport, SkippedPoints};
 pub use scan_points::{ScanPoints, TakePoints};
 pub use scan_ref::ScanRef;

@@ -47,6 +47,8 @@ impl Cli {
 pub enum Command {
     /// Build a map from scans, or add scans to one
     Build(BuildArgs),
+    /// Make a map of a file of OctoMap (.bt .ot)
+    Import(ImportArgs),
     /// Say what a map holds
     Info(InfoArgs),
     /// Ask whether places are occupied, free or unknown
@@ -99,6 +101,7 @@ impl Command {
     pub fn is_json(&self) -> bool {
         match self {
             Self::Build(args) => args.json,
+            Self::Import(args) => args.json,
             Self::Info(args) => args.json,
             Self::Query(args) => args.json,
             Self::Raycast(args) => args.json,
@@ -283,6 +286,24 @@ pub struct ShareArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// A file of OctoMap: .bt has free and occupied voxels, .ot their log-odds
+    pub file: PathBuf,
+    /// Folder of the new map, which does not exist yet
+    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    pub output: PathBuf,
+    /// How the tiles of the map are stored
+    #[arg(long, value_name = "FORM", default_value = "octomap")]
+    pub storage: StorageName,
+    /// Refuse a file that stands for more voxels: pruned cubes of a few bytes can stand for 2^48
+    #[arg(long, value_name = "N", default_value_t = 1 << 32)]
+    pub max_voxels: u64,
+    /// Print JSON; sizes in bytes
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct InfoArgs {
     /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
@@ -295,7 +316,7 @@ pub struct InfoArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct QueryArgs {
-    /// Folder of the map, or FOLDER@SNAPSHOT
+    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// A point: X Y Z in metres
     #[arg(value_names = ["X", "Y", "Z"], num_args = 3, required_unless_present = "points")]
@@ -311,7 +332,7 @@ pub struct QueryArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct RaycastArgs {
-    /// Folder of the map, or FOLDER@SNAPSHOT
+    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// Where the ray begins, in metres
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, required = true)]
@@ -378,7 +399,7 @@ pub enum ExportFormatName {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct DigestArgs {
-    /// Folder of the map, or FOLDER@SNAPSHOT
+    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// Print JSON
     #[arg(long)]

@@ -1,6 +1,6 @@
 use crate::args::DigestArgs;
 use crate::json;
-use crate::map_at::read_map;
+use crate::map_at::read_any_map;
 use crate::memory;
 use std::io::Write;
 use std::process::ExitCode;
@@ -8,7 +8,8 @@ use voxtile::MapQueries;
 use voxtile::mapper::MapView;
 
 pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {
-    let (digest, scan_number) = read_map(&args.map, |reader| Ok((reader.digest()?, reader.scan_number())))?;
+    let (digest, scan_number) =
+        read_any_map(&args.map, |reader| Ok((reader.digest()?, reader.scan_number())))?;
     let mut out = std::io::stdout().lock();
     if args.json {
         let digest = digest.to_string();

@@ -12,7 +12,7 @@ use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
-use voxtile::mapper::{MapReader, MapView};
+use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::maths::logit;
 use voxtile::octree::{OctreeFormat, write_bt, write_ot};
 use voxtile::query::OctreeExport;
@@ -43,7 +43,7 @@ struct Exported {
 /// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let export = Export::of(args)?;
-    let exported = if octree_file::is_octree_file(&args.map) {
+    let exported = if OctreeMap::is_named_by(&args.map) {
         export.octree_file()?
     } else {
         read_map(&args.map, |reader| match export.format {

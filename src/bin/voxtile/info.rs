@@ -6,7 +6,7 @@ use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::mapper::{MapReader, MapView};
+use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{KeptBytes, kept_bytes};
 use voxtile::sensor::SensorModel;
 use voxtile::space::Aabb;
@@ -44,7 +44,7 @@ struct Info {
 
 pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
-    if octree_file::is_octree_file(&args.map) {
+    if OctreeMap::is_named_by(&args.map) {
         octree_file::print_info(&args.map, args.json, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }

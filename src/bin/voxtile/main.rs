@@ -15,6 +15,7 @@ mod export;
 mod export_origin;
 mod failure;
 mod flush_schedule;
+mod import;
 mod info;
 mod intake;
 mod json;
@@ -79,6 +80,7 @@ fn main() -> ExitCode {
     }
     let outcome = match command {
         Command::Build(args) => build::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Query(args) => query::run(&args),
         Command::Raycast(args) => raycast::run(&args),

@@ -1,7 +1,8 @@
 use std::path::{Path, PathBuf};
-use voxtile::mapper::MapReader;
+use voxtile::mapper::{MapReader, MapStatistics, MapView, OctreeMap, TileRef};
+use voxtile::space::{TileBox, TileIndex};
 use voxtile::store::SnapshotName;
-use voxtile::{Error, Result};
+use voxtile::{Error, MapConfig, Result};
 
 /// Tiles that a reading command keeps in memory.
 const CACHE_TILES: usize = 32;
@@ -27,10 +28,74 @@ impl MapAt {
     }
 
     fn open(&self) -> Result<MapReader> {
+        if OctreeMap::is_named_by(&self.map) {
+            let reason = "is a file of OctoMap, which this command does not take; make a map of it with `voxtile import`";
+            return Err(Error::argument(self.map.display().to_string(), reason));
+        }
         match &self.snapshot {
             Some(name) => MapReader::open_snapshot(&self.map, name, CACHE_TILES),
             None => MapReader::open(&self.map, CACHE_TILES),
         }
+    }
+}
+
+/// What can be read.
+pub enum AnyMap {
+    /// A map, or a snapshot of one.
+    Map(MapReader),
+    /// A file of OctoMap.
+    Octree(OctreeMap),
+}
+
+/// Calls a method of whichever it is.
+macro_rules! whichever {
+    ($map:expr, $method:ident($($argument:expr),*)) => {
+        match $map {
+            AnyMap::Map(map) => map.$method($($argument),*),
+            AnyMap::Octree(map) => map.$method($($argument),*),
+        }
+    };
+}
+
+impl MapView for AnyMap {
+    fn config(&self) -> &MapConfig {
+        whichever!(self, config())
+    }
+
+    fn scan_number(&self) -> u64 {
+        whichever!(self, scan_number())
+    }
+
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        whichever!(self, tile_indices())
+    }
+
+    fn tile_bounds(&self) -> Option<TileBox> {
+        whichever!(self, tile_bounds())
+    }
+
+    fn has_tile(&self, index: TileIndex) -> bool {
+        whichever!(self, has_tile(index))
+    }
+
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        whichever!(self, cached_tile_indices())
+    }
+
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        whichever!(self, tile(index))
+    }
+
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        whichever!(self, tile_uncached(index))
+    }
+
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        whichever!(self, voxels_of_tile_hint(index))
+    }
+
+    fn statistics(&self) -> MapStatistics {
+        whichever!(self, statistics())
     }
 }
 
@@ -57,6 +122,15 @@ pub fn whole_map(path: &Path) -> Result<&Path> {
 pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Result<T>) -> anyhow::Result<T> {
     let map = MapAt::of(map)?;
     again_if_changed(|| read(&map.open()?))
+}
+
+/// The same from a map, a snapshot, or a file of OctoMap.
+pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Result<T>) -> anyhow::Result<T> {
+    if OctreeMap::is_named_by(map) {
+        return read(&AnyMap::Octree(OctreeMap::open(map)?));
+    }
+    let map = MapAt::of(map)?;
+    again_if_changed(|| read(&AnyMap::Map(map.open()?)))
 }
 
 /// The same from two maps.

@@ -14,12 +14,6 @@ use voxtile::{Error, Result};
 /// bytes can stand for 2^48.
 pub const MAX_VOXELS: u64 = 1 << 28;
 
-/// Whether a path names an octree file rather than a map.
-pub fn is_octree_file(path: &Path) -> bool {
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    path.is_file() && ["bt", "ot"].contains(&extension)
-}
-
 pub fn read(path: &Path) -> Result<OctreeFile> {
     let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
     octree::read(BufReader::with_capacity(1 << 16, file)).map_err(|error| error.in_input(path))

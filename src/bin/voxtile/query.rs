@@ -1,6 +1,6 @@
 use crate::args::QueryArgs;
 use crate::json;
-use crate::map_at::{point_of, read_map};
+use crate::map_at::{point_of, read_any_map};
 use anyhow::Context;
 use serde::Serialize;
 use std::fs::File;
@@ -30,7 +30,7 @@ pub fn run(args: &QueryArgs) -> anyhow::Result<ExitCode> {
     if let Some(point) = points.iter().find(|point| !point.iter().all(|coordinate| coordinate.is_finite())) {
         return Err(Error::argument("point", format!("{point:?} is not finite")).into());
     }
-    let answers = read_map(&args.map, |reader| {
+    let answers = read_any_map(&args.map, |reader| {
         let grid = reader.config().grid;
         // In tile order each tile is read once; the answers go back to the order of the points.
         let mut order: Vec<usize> = (0..points.len()).collect();

@@ -1,6 +1,6 @@
 use crate::args::RaycastArgs;
 use crate::json;
-use crate::map_at::{point_of, read_map};
+use crate::map_at::{point_of, read_any_map};
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::Queries;
@@ -13,7 +13,7 @@ pub fn run(args: &RaycastArgs) -> anyhow::Result<ExitCode> {
         max_range_m: args.max_range,
         unknown: if args.unknown_blocks { UnknownAs::Obstacle } else { UnknownAs::Free },
     };
-    let hit = read_map(&args.map, |reader| Ok(reader.cast_ray(&query)?))?;
+    let hit = read_any_map(&args.map, |reader| Ok(reader.cast_ray(&query)?))?;
     let mut out = std::io::stdout().lock();
     match hit {
         _ if args.json => json::print(&serde_json::json!({ "hit": hit }), &mut out)?,

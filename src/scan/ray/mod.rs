@@ -11,7 +11,8 @@ mod ray_walk;
 mod slab_path;
 mod slab_ray;
 
-pub(crate) use range::{RangeRule, Ranged};
+pub use range::no_return;
+pub(crate) use range::{NO_RETURN_M, RangeRule, Ranged};
 pub(crate) use ray_end::RayEnd;
 pub(crate) use ray_origin::RayOrigin;
 pub use ray_walk::{MAX_RAY_STEPS, RayWalk};

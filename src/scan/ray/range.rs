@@ -12,6 +12,25 @@ pub(crate) enum Ranged {
     Skipped,
 }
 
+/// A point so many metres away or more was no return, if rays without one count: nothing that is measured is so far.
+pub(crate) const NO_RETURN_M: f64 = 1e9;
+
+/// The point that stands for a ray without a return: far away along a direction of any length; `None` if that has no
+/// usable length. [`RayConfig::no_return_range_m`] says how far such a ray counts as free.
+///
+/// ```
+/// use voxtile::scan::no_return;
+///
+/// assert_eq!(no_return([1.0, 2.0, 3.0], [0.0, 0.5, 0.0]), Some([1.0, 1e12, 3.0]));
+/// assert_eq!(no_return([1.0, 2.0, 3.0], [0.0; 3]), None);
+/// ```
+pub fn no_return(origin: Point, direction: Point) -> Option<Point> {
+    const FAR_M: f64 = 1e12;
+    let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let point = std::array::from_fn(|k| origin[k] + direction[k] / length * FAR_M);
+    (length.is_normal() && point.iter().all(|coordinate| coordinate.is_finite())).then_some(point)
+}
+
 /// The range rule for points seen from one origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RangeRule {
@@ -19,6 +38,7 @@ pub(crate) struct RangeRule {
     origin: Point,
     min_range_m: f64,
     max_range_m: Option<f64>,
+    no_return_range_m: Option<f64>,
     /// Squared distances between which a point is certainly a hit.
     certain_m2: [f64; 2],
 }
@@ -26,12 +46,14 @@ pub(crate) struct RangeRule {
 impl RangeRule {
     /// The rule of `rays` for points seen from `origin`, in metres and finite.
     pub(crate) fn new(rays: &RayConfig, origin: Point) -> Self {
-        let RayConfig { min_range_m, max_range_m, .. } = *rays;
+        let RayConfig { min_range_m, max_range_m, no_return_range_m, .. } = *rays;
         // Far above the rounding error of squares and square roots.
         const MARGIN: f64 = 1e-12;
         let nearest = min_range_m * min_range_m * (1.0 + MARGIN);
         let farthest = max_range_m.map_or(f64::MAX, |max_m| (max_m * max_m * (1.0 - MARGIN)).min(f64::MAX));
-        Self { origin, min_range_m, max_range_m, certain_m2: [nearest, farthest] }
+        let nothing = no_return_range_m.map_or(f64::MAX, |_| NO_RETURN_M * NO_RETURN_M * (1.0 - MARGIN));
+        let certain_m2 = [nearest, farthest.min(nothing)];
+        Self { origin, min_range_m, max_range_m, no_return_range_m, certain_m2 }
     }
 
     /// Applies the rule to a point in metres.
@@ -68,9 +90,15 @@ impl RangeRule {
             skipped.too_near += 1;
             return Ranged::Skipped;
         }
-        match self.max_range_m {
-            Some(max_range_m) if length_m > max_range_m => {
-                let share = max_range_m / length_m;
+        let cut_m = match self.no_return_range_m {
+            Some(range_m) if length_m >= NO_RETURN_M => {
+                Some(self.max_range_m.map_or(range_m, |max| max.min(range_m)))
+            }
+            _ => self.max_range_m,
+        };
+        match cut_m {
+            Some(cut_m) if length_m > cut_m => {
+                let share = cut_m / length_m;
                 Ranged::Cut([origin[0] + dx * share, origin[1] + dy * share, origin[2] + dz * share])
             }
             _ => Ranged::Hit(point),
@@ -81,6 +109,26 @@ impl RangeRule {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rays_without_a_return_are_cut_where_they_count_as_free() {
+        let at = |rays: RayConfig| match RangeRule::new(&rays, [1.0; 3])
+            .apply(no_return([1.0; 3], [0.0, 0.0, -2.0]).unwrap(), &mut SkippedPoints::default())
+        {
+            Ranged::Cut(point) => Some(point[2]),
+            _ => None,
+        };
+        let rays = |max_range_m, no_return_range_m| RayConfig {
+            max_range_m,
+            no_return_range_m,
+            ..RayConfig::default()
+        };
+        assert_eq!(at(rays(None, None)), None);
+        assert_eq!(at(rays(None, Some(8.0))), Some(-7.0));
+        assert_eq!(at(rays(Some(16.0), Some(8.0))), Some(-7.0));
+        assert_eq!(at(rays(Some(4.0), Some(8.0))), Some(-3.0));
+        assert_eq!(at(rays(Some(4.0), None)), Some(-3.0));
+    }
 
     /// Outcome for a point at `x` metres.
     fn at(rule: &RangeRule, x: f64) -> &'static str {

@@ -7,7 +7,7 @@ use crate::scan::coherence::{sampling_passes, single_pass};
 use crate::scan::pages::{MAX_RAYS, Window};
 use crate::scan::per_ray::{OrderedCollector, PerRayCollector, drain_in_order, updates_in_order};
 use crate::scan::per_scan::{BATCH, PerScanCollector};
-use crate::scan::ray::{MAX_RAY_STEPS, RangeRule, Ranged, RayEnd, RayOrigin, SlabRay};
+use crate::scan::ray::{MAX_RAY_STEPS, NO_RETURN_M, RangeRule, Ranged, RayEnd, RayOrigin, SlabRay};
 use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::ScanParts;
 use crate::scan::stop::Stop;
@@ -304,8 +304,15 @@ impl<'a> ScanRays<'a> {
     /// Bounds of the points, cut at the max range, in units of voxels, without the points that are not finite.
     fn bounds(&self) -> Result<(Point, Point)> {
         let (mut low, mut high) = (self.origin_m, self.origin_m);
+        let mut has_no_return = false;
         self.points.for_each_chunk(0..self.points.len(), &mut |points, _| {
             for point in points.iter().filter(|point| point.iter().all(|x| x.is_finite())) {
+                if self.rays.no_return_range_m.is_some()
+                    && (0..3).any(|axis| (point[axis] - self.origin_m[axis]).abs() > NO_RETURN_M / 2.0)
+                {
+                    has_no_return = true;
+                    continue;
+                }
                 for axis in 0..3 {
                     low[axis] = low[axis].min(point[axis]);
                     high[axis] = high[axis].max(point[axis]);
@@ -313,6 +320,12 @@ impl<'a> ScanRays<'a> {
             }
             true
         })?;
+        if let Some(range_m) = self.rays.no_return_range_m.filter(|_| has_no_return) {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(self.origin_m[axis] - range_m);
+                high[axis] = high[axis].max(self.origin_m[axis] + range_m);
+            }
+        }
         if let Some(range_m) = self.rays.max_range_m {
             for axis in 0..3 {
                 low[axis] = low[axis].max(self.origin_m[axis] - range_m);

@@ -1,0 +1,236 @@
+use super::{MapStatistics, MapView, TileRef};
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::octree::{self, Leaf, Octree, OctreeFile, OctreeFormat};
+use crate::sensor::Evidence;
+use crate::space::{BRICK_EDGE, BrickCode, MortonCode, TileBox, TileIndex, VoxelBox, VoxelIndex};
+use crate::tile::{Table, Tile};
+use lru::LruCache;
+use std::fs::File;
+use std::io::BufReader;
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A file of OctoMap (`.bt` or `.ot`) as a map: it is asked like any other.
+///
+/// The file's tree is in memory as OctoMap would have it; tiles are made of it when somebody asks for them. Voxels have
+/// the log-odds of the file, in a `.bt` file OctoMap's clamps, and no observation count (0).
+///
+/// ```
+/// use voxtile::mapper::OctreeMap;
+/// use voxtile::octree::{Octree, write_bt};
+/// use voxtile::space::VoxelKey;
+/// use voxtile::Queries;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("one.bt");
+/// let mut tree = Octree::new();
+/// tree.set(VoxelKey::from_index([10, 0, 0]).morton(), 3.5);
+/// write_bt(&tree, 0.1, 0.0, &mut std::fs::File::create(&path)?)?;
+/// let map = OctreeMap::open(&path)?;
+/// assert!(map.occupancy_at([1.05, 0.05, 0.05])?.is_occupied());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct OctreeMap {
+    config: MapConfig,
+    tree: Octree,
+    format: OctreeFormat,
+    id: String,
+    /// In order.
+    tiles: Vec<TileIndex>,
+    cache: Mutex<LruCache<TileIndex, Arc<Tile>>>,
+}
+
+/// Edge of the tiles that a file is cut into, about.
+const TILE_SIZE_M: f64 = 10.0;
+/// Tiles in memory.
+const CACHE_TILES: NonZeroUsize = NonZeroUsize::new(32).expect("more than none");
+/// Most tiles that the leaves of a file may stand for: one of twenty bytes can stand for 2^48 voxels.
+const MOST_TILES: u64 = 1 << 22;
+/// Depth of bricks in OctoMap's tree.
+const BRICK_DEPTH: u8 = 13;
+/// The first voxel of OctoMap's space.
+const FIRST_VOXEL: VoxelIndex = [-32768; 3];
+
+impl OctreeMap {
+    /// Whether a path names a file of OctoMap, by its extension.
+    pub fn is_named_by(path: &Path) -> bool {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        path.is_file() && ["bt", "ot"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+    }
+
+    /// Reads a file into memory.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read or is invalid, with the offset; one whose leaves stand for more tiles than can be
+    /// listed.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
+        let read = octree::read(BufReader::with_capacity(1 << 16, file));
+        Self::of(read.map_err(|error| error.in_input(path))?)
+    }
+
+    /// The map of a file that is in memory.
+    ///
+    /// # Errors
+    ///
+    /// Leaves that stand for more tiles than can be listed, a resolution that no map can have.
+    pub fn of(file: OctreeFile) -> Result<Self> {
+        let OctreeFile { tree, resolution_m, id, format, .. } = file;
+        let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, 1024.0);
+        let config = MapConfig::new(resolution_m, edge * resolution_m)?;
+        let tiles = tiles_of(&config, &tree)?;
+        Ok(Self { config, tree, format, id, tiles, cache: Mutex::new(LruCache::new(CACHE_TILES)) })
+    }
+
+    /// Which of OctoMap's formats the file has.
+    pub fn format(&self) -> OctreeFormat {
+        self.format
+    }
+
+    /// OctoMap's name of the tree's class.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// The tree as it is in the file.
+    pub fn tree(&self) -> &Octree {
+        &self.tree
+    }
+
+    /// Makes the table of a tile.
+    pub(crate) fn table_of(&self, index: TileIndex) -> Table {
+        let end = FIRST_VOXEL.map(|first| -first);
+        let voxels = self.config.grid.voxels_of_tile(index);
+        let voxels = voxels.intersection(&VoxelBox { min: FIRST_VOXEL, end });
+        let mut table = Table::default();
+        let corners = |k: usize| {
+            (voxels.min[k] & !(BRICK_EDGE - 1)..voxels.end[k])
+                .step_by(BRICK_EDGE as usize)
+                .collect::<Vec<_>>()
+        };
+        let corners: [Vec<i32>; 3] = std::array::from_fn(corners);
+        let mut known = Vec::new();
+        for &x in &corners[0] {
+            for &y in &corners[1] {
+                for &z in &corners[2] {
+                    self.collect([x, y, z], &voxels, &mut known);
+                    if !known.is_empty() {
+                        table.insert(BrickCode::of_voxel([x, y, z]), &known);
+                    }
+                }
+            }
+        }
+        table
+    }
+
+    /// Collects the known voxels of a brick that lie in a box: place and evidence, in Morton order.
+    fn collect(&self, corner: VoxelIndex, within: &VoxelBox, known: &mut Vec<(usize, Evidence)>) {
+        known.clear();
+        let brick = BrickCode::of_voxel(corner);
+        for Leaf { code, depth, value } in self.tree.leaves_under(brick.voxel(0), BRICK_DEPTH) {
+            let evidence = Evidence { log_odds: f64::from(value), observation_count: 0 };
+            for code in code.0..code.0 + MortonCode::span(depth.max(BRICK_DEPTH)) {
+                let code = MortonCode(code);
+                if within.contains(code.to_key().to_index_from(FIRST_VOXEL)) {
+                    known.push((code.place_in_brick(), evidence));
+                }
+            }
+        }
+    }
+
+    fn has(&self, index: TileIndex) -> bool {
+        self.tiles.binary_search(&index).is_ok()
+    }
+}
+
+/// The tiles that a tree's leaves lie in, in order.
+fn tiles_of(config: &MapConfig, tree: &Octree) -> Result<Vec<TileIndex>> {
+    let grid = &config.grid;
+    let mut tiles: Vec<TileIndex> = Vec::new();
+    let mut most_before_sorting = 1 << 16;
+    for Leaf { code, depth, .. } in tree.leaves() {
+        let first = code.to_key().to_index_from(FIRST_VOXEL);
+        let last = first.map(|k| k + ((1 << (16 - i32::from(depth))) - 1));
+        let covered = TileBox::new(grid.tile_of_voxel(first), grid.tile_of_voxel(last));
+        let count = covered.count();
+        if tiles.len() as u64 + count > MOST_TILES {
+            let hint = "such a file is made by pruning large cubes; cut it with OctoMap's tools first";
+            let what = "number of tiles that the file stands for";
+            return Err(Error::TooLarge { what, size: count, limit: MOST_TILES, hint });
+        }
+        if count == 1 && tiles.last() == Some(&covered.min()) {
+            continue;
+        }
+        tiles.extend(covered.tiles());
+        if tiles.len() > most_before_sorting {
+            tiles.sort_unstable();
+            tiles.dedup();
+            most_before_sorting = 2 * tiles.len().max(1 << 15);
+        }
+    }
+    tiles.sort_unstable();
+    tiles.dedup();
+    Ok(tiles)
+}
+
+impl MapView for OctreeMap {
+    fn config(&self) -> &MapConfig {
+        &self.config
+    }
+
+    fn scan_number(&self) -> u64 {
+        0
+    }
+
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        self.tiles.clone()
+    }
+
+    fn tile_bounds(&self) -> Option<TileBox> {
+        TileBox::of(self.tiles.iter().copied())
+    }
+
+    fn has_tile(&self, index: TileIndex) -> bool {
+        self.has(index)
+    }
+
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut indices: Vec<_> = cache.iter().map(|(index, _)| *index).collect();
+        indices.sort_unstable();
+        indices
+    }
+
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        if !self.has(index) {
+            return Ok(None);
+        }
+        let cache = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(tile) = cache().get(&index) {
+            return Ok(Some(TileRef::shared(tile.clone())));
+        }
+        // Other threads find theirs meanwhile.
+        let tile = Arc::new(Tile::uncached(&self.config.grid, index, self.table_of(index)));
+        cache().put(index, tile.clone());
+        Ok(Some(TileRef::shared(tile)))
+    }
+
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        let make = || Arc::new(Tile::uncached(&self.config.grid, index, self.table_of(index)));
+        Ok(self.has(index).then(|| TileRef::shared(make())))
+    }
+
+    fn voxels_of_tile_hint(&self, _: TileIndex) -> Option<u64> {
+        None
+    }
+
+    fn statistics(&self) -> MapStatistics {
+        MapStatistics { tiles: self.tiles.len() as u64, ..MapStatistics::default() }
+    }
+}
