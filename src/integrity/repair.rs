@@ -7,7 +7,7 @@ use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, Layout, MapPath, Quarantine, Salvage, TileFile, TileStore, WriterLock, hex,
+    Disk, EntryKind, Layout, MapPath, Quarantine, Salvage, TileFile, TileStore, WriterLock, check_scans, hex,
 };
 use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
@@ -99,6 +99,7 @@ pub fn repair(
     };
     let config = config_from(store.metadata(), &store.layout().metadata())?;
     repairer.layout = store.layout().clone();
+    repairer.repair_scans(&mut store)?;
     repairer.repair_tiles(&mut store, &config)?;
     Ok(repairer.counts)
 }
@@ -159,6 +160,22 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 self.quarantine(&path, "no regular file: nobody could lock the map")
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Keeps what is whole of the list of scans, from its beginning.
+    fn repair_scans(&mut self, store: &mut TileStore) -> Result<()> {
+        let path = self.layout.scans();
+        let flush_number = store.commits().flush_number;
+        match check_scans(self.disk, &self.layout, flush_number) {
+            Ok(()) => Ok(()),
+            Err(Error::Damaged { cause, .. }) => {
+                self.quarantine_copy(&path, &format!("{cause}"))?;
+                store.settle_scans()?;
+                self.note(ActionKind::Derived, &path, "cut where the damage begins");
+                Ok(())
+            }
+            Err(error) => Err(error),
         }
     }
 

@@ -8,7 +8,7 @@ use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
     Disk, EntryKind, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage, SnapshotList,
-    SnapshotName, TileFile, TileStore, TileVersion, read_log, tile_of_folder,
+    SnapshotName, TileFile, TileStore, TileVersion, check_scans, read_log, tile_of_folder,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -133,6 +133,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             (note.offset, note.reason) =
                 (Some(torn.at), format!("a flush that never happened: {}", torn.reason));
             self.report(note);
+        }
+        if let Err(error) = check_scans(self.disk, &self.layout, self.counts.flush_number) {
+            let finding = Finding::of(error)?;
+            self.report(finding);
         }
         let mut tiles: Vec<_> = store.tiles().collect();
         tiles.sort_unstable();
@@ -269,7 +273,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         for name in self.list(&folder)? {
             let path = folder.join(&name);
             match (&*name, tile_of_folder(&name)) {
-                ("metadata.json" | "commits.log", _) => {}
+                ("metadata.json" | "commits.log" | "scans.bin", _) => {}
                 ("writer.lock", _) => {
                     if matches!(self.kind(&path)?, Some(EntryKind::Folder | EntryKind::Other)) {
                         self.damage(&path, None, "no regular file: nobody can lock the map to write to it");

@@ -59,7 +59,7 @@ impl ScanSource for PcdFolder {
         }
         let world_from_sensor = self.poses.as_ref().map_or(viewpoint, |poses| poses[self.next]);
         self.next += 1;
-        Ok(Some(ScanHead { name: name_of(path), world_from_sensor }))
+        Ok(Some(ScanHead { name: name_of(path), stamp_ns: None, world_from_sensor }))
     }
 
     fn skip(&mut self, scans: usize) -> Result<usize> {

@@ -162,6 +162,7 @@ mod tests {
         points.iter().for_each(|point| points_in_sensor.push(*point, intensity.unwrap_or_default()).unwrap());
         StoredScan {
             name: "any".into(),
+            stamp_ns: None,
             points_in_sensor,
             world_from_sensor: Isometry3::translation(x_m, 0.0, 0.0).into(),
         }

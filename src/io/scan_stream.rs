@@ -154,7 +154,7 @@ impl<R: Read> ScanSource for ScanStream<R> {
         let pose = self.pose(numbers, at);
         self.is_past_error = pose.is_err();
         let world_from_sensor = pose?;
-        Ok(Some(ScanHead { name, world_from_sensor }))
+        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))
     }
 
     fn pass_unread(&mut self) -> bool {

@@ -17,6 +17,8 @@ use std::path::Path;
 pub struct ScanHead {
     /// Name of the scan in its source: a file name or a number.
     pub name: String,
+    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    pub stamp_ns: Option<i64>,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Pose,
 }
@@ -41,7 +43,7 @@ pub trait ScanSource {
     fn next_scan(&mut self) -> Result<Option<SensorScan>> {
         let mut points = PointStore::default();
         let head = self.read_scan(&mut points)?;
-        Ok(head.map(|ScanHead { name, world_from_sensor }| {
+        Ok(head.map(|ScanHead { name, world_from_sensor, .. }| {
             let (points_in_sensor, intensities) = points.into_parts();
             SensorScan { name, points_in_sensor, intensities, world_from_sensor }
         }))
@@ -55,8 +57,9 @@ pub trait ScanSource {
     fn next_stored(&mut self, room: &PointRoom) -> Result<Option<StoredScan>> {
         let mut points_in_sensor = PointStore::new(room.clone());
         let head = self.read_scan(&mut points_in_sensor)?;
-        Ok(head.map(|ScanHead { name, world_from_sensor }| StoredScan {
+        Ok(head.map(|ScanHead { name, stamp_ns, world_from_sensor }| StoredScan {
             name,
+            stamp_ns,
             points_in_sensor,
             world_from_sensor,
         }))
@@ -80,6 +83,11 @@ pub trait ScanSource {
     /// behind it; `false` if that is not possible.
     fn pass_unread(&mut self) -> bool {
         false
+    }
+
+    /// What a person should know of this input beside its scans, so far: parts that were cut off, scans without poses.
+    fn remarks(&self) -> Vec<String> {
+        Vec::new()
     }
 
     /// The source of the poses.

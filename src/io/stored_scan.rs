@@ -11,6 +11,8 @@ use std::ops::Range;
 pub struct StoredScan {
     /// Name of the scan in its source: a file name or a number.
     pub name: String,
+    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    pub stamp_ns: Option<i64>,
     /// End points in metres, sensor frame.
     pub points_in_sensor: PointStore,
     /// Pose of the sensor: `world = R * p + t`.
@@ -20,6 +22,10 @@ pub struct StoredScan {
 impl ScanPoints for StoredScan {
     fn origin(&self) -> Point {
         self.world_from_sensor.position_m()
+    }
+
+    fn stamp_ns(&self) -> Option<i64> {
+        self.stamp_ns
     }
 
     fn len(&self) -> usize {

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
 use crate::space::{TileBox, TileIndex};
-use crate::store::{Disk, MapPath, Metadata, SnapshotName, TileStore, TileVersion};
+use crate::store::{Disk, MapPath, Metadata, ScanRecord, SnapshotName, TileStore, TileVersion, read_scans};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
@@ -213,6 +213,16 @@ impl MapReader {
                 (voxels + version.voxels, occupied + version.occupied)
             })
         })
+    }
+
+    /// The scans of the map in order: number, time stamp and origin of each. Batches have none, and neither have maps of
+    /// earlier versions.
+    ///
+    /// # Errors
+    ///
+    /// A list that cannot be read or is damaged.
+    pub fn scans(&self) -> Result<Vec<ScanRecord>> {
+        read_scans(&*self.disk, self.store.layout(), self.flush_number())
     }
 
     /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the original format.

@@ -1,13 +1,11 @@
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::octree::{self, Leaf, Octree, OctreeFile, OctreeFormat};
+use crate::octree::{Leaf, Octree, OctreeFile, OctreeFormat};
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickCode, MortonCode, TileBox, TileIndex, VoxelBox, VoxelIndex};
 use crate::tile::{Table, Tile};
 use lru::LruCache;
-use std::fs::File;
-use std::io::BufReader;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,17 +17,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 ///
 /// ```
 /// use voxtile::mapper::OctreeMap;
-/// use voxtile::octree::{Octree, write_bt};
+/// use voxtile::octree::{Octree, read, write_bt};
 /// use voxtile::space::VoxelKey;
 /// use voxtile::Queries;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("one.bt");
 /// let mut tree = Octree::new();
 /// tree.set(VoxelKey::from_index([10, 0, 0]).morton(), 3.5);
-/// write_bt(&tree, 0.1, 0.0, &mut std::fs::File::create(&path)?)?;
-/// let map = OctreeMap::open(&path)?;
+/// let mut file = Vec::new();
+/// write_bt(&tree, 0.1, 0.0, &mut file)?;
+/// let map = OctreeMap::of(read(&*file)?)?;
 /// assert!(map.occupancy_at([1.05, 0.05, 0.05])?.is_occupied());
 /// # Ok(())
 /// # }
@@ -61,18 +58,6 @@ impl OctreeMap {
     pub fn is_named_by(path: &Path) -> bool {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         path.is_file() && ["bt", "ot"].iter().any(|known| extension.eq_ignore_ascii_case(known))
-    }
-
-    /// Reads a file into memory.
-    ///
-    /// # Errors
-    ///
-    /// A file that cannot be read or is invalid, with the offset; one whose leaves stand for more tiles than can be
-    /// listed.
-    pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
-        let read = octree::read(BufReader::with_capacity(1 << 16, file));
-        Self::of(read.map_err(|error| error.in_input(path))?)
     }
 
     /// The map of a file that is in memory.

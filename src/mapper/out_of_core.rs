@@ -299,8 +299,9 @@ impl Mapper for OutOfCoreTileMapper {
         let traced = trace(&mut self.tracer, &self.config, scan, overflow);
         let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
         let inserted = traced.and_then(|updates| self.accept(updates));
-        if inserted.is_err() {
-            self.pager().discard_staged();
+        match inserted {
+            Ok(_) => self.pager().note_scan(scan.stamp_ns(), scan.origin()),
+            Err(_) => self.pager().discard_staged(),
         }
         inserted
     }
@@ -326,7 +327,9 @@ fn check_rays(store: &TileStore, rays: &RayConfig) -> Result<()> {
     };
     let range = |rays: &RayConfig| {
         let max = rays.max_range_m.map_or("no limit".to_owned(), |max| format!("{max} m"));
-        format!("{} m to {max}", rays.min_range_m)
+        let nothing =
+            rays.no_return_range_m.map_or(String::new(), |range| format!(", {range} m without a return"));
+        format!("{} m to {max}{nothing}", rays.min_range_m)
     };
     if range(&ext.rays) != range(rays) {
         return mismatch("been built with ranges of", range(&ext.rays), range(rays));

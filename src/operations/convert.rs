@@ -30,6 +30,7 @@ pub fn convert(
         ext.storage = storage;
     }
     let mut writer = MapWriter::create_as(map.disk(), folder.as_ref(), metadata)?;
+    writer.take_scans_of(map)?;
     let tiles = map.tile_indices();
     for (done, &tile) in (1..).zip(&tiles) {
         if let Some(read) = map.read_table(tile)? {

@@ -25,6 +25,7 @@ pub fn crop(
     let grid = map.config().grid;
     let part = part.voxels(&grid)?;
     let mut writer = MapWriter::create_as(map.disk(), output.as_ref(), metadata_of_part(map))?;
+    writer.take_scans_of(map)?;
     let mut tiles = map.tile_indices();
     tiles.retain(|&tile| part.share_of(&grid.voxels_of_tile(tile)) != Share::Nothing);
     for (done, &tile) in (0..).zip(&tiles) {

@@ -1,5 +1,6 @@
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
+use crate::mapper::MapReader;
 use crate::persistence::TileSaver;
 use crate::persistence::{config_from, new_map_id, new_metadata};
 use crate::space::TileIndex;
@@ -85,6 +86,17 @@ impl MapWriter {
     /// How the map is made.
     pub fn config(&self) -> &MapConfig {
         &self.config
+    }
+
+    /// Records the scans that the map is said to consist of.
+    ///
+    /// # Errors
+    ///
+    /// A list that is damaged or cannot be read.
+    pub(super) fn take_scans_of(&mut self, map: &MapReader) -> Result<()> {
+        let store = self.map.store();
+        map.scans()?.into_iter().for_each(|scan| store.note_scan(scan));
+        Ok(())
     }
 
     /// Adds a tile. One without voxels is left out, for a map has none.

@@ -11,6 +11,11 @@ pub trait ScanPoints: Sync {
     /// Position of the sensor in metres, world frame: every ray starts here.
     fn origin(&self) -> Point;
 
+    /// When the scan was taken, in nanoseconds since the epoch of its source, if that is known.
+    fn stamp_ns(&self) -> Option<i64> {
+        None
+    }
+
     /// Number of points.
     fn len(&self) -> usize;
 

@@ -84,6 +84,11 @@ impl Layout {
         self.folder.join("commits.log")
     }
 
+    /// `scans.bin`.
+    pub fn scans(&self) -> PathBuf {
+        self.folder.join("scans.bin")
+    }
+
     /// The file that a writer holds locked.
     pub fn lock(&self) -> PathBuf {
         self.folder.join("writer.lock")

@@ -5,6 +5,7 @@
 //! | `tile_store` | [`TileStore`]: opens maps and reads tiles; `commit/flush` and `snapshots/snapshot_store` extend it |
 //! | `tiles` | versions of tiles, locations, writers, spill files |
 //! | `commit` | the commit log, `metadata.json`, the steps after a commit |
+//! | `scans` | number, time and origin of each scan |
 //! | `snapshots` | snapshots, and replaced tables kept for them and for readers |
 //! | `recovery` | crash recovery, damaged logs, quarantine, unfinished maps |
 //! | `layout`, `map_files` | file names; operations on them |
@@ -21,6 +22,7 @@ mod map_folder;
 mod map_path;
 mod place;
 mod recovery;
+mod scans;
 mod snapshots;
 mod tile_store;
 mod tiles;
@@ -42,6 +44,8 @@ pub use place::check_outside_of_maps;
 pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;
 pub use recovery::staged_map::{StagedMap, staging_folder};
+pub use scans::ScanRecord;
+pub(crate) use scans::{check_scans, read_scans};
 pub use snapshots::snapshot_file::Snapshot;
 pub use snapshots::snapshot_list::SnapshotList;
 pub use snapshots::snapshot_name::SnapshotName;

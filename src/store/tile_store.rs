@@ -9,6 +9,7 @@ use super::map_files::MapFiles;
 use super::map_folder;
 use super::place;
 use super::recovery::recover::{recover, remove_uncommitted};
+use super::scans::ScanList;
 use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
 use super::snapshots::snapshot_name::SnapshotName;
@@ -39,6 +40,8 @@ pub struct TileStore {
     pub(super) committer: Committer,
     /// What the last commit left to do.
     pub(super) checkpoint: Checkpoint,
+    /// Which scans are in the map.
+    pub(super) scans: ScanList,
     /// Replaced tables that readers and snapshots see; a writer's.
     pub(super) kept: KeptTables,
     /// How many files of an earlier writer opening has removed.
@@ -215,6 +218,7 @@ impl TileStore {
             versions: TileVersions::new(commits),
             committer: Committer::new(log, metadata, None),
             checkpoint: Checkpoint::default(),
+            scans: ScanList::default(),
             kept: KeptTables::default(),
             leftovers_removed: 0,
             opened_snapshot: None,
@@ -303,7 +307,7 @@ impl TileStore {
 
     /// Bytes of memory that the next commit takes beside the index.
     pub fn commit_bytes(&self) -> usize {
-        self.versions.commit_bytes()
+        self.versions.commit_bytes() + self.scans.bytes()
     }
 
     /// What is known of the latest version of a tile on disk without reading it.

@@ -182,6 +182,13 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
     Some(())
 }
 
+/// The list of scans is that of the flush that the reader sees.
+fn check_scans(reader: &MapReader, what: &str) {
+    let scans = reader.scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
+    let numbers: Vec<u64> = scans.iter().map(|scan| scan.number).collect();
+    assert_eq!(numbers, (1..=reader.scan_number()).collect::<Vec<_>>(), "{what}");
+}
+
 /// The disk after an undisturbed life.
 fn undisturbed(oracle: &Oracle) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
@@ -197,6 +204,7 @@ fn check_after_crash(disk: &FaultyDisk, oracle: &Oracle, reached: Reached, what:
         Ok(reader) => {
             assert!(allowed.contains(&(reader.scan_number() as usize)), "{what}: {reached:?}");
             oracle.check(&reader, what);
+            check_scans(&reader, what);
         }
         Err(Error::NoMap { .. }) if reached.safe == 0 => {}
         Err(error) => panic!("{what}: {reached:?}: {error:#}"),
@@ -230,6 +238,7 @@ fn fail_once_at_every_operation(oracle: &Oracle) {
             .unwrap_or_else(|error| panic!("{fault:?}: {error:#}"));
         assert_eq!(reader.scan_number() as usize, oracle.scans.len(), "{fault:?}");
         oracle.check(&reader, &format!("{fault:?}"));
+        check_scans(&reader, &format!("{fault:?}"));
     }
 }
 

@@ -44,7 +44,7 @@ const LAYERS: [(&str, &[&str]); 23] = [
     ("store", &["config", "error", "scratch", "sensor", "space"]),
     // The one layer that knows both tiles and files.
     ("persistence", &["config", "error", "space", "store", "tile"]),
-    ("mapper", &["config", "error", "persistence", "scan", "sensor", "space", "store", "tile"]),
+    ("mapper", &["config", "error", "octree", "persistence", "scan", "sensor", "space", "store", "tile"]),
     ("query", &["config", "error", "mapper", "maths", "octree", "scan", "sensor", "space", "store", "tile"]),
     ("io", &["error", "maths", "scan", "space"]),
     // Voxels of an archive by the interface of mappers and queries alone.

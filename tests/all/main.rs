@@ -68,6 +68,8 @@ mod options;
 mod queries;
 /// Scans from files, good and bad.
 mod readers;
+/// The list of scans that a map keeps.
+mod scan_list;
 /// The stream of scans, in files and from standard input.
 mod scan_stream;
 /// Map sharing: codec, convergence over bad links, layers.

@@ -41,6 +41,8 @@ fn check_snapshots(disk: &Arc<dyn Disk>, map: &Path, naive: &Naive, what: &str) 
     for (of, (voxels, scans)) in &naive.snapshots {
         let reader = MapReader::open_snapshot(MapPath::on(disk.clone(), map), &name(of), 2).unwrap();
         assert_eq!((voxels_of(&reader), reader.scan_number()), (voxels.clone(), *scans), "{what}: {of}");
+        let numbers: Vec<u64> = reader.scans().unwrap().iter().map(|scan| scan.number).collect();
+        assert_eq!(numbers, (1..=*scans).collect::<Vec<_>>(), "{what}: {of}");
         let info = infos.iter().find(|info| info.name == *of).unwrap();
         assert_eq!((info.voxels, info.scan_number), (voxels.len() as u64, *scans), "{what}: {of}");
     }

@@ -2,6 +2,7 @@ use crate::args::ImportArgs;
 use crate::json;
 use crate::map_at::whole_map;
 use crate::memory;
+use crate::octree_file;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -30,7 +31,7 @@ struct Imported<'a> {
 
 pub fn run(args: &ImportArgs) -> anyhow::Result<ExitCode> {
     let output = whole_map(&args.output)?;
-    let map = OctreeMap::open(&args.file)?;
+    let map = OctreeMap::of(octree_file::read(&args.file)?)?;
     let expanded_voxels = map.tree().expanded_leaf_count();
     let most = args.max_voxels;
     if expanded_voxels > most {

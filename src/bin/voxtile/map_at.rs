@@ -1,3 +1,4 @@
+use crate::octree_file;
 use std::path::{Path, PathBuf};
 use voxtile::mapper::{MapReader, MapStatistics, MapView, OctreeMap, TileRef};
 use voxtile::space::{TileBox, TileIndex};
@@ -127,7 +128,7 @@ pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Resul
 /// The same from a map, a snapshot, or a file of OctoMap.
 pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Result<T>) -> anyhow::Result<T> {
     if OctreeMap::is_named_by(map) {
-        return read(&AnyMap::Octree(OctreeMap::open(map)?));
+        return read(&AnyMap::Octree(OctreeMap::of(octree_file::read(map)?)?));
     }
     let map = MapAt::of(map)?;
     again_if_changed(|| read(&AnyMap::Map(map.open()?)))

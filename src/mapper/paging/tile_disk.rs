@@ -5,7 +5,9 @@ use crate::mapper::statistics::{IoCounts, MapStatistics};
 use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
 use crate::scan::{PackedUpdates, TileUpdates};
 use crate::space::{TileIndex, TileTable};
-use crate::store::{InputRecord, Metadata, SnapshotName, SpillFile, TileStore, TileVersion, TileWriter};
+use crate::store::{
+    InputRecord, Metadata, ScanRecord, SnapshotName, SpillFile, TileStore, TileVersion, TileWriter,
+};
 use crate::tile::{Table, Tile};
 use std::time::Instant;
 
@@ -271,6 +273,11 @@ impl TileDisk {
     pub(super) fn upgrade(&mut self, inputs: &[InputRecord]) -> Result<()> {
         let Self { store, saver, config, .. } = self;
         upgrade(store, saver, config, |map_id| new_metadata(config, map_id, inputs))
+    }
+
+    /// Records a scan of the next commit.
+    pub(super) fn note_scan(&mut self, scan: ScanRecord) {
+        self.store.note_scan(scan);
     }
 
     /// Commits all that was written.

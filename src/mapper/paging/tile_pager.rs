@@ -7,8 +7,8 @@ use crate::error::{Error, Result};
 use crate::mapper::statistics::{MapStatistics, MemoryCounts};
 use crate::scan::{PackedUpdates, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
-use crate::space::{TileBox, TileIndex, VoxelIndex};
-use crate::store::{InputRecord, SnapshotName, TileReader, TileStore};
+use crate::space::{Point, TileBox, TileIndex, VoxelIndex};
+use crate::store::{InputRecord, ScanRecord, SnapshotName, TileReader, TileStore};
 use crate::tile::{Table, Tile};
 use rustc_hash::FxHashMap;
 use std::sync::{Arc, MutexGuard};
@@ -132,6 +132,12 @@ impl TilePager<'_> {
         }
         self.make_tiles(new);
         self.contents.scan_number += 1;
+    }
+
+    /// Notes where and when the last scan was taken.
+    pub(in crate::mapper) fn note_scan(&mut self, stamp_ns: Option<i64>, origin_m: Point) {
+        let number = self.contents.scan_number;
+        self.disk.note_scan(ScanRecord::new(number, stamp_ns, origin_m));
     }
 
     /// Makes tiles of what was observed first in them.

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use crate::store::layout::TileFile;
 use crate::store::map_files::MapFiles;
+use crate::store::scans::ScanRecord;
 use crate::store::tile_store::TileStore;
 use crate::store::tiles::file_checksum::FileChecksum;
 use crate::store::tiles::tile_version::TileVersion;
@@ -60,6 +61,27 @@ impl TileStore {
         Ok(())
     }
 
+    /// Records a scan of the next commit.
+    pub fn note_scan(&mut self, scan: ScanRecord) {
+        self.scans.note_scan(scan);
+    }
+
+    /// Cuts the list of scans to what is whole and committed.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
+    pub fn settle_scans(&mut self) -> Result<()> {
+        let bytes = self.scans.write(&self.files, self.versions.commits().flush_number)?;
+        self.scans.commit(bytes);
+        Ok(())
+    }
+
+    /// Records that from the next commit on the scans after this one are no longer in the map.
+    pub fn note_rewind(&mut self, scan_number: u64) {
+        self.scans.note_rewind(scan_number);
+    }
+
     /// Forgets the next version of a tile, as if it had not been written.
     pub fn drop_next(&mut self, tile: TileIndex) {
         self.versions.drop_next(tile);
@@ -96,6 +118,7 @@ impl TileStore {
         let has_changed = !self.versions.next().is_empty() || !removed.is_empty();
         if has_changed || is_new || scan_number != self.commits().scan_number {
             sync_next(&self.files, &mut self.versions)?;
+            let scans_bytes = self.scans.write(&self.files, number - 1)?;
             // As late as can be: what another writer commits must not be cut off.
             self.committer.check_lock()?;
             let text = metadata.to_text();
@@ -109,6 +132,7 @@ impl TileStore {
             }
             // Committed.
             self.note_added(number);
+            self.scans.commit(scans_bytes);
             let changed = self.versions.committed(number, scan_number);
             log::info!(
                 "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",

@@ -1,0 +1,276 @@
+use super::point_store::PointStore;
+use super::pose_source::PoseSource;
+use super::source::{ScanHead, ScanSource};
+use crate::error::{Error, FormatError, Result};
+use crate::scan::{Pose, no_return};
+use crate::space::Point;
+use std::path::{Path, PathBuf};
+use voxtile_clouds::poses::{Found, Trajectory};
+use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, Place, RigidPose};
+
+/// How clouds get their poses, and what becomes of their points.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CloudOptions {
+    /// Most nanoseconds between two poses of a file from which one between them is made, and from a cloud to a pose
+    /// that it takes: beyond, the cloud has no pose.
+    pub pose_tolerance_ns: i64,
+    /// Where the sensor is in the body that the poses are of.
+    pub body_from_sensor: RigidPose,
+    /// Points are in the world frame already; poses say from where they were seen.
+    pub is_world_frame: bool,
+    /// Takes each point to where it was at the time of its cloud, by its own time and the poses between.
+    pub is_deskewed: bool,
+    /// Points without a return are kept as rays: [`RayConfig::no_return_range_m`](crate::RayConfig).
+    pub has_no_returns: bool,
+}
+
+impl Default for CloudOptions {
+    fn default() -> Self {
+        Self {
+            pose_tolerance_ns: 500_000_000,
+            body_from_sensor: RigidPose::IDENTITY,
+            is_world_frame: false,
+            is_deskewed: false,
+            has_no_returns: false,
+        }
+    }
+}
+
+/// From where poses come.
+pub(super) enum CloudPoses {
+    /// A file, by time stamp or else by number.
+    File(PathBuf, Trajectory),
+    /// The source has them.
+    Source,
+    /// Every cloud is in the world frame.
+    Identity,
+}
+
+/// Clouds of other programs as scans. Clouds without a pose are passed over and counted.
+pub(super) struct PosedClouds {
+    source: Box<dyn CloudSource>,
+    path: PathBuf,
+    poses: CloudPoses,
+    options: CloudOptions,
+    /// Clouds so far.
+    number: u64,
+    without_pose: u64,
+    /// Why the first ones have none.
+    reasons: Vec<String>,
+}
+
+/// Most clouds without a pose that are named.
+const MOST_NAMED: usize = 3;
+
+impl PosedClouds {
+    pub(super) fn new(
+        source: Box<dyn CloudSource>,
+        path: &Path,
+        poses: CloudPoses,
+        options: CloudOptions,
+    ) -> Result<Self> {
+        if let CloudPoses::File(file, trajectory) = &poses
+            && !trajectory.has_stamps()
+            && let Some(clouds) = source.len_hint()
+            && trajectory.len() as u64 != clouds
+        {
+            let reason = format!(
+                "{} poses without time stamps for {clouds} clouds; there must be one a cloud, in their order",
+                trajectory.len()
+            );
+            return Err(Error::argument(file.display().to_string(), reason));
+        }
+        let (number, without_pose, reasons) = Default::default();
+        Ok(Self { source, path: path.to_owned(), poses, options, number, without_pose, reasons })
+    }
+
+    /// The pose of the body at a time, or of a cloud; or why there is none.
+    fn pose_of(&self, head: &CloudHead, number: u64) -> std::result::Result<RigidPose, String> {
+        match &self.poses {
+            CloudPoses::Identity => Ok(RigidPose::IDENTITY),
+            CloudPoses::Source => head.world_from_sensor.ok_or_else(|| "the recording has none at its time".to_owned()),
+            CloudPoses::File(_, trajectory) if trajectory.has_stamps() && head.stamp_ns.is_some() => {
+                let stamp_ns = head.stamp_ns.unwrap_or_default();
+                match trajectory.at(stamp_ns, self.options.pose_tolerance_ns) {
+                    Found::Exact(pose) | Found::Between(pose) => Ok(pose),
+                    Found::TooFar { nearest_ns } => {
+                        let apart_s = (nearest_ns.saturating_sub(stamp_ns)).unsigned_abs() as f64 * 1e-9;
+                        Err(format!("the nearest pose is {apart_s:.3} s away, beyond the tolerance"))
+                    }
+                    Found::Before => Err("it is before the first pose".to_owned()),
+                    Found::After => Err("it is after the last pose".to_owned()),
+                }
+            }
+            CloudPoses::File(_, trajectory) => usize::try_from(number)
+                .ok()
+                .and_then(|number| trajectory.by_number(number))
+                .ok_or_else(|| format!("the file has {} poses", trajectory.len())),
+        }
+    }
+
+    fn note_without_pose(&mut self, head: &CloudHead, why: &str) {
+        self.without_pose += 1;
+        log::debug!("{}: cloud {} has no pose: {why}", self.path.display(), head.name);
+        if self.reasons.len() < MOST_NAMED {
+            self.reasons.push(format!("{}: {why}", head.name));
+        }
+    }
+
+    /// Reads the points of the cloud at hand.
+    fn read_points(&mut self, head: &CloudHead, body: &RigidPose, points: &mut PointStore) -> Result<Pose> {
+        let sensor = body.then(&self.options.body_from_sensor);
+        let mut world_from_sensor = Pose::from_quaternion(sensor.position_m, sensor.quaternion)?;
+        if self.options.is_world_frame {
+            // The points stay where they are to the last bits; a rotation and its inverse would move them.
+            world_from_sensor = Pose::from_quaternion(sensor.position_m, RigidPose::IDENTITY.quaternion)?;
+        }
+        let Self { source, options, poses, .. } = self;
+        let deskew = match (&*poses, options.is_deskewed, head.stamp_ns) {
+            (CloudPoses::File(_, trajectory), true, Some(stamp_ns)) => {
+                Some(Deskew { trajectory, options, stamp_ns, sensor_from_world: sensor.inverse() })
+            }
+            _ => None,
+        };
+        points.begin(head.has_intensities());
+        let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
+        source.read_points(&mut |point| {
+            let CloudPoint { position_m, intensity, is_return, .. } = point;
+            let place = match is_return {
+                true => deskew.as_ref().map_or(position_m, |deskew| deskew.apply(&point)),
+                false if options.has_no_returns => {
+                    // As long as a direction is known.
+                    let direction = std::array::from_fn(|k| position_m[k] - origin[k]);
+                    let far = position_m.iter().all(|c| c.is_finite()).then(|| no_return([0.0; 3], direction)).flatten();
+                    return points.push(far.unwrap_or([f64::NAN; 3]), intensity).map_err(keep);
+                }
+                // Counted as a point without a return.
+                false => origin,
+            };
+            let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
+            let in_sensor = if options.is_world_frame { in_sensor } else { place };
+            points.push(in_sensor, intensity).map_err(keep)
+        })?;
+        Ok(world_from_sensor)
+    }
+}
+
+/// Takes points to where they were at the time of their cloud.
+struct Deskew<'a> {
+    trajectory: &'a Trajectory,
+    options: &'a CloudOptions,
+    stamp_ns: i64,
+    sensor_from_world: RigidPose,
+}
+
+impl Deskew<'_> {
+    /// A point whose own pose is not known stays where it is.
+    fn apply(&self, point: &CloudPoint) -> Point {
+        let after_ns = (point.time_s * 1e9).round();
+        if after_ns == 0.0 || !after_ns.is_finite() {
+            return point.position_m;
+        }
+        // Saturates where the time is beyond all poses.
+        let at_ns = self.stamp_ns.saturating_add(after_ns as i64);
+        match self.trajectory.at(at_ns, self.options.pose_tolerance_ns) {
+            Found::Exact(body) | Found::Between(body) => {
+                let sensor = body.then(&self.options.body_from_sensor);
+                self.sensor_from_world.apply(sensor.apply(point.position_m))
+            }
+            _ => point.position_m,
+        }
+    }
+}
+
+/// An error of this crate on its way through the reader.
+fn keep(error: Error) -> voxtile_clouds::Error {
+    match error {
+        Error::Io { path, source, .. } => voxtile_clouds::Error::io(&path, "write", source),
+        other => voxtile_clouds::Error::argument("points", other.to_string()),
+    }
+}
+
+impl From<voxtile_clouds::Error> for Error {
+    fn from(error: voxtile_clouds::Error) -> Self {
+        match error {
+            voxtile_clouds::Error::Io { path, action, source } => Self::io(&path, action, source),
+            voxtile_clouds::Error::Format { path, place, reason } => {
+                let error = match place {
+                    Place::Byte(offset) => FormatError::at_offset(offset, reason),
+                    Place::Line(line) => FormatError::at_line(line, reason),
+                    Place::Record(record) => FormatError::at_offset(0, format!("record {record}: {reason}")),
+                };
+                error.in_input(&path)
+            }
+            voxtile_clouds::Error::Argument { what, reason } => Self::argument(what, reason),
+            other => Self::argument("input", other.to_string()),
+        }
+    }
+}
+
+impl ScanSource for PosedClouds {
+    fn len_hint(&self) -> Option<usize> {
+        self.source.len_hint().and_then(|clouds| usize::try_from(clouds).ok())
+    }
+
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        while let Some(head) = self.source.next_cloud()? {
+            let number = self.number;
+            self.number += 1;
+            match self.pose_of(&head, number) {
+                Err(why) => self.note_without_pose(&head, &why),
+                Ok(body) => {
+                    let world_from_sensor = self.read_points(&head, &body, points)?;
+                    let CloudHead { name, stamp_ns, .. } = head;
+                    return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        let mut skipped = 0;
+        while skipped < scans
+            && let Some(head) = self.source.next_cloud()?
+        {
+            let number = self.number;
+            self.number += 1;
+            match self.pose_of(&head, number) {
+                Err(why) => self.note_without_pose(&head, &why),
+                Ok(_) => skipped += 1,
+            }
+        }
+        Ok(skipped)
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        true
+    }
+
+    fn pose_source(&self) -> PoseSource {
+        match &self.poses {
+            CloudPoses::File(path, _) => PoseSource::File(path.clone()),
+            CloudPoses::Source => PoseSource::Scans,
+            CloudPoses::Identity => PoseSource::Identity,
+        }
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.source.remarks();
+        if let CloudPoses::File(_, trajectory) = &self.poses {
+            remarks.extend(trajectory.remarks().iter().cloned());
+        }
+        if self.without_pose > 0 {
+            let more = if self.without_pose as usize > self.reasons.len() { ", and more" } else { "" };
+            let named = self.reasons.join("; ");
+            remarks.push(format!("{} clouds have no pose and are left out ({named}{more})", self.without_pose));
+        }
+        remarks
+    }
+
+    fn fingerprint(&self) -> Result<String> {
+        let reason = "maps of earlier versions have no inputs of this kind";
+        Err(Error::argument(self.path.display().to_string(), reason))
+    }
+}

@@ -1,0 +1,17 @@
+//! Which scans a map was built from: number, time and origin of each, in `scans.bin`.
+//!
+//! ```text
+//! header  magic, version
+//! record  scan    flush, number, time stamp, origin, checksum
+//!         rewind  flush, number: the map was reverted, and the scans after that number are no longer in it
+//! ```
+//!
+//! Records are synced before the commit that they belong to. One of a later flush than the last commit was left behind
+//! by a crash: readers pass over it, and the next writer cuts it off.
+
+mod scan_list;
+mod scan_record;
+
+pub(super) use scan_list::ScanList;
+pub(crate) use scan_list::{check_scans, read_scans};
+pub use scan_record::ScanRecord;

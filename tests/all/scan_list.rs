@@ -1,0 +1,147 @@
+//! `scans.bin` itself: what a crash leaves, what damage does. Its life beside the map is in `snapshots` and `faults`.
+
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use voxtile::integrity::{repair, verify};
+use voxtile::operations::convert;
+use voxtile::scan::{ScanPoints, TakePoints};
+use voxtile::store::ScanRecord;
+use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Scan, Storage};
+
+/// A scan with a time.
+struct Stamped(Scan, i64);
+
+impl ScanPoints for Stamped {
+    fn origin(&self) -> [f64; 3] {
+        self.0.origin
+    }
+
+    fn stamp_ns(&self) -> Option<i64> {
+        Some(self.1)
+    }
+
+    fn len(&self) -> usize {
+        self.0.points.len()
+    }
+
+    fn has_intensities(&self) -> bool {
+        false
+    }
+
+    fn for_each_chunk(
+        &self,
+        range: std::ops::Range<usize>,
+        take: &mut TakePoints<'_>,
+    ) -> voxtile::Result<()> {
+        self.0.for_each_chunk(range, take)
+    }
+}
+
+fn scan(k: u64) -> Scan {
+    let x = k as f64;
+    Scan { origin: [x, 0.5, 0.25], points: vec![[x + 2.0, 0.5, 0.25]], intensities: None }
+}
+
+fn make_map(folder: &Path, scans: u64) -> OutOfCoreTileMapper {
+    let config = MapConfig::new(0.5, 5.0).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(folder, config).unwrap();
+    insert(&mut mapper, 1..scans + 1);
+    mapper
+}
+
+fn insert(mapper: &mut OutOfCoreTileMapper, scans: std::ops::Range<u64>) {
+    for k in scans {
+        match k % 2 {
+            0 => mapper.insert_points(&Stamped(scan(k), -7 + k as i64)).unwrap(),
+            _ => mapper.insert_scan(&scan(k)).unwrap(),
+        };
+    }
+}
+
+fn expected(scans: u64) -> Vec<ScanRecord> {
+    let stamp = |k: u64| (k % 2 == 0).then_some(-7 + k as i64);
+    (1..=scans).map(|k| ScanRecord::new(k, stamp(k), [k as f64, 0.5, 0.25])).collect()
+}
+
+fn scans_of(folder: &Path) -> Vec<ScanRecord> {
+    MapReader::open(folder, 4).unwrap().scans().unwrap()
+}
+
+#[test]
+fn a_map_lists_the_scans_of_its_last_flush() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    let mut mapper = make_map(&map, 3);
+    assert_eq!(scans_of(&map), []);
+    mapper.flush().unwrap();
+    insert(&mut mapper, 4..6);
+    assert_eq!(scans_of(&map), expected(3));
+    mapper.flush().unwrap();
+    assert_eq!(scans_of(&map), expected(5));
+    drop(mapper);
+    let config = MapReader::config_of(&map).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(&map, config).unwrap();
+    insert(&mut mapper, 6..8);
+    mapper.flush().unwrap();
+    assert_eq!(scans_of(&map), expected(7));
+    let other = folder.path().join("other");
+    convert(&MapReader::open(&map, 4).unwrap(), &other, Storage::Compact, |_, _| ()).unwrap();
+    assert_eq!(scans_of(&other), expected(7));
+}
+
+#[test]
+fn what_a_killed_writer_left_is_passed_over_and_cut_off() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    let mut mapper = make_map(&map, 2);
+    mapper.flush().unwrap();
+    let path = map.join("scans.bin");
+    let committed = fs::read(&path).unwrap();
+    insert(&mut mapper, 3..5);
+    mapper.flush().unwrap();
+    let with_more = fs::read(&path).unwrap();
+    drop(mapper);
+    // Another map in which only the first flush came to its commit.
+    for length in committed.len()..=with_more.len() {
+        let other = folder.path().join(format!("other {length}"));
+        let mut mapper = make_map(&other, 2);
+        mapper.flush().unwrap();
+        drop(mapper);
+        fs::write(other.join("scans.bin"), &with_more[..length]).unwrap();
+        assert_eq!(scans_of(&other), expected(2), "{length}");
+        assert!(verify(&other, |_| (), |_, _| ()).unwrap().is_whole(), "{length}");
+        if length % 32 != 0 {
+            continue;
+        }
+        let config = MapReader::config_of(&other).unwrap();
+        let mut mapper = OutOfCoreTileMapper::open(&other, config).unwrap();
+        insert(&mut mapper, 3..4);
+        mapper.flush().unwrap();
+        assert_eq!(scans_of(&other), expected(3), "{length}");
+        assert_eq!(fs::read(other.join("scans.bin")).unwrap()[..], with_more[..committed.len() + 64]);
+    }
+}
+
+#[test]
+fn every_damaged_byte_is_found_and_repair_keeps_what_comes_before_it() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    make_map(&map, 3).flush().unwrap();
+    let path = map.join("scans.bin");
+    let whole = fs::read(&path).unwrap();
+    // The bytes after the version mean nothing.
+    for at in (0..12).chain((16..whole.len()).step_by(5)) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x40;
+        fs::write(&path, &damaged).unwrap();
+        // A last record of a later flush is one that did not come to its commit.
+        let of_a_later_flush = (8..16).contains(&(at as i64 - 16 - 2 * 64));
+        let found = verify(&map, |_| (), |_, _| ()).unwrap();
+        assert!(of_a_later_flush || !found.is_whole(), "byte {at}");
+        repair(&map, |_| (), |_, _| ()).unwrap();
+        let kept = if at < 16 { 0 } else { (at as u64 - 16) / 64 };
+        assert_eq!(scans_of(&map), expected(kept), "byte {at}");
+        assert!(verify(&map, |_| (), |_, _| ()).unwrap().is_whole(), "byte {at}");
+    }
+}
