@@ -283,6 +283,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         inputs: Vec::new(),
         decayed_scan: 0,
         storage: layout.storage(),
+        scan_records: None,
         snapshots: None,
     };
     let (resolution_m, tile_size_m) = (parameters.resolution, parameters.tile_size);

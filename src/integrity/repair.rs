@@ -167,10 +167,13 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     fn repair_scans(&mut self, store: &mut TileStore) -> Result<()> {
         let path = self.layout.scans();
         let flush_number = store.commits().flush_number;
-        match check_scans(self.disk, &self.layout, flush_number) {
+        let records = store.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
+        match check_scans(self.disk, &self.layout, flush_number, records) {
             Ok(()) => Ok(()),
             Err(Error::Damaged { cause, .. }) => {
-                self.quarantine_copy(&path, &format!("{cause}"))?;
+                if self.kind(&path)?.is_some() {
+                    self.quarantine_copy(&path, &format!("{cause}"))?;
+                }
                 store.settle_scans()?;
                 self.note(ActionKind::Derived, &path, "cut where the damage begins");
                 Ok(())

@@ -134,7 +134,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 (Some(torn.at), format!("a flush that never happened: {}", torn.reason));
             self.report(note);
         }
-        if let Err(error) = check_scans(self.disk, &self.layout, self.counts.flush_number) {
+        let records = store.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
+        if let Err(error) = check_scans(self.disk, &self.layout, self.counts.flush_number, records) {
             let finding = Finding::of(error)?;
             self.report(finding);
         }

@@ -222,7 +222,8 @@ impl MapReader {
     ///
     /// A list that cannot be read or is damaged.
     pub fn scans(&self) -> Result<Vec<ScanRecord>> {
-        read_scans(&*self.disk, self.store.layout(), self.flush_number())
+        let records = self.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
+        read_scans(&*self.disk, self.store.layout(), self.flush_number(), records)
     }
 
     /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the original format.

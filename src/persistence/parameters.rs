@@ -18,6 +18,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
         inputs: inputs.to_vec(),
         decayed_scan: 0,
         storage: config.storage,
+        scan_records: None,
         snapshots: None,
     };
     let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());

@@ -71,7 +71,7 @@ impl TileStore {
         let mut metadata = metadata;
         if let Some(ext) = &mut metadata.ext {
             // Of another map, perhaps.
-            ext.snapshots = None;
+            (ext.snapshots, ext.scan_records) = (None, None);
         }
         let commits = Commits::default();
         let log_path = layout.commit_log();

@@ -126,22 +126,41 @@ fn what_a_killed_writer_left_is_passed_over_and_cut_off() {
 #[test]
 fn every_damaged_byte_is_found_and_repair_keeps_what_comes_before_it() {
     let folder = TempDir::new().unwrap();
-    let map = folder.path().join("map");
-    make_map(&map, 3).flush().unwrap();
-    let path = map.join("scans.bin");
-    let whole = fs::read(&path).unwrap();
-    // The bytes after the version mean nothing.
-    for at in (0..12).chain((16..whole.len()).step_by(5)) {
-        let mut damaged = whole.clone();
-        damaged[at] ^= 0x40;
-        fs::write(&path, &damaged).unwrap();
-        // A last record of a later flush is one that did not come to its commit.
-        let of_a_later_flush = (8..16).contains(&(at as i64 - 16 - 2 * 64));
-        let found = verify(&map, |_| (), |_, _| ()).unwrap();
-        assert!(of_a_later_flush || !found.is_whole(), "byte {at}");
-        repair(&map, |_| (), |_, _| ()).unwrap();
-        let kept = if at < 16 { 0 } else { (at as u64 - 16) / 64 };
-        assert_eq!(scans_of(&map), expected(kept), "byte {at}");
-        assert!(verify(&map, |_| (), |_, _| ()).unwrap().is_whole(), "byte {at}");
+    for at in (0..16 + 3 * 64).step_by(5) {
+        let map = folder.path().join(at.to_string());
+        make_map(&map, 3).flush().unwrap();
+        let path = map.join("scans.bin");
+        let mut bytes = fs::read(&path).unwrap();
+        bytes[at] ^= 0x40;
+        fs::write(&path, &bytes).unwrap();
+        check_damage(&map, at, &format!("byte {at}"));
     }
+}
+
+#[test]
+fn a_list_that_was_cut_or_removed_is_found() {
+    let folder = TempDir::new().unwrap();
+    for length in [None, Some(0), Some(15), Some(16), Some(79), Some(80), Some(207)] {
+        let map = folder.path().join(format!("{length:?}"));
+        make_map(&map, 3).flush().unwrap();
+        let path = map.join("scans.bin");
+        match length {
+            Some(length) => fs::write(&path, &fs::read(&path).unwrap()[..length]).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        check_damage(&map, length.unwrap_or(0), &format!("{length:?} bytes"));
+    }
+}
+
+/// Damage in the list at a byte is found, and repaired up to it.
+fn check_damage(map: &Path, at: usize, what: &str) {
+    assert!(!verify(map, |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
+    assert!(MapReader::open(map, 4).unwrap().scans().is_err(), "{what}");
+    repair(map, |_| (), |_, _| ()).unwrap();
+    let kept = at.saturating_sub(16) as u64 / 64;
+    assert_eq!(scans_of(map), expected(kept), "{what}");
+    assert!(verify(map, |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
+    let config = MapReader::config_of(map).unwrap();
+    OutOfCoreTileMapper::open(map, config).unwrap().flush().unwrap();
+    assert_eq!(scans_of(map), expected(kept), "{what}");
 }

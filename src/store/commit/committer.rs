@@ -122,6 +122,13 @@ impl Committer {
         metadata
     }
 
+    /// Corrects the number of records in the list of scans; the next `metadata.json` has it.
+    pub(in crate::store) fn set_scan_records(&mut self, records: u64) {
+        if let Some(ext) = &mut self.metadata.ext {
+            ext.scan_records = Some(records);
+        }
+    }
+
     /// Whether a commit has to say what the metadata is.
     pub(in crate::store) fn is_new(&self, metadata: &Metadata) -> bool {
         !self.is_list_logged

@@ -72,9 +72,10 @@ impl TileStore {
     ///
     /// An I/O error.
     pub fn settle_scans(&mut self) -> Result<()> {
-        let bytes = self.scans.write(&self.files, self.versions.commits().flush_number)?;
-        self.scans.commit(bytes);
-        Ok(())
+        let scans = self.scans.write(&self.files, self.versions.commits().flush_number)?;
+        self.scans.commit(scans);
+        self.committer.set_scan_records(scans.records);
+        self.write_metadata()
     }
 
     /// Records that from the next commit on the scans after this one are no longer in the map.
@@ -112,13 +113,17 @@ impl TileStore {
             return Err(Error::io(&folder, "trust", io::Error::other("an earlier sync failed")));
         }
         let number = self.commits().flush_number + 1;
-        let metadata = self.committer.fill_in(metadata, &self.files, &self.versions, [number, scan_number]);
+        let mut metadata =
+            self.committer.fill_in(metadata, &self.files, &self.versions, [number, scan_number]);
         let is_new = self.committer.is_new(&metadata);
         let removed = self.versions.removed();
         let has_changed = !self.versions.next().is_empty() || !removed.is_empty();
         if has_changed || is_new || scan_number != self.commits().scan_number {
             sync_next(&self.files, &mut self.versions)?;
-            let scans_bytes = self.scans.write(&self.files, number - 1)?;
+            let scans = self.scans.write(&self.files, number - 1)?;
+            if let Some(ext) = &mut metadata.ext {
+                ext.scan_records = Some(scans.records);
+            }
             // As late as can be: what another writer commits must not be cut off.
             self.committer.check_lock()?;
             let text = metadata.to_text();
@@ -132,7 +137,7 @@ impl TileStore {
             }
             // Committed.
             self.note_added(number);
-            self.scans.commit(scans_bytes);
+            self.scans.commit(scans);
             let changed = self.versions.committed(number, scan_number);
             log::info!(
                 "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",

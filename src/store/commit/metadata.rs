@@ -56,6 +56,9 @@ pub struct Extension {
     /// How the tiles are stored; maps of the original files do not say.
     #[serde(default, skip_serializing_if = "Storage::is_octomap")]
     pub storage: Storage,
+    /// Number of records in `scans.bin` as of the last flush; `None` if that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scan_records: Option<u64>,
     /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions
     /// that did not list them: every file of the folder of snapshots is one then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -162,6 +165,7 @@ impl Metadata {
         if let Some(ext) = &mut metadata.ext {
             ext.empty = metadata.bounds.is_none();
             (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
+            ext.scan_records = None;
         }
         metadata
     }
@@ -172,6 +176,7 @@ impl Metadata {
             let mut metadata = Self { bounds: None, ..metadata.clone() };
             if let Some(ext) = &mut metadata.ext {
                 (ext.empty, ext.flush_number, ext.scan_number) = (true, 0, 0);
+                ext.scan_records = None;
             }
             metadata
         };
@@ -269,6 +274,7 @@ mod tests {
             inputs: vec![InputRecord { first_scan: 45, ..InputRecord::from("abc") }],
             decayed_scan: 0,
             storage: Storage::OctoMap,
+            scan_records: None,
             snapshots: None,
         };
         let bounds = Bounds::of([TileIndex::new(0, -1, 4), TileIndex::new(-7, 2, 0)].into_iter());

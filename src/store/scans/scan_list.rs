@@ -5,20 +5,33 @@ use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
 use std::io::{self, BufReader, Read, Write};
 
-const MAGIC: [u8; 8] = *b"VXTSCANS";
-const VERSION: u32 = 1;
-/// Bytes of the header: magic, version, zeros.
 const HEADER_BYTES: usize = 16;
+/// Magic, version, zeros.
+const HEADER: [u8; HEADER_BYTES] = *b"VXTSCANS\x01\0\0\0\0\0\0\0";
 
 /// What a writer knows of the file.
 #[derive(Debug, Default)]
 pub(in crate::store) struct ScanList {
     /// Scans and rewinds of the next commit.
     pending: Vec<Entry>,
-    /// Bytes of what is committed, 0 if there is no file; `None` before the file was looked at.
-    committed_bytes: Option<u64>,
+    /// What is committed, nothing if there is no file; `None` before the file was looked at.
+    committed: Option<Extent>,
     /// Whether there may be more in the file.
     has_excess: bool,
+}
+
+/// A beginning of the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(in crate::store) struct Extent {
+    /// Records.
+    pub(in crate::store) records: u64,
+}
+
+impl Extent {
+    /// Its bytes, the header among them.
+    fn bytes(self) -> u64 {
+        if self.records == 0 { 0 } else { HEADER_BYTES as u64 + self.records * RECORD_BYTES as u64 }
+    }
 }
 
 impl ScanList {
@@ -35,80 +48,73 @@ impl ScanList {
         self.pending.capacity() * size_of::<Entry>()
     }
 
-    /// Writes what belongs to a commit, synced; `committed` is the flush before it. Returns the file's new length for
-    /// [`ScanList::commit`].
+    /// Writes what belongs to a commit, synced; `committed` is the flush before it. Returns what [`ScanList::commit`] is
+    /// to be told.
     ///
     /// # Errors
     ///
     /// A disk that refuses: the next call writes it again.
-    pub(in crate::store) fn write(&mut self, files: &MapFiles, committed: u64) -> Result<u64> {
+    pub(in crate::store) fn write(&mut self, files: &MapFiles, committed: u64) -> Result<Extent> {
         let path = files.layout().scans();
-        let before = match self.committed_bytes {
-            Some(bytes) => bytes,
+        let before = match self.committed {
+            Some(before) => before,
             None => {
-                let found = find_end(&**files.disk(), files.layout(), committed)?;
-                self.has_excess = found.has_excess;
-                *self.committed_bytes.insert(found.bytes)
+                let (found, has_excess) = find_end(&**files.disk(), files.layout(), committed)?;
+                self.has_excess = has_excess;
+                *self.committed.insert(found)
             }
         };
         if self.pending.is_empty() && !self.has_excess {
             return Ok(before);
         }
-        if self.pending.is_empty() && before == 0 {
+        if self.pending.is_empty() && before.records == 0 {
             files.remove_file(&path)?;
             self.has_excess = false;
-            return Ok(0);
+            return Ok(before);
         }
         // Until this is committed.
         self.has_excess = true;
-        let mut length = before;
-        let mut write = || -> io::Result<u64> {
-            let mut out =
-                if before == 0 { files.disk().create(&path)? } else { files.disk().append(&path, before)? };
-            if before == 0 {
-                let mut header = [0; HEADER_BYTES];
-                header[..8].copy_from_slice(&MAGIC);
-                header[8..12].copy_from_slice(&VERSION.to_le_bytes());
-                out.write_all(&header)?;
-                length = HEADER_BYTES as u64;
-            }
+        let write = || -> io::Result<()> {
+            let mut out = match before.bytes() {
+                0 => {
+                    let mut out = files.disk().create(&path)?;
+                    out.write_all(&HEADER)?;
+                    out
+                }
+                bytes => files.disk().append(&path, bytes)?,
+            };
             for records in self.pending.chunks(1024) {
                 let bytes: Vec<u8> = records.iter().flat_map(|entry| entry.to_bytes(committed + 1)).collect();
                 out.write_all(&bytes)?;
-                length += bytes.len() as u64;
             }
-            out.sync()?;
-            Ok(length)
+            out.sync()
         };
-        let length = write().map_err(|error| Error::io(&path, "write", error))?;
-        if before == 0 {
+        write().map_err(|error| Error::io(&path, "write", error))?;
+        if before.records == 0 {
             files.sync_map_folder()?;
         }
-        Ok(length)
+        Ok(Extent { records: before.records + self.pending.len() as u64 })
     }
 
     /// Notes that what was written is committed.
-    pub(in crate::store) fn commit(&mut self, bytes: u64) {
-        (self.committed_bytes, self.has_excess) = (Some(bytes), false);
+    pub(in crate::store) fn commit(&mut self, written: Extent) {
+        (self.committed, self.has_excess) = (Some(written), false);
         self.pending = Vec::new();
     }
 }
 
-/// Where the committed part of a file ends.
-struct End {
-    bytes: u64,
-    has_excess: bool,
-}
-
-fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64) -> Result<End> {
-    let path = layout.scans();
-    match for_each_record(disk, layout, committed, &mut |_| ()) {
-        Ok(None) => Ok(End { bytes: 0, has_excess: false }),
-        Ok(Some(read)) => Ok(End { bytes: read.bytes, has_excess: read.bytes < read.file_bytes }),
-        Err(DecodeError::Io(error)) => Err(Error::io(&path, "read", error)),
+/// What is committed, and whether there is more in the file.
+fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64) -> Result<(Extent, bool)> {
+    let mut records = 0;
+    match for_each_record(disk, layout, committed, &mut |_| records += 1) {
+        Ok(file_bytes) => {
+            let found = Extent { records };
+            Ok((found, file_bytes.is_some_and(|bytes| bytes != found.bytes())))
+        }
+        Err(DecodeError::Io(error)) => Err(Error::io(&layout.scans(), "read", error)),
         Err(DecodeError::Format(error)) => {
-            log::warn!("{}: {error}; what follows there is lost", path.display());
-            Ok(End { bytes: if error.at < HEADER_BYTES as u64 { 0 } else { error.at }, has_excess: true })
+            log::warn!("{}: {error}; what follows there is lost", layout.scans().display());
+            Ok((Extent { records }, true))
         }
     }
 }
@@ -118,16 +124,20 @@ fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64) -> Result<End> {
 /// # Errors
 ///
 /// A disk that refuses, damage.
-pub(crate) fn read_scans(disk: &dyn Disk, layout: &Layout, flush_number: u64) -> Result<Vec<ScanRecord>> {
+pub(crate) fn read_scans(
+    disk: &dyn Disk,
+    layout: &Layout,
+    flush_number: u64,
+    records: Option<u64>,
+) -> Result<Vec<ScanRecord>> {
     let mut scans: Vec<ScanRecord> = Vec::new();
-    let read = for_each_record(disk, layout, flush_number, &mut |entry| match entry {
+    for_each_committed(disk, layout, flush_number, records, &mut |entry| match entry {
         Entry::Scan(scan) => scans.push(scan),
         Entry::Rewind(number) => {
             let kept = scans.partition_point(|scan| scan.number <= number);
             scans.truncate(kept);
         }
-    });
-    read.map_err(|error| error.in_map(&layout.scans(), None))?;
+    })?;
     Ok(scans)
 }
 
@@ -136,25 +146,47 @@ pub(crate) fn read_scans(disk: &dyn Disk, layout: &Layout, flush_number: u64) ->
 /// # Errors
 ///
 /// A disk that refuses, damage.
-pub(crate) fn check_scans(disk: &dyn Disk, layout: &Layout, flush_number: u64) -> Result<()> {
-    let read = for_each_record(disk, layout, flush_number, &mut |_| ());
-    read.map(|_| ()).map_err(|error| error.in_map(&layout.scans(), None))
+pub(crate) fn check_scans(
+    disk: &dyn Disk,
+    layout: &Layout,
+    flush_number: u64,
+    records: Option<u64>,
+) -> Result<()> {
+    for_each_committed(disk, layout, flush_number, records, &mut |_| ())
 }
 
-struct ReadTo {
-    /// Where the records up to the flush end.
-    bytes: u64,
-    file_bytes: u64,
+/// Visits the records up to a flush, of which there are so many, if that is known.
+fn for_each_committed(
+    disk: &dyn Disk,
+    layout: &Layout,
+    flush_number: u64,
+    records: Option<u64>,
+    visit: &mut dyn FnMut(Entry),
+) -> Result<()> {
+    let mut found = Extent::default();
+    let read = for_each_record(disk, layout, flush_number, &mut |entry| {
+        found.records += 1;
+        visit(entry);
+    });
+    let in_map = |error: DecodeError| error.in_map(&layout.scans(), None);
+    read.map_err(in_map)?;
+    match records {
+        Some(records) if records != found.records => {
+            let reason = format!("{} records, metadata.json says {records}", found.records);
+            Err(in_map(FormatError::at_offset(found.bytes(), reason).into()))
+        }
+        _ => Ok(()),
+    }
 }
 
-/// Visits the records up to a flush; `None` without a file. What a later flush has written, or a crash has left half
-/// written behind these, is passed over.
+/// Visits the records up to a flush; returns the file's length, `None` without a file. What a later flush has written,
+/// or a crash has left half written behind these, is passed over.
 fn for_each_record(
     disk: &dyn Disk,
     layout: &Layout,
     flush_number: u64,
     visit: &mut dyn FnMut(Entry),
-) -> std::result::Result<Option<ReadTo>, DecodeError> {
+) -> std::result::Result<Option<u64>, DecodeError> {
     let input = match disk.open(&layout.scans()) {
         Ok(input) => input,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -162,22 +194,22 @@ fn for_each_record(
     };
     let file_bytes = input.file_bytes();
     let mut input = BufReader::new(input);
-    if file_bytes < HEADER_BYTES as u64 {
-        // A crash while it was begun, or damage: a map whose first scans are committed has a whole header.
-        return Ok(Some(ReadTo { bytes: 0, file_bytes }));
+    let mut header = Vec::new();
+    input.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut header)?;
+    if header.len() < HEADER_BYTES {
+        // A crash while it was begun, or damage: the number of records tells.
+        return Ok(Some(file_bytes));
     }
-    let mut header = [0; HEADER_BYTES];
-    input.read_exact(&mut header)?;
-    if header[..8] != MAGIC {
-        return Err(FormatError::at_offset(0, "not a list of scans").into());
+    if header != HEADER {
+        let reason = match header.starts_with(&HEADER[..8]) {
+            true => "a list of scans of a newer version",
+            false => "not a list of scans",
+        };
+        return Err(FormatError::at_offset(0, reason).into());
     }
-    if header[8..12] != VERSION.to_le_bytes() {
-        return Err(FormatError::at_offset(8, "a list of scans of a newer version").into());
-    }
-    let mut bytes = HEADER_BYTES as u64;
-    let mut has_records = false;
+    let mut at = HEADER_BYTES as u64;
     let mut record = [0; RECORD_BYTES];
-    while bytes + RECORD_BYTES as u64 <= file_bytes {
+    while at + RECORD_BYTES as u64 <= file_bytes {
         input.read_exact(&mut record)?;
         match Entry::from_bytes(&record) {
             Some((flush, entry)) if flush <= flush_number => visit(entry),
@@ -185,15 +217,11 @@ fn for_each_record(
             None if is_uncommitted(&record, flush_number) && !has_committed(&mut input, flush_number)? => {
                 break;
             }
-            None => {
-                return Err(FormatError::at_offset(bytes, "the checksum of a record does not match").into());
-            }
+            None => return Err(FormatError::at_offset(at, "the checksum of a record does not match").into()),
         }
-        has_records = true;
-        bytes += RECORD_BYTES as u64;
+        at += RECORD_BYTES as u64;
     }
-    let bytes = if has_records { bytes } else { 0 };
-    Ok(Some(ReadTo { bytes, file_bytes }))
+    Ok(Some(file_bytes))
 }
 
 /// Whether a damaged record is of a flush that did not come to its commit, by what is left of it: zeros where nothing
