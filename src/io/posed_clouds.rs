@@ -71,7 +71,7 @@ impl PosedClouds {
         options: CloudOptions,
     ) -> Result<Self> {
         if let CloudPoses::File(file, trajectory) = &poses
-            && !trajectory.has_stamps()
+            && !trajectory.span_ns().is_some()
             && let Some(clouds) = source.len_hint()
             && trajectory.len() as u64 != clouds
         {
@@ -90,7 +90,7 @@ impl PosedClouds {
         match &self.poses {
             CloudPoses::Identity => Ok(RigidPose::IDENTITY),
             CloudPoses::Source => head.world_from_sensor.ok_or_else(|| "the recording has none at its time".to_owned()),
-            CloudPoses::File(_, trajectory) if trajectory.has_stamps() && head.stamp_ns.is_some() => {
+            CloudPoses::File(_, trajectory) if trajectory.span_ns().is_some() && head.stamp_ns.is_some() => {
                 let stamp_ns = head.stamp_ns.unwrap_or_default();
                 match trajectory.at(stamp_ns, self.options.pose_tolerance_ns) {
                     Found::Exact(pose) | Found::Between(pose) => Ok(pose),
@@ -98,8 +98,9 @@ impl PosedClouds {
                         let apart_s = (nearest_ns.saturating_sub(stamp_ns)).unsigned_abs() as f64 * 1e-9;
                         Err(format!("the nearest pose is {apart_s:.3} s away, beyond the tolerance"))
                     }
-                    Found::Before => Err("it is before the first pose".to_owned()),
-                    Found::After => Err("it is after the last pose".to_owned()),
+                    Found::Before { .. } => Err("it is before the first pose".to_owned()),
+                    Found::After { .. } => Err("it is after the last pose".to_owned()),
+                    _ => Err("the poses have no time stamps".to_owned()),
                 }
             }
             CloudPoses::File(_, trajectory) => usize::try_from(number)

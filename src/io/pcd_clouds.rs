@@ -1,0 +1,66 @@
+use super::file_order::name_of;
+use super::pcd::read_pcd_file;
+use super::point_store::{PointRoom, PointStore};
+use std::path::PathBuf;
+use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose, stamp_of_name};
+
+/// PCD files as clouds, for poses and options that [`PcdFolder`](super::pcd_folder::PcdFolder) does not know.
+pub(super) struct PcdClouds {
+    files: Vec<PathBuf>,
+    next: usize,
+    points: PointStore,
+}
+
+/// Bytes of memory for the points of a file; more go to a temporary file.
+const ROOM_BYTES: usize = 64 << 20;
+
+impl PcdClouds {
+    pub(super) fn new(files: Vec<PathBuf>) -> Self {
+        let points = PointStore::new(PointRoom::new(ROOM_BYTES, &std::env::temp_dir()));
+        Self { files, next: 0, points }
+    }
+}
+
+impl CloudSource for PcdClouds {
+    fn format(&self) -> &str {
+        "PCD"
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(self.files.len() as u64)
+    }
+
+    fn next_cloud(&mut self) -> voxtile_clouds::Result<Option<CloudHead>> {
+        let Some(path) = self.files.get(self.next) else { return Ok(None) };
+        self.next += 1;
+        let viewpoint = read_pcd_file(path, &mut self.points).map_err(|error| {
+            voxtile_clouds::Error::argument(path.display().to_string(), error.to_string())
+        })?;
+        let mut head = CloudHead { name: name_of(path), ..CloudHead::default() };
+        head.stamp_ns = stamp_of_name(path);
+        head.points = Some(self.points.len() as u64);
+        head.has_intensities = self.points.has_intensities();
+        let pose = RigidPose { position_m: viewpoint.position_m(), quaternion: viewpoint.quaternion() };
+        head.world_from_sensor = Some(pose);
+        Ok(Some(head))
+    }
+
+    fn read_points(
+        &mut self,
+        visit: &mut dyn FnMut(CloudPoint) -> voxtile_clouds::Result<()>,
+    ) -> voxtile_clouds::Result<()> {
+        let mut outcome = Ok(());
+        let read = self.points.for_each_chunk(0..self.points.len(), &mut |points, intensities| {
+            for (number, &position_m) in points.iter().enumerate() {
+                let intensity = intensities.map_or(0.0, |intensities| intensities[number]);
+                outcome = visit(CloudPoint { intensity, ..CloudPoint::hit(position_m) });
+                if outcome.is_err() {
+                    return false;
+                }
+            }
+            true
+        });
+        read.map_err(|error| voxtile_clouds::Error::argument("temporary file", error.to_string()))?;
+        outcome
+    }
+}
