@@ -7,17 +7,25 @@
 //! voxtile's scan stream ┘
 //! ```
 
+#[cfg(feature = "clouds")]
+mod any_scans;
 mod file_order;
 mod fingerprint;
 mod lzf;
 mod pcd;
+#[cfg(feature = "clouds")]
+mod pcd_clouds;
 mod pcd_folder;
 mod pcd_header;
 mod pcd_viewpoint;
 mod point_store;
 mod points;
 mod pose_source;
+#[cfg(feature = "clouds")]
+mod posed_clouds;
 mod poses;
+#[cfg(feature = "clouds")]
+mod read_options;
 mod scan_chain;
 mod scan_graph;
 mod scan_log;
@@ -29,11 +37,17 @@ mod source;
 mod stored_scan;
 mod voxel_writer;
 
+#[cfg(feature = "clouds")]
+pub use any_scans::open_any_scans;
 pub use pcd::{PcdCloud, read_pcd};
 pub use point_store::{PointRoom, PointStore};
 pub use points::read_points;
 pub use pose_source::PoseSource;
+#[cfg(feature = "clouds")]
+pub use posed_clouds::CloudOptions;
 pub use poses::{parse_poses, read_poses};
+#[cfg(feature = "clouds")]
+pub use read_options::{ReadOptions, RecordingOptions};
 pub use scan_chain::{ScanChain, ScanMark};
 pub use scan_graph::read_scan_graph;
 pub use scan_log::read_scan_log;

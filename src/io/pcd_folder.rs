@@ -22,10 +22,10 @@ pub(super) struct PcdFolder {
 impl PcdFolder {
     pub(super) fn open(path: &Path, poses: Option<&Path>) -> Result<Self> {
         let mut folder = path.to_owned();
-        let mut files = pcd_files(&folder)?;
+        let mut files = pcd_files_of(&folder)?;
         if files.is_empty() && folder.join("scans").is_dir() {
             folder = folder.join("scans");
-            files = pcd_files(&folder)?;
+            files = pcd_files_of(&folder)?;
         }
         if files.is_empty() {
             let reason = "no .pcd file in this folder, nor in a folder scans/ below it";
@@ -48,6 +48,10 @@ impl PcdFolder {
 impl ScanSource for PcdFolder {
     fn len_hint(&self) -> Option<usize> {
         Some(self.files.len())
+    }
+
+    fn format(&self) -> String {
+        "PCD".to_owned()
     }
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
@@ -85,7 +89,7 @@ impl ScanSource for PcdFolder {
     }
 }
 
-fn pcd_files(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn pcd_files_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let cannot = |error| Error::io(folder, "list", error);
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(cannot)? {

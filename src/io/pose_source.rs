@@ -22,7 +22,7 @@ pub enum PoseSource {
 /// Names of pose files that are searched for.
 const POSE_FILES: [&str; 2] = ["poses_tum.txt", "poses_kitti.txt"];
 /// Given instead of a pose file: every scan is in the world frame.
-const IDENTITY: &str = "identity";
+pub(super) const IDENTITY: &str = "identity";
 /// Most files that an error names.
 const MOST_NAMED: usize = 4;
 
@@ -90,7 +90,7 @@ fn no_poses(files: &[PathBuf], folder: Option<&Path>) -> Error {
 }
 
 /// The pose file in a folder, or beside it.
-fn pose_file_for(folder: &Path) -> Option<PathBuf> {
+pub(super) fn pose_file_for(folder: &Path) -> Option<PathBuf> {
     let beside = folder.join("..");
     let places = [folder, &*beside];
     places.iter().flat_map(|place| POSE_FILES.map(|name| place.join(name))).find(|path| path.is_file())

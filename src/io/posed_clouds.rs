@@ -21,8 +21,17 @@ pub struct CloudOptions {
     pub is_world_frame: bool,
     /// Takes each point to where it was at the time of its cloud, by its own time and the poses between.
     pub is_deskewed: bool,
+    /// A cloud without a pose is in the world frame: for points without rays.
+    pub may_lack_poses: bool,
     /// Points without a return are kept as rays: [`RayConfig::no_return_range_m`](crate::RayConfig).
     pub has_no_returns: bool,
+}
+
+impl CloudOptions {
+    /// Whether nothing but the poses' own places is asked for.
+    pub(super) fn is_plain(&self) -> bool {
+        self.body_from_sensor == RigidPose::IDENTITY && !self.is_world_frame && !self.is_deskewed
+    }
 }
 
 impl Default for CloudOptions {
@@ -32,6 +41,7 @@ impl Default for CloudOptions {
             body_from_sensor: RigidPose::IDENTITY,
             is_world_frame: false,
             is_deskewed: false,
+            may_lack_poses: false,
             has_no_returns: false,
         }
     }
@@ -58,6 +68,7 @@ pub(super) struct PosedClouds {
     without_pose: u64,
     /// Why the first ones have none.
     reasons: Vec<String>,
+    fields: Vec<String>,
 }
 
 /// Most clouds without a pose that are named.
@@ -81,15 +92,17 @@ impl PosedClouds {
             );
             return Err(Error::argument(file.display().to_string(), reason));
         }
-        let (number, without_pose, reasons) = Default::default();
-        Ok(Self { source, path: path.to_owned(), poses, options, number, without_pose, reasons })
+        let (number, without_pose, reasons, fields) = Default::default();
+        Ok(Self { source, path: path.to_owned(), poses, options, number, without_pose, reasons, fields })
     }
 
     /// The pose of the body at a time, or of a cloud; or why there is none.
     fn pose_of(&self, head: &CloudHead, number: u64) -> std::result::Result<RigidPose, String> {
         match &self.poses {
             CloudPoses::Identity => Ok(RigidPose::IDENTITY),
-            CloudPoses::Source => head.world_from_sensor.ok_or_else(|| "the recording has none at its time".to_owned()),
+            CloudPoses::Source => {
+                head.world_from_sensor.ok_or_else(|| "the recording has none at its time".to_owned())
+            }
             CloudPoses::File(_, trajectory) if trajectory.span_ns().is_some() && head.stamp_ns.is_some() => {
                 let stamp_ns = head.stamp_ns.unwrap_or_default();
                 match trajectory.at(stamp_ns, self.options.pose_tolerance_ns) {
@@ -100,7 +113,7 @@ impl PosedClouds {
                     }
                     Found::Before { .. } => Err("it is before the first pose".to_owned()),
                     Found::After { .. } => Err("it is after the last pose".to_owned()),
-                    _ => Err("the poses have no time stamps".to_owned()),
+                    Found::WithoutStamps => Err("the poses have no time stamps".to_owned()),
                 }
             }
             CloudPoses::File(_, trajectory) => usize::try_from(number)
@@ -133,7 +146,7 @@ impl PosedClouds {
             }
             _ => None,
         };
-        points.begin(head.has_intensities());
+        points.begin(head.has_intensities);
         let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
         source.read_points(&mut |point| {
             let CloudPoint { position_m, intensity, is_return, .. } = point;
@@ -142,7 +155,11 @@ impl PosedClouds {
                 false if options.has_no_returns => {
                     // As long as a direction is known.
                     let direction = std::array::from_fn(|k| position_m[k] - origin[k]);
-                    let far = position_m.iter().all(|c| c.is_finite()).then(|| no_return([0.0; 3], direction)).flatten();
+                    let far = position_m
+                        .iter()
+                        .all(|c| c.is_finite())
+                        .then(|| no_return([0.0; 3], direction))
+                        .flatten();
                     return points.push(far.unwrap_or([f64::NAN; 3]), intensity).map_err(keep);
                 }
                 // Counted as a point without a return.
@@ -219,10 +236,12 @@ impl ScanSource for PosedClouds {
             let number = self.number;
             self.number += 1;
             match self.pose_of(&head, number) {
-                Err(why) => self.note_without_pose(&head, &why),
-                Ok(body) => {
+                Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
+                found => {
+                    let body = found.unwrap_or(RigidPose::IDENTITY);
                     let world_from_sensor = self.read_points(&head, &body, points)?;
-                    let CloudHead { name, stamp_ns, .. } = head;
+                    let CloudHead { name, stamp_ns, fields, .. } = head;
+                    self.fields = fields;
                     return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
                 }
             }
@@ -238,8 +257,8 @@ impl ScanSource for PosedClouds {
             let number = self.number;
             self.number += 1;
             match self.pose_of(&head, number) {
-                Err(why) => self.note_without_pose(&head, &why),
-                Ok(_) => skipped += 1,
+                Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
+                _ => skipped += 1,
             }
         }
         Ok(skipped)
@@ -257,6 +276,14 @@ impl ScanSource for PosedClouds {
         }
     }
 
+    fn format(&self) -> String {
+        self.source.format().to_owned()
+    }
+
+    fn fields(&self) -> Vec<String> {
+        self.fields.clone()
+    }
+
     fn remarks(&self) -> Vec<String> {
         let mut remarks = self.source.remarks();
         if let CloudPoses::File(_, trajectory) = &self.poses {
@@ -265,7 +292,8 @@ impl ScanSource for PosedClouds {
         if self.without_pose > 0 {
             let more = if self.without_pose as usize > self.reasons.len() { ", and more" } else { "" };
             let named = self.reasons.join("; ");
-            remarks.push(format!("{} clouds have no pose and are left out ({named}{more})", self.without_pose));
+            remarks
+                .push(format!("{} clouds have no pose and are left out ({named}{more})", self.without_pose));
         }
         remarks
     }

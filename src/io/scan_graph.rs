@@ -77,6 +77,10 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         Some(self.nodes as usize)
     }
 
+    fn format(&self) -> String {
+        "OctoMap scan graph".to_owned()
+    }
+
     fn read_scan(&mut self, store: &mut PointStore) -> Result<Option<ScanHead>> {
         if self.done == self.nodes {
             return Ok(None);

@@ -81,6 +81,10 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
         None
     }
 
+    fn format(&self) -> String {
+        "OctoMap scan log".to_owned()
+    }
+
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
         points.begin(false);
         let mut next = None;

@@ -130,6 +130,10 @@ impl<R: Read> ScanSource for ScanStream<R> {
         None
     }
 
+    fn format(&self) -> String {
+        "voxtile's scan stream".to_owned()
+    }
+
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
         let Some(count) = self.next_count()? else { return Ok(None) };
         self.is_past_error = false;

@@ -152,6 +152,14 @@ impl ScanSource for SelectedScans {
         self.source.pose_source()
     }
 
+    fn format(&self) -> String {
+        self.source.format()
+    }
+
+    fn fields(&self) -> Vec<String> {
+        self.source.fields()
+    }
+
     fn remarks(&self) -> Vec<String> {
         self.source.remarks()
     }

@@ -85,6 +85,16 @@ pub trait ScanSource {
         false
     }
 
+    /// What the input is, for people.
+    fn format(&self) -> String {
+        "scans".to_owned()
+    }
+
+    /// Names of the fields of its points, as of the last scan, if they are known.
+    fn fields(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// What a person should know of this input beside its scans, so far: parts that were cut off, scans without poses.
     fn remarks(&self) -> Vec<String> {
         Vec::new()

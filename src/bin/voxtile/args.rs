@@ -1,4 +1,5 @@
 mod edit;
+mod read;
 mod snapshot;
 
 use crate::flush_schedule::FlushEvery;
@@ -7,6 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
 use log::LevelFilter;
+pub use read::{FrameName, ReadArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -47,6 +49,8 @@ impl Cli {
 pub enum Command {
     /// Build a map from scans, or add scans to one
     Build(BuildArgs),
+    /// Say what would be read of an input, or list the scans of a map
+    Scans(ScansArgs),
     /// Make a map of a file of OctoMap (.bt .ot)
     Import(ImportArgs),
     /// Say what a map holds
@@ -101,6 +105,7 @@ impl Command {
     pub fn is_json(&self) -> bool {
         match self {
             Self::Build(args) => args.json,
+            Self::Scans(args) => args.json,
             Self::Import(args) => args.json,
             Self::Info(args) => args.json,
             Self::Query(args) => args.json,
@@ -129,8 +134,9 @@ impl Command {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct BuildArgs {
-    /// A folder of PCD files in the sensor frame (or one that holds it as scans/), an OctoMap scan graph (.graph) or
-    /// scan log (.log), a scan stream (.scans), or - for a scan stream from standard input
+    /// Scans: a folder of point clouds (PCD, PLY, LAS, KITTI .bin, depth images) in the sensor's frame or one that holds
+    /// it as scans/, a recording (.bag .mcap .db3, a rosbag2 folder), one file (.laz .e57 .xyz ...), OctoMap's .graph and
+    /// .log, a scan stream (.scans), or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
     /// Folder of the map
@@ -170,11 +176,13 @@ pub struct BuildArgs {
     /// How often one scan updates a voxel [default: per-scan, or as begun with --resume]
     #[arg(long, value_name = "MODE")]
     pub insert: Option<InsertName>,
-    /// File of poses, sensor to world, one line a scan: TUM (t tx ty tz qx qy qz qw) or KITTI (3x4 matrix, row by row)
-    /// in the natural order of the files' names; or identity: all scans are in the world frame
-    /// [default: poses_tum.txt or poses_kitti.txt in or beside SCANS, else the VIEWPOINT of each PCD file]
-    #[arg(long, value_name = "FILE")]
-    pub poses: Option<PathBuf>,
+    /// Rays without a return clear up to so many metres, or --max-range if that is less: laser scans, depth images,
+    /// e57 [default: they clear nothing, or as begun with --resume]
+    #[arg(long, value_name = "M")]
+    pub clear_no_return: Option<f64>,
+    /// Take points as hits alone: no rays, nothing is cleared; no poses are needed
+    #[arg(long)]
+    pub no_rays: bool,
     /// Add the scans to an existing map, which must not have scans of this input yet
     #[arg(long)]
     pub append: bool,
@@ -195,6 +203,8 @@ pub struct BuildArgs {
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
     #[command(flatten)]
     pub octree: OctreeArgs,
 }
@@ -283,6 +293,22 @@ pub struct ShareArgs {
     /// Handed to voxtile-share as they are; --help lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     pub arguments: Vec<OsString>,
+}
+
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct ScansArgs {
+    /// An input as for build, a map, or MAP@SNAPSHOT; nothing is mapped
+    #[arg(value_name = "DATA")]
+    pub data: PathBuf,
+    /// List each scan: number, time stamp in seconds, origin in metres, points, name
+    #[arg(long)]
+    pub each: bool,
+    /// Print JSON; with --each one object a scan, and the summary last
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
 
 #[derive(Debug, Args)]
@@ -473,8 +499,9 @@ pub struct DemoArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct LocalArgs {
-    /// A folder of PCD files in the sensor frame (or one that holds it as scans/), an OctoMap scan graph (.graph) or
-    /// scan log (.log), a scan stream (.scans), or - for a scan stream from standard input
+    /// Scans: a folder of point clouds (PCD, PLY, LAS, KITTI .bin, depth images) in the sensor's frame or one that holds
+    /// it as scans/, a recording (.bag .mcap .db3, a rosbag2 folder), one file (.laz .e57 .xyz ...), OctoMap's .graph and
+    /// .log, a scan stream (.scans), or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
     /// What the map is for; table runs the setups a to e of the voxel mapping paper one after the other
@@ -508,15 +535,14 @@ pub struct LocalArgs {
     /// adds to some, never to all
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
-    /// File of poses, as for build
-    #[arg(long, value_name = "FILE")]
-    pub poses: Option<PathBuf>,
     /// Picture of the map at several times
     #[arg(short = 'o', long = "output", value_name = "FILE", default_value = "local_map.png")]
     pub output: PathBuf,
     /// Print JSON, one object a setup
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -5,6 +5,7 @@ use crate::flush_schedule::FlushSchedule;
 use crate::intake::{Intake, Next};
 use crate::map_at::whole_map;
 use crate::progress::Progress;
+use crate::read_options::read_options;
 use crate::scan_reader::ScanReader;
 use crate::stop_signal;
 use crate::summary::Summary;
@@ -12,9 +13,9 @@ use crate::{INTERRUPTED, say};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use voxtile::io::{PointRoom, StoredScan};
+use voxtile::io::{PointRoom, ReadOptions, StoredScan};
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
-use voxtile::scan::{ScanReport, ScanTracer};
+use voxtile::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer};
 use voxtile::store::InputRecord;
 use voxtile::{Error, MapConfig, MemoryLimit};
 
@@ -26,7 +27,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let stop = stop_signal::catch()?;
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
-    let opened = ScanReader::open(args.scans.clone(), args.poses.clone(), room(args, &config), stop.clone())?;
+    let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room(args, &config), stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(stopped_early(args)) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
     let mut mapper = match exists {
@@ -59,13 +60,15 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
         progress,
         report: ScanReport::default(),
         scans: 0,
+        has_rays: !args.no_rays,
     };
     let outcome = build.insert_all();
     build.progress.say("flushing");
     // What was accepted is kept, whatever ended the build.
     let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
-    let Build { report, scans, intake, progress, .. } = build;
+    let Build { report, scans, mut intake, progress, .. } = build;
     drop(progress);
+    intake.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", args.scans.display()));
     match (outcome, flushed) {
         (Err(error), Ok(())) => {
             return Err(error.context(format!("after {scans} scans, which are in the map")));
@@ -93,6 +96,7 @@ struct Build<'a> {
     progress: Progress,
     report: ScanReport,
     scans: u64,
+    has_rays: bool,
 }
 
 impl Build<'_> {
@@ -110,7 +114,9 @@ impl Build<'_> {
                         return Ok(());
                     }
                 };
-            match mapper.insert_points(&scan) {
+            let inserted =
+                if self.has_rays { mapper.insert_points(&scan) } else { insert_hits(mapper, &scan) };
+            match inserted {
                 Ok(report) => self.report += report,
                 Err(Error::Stopped) => return Ok(()),
                 Err(error) => return Err(error.into()),
@@ -122,6 +128,29 @@ impl Build<'_> {
             flush_if(schedule.is_due(), mapper, schedule)?;
         }
     }
+}
+
+/// How the input is read; without rays no poses are needed.
+fn options_of(args: &BuildArgs) -> voxtile::Result<ReadOptions> {
+    let mut options = read_options(&args.read)?;
+    options.clouds.has_no_returns = args.clear_no_return.is_some();
+    if args.no_rays && options.poses.is_none() {
+        options.clouds.may_lack_poses = true;
+    }
+    Ok(options)
+}
+
+/// Takes the points of a scan as hits alone, as one batch.
+fn insert_hits(mapper: &mut OutOfCoreTileMapper, scan: &StoredScan) -> voxtile::Result<ScanReport> {
+    let (mut points, mut intensities) = (Vec::new(), Vec::new());
+    scan.for_each_chunk(0..scan.len(), &mut |chunk, of_chunk| {
+        points.extend_from_slice(chunk);
+        intensities.extend_from_slice(of_chunk.unwrap_or_default());
+        true
+    })?;
+    let intensities = scan.has_intensities().then_some(&*intensities);
+    let is_occupied = vec![true; points.len()];
+    mapper.batch_update(&PointBatch { points: &points, intensities, is_occupied: &is_occupied })
 }
 
 fn flush_if(

@@ -79,6 +79,7 @@ fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig
             config.with_memory_bytes(least.max(DEFAULT_MEMORY_BYTES))
         }
     };
+    config.rays.no_return_range_m = args.clear_no_return.or(begun.and_then(|rays| rays.no_return_range_m));
     config.rays.min_range_m = min_range_m;
     config.rays.max_range_m = args.max_range.or(begun_max_m);
     Ok(config)

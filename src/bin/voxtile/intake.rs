@@ -85,6 +85,11 @@ impl Intake {
         self.reader.fingerprint()
     }
 
+    /// What a person should know of the input so far.
+    pub fn remarks(&mut self) -> Vec<String> {
+        self.reader.remarks().unwrap_or_default()
+    }
+
     /// What has been taken so far.
     pub fn content(&self) -> InputContent {
         InputContent {

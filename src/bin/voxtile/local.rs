@@ -4,6 +4,7 @@ use crate::local_table::{Row, print_table};
 use crate::output_file::check_picture;
 use crate::picture::{OverTime, Panel};
 use crate::progress::Progress;
+use crate::read_options::read_options;
 use crate::scan_input::{self, is_standard_input};
 use std::io::Write;
 use std::process::ExitCode;
@@ -94,7 +95,7 @@ fn setups(args: &LocalArgs) -> Vec<Setup> {
 }
 
 fn run_setup(args: &LocalArgs, setup: &Setup, mut panels: Option<&mut Vec<Panel>>) -> anyhow::Result<Row> {
-    let mut source = scan_input::open(&args.scans, args.poses.as_deref())?;
+    let mut source = scan_input::open(&args.scans, &read_options(&args.read)?)?;
     let scans = source.len_hint();
     let progress = Progress::over_scans(scans);
     let mut map = LocalMap::new(args.resolution, setup.parameters)?;

@@ -34,10 +34,12 @@ mod picture;
 mod progress;
 mod query;
 mod raycast;
+mod read_options;
 mod repair;
 mod revert;
 mod scan_input;
 mod scan_reader;
+mod scans;
 mod share;
 mod snapshot;
 mod snapshots;
@@ -80,6 +82,7 @@ fn main() -> ExitCode {
     }
     let outcome = match command {
         Command::Build(args) => build::run(&args),
+        Command::Scans(args) => scans::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Query(args) => query::run(&args),

@@ -1,6 +1,6 @@
 use std::io::{BufReader, stdin};
 use std::path::Path;
-use voxtile::io::{ScanSource, open_scans, read_scan_stream};
+use voxtile::io::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
 use voxtile::{Error, Result};
 
 /// Most letters of an input's name that a map keeps.
@@ -12,15 +12,16 @@ pub fn is_standard_input(scans: &Path) -> bool {
 }
 
 /// Opens scans, which are a scan stream if they come from standard input.
-pub fn open(scans: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource + Send>> {
+pub fn open(scans: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     if !is_standard_input(scans) {
-        return open_scans(scans, poses);
+        return open_any_scans(scans, options);
     }
-    if poses.is_some() {
+    if options.poses.is_some() {
         return Err(Error::argument("--poses", "a scan stream has its own poses; leave the option out"));
     }
     let input = BufReader::with_capacity(1 << 18, stdin());
-    Ok(Box::new(read_scan_stream(input, Path::new("standard input"), false)?))
+    let stream = read_scan_stream(input, Path::new("standard input"), false)?;
+    Ok(options.selection.clone().of(Box::new(stream)))
 }
 
 /// What a map calls an input, for people: the last part of its path (the last two, where that is `scans`), or the label

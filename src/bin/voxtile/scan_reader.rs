@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 use voxtile::Error;
-use voxtile::io::{PointRoom, PoseSource, ScanMark, ScanSource, StoredScan};
+use voxtile::io::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
 use voxtile::scan::Stop;
 
 /// How long an input may keep us waiting before we look up.
@@ -49,27 +49,29 @@ enum Place {
 enum Request {
     Scan,
     Fingerprint,
+    Remarks,
 }
 
 enum Answer {
     Opened(voxtile::Result<Opened>),
     Read(voxtile::Result<Read>),
     Fingerprint(voxtile::Result<String>),
+    Remarks(Vec<String>),
 }
 
 impl ScanReader {
     /// Opens an input; `None` if it was asked to stop before that had come to an end.
     pub fn open(
         scans: PathBuf,
-        poses: Option<PathBuf>,
+        options: ReadOptions,
         room: PointRoom,
         stop: Stop,
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
         let (answers_out, answers) = channel();
-        let (path, pose_path, here) = (scans.clone(), poses.clone(), room.clone());
+        let (path, own_options, here) = (scans.clone(), options.clone(), room.clone());
         let read = move || {
-            let mut source = match scan_input::open(&path, pose_path.as_deref()) {
+            let mut source = match scan_input::open(&path, &own_options) {
                 Ok(source) => source,
                 Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
             };
@@ -89,7 +91,7 @@ impl ScanReader {
             }
             Err(error) => {
                 log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
-                let source = scan_input::open(&scans, poses.as_deref())?;
+                let source = scan_input::open(&scans, &options)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((Self { place: Place::Here(source, here), stop }, opened)))
             }
@@ -109,6 +111,14 @@ impl ScanReader {
         match self.ask(Request::Fingerprint, &mut || Ok(()))? {
             Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
             _ => Ok(None),
+        }
+    }
+
+    /// What a person should know of the input so far.
+    pub fn remarks(&mut self) -> anyhow::Result<Vec<String>> {
+        match self.ask(Request::Remarks, &mut || Ok(()))? {
+            Some(Answer::Remarks(remarks)) => Ok(remarks),
+            _ => Ok(Vec::new()),
         }
     }
 
@@ -152,6 +162,7 @@ fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom) -> A
     match request {
         Request::Scan => Answer::Read(read(source, room)),
         Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
+        Request::Remarks => Answer::Remarks(source.remarks()),
     }
 }
 

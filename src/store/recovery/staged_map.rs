@@ -131,8 +131,8 @@ fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
 }
 
 /// The files that a map has beside its tiles, at any moment of its making.
-const OWN_FILES: [&str; 5] =
-    ["metadata.json", "metadata.json.next", "commits.log", "commits.log.next", "writer.lock"];
+const OWN_FILES: [&str; 6] =
+    ["metadata.json", "metadata.json.next", "commits.log", "commits.log.next", "scans.bin", "writer.lock"];
 
 fn check_content(disk: &dyn Disk, layout: &Layout) -> Result<()> {
     for name in list(disk, layout.folder())? {

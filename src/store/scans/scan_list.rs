@@ -200,12 +200,16 @@ fn for_each_record(
         // A crash while it was begun, or damage: the number of records tells.
         return Ok(Some(file_bytes));
     }
-    if header != HEADER {
+    if header.iter().zip(HEADER).any(|(&byte, wanted)| byte != wanted && byte != 0) {
         let reason = match header.starts_with(&HEADER[..8]) {
             true => "a list of scans of a newer version",
             false => "not a list of scans",
         };
         return Err(FormatError::at_offset(0, reason).into());
+    }
+    if header != HEADER {
+        // Of what a crash interrupted not all reached the medium; if records are missing, their number tells.
+        return Ok(Some(file_bytes));
     }
     let mut at = HEADER_BYTES as u64;
     let mut record = [0; RECORD_BYTES];
