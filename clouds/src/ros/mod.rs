@@ -1,1 +1,44 @@
 //! Recordings of ROS 1 and ROS 2.
+//!
+//! ```text
+//! .bag, .mcap, .db3, folder of a bag -> Recording -> Message
+//! Message -> messages -> points, poses
+//! poses -> Transforms -> RigidPose at a stamp
+//! all of it -> BagClouds, which is a CloudSource
+//! ```
+
+mod bag1;
+mod bag1_record;
+mod bag2_folder;
+mod bag2_metadata;
+mod bag_clouds;
+mod bag_options;
+mod bag_poses;
+mod bag_topic;
+mod chunk;
+mod chunk_order;
+mod cloud_message;
+#[cfg(feature = "sqlite")]
+mod db3;
+mod file_bytes;
+mod mcap_file;
+mod mcap_record;
+pub mod messages;
+mod open;
+mod recording;
+mod sequence;
+mod transforms;
+mod wire;
+
+pub use bag_clouds::{BagClouds, open_bag};
+pub use bag_options::{BagOptions, PoseSource};
+pub use bag1::Bag1;
+pub use bag2_folder::Bag2Folder;
+#[cfg(feature = "sqlite")]
+pub use db3::Db3;
+pub use mcap_file::McapFile;
+pub use open::open_recording;
+pub use recording::{Message, Recording, Topic};
+pub use sequence::Sequence;
+pub use transforms::{Transforms, WhyNot};
+pub use wire::{Decoded, Wire, WireError, WireReader};

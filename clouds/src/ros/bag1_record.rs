@@ -1,0 +1,90 @@
+use super::file_bytes::Pieces;
+use std::ops::Range;
+
+/// What a record of a bag is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum RecordKind {
+    Message,
+    BagHeader,
+    IndexData,
+    Chunk,
+    ChunkInfo,
+    Connection,
+}
+
+/// The header of a record: names and values.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Record {
+    pub(super) op: Option<RecordKind>,
+    fields: Vec<(String, Vec<u8>)>,
+    pub(super) header_bytes: u64,
+    /// Its data, where they were read.
+    pub(super) data: Vec<u8>,
+}
+
+impl Record {
+    /// Parses `name=value` after `name=value`, each behind its length.
+    pub(super) fn of(header: &[u8]) -> Option<Self> {
+        let mut pieces = Pieces::new(header);
+        let mut record = Self { header_bytes: header.len() as u64, ..Self::default() };
+        while !pieces.is_empty() {
+            let field = pieces.sized()?;
+            let equals = field.iter().position(|&byte| byte == b'=')?;
+            let (name, value) = field.split_at_checked(equals)?;
+            let value = value.strip_prefix(b"=")?;
+            record.fields.push((String::from_utf8_lossy(name).into_owned(), value.to_vec()));
+        }
+        record.op = match record.value("op")? {
+            [2] => Some(RecordKind::Message),
+            [3] => Some(RecordKind::BagHeader),
+            [4] => Some(RecordKind::IndexData),
+            [5] => Some(RecordKind::Chunk),
+            [6] => Some(RecordKind::ChunkInfo),
+            [7] => Some(RecordKind::Connection),
+            _ => None,
+        };
+        Some(record)
+    }
+
+    /// Fields without an `op`: the data of a connection.
+    pub(super) fn fields_of(data: &[u8]) -> Option<Self> {
+        // An operation is put before them, so that they are a header.
+        let mut header = b"\x04\0\0\0op=\x07".to_vec();
+        header.extend_from_slice(data);
+        Self::of(&header)
+    }
+
+    /// The record at a place of a chunk, where its data are, and the place behind it.
+    pub(super) fn in_chunk(bytes: &[u8], at: usize) -> Option<(Self, Range<usize>, usize)> {
+        let mut pieces = Pieces { bytes, at };
+        let record = Self::of(pieces.sized()?)?;
+        let count = pieces.u32()? as usize;
+        let start = pieces.at;
+        pieces.take(count)?;
+        Some((record, start..pieces.at, pieces.at))
+    }
+
+    fn value(&self, name: &str) -> Option<&[u8]> {
+        self.fields.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_slice())
+    }
+
+    pub(super) fn text(&self, name: &str) -> Option<String> {
+        self.value(name).map(|value| String::from_utf8_lossy(value).into_owned())
+    }
+
+    pub(super) fn u32(&self, name: &str) -> Option<u32> {
+        Some(u32::from_le_bytes(*self.value(name)?.first_chunk()?))
+    }
+
+    pub(super) fn u64(&self, name: &str) -> Option<u64> {
+        Some(u64::from_le_bytes(*self.value(name)?.first_chunk()?))
+    }
+
+    /// Seconds and nanoseconds, as nanoseconds.
+    pub(super) fn time_ns(&self, name: &str) -> Option<i64> {
+        let mut pieces = Pieces::new(self.value(name)?);
+        let (seconds, ns) = (pieces.u32()?, pieces.u32()?);
+        // At most 2^32 * 10^9 + 2^32: far below 2^63.
+        Some(i64::from(seconds) * 1_000_000_000 + i64::from(ns))
+    }
+}

@@ -1,0 +1,166 @@
+use super::bag2_metadata::Bag2Metadata;
+use super::chunk::{MOST_CHUNK_BYTES, read_all};
+use super::open::open_file;
+use super::recording::{Message, Recording, Topic};
+use super::sequence::Sequence;
+use crate::error::{Error, Place, Result};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A folder of `ros2 bag`: `metadata.yaml` and the files that it names, in order.
+///
+/// Files that are compressed as a whole are unpacked into a temporary folder, which goes with this.
+pub struct Bag2Folder {
+    path: PathBuf,
+    files: Sequence,
+    has_compressed_messages: bool,
+    remarks: Vec<String>,
+    _unpacked: Option<TempDir>,
+}
+
+/// A longer `metadata.yaml` is none.
+const MOST_METADATA_BYTES: u64 = 64 << 20;
+
+impl Bag2Folder {
+    /// Opens a folder.
+    ///
+    /// # Errors
+    ///
+    /// A folder without files of a recording; a file that cannot be read or is invalid.
+    pub fn open(path: &Path) -> Result<Self> {
+        let mut remarks = Vec::new();
+        let metadata_path = path.join("metadata.yaml");
+        let (metadata, files) = if metadata_path.is_file() {
+            let file =
+                File::open(&metadata_path).map_err(|error| Error::io(&metadata_path, "read", error))?;
+            let (text, _) = read_all(file, MOST_METADATA_BYTES);
+            let metadata = Bag2Metadata::of(&String::from_utf8_lossy(&text));
+            let files = metadata.files.iter().map(|name| find(path, name)).collect::<Result<Vec<_>>>()?;
+            (metadata, files)
+        } else {
+            let path = path.display();
+            remarks
+                .push(format!("{path} has no metadata.yaml: its files are read in the order of their names"));
+            (Bag2Metadata::default(), Vec::new())
+        };
+        let files = if files.is_empty() { files_of(path)? } else { files };
+        if files.is_empty() {
+            let reason = "the folder holds no .mcap, .db3 or .bag file, and no metadata.yaml names one";
+            return Err(Error::argument(path.display().to_string(), reason));
+        }
+        let format = metadata.compression_format.as_str();
+        if !matches!(format, "" | "zstd") {
+            let reason = format!("compression_format `{format}` is not read; known: zstd");
+            return Err(Error::format(&metadata_path, Place::Byte(0), reason));
+        }
+        let mut unpacked = None;
+        let mut recordings = Vec::new();
+        for file in &files {
+            if is_packed(file) {
+                let folder = match &mut unpacked {
+                    Some(folder) => folder,
+                    none => {
+                        none.insert(tempfile::tempdir().map_err(|error| Error::io(path, "unpack", error))?)
+                    }
+                };
+                recordings.push(open_file(&unpack(file, folder.path())?)?);
+            } else {
+                recordings.push(open_file(file)?);
+            }
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            files: Sequence::new(recordings),
+            has_compressed_messages: metadata.compression_mode.eq_ignore_ascii_case("message"),
+            remarks,
+            _unpacked: unpacked,
+        })
+    }
+}
+
+fn is_packed(file: &Path) -> bool {
+    file.extension().is_some_and(|extension| extension == "zstd" || extension == "zst")
+}
+
+/// A file that the metadata name: beside them, perhaps behind the name of the folder, perhaps compressed since.
+fn find(folder: &Path, name: &str) -> Result<PathBuf> {
+    let last = Path::new(name).file_name().map(|name| folder.join(name));
+    let candidates = [Some(folder.join(name)), last];
+    let candidates = candidates.into_iter().flatten().flat_map(|path| {
+        let packed = PathBuf::from(format!("{}.zstd", path.display()));
+        [path, packed]
+    });
+    candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+        let reason =
+            format!("metadata.yaml names {name}, which is not there; give the files that are there instead");
+        Error::argument(folder.display().to_string(), reason)
+    })
+}
+
+/// The files of recordings in a folder, in the natural order of their names.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let wrong = |error| Error::io(folder, "read", error);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(wrong)? {
+        let path = entry.map_err(wrong)?.path();
+        let name = path.to_string_lossy().to_lowercase();
+        let name = name.trim_end_matches(".zstd");
+        if path.is_file() && [".mcap", ".db3", ".bag"].iter().any(|known| name.ends_with(known)) {
+            files.push(path);
+        }
+    }
+    alphanumeric_sort::sort_path_slice(&mut files);
+    Ok(files)
+}
+
+/// Unpacks a compressed file; as much of it as is whole, if it is cut off.
+fn unpack(file: &Path, folder: &Path) -> Result<PathBuf> {
+    let target = folder.join(file.file_stem().unwrap_or_default());
+    let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
+    let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
+    let mut decoder = zstd::stream::read::Decoder::new(BufReader::new(input))
+        .map_err(|error| Error::io(file, "unpack", error))?;
+    std::io::copy(&mut decoder, &mut output).map_err(|error| Error::io(file, "unpack", error))?;
+    Ok(target)
+}
+
+impl Recording for Bag2Folder {
+    fn format(&self) -> &str {
+        self.files.format()
+    }
+
+    fn topics(&self) -> &[Topic] {
+        self.files.topics()
+    }
+
+    fn begin(&mut self, topics: &[usize]) -> Result<()> {
+        self.files.begin(topics)
+    }
+
+    fn next_message(&mut self) -> Result<Option<Message>> {
+        let Some(mut message) = self.files.next_message()? else { return Ok(None) };
+        if self.has_compressed_messages {
+            let (data, complaint) = unpack_message(message.data);
+            if let Some(complaint) = complaint {
+                let reason =
+                    format!("a message recorded at {} ns cannot be unpacked: {complaint}", message.log_ns);
+                return Err(Error::argument(self.path.display().to_string(), reason));
+            }
+            message.data = data;
+        }
+        Ok(Some(message))
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.iter().cloned().chain(self.files.remarks()).collect()
+    }
+}
+
+fn unpack_message(data: Vec<u8>) -> (Vec<u8>, Option<String>) {
+    match zstd::stream::read::Decoder::new(data.as_slice()) {
+        Ok(decoder) => read_all(decoder, MOST_CHUNK_BYTES),
+        Err(error) => (Vec::new(), Some(error.to_string())),
+    }
+}

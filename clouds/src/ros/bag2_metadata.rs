@@ -1,0 +1,65 @@
+/// What is needed of the `metadata.yaml` of a bag of ROS 2.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Bag2Metadata {
+    /// In the order of their messages.
+    pub(super) files: Vec<String>,
+    /// Empty if nothing is compressed.
+    pub(super) compression_format: String,
+    /// `FILE`, `MESSAGE` or empty.
+    pub(super) compression_mode: String,
+}
+
+impl Bag2Metadata {
+    /// Reads the lines of the three keys. `ros2 bag` and rosbags write each of them once, outside of other lists.
+    pub(super) fn of(text: &str) -> Self {
+        let mut metadata = Self::default();
+        let mut is_in_files = false;
+        for line in text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {
+            if is_in_files {
+                if let Some(item) = line.strip_prefix("- ") {
+                    metadata.files.push(scalar(item));
+                    continue;
+                }
+                is_in_files = false;
+            }
+            let Some((key, value)) = line.split_once(':') else { continue };
+            match key.trim() {
+                "relative_file_paths" if metadata.files.is_empty() => {
+                    let list = value.trim().strip_prefix('[').and_then(|list| list.strip_suffix(']'));
+                    match list {
+                        Some(list) => {
+                            let items = list.split(',').map(scalar).filter(|item| !item.is_empty());
+                            metadata.files.extend(items);
+                        }
+                        None => is_in_files = true,
+                    }
+                }
+                "compression_format" => metadata.compression_format = scalar(value),
+                "compression_mode" => metadata.compression_mode = scalar(value),
+                _ => {}
+            }
+        }
+        metadata
+    }
+}
+
+/// A value without its quotes.
+fn scalar(value: &str) -> String {
+    let value = value.trim();
+    let inner = ['"', '\''].iter().find_map(|&quote| value.strip_prefix(quote)?.strip_suffix(quote));
+    inner.unwrap_or(value).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_stand_below_their_key_or_behind_it() {
+        let text = "a:\n  relative_file_paths:\n    - x_0.db3\n    - \"x_1.db3\"\n  compression_mode: ''\n  files:\n  - path: y\n";
+        let metadata = Bag2Metadata::of(text);
+        assert_eq!(metadata.files, ["x_0.db3", "x_1.db3"]);
+        assert_eq!(metadata.compression_mode, "");
+        assert_eq!(Bag2Metadata::of("relative_file_paths: [a.mcap, 'b.mcap']").files, ["a.mcap", "b.mcap"]);
+    }
+}

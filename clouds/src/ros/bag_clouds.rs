@@ -1,0 +1,157 @@
+use super::bag_options::BagOptions;
+use super::bag_poses::BagPoses;
+use super::bag_topic::{Chosen, choose_clouds};
+use super::cloud_message::CloudMessage;
+use super::messages::CameraInfo;
+use super::open::open_recording;
+use super::recording::{Message, Recording, Topic};
+use super::wire::{Wire, WireError};
+use crate::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::error::{Error, Place, Result};
+use std::path::PathBuf;
+
+/// The clouds of one topic of a recording, with the poses that the recording knows.
+pub struct BagClouds {
+    path: PathBuf,
+    recording: Box<dyn Recording>,
+    topic: Topic,
+    wire: Wire,
+    chosen: Chosen,
+    camera: Option<CameraInfo>,
+    poses: BagPoses,
+    /// Number of the next cloud.
+    next: u64,
+    current: Option<Message>,
+    /// Number of clouds whose stamp is 0.
+    without_stamp: u64,
+}
+
+/// Opens the clouds of a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
+///
+/// The recording is read once for its poses here, and once more for its clouds.
+///
+/// # Errors
+///
+/// A file that cannot be read or is no recording; no topic with clouds, or several and none is chosen.
+pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
+    let path = paths.first().cloned().unwrap_or_default();
+    let name_it = |error| match error {
+        Error::Argument { what, reason } if what == "recording" => {
+            Error::argument(path.display().to_string(), reason)
+        }
+        error => error,
+    };
+    let mut recording = open_recording(paths).map_err(name_it)?;
+    let chosen = choose_clouds(recording.as_mut(), options.topic.as_deref()).map_err(name_it)?;
+    let poses = BagPoses::read(recording.as_mut(), options).map_err(name_it)?;
+    let topic = recording.topics().get(chosen.index).cloned();
+    let gone = || Error::argument(path.display().to_string(), "the topic of the clouds is gone");
+    let topic = topic.ok_or_else(gone)?;
+    let wire = topic.wire.ok_or_else(gone)?;
+    let camera = match chosen.camera {
+        Some(index) => Some(read_camera(recording.as_mut(), index).map_err(name_it)?),
+        None => None,
+    };
+    recording.begin(&[chosen.index])?;
+    Ok(BagClouds {
+        path,
+        recording,
+        topic,
+        wire,
+        chosen,
+        camera,
+        poses,
+        next: 0,
+        current: None,
+        without_stamp: 0,
+    })
+}
+
+/// The first camera of a topic that is whole: cameras do not change while they record.
+fn read_camera(recording: &mut dyn Recording, index: usize) -> Result<CameraInfo> {
+    let topic = recording.topics().get(index).cloned();
+    let (name, wire) = topic.map_or_else(Default::default, |topic| (topic.name, topic.wire));
+    recording.begin(&[index])?;
+    let mut last = format!("depth images need their camera, but {name} holds no message");
+    loop {
+        match recording.next_message() {
+            Ok(Some(message)) => match CameraInfo::decode(wire.unwrap_or(Wire::Cdr), &message.data) {
+                Ok(camera) => return Ok(camera),
+                Err(error) => last = format!("no message of {name} can be used; the last: {error}"),
+            },
+            Ok(None) => return Err(Error::argument("recording", last)),
+            // Bad parts are told of when clouds are read.
+            Err(_) => {}
+        }
+    }
+}
+
+impl BagClouds {
+    /// The topic that is read.
+    pub fn topic(&self) -> &Topic {
+        &self.topic
+    }
+
+    /// All topics of the recording.
+    pub fn topics(&self) -> &[Topic] {
+        self.recording.topics()
+    }
+
+    fn wrong(&self, number: u64, error: &WireError) -> Error {
+        Error::format(&self.path, Place::Record(number), format!("topic {}: {error}", self.topic.name))
+    }
+}
+
+impl CloudSource for BagClouds {
+    fn format(&self) -> &str {
+        self.recording.format()
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(self.topic.messages)
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        self.current = None;
+        let Some(message) = self.recording.next_message()? else { return Ok(None) };
+        let number = self.next;
+        self.next += 1;
+        let cloud = CloudMessage::decode(self.chosen.kind, self.wire, &message.data, self.camera.as_ref());
+        let cloud = cloud.map_err(|error| self.wrong(number, &error))?;
+        let header = cloud.header().clone();
+        // Drivers without a clock leave it at 0.
+        let stamp_ns = if header.stamp_ns == 0 { message.log_ns } else { header.stamp_ns };
+        self.without_stamp += u64::from(header.stamp_ns == 0);
+        let head = CloudHead {
+            name: number.to_string(),
+            stamp_ns: Some(stamp_ns),
+            world_from_sensor: self.poses.world_from_sensor(&header.frame_id, stamp_ns),
+            frame: Some(header.frame_id),
+            points: Some(cloud.points_claimed()),
+            fields: cloud.fields(),
+            has_intensities: cloud.has_intensities(),
+            has_times: cloud.has_times(),
+        };
+        self.current = Some(message);
+        Ok(Some(head))
+    }
+
+    fn read_points(&mut self, visit: &mut dyn FnMut(CloudPoint) -> Result<()>) -> Result<()> {
+        let Some(message) = self.current.take() else { return Ok(()) };
+        let number = self.next.saturating_sub(1);
+        let cloud = CloudMessage::decode(self.chosen.kind, self.wire, &message.data, self.camera.as_ref());
+        let shortage = cloud.map_err(|error| self.wrong(number, &error))?.visit(visit)?;
+        shortage.map_or(Ok(()), |error| Err(self.wrong(number, &error)))
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.recording.remarks();
+        remarks.extend(self.poses.remarks());
+        if self.without_stamp > 0 {
+            let count = self.without_stamp;
+            remarks
+                .push(format!("{count} clouds have no stamp; they are taken as of when they were recorded"));
+        }
+        remarks
+    }
+}

@@ -1,0 +1,27 @@
+/// Which clouds of a recording are read, and where their poses come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BagOptions {
+    /// The topic of the clouds; needed if there are several.
+    pub topic: Option<String>,
+    /// The topic of poses, for [`PoseSource::Odometry`]; needed if there are several.
+    pub odometry_topic: Option<String>,
+    /// The frame of the map. By default `map`, else `odom`, else the root of the tree that the clouds' frame is in;
+    /// with poses of a topic, the frame of these.
+    pub fixed_frame: Option<String>,
+    /// Where poses come from.
+    pub poses: PoseSource,
+    /// Between two poses further apart in time there is none.
+    pub most_gap_ns: Option<i64>,
+}
+
+/// Where the poses of the sensor come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PoseSource {
+    /// The transforms of `/tf` and `/tf_static`.
+    #[default]
+    Tf,
+    /// A topic of odometry, poses or a path, with the transforms from there to the sensor on top.
+    Odometry,
+    /// Nowhere: the caller knows them.
+    None,
+}

@@ -1,0 +1,198 @@
+use super::bag_options::{BagOptions, PoseSource};
+use super::bag_topic::{choose_poses, kind_of};
+use super::messages::{MessageKind, StampedPose, decode_poses};
+use super::recording::{Recording, Topic};
+use super::transforms::{Transforms, WhyNot};
+use crate::error::Result;
+use crate::pose::RigidPose;
+use std::collections::BTreeMap;
+
+/// Where the sensor was at the stamp of each cloud.
+#[derive(Debug)]
+pub(super) struct BagPoses {
+    source: PoseSource,
+    transforms: Transforms,
+    fixed_frame: Option<String>,
+    /// Poses of a topic: the first says which frames they are of.
+    track: Vec<StampedPose>,
+    /// Number of clouds without a pose, by reason.
+    without: BTreeMap<String, u64>,
+    remarks: Vec<String>,
+}
+
+/// The frames that a robot moves by, if a pose does not name its own.
+const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
+
+impl BagPoses {
+    /// Reads all transforms, and the poses of a topic if these are asked for.
+    pub(super) fn read(recording: &mut dyn Recording, options: &BagOptions) -> Result<Self> {
+        let mut poses = Self {
+            source: options.poses,
+            transforms: Transforms::default(),
+            fixed_frame: options.fixed_frame.as_ref().map(|frame| frame.trim_start_matches('/').to_owned()),
+            track: Vec::new(),
+            without: BTreeMap::new(),
+            remarks: Vec::new(),
+        };
+        if options.poses == PoseSource::None {
+            return Ok(poses);
+        }
+        poses.transforms.set_most_gap_ns(options.most_gap_ns);
+        let topics = recording.topics().to_vec();
+        let is_tf = |index: &usize| topics.get(*index).and_then(kind_of) == Some(MessageKind::Tf);
+        let mut wanted: Vec<usize> = (0..topics.len()).filter(is_tf).collect();
+        let odometry = match options.poses {
+            PoseSource::Odometry => Some(choose_poses(&topics, options.odometry_topic.as_deref())?),
+            _ => None,
+        };
+        wanted.extend(odometry);
+        poses.read_topics(recording, &topics, &wanted, odometry)?;
+        Ok(poses)
+    }
+
+    fn read_topics(
+        &mut self,
+        recording: &mut dyn Recording,
+        topics: &[Topic],
+        wanted: &[usize],
+        odometry: Option<usize>,
+    ) -> Result<()> {
+        let (mut bad, mut invalid) = (Vec::new(), 0_u64);
+        recording.begin(wanted)?;
+        loop {
+            let message = match recording.next_message() {
+                Ok(Some(message)) => message,
+                Ok(None) => break,
+                Err(error) => {
+                    bad.push(error.to_string());
+                    continue;
+                }
+            };
+            let topic = topics.get(message.topic);
+            let Some((topic, kind, wire)) =
+                topic.and_then(|topic| Some((topic, kind_of(topic)?, topic.wire?)))
+            else {
+                continue;
+            };
+            match decode_poses(kind, wire, &message.data) {
+                Ok(poses) if Some(message.topic) == odometry => self.track.extend(poses),
+                Ok(poses) => {
+                    let is_static = topic.name.ends_with("tf_static");
+                    for StampedPose { header, child_frame, parent_from_child } in poses {
+                        let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
+                        let is_taken = self.transforms.insert(
+                            parent,
+                            &child_frame,
+                            stamp_ns,
+                            parent_from_child,
+                            is_static,
+                        );
+                        invalid += u64::from(!is_taken);
+                    }
+                }
+                Err(error) => bad.push(format!("{}: {error}", topic.name)),
+            }
+        }
+        if let Some(first) = bad.first() {
+            self.remarks.push(format!(
+                "{} messages or chunks with poses cannot be read; the first: {first}",
+                bad.len()
+            ));
+        }
+        if invalid > 0 {
+            let remark =
+                "transforms are not valid (numbers, frames without a name or in themselves) and left out";
+            self.remarks.push(format!("{invalid} {remark}"));
+        }
+        Ok(())
+    }
+
+    /// Where the sensor was; counts why not.
+    pub(super) fn world_from_sensor(&mut self, sensor_frame: &str, stamp_ns: i64) -> Option<RigidPose> {
+        let found = match self.source {
+            PoseSource::None => return None,
+            PoseSource::Odometry if !self.track.is_empty() => {
+                self.settle_track(sensor_frame);
+                self.find(sensor_frame, stamp_ns)
+            }
+            _ => self.find(sensor_frame, stamp_ns),
+        };
+        found.map_err(|why| *self.without.entry(why.to_string()).or_default() += 1).ok()
+    }
+
+    fn find(&mut self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
+        let fixed = match &self.fixed_frame {
+            Some(frame) => frame.clone(),
+            None => self.fixed_frame_of(sensor_frame)?,
+        };
+        if fixed == sensor_frame {
+            return Err(WhyNot::AlreadyFixed(fixed));
+        }
+        self.transforms.lookup(&fixed, sensor_frame, stamp_ns)
+    }
+
+    /// The default frame of the map, above the frame of a sensor.
+    fn fixed_frame_of(&self, sensor_frame: &str) -> std::result::Result<String, WhyNot> {
+        if !self.transforms.knows(sensor_frame) {
+            return Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
+        }
+        let chain = self.transforms.ancestors(sensor_frame)?;
+        if let Some(known) =
+            ["map", "odom"].into_iter().find(|known| chain.iter().any(|frame| frame == known))
+        {
+            return Ok(known.to_owned());
+        }
+        // A mount alone says nothing of where the robot went.
+        if !chain.iter().any(|frame| self.transforms.is_moving(frame)) {
+            return Err(WhyNot::NothingMoves(sensor_frame.to_owned()));
+        }
+        chain.last().cloned().ok_or_else(|| WhyNot::UnknownFrame(sensor_frame.to_owned()))
+    }
+
+    /// Puts the poses of a topic among the transforms, in the place of those of the same frame.
+    fn settle_track(&mut self, sensor_frame: &str) {
+        let track = std::mem::take(&mut self.track);
+        let Some(first) = track.first() else { return };
+        let parent = first.header.frame_id.clone();
+        let child =
+            if first.child_frame.is_empty() { self.base_of(sensor_frame) } else { first.child_frame.clone() };
+        self.transforms.detach(&child);
+        if self.fixed_frame.is_none() {
+            // What is above the frame of the poses does not matter, and might lead back to its child.
+            self.transforms.detach(&parent);
+            self.fixed_frame = Some(parent.clone());
+        }
+        let mut odd = 0_u64;
+        for pose in &track {
+            let (own, stamp_ns) = (&pose.header.frame_id, pose.header.stamp_ns);
+            let is_same = *own == parent && (pose.child_frame.is_empty() || pose.child_frame == child);
+            let is_taken =
+                is_same && self.transforms.insert(&parent, &child, stamp_ns, pose.parent_from_child, false);
+            odd += u64::from(!is_taken);
+        }
+        if odd > 0 {
+            let remark = format!(
+                "{odd} poses are not valid, or of other frames than {parent} and {child}, and left out"
+            );
+            self.remarks.push(remark);
+        }
+        if first.child_frame.is_empty() {
+            self.remarks.push(format!(
+                "the poses do not say of which frame they are; they are taken as those of {child}"
+            ));
+        }
+    }
+
+    /// The frame that poses without a name are of: the base of the robot that carries the sensor, or the sensor.
+    fn base_of(&self, sensor_frame: &str) -> String {
+        let chain = self.transforms.ancestors(sensor_frame).unwrap_or_default();
+        let base = BASE_FRAMES.into_iter().find(|base| chain.iter().any(|frame| frame == base));
+        base.unwrap_or(sensor_frame).to_owned()
+    }
+
+    /// What a person should know.
+    pub(super) fn remarks(&self) -> impl Iterator<Item = String> + '_ {
+        let without = self.without.iter().map(|(why, count)| format!("{count} clouds have no pose: {why}"));
+        self.remarks.iter().cloned().chain(without)
+    }
+}

@@ -1,0 +1,114 @@
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// A file that is read here and there.
+#[derive(Debug)]
+pub(super) struct FileBytes {
+    path: PathBuf,
+    input: BufReader<File>,
+    at: u64,
+    pub(super) len: u64,
+}
+
+impl FileBytes {
+    pub(super) fn open(path: &Path) -> Result<Self> {
+        let open = || {
+            let file = File::open(path)?;
+            let len = file.metadata()?.len();
+            Ok((BufReader::with_capacity(1 << 16, file), len))
+        };
+        let (input, len) = open().map_err(|error| Error::io(path, "read", error))?;
+        Ok(Self { path: path.to_owned(), input, at: 0, len })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Bytes from a place on: fewer than asked for at the end of the file. Memory grows with what is there only.
+    pub(super) fn read_at(&mut self, offset: u64, bytes: u64) -> Result<Vec<u8>> {
+        let there = bytes.min(self.len.saturating_sub(offset));
+        if there == 0 {
+            return Ok(Vec::new());
+        }
+        let mut read = || {
+            match i64::try_from(i128::from(offset) - i128::from(self.at)) {
+                // Keeps what is buffered already.
+                Ok(ahead) => self.input.seek_relative(ahead)?,
+                Err(_) => drop(self.input.seek(SeekFrom::Start(offset))?),
+            }
+            let mut taken = Vec::new();
+            (&mut self.input).take(there).read_to_end(&mut taken)?;
+            Ok(taken)
+        };
+        let taken = match read() {
+            Ok(taken) => taken,
+            Err(error) => {
+                // Where the file is now is not known.
+                self.at = 0;
+                drop(self.input.seek(SeekFrom::Start(0)));
+                return Err(Error::io(&self.path, "read", error));
+            }
+        };
+        self.at = offset.saturating_add(taken.len() as u64);
+        Ok(taken)
+    }
+}
+
+/// Reads little-endian numbers and pieces of a record.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pieces<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) at: usize,
+}
+
+impl<'a> Pieces<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0 }
+    }
+
+    pub(super) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let end = self.at.checked_add(count)?;
+        let taken = self.bytes.get(self.at..end)?;
+        self.at = end;
+        Some(taken)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.at >= self.bytes.len()
+    }
+
+    pub(super) fn u8(&mut self) -> Option<u8> {
+        self.take(1)?.first().copied()
+    }
+
+    pub(super) fn u16(&mut self) -> Option<u16> {
+        Some(u16::from_le_bytes(*self.take(2)?.first_chunk()?))
+    }
+
+    pub(super) fn u32(&mut self) -> Option<u32> {
+        Some(u32::from_le_bytes(*self.take(4)?.first_chunk()?))
+    }
+
+    pub(super) fn u64(&mut self) -> Option<u64> {
+        Some(u64::from_le_bytes(*self.take(8)?.first_chunk()?))
+    }
+
+    /// Bytes behind their length.
+    pub(super) fn sized(&mut self) -> Option<&'a [u8]> {
+        let count = self.u32()? as usize;
+        self.take(count)
+    }
+
+    /// Text behind its length.
+    pub(super) fn text(&mut self) -> Option<String> {
+        Some(String::from_utf8_lossy(self.sized()?).into_owned())
+    }
+}
+
+/// Nanoseconds as files count them, which may be more than a signed number holds.
+pub(super) fn signed_ns(ns: u64) -> i64 {
+    i64::try_from(ns).unwrap_or(i64::MAX)
+}

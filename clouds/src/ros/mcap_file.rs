@@ -1,0 +1,322 @@
+use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress};
+use super::chunk_order::{ChunkOrder, Step};
+use super::file_bytes::{FileBytes, Pieces};
+use super::mcap_record::{
+    Channels, ChunkHead, ChunkIndex, MAGIC, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, Statistics, message_head,
+    op, record_at,
+};
+use super::recording::{Message, Recording, Topic, TopicList};
+use crate::error::{Error, Place, Result};
+use std::path::Path;
+
+/// An MCAP file, of ROS 1 or ROS 2. Its summary is read if there is one; otherwise the file is read once before.
+///
+/// Messages come in order of the time at which they were recorded. Memory holds the chunks that overlap in time.
+#[derive(Debug)]
+pub struct McapFile {
+    file: FileBytes,
+    topics: TopicList,
+    channels: Channels,
+    chunks: Vec<ChunkPlace>,
+    wanted: Vec<usize>,
+    order: ChunkOrder,
+    remarks: Vec<String>,
+}
+
+/// A footer and the magic at the end.
+const END_BYTES: u64 = RECORD_HEAD_BYTES + 20 + 8;
+/// The magic at the end.
+const END_MAGIC_BYTES: u64 = 8;
+/// A longer record outside of chunks is not read, but stepped over.
+const MOST_RECORD_BYTES: u64 = 64 << 20;
+/// Messages outside of chunks are read together up to this size.
+const BARE_CHUNK_BYTES: u64 = 4 << 20;
+
+impl McapFile {
+    /// Opens a file.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read or is no MCAP file.
+    pub fn open(path: &Path) -> Result<Self> {
+        let mut file = FileBytes::open(path)?;
+        if file.read_at(0, MAGIC.len() as u64)? != MAGIC {
+            return Err(Error::format(
+                path,
+                Place::Byte(0),
+                "it does not start as an MCAP file (version 0) does",
+            ));
+        }
+        let mut mcap = Self {
+            file,
+            topics: TopicList::default(),
+            channels: Channels::default(),
+            chunks: Vec::new(),
+            wanted: Vec::new(),
+            order: ChunkOrder::default(),
+            remarks: Vec::new(),
+        };
+        if !mcap.read_summary()? {
+            mcap.topics = TopicList::default();
+            mcap.channels = Channels::default();
+            mcap.chunks.clear();
+            mcap.scan()?;
+        }
+        Ok(mcap)
+    }
+
+    /// The kind and the length of the record at a place; `None` at the end of the file.
+    fn head(&mut self, offset: u64) -> Result<Option<(u8, u64)>> {
+        let head = self.file.read_at(offset, RECORD_HEAD_BYTES)?;
+        let mut pieces = Pieces::new(&head);
+        Ok(pieces.u8().zip(pieces.u64()))
+    }
+
+    /// Reads channels and places of chunks from the end of the file; `false` if they are not all there.
+    fn read_summary(&mut self) -> Result<bool> {
+        let Some(end_at) = self.file.len.checked_sub(END_BYTES) else { return Ok(false) };
+        let end = self.file.read_at(end_at, END_BYTES)?;
+        let footer = record_at(&end, 0).filter(|(kind, ..)| *kind == op::FOOTER && end.ends_with(MAGIC));
+        let footer = footer.and_then(|(_, contents, _)| Pieces::new(end.get(contents)?).u64());
+        let Some(mut at) = footer.filter(|&start| start != 0) else { return Ok(false) };
+        let mut statistics = None;
+        let mut indices = Vec::new();
+        while at < end_at {
+            let Some((kind, bytes)) = self.head(at)? else { return Ok(false) };
+            let next = at.checked_add(RECORD_HEAD_BYTES).and_then(|at| at.checked_add(bytes));
+            let Some(next) = next.filter(|&next| next <= end_at) else { return Ok(false) };
+            if matches!(kind, op::SCHEMA | op::CHANNEL | op::CHUNK_INDEX | op::STATISTICS) {
+                if bytes > MOST_RECORD_BYTES {
+                    return Ok(false);
+                }
+                let contents = self.file.read_at(at + RECORD_HEAD_BYTES, bytes)?;
+                let taken = match kind {
+                    op::SCHEMA => self.channels.add_schema(&contents),
+                    op::CHANNEL => self.channels.add_channel(&contents, &mut self.topics),
+                    op::CHUNK_INDEX => ChunkIndex::of(&contents).map(|index| indices.push(index)),
+                    _ => Statistics::of(&contents).map(|found| statistics = Some(found)),
+                };
+                if taken.is_none() {
+                    return Ok(false);
+                }
+            }
+            at = next;
+        }
+        let Some(statistics) = statistics else { return Ok(false) };
+        // Without chunks, or without their places, messages are found by stepping over all records.
+        if statistics.messages > 0
+            && (self.channels.is_empty() || indices.len() as u64 != u64::from(statistics.chunks))
+        {
+            return Ok(false);
+        }
+        if statistics.messages > 0 && indices.is_empty() {
+            return Ok(false);
+        }
+        for (channel, messages) in statistics.channels {
+            if let Some(topic) = self.channels.topic(channel) {
+                self.topics.count(topic, messages);
+            }
+        }
+        for index in indices {
+            let topics = index.channels.iter().map(|&channel| self.channels.topic(channel)).collect();
+            let topics: Option<Vec<usize>> = if index.channels.is_empty() { None } else { topics };
+            let ChunkIndex { start_ns, offset, bytes, .. } = index;
+            self.chunks.push(ChunkPlace { offset, bytes, start_ns, topics, is_bare: false });
+        }
+        Ok(true)
+    }
+
+    /// Steps over all records, and looks into each chunk.
+    fn scan(&mut self) -> Result<()> {
+        let mut at = MAGIC.len() as u64;
+        let mut start_ns = i64::MIN;
+        let (mut messages, mut is_closed) = (0_u64, false);
+        while let Some((kind, bytes)) = self.head(at)? {
+            if matches!(kind, op::DATA_END | op::FOOTER) {
+                is_closed =
+                    self.file.read_at(self.file.len.saturating_sub(END_MAGIC_BYTES), END_MAGIC_BYTES)?
+                        == MAGIC;
+                break;
+            }
+            let Some(next) = at.checked_add(RECORD_HEAD_BYTES).and_then(|at| at.checked_add(bytes)) else {
+                break;
+            };
+            match kind {
+                op::SCHEMA | op::CHANNEL if bytes <= MOST_RECORD_BYTES => {
+                    let contents = self.file.read_at(at + RECORD_HEAD_BYTES, bytes)?;
+                    match kind {
+                        op::SCHEMA => self.channels.add_schema(&contents),
+                        _ => self.channels.add_channel(&contents, &mut self.topics),
+                    };
+                }
+                op::CHUNK => {
+                    let place =
+                        ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
+                    // A bad chunk is told of when it is its turn; others come behind it.
+                    let chunk = self.load(&place, None).unwrap_or_default();
+                    for message in &chunk.messages {
+                        self.topics.count(message.topic, 1);
+                    }
+                    messages += chunk.messages.len() as u64;
+                    start_ns = chunk.messages.iter().map(|message| message.log_ns).min().unwrap_or(start_ns);
+                    self.chunks.push(ChunkPlace { start_ns, ..place });
+                }
+                op::MESSAGE if next <= self.file.len => {
+                    let head = self.file.read_at(at + RECORD_HEAD_BYTES, MESSAGE_HEAD_BYTES.min(bytes))?;
+                    let head = message_head(&head);
+                    let known =
+                        head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
+                    if let Some((topic, log_ns)) = known {
+                        self.topics.count(topic, 1);
+                        messages += 1;
+                        self.append_bare(at, next, topic, log_ns);
+                    }
+                }
+                _ => {}
+            }
+            at = next;
+        }
+        if !is_closed {
+            self.remarks.push(format!(
+                "{} has no end (the recorder did not close it, or it was cut off): {messages} messages were found by \
+                 reading it whole",
+                self.file.path().display()
+            ));
+        }
+        Ok(())
+    }
+
+    /// Takes a message outside of chunks together with those before it.
+    fn append_bare(&mut self, at: u64, next: u64, topic: usize, log_ns: i64) {
+        match self.chunks.last_mut().filter(|place| place.is_bare && next - place.offset <= BARE_CHUNK_BYTES)
+        {
+            Some(place) => {
+                place.bytes = next - place.offset;
+                place.start_ns = place.start_ns.min(log_ns);
+                let topics = place.topics.get_or_insert_default();
+                if !topics.contains(&topic) {
+                    topics.push(topic);
+                }
+            }
+            None => {
+                let (bytes, topics) = (next - at, Some(vec![topic]));
+                self.chunks.push(ChunkPlace { offset: at, bytes, start_ns: log_ns, topics, is_bare: true });
+            }
+        }
+    }
+
+    /// Reads a chunk; of its messages those of some topics, or of all.
+    fn load(&mut self, place: &ChunkPlace, wanted: Option<&[usize]>) -> Result<OpenChunk> {
+        let path = self.file.path().to_owned();
+        let wrong = |reason: &str| Error::format(&path, Place::Byte(place.offset), reason);
+        let too_large =
+            || wrong("a chunk of more than 1 GiB is not read; record with smaller chunks (`mcap recover`)");
+        let mut chunk = OpenChunk::default();
+        if place.is_bare {
+            if place.bytes > MOST_CHUNK_BYTES {
+                return Err(too_large());
+            }
+            chunk.bytes = self.file.read_at(place.offset, place.bytes)?;
+        } else {
+            let head = self.head(place.offset)?;
+            let Some((_, bytes)) = head.filter(|(kind, _)| *kind == op::CHUNK) else {
+                return Err(wrong(
+                    "there is no chunk where the index says so; `mcap recover` makes a new index",
+                ));
+            };
+            if bytes > MOST_CHUNK_BYTES {
+                return Err(too_large());
+            }
+            let mut contents = self.file.read_at(place.offset.saturating_add(RECORD_HEAD_BYTES), bytes)?;
+            let is_cut = (contents.len() as u64) < bytes;
+            let head = ChunkHead::of(&contents).ok_or_else(|| wrong("a chunk is cut off in its header"))?;
+            if head.plain_bytes > MOST_CHUNK_BYTES {
+                return Err(too_large());
+            }
+            contents.truncate(head.records.end);
+            contents.drain(..head.records.start);
+            let (bytes, complaint) = decompress(&head.compression, contents, head.plain_bytes);
+            let cut = (is_cut || head.is_cut).then(|| "the file ends in the midst of it".to_owned());
+            chunk = OpenChunk { bytes, messages: Vec::new(), complaint: cut.or(complaint) };
+        }
+        self.find_messages(&mut chunk, wanted);
+        Ok(chunk)
+    }
+
+    /// Walks over the records of a chunk.
+    fn find_messages(&mut self, chunk: &mut OpenChunk, wanted: Option<&[usize]>) {
+        let mut at = 0;
+        while at < chunk.bytes.len() {
+            let Some((kind, range, next)) = record_at(&chunk.bytes, at) else {
+                chunk.complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
+                return;
+            };
+            let contents = chunk.bytes.get(range.clone()).unwrap_or_default();
+            match kind {
+                op::SCHEMA => drop(self.channels.add_schema(contents)),
+                op::CHANNEL => drop(self.channels.add_channel(contents, &mut self.topics)),
+                op::MESSAGE => {
+                    let head = message_head(contents);
+                    let known =
+                        head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
+                    let Some((topic, log_ns)) = known else {
+                        chunk
+                            .complaint
+                            .get_or_insert_with(|| format!("byte {at}: a message without a channel"));
+                        return;
+                    };
+                    if wanted.is_none_or(|wanted| wanted.contains(&topic)) {
+                        let start = range.start + MESSAGE_HEAD_BYTES as usize;
+                        chunk.messages.push(MessagePlace { log_ns, topic, range: start..range.end });
+                    }
+                }
+                _ => {}
+            }
+            at = next;
+        }
+    }
+}
+
+impl Recording for McapFile {
+    fn format(&self) -> &str {
+        let is_ros_1 = self.topics.topics.iter().any(|topic| topic.wire == Some(super::wire::Wire::Ros1));
+        if is_ros_1 { "ROS 1 recording (MCAP)" } else { "ROS 2 bag (MCAP)" }
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics.topics
+    }
+
+    fn begin(&mut self, topics: &[usize]) -> Result<()> {
+        self.wanted = topics.to_vec();
+        self.order = ChunkOrder::new(&self.chunks, topics);
+        Ok(())
+    }
+
+    fn next_message(&mut self) -> Result<Option<Message>> {
+        loop {
+            let place = match self.order.step() {
+                Step::Load(place) => place,
+                Step::Message(message) => return Ok(Some(message)),
+                Step::End => return Ok(None),
+            };
+            let wanted = self.wanted.clone();
+            let mut chunk = self.load(&place, Some(&wanted))?;
+            let complaint = chunk.complaint.take();
+            let whole = chunk.messages.len();
+            self.order.open(chunk);
+            if let Some(complaint) = complaint {
+                let reason = format!("a chunk is damaged: {complaint}; {whole} messages of it can be read");
+                return Err(Error::format(self.file.path(), Place::Byte(place.offset), reason));
+            }
+        }
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let overlap = format!(
+            "{}: its chunks overlap so much that messages come out of order",
+            self.file.path().display()
+        );
+        self.remarks.iter().cloned().chain(self.order.has_given_up.then_some(overlap)).collect()
+    }
+}

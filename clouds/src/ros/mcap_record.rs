@@ -1,0 +1,156 @@
+use super::file_bytes::{Pieces, signed_ns};
+use super::recording::TopicList;
+use super::wire::Wire;
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// The first and the last bytes of an MCAP file.
+pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// Bytes of a record before its contents: its kind and its length.
+pub(super) const RECORD_HEAD_BYTES: u64 = 9;
+/// Bytes of a message before its data: channel, sequence, two times.
+pub(super) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
+
+/// Kinds of records.
+pub(super) mod op {
+    pub(in crate::ros) const FOOTER: u8 = 2;
+    pub(in crate::ros) const SCHEMA: u8 = 3;
+    pub(in crate::ros) const CHANNEL: u8 = 4;
+    pub(in crate::ros) const MESSAGE: u8 = 5;
+    pub(in crate::ros) const CHUNK: u8 = 6;
+    pub(in crate::ros) const CHUNK_INDEX: u8 = 8;
+    pub(in crate::ros) const STATISTICS: u8 = 11;
+    pub(in crate::ros) const DATA_END: u8 = 15;
+}
+
+/// The channels of a file: what its messages are.
+#[derive(Debug, Default)]
+pub(super) struct Channels {
+    types: HashMap<u16, String>,
+    topics: HashMap<u16, usize>,
+}
+
+/// The record at a place of some bytes: its kind, its contents and the place behind it.
+pub(super) fn record_at(bytes: &[u8], at: usize) -> Option<(u8, Range<usize>, usize)> {
+    let mut pieces = Pieces { bytes, at };
+    let (kind, count) = (pieces.u8()?, usize::try_from(pieces.u64()?).ok()?);
+    let start = pieces.at;
+    pieces.take(count)?;
+    Some((kind, start..pieces.at, pieces.at))
+}
+
+impl Channels {
+    pub(super) fn is_empty(&self) -> bool {
+        self.topics.is_empty()
+    }
+
+    pub(super) fn topic(&self, channel: u16) -> Option<usize> {
+        self.topics.get(&channel).copied()
+    }
+
+    /// Takes the contents of a schema record.
+    pub(super) fn add_schema(&mut self, contents: &[u8]) -> Option<()> {
+        let mut pieces = Pieces::new(contents);
+        let id = pieces.u16()?;
+        self.types.insert(id, pieces.text()?);
+        Some(())
+    }
+
+    /// Takes the contents of a channel record.
+    pub(super) fn add_channel(&mut self, contents: &[u8], topics: &mut TopicList) -> Option<()> {
+        let mut pieces = Pieces::new(contents);
+        let (id, schema) = (pieces.u16()?, pieces.u16()?);
+        let (name, encoding) = (pieces.text()?, pieces.text()?);
+        let wire = match encoding.as_str() {
+            "ros1" => Some(Wire::Ros1),
+            "cdr" => Some(Wire::Cdr),
+            _ => None,
+        };
+        let type_name = self.types.get(&schema).map_or("", String::as_str);
+        self.topics.insert(id, topics.index(&name, type_name, wire));
+        Some(())
+    }
+}
+
+/// The start of a message: its channel, and when it was recorded.
+pub(super) fn message_head(contents: &[u8]) -> Option<(u16, i64)> {
+    let mut pieces = Pieces::new(contents);
+    let channel = pieces.u16()?;
+    pieces.u32()?;
+    let log_ns = signed_ns(pieces.u64()?);
+    pieces.u64()?;
+    Some((channel, log_ns))
+}
+
+/// The start of a chunk.
+pub(super) struct ChunkHead {
+    pub(super) plain_bytes: u64,
+    pub(super) compression: String,
+    /// Its compressed records, as many as are there.
+    pub(super) records: Range<usize>,
+    pub(super) is_cut: bool,
+}
+
+impl ChunkHead {
+    pub(super) fn of(contents: &[u8]) -> Option<Self> {
+        let mut pieces = Pieces::new(contents);
+        pieces.take(16)?;
+        let plain_bytes = pieces.u64()?;
+        pieces.u32()?;
+        let compression = pieces.text()?;
+        let claimed = pieces.u64()?;
+        let there = (contents.len() - pieces.at) as u64;
+        let count = usize::try_from(claimed.min(there)).ok()?;
+        Some(Self {
+            plain_bytes,
+            compression,
+            records: pieces.at..pieces.at + count,
+            is_cut: claimed > there,
+        })
+    }
+}
+
+/// Where a chunk is.
+pub(super) struct ChunkIndex {
+    pub(super) start_ns: i64,
+    pub(super) offset: u64,
+    pub(super) bytes: u64,
+    /// Empty if the file does not say.
+    pub(super) channels: Vec<u16>,
+}
+
+impl ChunkIndex {
+    pub(super) fn of(contents: &[u8]) -> Option<Self> {
+        let mut pieces = Pieces::new(contents);
+        let start_ns = signed_ns(pieces.u64()?);
+        pieces.u64()?;
+        let (offset, bytes) = (pieces.u64()?, pieces.u64()?);
+        let map = pieces.sized()?;
+        let channels = map.chunks_exact(10).filter_map(|entry| Pieces::new(entry).u16()).collect();
+        Some(Self { start_ns, offset, bytes, channels })
+    }
+}
+
+/// How many messages each channel has.
+pub(super) struct Statistics {
+    pub(super) messages: u64,
+    pub(super) chunks: u32,
+    pub(super) channels: Vec<(u16, u64)>,
+}
+
+impl Statistics {
+    pub(super) fn of(contents: &[u8]) -> Option<Self> {
+        let mut pieces = Pieces::new(contents);
+        let messages = pieces.u64()?;
+        // Numbers of schemas, channels, attachments and metadata.
+        pieces.take(2 + 4 + 4 + 4)?;
+        let chunks = pieces.u32()?;
+        pieces.take(16)?;
+        let map = pieces.sized()?;
+        let channels = map.chunks_exact(10).filter_map(|entry| {
+            let mut pieces = Pieces::new(entry);
+            Some((pieces.u16()?, pieces.u64()?))
+        });
+        Some(Self { messages, chunks, channels: channels.collect() })
+    }
+}

@@ -1,0 +1,52 @@
+use super::header::Header;
+use crate::cloud::CloudPoint;
+use crate::ros::wire::{Decoded, Wire, WireReader};
+
+/// `CustomMsg` of `livox_ros_driver` and `livox_ros_driver2`.
+#[derive(Clone, Debug)]
+pub struct LivoxCustom<'a> {
+    /// Stamp and frame.
+    pub header: Header,
+    /// Number of points.
+    pub count: usize,
+    points: WireReader<'a>,
+}
+
+/// `offset_time`, x, y, z, `reflectivity`, `tag`, `line`.
+const POINT_BYTES: usize = 4 + 3 * 4 + 3;
+
+impl<'a> LivoxCustom<'a> {
+    /// Decodes a message.
+    ///
+    /// # Errors
+    ///
+    /// The message is cut off.
+    pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
+        let mut reader = WireReader::new(wire, bytes)?;
+        let header = Header::read(&mut reader)?;
+        // `timebase` repeats the stamp; `point_num` repeats the length of the sequence.
+        reader.u64()?;
+        reader.u32()?;
+        // `lidar_id` and `rsvd`.
+        reader.bytes(4)?;
+        let count = reader.sequence(POINT_BYTES)?;
+        Ok(Self { header, count, points: reader })
+    }
+
+    /// Its points, in order. A message that is cut off ends with an error.
+    pub fn points(&self) -> impl Iterator<Item = Decoded<CloudPoint>> + '_ {
+        let mut reader = self.points.clone();
+        (0..self.count).map(move |_| point(&mut reader))
+    }
+}
+
+fn point(reader: &mut WireReader<'_>) -> Decoded<CloudPoint> {
+    let time_s = f64::from(reader.u32()?) * 1e-9;
+    let position_m = [reader.f32()?, reader.f32()?, reader.f32()?].map(f64::from);
+    let intensity = f32::from(reader.u8()?);
+    reader.bytes(2)?;
+    // All zeros where nothing came back.
+    let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
+    let position_m = if is_return { position_m } else { [f64::NAN; 3] };
+    Ok(CloudPoint { position_m, intensity, time_s, is_return })
+}

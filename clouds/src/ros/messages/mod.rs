@@ -1,0 +1,19 @@
+//! Messages, each decoded by one function for ROS 1 and ROS 2.
+
+mod header;
+mod image;
+mod kind;
+mod laser_scan;
+mod livox;
+mod point_cloud2;
+mod point_field;
+mod poses;
+
+pub use header::Header;
+pub use image::{CameraInfo, Image, is_depth_encoding};
+pub use kind::MessageKind;
+pub use laser_scan::LaserScan;
+pub use livox::LivoxCustom;
+pub use point_cloud2::PointCloud2;
+pub use point_field::{FieldType, PointField};
+pub use poses::{StampedPose, decode_poses};

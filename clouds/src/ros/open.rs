@@ -1,0 +1,50 @@
+use super::bag1::Bag1;
+use super::bag2_folder::Bag2Folder;
+use super::mcap_file::McapFile;
+use super::recording::Recording;
+use super::sequence::Sequence;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Opens a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
+///
+/// # Errors
+///
+/// No path; a file that cannot be read or is no recording.
+pub fn open_recording(paths: &[PathBuf]) -> Result<Box<dyn Recording>> {
+    let open = |path: &PathBuf| -> Result<Box<dyn Recording>> {
+        if path.is_dir() { Ok(Box::new(Bag2Folder::open(path)?)) } else { open_file(path) }
+    };
+    match paths {
+        [] => Err(Error::argument("recording", "no file is given")),
+        [path] => open(path),
+        paths => Ok(Box::new(Sequence::new(paths.iter().map(open).collect::<Result<_>>()?))),
+    }
+}
+
+/// Opens a file by the end of its name.
+pub(super) fn open_file(path: &Path) -> Result<Box<dyn Recording>> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        Some("bag") => Ok(Box::new(Bag1::open(path)?)),
+        Some("mcap") => Ok(Box::new(McapFile::open(path)?)),
+        Some("db3") => open_db3(path),
+        _ => {
+            let reason =
+                "it is no recording by its name; known: .bag, .mcap, .db3, a folder with metadata.yaml";
+            Err(Error::argument(path.display().to_string(), reason))
+        }
+    }
+}
+
+#[cfg(feature = "sqlite")]
+fn open_db3(path: &Path) -> Result<Box<dyn Recording>> {
+    Ok(Box::new(super::db3::Db3::open(path)?))
+}
+
+#[cfg(not(feature = "sqlite"))]
+fn open_db3(path: &Path) -> Result<Box<dyn Recording>> {
+    let reason =
+        "this program was built without SQLite (feature `sqlite`); `ros2 bag convert` makes an .mcap of it";
+    Err(Error::argument(path.display().to_string(), reason))
+}

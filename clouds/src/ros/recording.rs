@@ -1,0 +1,79 @@
+use super::wire::Wire;
+use crate::error::Result;
+
+/// A topic of a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name: `/points`.
+    pub name: String,
+    /// The type of its messages, as the recording writes it.
+    pub type_name: String,
+    /// How they are serialised; `None` if it is a way that is not read.
+    pub wire: Option<Wire>,
+    /// Number of messages, as the recording counts them.
+    pub messages: u64,
+}
+
+/// A message of a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// Its topic: an index into [`Recording::topics`].
+    pub topic: usize,
+    /// When it was recorded, in nanoseconds.
+    pub log_ns: i64,
+    /// Its bytes.
+    pub data: Vec<u8>,
+}
+
+/// Messages one at a time, in the order in which they are played.
+pub trait Recording: Send {
+    /// Name of the format, for people.
+    fn format(&self) -> &str;
+
+    /// All topics.
+    fn topics(&self) -> &[Topic];
+
+    /// Begins from the start, with the messages of these topics (indices) only.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
+    fn begin(&mut self, topics: &[usize]) -> Result<()>;
+
+    /// The next message. `None` after the last one, and before [`Recording::begin`].
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read or is invalid. The call after that goes on behind the bad part.
+    fn next_message(&mut self) -> Result<Option<Message>>;
+
+    /// What a person should know: parts that were cut off, an index that is missing.
+    fn remarks(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// Topics as they are found. A topic that several publishers write is one; one of two types is two.
+#[derive(Debug, Default)]
+pub(super) struct TopicList {
+    pub(super) topics: Vec<Topic>,
+}
+
+impl TopicList {
+    /// The index of a topic, which is appended if it is new.
+    pub(super) fn index(&mut self, name: &str, type_name: &str, wire: Option<Wire>) -> usize {
+        let is_it = |topic: &Topic| topic.name == name && topic.type_name == type_name && topic.wire == wire;
+        if let Some(index) = self.topics.iter().position(is_it) {
+            return index;
+        }
+        self.topics.push(Topic { name: name.to_owned(), type_name: type_name.to_owned(), wire, messages: 0 });
+        self.topics.len() - 1
+    }
+
+    /// Counts messages of a topic.
+    pub(super) fn count(&mut self, index: usize, messages: u64) {
+        if let Some(topic) = self.topics.get_mut(index) {
+            topic.messages = topic.messages.saturating_add(messages);
+        }
+    }
+}

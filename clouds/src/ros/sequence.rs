@@ -1,0 +1,80 @@
+use super::recording::{Message, Recording, Topic, TopicList};
+use crate::error::Result;
+
+/// Recordings one after the other, as one: the parts of a split bag.
+pub struct Sequence {
+    parts: Vec<Part>,
+    topics: TopicList,
+    wanted: Vec<usize>,
+    at: usize,
+    has_begun: bool,
+}
+
+struct Part {
+    recording: Box<dyn Recording>,
+    /// The topic of all parts, for each of this one.
+    topics: Vec<usize>,
+}
+
+impl Sequence {
+    /// Puts recordings together, in the order in which they are given.
+    pub fn new(recordings: Vec<Box<dyn Recording>>) -> Self {
+        let mut topics = TopicList::default();
+        let parts = recordings.into_iter().map(|recording| {
+            let known = recording.topics().iter().map(|topic| {
+                let index = topics.index(&topic.name, &topic.type_name, topic.wire);
+                topics.count(index, topic.messages);
+                index
+            });
+            let known = known.collect();
+            Part { recording, topics: known }
+        });
+        let parts = parts.collect();
+        Self { parts, topics, wanted: Vec::new(), at: 0, has_begun: false }
+    }
+}
+
+impl Recording for Sequence {
+    fn format(&self) -> &str {
+        self.parts.first().map_or("recording", |part| part.recording.format())
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics.topics
+    }
+
+    fn begin(&mut self, topics: &[usize]) -> Result<()> {
+        self.wanted = topics.to_vec();
+        self.at = 0;
+        self.has_begun = false;
+        Ok(())
+    }
+
+    fn next_message(&mut self) -> Result<Option<Message>> {
+        while let Some(part) = self.parts.get_mut(self.at) {
+            if !self.has_begun {
+                let is_wanted =
+                    |index: &usize| part.topics.get(*index).is_some_and(|t| self.wanted.contains(t));
+                let own: Vec<usize> = (0..part.topics.len()).filter(is_wanted).collect();
+                self.has_begun = true;
+                part.recording.begin(&own)?;
+            }
+            let Some(message) = part.recording.next_message()? else {
+                // Chunks that are in memory are not needed any more.
+                part.recording.begin(&[])?;
+                self.at += 1;
+                self.has_begun = false;
+                continue;
+            };
+            // A topic that only shows up in the midst of a file was not asked for.
+            if let Some(&topic) = part.topics.get(message.topic) {
+                return Ok(Some(Message { topic, ..message }));
+            }
+        }
+        Ok(None)
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.parts.iter().flat_map(|part| part.recording.remarks()).collect()
+    }
+}

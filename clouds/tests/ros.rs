@@ -1,0 +1,320 @@
+//! Recordings that rosbags and the writer of mcap.dev made (tests/fixtures/make_ros.py) give what was put into them.
+#![cfg(feature = "ros")]
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use voxtile_clouds::ros::{BagOptions, PoseSource, open_bag, open_recording};
+use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
+
+const FILES: [&str; 8] =
+    ["none.bag", "bz2.bag", "lz4.bag", "none.mcap", "lz4.mcap", "zstd.mcap", "ros1.mcap", "unchunked.mcap"];
+#[cfg(feature = "sqlite")]
+const FOLDERS: &[&str] = &["folder", "by_file", "by_message", "folder/folder.db3"];
+#[cfg(not(feature = "sqlite"))]
+const FOLDERS: &[&str] = &[];
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ros").join(name)
+}
+
+fn recordings() -> impl Iterator<Item = &'static str> {
+    FILES.into_iter().chain(FOLDERS.iter().copied())
+}
+
+fn expected() -> Value {
+    serde_json::from_slice(&std::fs::read(data("expected.json")).unwrap()).unwrap()
+}
+
+fn topic(name: &str) -> BagOptions {
+    BagOptions { topic: Some(name.to_owned()), ..BagOptions::default() }
+}
+
+/// All clouds, and all that went wrong.
+fn read(
+    paths: &[PathBuf],
+    options: &BagOptions,
+) -> (Vec<(CloudHead, Vec<CloudPoint>)>, Vec<String>, Vec<String>) {
+    let mut source = open_bag(paths, options).unwrap();
+    let (mut clouds, mut errors) = (Vec::new(), Vec::new());
+    loop {
+        match source.next_cloud() {
+            Ok(Some(head)) => {
+                let mut points = Vec::new();
+                let result = source.read_points(&mut |point| {
+                    points.push(point);
+                    Ok(())
+                });
+                errors.extend(result.err().map(|error| error.to_string()));
+                clouds.push((head, points));
+            }
+            Ok(None) => break,
+            Err(error) => errors.push(error.to_string()),
+        }
+    }
+    let remarks = source.remarks();
+    (clouds, errors, remarks)
+}
+
+fn assert_points(points: &[CloudPoint], rows: &Value, of: &str) {
+    let rows = rows.as_array().unwrap();
+    assert_eq!(points.len(), rows.len(), "{of}");
+    for (k, (point, row)) in points.iter().zip(rows).enumerate() {
+        let near = |value: f64, wanted: &Value, room: f64| match wanted.as_f64() {
+            Some(wanted) => (value - wanted).abs() <= room,
+            None => value.is_nan(),
+        };
+        let is_right = (0..3).all(|axis| near(point.position_m[axis], &row[axis], 1e-6))
+            && near(f64::from(point.intensity), &row[3], 0.0)
+            // Stamps of type f64 in seconds since the epoch are this coarse.
+            && near(point.time_s, &row[4], 3e-7)
+            && Some(point.is_return) == row[5].as_bool();
+        assert!(is_right, "{of}, point {k}: {point:?} is not {row}");
+    }
+}
+
+fn assert_pose(pose: Option<RigidPose>, wanted: &Value, of: &str) {
+    let pose = pose.unwrap_or_else(|| panic!("{of}: no pose"));
+    let numbers: Vec<f64> = pose.position_m.into_iter().chain(pose.quaternion).collect();
+    let wanted: Vec<f64> = wanted.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect();
+    let sign = if pose.quaternion[3] * wanted[6] < 0.0 { -1.0 } else { 1.0 };
+    for k in 0..7 {
+        let value = if k < 3 { numbers[k] } else { sign * numbers[k] };
+        assert!((value - wanted[k]).abs() < 1e-9, "{of}: {numbers:?} is not {wanted:?}");
+    }
+}
+
+fn assert_clouds(clouds: &[(CloudHead, Vec<CloudPoint>)], frame: &str, of: &str) {
+    let expected = expected();
+    let wanted = expected["clouds"].as_array().unwrap();
+    assert_eq!(clouds.len(), wanted.len(), "{of}");
+    for (k, ((head, points), wanted)) in clouds.iter().zip(wanted).enumerate() {
+        let of = format!("{of}, cloud {k}");
+        assert_eq!(head.stamp_ns, wanted["stamp_ns"].as_i64(), "{of}");
+        assert_eq!(head.frame.as_deref(), Some("lidar"), "{of}");
+        assert_eq!(head.name, k.to_string());
+        assert_eq!(head.points, Some(20));
+        assert_eq!(head.has_intensities, k != 3);
+        assert!(head.has_times);
+        let fields: Vec<&str> =
+            wanted["fields"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        assert_eq!(head.fields, fields, "{of}");
+        assert_points(points, &wanted["points"], &of);
+        assert_pose(head.world_from_sensor, &wanted["poses"][frame], &of);
+    }
+}
+
+#[test]
+fn the_same_clouds_and_poses_come_out_of_each() {
+    for name in recordings() {
+        let (clouds, errors, remarks) = read(&[data(name)], &topic("/points"));
+        assert_eq!((errors, remarks), (vec![], vec![]), "{name}");
+        assert_clouds(&clouds, "map", name);
+    }
+}
+
+#[test]
+fn a_fixed_frame_may_be_chosen() {
+    let options = BagOptions { fixed_frame: Some("/odom".to_owned()), ..topic("points") };
+    let (clouds, errors, _) = read(&[data("zstd.mcap")], &options);
+    assert_eq!(errors, Vec::<String>::new());
+    assert_clouds(&clouds, "odom", "odom");
+    // The second cloud has a stamp that a transform has: nothing is computed but the mount on top.
+}
+
+#[test]
+fn odometry_and_poses_carry_the_mount() {
+    for name in recordings() {
+        for odometry in ["/odometry", "/pose"] {
+            let options = BagOptions {
+                poses: PoseSource::Odometry,
+                odometry_topic: Some(odometry.to_owned()),
+                ..topic("/points")
+            };
+            let (clouds, errors, remarks) = read(&[data(name)], &options);
+            assert_eq!(errors, Vec::<String>::new());
+            assert_eq!(remarks.len(), usize::from(odometry == "/pose"), "{remarks:?}");
+            assert_clouds(&clouds, "odom", &format!("{name} {odometry}"));
+        }
+    }
+}
+
+#[test]
+fn odometry_is_preferred_to_topics_that_do_not_say_what_moves() {
+    let options = BagOptions { poses: PoseSource::Odometry, ..topic("/points") };
+    let (clouds, _, remarks) = read(&[data("none.bag")], &options);
+    assert!(remarks.is_empty(), "{remarks:?}");
+    assert_clouds(&clouds, "odom", "odometry");
+}
+
+#[test]
+fn scans_depth_images_and_livox_are_clouds() {
+    let expected = expected();
+    for name in recordings() {
+        for (topic_name, key) in [("/scan", "scan"), ("/depth/image_raw", "depth"), ("/livox", "livox")] {
+            let of = format!("{name} {topic_name}");
+            let (clouds, errors, remarks) = read(&[data(name)], &topic(topic_name));
+            assert_eq!((errors, remarks), (vec![], vec![]), "{of}");
+            assert_eq!(clouds.len(), 1, "{of}");
+            let (head, points) = &clouds[0];
+            assert_points(points, &expected[key], &of);
+            assert_eq!(head.points, Some(points.len() as u64), "{of}");
+            assert_pose(head.world_from_sensor, &expected["clouds"][1]["poses"]["map"], &of);
+        }
+    }
+}
+
+#[test]
+fn several_topics_are_listed_and_none_too() {
+    let error = |name: &str, options: &BagOptions| match open_bag(&[data(name)], options) {
+        Ok(_) => panic!("{name} opens"),
+        Err(error) => error.to_string(),
+    };
+    for name in recordings() {
+        let text = error(name, &BagOptions::default());
+        let image = if name.ends_with(".bag") || name == "ros1.mcap" {
+            "/depth/image_raw (sensor_msgs/Image, 1 messages)"
+        } else {
+            "/depth/image_raw (sensor_msgs/msg/Image, 1 messages)"
+        };
+        for part in
+            ["--topic NAME", "/points (sensor_msgs/", "PointCloud2, 4 messages)", "/livox", "/scan", image]
+        {
+            assert!(text.contains(part), "{name}: {text}");
+        }
+        assert!(!text.contains("/color"), "{text}");
+        assert!(text.contains(name), "{text}");
+        assert!(error(name, &topic("/pionts")).contains("/points"));
+        assert!(error(name, &topic("/tf")).contains("are no clouds"));
+        assert!(error(name, &topic("/color/image_raw")).contains("/color/camera_info"));
+    }
+}
+
+#[test]
+fn one_topic_needs_no_name_and_no_transforms_leave_clouds_without_poses() {
+    let (clouds, errors, remarks) = read(&[data("only_points.mcap")], &BagOptions::default());
+    assert_eq!((clouds.len(), errors), (4, vec![]));
+    assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
+    assert_eq!(remarks, ["4 clouds have no pose: no transform names the frame lidar"]);
+    let options = BagOptions { poses: PoseSource::None, ..BagOptions::default() };
+    let (_, _, remarks) = read(&[data("only_points.mcap")], &options);
+    assert!(remarks.is_empty());
+}
+
+#[test]
+fn gaps_between_transforms_may_be_limited() {
+    let options = BagOptions { most_gap_ns: Some(10_000_000), ..topic("/points") };
+    let (clouds, _, remarks) = read(&[data("lz4.bag")], &options);
+    assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
+    assert!(remarks.iter().any(|remark| remark.contains("too far apart")), "{remarks:?}");
+}
+
+#[test]
+fn messages_come_in_the_order_in_which_they_were_recorded() {
+    for name in recordings() {
+        let mut recording = open_recording(&[data(name)]).unwrap();
+        let all: Vec<usize> = (0..recording.topics().len()).collect();
+        let announced: u64 = recording.topics().iter().map(|topic| topic.messages).sum();
+        recording.begin(&all).unwrap();
+        let mut stamps = Vec::new();
+        while let Some(message) = recording.next_message().unwrap() {
+            stamps.push(message.log_ns);
+        }
+        assert_eq!((stamps.len() as u64, announced), (41, 41), "{name}");
+        assert!(stamps.is_sorted(), "{name}: {stamps:?}");
+    }
+}
+
+#[test]
+fn parts_of_a_split_recording_are_one() {
+    let (clouds, errors, _) = read(&[data("none.bag"), data("bz2.bag")], &topic("/points"));
+    assert_eq!((clouds.len(), errors), (8, vec![]));
+    assert_clouds(&clouds[..4], "map", "first part");
+}
+
+#[test]
+fn files_that_are_cut_off_give_what_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in FILES {
+        let bytes = std::fs::read(data(name)).unwrap();
+        let path = folder.path().join(name);
+        // Without the last byte the index is gone, but no message is.
+        std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+        let (clouds, errors, remarks) = read(&[path.clone()], &topic("/points"));
+        assert_eq!(errors, Vec::<String>::new(), "{name}");
+        assert_eq!(remarks.len(), 1, "{name}: {remarks:?}");
+        assert!(remarks[0].contains("41 messages were found"), "{remarks:?}");
+        assert_clouds(&clouds, "map", name);
+        // In the midst of messages: some are gone, the first is not.
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let (clouds, _, remarks) = read(&[path], &topic("/points"));
+        assert!((1..4).contains(&clouds.len()), "{name}: {}", clouds.len());
+        assert!(remarks.iter().any(|remark| remark.contains("cut off")), "{name}: {remarks:?}");
+    }
+}
+
+#[test]
+fn files_that_are_no_recordings_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["x.bag", "x.mcap", "x.db3", "x.txt"] {
+        let path = folder.path().join(name);
+        for bytes in [&b""[..], b"#ROSBAG V1.2\n", b"hello"] {
+            std::fs::write(&path, bytes).unwrap();
+            let error = open_recording(&[path.clone()]).err().map(|error| error.to_string());
+            assert!(error.is_some_and(|error| error.contains(name)), "{name}");
+        }
+    }
+    assert!(open_recording(&[folder.path().join("gone.bag")]).is_err());
+    let empty = tempfile::tempdir().unwrap();
+    assert!(open_recording(&[empty.path().to_owned()]).is_err());
+    assert!(open_recording(&[]).is_err());
+}
+
+/// A generator of numbers that need not be good.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % end.max(1)
+    }
+}
+
+#[test]
+fn damaged_files_never_panic_and_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut numbers = Numbers(3);
+    let databases = cfg!(feature = "sqlite").then_some("folder/folder.db3");
+    for name in FILES.into_iter().chain(databases) {
+        let whole = std::fs::read(data(name)).unwrap();
+        let path = folder.path().join(name.rsplit('/').next().unwrap());
+        let mut read = 0;
+        for turn in 0..250 {
+            let mut bytes = whole.clone();
+            if turn % 3 != 0 {
+                for _ in 0..=numbers.below(8) {
+                    let at = numbers.below(bytes.len());
+                    bytes[at] = [0, 255, 127, 1, numbers.below(256) as u8][numbers.below(5)];
+                }
+            }
+            if turn % 3 != 1 {
+                bytes.truncate(numbers.below(bytes.len()));
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            for (topic_name, poses) in [("/points", PoseSource::Tf), ("/livox", PoseSource::Odometry)] {
+                let options = BagOptions { poses, ..topic(topic_name) };
+                let Ok(mut source) = open_bag(&[path.clone()], &options) else { continue };
+                let mut calls = 0;
+                while !matches!(source.next_cloud(), Ok(None)) {
+                    let _ = source.read_points(&mut |_| {
+                        read += 1;
+                        Ok(())
+                    });
+                    calls += 1;
+                    assert!(calls < 10_000, "{name}, turn {turn}: it does not end");
+                }
+            }
+        }
+        // Most of it must have got as far as points, or this tests nothing.
+        assert!(read > 2_000, "{name}: {read} points");
+    }
+}
