@@ -68,6 +68,11 @@ pub trait CloudSource: Send {
     /// A file that cannot be read or is invalid; the first error of `visit`.
     fn read_points(&mut self, visit: &mut dyn FnMut(CloudPoint) -> Result<()>) -> Result<()>;
 
+    /// Where the sensor of the cloud at hand was at another time, if the source knows.
+    fn pose_at(&mut self, _stamp_ns: i64) -> Option<RigidPose> {
+        None
+    }
+
     /// What a person should know of this input beside its clouds: parts that were cut off, messages without an index.
     fn remarks(&self) -> Vec<String> {
         Vec::new()

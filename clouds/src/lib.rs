@@ -10,12 +10,16 @@
 
 mod cloud;
 mod error;
+mod lines;
 mod pose;
+pub mod poses;
 pub mod read;
 #[cfg(feature = "ros")]
 pub mod ros;
+mod stamp;
 pub mod write;
 
 pub use cloud::{CloudHead, CloudPoint, CloudSource};
 pub use error::{Error, Place, Result};
 pub use pose::RigidPose;
+pub use stamp::in_name as stamp_of_name;

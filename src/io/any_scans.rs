@@ -112,3 +112,23 @@ fn poses_for(path: &Path, options: &ReadOptions, has_own: bool, clouds: Option<u
         }
     }
 }
+
+/// Opens a recording; poses of a file go before its own.
+#[cfg(feature = "ros")]
+fn open_recording(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    use voxtile_clouds::ros::{BagOptions, PoseSource, open_bag};
+    let recording = &options.recording;
+    let poses = match (&options.poses, &recording.odometry_topic) {
+        (Some(_), _) => PoseSource::None,
+        (None, Some(_)) => PoseSource::Odometry,
+        (None, None) => PoseSource::Tf,
+    };
+    let bag = BagOptions {
+        topic: recording.topic.clone(),
+        odometry_topic: recording.odometry_topic.clone(),
+        fixed_frame: recording.fixed_frame.clone(),
+        poses,
+        most_gap_ns: Some(options.clouds.pose_tolerance_ns),
+    };
+    Ok(Box::new(open_bag(&[path.to_owned()], &bag)?))
+}

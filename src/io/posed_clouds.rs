@@ -140,11 +140,9 @@ impl PosedClouds {
             world_from_sensor = Pose::from_quaternion(sensor.position_m, RigidPose::IDENTITY.quaternion)?;
         }
         let Self { source, options, poses, .. } = self;
-        let deskew = match (&*poses, options.is_deskewed, head.stamp_ns) {
-            (CloudPoses::File(_, trajectory), true, Some(stamp_ns)) => {
-                Some(Deskew { trajectory, options, stamp_ns, sensor_from_world: sensor.inverse() })
-            }
-            _ => None,
+        let deskew = match head.stamp_ns.filter(|_| options.is_deskewed && head.has_times) {
+            Some(stamp_ns) => Some(Deskew::new(&mut **source, poses, options, stamp_ns, &sensor)),
+            None => None,
         };
         points.begin(head.has_intensities);
         let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
@@ -174,14 +172,40 @@ impl PosedClouds {
 }
 
 /// Takes points to where they were at the time of their cloud.
-struct Deskew<'a> {
-    trajectory: &'a Trajectory,
-    options: &'a CloudOptions,
+struct Deskew {
     stamp_ns: i64,
     sensor_from_world: RigidPose,
+    /// Where the sensor was around that time, in order.
+    world_from_sensor: Vec<(i64, RigidPose)>,
 }
 
-impl Deskew<'_> {
+/// Points are measured so long before or after the stamp of their cloud at most.
+const SWEEP_NS: i64 = 300_000_000;
+/// Between two poses so far apart the sensor moves along a line.
+const POSE_PERIOD_NS: i64 = 1_000_000;
+
+impl Deskew {
+    fn new(
+        source: &mut dyn CloudSource,
+        poses: &CloudPoses,
+        options: &CloudOptions,
+        stamp_ns: i64,
+        sensor: &RigidPose,
+    ) -> Self {
+        let mut pose_at = |at_ns: i64| match poses {
+            CloudPoses::File(_, trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns) {
+                Found::Exact(body) | Found::Between(body) => Some(body),
+                _ => None,
+            },
+            CloudPoses::Source => source.pose_at(at_ns),
+            CloudPoses::Identity => None,
+        };
+        let periods = -SWEEP_NS / POSE_PERIOD_NS..=SWEEP_NS / POSE_PERIOD_NS;
+        let times = periods.map(|period| stamp_ns.saturating_add(period * POSE_PERIOD_NS));
+        let around = times.filter_map(|at_ns| Some((at_ns, pose_at(at_ns)?.then(&options.body_from_sensor))));
+        Self { stamp_ns, sensor_from_world: sensor.inverse(), world_from_sensor: around.collect() }
+    }
+
     /// A point whose own pose is not known stays where it is.
     fn apply(&self, point: &CloudPoint) -> Point {
         let after_ns = (point.time_s * 1e9).round();
@@ -190,20 +214,23 @@ impl Deskew<'_> {
         }
         // Saturates where the time is beyond all poses.
         let at_ns = self.stamp_ns.saturating_add(after_ns as i64);
-        match self.trajectory.at(at_ns, self.options.pose_tolerance_ns) {
-            Found::Exact(body) | Found::Between(body) => {
-                let sensor = body.then(&self.options.body_from_sensor);
-                self.sensor_from_world.apply(sensor.apply(point.position_m))
+        let next = self.world_from_sensor.partition_point(|(pose_ns, _)| *pose_ns < at_ns);
+        let before = next.checked_sub(1).and_then(|before| self.world_from_sensor.get(before));
+        let sensor = match (before, self.world_from_sensor.get(next)) {
+            (_, Some((pose_ns, pose))) if *pose_ns == at_ns => *pose,
+            (Some((from_ns, from)), Some((to_ns, to))) if to_ns - from_ns <= 2 * POSE_PERIOD_NS => {
+                from.towards(to, (at_ns - from_ns) as f64 / (to_ns - from_ns) as f64)
             }
-            _ => point.position_m,
-        }
+            _ => return point.position_m,
+        };
+        self.sensor_from_world.apply(sensor.apply(point.position_m))
     }
 }
 
 /// An error of this crate on its way through the reader.
 fn keep(error: Error) -> voxtile_clouds::Error {
     match error {
-        Error::Io { path, source, .. } => voxtile_clouds::Error::io(&path, "write", source),
+        Error::Io { path, cause, .. } => voxtile_clouds::Error::io(&path, "write", cause),
         other => voxtile_clouds::Error::argument("points", other.to_string()),
     }
 }

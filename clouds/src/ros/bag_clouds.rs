@@ -8,6 +8,7 @@ use super::recording::{Message, Recording, Topic};
 use super::wire::{Wire, WireError};
 use crate::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::error::{Error, Place, Result};
+use crate::pose::RigidPose;
 use std::path::PathBuf;
 
 /// The clouds of one topic of a recording, with the poses that the recording knows.
@@ -22,6 +23,8 @@ pub struct BagClouds {
     /// Number of the next cloud.
     next: u64,
     current: Option<Message>,
+    /// The frame of the cloud at hand.
+    frame: Option<String>,
     /// Number of clouds whose stamp is 0.
     without_stamp: u64,
 }
@@ -63,6 +66,7 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
         poses,
         next: 0,
         current: None,
+        frame: None,
         without_stamp: 0,
     })
 }
@@ -133,6 +137,7 @@ impl CloudSource for BagClouds {
             has_times: cloud.has_times(),
         };
         self.current = Some(message);
+        self.frame.clone_from(&head.frame);
         Ok(Some(head))
     }
 
@@ -142,6 +147,10 @@ impl CloudSource for BagClouds {
         let cloud = CloudMessage::decode(self.chosen.kind, self.wire, &message.data, self.camera.as_ref());
         let shortage = cloud.map_err(|error| self.wrong(number, &error))?.visit(visit)?;
         shortage.map_or(Ok(()), |error| Err(self.wrong(number, &error)))
+    }
+
+    fn pose_at(&mut self, stamp_ns: i64) -> Option<RigidPose> {
+        self.poses.find(self.frame.as_deref()?, stamp_ns).ok()
     }
 
     fn remarks(&self) -> Vec<String> {

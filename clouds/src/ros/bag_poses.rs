@@ -120,7 +120,11 @@ impl BagPoses {
         found.map_err(|why| *self.without.entry(why.to_string()).or_default() += 1).ok()
     }
 
-    fn find(&mut self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
+    pub(super) fn find(
+        &mut self,
+        sensor_frame: &str,
+        stamp_ns: i64,
+    ) -> std::result::Result<RigidPose, WhyNot> {
         let fixed = match &self.fixed_frame {
             Some(frame) => frame.clone(),
             None => self.fixed_frame_of(sensor_frame)?,
