@@ -3,6 +3,7 @@
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::slice::from_ref;
 use voxtile_clouds::ros::{BagOptions, PoseSource, open_bag, open_recording};
 use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
 
@@ -12,6 +13,8 @@ const FILES: [&str; 8] =
 const FOLDERS: &[&str] = &["folder", "by_file", "by_message", "folder/folder.db3"];
 #[cfg(not(feature = "sqlite"))]
 const FOLDERS: &[&str] = &[];
+
+type Cloud = (CloudHead, Vec<CloudPoint>);
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ros").join(name)
@@ -30,10 +33,7 @@ fn topic(name: &str) -> BagOptions {
 }
 
 /// All clouds, and all that went wrong.
-fn read(
-    paths: &[PathBuf],
-    options: &BagOptions,
-) -> (Vec<(CloudHead, Vec<CloudPoint>)>, Vec<String>, Vec<String>) {
+fn read(paths: &[PathBuf], options: &BagOptions) -> (Vec<Cloud>, Vec<String>, Vec<String>) {
     let mut source = open_bag(paths, options).unwrap();
     let (mut clouds, mut errors) = (Vec::new(), Vec::new());
     loop {
@@ -83,7 +83,7 @@ fn assert_pose(pose: Option<RigidPose>, wanted: &Value, of: &str) {
     }
 }
 
-fn assert_clouds(clouds: &[(CloudHead, Vec<CloudPoint>)], frame: &str, of: &str) {
+fn assert_clouds(clouds: &[Cloud], frame: &str, of: &str) {
     let expected = expected();
     let wanted = expected["clouds"].as_array().unwrap();
     assert_eq!(clouds.len(), wanted.len(), "{of}");
@@ -118,7 +118,6 @@ fn a_fixed_frame_may_be_chosen() {
     let (clouds, errors, _) = read(&[data("zstd.mcap")], &options);
     assert_eq!(errors, Vec::<String>::new());
     assert_clouds(&clouds, "odom", "odom");
-    // The second cloud has a stamp that a transform has: nothing is computed but the mount on top.
 }
 
 #[test]
@@ -239,7 +238,7 @@ fn files_that_are_cut_off_give_what_is_whole() {
         let path = folder.path().join(name);
         // Without the last byte the index is gone, but no message is.
         std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
-        let (clouds, errors, remarks) = read(&[path.clone()], &topic("/points"));
+        let (clouds, errors, remarks) = read(from_ref(&path), &topic("/points"));
         assert_eq!(errors, Vec::<String>::new(), "{name}");
         assert_eq!(remarks.len(), 1, "{name}: {remarks:?}");
         assert!(remarks[0].contains("41 messages were found"), "{remarks:?}");
@@ -252,6 +251,27 @@ fn files_that_are_cut_off_give_what_is_whole() {
     }
 }
 
+#[cfg(feature = "sqlite")]
+#[test]
+fn folders_whose_file_is_cut_off_or_gone_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    copy("metadata.yaml", &std::fs::read(data("by_file/metadata.yaml")).unwrap());
+    let error = open_recording(&[folder.path().to_owned()]).err().unwrap().to_string();
+    assert!(error.contains("names by_file.db3.zstd, which is not there"), "{error}");
+    let bytes = std::fs::read(data("by_file/by_file.db3.zstd")).unwrap();
+    copy("by_file.db3.zstd", &bytes[..bytes.len() - 1]);
+    // The archive is one block: without its end there is nothing.
+    let error = open_recording(&[folder.path().to_owned()]).err().unwrap().to_string();
+    assert!(error.contains("by_file.db3.zstd, byte 0: it is cut off or damaged"), "{error}");
+    // Without metadata, files are found by their names.
+    std::fs::remove_file(folder.path().join("metadata.yaml")).unwrap();
+    copy("by_file.db3.zstd", &bytes);
+    let (clouds, errors, remarks) = read(&[folder.path().to_owned()], &topic("/points"));
+    assert_eq!((errors, remarks.len()), (vec![], 1), "{remarks:?}");
+    assert_clouds(&clouds, "map", "without metadata");
+}
+
 #[test]
 fn files_that_are_no_recordings_say_so() {
     let folder = tempfile::tempdir().unwrap();
@@ -259,7 +279,7 @@ fn files_that_are_no_recordings_say_so() {
         let path = folder.path().join(name);
         for bytes in [&b""[..], b"#ROSBAG V1.2\n", b"hello"] {
             std::fs::write(&path, bytes).unwrap();
-            let error = open_recording(&[path.clone()]).err().map(|error| error.to_string());
+            let error = open_recording(from_ref(&path)).err().map(|error| error.to_string());
             assert!(error.is_some_and(|error| error.contains(name)), "{name}");
         }
     }
@@ -302,7 +322,7 @@ fn damaged_files_never_panic_and_end() {
             std::fs::write(&path, &bytes).unwrap();
             for (topic_name, poses) in [("/points", PoseSource::Tf), ("/livox", PoseSource::Odometry)] {
                 let options = BagOptions { poses, ..topic(topic_name) };
-                let Ok(mut source) = open_bag(&[path.clone()], &options) else { continue };
+                let Ok(mut source) = open_bag(from_ref(&path), &options) else { continue };
                 let mut calls = 0;
                 while !matches!(source.next_cloud(), Ok(None)) {
                     let _ = source.read_points(&mut |_| {

@@ -157,7 +157,8 @@ impl Bag1 {
         let (path, len) = (self.file.path().display(), self.file.len);
         let cut = if at == len { "" } else { ", which ends in the midst of a record (it was cut off)" };
         self.remarks.push(format!(
-            "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading it whole"
+            "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading it \
+             whole"
         ));
         Ok(())
     }
@@ -185,7 +186,8 @@ impl Bag1 {
         let data_at = place.offset + 8 + record.header_bytes;
         let data_bytes = end.saturating_sub(data_at);
         if claimed.max(data_bytes) > MOST_CHUNK_BYTES {
-            let reason = "a chunk of more than 1 GiB is not read; record with smaller chunks (rosbag record --chunksize)";
+            let reason =
+                "a chunk of more than 1 GiB is not read; record smaller ones (rosbag record --chunksize)";
             return Err(wrong(reason.into()));
         }
         let data = self.file.read_at(data_at, data_bytes)?;

@@ -5,7 +5,7 @@ use super::recording::{Message, Recording, Topic};
 use super::sequence::Sequence;
 use crate::error::{Error, Place, Result};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -65,7 +65,21 @@ impl Bag2Folder {
                         none.insert(tempfile::tempdir().map_err(|error| Error::io(path, "unpack", error))?)
                     }
                 };
-                recordings.push(open_file(&unpack(file, folder.path())?)?);
+                let (plain, damage) = unpack(file, folder.path())?;
+                // The name of the temporary file would tell nobody anything.
+                let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
+                let opened = open_file(&plain).map_err(|error| {
+                    let damaged = damaged.as_deref().unwrap_or("it was unpacked");
+                    Error::format(
+                        file,
+                        Place::Byte(0),
+                        format!("{damaged}, and what is in it cannot be read: {error}"),
+                    )
+                })?;
+                let remark =
+                    damaged.map(|damaged| format!("{}: {damaged}; read as far as it goes", file.display()));
+                remarks.extend(remark);
+                recordings.push(opened);
             } else {
                 recordings.push(open_file(file)?);
             }
@@ -115,15 +129,24 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Unpacks a compressed file; as much of it as is whole, if it is cut off.
-fn unpack(file: &Path, folder: &Path) -> Result<PathBuf> {
+/// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off.
+fn unpack(file: &Path, folder: &Path) -> Result<(PathBuf, Option<String>)> {
     let target = folder.join(file.file_stem().unwrap_or_default());
     let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
     let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
     let mut decoder = zstd::stream::read::Decoder::new(BufReader::new(input))
         .map_err(|error| Error::io(file, "unpack", error))?;
-    std::io::copy(&mut decoder, &mut output).map_err(|error| Error::io(file, "unpack", error))?;
-    Ok(target)
+    let mut bytes = vec![0; 1 << 16];
+    loop {
+        match decoder.read(&mut bytes) {
+            Ok(0) => return Ok((target, None)),
+            Ok(count) => {
+                let taken = bytes.get(..count).unwrap_or_default();
+                output.write_all(taken).map_err(|error| Error::io(&target, "write", error))?;
+            }
+            Err(error) => return Ok((target, Some(error.to_string()))),
+        }
+    }
 }
 
 impl Recording for Bag2Folder {

@@ -56,7 +56,8 @@ mod tests {
 
     #[test]
     fn lists_stand_below_their_key_or_behind_it() {
-        let text = "a:\n  relative_file_paths:\n    - x_0.db3\n    - \"x_1.db3\"\n  compression_mode: ''\n  files:\n  - path: y\n";
+        let text = "a:\n  relative_file_paths:\n    - x_0.db3\n    - \"x_1.db3\"\n  \
+                    compression_mode: ''\n  files:\n  - path: y\n";
         let metadata = Bag2Metadata::of(text);
         assert_eq!(metadata.files, ["x_0.db3", "x_1.db3"]);
         assert_eq!(metadata.compression_mode, "");

@@ -1,4 +1,5 @@
 use super::header::Header;
+use super::point_field::FieldType;
 use crate::cloud::CloudPoint;
 use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 
@@ -88,9 +89,9 @@ impl<'a> Image<'a> {
 
     /// A point a pixel, row by row; nothing if its pixels are not depths.
     pub fn points<'s>(&'s self, camera: &'s CameraInfo) -> impl Iterator<Item = CloudPoint> + 's {
-        let depth_m = self.depth();
-        let rows = if self.width == 0 || depth_m.is_none() { 0 } else { self.height };
-        let pixel_bytes = depth_m.map_or(1, |(bytes, _)| bytes);
+        let depth = self.depth();
+        let rows = if self.width == 0 || depth.is_none() { 0 } else { self.height };
+        let pixel_bytes = depth.map_or(1, |(kind, _)| kind.bytes());
         let width = self.width as usize;
         let row_bytes = self.row_bytes.max(width.saturating_mul(pixel_bytes));
         let rows = (0..rows as usize)
@@ -99,7 +100,9 @@ impl<'a> Image<'a> {
             row.chunks_exact(pixel_bytes).take(width).enumerate().map(move |(u, pixel)| (u, v, pixel))
         })
         .map(move |(u, v, pixel)| {
-            let depth_m = depth_m.map_or(f64::NAN, |(_, depth_m)| depth_m(pixel, self.is_big_endian));
+            let value =
+                depth.and_then(|(kind, unit_m)| Some(kind.value(pixel, self.is_big_endian)? * unit_m));
+            let depth_m = value.unwrap_or(f64::NAN);
             let is_return = depth_m.is_finite() && depth_m > 0.0;
             // Nothing came back: the ray through the pixel.
             let z = if is_return { depth_m } else { 1.0 };
@@ -111,11 +114,11 @@ impl<'a> Image<'a> {
 
     /// Why there are fewer points than pixels, if there are.
     pub fn shortage(&self) -> Option<WireError> {
-        let Some((pixel_bytes, _)) = self.depth() else {
+        let Some((kind, _)) = self.depth() else {
             let reason = format!("pixels are `{}`; depths are 16UC1 (mm) or 32FC1 (m)", self.encoding);
             return Some(WireError { byte: 0, reason });
         };
-        let row = (self.width as usize).checked_mul(pixel_bytes)?;
+        let row = (self.width as usize).checked_mul(kind.bytes())?;
         let rows = (self.height as usize).checked_sub(1)?.checked_mul(self.row_bytes.max(row));
         let needed = rows.and_then(|rows| rows.checked_add(row));
         if self.width == 0 || needed.is_some_and(|needed| needed <= self.data.len()) {
@@ -128,14 +131,11 @@ impl<'a> Image<'a> {
         })
     }
 
-    /// Bytes of a pixel, and its depth.
-    fn depth(&self) -> Option<(usize, fn(&[u8], bool) -> f64)> {
-        use super::point_field::FieldType;
+    /// The type of a pixel, and how many metres its unit has.
+    fn depth(&self) -> Option<(FieldType, f64)> {
         match self.encoding.as_str() {
-            "16UC1" | "mono16" => {
-                Some((2, |pixel, is_big| FieldType::U16.value(pixel, is_big).unwrap_or(0.0) * 1e-3))
-            }
-            "32FC1" => Some((4, |pixel, is_big| FieldType::F32.value(pixel, is_big).unwrap_or(0.0))),
+            "16UC1" | "mono16" => Some((FieldType::U16, 1e-3)),
+            "32FC1" => Some((FieldType::F32, 1.0)),
             _ => None,
         }
     }
