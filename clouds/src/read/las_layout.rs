@@ -60,7 +60,9 @@ impl Layout {
         if points_at - header_bytes > MOST_GAP_BYTES {
             return Err(wrong(96, format!("{points_at} bytes before the points are no records of LAS")));
         }
-        if record_bytes == 0 || points.checked_mul(record_bytes).and_then(|all| all.checked_add(points_at)).is_none() {
+        if record_bytes == 0
+            || points.checked_mul(record_bytes).and_then(|all| all.checked_add(points_at)).is_none()
+        {
             return Err(wrong(105, format!("{points} points of {record_bytes} bytes are impossible")));
         }
         let mut layout = Self {
@@ -90,7 +92,14 @@ impl Layout {
     }
 
     /// Reads the records of coordinates between two places. What is cut off is left out.
-    fn read_records(&mut self, file: &mut File, start: u64, count: u64, end: u64, wide: usize) -> io::Result<()> {
+    fn read_records(
+        &mut self,
+        file: &mut File,
+        start: u64,
+        count: u64,
+        end: u64,
+        wide: usize,
+    ) -> io::Result<()> {
         let head_bytes = 52 + wide as u64;
         let mut at = start;
         for _ in 0..count.min(u64::from(MOST_RECORDS)) {
@@ -127,7 +136,10 @@ impl Layout {
 
     /// The record of coordinates with this number.
     pub(super) fn record(&self, id: u16) -> Option<&[u8]> {
-        self.records.iter().find(|record| record.user == "LASF_Projection" && record.id == id).map(|r| r.data.as_slice())
+        self.records
+            .iter()
+            .find(|record| record.user == "LASF_Projection" && record.id == id)
+            .map(|r| r.data.as_slice())
     }
 }
 

@@ -29,7 +29,9 @@ fn of_epsg(code: u64) -> Option<f64> {
 impl Units {
     pub(super) fn of(layout: &Layout) -> Self {
         let mut units = Self { metres: [1.0; 2], wkt: None, remarks: Vec::new() };
-        let text = layout.record(WKT).map(|data| String::from_utf8_lossy(data).trim_end_matches('\0').trim().to_owned());
+        let text = layout
+            .record(WKT)
+            .map(|data| String::from_utf8_lossy(data).trim_end_matches('\0').trim().to_owned());
         units.wkt = text.filter(|text| !text.is_empty());
         // Both may be there: the header says which one counts.
         let keys = layout.record(KEYS).filter(|_| units.wkt.is_none() || !layout.has_wkt);
@@ -49,7 +51,8 @@ impl Units {
     fn take_keys(&mut self, keys: &[u8]) {
         let entries = keys.as_chunks::<8>().0.iter().skip(1);
         let value = |wanted: u64| {
-            let mut found = entries.clone().filter(|entry| number(*entry, 0, 2) == wanted && number(*entry, 2, 2) == 0);
+            let mut found =
+                entries.clone().filter(|entry| number(*entry, 0, 2) == wanted && number(*entry, 2, 2) == 0);
             found.next().map(|entry| number(entry, 6, 2))
         };
         if value(1024) == Some(2) {
@@ -57,7 +60,7 @@ impl Units {
             return;
         }
         let flat = value(3076).and_then(of_epsg);
-        match (flat, value(3072)) {
+        match (flat.or(value(3072).and_then(of_state_plane)), value(3072)) {
             (Some(metres), _) => self.metres = [metres; 2],
             (None, Some(code)) if code != 32767 && !is_metric(code) => self.remarks.push(format!(
                 "the unit of coordinate system EPSG:{code} is not in the file; metres are assumed"
@@ -89,7 +92,18 @@ impl Units {
     }
 
     fn degrees(&mut self) {
-        self.remarks.push("coordinates are degrees, not metres: project the file first (PDAL: filters.reprojection)".into());
+        self.remarks.push(
+            "coordinates are degrees, not metres: project the file first (PDAL: filters.reprojection)".into(),
+        );
+    }
+}
+
+/// Metres in a unit of the state planes of NAD83 in feet, which files often name without their unit.
+fn of_state_plane(code: u64) -> Option<f64> {
+    match code {
+        2222..=2224 | 2251..=2253 | 2256 | 2265 | 2266 | 2269 | 2270 | 2273 | 2280..=2282 => Some(0.3048),
+        2225..=2289 => Some(US_FOOT_M),
+        _ => None,
     }
 }
 

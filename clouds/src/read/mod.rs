@@ -8,12 +8,26 @@ mod columns;
 mod depth_frames;
 mod depth_images;
 mod depth_tum;
+#[cfg(feature = "e57")]
+mod e57;
 mod files;
 mod foreign;
 mod format;
 mod from_origin;
 mod glance;
 mod intrinsics;
+#[cfg(feature = "las")]
+mod las;
+#[cfg(feature = "las")]
+mod las_layout;
+#[cfg(feature = "las")]
+mod las_points;
+#[cfg(feature = "las")]
+mod las_runs;
+#[cfg(feature = "las")]
+mod las_scans;
+#[cfg(feature = "las")]
+mod las_units;
 mod listing;
 mod one;
 mod open;

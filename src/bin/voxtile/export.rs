@@ -1,5 +1,6 @@
 use crate::args::{ExportArgs, ExportFormatName};
 use crate::export_origin::{ExportOrigin, OriginFile};
+use crate::export_voxels;
 use crate::json;
 use crate::map_at::{point_of, read_map};
 use crate::memory;
@@ -18,11 +19,14 @@ use voxtile::octree::{OctreeFormat, write_bt, write_ot};
 use voxtile::query::OctreeExport;
 use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
 use voxtile::{Error, MapQueries};
+use voxtile_clouds::write::VoxelFileFormat;
 
 #[derive(Clone, Copy)]
 enum ExportFormat {
     Voxels(VoxelFormat),
     Octree(OctreeFormat),
+    /// Of another program.
+    Foreign(VoxelFileFormat),
 }
 
 /// What to write, once it is known that the arguments fit each other.
@@ -43,12 +47,16 @@ struct Exported {
 /// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let export = Export::of(args)?;
+    if let ExportFormat::Foreign(format) = export.format {
+        return export_voxels::run(args, format, export.region.as_ref());
+    }
     let exported = if OctreeMap::is_named_by(&args.map) {
         export.octree_file()?
     } else {
         read_map(&args.map, |reader| match export.format {
             ExportFormat::Voxels(format) => export.voxels(format, reader),
             ExportFormat::Octree(format) => export.octree(format, reader),
+            ExportFormat::Foreign(_) => unreachable!("written above"),
         })?
     };
     if !is_standard_output(&args.output) {
@@ -178,6 +186,7 @@ impl<'a> Export<'a> {
         let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m)?;
         let format = match self.format {
             ExportFormat::Voxels(format) => format,
+            ExportFormat::Foreign(_) => unreachable!("written before"),
             ExportFormat::Octree(_) if self.region.is_some() || self.args.origin.is_some() => {
                 let reason = "from an octree file to another is the whole tree, where it is";
                 return Err(Error::argument("--region, --origin", reason).into());
@@ -263,7 +272,12 @@ fn format_of(args: &ExportArgs) -> voxtile::Result<ExportFormat> {
         (Some(ExportFormatName::Csv), _) => ExportFormat::Voxels(VoxelFormat::Csv),
         (Some(ExportFormatName::Bt), _) | (None, "bt") => ExportFormat::Octree(OctreeFormat::Bt),
         (Some(ExportFormatName::Ot), _) | (None, "ot") => ExportFormat::Octree(OctreeFormat::Ot),
-        _ => voxels.ok_or_else(|| missing_format(&args.output))?,
+        (Some(name), _) => VoxelFileFormat::of_name(&name.name())
+            .map(ExportFormat::Foreign)
+            .ok_or_else(|| missing_format(&args.output))?,
+        (None, _) => voxels
+            .or_else(|| VoxelFileFormat::of_path(&args.output).map(ExportFormat::Foreign))
+            .ok_or_else(|| missing_format(&args.output))?,
     })
 }
 
@@ -271,7 +285,11 @@ fn missing_format(output: &Path) -> Error {
     let reason = if is_standard_output(output) {
         "standard output has no extension; add --format ply, pcd, csv, bt or ot".to_owned()
     } else {
-        format!("{}: the extension must be .ply, .pcd, .csv, .bt or .ot, or add --format", output.display())
+        format!(
+            "{}: its extension is of no known format; known are .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet \
+             .mcap .glb .pgm .png .bt .ot; or add --format",
+            output.display()
+        )
     };
     Error::argument("--output", reason)
 }

@@ -13,6 +13,7 @@ mod diff;
 mod digest;
 mod export;
 mod export_origin;
+mod export_voxels;
 mod failure;
 mod flush_schedule;
 mod import;

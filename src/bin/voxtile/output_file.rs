@@ -201,3 +201,98 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
         _ => Ok(()),
     }
 }
+
+/// A file or a folder that another library writes under its own name, and files beside it: in a folder of its own until
+/// all of it is whole.
+pub struct StagedOutput {
+    target: PathBuf,
+    staging: tempfile::TempDir,
+}
+
+impl StagedOutput {
+    /// Begins an output.
+    ///
+    /// # Errors
+    ///
+    /// A link, a place inside of a map; a folder that is not empty; a folder that refuses.
+    pub fn beside(target: &Path) -> Result<Self> {
+        check_staged_target(target)?;
+        let staging = tempfile::Builder::new().prefix(".voxtile-").tempdir_in(folder_of(target));
+        let staging = staging.map_err(|error| Error::io(target, "create", error))?;
+        Ok(Self { target: target.to_owned(), staging })
+    }
+
+    /// Where all of it is written.
+    pub fn folder(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Where the output itself is written.
+    ///
+    /// # Errors
+    ///
+    /// A path without a name.
+    pub fn path(&self) -> Result<PathBuf> {
+        let name = self.target.file_name().ok_or_else(|| Error::argument("--output", "has no name"))?;
+        Ok(self.folder().join(name))
+    }
+
+    /// Gives everything its name, durably, the output itself last. Returns the files beside it.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn finish(self) -> Result<Vec<PathBuf>> {
+        let own = self.path()?;
+        let folder = folder_of(&self.target);
+        let list = std::fs::read_dir(self.folder()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+        let list = list.map_err(|error| Error::io(self.folder(), "list", error))?;
+        let mut beside: Vec<PathBuf> =
+            list.iter().map(|entry| entry.path()).filter(|path| *path != own).collect();
+        beside.sort_unstable();
+        let mut named = Vec::new();
+        for from in beside.iter().chain([&own]) {
+            let to = from.file_name().map_or(self.target.clone(), |name| folder.join(name));
+            sync_all(from).map_err(|error| Error::io(from, "make durable", error))?;
+            check_staged_target(&to)?;
+            if from.is_dir() && to.is_dir() {
+                std::fs::remove_dir(&to).map_err(|error| Error::io(&to, "replace", error))?;
+            }
+            std::fs::rename(from, &to).map_err(|error| Error::io(&to, "replace", error))?;
+            named.push(to);
+        }
+        named.pop();
+        sync_folder(folder).map_err(|error| Error::io(&self.target, "make durable", error))?;
+        Ok(named)
+    }
+}
+
+/// A new file, a file that is replaced, or an empty folder.
+fn check_staged_target(target: &Path) -> Result<()> {
+    if !target.is_dir() {
+        return match check_target(target)? {
+            Place::File => Ok(()),
+            Place::Stream => {
+                let reason = format!("{} is no regular file", target.display());
+                Err(Error::argument("--output", reason))
+            }
+        };
+    }
+    let is_empty = std::fs::read_dir(target).is_ok_and(|mut entries| entries.next().is_none());
+    if is_empty {
+        return Ok(());
+    }
+    let reason = "is a folder with content; name another, or remove it first";
+    Err(Error::argument(target.display().to_string(), reason))
+}
+
+/// Makes a file durable, or a folder with its files.
+fn sync_all(path: &Path) -> io::Result<()> {
+    if path.is_dir() {
+        for entry in std::fs::read_dir(path)? {
+            sync_all(&entry?.path())?;
+        }
+        return sync_folder(path);
+    }
+    File::open(path)?.sync_all()
+}
