@@ -10,10 +10,15 @@
 
 mod cloud;
 mod error;
+#[cfg(any(feature = "las", feature = "e57"))]
+mod guard;
+mod lines;
 mod pose;
+pub mod poses;
 pub mod read;
 #[cfg(feature = "ros")]
 pub mod ros;
+mod stamp;
 pub mod write;
 
 pub use cloud::{CloudHead, CloudPoint, CloudSource};

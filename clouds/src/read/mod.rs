@@ -1,1 +1,44 @@
 //! Point clouds in files, one format a file.
+//!
+//! [`open`] takes a file or a folder; [`Format::guess`] looks at what is in it. Each format is a [`crate::CloudSource`]:
+//! files with one cloud (PLY, text, `.bin`), with several (LAS cut by GPS time, E57), and folders of either.
+
+mod bin;
+mod columns;
+mod depth_frames;
+mod depth_images;
+mod depth_tum;
+#[cfg(feature = "e57")]
+mod e57;
+mod files;
+mod foreign;
+mod format;
+mod from_origin;
+mod glance;
+mod intrinsics;
+#[cfg(feature = "las")]
+mod las;
+#[cfg(feature = "las")]
+mod las_layout;
+#[cfg(feature = "las")]
+mod las_points;
+#[cfg(feature = "las")]
+mod las_runs;
+#[cfg(feature = "las")]
+mod las_scans;
+#[cfg(feature = "las")]
+mod las_units;
+mod listing;
+mod one;
+mod open;
+mod options;
+mod ply;
+mod ply_header;
+mod scalar;
+mod text;
+mod text_line;
+
+pub use format::Format;
+pub use intrinsics::Intrinsics;
+pub use open::open;
+pub use options::OpenOptions;

@@ -1,0 +1,12 @@
+//! Files of poses: [`Trajectory`] reads them and tells the pose at a time.
+
+mod calib;
+mod header;
+mod matrix;
+mod npy;
+mod text;
+mod time_unit;
+mod trajectory;
+
+pub(crate) use matrix::matrix_of;
+pub use trajectory::{Found, Trajectory};

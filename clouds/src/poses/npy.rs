@@ -1,0 +1,101 @@
+use super::matrix::matrix_of;
+use super::text::pose;
+use super::time_unit::{digits_of_value, stamp_of_value};
+use super::trajectory::Row;
+use crate::error::{Error, Place, Result};
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+/// A longer header is an error.
+const MOST_HEADER_BYTES: usize = 1 << 16;
+
+/// Whether a file is an array of NumPy.
+pub(super) fn is_npy(path: &Path) -> Result<bool> {
+    let mut start = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut start))
+        .map_err(|error| Error::io(path, "read", error))?;
+    Ok(start == MAGIC)
+}
+
+/// Reads an array of poses: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
+pub(super) fn read(path: &Path) -> Result<Vec<Row>> {
+    let fail = |error| Error::io(path, "read", error);
+    let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
+    let mut input = BufReader::new(File::open(path).map_err(fail)?);
+    let mut start = [0; 8];
+    input.read_exact(&mut start).map_err(fail)?;
+    let is_long = start[6] >= 2;
+    let mut length = [0; 4];
+    let length_bytes = if is_long { &mut length[..] } else { &mut length[..2] };
+    input.read_exact(length_bytes).map_err(fail)?;
+    let header_bytes = u32::from_le_bytes(length) as usize;
+    if header_bytes > MOST_HEADER_BYTES {
+        return Err(wrong(8, format!("a header of {header_bytes} bytes is no header")));
+    }
+    let mut header = vec![0; header_bytes];
+    input.read_exact(&mut header).map_err(|_| wrong(8, "the file ends within its header".into()))?;
+    let header = String::from_utf8_lossy(&header).into_owned();
+    let (width, rows, columns) = layout(&header).map_err(|reason| wrong(10, reason))?;
+    let data_at = 8 + if is_long { 4 } else { 2 } + header_bytes as u64;
+    let (mut record, mut numbers, mut digits) = (vec![0; columns * width], Vec::new(), None);
+    let mut poses = Vec::new();
+    for row in 0..rows {
+        let at = data_at.saturating_add(row.saturating_mul((columns * width) as u64));
+        input
+            .read_exact(&mut record)
+            .map_err(|_| wrong(at, format!("the file ends after {row} of {rows} poses")))?;
+        numbers.clear();
+        numbers.extend(record.chunks_exact(width).map(|bytes| match *bytes {
+            [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
+            [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+            _ => f64::NAN,
+        }));
+        let bad = |reason: String| Error::format(path, Place::Record(row), reason);
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err(bad("a number is not finite".into()));
+        }
+        let row = match *numbers.as_slice() {
+            [stamp, x, y, z, qx, qy, qz, qw] => {
+                let digits = *digits.get_or_insert_with(|| digits_of_value(stamp));
+                let stamp_ns =
+                    stamp_of_value(stamp, digits).ok_or_else(|| bad(format!("{stamp} is no time stamp")))?;
+                Row { stamp_ns: Some(stamp_ns), pose: pose([x, y, z, qx, qy, qz, qw]).map_err(bad)? }
+            }
+            _ => Row { stamp_ns: None, pose: matrix_of(&numbers).map_err(bad)? },
+        };
+        poses.push(row);
+    }
+    Ok(poses)
+}
+
+/// Bytes of a number, rows, numbers in a row.
+fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
+    let value = |key: &str| header.split_once(key).map(|(_, rest)| rest.trim_start_matches([':', ' ']));
+    let kind = value("'descr'").and_then(|rest| rest.split('\'').nth(1)).unwrap_or_default();
+    let width = match kind {
+        "<f8" => 8,
+        "<f4" => 4,
+        other => {
+            return Err(format!(
+                "numbers of type `{other}`; poses are little-endian floats: save it with astype('<f8')"
+            ));
+        }
+    };
+    if value("'fortran_order'").is_some_and(|rest| rest.starts_with("True")) {
+        return Err("is in Fortran order; save numpy.ascontiguousarray(poses)".into());
+    }
+    let shape =
+        value("'shape'").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).unwrap_or_default();
+    let sides: Vec<u64> = shape.split(',').filter_map(|side| side.trim().parse().ok()).collect();
+    match *sides.as_slice() {
+        [rows, 8] => Ok((width, rows, 8)),
+        [rows, 12] | [rows, 3, 4] => Ok((width, rows, 12)),
+        [rows, 16] | [rows, 4, 4] => Ok((width, rows, 16)),
+        _ => Err(format!(
+            "has the shape ({shape}); poses are N x 8 (t x y z qx qy qz qw), N x 3 x 4 or N x 4 x 4"
+        )),
+    }
+}

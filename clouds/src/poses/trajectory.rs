@@ -1,0 +1,150 @@
+use super::{npy, text};
+use crate::error::{Error, Result};
+use crate::pose::RigidPose;
+use std::path::Path;
+
+/// Poses of a sensor, sensor to world, in the order of their file and by time.
+#[derive(Clone, Debug, Default)]
+pub struct Trajectory {
+    /// In the order of the file.
+    poses: Vec<RigidPose>,
+    /// Strictly increasing stamps, each with the number of its pose; empty where the file has none.
+    stamps: Vec<(i64, usize)>,
+    remarks: Vec<String>,
+}
+
+/// What a trajectory knows of a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Found {
+    /// A pose with this very stamp, as it was written.
+    Exact(RigidPose),
+    /// Between two poses: positions along a line, rotations at constant speed.
+    Between(RigidPose),
+    /// There are poses before and after, but none within the tolerance.
+    TooFar {
+        /// Stamp of the nearest pose.
+        nearest_ns: i64,
+    },
+    /// Before the first pose.
+    Before {
+        /// Its stamp.
+        first_ns: i64,
+    },
+    /// After the last pose.
+    After {
+        /// Its stamp.
+        last_ns: i64,
+    },
+    /// The file has no stamps: its poses are known by number only.
+    WithoutStamps,
+}
+
+/// A line or a row of a file of poses.
+pub(super) struct Row {
+    pub(super) stamp_ns: Option<i64>,
+    pub(super) pose: RigidPose,
+}
+
+impl Trajectory {
+    /// Reads a file of poses: TUM (`t x y z qx qy qz qw`), KITTI (12 numbers of a 3x4 matrix), matrices of 4x4, tables
+    /// with names of columns (EuRoC, exports of ROS), arrays of NumPy (`.npy`) of N x 8, N x 3 x 4 or N x 4 x 4.
+    ///
+    /// Stamps are seconds; of nanoseconds, if their column says so or they would lie thousands of years ahead.
+    /// `calib` is the `calib.txt` of a KITTI sequence, whose poses are of the camera: they become those of the lidar.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read; a line that is no pose, with its number; no pose at all.
+    pub fn read(path: &Path, calib: Option<&Path>) -> Result<Self> {
+        let rows = if npy::is_npy(path)? { npy::read(path)? } else { text::read(path)? };
+        if rows.is_empty() {
+            return Err(Error::argument(path.display().to_string(), "holds no pose"));
+        }
+        let mut trajectory = Self::of_rows(rows);
+        if let Some(calib) = calib {
+            let camera_from_lidar = super::calib::read(calib)?;
+            let lidar_from_camera = camera_from_lidar.inverse();
+            for pose in &mut trajectory.poses {
+                *pose = lidar_from_camera.then(pose).then(&camera_from_lidar);
+            }
+        }
+        Ok(trajectory)
+    }
+
+    fn of_rows(rows: Vec<Row>) -> Self {
+        let mut remarks = Vec::new();
+        let are_stamped = rows.iter().all(|row| row.stamp_ns.is_some());
+        let mut stamps: Vec<(i64, usize)> =
+            rows.iter().enumerate().filter_map(|(number, row)| Some((row.stamp_ns?, number))).collect();
+        let back = stamps.windows(2).filter(|pair| matches!(pair, [a, b] if b.0 < a.0)).count();
+        if back > 0 {
+            remarks.push(format!("{back} time stamps of poses go back; the poses were sorted by time"));
+            stamps.sort_unstable();
+        }
+        let all = stamps.len();
+        // Of equal stamps the last stays.
+        stamps.reverse();
+        stamps.dedup_by_key(|(stamp_ns, _)| *stamp_ns);
+        stamps.reverse();
+        if stamps.len() < all {
+            let twice = all - stamps.len();
+            remarks.push(format!("{twice} time stamps of poses occur again; the last pose of each is taken"));
+        }
+        if !are_stamped {
+            stamps.clear();
+        }
+        Self { poses: rows.into_iter().map(|row| row.pose).collect(), stamps, remarks }
+    }
+
+    /// The pose at a time. A pose between two others needs one of them within the tolerance; none is ever extrapolated.
+    pub fn at(&self, stamp_ns: i64, tolerance_ns: i64) -> Found {
+        let after = self.stamps.partition_point(|&(stamp, _)| stamp < stamp_ns);
+        let later = self.stamps.get(after).copied();
+        let earlier = after.checked_sub(1).and_then(|before| self.stamps.get(before)).copied();
+        let pose = |number: usize| self.poses.get(number).copied().unwrap_or(RigidPose::IDENTITY);
+        match (earlier, later) {
+            (_, Some((stamp, number))) if stamp == stamp_ns => Found::Exact(pose(number)),
+            (Some((before_ns, before)), Some((after_ns, after))) => {
+                let (since, until) = (before_ns.abs_diff(stamp_ns), after_ns.abs_diff(stamp_ns));
+                if since.min(until) > u64::try_from(tolerance_ns).unwrap_or(0) {
+                    return Found::TooFar { nearest_ns: if since <= until { before_ns } else { after_ns } };
+                }
+                let share = since as f64 / before_ns.abs_diff(after_ns) as f64;
+                Found::Between(pose(before).towards(&pose(after), share))
+            }
+            (None, Some((first_ns, _))) => Found::Before { first_ns },
+            (Some((last_ns, _)), None) => Found::After { last_ns },
+            (None, None) => Found::WithoutStamps,
+        }
+    }
+
+    /// The pose of a number, from 0, in the order of the file.
+    pub fn by_number(&self, number: usize) -> Option<RigidPose> {
+        self.poses.get(number).copied()
+    }
+
+    /// Number of poses in the file.
+    pub fn len(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// Whether there is no pose.
+    pub fn is_empty(&self) -> bool {
+        self.poses.is_empty()
+    }
+
+    /// First and last time stamp, if poses have stamps.
+    pub fn span_ns(&self) -> Option<[i64; 2]> {
+        Some([self.stamps.first()?.0, self.stamps.last()?.0])
+    }
+
+    /// The different stamps, in order.
+    pub fn stamps_ns(&self) -> impl Iterator<Item = i64> + '_ {
+        self.stamps.iter().map(|&(stamp_ns, _)| stamp_ns)
+    }
+
+    /// What a person should know of the file.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+}

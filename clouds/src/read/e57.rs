@@ -1,0 +1,126 @@
+use super::one::{Visit, head_of};
+use crate::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::error::{Error, Place, Result};
+use crate::guard::guarded;
+use crate::pose::RigidPose;
+use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordName, SphericalCoordinate};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// The scans of an E57 file.
+struct E57 {
+    path: PathBuf,
+    reader: E57Reader<BufReader<File>>,
+    scans: Vec<PointCloud>,
+    next: usize,
+    is_read: bool,
+    crs_wkt: Option<String>,
+}
+
+/// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
+/// frame of the file.
+pub(super) fn open(path: &Path) -> Result<Box<dyn CloudSource>> {
+    let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    let reader = guarded(|| E57Reader::new(BufReader::new(file)))
+        .map_err(|reason| Error::format(path, Place::Byte(0), reason))?;
+    let scans = reader.pointclouds();
+    let crs_wkt = reader.coordinate_metadata().map(str::to_owned).filter(|wkt| !wkt.trim().is_empty());
+    Ok(Box::new(E57 { path: path.to_owned(), reader, scans, next: 0, is_read: true, crs_wkt }))
+}
+
+/// The name of a field, as the library spells it.
+fn name_of(name: &RecordName) -> String {
+    match name {
+        RecordName::Unknown { name, .. } => name.clone(),
+        known => format!("{known:?}"),
+    }
+}
+
+fn pose(scan: &PointCloud) -> Option<RigidPose> {
+    let transform = scan.transform.as_ref()?;
+    let (at, turn) = (&transform.translation, &transform.rotation);
+    Some(RigidPose { position_m: [at.x, at.y, at.z], quaternion: [turn.x, turn.y, turn.z, turn.w] })
+}
+
+impl CloudSource for E57 {
+    fn format(&self) -> &str {
+        "E57"
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(self.scans.len() as u64)
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        let Some(scan) = self.scans.get(self.next) else {
+            self.is_read = true;
+            return Ok(None);
+        };
+        let number = self.next;
+        self.next += 1;
+        self.is_read = false;
+        let pose = pose(scan);
+        if pose.is_some_and(|pose| !pose.is_valid()) {
+            self.is_read = true;
+            let reason = "the pose of the scan is not a rotation and a translation";
+            return Err(Error::format(&self.path, Place::Record(number as u64), reason));
+        }
+        let one = (self.scans.len() == 1).then(|| head_of(&self.path)).unwrap_or_default();
+        let name = scan.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| number.to_string());
+        Ok(Some(CloudHead {
+            name,
+            world_from_sensor: pose,
+            points: Some(scan.records),
+            fields: scan.prototype.iter().map(|record| name_of(&record.name)).collect(),
+            has_intensities: scan.prototype.iter().any(|record| record.name == RecordName::Intensity),
+            ..one
+        }))
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Some(scan) = self.next.checked_sub(1).and_then(|number| self.scans.get(number)) else {
+            return Ok(());
+        };
+        if std::mem::replace(&mut self.is_read, true) {
+            return Ok(());
+        }
+        let (path, mut done) = (&self.path, 0);
+        let wrong = |done: u64, reason: String| {
+            let reason = format!("{reason} (after {done} of {} points)", scan.records);
+            Error::format(path, Place::Record(done), reason)
+        };
+        let mut points =
+            guarded(|| self.reader.pointcloud_simple(scan)).map_err(|reason| wrong(0, reason))?;
+        points.apply_pose(false);
+        points.normalize_intensity(false);
+        points.normalize_color(false);
+        while let Some(point) = guarded(|| points.next().transpose()).map_err(|reason| wrong(done, reason))? {
+            done += 1;
+            let (position_m, is_return) = place(&point.cartesian, &point.spherical);
+            let intensity = point.intensity.unwrap_or(0.0);
+            visit(CloudPoint { intensity, is_return, ..CloudPoint::hit(position_m) })?;
+        }
+        Ok(())
+    }
+
+    fn crs_wkt(&self) -> Option<&str> {
+        self.crs_wkt.as_deref()
+    }
+}
+
+/// Where a point is, or where nothing came back.
+fn place(cartesian: &CartesianCoordinate, spherical: &SphericalCoordinate) -> ([f64; 3], bool) {
+    match (cartesian, spherical) {
+        (CartesianCoordinate::Valid { x, y, z }, _) => {
+            let position_m = [*x, *y, *z];
+            (position_m, position_m.iter().all(|axis| axis.is_finite()))
+        }
+        (CartesianCoordinate::Direction { x, y, z }, _) => ([*x, *y, *z], false),
+        (CartesianCoordinate::Invalid, SphericalCoordinate::Direction { azimuth, elevation }) => {
+            let flat = elevation.cos();
+            ([flat * azimuth.cos(), flat * azimuth.sin(), elevation.sin()], false)
+        }
+        _ => ([f64::NAN; 3], false),
+    }
+}

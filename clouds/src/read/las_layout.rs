@@ -1,0 +1,183 @@
+use crate::error::{Error, Place, Result};
+use std::fs::File;
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// What the header of a LAS file says, checked against the size of the file.
+pub(super) struct Layout {
+    /// The header, with what would mislead the library taken out.
+    pub(super) header: Vec<u8>,
+    pub(super) file_bytes: u64,
+    pub(super) points_at: u64,
+    pub(super) points: u64,
+    /// Bytes of a point that is not compressed.
+    pub(super) record_bytes: u64,
+    pub(super) is_compressed: bool,
+    /// Times count from GPS time + 1e9 s, not from the begin of a week.
+    pub(super) has_standard_time: bool,
+    pub(super) has_wkt: bool,
+    pub(super) records: Vec<Record>,
+}
+
+/// A variable length record.
+pub(super) struct Record {
+    pub(super) user: String,
+    pub(super) id: u16,
+    pub(super) data: Vec<u8>,
+}
+
+/// A header is at most so long in LAS 1.4.
+const HEADER_BYTES: usize = 375;
+/// Records of more bytes, and more of them, have nothing to do with coordinates.
+const MOST_RECORD_BYTES: u64 = 1 << 20;
+const MOST_RECORDS: u32 = 10_000;
+/// Bytes between the records and the points that the library would hold in memory.
+const MOST_GAP_BYTES: u64 = 64 << 20;
+
+impl Layout {
+    pub(super) fn read(path: &Path, file: &mut File) -> Result<Self> {
+        let fail = |error| Error::io(path, "read", error);
+        let file_bytes = file.metadata().map_err(fail)?.len();
+        let mut header = Vec::new();
+        file.seek(SeekFrom::Start(0)).map_err(fail)?;
+        file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(fail)?;
+        let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
+        if !header.starts_with(b"LASF") || header.len() < 227 {
+            return Err(wrong(0, "the file ends within its header, or is no LAS".into()));
+        }
+        let (minor, header_bytes) = (number(&header, 25, 1), number(&header, 94, 2));
+        let points_at = number(&header, 96, 4);
+        let format = number(&header, 104, 1);
+        let record_bytes = number(&header, 105, 2);
+        let encoding = number(&header, 6, 2);
+        let is_large = minor >= 4 && header.len() == HEADER_BYTES && header_bytes >= HEADER_BYTES as u64;
+        let large_points = if is_large { number(&header, 247, 8) } else { 0 };
+        let points = if number(&header, 107, 4) > 0 { number(&header, 107, 4) } else { large_points };
+        if points_at < header_bytes || points_at > file_bytes {
+            let reason = format!("points begin at byte {points_at} of a file of {file_bytes} bytes");
+            return Err(wrong(96, reason));
+        }
+        if points_at - header_bytes > MOST_GAP_BYTES {
+            return Err(wrong(96, format!("{points_at} bytes before the points are no records of LAS")));
+        }
+        if record_bytes == 0
+            || points.checked_mul(record_bytes).and_then(|all| all.checked_add(points_at)).is_none()
+        {
+            return Err(wrong(105, format!("{points} points of {record_bytes} bytes are impossible")));
+        }
+        let mut layout = Self {
+            header,
+            file_bytes,
+            points_at,
+            points,
+            record_bytes,
+            is_compressed: format & 0x80 != 0,
+            has_standard_time: encoding & 1 != 0,
+            has_wkt: encoding & 16 != 0,
+            records: Vec::new(),
+        };
+        let count = number(&layout.header, 100, 4);
+        layout.read_records(file, header_bytes, count, points_at, 2).map_err(fail)?;
+        if is_large {
+            let (start, count) = (number(&layout.header, 235, 8), number(&layout.header, 243, 4));
+            if start >= points_at {
+                layout.read_records(file, start, count, file_bytes, 8).map_err(fail)?;
+            }
+            // The library reads the first of them whole, however long it says to be. They are known by now.
+            for byte in layout.header.iter_mut().skip(235).take(12) {
+                *byte = 0;
+            }
+        }
+        Ok(layout)
+    }
+
+    /// Reads the records of coordinates between two places. What is cut off is left out.
+    fn read_records(
+        &mut self,
+        file: &mut File,
+        start: u64,
+        count: u64,
+        end: u64,
+        wide: usize,
+    ) -> io::Result<()> {
+        let head_bytes = 52 + wide as u64;
+        let mut at = start;
+        for _ in 0..count.min(u64::from(MOST_RECORDS)) {
+            if at.checked_add(head_bytes).is_none_or(|behind| behind > end) {
+                break;
+            }
+            let mut head = vec![0; 52 + wide];
+            file.seek(SeekFrom::Start(at))?;
+            if file.read_exact(&mut head).is_err() {
+                break;
+            }
+            let user: Vec<u8> = head.iter().skip(2).take(16).copied().take_while(|byte| *byte != 0).collect();
+            let (id, bytes) = (number(&head, 18, 2) as u16, number(&head, 20, wide));
+            let data_at = at + head_bytes;
+            let Some(next) = data_at.checked_add(bytes).filter(|next| *next <= end) else { break };
+            let user = String::from_utf8_lossy(&user).into_owned();
+            if user == "LASF_Projection" && bytes <= MOST_RECORD_BYTES {
+                let mut data = Vec::new();
+                (&mut *file).take(bytes).read_to_end(&mut data)?;
+                self.records.push(Record { user, id, data });
+            }
+            at = next;
+        }
+        Ok(())
+    }
+
+    /// Points that are whole in a file that is not compressed.
+    pub(super) fn whole_points(&self) -> u64 {
+        if self.is_compressed {
+            return self.points;
+        }
+        self.points.min((self.file_bytes - self.points_at.min(self.file_bytes)) / self.record_bytes.max(1))
+    }
+
+    /// The record of coordinates with this number.
+    pub(super) fn record(&self, id: u16) -> Option<&[u8]> {
+        self.records
+            .iter()
+            .find(|record| record.user == "LASF_Projection" && record.id == id)
+            .map(|r| r.data.as_slice())
+    }
+}
+
+/// A little-endian number of up to eight bytes; what is missing is zero.
+pub(super) fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
+    let bytes = bytes.iter().skip(at).take(width);
+    bytes.enumerate().fold(0, |sum, (k, byte)| sum | u64::from(*byte) << (8 * k.min(7)))
+}
+
+/// A file whose first bytes are others.
+pub(super) struct Patched {
+    header: Cursor<Vec<u8>>,
+    file: File,
+}
+
+impl Patched {
+    pub(super) fn new(header: Vec<u8>, mut file: File) -> io::Result<Self> {
+        file.seek(SeekFrom::Start(0))?;
+        Ok(Self { header: Cursor::new(header), file })
+    }
+}
+
+impl Read for Patched {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.header.read(buffer)?;
+        if read > 0 {
+            // Both stand at the same place.
+            self.file.seek(SeekFrom::Current(read as i64))?;
+            return Ok(read);
+        }
+        self.file.read(buffer)
+    }
+}
+
+impl Seek for Patched {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let at = self.file.seek(to)?;
+        self.header.set_position(at);
+        Ok(at)
+    }
+}

@@ -1,0 +1,180 @@
+use super::las_layout::Layout;
+use super::las_points::{LasPoint, LasPoints};
+use super::las_runs::{Sorted, Sorter};
+use super::las_units::Units;
+use super::one::Visit;
+use super::options::OpenOptions;
+use crate::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::error::{Error, Place, Result};
+use std::path::{Path, PathBuf};
+
+/// The zero of adjusted standard GPS time, in nanoseconds of GPS time.
+const STANDARD_ZERO_NS: i64 = 1_000_000_000_000_000_000;
+
+/// A LAS file cut into scans of equal length by GPS time.
+pub(super) struct LasScans {
+    format: String,
+    path: PathBuf,
+    units: Units,
+    /// Until the first scan is asked for.
+    unsorted: Option<(LasPoints, Sorter)>,
+    sorted: Option<Sorted>,
+    period_s: f64,
+    zero_ns: i64,
+    first_s: f64,
+    has_one_time: bool,
+    /// The window that is read, and the first point that was not given.
+    window: Option<u64>,
+    peeked: Option<LasPoint>,
+    scans: u64,
+    remarks: Vec<String>,
+    /// Why not all points could be read; told after those that could.
+    failure: Option<Error>,
+}
+
+impl LasScans {
+    pub(super) fn new(
+        format: String,
+        path: &Path,
+        layout: &Layout,
+        units: Units,
+        points: LasPoints,
+        options: &OpenOptions,
+    ) -> Self {
+        let sorter = Sorter::new(options.sort_memory_bytes, options.scratch.as_deref());
+        Self {
+            format,
+            path: path.to_owned(),
+            units,
+            unsorted: Some((points, sorter)),
+            sorted: None,
+            period_s: options.scan_period_s,
+            zero_ns: if layout.has_standard_time { STANDARD_ZERO_NS } else { 0 },
+            first_s: 0.0,
+            has_one_time: false,
+            window: None,
+            peeked: None,
+            scans: 0,
+            remarks: Vec::new(),
+            failure: None,
+        }
+    }
+
+    fn sort(&mut self) -> Result<()> {
+        let Some((mut points, mut sorter)) = self.unsorted.take() else { return Ok(()) };
+        let (mut number, mut least, mut most) = (0, f64::INFINITY, f64::NEG_INFINITY);
+        let mut is_sorting = false;
+        let path = &self.path;
+        let read = points.visit(&mut |point| {
+            if !point.time_s.is_finite() {
+                return Err(Error::format(path, Place::Record(number), "the GPS time is not a number"));
+            }
+            number += 1;
+            (least, most) = (least.min(point.time_s), most.max(point.time_s));
+            let pushed = sorter.push(point);
+            is_sorting = pushed.is_err();
+            pushed
+        });
+        match read {
+            Err(error) if is_sorting => return Err(error),
+            other => self.failure = other.err(),
+        }
+        if points.withheld > 0 {
+            self.remarks.push(withheld(points.withheld));
+        }
+        (self.first_s, self.has_one_time) = (least, least >= most);
+        if self.has_one_time && number > 1 {
+            self.remarks
+                .push("all points have the same GPS time: the file is one cloud without a stamp".into());
+        }
+        let mut sorted = sorter.finish()?;
+        self.peeked = sorted.next()?;
+        self.sorted = Some(sorted);
+        Ok(())
+    }
+
+    /// The window of a time, from 0.
+    fn window_of(&self, time_s: f64) -> u64 {
+        if self.has_one_time { 0 } else { ((time_s - self.first_s) / self.period_s) as u64 }
+    }
+
+    /// The middle of a window, in seconds of the file.
+    fn middle_s(&self, window: u64) -> f64 {
+        self.first_s + (window as f64 + 0.5) * self.period_s
+    }
+
+    /// Nanoseconds of GPS time: since 6 January 1980 or, of old files, since the begin of the week.
+    fn stamp_ns(&self, window: u64) -> Option<i64> {
+        let middle_ns = (self.middle_s(window) * 1e9).round();
+        let is_possible = middle_ns.abs() < 9e18 && !self.has_one_time;
+        is_possible.then(|| (middle_ns as i64).checked_add(self.zero_ns)).flatten()
+    }
+
+    fn next_of(&mut self, window: u64) -> Result<Option<LasPoint>> {
+        let Some(point) = self.peeked else { return Ok(None) };
+        if self.window_of(point.time_s) != window {
+            return Ok(None);
+        }
+        self.peeked = match &mut self.sorted {
+            Some(sorted) => sorted.next()?,
+            None => None,
+        };
+        Ok(Some(point))
+    }
+}
+
+/// A remark on points that are left out.
+pub(super) fn withheld(points: u64) -> String {
+    format!("{points} points are marked as withheld, that is deleted, and are left out")
+}
+
+impl CloudSource for LasScans {
+    fn format(&self) -> &str {
+        &self.format
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        self.sort()?;
+        if let Some(window) = self.window.take() {
+            while self.next_of(window)?.is_some() {}
+        }
+        let Some(first) = self.peeked else {
+            // What was whole has been given.
+            return self.failure.take().map_or(Ok(None), Err);
+        };
+        let window = self.window_of(first.time_s);
+        self.window = Some(window);
+        let head = CloudHead {
+            name: self.scans.to_string(),
+            stamp_ns: self.stamp_ns(window),
+            fields: super::las::fields(true),
+            has_intensities: true,
+            has_times: !self.has_one_time,
+            ..CloudHead::default()
+        };
+        self.scans += 1;
+        Ok(Some(head))
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Some(window) = self.window else { return Ok(()) };
+        let middle_s = if self.has_one_time { self.first_s } else { self.middle_s(window) };
+        while let Some(point) = self.next_of(window)? {
+            let intensity = f32::from(point.intensity);
+            visit(CloudPoint {
+                intensity,
+                time_s: point.time_s - middle_s,
+                ..CloudPoint::hit(point.position_m)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.units.remarks.iter().chain(&self.remarks).cloned().collect()
+    }
+
+    fn crs_wkt(&self) -> Option<&str> {
+        self.units.wkt.as_deref()
+    }
+}

@@ -1,0 +1,44 @@
+use super::format::Format;
+use super::intrinsics::Intrinsics;
+use std::path::PathBuf;
+
+/// How clouds are read where their files do not say it.
+#[derive(Clone, Debug)]
+pub struct OpenOptions {
+    /// The format; guessed if `None`.
+    pub format: Option<Format>,
+    /// Columns of a `.bin` file, each a float of four bytes: `x`, `y`, `z`, `intensity`, and any others. `None`: KITTI's
+    /// four, or nuScenes' five for a `.pcd.bin`.
+    pub fields: Option<Vec<String>>,
+    /// A LAS file with GPS times is cut into scans of this many seconds. 0: the file is one cloud.
+    pub scan_period_s: f64,
+    /// Where the sensor was, in metres in the frame of the points: for clouds that are registered already and come
+    /// without poses. Their points are then given relative to it, and the cloud says where it was.
+    pub sensor_origin_m: Option<[f64; 3]>,
+    /// Units of a depth image in a metre. `None`: 5000 for TUM RGB-D, 1000 (millimetres) otherwise.
+    pub depth_scale: Option<f64>,
+    /// The camera of depth images.
+    pub intrinsics: Option<Intrinsics>,
+    /// A file with the camera of depth images. `None`: `camera-intrinsics.txt` in the folder or beside it.
+    pub intrinsics_path: Option<PathBuf>,
+    /// Bytes of memory that sorting may take; beyond them it goes to temporary files.
+    pub sort_memory_bytes: usize,
+    /// Folder of temporary files; the system's own if `None`.
+    pub scratch: Option<PathBuf>,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self {
+            format: None,
+            fields: None,
+            scan_period_s: 0.1,
+            sensor_origin_m: None,
+            depth_scale: None,
+            intrinsics: None,
+            intrinsics_path: None,
+            sort_memory_bytes: 64 << 20,
+            scratch: None,
+        }
+    }
+}

@@ -1,0 +1,56 @@
+/// A number in a binary file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// The value of the first bytes, in either order.
+macro_rules! number {
+    ($kind:ty, $bytes:expr, $big:expr) => {{
+        let mut array = [0; size_of::<$kind>()];
+        for (to, from) in array.iter_mut().zip($bytes) {
+            *to = *from;
+        }
+        if $big { <$kind>::from_be_bytes(array) } else { <$kind>::from_le_bytes(array) }
+    }};
+}
+
+impl Scalar {
+    pub(super) fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    pub(super) fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// The value at the start of `bytes`; missing bytes are zero, so callers check that there are enough.
+    pub(super) fn value(self, bytes: &[u8], is_big_endian: bool) -> f64 {
+        match self {
+            Self::I8 => f64::from(number!(i8, bytes, is_big_endian)),
+            Self::U8 => f64::from(number!(u8, bytes, is_big_endian)),
+            Self::I16 => f64::from(number!(i16, bytes, is_big_endian)),
+            Self::U16 => f64::from(number!(u16, bytes, is_big_endian)),
+            Self::I32 => f64::from(number!(i32, bytes, is_big_endian)),
+            Self::U32 => f64::from(number!(u32, bytes, is_big_endian)),
+            Self::I64 => number!(i64, bytes, is_big_endian) as f64,
+            Self::U64 => number!(u64, bytes, is_big_endian) as f64,
+            Self::F32 => f64::from(number!(f32, bytes, is_big_endian)),
+            Self::F64 => number!(f64, bytes, is_big_endian),
+        }
+    }
+}
