@@ -66,7 +66,7 @@ impl CloudSource for E57 {
             let reason = "the pose of the scan is not a rotation and a translation";
             return Err(Error::format(&self.path, Place::Record(number as u64), reason));
         }
-        let one = (self.scans.len() == 1).then(|| head_of(&self.path)).unwrap_or_default();
+        let one = if self.scans.len() == 1 { head_of(&self.path) } else { CloudHead::default() };
         let name = scan.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| number.to_string());
         Ok(Some(CloudHead {
             name,

@@ -44,8 +44,8 @@ impl Listing {
         let is_of = |path: &&PathBuf| format.extensions().contains(&extension_of(path).as_str());
         let files: Vec<PathBuf> = self.files.iter().filter(is_of).cloned().collect();
         // Beside colours, depths say that they are depths.
-        if format == Format::DepthImages && files.iter().any(is_named_depth) {
-            return files.into_iter().filter(is_named_depth).collect();
+        if format == Format::DepthImages && files.iter().any(|path| is_named_depth(path)) {
+            return files.into_iter().filter(|path| is_named_depth(path)).collect();
         }
         files
     }
@@ -70,7 +70,7 @@ impl Listing {
             }
         }
         // Lists, times and poses lie beside clouds, and so do pictures. Between the two, a camera decides.
-        let are_depths = self.files.iter().any(is_named_depth) || Intrinsics::is_in(&self.files);
+        let are_depths = self.files.iter().any(|path| is_named_depth(path)) || Intrinsics::is_in(&self.files);
         let sides = if are_depths {
             [Format::Text, Format::DepthImages]
         } else {
@@ -118,7 +118,7 @@ impl Listing {
     }
 }
 
-fn is_named_depth(path: &PathBuf) -> bool {
+fn is_named_depth(path: &Path) -> bool {
     path.to_string_lossy().to_lowercase().ends_with(".depth.png")
 }
 
