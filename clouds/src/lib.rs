@@ -10,6 +10,8 @@
 
 mod cloud;
 mod error;
+#[cfg(any(feature = "las", feature = "e57"))]
+mod guard;
 mod lines;
 mod pose;
 pub mod poses;

@@ -1,0 +1,44 @@
+use crate::support::{clouds, fixture, wanted};
+use std::fs;
+use voxtile_clouds::read::{OpenOptions, open};
+
+/// Written by pye57 (libE57Format).
+#[test]
+fn scans_have_poses_and_invalid_points_are_no_returns() {
+    let clouds = clouds(&fixture("scans.e57"));
+    let names: Vec<&str> = clouds.iter().map(|(head, _)| head.name.as_str()).collect();
+    assert_eq!(names, ["scan at 0", "scan at 100"]);
+    for ((head, points), shift) in clouds.iter().zip([0.0, 100.0]) {
+        let pose = head.world_from_sensor.unwrap();
+        assert_eq!(pose.position_m, [shift, 2.0, 3.0]);
+        let half = 0.5_f64.sqrt();
+        for (found, wanted) in pose.quaternion.iter().zip([0.0, 0.0, half, half]) {
+            assert!((found - wanted).abs() < 1e-12, "{pose:?}");
+        }
+        assert_eq!((head.points, head.has_intensities), (Some(20), true));
+        let wanted = wanted([shift, 0.0, 0.0]);
+        for (number, (found, wanted)) in points.iter().zip(&wanted).enumerate() {
+            assert_eq!(found.is_return, number != 5);
+            if found.is_return {
+                let is_near = |k: usize| (found.position_m[k] - wanted.position_m[k]).abs() < 1e-6;
+                assert!((0..3).all(is_near) && found.intensity == wanted.intensity, "{found:?} {wanted:?}");
+            }
+        }
+        assert_eq!(points.len(), 20);
+    }
+}
+
+#[test]
+fn no_damage_makes_a_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("damaged.e57");
+    let bytes = fs::read(fixture("scans.e57")).unwrap();
+    for at in (0..bytes.len()).step_by(29) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x55;
+        fs::write(&path, &damaged).unwrap();
+        if let Ok(mut source) = open(&path, &OpenOptions::default()) {
+            drop(crate::support::all(source.as_mut()));
+        }
+    }
+}

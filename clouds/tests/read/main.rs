@@ -1,0 +1,15 @@
+//! Files of other programs, read.
+
+/// Depth images that the test makes.
+mod depth;
+#[cfg(feature = "e57")]
+mod e57;
+/// What a file or a folder is.
+mod formats;
+#[cfg(feature = "las")]
+mod las;
+/// PLY, text and raw floats.
+mod plain;
+/// Files of poses.
+mod poses;
+mod support;

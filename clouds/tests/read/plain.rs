@@ -1,0 +1,113 @@
+use crate::support::{clouds, clouds_with, failure, fixture, wanted};
+use std::fs;
+use voxtile_clouds::read::OpenOptions;
+use voxtile_clouds::{CloudPoint, RigidPose};
+
+#[test]
+fn ply_of_every_encoding() {
+    for name in ["ascii.ply", "little.ply", "big.ply"] {
+        let clouds = clouds(&fixture(name));
+        let [(head, points)] = clouds.as_slice() else { panic!("{} clouds", clouds.len()) };
+        assert_eq!((head.points, head.has_intensities, head.has_times), (Some(20), true, true), "{name}");
+        let timed: Vec<CloudPoint> = (wanted([0.0; 3]).into_iter().zip(0..))
+            .map(|(point, k)| CloudPoint { time_s: f64::from(k * 1_000_000) * 1e-9, ..point })
+            .collect();
+        assert_eq!(points, &timed, "{name}");
+    }
+}
+
+#[test]
+fn ply_that_is_cut_off_gives_what_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    // A face of 13 bytes and some of the last vertex go; of the text, a line and a half.
+    for (name, cut) in [("little.ply", 15), ("big.ply", 15), ("ascii.ply", 12)] {
+        let bytes = fs::read(fixture(name)).unwrap();
+        let path = folder.path().join(name);
+        fs::write(&path, &bytes[..bytes.len() - cut]).unwrap();
+        let (error, points) = failure(&path, &OpenOptions::default());
+        assert!(error.contains("of 20 vertex") || error.contains("is missing"), "{error}");
+        assert_eq!(points, 19, "{name}: {error}");
+    }
+}
+
+#[test]
+fn text_and_raw_floats_are_the_same_points() {
+    for name in ["points.csv", "points.xyz", "kitti.bin", "nuscenes.pcd.bin"] {
+        let clouds = clouds(&fixture(name));
+        assert_eq!(clouds.len(), 1, "{name}");
+        assert_eq!(clouds[0].1, wanted([0.0; 3]), "{name}");
+        assert!(clouds[0].0.has_intensities, "{name}");
+    }
+    let fields = ["z", "y", "x", "intensity"].map(str::to_owned).to_vec();
+    let turned =
+        clouds_with(&fixture("kitti.bin"), &OpenOptions { fields: Some(fields), ..Default::default() });
+    assert_eq!(turned[0].1[0].position_m, [10.0, -7.0, -3.0]);
+}
+
+#[test]
+fn raw_floats_that_do_not_fit_their_columns_are_an_error() {
+    let fields = ["x", "y", "z"].map(str::to_owned).to_vec();
+    let (error, points) =
+        failure(&fixture("kitti.bin"), &OpenOptions { fields: Some(fields), ..Default::default() });
+    assert!(error.contains("320 bytes are no whole number of points of 3 floats"), "{error}");
+    assert_eq!(points, 0);
+}
+
+#[test]
+fn a_folder_is_read_in_natural_order_with_stamps_of_names() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["10.bin", "9.bin", "1700000000123456789.bin"] {
+        fs::copy(fixture("kitti.bin"), folder.path().join(name)).unwrap();
+    }
+    fs::write(folder.path().join("times.txt"), "0\n1\n").unwrap();
+    let clouds = clouds(folder.path());
+    let found: Vec<_> = clouds.iter().map(|(head, _)| (head.name.as_str(), head.stamp_ns)).collect();
+    let stamp_ns = Some(1_700_000_000_123_456_789);
+    assert_eq!(found, [("9.bin", None), ("10.bin", None), ("1700000000123456789.bin", stamp_ns)]);
+}
+
+#[test]
+fn a_bad_file_of_a_folder_is_passed_by() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["1.ply", "2.ply", "3.ply"] {
+        fs::copy(fixture("little.ply"), folder.path().join(name)).unwrap();
+    }
+    fs::write(folder.path().join("2.ply"), "ply\nformat ascii 1.0\nelement point 5\nend_header\n").unwrap();
+    let mut source = voxtile_clouds::read::open(folder.path(), &OpenOptions::default()).unwrap();
+    assert_eq!(source.len_hint(), Some(3));
+    assert_eq!(source.next_cloud().unwrap().map(|head| head.name), Some("1.ply".into()));
+    let error = source.next_cloud().unwrap_err().to_string();
+    assert!(error.contains("2.ply, line 4: the file has no element `vertex`"), "{error}");
+    assert_eq!(source.next_cloud().unwrap().map(|head| head.name), Some("3.ply".into()));
+    assert_eq!(source.next_cloud().unwrap(), None);
+}
+
+#[test]
+fn registered_points_are_seen_from_the_sensor_origin() {
+    let options = OpenOptions { sensor_origin_m: Some([1.0, 2.0, 4.0]), ..Default::default() };
+    let clouds = clouds_with(&fixture("points.csv"), &options);
+    let (head, points) = &clouds[0];
+    assert_eq!(
+        head.world_from_sensor,
+        Some(RigidPose { position_m: [1.0, 2.0, 4.0], ..RigidPose::IDENTITY })
+    );
+    assert_eq!(points, &wanted([-1.0, -2.0, -4.0]));
+}
+
+#[test]
+fn no_damage_of_a_small_file_makes_a_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["ascii.ply", "little.ply", "points.csv"] {
+        let bytes = fs::read(fixture(name)).unwrap();
+        for at in (0..bytes.len()).step_by(7) {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x15;
+            damaged.truncate(bytes.len() - at % 13);
+            let path = folder.path().join(name);
+            fs::write(&path, &damaged).unwrap();
+            if let Ok(mut source) = voxtile_clouds::read::open(&path, &OpenOptions::default()) {
+                let _ = crate::support::all(source.as_mut());
+            }
+        }
+    }
+}

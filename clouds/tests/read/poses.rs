@@ -1,0 +1,135 @@
+use crate::support::shared_data;
+use std::fs;
+use std::path::PathBuf;
+use voxtile_clouds::RigidPose;
+use voxtile_clouds::poses::{Found, Trajectory};
+
+fn read(text: &str) -> voxtile_clouds::Result<Trajectory> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("poses.txt");
+    fs::write(&path, text).unwrap();
+    Trajectory::read(&path, None)
+}
+
+const TUM: &str = "# timestamp tx ty tz qx qy qz qw\n\
+                   1403636579.763555584 1 2 3 0 0 0 1\n\
+                   1403636580.763555584 3 2 3 0 0 0.7071067811865476 0.7071067811865476\n\
+                   1403636590.763555584 3 2 3 0 0 0.707 0.7072\n";
+const FIRST_NS: i64 = 1_403_636_579_763_555_584;
+
+#[test]
+fn stamps_are_exact_and_poses_lie_between() {
+    let trajectory = read(TUM).unwrap();
+    let first = RigidPose { position_m: [1.0, 2.0, 3.0], ..RigidPose::IDENTITY };
+    assert_eq!(trajectory.at(FIRST_NS, 0), Found::Exact(first));
+    assert_eq!(trajectory.at(FIRST_NS - 1, i64::MAX), Found::Before { first_ns: FIRST_NS });
+    let last_ns = FIRST_NS + 11_000_000_000;
+    assert_eq!(trajectory.at(last_ns + 1, i64::MAX), Found::After { last_ns });
+    // Written numbers stay, though their length is not 1 to the last bit.
+    let Found::Exact(last) = trajectory.at(last_ns, 0) else { panic!() };
+    assert_eq!(last.quaternion, [0.0, 0.0, 0.707, 0.7072]);
+    let Found::Between(half) = trajectory.at(FIRST_NS + 500_000_000, 500_000_000) else { panic!() };
+    assert_eq!(half.position_m, [2.0, 2.0, 3.0]);
+    let (sin, cos) = (std::f64::consts::PI / 8.0).sin_cos();
+    assert!((half.quaternion[2] - sin).abs() < 1e-12 && (half.quaternion[3] - cos).abs() < 1e-12, "{half:?}");
+    let nearest_ns = FIRST_NS + 1_000_000_000;
+    assert_eq!(trajectory.at(nearest_ns + 2_000_000_000, 1_999_999_999), Found::TooFar { nearest_ns });
+    assert!(matches!(trajectory.at(nearest_ns + 2_000_000_000, 2_000_000_000), Found::Between(_)));
+    assert_eq!(trajectory.by_number(0), Some(first));
+    assert_eq!(trajectory.by_number(3), None);
+}
+
+#[test]
+fn stamps_out_of_order_and_twice_are_remarked() {
+    let trajectory = read("2 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n").unwrap();
+    assert_eq!(trajectory.stamps_ns().collect::<Vec<_>>(), [1_000_000_000, 2_000_000_000]);
+    let Found::Exact(pose) = trajectory.at(2_000_000_000, 0) else { panic!() };
+    assert_eq!(pose.position_m[0], 3.0);
+    assert_eq!(trajectory.remarks().len(), 2, "{:?}", trajectory.remarks());
+    assert_eq!(trajectory.by_number(0).map(|pose| pose.position_m[0]), Some(1.0));
+}
+
+#[test]
+fn what_is_no_pose_is_an_error_with_its_line() {
+    for (text, reason) in [
+        ("0 0 0 0 0 0 0 1\n1 nan 0 0 0 0 0 1\n", "line 2: `nan` is not finite"),
+        ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0"),
+        ("0 0 0 0 0 0 0 1\n\n# x\n1 2 3\n", "line 4: 3 numbers; the lines before have 8"),
+        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),
+        ("one two\n", "line 1: `one two` is neither"),
+        ("1 2 3\n", "line 1: 3 numbers"),
+        ("# nothing\n", "holds no pose"),
+        ("x 0 0 0 0 0 0 1\n", "is neither a pose"),
+    ] {
+        let error = read(text).unwrap_err().to_string();
+        assert!(error.contains(reason), "{error}");
+    }
+}
+
+#[test]
+fn tables_name_their_columns() {
+    let euroc = "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n\
+                 1403636579763555584,1,2,3,0,1,0,0\n";
+    let csv = "qw,qz,qy,qx,z,y,x,timestamp,note\n0,0,0,1,3,2,1,1403636579.763555584,9\n";
+    for text in [euroc, csv] {
+        let trajectory = read(text).unwrap();
+        let wanted = RigidPose { position_m: [1.0, 2.0, 3.0], quaternion: [1.0, 0.0, 0.0, 0.0] };
+        assert_eq!(trajectory.at(FIRST_NS, 0), Found::Exact(wanted), "{text}");
+    }
+}
+
+#[test]
+fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
+    let folder = tempfile::tempdir().unwrap();
+    let (poses, calib) = (folder.path().join("00.txt"), folder.path().join("calib.txt"));
+    // The camera looks along the lidar's x and went 5 m forward.
+    fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 5\n").unwrap();
+    fs::write(&calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 -0.08 1 0 0 -0.27\n").unwrap();
+    let trajectory = Trajectory::read(&poses, Some(&calib)).unwrap();
+    let moved = trajectory.by_number(1).unwrap();
+    for (found, wanted) in moved.position_m.iter().zip([5.0, 0.0, 0.0]) {
+        assert!((found - wanted).abs() < 1e-12, "{moved:?}");
+    }
+    assert_eq!(trajectory.at(0, 0), Found::WithoutStamps);
+    let plain = Trajectory::read(&poses, None).unwrap();
+    assert_eq!(plain.by_number(1).unwrap().position_m, [0.0, 0.0, 5.0]);
+}
+
+#[test]
+fn arrays_of_numpy() {
+    let at = |name: &str| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
+    let tum = Trajectory::read(&at("poses_tum.npy"), None).unwrap();
+    assert_eq!(tum.span_ns(), Some([1_700_000_000_250_000_000, 1_700_000_001_250_000_000]));
+    for name in ["poses_4x4.npy", "poses_3x4_f4.npy"] {
+        let matrices = Trajectory::read(&at(name), None).unwrap();
+        assert_eq!(matrices.len(), 2);
+        for number in 0..2 {
+            let (a, b) = (tum.by_number(number).unwrap(), matrices.by_number(number).unwrap());
+            assert_eq!(a.position_m, b.position_m, "{name}");
+            let cosine: f64 = a.quaternion.iter().zip(b.quaternion).map(|(a, b)| a * b).sum();
+            assert!((cosine.abs() - 1.0).abs() < 1e-7, "{name}: {a:?} {b:?}");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let cut = folder.path().join("cut.npy");
+    let bytes = fs::read(at("poses_tum.npy")).unwrap();
+    fs::write(&cut, &bytes[..bytes.len() - 1]).unwrap();
+    let error = Trajectory::read(&cut, None).unwrap_err().to_string();
+    assert!(error.contains("the file ends after 1 of 2 poses"), "{error}");
+}
+
+#[test]
+fn real_poses_of_two_forms_agree() {
+    let Some(folder) = shared_data("balm_os0_hall") else { return };
+    let tum = Trajectory::read(&folder.join("poses_tum.txt"), None).unwrap();
+    let kitti = Trajectory::read(&folder.join("poses_kitti.txt"), None).unwrap();
+    let stacked = Trajectory::read(&folder.join("alidarPose_all177.csv"), None).unwrap();
+    assert_eq!((tum.len(), kitti.len(), stacked.len()), (36, 36, 177));
+    assert_eq!(stacked.span_ns().map(|[first, _]| first), Some(1_630_577_758_569_490_000));
+    for number in 0..36 {
+        let (a, b) = (tum.by_number(number).unwrap(), kitti.by_number(number).unwrap());
+        let point = [10.0, -20.0, 5.0];
+        let (a, b) = (a.apply(point), b.apply(point));
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3), "{number}: {a:?} {b:?}");
+    }
+}
