@@ -1,5 +1,32 @@
 //! Voxels as files of other programs, one format a file.
+//!
+//! ```text
+//! VoxelsHead, WriteOptions -> open_sink -> VoxelSink <- VoxelRow after VoxelRow, then finish
+//! ```
+//!
+//! A sink writes to the path that it is given; who calls renames it when it is whole. What cannot be written in the
+//! order of the voxels is sorted in files without names beside the output: memory does not grow with the voxels, but
+//! for the flat grids of [`VoxelFileFormat::Nav2Map`] and [`VoxelFileFormat::Heightmap`].
 
+mod column_grid;
+mod counted;
+mod format;
+mod heightmap;
+mod lattice;
+mod nav2;
+mod npz;
+mod open;
+mod options;
+mod out_file;
 mod row;
+mod sort;
+mod spool;
+#[cfg(test)]
+mod testing;
+mod xyz;
+mod zip_store;
 
+pub use format::VoxelFileFormat;
+pub use open::open_sink;
+pub use options::WriteOptions;
 pub use row::{VoxelRow, VoxelSink, VoxelsHead};

@@ -1,0 +1,75 @@
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// How voxels are written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WriteOptions {
+    /// The name that the output has in the end: files beside it, and names within it, follow this one.
+    pub final_path: PathBuf,
+    /// Where files beside the output are written, under names that follow the final one: `map.yaml`, `map.pgw`.
+    pub companion_folder: PathBuf,
+    /// Where files without a name are kept until the output is whole. They need about as much room as the output.
+    pub scratch_folder: PathBuf,
+    /// Flat maps: the lowest height that counts, in metres.
+    pub z_min_m: Option<f64>,
+    /// Flat maps: the greatest height that counts, in metres.
+    pub z_max_m: Option<f64>,
+    /// Autoware: edge of the square of a file, in whole metres.
+    pub cell_m: f64,
+    /// Subtracted from coordinates where a format holds them in single precision (Autoware).
+    pub origin_m: [f64; 3],
+    /// Recordings: the frame of the clouds.
+    pub frame: String,
+    /// Recordings: the time of the clouds, in nanoseconds since 1970.
+    pub stamp_ns: u64,
+}
+
+impl WriteOptions {
+    /// Most points of a cloud in a recording.
+    pub(super) const MOST_CLOUD_POINTS: usize = 1 << 20;
+
+    /// All that follows from where the output ends up: files beside it and scratch files lie in its folder.
+    pub fn beside(final_path: &Path) -> Self {
+        let folder = match final_path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        Self {
+            final_path: final_path.to_owned(),
+            companion_folder: folder.clone(),
+            scratch_folder: folder,
+            z_min_m: None,
+            z_max_m: None,
+            cell_m: 20.0,
+            origin_m: [0.0; 3],
+            frame: "map".to_owned(),
+            stamp_ns: 0,
+        }
+    }
+
+    /// The final name without its folder.
+    pub(super) fn final_name(&self) -> Result<&str> {
+        let name = self.final_path.file_name().and_then(|name| name.to_str());
+        name.ok_or_else(|| {
+            let reason = "the output needs a name in Unicode, for files beside it name it";
+            Error::argument(self.final_path.display().to_string(), reason)
+        })
+    }
+
+    /// Where a file beside the output is written: its name is the final one with another end.
+    pub(super) fn companion(&self, extension: &str) -> Result<PathBuf> {
+        let name = Path::new(self.final_name()?).with_extension(extension);
+        Ok(self.companion_folder.join(name))
+    }
+
+    /// Heights that count, checked.
+    pub(super) fn heights_m(&self) -> Result<[f64; 2]> {
+        let least = self.z_min_m.unwrap_or(f64::NEG_INFINITY);
+        let most = self.z_max_m.unwrap_or(f64::INFINITY);
+        if least < most {
+            return Ok([least, most]);
+        }
+        let reason = format!("heights from {least} to {most} m hold nothing; z_min must be below z_max");
+        Err(Error::argument("z_min, z_max", reason))
+    }
+}
