@@ -8,16 +8,36 @@
 //! order of the voxels is sorted in files without names beside the output: memory does not grow with the voxels, but
 //! for the flat grids of [`VoxelFileFormat::Nav2Map`] and [`VoxelFileFormat::Heightmap`].
 
+mod autoware;
 mod column_grid;
+#[cfg(feature = "las")]
+mod copc;
+#[cfg(feature = "las")]
+mod copc_levels;
 mod counted;
+#[cfg(feature = "e57")]
+mod e57;
 mod format;
+mod glb;
+mod glb_json;
+mod greedy;
 mod heightmap;
+#[cfg(feature = "las")]
+mod las;
+#[cfg(feature = "las")]
+mod las_layout;
 mod lattice;
+#[cfg(feature = "ros")]
+mod mcap;
 mod nav2;
 mod npz;
 mod open;
 mod options;
 mod out_file;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(feature = "ros")]
+mod point_cloud2;
 mod row;
 mod sort;
 mod spool;

@@ -1,8 +1,16 @@
 use super::counted::Counted;
+#[cfg(feature = "e57")]
+use super::e57;
 use super::format::VoxelFileFormat;
+#[cfg(feature = "ros")]
+use super::mcap;
 use super::options::WriteOptions;
+#[cfg(feature = "parquet")]
+use super::parquet;
 use super::row::{VoxelSink, VoxelsHead};
-use super::{heightmap, nav2, npz, xyz};
+use super::{autoware, glb, heightmap, nav2, npz, xyz};
+#[cfg(feature = "las")]
+use super::{copc, las};
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -33,6 +41,20 @@ pub fn open_sink(
         VoxelFileFormat::Npz => Box::new(npz::NpzSink::create(head, path, options)?),
         VoxelFileFormat::Nav2Map => Box::new(nav2::Nav2Sink::create(head, path, options)?),
         VoxelFileFormat::Heightmap => Box::new(heightmap::HeightmapSink::create(head, path, options)?),
+        VoxelFileFormat::Glb => Box::new(glb::GlbSink::create(head, path, options)?),
+        VoxelFileFormat::Autoware => Box::new(autoware::AutowareSink::create(head, path, options)?),
+        #[cfg(feature = "las")]
+        VoxelFileFormat::Las => Box::new(las::LasSink::create(head, path, false)?),
+        #[cfg(feature = "las")]
+        VoxelFileFormat::Laz => Box::new(las::LasSink::create(head, path, true)?),
+        #[cfg(feature = "las")]
+        VoxelFileFormat::Copc => Box::new(copc::CopcSink::create(head, path, options)?),
+        #[cfg(feature = "e57")]
+        VoxelFileFormat::E57 => Box::new(e57::E57Sink::create(head, path, options)?),
+        #[cfg(feature = "parquet")]
+        VoxelFileFormat::Parquet => Box::new(parquet::ParquetSink::create(head, path)?),
+        #[cfg(feature = "ros")]
+        VoxelFileFormat::Mcap => Box::new(mcap::McapSink::create(head, path, options)?),
         #[allow(unreachable_patterns)]
         other => {
             let feature = other.feature().unwrap_or_default();

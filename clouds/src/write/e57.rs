@@ -1,0 +1,101 @@
+use super::options::WriteOptions;
+use super::out_file::OutFile;
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::sort::part;
+use super::spool::Spool;
+use crate::error::{Error, Result};
+use ::e57::{E57Writer, Record, RecordValue};
+use std::path::{Path, PathBuf};
+
+/// Three coordinates of 64 bit and a probability of 32.
+const RECORD_BYTES: u64 = 28;
+/// Points that are read back at once.
+const BATCH: u64 = 4096;
+
+/// A cloud of E57: coordinates in double precision, probabilities as intensities.
+///
+/// The library's writer of a cloud borrows its file for as long as it lives, so points wait in a file of their own.
+pub(super) struct E57Sink {
+    out: OutFile,
+    points: Spool,
+    crs_wkt: Option<String>,
+}
+
+impl E57Sink {
+    pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+        let points = Spool::new(&options.scratch_folder)?;
+        Ok(Self { out: OutFile::create(path)?, points, crs_wkt: head.crs_wkt.clone() })
+    }
+}
+
+impl VoxelSink for E57Sink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        self.points.write(voxel.center_m.map(f64::to_le_bytes).as_flattened())?;
+        self.points.write(&(voxel.probability.clamp(0.0, 1.0) as f32).to_le_bytes())
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        let Self { mut out, points, crs_wkt } = *self;
+        let path: PathBuf = out.path().to_owned();
+        let refused = |error: ::e57::Error| Error::io(&path, "write", std::io::Error::other(error));
+        let bytes = points.len();
+        let mut reader = points.into_reader()?;
+        let mut file = E57Writer::new(&mut out, &guid(bytes, 1)).map_err(refused)?;
+        file.set_coordinate_metadata(crs_wkt);
+        let fields = vec![
+            Record::CARTESIAN_X_F64,
+            Record::CARTESIAN_Y_F64,
+            Record::CARTESIAN_Z_F64,
+            Record::INTENSITY_UNIT_F32,
+        ];
+        let mut cloud = file.add_pointcloud(&guid(bytes, 2), fields).map_err(refused)?;
+        cloud.set_name(Some("voxels".to_owned()));
+        let mut batch = Vec::new();
+        let mut at = 0;
+        while at < bytes {
+            reader.read_at(at, &mut batch, BATCH * RECORD_BYTES)?;
+            at += BATCH * RECORD_BYTES;
+            for record in batch.chunks(RECORD_BYTES as usize) {
+                let [x, y, z] = [0, 8, 16].map(|k| RecordValue::Double(f64::from_le_bytes(part(record, k))));
+                let probability = RecordValue::Single(f32::from_le_bytes(part(record, 24)));
+                cloud.add_point(vec![x, y, z, probability]).map_err(refused)?;
+            }
+        }
+        cloud.finalize().map_err(refused)?;
+        file.finalize().map_err(refused)?;
+        drop(file);
+        out.finish()
+    }
+}
+
+/// A name for a file or a cloud, as the format wants one: unlike in one file, and the same for the same voxels.
+fn guid(bytes: u64, number: u16) -> String {
+    format!("{{766f7874-696c-{number:04x}-8000-{:012x}}}", bytes & 0xffff_ffff_ffff)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::*;
+    use ::e57::{CartesianCoordinate, E57Reader};
+
+    #[test]
+    fn points_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.e57");
+        let rows: Vec<_> = (0..5000).map(|k| row([k, -k, 3], 0.75)).collect();
+        let mut sink =
+            Box::new(E57Sink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap());
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        sink.finish().unwrap();
+        let mut reader = E57Reader::from_file(&path).unwrap();
+        let cloud = reader.pointclouds().remove(0);
+        let points: Vec<_> = reader.pointcloud_simple(&cloud).unwrap().collect::<::e57::Result<_>>().unwrap();
+        assert_eq!(points.len(), rows.len());
+        for (point, row) in points.iter().zip(&rows) {
+            let [x, y, z] = row.center_m;
+            assert_eq!(point.cartesian, CartesianCoordinate::Valid { x, y, z });
+            assert_eq!(point.intensity, Some(0.75));
+        }
+    }
+}

@@ -1,0 +1,127 @@
+use super::options::WriteOptions;
+use super::out_file::OutFile;
+use super::point_cloud2::{FieldType, SCHEMA, encode};
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use crate::error::{Error, Result};
+use ::mcap::records::MessageHeader;
+use ::mcap::{Compression, McapError, Writer};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const TOPIC: &str = "/voxels";
+
+/// A recording of ROS 2 (MCAP) with clouds of whole tiles, as far as they fit.
+///
+/// Coordinates are in single precision, which all viewers know, unless that is too coarse where the map is.
+pub(super) struct McapSink {
+    path: PathBuf,
+    writer: Writer<OutFile>,
+    channel: u16,
+    frame: String,
+    stamp_ns: u64,
+    fields: Vec<(&'static str, FieldType)>,
+    /// Points of the cloud that is next, and where its last tile begins.
+    points: Vec<u8>,
+    tile: Option<[i32; 3]>,
+    tile_start: usize,
+    clouds: u32,
+}
+
+impl McapSink {
+    pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+        let refused = |error| refused(path, error);
+        let out = OutFile::create(path)?;
+        let writing = ::mcap::WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("voxtile-clouds ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0);
+        let mut writer = writing.create(out).map_err(refused)?;
+        let schema = writer
+            .add_schema("sensor_msgs/msg/PointCloud2", "ros2msg", SCHEMA.as_bytes())
+            .map_err(refused)?;
+        let channel = writer.add_channel(schema, TOPIC, "cdr", &BTreeMap::new()).map_err(refused)?;
+        let fits = head.bounds_m.as_flattened().iter().all(|bound| {
+            // Half the distance of neighbouring numbers of single precision at that place.
+            bound.abs() * f64::from(f32::EPSILON) <= head.resolution_m / 16.0
+        });
+        let of = if fits { FieldType::Float32 } else { FieldType::Float64 };
+        let fields = vec![
+            ("x", of),
+            ("y", of),
+            ("z", of),
+            ("intensity", FieldType::Float32),
+            ("log_odds", FieldType::Float64),
+            ("count", FieldType::Int32),
+        ];
+        Ok(Self {
+            path: path.to_owned(),
+            writer,
+            channel,
+            frame: options.frame.clone(),
+            stamp_ns: options.stamp_ns,
+            fields,
+            points: Vec::new(),
+            tile: None,
+            tile_start: 0,
+            clouds: 0,
+        })
+    }
+
+    fn step(&self) -> usize {
+        self.fields.iter().map(|(_, of)| of.bytes() as usize).sum()
+    }
+
+    /// Writes the points up to a place as a cloud.
+    fn write_cloud(&mut self, end: usize) -> Result<()> {
+        let end = end.min(self.points.len());
+        if end == 0 {
+            return Ok(());
+        }
+        let rest = self.points.split_off(end);
+        let data = encode(self.stamp_ns, &self.frame, &self.fields, &self.points);
+        // A nanosecond apart, so that players keep their order.
+        let log_time = self.stamp_ns.saturating_add(u64::from(self.clouds));
+        let (channel_id, publish_time) = (self.channel, self.stamp_ns);
+        let header = MessageHeader { channel_id, sequence: self.clouds, log_time, publish_time };
+        self.writer.write_to_known_channel(&header, &data).map_err(|error| refused(&self.path, error))?;
+        self.clouds = self.clouds.saturating_add(1);
+        self.points = rest;
+        self.tile_start = self.tile_start.saturating_sub(end);
+        Ok(())
+    }
+}
+
+impl VoxelSink for McapSink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        if self.tile.replace(voxel.tile) != Some(voxel.tile) {
+            self.tile_start = self.points.len();
+        }
+        if self.points.len() >= WriteOptions::MOST_CLOUD_POINTS * self.step() {
+            // Before the last tile, unless it fills the cloud alone.
+            let end = if self.tile_start == 0 { self.points.len() } else { self.tile_start };
+            self.write_cloud(end)?;
+        }
+        let is_short = self.fields.first().is_some_and(|(_, of)| *of == FieldType::Float32);
+        for place in voxel.center_m {
+            match is_short {
+                true => self.points.extend((place as f32).to_le_bytes()),
+                false => self.points.extend(place.to_le_bytes()),
+            }
+        }
+        self.points.extend((voxel.probability as f32).to_le_bytes());
+        self.points.extend(voxel.log_odds.to_le_bytes());
+        self.points.extend(voxel.observation_count.to_le_bytes());
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        self.write_cloud(self.points.len())?;
+        self.writer.finish().map_err(|error| refused(&self.path, error))?;
+        self.writer.into_inner().finish()
+    }
+}
+
+fn refused(path: &Path, error: McapError) -> Error {
+    Error::io(path, "write", std::io::Error::other(error))
+}
