@@ -50,7 +50,7 @@ const INNER_ENDINGS: [&str; 4] = [".pcd", ".depth", ".cloud", ".points"];
 const PLAUSIBLE_S: std::ops::Range<i128> = 631_152_000..4_102_444_800;
 
 /// The time stamp in a file's name: `1700000000123456789.bin`, `1403636579.763555.ply`, `lidar__1532402927647951.bin`.
-pub(crate) fn in_name(path: &Path) -> Option<i64> {
+pub fn in_name(path: &Path) -> Option<i64> {
     let name = path.file_name()?.to_str()?;
     let mut stem = name;
     if let Some((before, ending)) = name.rsplit_once('.')
