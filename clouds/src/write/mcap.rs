@@ -8,6 +8,8 @@ use ::mcap::{Compression, McapError, Writer};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// Most points of a cloud.
+const MOST_POINTS: usize = 1 << 20;
 const TOPIC: &str = "/voxels";
 
 /// A recording of ROS 2 (MCAP) with clouds of whole tiles, as far as they fit.
@@ -22,6 +24,7 @@ pub(super) struct McapSink {
     fields: Vec<(&'static str, FieldType)>,
     /// Points of the cloud that is next, and where its last tile begins.
     points: Vec<u8>,
+    most_points: usize,
     tile: Option<[i32; 3]>,
     tile_start: usize,
     clouds: u32,
@@ -62,6 +65,7 @@ impl McapSink {
             stamp_ns: options.stamp_ns,
             fields,
             points: Vec::new(),
+            most_points: MOST_POINTS,
             tile: None,
             tile_start: 0,
             clouds: 0,
@@ -97,7 +101,7 @@ impl VoxelSink for McapSink {
         if self.tile.replace(voxel.tile) != Some(voxel.tile) {
             self.tile_start = self.points.len();
         }
-        if self.points.len() >= WriteOptions::MOST_CLOUD_POINTS * self.step() {
+        if self.points.len() >= self.most_points.saturating_mul(self.step()) {
             // Before the last tile, unless it fills the cloud alone.
             let end = if self.tile_start == 0 { self.points.len() } else { self.tile_start };
             self.write_cloud(end)?;
@@ -124,4 +128,31 @@ impl VoxelSink for McapSink {
 
 fn refused(path: &Path, error: McapError) -> Error {
     Error::io(path, "write", std::io::Error::other(error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::*;
+
+    #[test]
+    fn clouds_hold_whole_tiles_as_far_as_they_fit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        // Tiles of 16 voxels along x: 16 points each, and one of 64 that is cut.
+        let mut rows: Vec<_> = (0..48).map(|x| row([x, 0, 0], 0.9)).collect();
+        rows.extend((0..4).flat_map(|y| (48..64).map(move |x| row([x, y, 0], 0.9))));
+        let mut sink = McapSink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap();
+        sink.most_points = 40;
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        Box::new(sink).finish().unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let messages: Vec<_> =
+            ::mcap::MessageStream::new(&bytes).unwrap().map(|message| message.unwrap()).collect();
+        // Behind the head of the CDR, stamp, frame and height stands the number of points.
+        let width = |data: &[u8]| u32::from_le_bytes(data[24..28].try_into().unwrap());
+        let widths: Vec<u32> = messages.iter().map(|message| width(&message.data)).collect();
+        assert_eq!(widths, [32, 16, 40, 24]);
+        assert!(messages.is_sorted_by_key(|message| message.log_time));
+    }
 }

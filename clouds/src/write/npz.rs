@@ -152,7 +152,6 @@ mod tests {
         assert_eq!(bytes[end - 20..end - 16], 0x0706_4b50_u32.to_le_bytes());
         let record = u64::from_le_bytes(bytes[end - 12..end - 4].try_into().unwrap()) as usize;
         assert_eq!(bytes[record..record + 4], 0x0606_4b50_u32.to_le_bytes());
-        // An oracle beside this test reads it where Python is there: `tools/interchange/formats.sh`.
         assert_eq!(bytes[18..26], [255; 8]);
     }
 }

@@ -25,9 +25,6 @@ pub struct WriteOptions {
 }
 
 impl WriteOptions {
-    /// Most points of a cloud in a recording.
-    pub(super) const MOST_CLOUD_POINTS: usize = 1 << 20;
-
     /// All that follows from where the output ends up: files beside it and scratch files lie in its folder.
     pub fn beside(final_path: &Path) -> Self {
         let folder = match final_path.parent() {
