@@ -82,7 +82,7 @@ impl PosedClouds {
         options: CloudOptions,
     ) -> Result<Self> {
         if let CloudPoses::File(file, trajectory) = &poses
-            && !trajectory.span_ns().is_some()
+            && trajectory.span_ns().is_none()
             && let Some(clouds) = source.len_hint()
             && trajectory.len() as u64 != clouds
         {
@@ -140,10 +140,8 @@ impl PosedClouds {
             world_from_sensor = Pose::from_quaternion(sensor.position_m, RigidPose::IDENTITY.quaternion)?;
         }
         let Self { source, options, poses, .. } = self;
-        let deskew = match head.stamp_ns.filter(|_| options.is_deskewed && head.has_times) {
-            Some(stamp_ns) => Some(Deskew::new(&mut **source, poses, options, stamp_ns, &sensor)),
-            None => None,
-        };
+        let stamp_ns = head.stamp_ns.filter(|_| options.is_deskewed && head.has_times);
+        let deskew = stamp_ns.map(|stamp_ns| Deskew::new(&mut **source, poses, options, stamp_ns, &sensor));
         points.begin(head.has_intensities);
         let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
         source.read_points(&mut |point| {

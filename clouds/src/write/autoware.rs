@@ -77,8 +77,8 @@ impl VoxelSink for AutowareSink {
         let place: [f32; 3] = std::array::from_fn(|k| (voxel.center_m[k] - self.origin_m[k]) as f32);
         let is_far = |k: usize| {
             let exact = voxel.center_m[k] - self.origin_m[k];
-            // Also true of what is not a number.
-            !((f64::from(place[k]) - exact).abs() <= self.resolution_m / 8.0)
+            let error_m = (f64::from(place[k]) - exact).abs();
+            error_m.is_nan() || error_m > self.resolution_m / 8.0
         };
         if (0..3).any(is_far) {
             let reason = format!(

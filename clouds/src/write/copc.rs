@@ -69,10 +69,10 @@ impl Cube {
 
     fn code(&self, voxel: &VoxelRow) -> Result<u128> {
         let mut index = [0; 3];
-        for k in 0..3 {
+        for (k, inside_index) in index.iter_mut().enumerate() {
             let at = i64::from(voxel.index[k]) - self.lowest[k];
             let inside = u32::try_from(at).ok().filter(|&at| f64::from(at) < self.levels.edge_voxels());
-            index[k] = inside.ok_or_else(|| {
+            *inside_index = inside.ok_or_else(|| {
                 let reason = format!("voxel {:?} lies outside the box that was announced", voxel.index);
                 Error::argument("COPC", reason)
             })?;

@@ -115,13 +115,13 @@ impl VoxelFileFormat {
 
     /// Whether this program was built to write it.
     pub fn is_built(self) -> bool {
-        match self.feature() {
-            Some("las") => cfg!(feature = "las"),
-            Some("e57") => cfg!(feature = "e57"),
-            Some("parquet") => cfg!(feature = "parquet"),
-            Some("ros") => cfg!(feature = "ros"),
-            _ => true,
-        }
+        let built = [
+            ("las", cfg!(feature = "las")),
+            ("e57", cfg!(feature = "e57")),
+            ("parquet", cfg!(feature = "parquet")),
+            ("ros", cfg!(feature = "ros")),
+        ];
+        self.feature().is_none_or(|feature| built.contains(&(feature, true)))
     }
 }
 

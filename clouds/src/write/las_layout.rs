@@ -58,15 +58,15 @@ impl LasLayout {
     /// A voxel far outside the box that was announced.
     pub(super) fn point(&mut self, voxel: &VoxelRow) -> Result<[u8; POINT_BYTES]> {
         let mut position = [0; 3];
-        for k in 0..3 {
+        for (k, whole) in position.iter_mut().enumerate() {
             let scaled = ((voxel.center_m[k] - self.offset_m[k]) / self.scale_m).round();
             if scaled.abs() > f64::from(i32::MAX) {
                 let reason = format!("voxel {:?} lies outside the box that was announced", voxel.index);
                 return Err(Error::argument("LAS", reason));
             }
-            position[k] = scaled as i32;
-            self.least[k] = self.least[k].min(position[k]);
-            self.most[k] = self.most[k].max(position[k]);
+            *whole = scaled as i32;
+            self.least[k] = self.least[k].min(*whole);
+            self.most[k] = self.most[k].max(*whole);
         }
         self.points += 1;
         let mut point = [0; POINT_BYTES];
