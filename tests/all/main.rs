@@ -11,6 +11,9 @@ mod cli_edit;
 /// Files that are exported: whole or not there, where they say, and no stranger's.
 #[cfg(feature = "cli")]
 mod cli_export;
+/// Files of other programs, in and out.
+#[cfg(feature = "cli")]
+mod cli_formats;
 /// Help, man pages and completion scripts.
 #[cfg(feature = "cli")]
 mod cli_help;

@@ -5,6 +5,7 @@
 #   voxtile_VERSION-1_ARCH.deb        the same as Debian packages
 #   voxtile-share_VERSION-1_ARCH.deb
 #   voxtile-VERSION.crate             the sources of the library and of voxtile, built once more from this package
+#   voxtile-clouds-VERSION.crate      the sources of what reads and writes files of other programs
 #   SHA256SUMS
 #
 #   tools/release/run.sh [--out FOLDER] [--dirty]
@@ -49,7 +50,7 @@ trap 'rm -rf "$work"' EXIT
 export RUSTFLAGS="--remap-path-prefix=$PWD=voxtile --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
 cargo build --profile dist --locked --target "$target" --package voxtile --package voxtile-share --bins
 unset RUSTFLAGS
-cargo package --locked "${dirty[@]}"
+cargo package --locked --package voxtile-clouds --package voxtile "${dirty[@]}"
 
 # What is installed, as below /usr.
 tree=$work/voxtile-$version-$target
@@ -79,7 +80,7 @@ deb voxtile-share "occupancy map sharing between robots over Zenoh" \
 
 tar --create --gzip --directory "$work" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" \
     --file "$work/out/voxtile-$version-$target.tar.gz" "$(basename "$tree")"
-cp "$built/package/voxtile-$version.crate" "$work/out/"
+cp "$built/package/voxtile-$version.crate" "$built/package/voxtile-clouds-$version.crate" "$work/out/"
 (cd "$work/out" && sha256sum ./* | sed 's| \./| |' >SHA256SUMS)
 
 tools/release/try.sh "$work/out/voxtile-$version-$target.tar.gz"

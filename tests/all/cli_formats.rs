@@ -1,0 +1,208 @@
+//! Files of other programs, in and out, by the command.
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn voxtile(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("voxtile").unwrap();
+    command.args(arguments);
+    command
+}
+
+fn output(arguments: &[&str]) -> String {
+    let output = voxtile(arguments).output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refusal(arguments: &[&str]) -> String {
+    let output = voxtile(arguments).output().unwrap();
+    assert!(!output.status.success(), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn repository(path: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path).to_str().unwrap().to_owned()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Three scans of a wall, as float32, in folders of three formats with the same poses.
+fn make_inputs(folder: &Path) -> Vec<PathBuf> {
+    let clouds: Vec<Vec<[f32; 3]>> = (0..3)
+        .map(|scan| (0..60).map(|k| [4.0 + 0.01 * scan as f32, 0.1 * k as f32 - 3.0, 0.3]).collect())
+        .collect();
+    let poses = "1.5 0 0 1 0 0 0 1\n2.5 0.5 0 1 0 0 0.1 0.995\n3.5 1 0.25 1 0 0 0.2 0.98\n";
+    let folders: Vec<PathBuf> = ["bin", "xyz", "ply"].iter().map(|name| folder.join(name)).collect();
+    for path in &folders {
+        fs::create_dir(path).unwrap();
+        fs::write(path.join("poses_tum.txt"), poses).unwrap();
+    }
+    for (number, cloud) in clouds.iter().enumerate() {
+        let rows: Vec<String> = cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect();
+        let floats = cloud.iter().flat_map(|[x, y, z]| [*x, *y, *z, 0.0]).flat_map(f32::to_le_bytes);
+        fs::write(folders[0].join(format!("{number}.bin")), floats.collect::<Vec<u8>>()).unwrap();
+        fs::write(folders[1].join(format!("{number}.xyz")), rows.join("\n")).unwrap();
+        let header = format!(
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+            rows.len()
+        );
+        fs::write(folders[2].join(format!("{number}.ply")), header + &rows.join("\n") + "\n").unwrap();
+    }
+    folders
+}
+
+fn digest_of(input: &str, map: &Path, options: &[&str]) -> String {
+    let mut arguments = vec!["build", input, "-o", text(map), "--resolution", "0.2"];
+    arguments.extend(options);
+    output(&arguments);
+    let digest = output(&["digest", text(map)]);
+    fs::remove_dir_all(map).unwrap();
+    digest
+}
+
+#[test]
+fn the_same_scans_in_other_formats_make_the_same_map() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    let digests: Vec<String> =
+        make_inputs(folder.path()).iter().map(|input| digest_of(text(input), &map, &[])).collect();
+    assert!(digests.iter().all(|digest| *digest == digests[0]), "{digests:?}");
+}
+
+#[cfg(feature = "ros")]
+#[test]
+fn recordings_of_either_ros_make_the_same_map() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    let data = |name: &str| repository(&format!("clouds/tests/data/ros/{name}"));
+    let digests: Vec<String> = ["none.bag", "bz2.bag", "lz4.bag", "none.mcap", "zstd.mcap", "ros1.mcap"]
+        .iter()
+        .map(|name| digest_of(&data(name), &map, &["--topic", "/points"]))
+        .collect();
+    assert!(digests.iter().all(|digest| *digest == digests[0]), "{digests:?}");
+    let refused = refusal(&["build", &data("none.bag"), "-o", text(&map)]);
+    assert!(refused.contains("--topic") && refused.contains("/scan"), "{refused}");
+    assert!(!map.exists());
+}
+
+#[test]
+fn what_would_be_read_is_told_and_nothing_is_mapped() {
+    let folder = TempDir::new().unwrap();
+    let inputs = make_inputs(folder.path());
+    let told = output(&["scans", text(&inputs[0]), "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!((&told["scans"], &told["points"]), (&3.into(), &180.into()), "{told}");
+    let each = output(&["scans", text(&inputs[1]), "--each", "--first", "1", "--every", "2"]);
+    assert!(each.contains("scans     1, 60 points"), "{each}");
+    let unknown = folder.path().join("file.pcap");
+    fs::write(&unknown, b"\xd4\xc3\xb2\xa1 and more of a capture").unwrap();
+    let refused = refusal(&["scans", text(&unknown)]);
+    assert!(refused.contains("pcap"), "{refused}");
+}
+
+#[test]
+fn a_map_lists_where_its_scans_were_taken() {
+    let folder = TempDir::new().unwrap();
+    let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
+    output(&["build", text(&inputs[2]), "-o", text(&map), "--resolution", "0.2"]);
+    let each = output(&["scans", text(&map), "--each", "--json"]);
+    let rows: Vec<serde_json::Value> = each.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let origins: Vec<&serde_json::Value> = rows[..3].iter().map(|row| &row["origin_m"]).collect();
+    assert_eq!(
+        serde_json::json!(origins),
+        serde_json::json!([[0.0, 0.0, 1.0], [0.5, 0.0, 1.0], [1.0, 0.25, 1.0]])
+    );
+    assert_eq!(rows[3]["scans"], 3);
+}
+
+#[test]
+fn points_are_left_out_and_taken_without_rays() {
+    let folder = TempDir::new().unwrap();
+    let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
+    let count = |options: &[&str], key: &str| {
+        let mut arguments = vec!["build", text(&inputs[0]), "-o", text(&map), "--resolution", "0.2"];
+        arguments.extend(options);
+        output(&arguments);
+        let info: serde_json::Value = serde_json::from_str(&output(&["info", text(&map), "--json"])).unwrap();
+        fs::remove_dir_all(&map).unwrap();
+        info[key].as_u64().unwrap()
+    };
+    let (all, occupied) = (count(&[], "voxels"), count(&[], "occupied"));
+    assert!(all > occupied);
+    assert_eq!(count(&["--no-rays"], "voxels"), count(&["--no-rays"], "occupied"));
+    let half = ["--ignore-box", "0", "-10", "-10", "10", "0", "10"];
+    assert!(count(&half, "occupied") < occupied);
+    assert_eq!(count(&["--ignore-box", "-99", "-99", "-99", "99", "99", "99"], "occupied"), 0);
+}
+
+#[test]
+fn a_file_of_octomap_is_imported_and_asked_as_it_is() {
+    let folder = TempDir::new().unwrap();
+    let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (bt, ot) = (place("map.bt"), place("map.ot"));
+    output(&["export", &repository("map_tiles_example"), "-o", &bt]);
+    output(&["export", &repository("map_tiles_example"), "-o", &ot]);
+    for (file, again) in [(&bt, "again.bt"), (&ot, "again.ot")] {
+        let map = place(&format!("{again} map"));
+        output(&["import", file, "-o", &map]);
+        output(&["export", &map, "-o", &place(again)]);
+        assert_eq!(fs::read(file).unwrap(), fs::read(place(again)).unwrap(), "{again}");
+        assert_eq!(output(&["digest", file]), output(&["digest", &map]));
+        let ray = ["--origin", "8", "-2", "1.8", "--direction", "1", "1", "0"];
+        let ask = |map: &str| output(&[&["raycast", map], &ray[..]].concat());
+        assert_eq!(ask(file), ask(&map));
+        assert!(ask(file).contains("hit at"), "{}", ask(file));
+        output(&["verify", &map]);
+    }
+    let refused = refusal(&["import", &bt, "-o", &place("none"), "--max-voxels", "3"]);
+    assert!(refused.contains("--max-voxels 3"), "{refused}");
+    let refused = refusal(&["crop", &bt, "-o", &place("none"), "--region", "0", "0", "0", "1", "1", "1"]);
+    assert!(refused.contains("voxtile import"), "{refused}");
+}
+
+#[test]
+fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
+    let folder = TempDir::new().unwrap();
+    let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let map = repository("map_tiles_example");
+    output(&["export", &map, "-o", &place("map.csv")]);
+    let rows = fs::read_to_string(place("map.csv")).unwrap();
+    let mut wanted: Vec<String> =
+        rows.lines().skip(1).map(|row| row.split(',').take(3).collect::<Vec<_>>().join(" ")).collect();
+    output(&["export", &map, "-o", &place("map.xyz")]);
+    let lines = fs::read_to_string(place("map.xyz")).unwrap();
+    let mut found: Vec<String> =
+        lines.lines().map(|row| row.split(' ').take(3).collect::<Vec<_>>().join(" ")).collect();
+    wanted.sort_unstable();
+    found.sort_unstable();
+    assert_eq!(found, wanted);
+    for name in [
+        "map.npz",
+        "map.glb",
+        "map.png",
+        "map.pgm",
+        "map.las",
+        "map.laz",
+        "map.copc.laz",
+        "map.e57",
+        "map.mcap",
+    ] {
+        output(&["export", &map, "-o", &place(name)]);
+        assert!(fs::metadata(place(name)).unwrap().len() > 0, "{name}");
+        // Over itself, too.
+        output(&["export", &map, "-o", &place(name)]);
+    }
+    assert!(Path::new(&place("map.yaml")).exists() && Path::new(&place("map.pgw")).exists());
+    output(&["export", &map, "-o", &place("squares"), "--format", "autoware"]);
+    assert!(Path::new(&place("squares/pointcloud_map_metadata.yaml")).exists());
+    refusal(&["export", &map, "-o", &place("squares"), "--format", "autoware"]);
+    refusal(&["export", &map, "-o", "-", "--format", "laz"]);
+    let left = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
+}

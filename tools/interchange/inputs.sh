@@ -1,0 +1,68 @@
+#!/bin/sh
+# The same scans in the formats of many programs, each written by somebody else's library, give one map: `inputs.py`
+# writes them, `voxtile build` reads them, and the digests are compared.
+#
+#   tools/interchange/inputs.sh
+#
+# Needs python3 with venv; its packages go to a temporary folder. VOXTILE_BIN is a folder of programs that are built
+# already. Exits with 1 if a digest differs that must not.
+set -eu
+cd "$(dirname "$0")/../.."
+here=tools/interchange
+target=${CARGO_TARGET_DIR:-target}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+[ -n "${VOXTILE_BIN-}" ] || cargo build --release --quiet --bin voxtile
+voxtile=${VOXTILE_BIN:-$target/release}/voxtile
+python3 -m venv "$work/venv"
+"$work/venv/bin/pip" install --quiet --disable-pip-version-check numpy plyfile 'laspy[lazrs]' pye57 rosbags
+"$work/venv/bin/python" "$here/inputs.py" "$work/in"
+
+failed=0
+digest_of() { # input, options
+    rm -rf "$work/map"
+    "$voxtile" --quiet build "$@" -o "$work/map" --resolution 0.2 --max-range 50 >/dev/null || return
+    "$voxtile" digest "$work/map"
+}
+wanted=$(digest_of "$work/in/pcd")
+compare() { # name, input, options
+    name=$1
+    shift
+    found=$(digest_of "$@") || found=none
+    if [ "$found" = "$wanted" ]; then
+        printf '%-28s same digest\n' "$name"
+    else
+        printf '%-28s %s, not %s\n' "$name" "$found" "$wanted"
+        failed=1
+    fi
+}
+in=$work/in
+compare "PLY, binary" "$in/ply"
+compare "PLY, text" "$in/ply_text"
+compare "text" "$in/xyz"
+compare "KITTI .bin" "$in/kitti"
+compare "KITTI .bin, poses by stamp" "$in/stamped"
+compare "KITTI .bin, poses as .npy" "$in/kitti" --poses "$in/poses.npy"
+compare "ROS 1 bag, tf" "$in/scans.bag"
+compare "ROS 1 bag, poses of a file" "$in/scans.bag" --poses "$in/pcd/poses_tum.txt"
+compare "ROS 2 folder of MCAP, tf" "$in/rosbag2"
+compare "MCAP, tf" "$in/rosbag2/rosbag2.mcap"
+compare "E57, its own poses" "$in/scans.e57"
+if "$voxtile" scans "$in/sqlite" >/dev/null 2>&1; then
+    compare "ROS 2 folder of SQLite, tf" "$in/sqlite"
+else
+    echo "ROS 2 folder of SQLite       skipped: built without the feature sqlite"
+fi
+
+# Coordinates in tenths of millimetres and in the world frame: nearly the same voxels are occupied.
+count() {
+    "$voxtile" info "$1" --json | sed -n 's/.*"occupied": *\([0-9]*\).*/\1/p' | head -1
+}
+digest_of "$in/pcd" >/dev/null
+exact=$(count "$work/map")
+digest_of "$in/scans.laz" --world-frame --poses "$in/laz_poses.txt" >/dev/null
+rounded=$(count "$work/map")
+echo "LAZ, cut by GPS time: $rounded voxels occupied, $exact from the exact scans"
+awk "BEGIN { exit !($rounded > 0.98 * $exact && $rounded < 1.02 * $exact) }" || failed=1
+exit $failed
