@@ -17,6 +17,8 @@ pub enum PoseSource {
     Viewpoint,
     /// None: every scan is in the world frame.
     Identity,
+    /// None are known.
+    Missing,
 }
 
 /// Names of pose files that are searched for.
@@ -32,6 +34,7 @@ impl fmt::Display for PoseSource {
             Self::Scans => f.write_str("with each scan, in the input"),
             Self::File(path) => write!(f, "{}", path.display()),
             Self::Viewpoint => f.write_str("VIEWPOINT of each file"),
+            Self::Missing => f.write_str("none"),
             Self::Identity => f.write_str("identity: the scans are in the world frame"),
         }
     }

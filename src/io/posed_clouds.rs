@@ -55,6 +55,8 @@ pub(super) enum CloudPoses {
     Source,
     /// Every cloud is in the world frame.
     Identity,
+    /// There are none.
+    Missing,
 }
 
 /// Clouds of other programs as scans. Clouds without a pose are passed over and counted.
@@ -100,6 +102,7 @@ impl PosedClouds {
     fn pose_of(&self, head: &CloudHead, number: u64) -> std::result::Result<RigidPose, String> {
         match &self.poses {
             CloudPoses::Identity => Ok(RigidPose::IDENTITY),
+            CloudPoses::Missing => Err("neither the input has poses nor a file of them was named".to_owned()),
             CloudPoses::Source => {
                 head.world_from_sensor.ok_or_else(|| "the recording has none at its time".to_owned())
             }
@@ -196,7 +199,7 @@ impl Deskew {
                 _ => None,
             },
             CloudPoses::Source => source.pose_at(at_ns),
-            CloudPoses::Identity => None,
+            CloudPoses::Identity | CloudPoses::Missing => None,
         };
         let periods = -SWEEP_NS / POSE_PERIOD_NS..=SWEEP_NS / POSE_PERIOD_NS;
         let times = periods.map(|period| stamp_ns.saturating_add(period * POSE_PERIOD_NS));
@@ -260,16 +263,21 @@ impl ScanSource for PosedClouds {
         while let Some(head) = self.source.next_cloud()? {
             let number = self.number;
             self.number += 1;
-            match self.pose_of(&head, number) {
-                Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
-                found => {
-                    let body = found.unwrap_or(RigidPose::IDENTITY);
-                    let world_from_sensor = self.read_points(&head, &body, points)?;
-                    let CloudHead { name, stamp_ns, fields, .. } = head;
-                    self.fields = fields;
-                    return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
+            let found = self.pose_of(&head, number);
+            let body = match found {
+                Ok(body) => body,
+                Err(why) => {
+                    self.note_without_pose(&head, &why);
+                    if !self.options.may_lack_poses {
+                        continue;
+                    }
+                    RigidPose::IDENTITY
                 }
-            }
+            };
+            let world_from_sensor = self.read_points(&head, &body, points)?;
+            let CloudHead { name, stamp_ns, fields, .. } = head;
+            self.fields = fields;
+            return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
         }
         Ok(None)
     }
@@ -298,6 +306,7 @@ impl ScanSource for PosedClouds {
             CloudPoses::File(path, _) => PoseSource::File(path.clone()),
             CloudPoses::Source => PoseSource::Scans,
             CloudPoses::Identity => PoseSource::Identity,
+            CloudPoses::Missing => PoseSource::Missing,
         }
     }
 

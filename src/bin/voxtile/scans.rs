@@ -76,7 +76,10 @@ fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
 }
 
 fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
-    let mut source: Box<dyn ScanSource + Send> = scan_input::open(&args.data, &read_options(&args.read)?)?;
+    let mut options = read_options(&args.read)?;
+    // What a build would leave out is listed all the same, and said.
+    options.clouds.may_lack_poses = true;
+    let mut source: Box<dyn ScanSource + Send> = scan_input::open(&args.data, &options)?;
     let progress = Progress::over_scans(source.len_hint());
     let room = PointRoom::new(ROOM_BYTES, &std::env::temp_dir());
     let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
