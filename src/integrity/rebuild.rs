@@ -37,7 +37,8 @@ pub(super) fn index_of(
     remains: &Salvage,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Option<Index>> {
-    if let Some((map_id, metadata)) = told_by_log(remains) {
+    if let Some((map_id, mut metadata)) = told_by_log(remains) {
+        forget_scan_records(&mut metadata);
         let commits = remains.commits.clone();
         let (waiting, damaged) = Default::default();
         return Ok(Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles: false }));
@@ -48,6 +49,13 @@ pub(super) fn index_of(
         return Ok(None);
     }
     index_from_tiles(disk, layout, remains, progress).map(Some)
+}
+
+/// How many records the list of scans had is not known of a state that is put together.
+fn forget_scan_records(metadata: &mut Metadata) {
+    if let Some(ext) = &mut metadata.ext {
+        ext.scan_records = None;
+    }
 }
 
 /// Id and metadata of a log that leads to the last flush.
@@ -75,7 +83,8 @@ fn index_from_tiles(
     tiles.sort_unstable();
     let trailers = Trailers::of(disk, layout, &tiles)?;
     let written = remains.metadata.as_ref().ok();
-    let (map_id, metadata) = identity(layout, remains, &trailers)?;
+    let (map_id, mut metadata) = identity(layout, remains, &trailers)?;
+    forget_scan_records(&mut metadata);
     let config = crate::persistence::config_from(&metadata, &layout.metadata())?;
     let known_scan = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.scan_number);
     let written_flush = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.flush_number);

@@ -67,6 +67,10 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<(PathBuf, Format)> {
         Some(format) => Ok((path.to_owned(), format)),
         None => match Format::guess(path) {
             Ok(format) => Ok((path.to_owned(), format)),
+            // PCD has many beginnings; what is wrong with a file says its reader.
+            Err(_) if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pcd")) => {
+                Ok((path.to_owned(), Format::Pcd))
+            }
             Err(_) if inner.is_dir() => Ok((inner.clone(), Format::guess(&inner)?)),
             Err(error) => Err(error.into()),
         },

@@ -231,7 +231,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
     let cases: Vec<(Vec<&str>, i32, &str)> = vec![
         (vec!["build", scans, "-o", map], 2, "use --resume to go on with these scans"),
         (vec!["build", "nowhere", "-o", new], 2, "nowhere: there is no such file or folder"),
-        (vec!["build", text(&empty_folder), "-o", new], 2, "no .pcd file in this folder"),
+        (vec!["build", text(&empty_folder), "-o", new], 2, "no file of a known format"),
         (
             vec!["build", &other, "-o", new],
             2,

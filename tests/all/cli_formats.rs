@@ -44,7 +44,8 @@ fn make_inputs(folder: &Path) -> Vec<PathBuf> {
         fs::write(path.join("poses_tum.txt"), poses).unwrap();
     }
     for (number, cloud) in clouds.iter().enumerate() {
-        let rows: Vec<String> = cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect();
+        let rows: Vec<String> =
+            cloud.iter().map(|[x, y, z]| [*x, *y, *z].map(|c| f64::from(c).to_string()).join(" ")).collect();
         let floats = cloud.iter().flat_map(|[x, y, z]| [*x, *y, *z, 0.0]).flat_map(f32::to_le_bytes);
         fs::write(folders[0].join(format!("{number}.bin")), floats.collect::<Vec<u8>>()).unwrap();
         fs::write(folders[1].join(format!("{number}.xyz")), rows.join("\n")).unwrap();

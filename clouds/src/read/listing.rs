@@ -11,6 +11,22 @@ pub(super) struct Listing {
     folders: Vec<PathBuf>,
 }
 
+/// Names, without their ends, of texts that lie beside clouds and are none: poses, times, cameras.
+const BESIDE_CLOUDS: [&str; 12] = [
+    "calib",
+    "camera-intrinsics",
+    "depth",
+    "groundtruth",
+    "intrinsics",
+    "odometry",
+    "poses",
+    "poses_kitti",
+    "poses_tum",
+    "readme",
+    "rgb",
+    "times",
+];
+
 /// How much of a `metadata.yaml` is read to see whether it is rosbag2's.
 const BAG2_MARK: &[u8] = b"rosbag2_bagfile_information";
 
@@ -41,7 +57,9 @@ impl Listing {
 
     /// The files of a format.
     pub(super) fn of(&self, format: Format) -> Vec<PathBuf> {
-        let is_of = |path: &&PathBuf| format.extensions().contains(&extension_of(path).as_str());
+        let is_of = |path: &&PathBuf| {
+            format.extensions().contains(&extension_of(path).as_str()) && !is_beside_clouds(path)
+        };
         let files: Vec<PathBuf> = self.files.iter().filter(is_of).cloned().collect();
         // Beside colours, depths say that they are depths.
         if format == Format::DepthImages && files.iter().any(|path| is_named_depth(path)) {
@@ -129,4 +147,10 @@ fn of_extension(extension: &str) -> Option<Format> {
         "db3" => Format::Db3,
         _ => Format::ALL.into_iter().find(|format| format.extensions().contains(&extension))?,
     })
+}
+
+/// Whether a file is a text beside clouds, by its name.
+fn is_beside_clouds(path: &Path) -> bool {
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()).unwrap_or_default();
+    BESIDE_CLOUDS.contains(&stem.as_str())
 }

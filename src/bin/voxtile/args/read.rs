@@ -43,7 +43,7 @@ pub struct ReadArgs {
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     pub pose_tolerance: f64,
     /// Where the sensor is in the body that --poses are of: tx ty tz qx qy qz qw, or a 3x4 matrix row by row
-    #[arg(long, value_name = "NUMBERS", num_args = 7..=12)]
+    #[arg(long, value_name = "N", num_args = 7..=12)]
     pub extrinsic: Option<Vec<f64>>,
     /// The points are in the world frame already; poses say from where they were seen
     #[arg(long)]
