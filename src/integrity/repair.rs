@@ -178,6 +178,10 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 self.note(ActionKind::Derived, &path, "cut where the damage begins");
                 Ok(())
             }
+            Err(error) if Finding::is_of_file(&error) => {
+                self.quarantine(&path, &format!("{error:#}"))?;
+                store.settle_scans()
+            }
             Err(error) => Err(error),
         }
     }

@@ -61,7 +61,7 @@ fn go_on(disk: &FaultyDisk, storage: Storage) -> Result<()> {
 }
 
 fn is_index(path: &Path) -> bool {
-    path.ends_with("metadata.json") || path.ends_with("commits.log")
+    ["metadata.json", "commits.log", "scans.bin"].iter().any(|name| path.ends_with(name))
 }
 
 #[test]

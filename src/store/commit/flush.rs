@@ -78,9 +78,9 @@ impl TileStore {
         self.write_metadata()
     }
 
-    /// Records that from the next commit on the scans after this one are no longer in the map.
-    pub fn note_rewind(&mut self, scan_number: u64) {
-        self.scans.note_rewind(scan_number);
+    /// Records that from the next commit on the map consists of the scans as of an earlier flush again.
+    pub fn note_rewind(&mut self, to_flush: u64) {
+        self.scans.note_rewind(to_flush);
     }
 
     /// Forgets the next version of a tile, as if it had not been written.

@@ -3,7 +3,7 @@
 //! ```text
 //! header  magic, version
 //! record  scan    flush, number, time stamp, origin, checksum
-//!         rewind  flush, number: the map was reverted, and the scans after that number are no longer in it
+//!         rewind  flush, number of an earlier one: the map was reverted to it, and its list of scans, too
 //! ```
 //!
 //! Records are synced before the commit that they belong to. One of a later flush than the last commit was left behind

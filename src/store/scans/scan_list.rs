@@ -39,8 +39,8 @@ impl ScanList {
         self.pending.push(Entry::Scan(scan));
     }
 
-    pub(in crate::store) fn note_rewind(&mut self, scan_number: u64) {
-        self.pending.push(Entry::Rewind(scan_number));
+    pub(in crate::store) fn note_rewind(&mut self, to_flush: u64) {
+        self.pending.push(Entry::Rewind(to_flush));
     }
 
     /// Bytes of memory.
@@ -106,7 +106,7 @@ impl ScanList {
 /// What is committed, and whether there is more in the file.
 fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64) -> Result<(Extent, bool)> {
     let mut records = 0;
-    match for_each_record(disk, layout, committed, &mut |_| records += 1) {
+    match for_each_record(disk, layout, committed, &mut |_, _| records += 1) {
         Ok(file_bytes) => {
             let found = Extent { records };
             Ok((found, file_bytes.is_some_and(|bytes| bytes != found.bytes())))
@@ -130,15 +130,27 @@ pub(crate) fn read_scans(
     flush_number: u64,
     records: Option<u64>,
 ) -> Result<Vec<ScanRecord>> {
-    let mut scans: Vec<ScanRecord> = Vec::new();
-    for_each_committed(disk, layout, flush_number, records, &mut |entry| match entry {
-        Entry::Scan(scan) => scans.push(scan),
-        Entry::Rewind(number) => {
-            let kept = scans.partition_point(|scan| scan.number <= number);
-            scans.truncate(kept);
-        }
+    let mut entries = Vec::new();
+    for_each_committed(disk, layout, flush_number, records, &mut |flush, entry| {
+        entries.push((flush, entry))
     })?;
-    Ok(scans)
+    // Backwards from revert to revert: before each, the list is that of the flush that it went back to.
+    let (mut parts, mut end) = (Vec::new(), entries.len());
+    loop {
+        let before = &entries[..end];
+        let Some(revert) = before.iter().rposition(|(_, entry)| matches!(entry, Entry::Rewind(_))) else {
+            parts.push(before);
+            break;
+        };
+        parts.push(&before[revert + 1..]);
+        let (_, Entry::Rewind(to_flush)) = before[revert] else { break };
+        end = before[..revert].partition_point(|(flush, _)| *flush <= to_flush);
+    }
+    let scans = parts.into_iter().rev().flatten().filter_map(|(_, entry)| match entry {
+        Entry::Scan(scan) => Some(*scan),
+        Entry::Rewind(_) => None,
+    });
+    Ok(scans.collect())
 }
 
 /// Whether the list is whole as of a flush; as [`read_scans`], in constant memory.
@@ -152,7 +164,7 @@ pub(crate) fn check_scans(
     flush_number: u64,
     records: Option<u64>,
 ) -> Result<()> {
-    for_each_committed(disk, layout, flush_number, records, &mut |_| ())
+    for_each_committed(disk, layout, flush_number, records, &mut |_, _| ())
 }
 
 /// Visits the records up to a flush, of which there are so many, if that is known.
@@ -161,12 +173,12 @@ fn for_each_committed(
     layout: &Layout,
     flush_number: u64,
     records: Option<u64>,
-    visit: &mut dyn FnMut(Entry),
+    visit: &mut dyn FnMut(u64, Entry),
 ) -> Result<()> {
     let mut found = Extent::default();
-    let read = for_each_record(disk, layout, flush_number, &mut |entry| {
+    let read = for_each_record(disk, layout, flush_number, &mut |flush, entry| {
         found.records += 1;
-        visit(entry);
+        visit(flush, entry);
     });
     let in_map = |error: DecodeError| error.in_map(&layout.scans(), None);
     read.map_err(in_map)?;
@@ -185,7 +197,7 @@ fn for_each_record(
     disk: &dyn Disk,
     layout: &Layout,
     flush_number: u64,
-    visit: &mut dyn FnMut(Entry),
+    visit: &mut dyn FnMut(u64, Entry),
 ) -> std::result::Result<Option<u64>, DecodeError> {
     let input = match disk.open(&layout.scans()) {
         Ok(input) => input,
@@ -216,7 +228,7 @@ fn for_each_record(
     while at + RECORD_BYTES as u64 <= file_bytes {
         input.read_exact(&mut record)?;
         match Entry::from_bytes(&record) {
-            Some((flush, entry)) if flush <= flush_number => visit(entry),
+            Some((flush, entry)) if flush <= flush_number => visit(flush, entry),
             Some(_) => break,
             None if is_uncommitted(&record, flush_number) && !has_committed(&mut input, flush_number)? => {
                 break;

@@ -17,7 +17,7 @@ pub struct ScanRecord {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Entry {
     Scan(ScanRecord),
-    /// Scans after this number are no longer in the map.
+    /// The map is again as of this flush: its list of scans, too.
     Rewind(u64),
 }
 
