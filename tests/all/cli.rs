@@ -227,16 +227,12 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
     let plain =
         file("plain.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 3\n");
     let points = file("points.txt", b"1 2 3\n4 five 6\n");
-    let other = file("scans.xyz", b"1 2 3\n");
+    let other = file("scans.pcap", b"\xd4\xc3\xb2\xa1 and more of a capture");
     let cases: Vec<(Vec<&str>, i32, &str)> = vec![
         (vec!["build", scans, "-o", map], 2, "use --resume to go on with these scans"),
         (vec!["build", "nowhere", "-o", new], 2, "nowhere: there is no such file or folder"),
         (vec!["build", text(&empty_folder), "-o", new], 2, "no file of a known format"),
-        (
-            vec!["build", &other, "-o", new],
-            2,
-            "not a folder of .pcd files, nor a .pcd, .graph, .log or .scans file",
-        ),
+        (vec!["build", &other, "-o", new], 2, "pcap"),
         (vec!["build", scans, "-o", new, "--poses", &few], 2, "1 poses for 3 scan files"),
         (vec!["build", scans, "-o", new, "--poses", &many], 2, "4 poses for 3 scan files"),
         (vec!["build", &wrong_header, "-o", new], 1, "line 7: the points have no field z"),
@@ -324,7 +320,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
             2,
             "has no usable length",
         ),
-        (vec!["export", map, "-o", "a.xyz"], 2, "the extension must be .ply, .pcd, .csv, .bt or .ot"),
+        (vec!["export", map, "-o", "a.abc"], 2, "its extension is of no known format"),
         (vec!["export", map, "-o", "a.ply", "--region", "1", "1", "1", "0", "2", "2"], 2, "needs X0 < X1"),
         (vec!["export", map, "-o", "no/such/a.ply"], 1, "no/such/a.ply: cannot create"),
     ];
