@@ -7,9 +7,9 @@ use super::read_options::ReadOptions;
 use super::source::{ScanSource, open_scans};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
-use voxtile_clouds::CloudSource;
 use voxtile_clouds::poses::Trajectory;
 use voxtile_clouds::read::{self, Format};
+use voxtile_clouds::{CloudSource, stamp_of_name};
 
 /// Opens scans of any known format: what [`open_scans`] takes, point clouds and recordings of other programs. What the
 /// input is, is told by its content first and by its name second.
@@ -80,9 +80,11 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<(PathBuf, Format)> {
 fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     let files = if path.is_dir() { pcd_files_of(path)? } else { vec![path.to_owned()] };
     let poses = options.poses.as_deref();
-    // A line a file, as ever.
+    // A line a file, as ever, unless the names of all files are time stamps.
     let are_by_line = poses.is_none_or(|poses| {
-        poses == Path::new(IDENTITY) || read_poses(poses).is_ok_and(|poses| poses.len() == files.len())
+        poses == Path::new(IDENTITY)
+            || files.iter().any(|file| stamp_of_name(file).is_none())
+            || read_poses(poses).is_ok_and(|poses| poses.len() == files.len())
     });
     if are_by_line && options.calib.is_none() && options.clouds.is_plain() {
         return match path.is_dir() {

@@ -43,7 +43,7 @@ impl MapAt {
 /// What can be read.
 pub enum AnyMap {
     /// A map, or a snapshot of one.
-    Map(MapReader),
+    Map(Box<MapReader>),
     /// A file of OctoMap.
     Octree(OctreeMap),
 }
@@ -131,7 +131,7 @@ pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Resu
         return read(&AnyMap::Octree(OctreeMap::of(octree_file::read(map)?)?));
     }
     let map = MapAt::of(map)?;
-    again_if_changed(|| read(&AnyMap::Map(map.open()?)))
+    again_if_changed(|| read(&AnyMap::Map(Box::new(map.open()?))))
 }
 
 /// The same from two maps.
