@@ -41,6 +41,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     rows.sort_by_key(|row| (row.tile, morton(row.index)));
     let mut bounds_m = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for row in &rows {
+        #[expect(clippy::needless_range_loop, reason = "two lists, one index")]
         for k in 0..3 {
             bounds_m[0][k] = bounds_m[0][k].min(row.center_m[k]);
             bounds_m[1][k] = bounds_m[1][k].max(row.center_m[k]);

@@ -60,7 +60,7 @@ fn insert(mapper: &mut OutOfCoreTileMapper, scans: std::ops::Range<u64>) {
 }
 
 fn expected(scans: u64) -> Vec<ScanRecord> {
-    let stamp = |k: u64| (k % 2 == 0).then_some(-7 + k as i64);
+    let stamp = |k: u64| k.is_multiple_of(2).then_some(-7 + k as i64);
     (1..=scans).map(|k| ScanRecord::new(k, stamp(k), [k as f64, 0.5, 0.25])).collect()
 }
 
