@@ -45,7 +45,7 @@ pub enum AnyMap {
     /// A map, or a snapshot of one.
     Map(Box<MapReader>),
     /// A file of OctoMap.
-    Octree(OctreeMap),
+    Octree(Box<OctreeMap>),
 }
 
 /// Calls a method of whichever it is.
@@ -128,7 +128,7 @@ pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Resul
 /// The same from a map, a snapshot, or a file of OctoMap.
 pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Result<T>) -> anyhow::Result<T> {
     if OctreeMap::is_named_by(map) {
-        return read(&AnyMap::Octree(OctreeMap::of(octree_file::read(map)?)?));
+        return read(&AnyMap::Octree(Box::new(OctreeMap::of(octree_file::read(map)?)?)));
     }
     let map = MapAt::of(map)?;
     again_if_changed(|| read(&AnyMap::Map(Box::new(map.open()?))))
