@@ -21,7 +21,7 @@ pub(crate) const NO_RETURN_M: f64 = 1e9;
 /// ```
 /// use voxtile::scan::no_return;
 ///
-/// assert_eq!(no_return([1.0, 2.0, 3.0], [0.0, 0.5, 0.0]), Some([1.0, 1e12, 3.0]));
+/// assert_eq!(no_return([1.0, 2.0, 3.0], [0.0, 0.5, 0.0]), Some([1.0, 2.0 + 1e12, 3.0]));
 /// assert_eq!(no_return([1.0, 2.0, 3.0], [0.0; 3]), None);
 /// ```
 pub fn no_return(origin: Point, direction: Point) -> Option<Point> {
