@@ -56,7 +56,8 @@
 //!
 //! # Features
 //!
-//! `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
+//! - `render`: levels of detail for viewers.
+//! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
 //! it, and no feature changes a result.
 
 mod config;
@@ -74,6 +75,8 @@ pub mod operations;
 pub mod path_text;
 mod persistence;
 pub mod query;
+#[cfg(feature = "render")]
+pub mod render;
 pub mod scan;
 mod scratch;
 pub mod sensor;

@@ -337,6 +337,10 @@ impl MapView for MapReader {
         self.store.version(index).map(|version| version.voxels)
     }
 
+    fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
+        self.store.version(index)
+    }
+
     fn statistics(&self) -> MapStatistics {
         let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         let disk_bytes = self.disk_bytes().map_or(0, |(table, octree)| table + octree);

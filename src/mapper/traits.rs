@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::scan::{PointBatch, Scan, ScanPoints, ScanReport};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::store::TileVersion;
 
 /// A map of tiles. All of [`Queries`](crate::query::Queries) and [`MapQueries`](crate::query::MapQueries) use these few.
 ///
@@ -56,6 +57,14 @@ pub trait MapView: Sync {
 
     /// About how many voxels were observed in a tile, where that is known without reading it.
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64>;
+
+    /// The committed version of a tile, where the map knows it without reading the tile: maps on disk that are open to
+    /// be read.
+    #[doc(hidden)]
+    fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
+        let _ = index;
+        None
+    }
 
     /// Sizes of the map and of what is in memory.
     fn statistics(&self) -> MapStatistics;

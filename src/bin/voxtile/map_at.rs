@@ -2,7 +2,7 @@ use crate::octree_file;
 use std::path::{Path, PathBuf};
 use voxtile::mapper::{MapReader, MapStatistics, MapView, OctreeMap, TileRef};
 use voxtile::space::{TileBox, TileIndex};
-use voxtile::store::SnapshotName;
+use voxtile::store::{SnapshotName, TileVersion};
 use voxtile::{Error, MapConfig, Result};
 
 /// Tiles that a reading command keeps in memory.
@@ -93,6 +93,10 @@ impl MapView for AnyMap {
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
         whichever!(self, voxels_of_tile_hint(index))
+    }
+
+    fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
+        whichever!(self, version_of_tile(index))
     }
 
     fn statistics(&self) -> MapStatistics {

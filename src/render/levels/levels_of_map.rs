@@ -1,0 +1,397 @@
+use super::cells::{Cells, Kind, Scale};
+use super::node_bytes::{self, Head};
+use super::node_key::{MAX_LEVEL, NodeKey};
+use super::node_store::{NodeStore, Stored};
+use super::scheme::Scheme;
+use crate::config::MapConfig;
+use crate::error::{Error, Result};
+use crate::mapper::MapView;
+use crate::space::{Aabb, TileIndex};
+use parking_lot::Mutex;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use std::collections::BTreeSet;
+
+/// The levels of detail of one state of a map, or of some of its tiles.
+///
+/// ```
+/// use voxtile::render::levels::{Kind, Levels, NodeStore};
+/// use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Scan};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
+/// map.insert_scan(&Scan { points: vec![[5.0, 0.0, 0.0]], ..Scan::default() })?;
+/// let store = NodeStore::open(std::io::Cursor::new(Vec::new()), "nodes")?;
+/// let levels = Levels::build(&map, &map.tile_indices(), &store, &|_| true)?.expect("not stopped");
+/// let top = levels.tops()[0];
+/// assert!(levels.node(&map, &store, top, Kind::Occupied)?.is_some());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Levels {
+    config: MapConfig,
+    pub(super) scheme: Scheme,
+    /// From the level of tiles on, those without occupied voxels only where one beside them has some.
+    nodes: FxHashMap<NodeKey, Node>,
+    tops: Vec<NodeKey>,
+    unreadable: Vec<String>,
+}
+
+/// What is known of a node without its bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Node {
+    /// A hash of the tiles below it, of the threshold, and of how nodes are made.
+    pub(super) version: u64,
+    /// Whether it has occupied voxels.
+    pub(super) is_occupied: bool,
+    /// The last scan that may have changed it; 0 where nobody knows.
+    last_scan: u64,
+}
+
+/// Another number whenever nodes are made in another way.
+const HOW_NODES_ARE_MADE: u64 = 1;
+/// The coarsest level has no more voxels than this, so that it is there at once.
+const MOST_TOP_VOXELS: u64 = 4096;
+
+impl Levels {
+    /// Makes the coarse nodes of these tiles of a map, those that the store does not have yet, on all cores. `progress`
+    /// is told how many tiles were read since the last call; if it returns `false` the work stops, and the result is
+    /// `None`. What was made until then stays in the store.
+    ///
+    /// Tiles that are damaged are left out; [`Levels::unreadable`] says which. A store that other maps use too, or the
+    /// same map at other times, takes only maps whose tiles have versions: not files of OctoMap.
+    ///
+    /// Memory: some sixty bytes a tile, and a few tiles for each thread.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read for other reasons than damage, a store that cannot be read or written.
+    pub fn build<V: MapView>(
+        map: &V,
+        tiles: &[TileIndex],
+        store: &NodeStore,
+        progress: &(dyn Fn(u64) -> bool + Sync),
+    ) -> Result<Option<Self>> {
+        let mut left_out = BTreeSet::new();
+        let mut unreadable = Vec::new();
+        loop {
+            let damaged = Mutex::new(Vec::new());
+            let levels = Self::build_without(map, tiles, &left_out, store, progress, &damaged)?;
+            let damaged = damaged.into_inner();
+            if damaged.is_empty() {
+                return Ok(levels.map(|levels| Self { unreadable, ..levels }));
+            }
+            for (tile, reason) in damaged {
+                if left_out.insert(tile) {
+                    unreadable.push(reason);
+                }
+            }
+        }
+    }
+
+    fn build_without<V: MapView>(
+        map: &V,
+        tiles: &[TileIndex],
+        left_out: &BTreeSet<TileIndex>,
+        store: &NodeStore,
+        progress: &(dyn Fn(u64) -> bool + Sync),
+        damaged: &Mutex<Vec<(TileIndex, String)>>,
+    ) -> Result<Option<Self>> {
+        let config = map.config().clone();
+        let scheme = Scheme::of(&config.grid);
+        let mut levels =
+            Self { config, scheme, nodes: FxHashMap::default(), tops: Vec::new(), unreadable: Vec::new() };
+        let mut level: Vec<(NodeKey, Node)> = tiles
+            .iter()
+            .filter(|tile| !left_out.contains(tile))
+            .map(|&tile| (scheme.key_of_tile(tile), levels.node_of_tile(map, tile)))
+            .collect();
+        level.sort_unstable_by_key(|(key, _)| *key);
+        levels.nodes.extend(level.iter().copied());
+        loop {
+            level.retain(|(_, node)| node.is_occupied);
+            let parents = parents_of(&level);
+            let made = parents.par_iter().map(|&(key, node)| {
+                let stored = match store.find(key, node.version) {
+                    Some(stored) => stored,
+                    None => match levels.make(map, store, key, node, damaged)? {
+                        Some(stored) => stored,
+                        None => return Ok(None),
+                    },
+                };
+                let tiles = if key.level == scheme.tile_level() + 1 { 8 } else { 0 };
+                if !progress(tiles) {
+                    return Err(Stop::Asked);
+                }
+                Ok(Some((key, Node { is_occupied: stored.voxels > 0, ..node }, stored.voxels)))
+            });
+            let made: Vec<_> = match made.collect::<std::result::Result<_, Stop>>() {
+                Ok(made) => made,
+                Err(Stop::Asked) => return Ok(None),
+                Err(Stop::Failed(error)) => return Err(error),
+            };
+            if !damaged.lock().is_empty() || parents.is_empty() {
+                return Ok(Some(levels));
+            }
+            let voxels: u64 = made.iter().flatten().map(|(_, _, voxels)| u64::from(*voxels)).sum();
+            level = made.into_iter().flatten().map(|(key, node, _)| (key, node)).collect();
+            levels.nodes.extend(level.iter().copied());
+            let is_coarsest = level.first().is_none_or(|(key, _)| key.level == MAX_LEVEL);
+            if is_coarsest || (voxels <= MOST_TOP_VOXELS && is_small(&level)) {
+                levels.tops =
+                    level.iter().filter(|(_, node)| node.is_occupied).map(|(key, _)| *key).collect();
+                levels.leave_out_empty_regions();
+                return Ok(Some(levels));
+            }
+        }
+    }
+
+    /// What the index of the map tells of a tile.
+    fn node_of_tile<V: MapView>(&self, map: &V, tile: TileIndex) -> Node {
+        let version = map.version_of_tile(tile);
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&HOW_NODES_ARE_MADE.to_le_bytes());
+        hasher.update(&self.config.occupied_log_odds().to_le_bytes());
+        hasher.update(tile.to_array().map(i32::to_le_bytes).as_flattened());
+        if let Some(version) = version {
+            hasher.update(&version.table.bytes.to_le_bytes());
+            hasher.update(&version.table.crc.to_le_bytes());
+        }
+        Node {
+            version: first_eight(&hasher),
+            is_occupied: version.is_none_or(|version| version.occupied > 0),
+            last_scan: version.map_or(0, |version| version.scan_number),
+        }
+    }
+
+    /// Tiles where everything is free are of no use by themselves.
+    fn leave_out_empty_regions(&mut self) {
+        let parents: FxHashMap<NodeKey, bool> =
+            self.nodes.iter().map(|(&key, node)| (key, node.is_occupied)).collect();
+        self.nodes.retain(|key, node| {
+            node.is_occupied || parents.get(&key.parent()).is_some_and(|&is_occupied| is_occupied)
+        });
+    }
+
+    /// Makes a node of several tiles and stores it; `None` if a tile below it is damaged.
+    fn make<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+        node: Node,
+        damaged: &Mutex<Vec<(TileIndex, String)>>,
+    ) -> std::result::Result<Option<Stored>, Stop> {
+        let cells = match self.pooled(map, store, key) {
+            Ok(cells) => Cells { last_scan: node.last_scan, ..cells },
+            Err(error @ Error::Damaged { tile: Some(tile), .. }) => {
+                damaged.lock().push((tile, format!("{error:#}")));
+                return Ok(None);
+            }
+            Err(error) => return Err(Stop::Failed(error)),
+        };
+        let bytes = node_bytes::encode(&self.head(key, Kind::Occupied), &cells);
+        let bounds = cells.bounds().unwrap_or_default();
+        let stored = store.put(key, node.version, &bytes, bounds, cells.cells.len() as u32);
+        stored.map(Some).map_err(Stop::Failed)
+    }
+
+    /// The occupied voxels of a node, from those of its children.
+    fn pooled<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
+        let mut cells = Cells::default();
+        for child in key.children() {
+            if self.get(child).is_some_and(|node| node.is_occupied) {
+                cells.add_child(self.scheme, key, child, &self.cells(map, store, child)?);
+            }
+        }
+        Ok(cells)
+    }
+
+    /// The occupied voxels of a node.
+    pub(super) fn cells<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
+        if let Some(tile) = self.scheme.tile_of(key) {
+            return self.cells_of_tile(map, key, tile, Kind::Occupied);
+        }
+        let Some(node) = self.get(key) else { return Ok(Cells::default()) };
+        match store.get(key, node.version)?.map(|bytes| node_bytes::decode(&bytes)) {
+            Some(Ok(cells)) => Ok(cells),
+            // What is kept for later may have been damaged: it is made again.
+            _ => {
+                let cells = self.pooled(map, store, key)?;
+                Ok(Cells { last_scan: node.last_scan, ..cells })
+            }
+        }
+    }
+
+    fn cells_of_tile<V: MapView>(&self, map: &V, key: NodeKey, tile: TileIndex, kind: Kind) -> Result<Cells> {
+        let last_scan = self.nodes.get(&self.scheme.key_of_tile(tile)).map_or(0, |node| node.last_scan);
+        let Some(tile) = map.tile_uncached(tile)? else { return Ok(Cells::default()) };
+        Ok(Cells::of_tile(self.scheme, key, &tile, &self.config, kind, last_scan))
+    }
+
+    /// The bytes of a node (`docs/view.md`), compressed as gzip; `None` if there is no such node. Only nodes that are
+    /// tiles, or parts of them, know free and unknown voxels.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read, a store that cannot be read.
+    pub fn node<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+        kind: Kind,
+    ) -> Result<Option<Vec<u8>>> {
+        let head = self.head(key, kind);
+        let Some(tile) = self.scheme.tile_of(key) else {
+            let Some(node) = self.nodes.get(&key).filter(|_| kind == Kind::Occupied) else { return Ok(None) };
+            return match store.get(key, node.version)? {
+                Some(bytes) => Ok(Some(bytes)),
+                None => Ok(Some(node_bytes::encode(&head, &self.cells(map, store, key)?))),
+            };
+        };
+        let is_there = self.scheme.edges(key).iter().all(|&edge| edge > 0);
+        let Some(node) = self.nodes.get(&self.scheme.key_of_tile(tile)).filter(|_| is_there) else {
+            return Ok(None);
+        };
+        let cells = match kind {
+            Kind::Occupied if !node.is_occupied => Cells { last_scan: node.last_scan, ..Cells::default() },
+            _ => self.cells_of_tile(map, key, tile, kind)?,
+        };
+        Ok(Some(node_bytes::encode(&head, &cells)))
+    }
+
+    /// The finest blocks of a tile that have occupied voxels, and all above them within the tile.
+    pub(super) fn blocks_of_tile<V: MapView>(&self, map: &V, tile: TileIndex) -> Result<BTreeSet<NodeKey>> {
+        let mut blocks = BTreeSet::new();
+        let own = self.scheme.key_of_tile(tile);
+        let mut level = vec![own];
+        while let Some(key) = level.pop() {
+            if key.level == 0 {
+                if !self.cells_of_tile(map, key, tile, Kind::Occupied)?.cells.is_empty() {
+                    let mut above = key;
+                    while above != own && blocks.insert(above) {
+                        above = above.parent();
+                    }
+                }
+                continue;
+            }
+            level.extend(
+                key.children().filter(|&child| self.scheme.edges(child).iter().all(|&edge| edge > 0)),
+            );
+        }
+        Ok(blocks)
+    }
+
+    pub(super) fn head(&self, key: NodeKey, kind: Kind) -> Head {
+        let resolution_m = self.config.grid.resolution_m();
+        let edges = self.scheme.edges(key);
+        Head {
+            corner_m: self.scheme.first_voxel(key).map(|voxel| voxel as f64 * resolution_m),
+            voxel_edge_m: self.voxel_edge_m(key.level),
+            edge: edges.into_iter().max().unwrap_or(0).max(0),
+            kind: match kind {
+                Kind::Occupied => 0,
+                Kind::Free => 1,
+                Kind::Unknown => 2,
+            },
+            scale: Scale::of(&self.config, kind),
+            threshold: self.config.occupied_log_odds(),
+        }
+    }
+
+    /// Edge of the voxels of a level, in metres.
+    pub fn voxel_edge_m(&self, level: u8) -> f64 {
+        self.config.grid.resolution_m() * (1_u64 << level) as f64
+    }
+
+    /// The coarsest nodes, at most eight: all of the map in few voxels. None for a map without occupied voxels.
+    pub fn tops(&self) -> &[NodeKey] {
+        &self.tops
+    }
+
+    /// Tiles that are damaged and were left out: an error each.
+    pub fn unreadable(&self) -> &[String] {
+        &self.unreadable
+    }
+
+    /// Number of nodes that are tiles.
+    pub fn tiles(&self) -> usize {
+        self.nodes.keys().filter(|key| key.level == self.scheme.tile_level()).count()
+    }
+
+    /// What is known of a node, also of one above the coarsest, which stands for those below it.
+    pub(super) fn get(&self, key: NodeKey) -> Option<Node> {
+        let top_level = self.tops.first().map_or(MAX_LEVEL, |top| top.level);
+        if key.level <= top_level {
+            return self.nodes.get(&key).copied();
+        }
+        let up = |top: &NodeKey| NodeKey {
+            level: key.level,
+            index: top.index.map(|k| k >> (key.level - top.level).min(31)),
+        };
+        let below = self.tops.iter().filter(|top| up(top) == key).filter_map(|top| self.nodes.get(top));
+        below.copied().reduce(|a, b| Node {
+            version: a.version.rotate_left(1) ^ b.version,
+            last_scan: a.last_scan.max(b.last_scan),
+            is_occupied: true,
+        })
+    }
+
+    /// A box around the occupied voxels of a node: as tight as is known without reading a tile.
+    pub(super) fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
+        let head = self.head(key, Kind::Occupied);
+        let stored = self.nodes.get(&key).and_then(|node| store.find(key, node.version));
+        let bounds = match stored.filter(|stored| stored.voxels > 0) {
+            Some(stored) => stored.bounds,
+            None => [[0; 3], self.scheme.edges(key).map(|edge| (edge - 1).clamp(0, 255) as u8)],
+        };
+        let [min, max] = node_bytes::bounds_m(&head, bounds);
+        Aabb { min, max }
+    }
+}
+
+enum Stop {
+    Asked,
+    Failed(Error),
+}
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// The nodes above those of a level, which are in order, with their versions.
+fn parents_of(level: &[(NodeKey, Node)]) -> Vec<(NodeKey, Node)> {
+    let mut children: Vec<_> = level.iter().map(|&(key, node)| (key.parent(), key, node)).collect();
+    children.sort_unstable_by_key(|&(parent, key, _)| (parent, key));
+    let families = children.chunk_by(|(first, ..), (second, ..)| first == second);
+    families
+        .map(|family| {
+            let mut hasher = blake3::Hasher::new();
+            for (_, key, node) in family {
+                hasher.update(key.index.map(i32::to_le_bytes).as_flattened());
+                hasher.update(&node.version.to_le_bytes());
+            }
+            let last_scan = family.iter().map(|(_, _, node)| node.last_scan).max().unwrap_or(0);
+            (family[0].0, Node { version: first_eight(&hasher), is_occupied: true, last_scan })
+        })
+        .collect()
+}
+
+fn first_eight(hasher: &blake3::Hasher) -> u64 {
+    let hash = hasher.finalize();
+    hash.as_bytes().iter().take(8).fold(0, |number, &byte| number << 8 | u64::from(byte))
+}
+
+/// Whether the nodes of a level are at most two along each axis.
+fn is_small(level: &[(NodeKey, Node)]) -> bool {
+    (0..3).all(|k| {
+        let places = level.iter().map(|(key, _)| i64::from(key.index[k]));
+        let (least, most) =
+            places.fold((i64::MAX, i64::MIN), |(least, most), at| (least.min(at), most.max(at)));
+        most - least <= 1
+    })
+}
