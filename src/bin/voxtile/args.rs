@@ -1,6 +1,8 @@
 mod edit;
 mod read;
 mod snapshot;
+#[cfg(feature = "view")]
+mod view;
 
 use crate::flush_schedule::FlushEvery;
 use bytesize::ByteSize;
@@ -12,6 +14,8 @@ pub use read::{FrameName, ReadArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
+#[cfg(feature = "view")]
+pub use view::ViewArgs;
 use voxtile::Storage;
 
 /// Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
@@ -87,6 +91,9 @@ pub enum Command {
     /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted; exit code 1 if
     /// there is such a thing
     Repair(RepairArgs),
+    /// Look at maps in a browser: a server on this machine, and a page that needs no network
+    #[cfg(feature = "view")]
+    View(ViewArgs),
     /// Run scans through a local map, as a planner needs it: sizes and times in a table, and a picture
     Local(LocalArgs),
     /// Share what is occupied with other robots over a network; runs voxtile-share, which comes separately
@@ -123,6 +130,8 @@ impl Command {
             Self::Convert(args) => args.json,
             Self::Verify(args) => args.json,
             Self::Repair(args) => args.json,
+            #[cfg(feature = "view")]
+            Self::View(args) => args.json,
             Self::Local(args) => args.json,
             Self::Demo(args) => args.json,
             // What voxtile-share is asked for is its own to say.

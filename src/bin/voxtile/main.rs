@@ -48,6 +48,8 @@ mod stop_signal;
 mod summary;
 mod threads;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
 mod written;
 
 use args::{Cli, Command};
@@ -101,6 +103,8 @@ fn main() -> ExitCode {
         Command::Convert(args) => convert::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
         Command::Local(args) => local::run(&args),
         Command::Share(args) => share::run(&args),
         Command::Demo(args) => demo::run(&args),

@@ -28,7 +28,7 @@ impl MapAt {
         }
     }
 
-    fn open(&self) -> Result<MapReader> {
+    pub fn open(&self) -> Result<MapReader> {
         if OctreeMap::is_named_by(&self.map) {
             let reason = "is a file of OctoMap, which this command does not take; make a map of it with `voxtile import`";
             return Err(Error::argument(self.map.display().to_string(), reason));
@@ -129,13 +129,17 @@ pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Resul
     again_if_changed(|| read(&map.open()?))
 }
 
-/// The same from a map, a snapshot, or a file of OctoMap.
-pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Result<T>) -> anyhow::Result<T> {
+/// Opens a map, a snapshot, or a file of OctoMap.
+pub fn open_any_map(map: &Path) -> anyhow::Result<AnyMap> {
     if OctreeMap::is_named_by(map) {
-        return read(&AnyMap::Octree(Box::new(OctreeMap::of(octree_file::read(map)?)?)));
+        return Ok(AnyMap::Octree(Box::new(OctreeMap::of(octree_file::read(map)?)?)));
     }
-    let map = MapAt::of(map)?;
-    again_if_changed(|| read(&AnyMap::Map(Box::new(map.open()?))))
+    Ok(AnyMap::Map(Box::new(MapAt::of(map)?.open()?)))
+}
+
+/// Answers from one state of a map, a snapshot, or a file of OctoMap.
+pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Result<T>) -> anyhow::Result<T> {
+    again_if_changed(|| read(&open_any_map(map)?))
 }
 
 /// The same from two maps.

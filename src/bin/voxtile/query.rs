@@ -12,8 +12,9 @@ use voxtile::mapper::MapView;
 use voxtile::space::Point;
 use voxtile::{Error, MapQueries, Occupancy};
 
+/// What is known of a point.
 #[derive(Debug, Serialize)]
-struct Answer {
+pub struct Answer {
     point_m: Point,
     state: &'static str,
     probability: Option<f64>,
@@ -37,17 +38,7 @@ pub fn run(args: &QueryArgs) -> anyhow::Result<ExitCode> {
         order.sort_by_key(|&number| grid.tile_of(points[number]));
         let mut answers: Vec<(usize, Answer)> = Vec::with_capacity(points.len());
         for number in order {
-            let voxel = reader.voxel_at(points[number])?;
-            let occupancy = Occupancy::of(reader.config(), voxel.map(|voxel| voxel.evidence));
-            let answer = Answer {
-                point_m: points[number],
-                state: state_of(&occupancy),
-                probability: occupancy.probability(),
-                log_odds: voxel.map(|voxel| voxel.evidence.log_odds),
-                observation_count: voxel.map(|voxel| voxel.evidence.observation_count),
-                voxel_center_m: grid.voxel_of(points[number]).map(|voxel| grid.center_m(voxel)),
-            };
-            answers.push((number, answer));
+            answers.push((number, answer_at(reader, points[number])?));
         }
         answers.sort_by_key(|(number, _)| *number);
         Ok(answers)
@@ -68,6 +59,21 @@ pub fn run(args: &QueryArgs) -> anyhow::Result<ExitCode> {
     }
     out.flush()?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What a map knows of a point.
+pub fn answer_at(map: &impl MapView, point: Point) -> voxtile::Result<Answer> {
+    let grid = map.config().grid;
+    let voxel = map.voxel_at(point)?;
+    let occupancy = Occupancy::of(map.config(), voxel.map(|voxel| voxel.evidence));
+    Ok(Answer {
+        point_m: point,
+        state: state_of(&occupancy),
+        probability: occupancy.probability(),
+        log_odds: voxel.map(|voxel| voxel.evidence.log_odds),
+        observation_count: voxel.map(|voxel| voxel.evidence.observation_count),
+        voxel_center_m: grid.voxel_of(point).map(|voxel| grid.center_m(voxel)),
+    })
 }
 
 fn points_from(path: &Path) -> anyhow::Result<Vec<Point>> {

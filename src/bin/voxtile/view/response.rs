@@ -1,0 +1,99 @@
+use bytes::Bytes;
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+use http_body_util::combinators::UnsyncBoxBody;
+use http_body_util::{BodyExt, Full};
+use hyper::header::{CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, HeaderValue};
+use hyper::{Response, StatusCode};
+use std::convert::Infallible;
+use std::io::{Read, Write};
+
+pub type Body = UnsyncBoxBody<Bytes, Infallible>;
+
+/// How long a browser may keep an answer.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Keep {
+    /// It is another the next time.
+    No,
+    /// Its URL names its version.
+    ForEver,
+}
+
+/// What is sent, before it is known whether the other side understands gzip.
+pub struct Answer {
+    pub status: StatusCode,
+    pub kind: &'static str,
+    /// Compressed as gzip.
+    pub gzip: Vec<u8>,
+    pub keep: Keep,
+}
+
+const JSON: &str = "application/json";
+/// Nothing but the page's own files runs or is loaded, and nobody may put the page into another.
+const POLICY: &str = "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; worker-src 'self' blob:; \
+                      connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+pub fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+    // Memory takes everything.
+    gzip.write_all(bytes).and_then(|()| gzip.finish()).unwrap_or_default()
+}
+
+impl Answer {
+    pub fn json(mut value: serde_json::Value) -> Self {
+        // As in all that the command prints.
+        if let Some(object) = value.as_object_mut().filter(|object| !object.contains_key("asset")) {
+            object.insert("version".into(), 1.into());
+        }
+        Self { status: StatusCode::OK, kind: JSON, gzip: gzip(value.to_string().as_bytes()), keep: Keep::No }
+    }
+
+    pub fn node(gzip: Vec<u8>, keep: Keep) -> Self {
+        Self { status: StatusCode::OK, kind: "application/octet-stream", gzip, keep }
+    }
+
+    pub fn error(status: StatusCode, reason: &str) -> Self {
+        Self { status, ..Self::json(serde_json::json!({ "error": reason })) }
+    }
+
+    pub fn into_response(self, takes_gzip: bool) -> Response<Body> {
+        let bytes = if takes_gzip { self.gzip } else { plain(&self.gzip) };
+        let mut response = empty(self.status);
+        let headers = response.headers_mut();
+        headers.insert(CONTENT_TYPE, HeaderValue::from_static(self.kind));
+        if takes_gzip {
+            headers.insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+        }
+        let keep = match self.keep {
+            Keep::No => "no-store",
+            Keep::ForEver => "private, max-age=31536000, immutable",
+        };
+        headers.insert(CACHE_CONTROL, HeaderValue::from_static(keep));
+        *response.body_mut() = Full::new(Bytes::from(bytes)).boxed_unsync();
+        response
+    }
+}
+
+/// A response with the headers of all.
+pub fn empty(status: StatusCode) -> Response<Body> {
+    let mut response = Response::new(Full::default().boxed_unsync());
+    *response.status_mut() = status;
+    for (name, value) in [
+        ("content-security-policy", POLICY),
+        ("referrer-policy", "no-referrer"),
+        ("x-content-type-options", "nosniff"),
+        ("cross-origin-resource-policy", "same-origin"),
+        ("vary", "accept-encoding"),
+    ] {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+fn plain(gzip: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Own bytes, whole.
+    GzDecoder::new(gzip).read_to_end(&mut bytes).unwrap_or_default();
+    bytes
+}

@@ -1,0 +1,239 @@
+use super::response::{Answer, Body, Keep, empty};
+use super::route::Route;
+use super::served_map::ServedMap;
+use super::token::Token;
+use super::{answers, page};
+use bytes::Bytes;
+use http_body_util::BodyExt;
+use http_body_util::channel::Channel;
+use hyper::body::Incoming;
+use hyper::header::{ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_TYPE, HOST, HeaderValue, LOCATION};
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper::{Method, Request, Response, StatusCode};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use std::convert::Infallible;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::{Semaphore, watch};
+use tokio_io_timeout::TimeoutStream;
+
+/// Connections at once; others wait to be accepted.
+const CONNECTIONS: usize = 512;
+/// A connection that sends no request, or takes nothing of an answer, for so long is closed.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Something is sent this often to those who wait for events.
+const ALIVE_EVERY: Duration = Duration::from_secs(15);
+
+/// Answers requests until a signal.
+pub struct Server {
+    maps: Vec<Arc<ServedMap>>,
+    token: Token,
+    address: SocketAddr,
+    changed: watch::Receiver<u64>,
+    /// Answers computed at once: each may hold a tile.
+    work: Semaphore,
+}
+
+impl Server {
+    pub fn new(
+        maps: Vec<Arc<ServedMap>>,
+        token: Token,
+        address: SocketAddr,
+        changed: watch::Receiver<u64>,
+    ) -> Self {
+        let threads = std::thread::available_parallelism().map_or(2, usize::from);
+        Self { maps, token, address, changed, work: Semaphore::new(threads) }
+    }
+
+    pub fn run(self, listener: TcpListener) -> anyhow::Result<()> {
+        listener.set_nonblocking(true)?;
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+        runtime.block_on(async {
+            let listener = tokio::net::TcpListener::from_std(listener)?;
+            let accept = Arc::new(self).accept(listener);
+            tokio::select! {
+                () = accept => {}
+                stopped = stop_signal() => stopped?,
+            }
+            anyhow::Ok(())
+        })?;
+        // Answers that are being computed are of no use any more.
+        runtime.shutdown_background();
+        Ok(())
+    }
+
+    async fn accept(self: Arc<Self>, listener: tokio::net::TcpListener) {
+        let connections = Arc::new(Semaphore::new(CONNECTIONS));
+        loop {
+            let Ok(permit) = connections.clone().acquire_owned().await else { return };
+            let stream = match listener.accept().await {
+                Ok((stream, _)) => stream,
+                // Too many open files, or a connection that is gone already.
+                Err(error) => {
+                    log::warn!("a connection was not accepted: {error}");
+                    tokio::time::sleep(Duration::from_millis(50)).await;
+                    continue;
+                }
+            };
+            let mut stream = TimeoutStream::new(stream);
+            stream.set_write_timeout(Some(PATIENCE));
+            let server = self.clone();
+            tokio::spawn(async move {
+                let service = service_fn(move |request| {
+                    let server = server.clone();
+                    async move { Ok::<_, Infallible>(server.answer(request).await) }
+                });
+                let connection = http1::Builder::new()
+                    .timer(TokioTimer::new())
+                    .header_read_timeout(PATIENCE)
+                    .serve_connection(TokioIo::new(Box::pin(stream)), service);
+                if let Err(error) = connection.await {
+                    log::debug!("a connection ended: {error}");
+                }
+                drop(permit);
+            });
+        }
+    }
+
+    async fn answer(self: Arc<Self>, request: Request<Incoming>) -> Response<Body> {
+        let is_head = request.method() == Method::HEAD;
+        let takes_gzip = takes_gzip(&request);
+        let mut response = match self.clone().route(&request) {
+            Ok(Route::Slash) => {
+                let mut response = empty(StatusCode::PERMANENT_REDIRECT);
+                if let Ok(to) = HeaderValue::from_str(&format!("/{}/", self.token.as_str())) {
+                    response.headers_mut().insert(LOCATION, to);
+                }
+                response
+            }
+            Ok(Route::Events) if !is_head => self.events(),
+            Ok(route) => self.compute(route, request.uri().query()).await.into_response(takes_gzip),
+            Err(answer) => {
+                let is_wrong_method = answer.status == StatusCode::METHOD_NOT_ALLOWED;
+                let mut response = answer.into_response(takes_gzip);
+                if is_wrong_method {
+                    response.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
+                }
+                response
+            }
+        };
+        if is_head {
+            *response.body_mut() = http_body_util::Empty::new().boxed_unsync();
+        }
+        response
+    }
+
+    fn route(&self, request: &Request<Incoming>) -> Result<Route, Answer> {
+        if ![Method::GET, Method::HEAD].contains(request.method()) {
+            return Err(Answer::error(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD are answered"));
+        }
+        if !self.is_asked_by_its_name(request) {
+            return Err(Answer::error(StatusCode::FORBIDDEN, "this server has another name"));
+        }
+        Route::of(request.uri().path(), request.uri().query(), &self.token).ok_or_else(|| {
+            Answer::error(StatusCode::NOT_FOUND, "there is nothing here; is the URL complete?")
+        })
+    }
+
+    /// On this machine alone: a page of elsewhere whose name was made to mean 127.0.0.1 gets no answer.
+    fn is_asked_by_its_name(&self, request: &Request<Incoming>) -> bool {
+        if !self.address.ip().is_loopback() {
+            return true;
+        }
+        let host = request.headers().get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+        let name = match host.rsplit_once(':') {
+            Some((name, port)) if !port.contains(']') => name,
+            _ => host,
+        };
+        let is_address = name.trim_start_matches('[').trim_end_matches(']').parse::<std::net::IpAddr>();
+        name == "localhost" || is_address.is_ok_and(|ip| ip.is_loopback())
+    }
+
+    async fn compute(self: &Arc<Self>, route: Route, question: Option<&str>) -> Answer {
+        if let Route::Page(name) = route {
+            return match page::file(name) {
+                Some(file) => Answer {
+                    status: StatusCode::OK,
+                    kind: file.kind,
+                    gzip: file.gzip.clone(),
+                    keep: Keep::No,
+                },
+                None => Answer::error(StatusCode::NOT_FOUND, "there is no such file"),
+            };
+        }
+        let has_version =
+            question.is_some_and(|question| question.split('&').any(|part| part.starts_with("v=")));
+        let busy = || Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is ending");
+        let Ok(_permit) = self.work.acquire().await else { return busy() };
+        let server = self.clone();
+        let work = tokio::task::spawn_blocking(move || match &route {
+            Route::Of(id, thing) => answers::of_map(&server.maps, id, thing, has_version),
+            _ => answers::maps(&server.maps),
+        });
+        work.await.unwrap_or_else(|_| busy())
+    }
+
+    /// What changes, as it does.
+    fn events(&self) -> Response<Body> {
+        let (mut sender, body) = Channel::<Bytes, Infallible>::new(4);
+        let (maps, mut changed) = (self.maps.clone(), self.changed.clone());
+        tokio::spawn(async move {
+            let mut told = vec![0; maps.len()];
+            loop {
+                let mut text = String::new();
+                changed.mark_unchanged();
+                for (number, map) in maps.iter().enumerate() {
+                    let generation = map.now().generation;
+                    if std::mem::replace(&mut told[number], generation) != generation {
+                        let data = serde_json::json!({ "map": number.to_string(), "generation": generation });
+                        text += &format!("event: changed\ndata: {data}\n\n");
+                    }
+                }
+                if text.is_empty() {
+                    text = "event: alive\ndata: {}\n\n".to_owned();
+                }
+                if sender.send_data(text.into()).await.is_err() {
+                    return;
+                }
+                // Nobody sends any more: the server ends.
+                if let Ok(Err(_)) = tokio::time::timeout(ALIVE_EVERY, changed.changed()).await {
+                    return;
+                }
+            }
+        });
+        let mut response = empty(StatusCode::OK);
+        response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/event-stream"));
+        response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
+        *response.body_mut() = body.boxed_unsync();
+        response
+    }
+}
+
+fn takes_gzip(request: &Request<Incoming>) -> bool {
+    let accepted = request.headers().get(ACCEPT_ENCODING).and_then(|accepted| accepted.to_str().ok());
+    accepted.is_some_and(|accepted| {
+        accepted.split(',').any(|coding| {
+            let mut parts = coding.split(';').map(str::trim);
+            let is_gzip = parts.next().is_some_and(|name| name.eq_ignore_ascii_case("gzip") || name == "*");
+            is_gzip && !parts.any(|part| part.replace(' ', "") == "q=0")
+        })
+    })
+}
+
+#[cfg(unix)]
+async fn stop_signal() -> std::io::Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let (mut interrupt, mut terminate) = (signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?);
+    tokio::select! {
+        _ = interrupt.recv() => {}
+        _ = terminate.recv() => {}
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+async fn stop_signal() -> std::io::Result<()> {
+    tokio::signal::ctrl_c().await
+}
