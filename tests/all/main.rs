@@ -90,6 +90,9 @@ mod support;
 mod trajectories;
 /// Files that the medium does not give back.
 mod unreadable;
+/// Maps in a browser, by what the server sends.
+#[cfg(all(feature = "view", target_os = "linux"))]
+mod view;
 /// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
 mod voxel_cache;
 mod wide_scans;

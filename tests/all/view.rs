@@ -1,0 +1,441 @@
+//! `voxtile view`, by its server: what it serves is the map, and nothing else, to nobody else, whatever the other side does.
+
+use assert_cmd::cargo::cargo_bin;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+const TOKEN: &str = "open_sesame";
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A running `voxtile view`, ended with its value.
+struct Viewer {
+    process: Child,
+    address: SocketAddr,
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+}
+
+struct Reply {
+    status: u16,
+    head: String,
+    body: Vec<u8>,
+}
+
+fn read_reply(stream: TcpStream) -> Reply {
+    let mut bytes = Vec::new();
+    BufReader::new(stream).read_to_end(&mut bytes).unwrap();
+    let end = bytes.windows(4).position(|four| four == b"\r\n\r\n").expect("a head") + 4;
+    let head = String::from_utf8(bytes[..end].to_vec()).unwrap();
+    let status = head.split(' ').nth(1).unwrap().parse().unwrap();
+    Reply { status, head, body: bytes[end..].to_vec() }
+}
+
+impl Viewer {
+    fn of(maps: &[&Path], cache: &Path) -> Self {
+        let mut command = Command::new(cargo_bin("voxtile"));
+        command.arg("view").args(maps).args(["--json", "--token", TOKEN]).env("XDG_CACHE_HOME", cache);
+        let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let said: Value = serde_json::from_str(&line).unwrap();
+        let address: SocketAddr = said["listen"].as_str().unwrap().parse().unwrap();
+        assert_eq!(said["url"], format!("http://{address}/{TOKEN}/"));
+        assert!(address.ip().is_loopback());
+        Self { process, address }
+    }
+
+    /// As [`Viewer::of`], once the levels of all maps are there.
+    fn ready(maps: &[&Path], cache: &Path) -> Self {
+        let viewer = Self::of(maps, cache);
+        viewer.wait(|maps| maps.iter().all(|map| map["generation"] != 0 && map["pending_tiles"] == 0));
+        viewer
+    }
+
+    fn wait(&self, is_there: impl Fn(&[Value]) -> bool) {
+        let since = Instant::now();
+        while !is_there(self.json("maps.json")["maps"].as_array().unwrap()) {
+            assert!(since.elapsed() < PATIENCE, "{}", self.json("maps.json"));
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream
+    }
+
+    /// A request of these very bytes.
+    fn send(&self, request: &str) -> Reply {
+        let mut stream = self.connect();
+        stream.write_all(request.as_bytes()).unwrap();
+        read_reply(stream)
+    }
+
+    /// A path as it is, with the token in front.
+    fn get(&self, path: &str) -> Reply {
+        self.send(&format!("GET /{TOKEN}/{path} HTTP/1.1\r\nhost: {}\r\nconnection: close\r\n\r\n", self.address))
+    }
+
+    fn json(&self, path: &str) -> Value {
+        let reply = self.get(path);
+        let text = String::from_utf8_lossy(&reply.body).into_owned();
+        assert_eq!(reply.status, 200, "{path}: {text}");
+        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{path}: {error}: {text}"))
+    }
+
+    /// Paths of all nodes with their versions, by the tileset and the files below it.
+    fn nodes(&self, map: &str) -> Vec<String> {
+        let mut nodes = Vec::new();
+        let mut open = vec![self.json(&format!("maps/{map}/tileset.json"))["root"].clone()];
+        while let Some(node) = open.pop() {
+            open.extend(node["children"].as_array().into_iter().flatten().cloned());
+            let Some(uri) = node["content"]["uri"].as_str() else { continue };
+            let path = format!("maps/{map}/{}", uri.trim_start_matches("../"));
+            if path.contains("/subtree/") {
+                open.push(self.json(&path)["root"].clone());
+            } else {
+                nodes.push(path);
+            }
+        }
+        nodes
+    }
+
+    /// The voxels of a node: centers in millimetres, and values.
+    fn voxels(&self, node: &str) -> Vec<([i64; 3], u8)> {
+        let reply = self.get(node);
+        assert_eq!(reply.status, 200, "{node}");
+        let bytes = reply.body;
+        assert_eq!(&bytes[..4], b"VXN1");
+        let count = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
+        assert_eq!(bytes.len(), 64 + 5 * count);
+        let number = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        let (corner, edge) = ([number(8), number(16), number(24)], number(32));
+        let mut at = [0_u8; 3];
+        let voxel = |number: usize| {
+            for k in 0..3 {
+                at[k] = at[k].wrapping_add(bytes[64 + k * count + number]);
+            }
+            let center = [0, 1, 2].map(|k| corner[k] + (f64::from(at[k]) + 0.5) * edge);
+            (center.map(|c| (1000.0 * c).round() as i64), bytes[64 + 3 * count + number])
+        };
+        (0..count).map(voxel).collect()
+    }
+
+    /// The voxels of the finest nodes.
+    fn finest(&self, map: &str) -> Vec<([i64; 3], u8)> {
+        let is_finest = |path: &&String| path.contains("/node/0/");
+        self.nodes(map).iter().filter(is_finest).flat_map(|path| self.voxels(path)).collect()
+    }
+
+    fn resident_bytes(&self) -> u64 {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap();
+        let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
+        1024 * line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap()
+    }
+}
+
+fn run(arguments: &[&str]) -> String {
+    let output = Command::new(cargo_bin("voxtile")).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Scans of walls, from `first` on, into a map: each scan of another wall.
+fn build(folder: &Path, map: &Path, walls: std::ops::Range<usize>) {
+    for wall in walls {
+        let scans = folder.join(format!("wall{wall}"));
+        fs::create_dir(&scans).unwrap();
+        let row = |k: usize| format!("{} {} {}", 4.03 + wall as f64, 0.05 * (k % 160) as f64 - 4.0, 0.1 * (k / 160) as f64);
+        fs::write(scans.join("0.xyz"), (0..1600).map(row).collect::<Vec<_>>().join("\n")).unwrap();
+        fs::write(scans.join("poses_tum.txt"), format!("{wall} {} 0 1 0 0 0 1\n", 12 * wall)).unwrap();
+        let mut arguments = vec!["build", text(&scans), "-o", text(map), "--resolution", "0.1", "-q"];
+        arguments.extend(map.exists().then_some("--append"));
+        run(&arguments);
+    }
+}
+
+fn exported(folder: &Path, map: &str) -> BTreeSet<[i64; 3]> {
+    let file = folder.join("voxels.csv");
+    run(&["export", map, "-o", text(&file), "-q"]);
+    let rows = fs::read_to_string(&file).unwrap();
+    let millimetres = |row: &str| {
+        let mut numbers = row.split(',').map(|number| (1000.0 * number.parse::<f64>().unwrap()).round() as i64);
+        std::array::from_fn(|_| numbers.next().unwrap())
+    };
+    rows.lines().filter(|row| row.starts_with(|first: char| first == '-' || first.is_ascii_digit())).map(millimetres).collect()
+}
+
+fn a_map() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let map = folder.path().join("walls");
+    build(folder.path(), &map, 0..3);
+    (folder, map)
+}
+
+#[test]
+fn what_is_shown_is_the_map() {
+    let (folder, map) = a_map();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let shown = viewer.finest("0");
+    let wanted = exported(folder.path(), text(&map));
+    assert_eq!(shown.len(), wanted.len());
+    assert_eq!(shown.iter().map(|(voxel, _)| *voxel).collect::<BTreeSet<_>>(), wanted);
+    // The coarsest are there at once: few, and around everything.
+    let tops: u64 = viewer.nodes("0").iter().filter(|path| !path.contains("/node/0/")).count() as u64;
+    assert!(tops > 0);
+    for voxel in wanted.iter().step_by(101) {
+        let [x, y, z] = voxel.map(|c| c as f64 / 1000.0);
+        let asked = viewer.json(&format!("maps/0/query?x={x}&y={y}&z={z}"));
+        let line = run(&["query", text(&map), &x.to_string(), &y.to_string(), &z.to_string(), "--json"]);
+        let wanted: Value = serde_json::from_str(&line).unwrap();
+        for (name, value) in wanted.as_object().unwrap() {
+            assert_eq!(asked[name], *value, "{name}");
+        }
+        assert_eq!(asked["state"], "occupied");
+        let low = asked["voxel_m"]["min"][0].as_f64().unwrap();
+        assert!(low < x && x < asked["voxel_m"]["max"][0].as_f64().unwrap());
+    }
+    let way = viewer.json("maps/0/trajectory.json");
+    assert_eq!(way["points"], serde_json::json!([[0.0, 0.0, 1.0], [12.0, 0.0, 1.0], [24.0, 0.0, 1.0]]));
+    // From the first place to its wall, and beyond it.
+    assert_eq!(viewer.json("maps/0/raycast?from=0,0,1&to=3.5,0,0.5")["visible"], true);
+    assert_eq!(viewer.json("maps/0/raycast?from=0,0,1&to=4.05,0.02,0.95")["visible"], true);
+    let beyond = viewer.json("maps/0/raycast?from=0,0,0.55&to=6,0,0.55");
+    assert_eq!(beyond["visible"], false);
+    assert!((beyond["hit"]["distance_m"].as_f64().unwrap() - 4.0).abs() < 0.2, "{beyond}");
+}
+
+#[test]
+fn octomap_files_and_several_maps_are_shown() {
+    let (folder, map) = a_map();
+    let file = folder.path().join("walls.bt");
+    run(&["export", text(&map), "-o", text(&file), "-q"]);
+    let viewer = Viewer::ready(&[&map, &file], &folder.path().join("cache"));
+    let voxels = |id: &str| viewer.finest(id).into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>();
+    assert_eq!(voxels("1"), voxels("0"));
+    assert_eq!(viewer.json("maps.json")["maps"][1]["name"], "walls.bt");
+    assert_eq!(viewer.get("maps/2/tileset.json").status, 404);
+}
+
+#[test]
+fn strangers_get_nothing() {
+    let (folder, map) = a_map();
+    let secret = folder.path().join("secret.txt");
+    fs::write(&secret, "secret").unwrap();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let host = viewer.address;
+    let asked = |line: &str, host: &str| viewer.send(&format!("{line}\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
+    let host = host.to_string();
+    assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), &host).status, 200);
+    for path in [
+        "/".to_owned(),
+        "/maps.json".to_owned(),
+        "/wrong_token/maps.json".to_owned(),
+        format!("/{}/maps.json", &TOKEN[..TOKEN.len() - 1]),
+        format!("/{TOKEN}/../secret.txt"),
+        format!("/{TOKEN}/../../../../../../etc/passwd"),
+        format!("/{TOKEN}//etc/passwd"),
+        format!("/{TOKEN}/maps/0/../../secret.txt"),
+        format!("/{TOKEN}/maps/0/%2e%2e/%2e%2e/secret.txt"),
+        format!("/{TOKEN}/maps/0/metadata.json"),
+        format!("/{TOKEN}{}", secret.display()),
+        format!("http://elsewhere/{TOKEN}x/maps.json"),
+    ] {
+        let reply = asked(&format!("GET {path} HTTP/1.1"), &host);
+        assert!(reply.status == 404 || reply.status == 400, "{path}: {}", reply.status);
+        let body = String::from_utf8_lossy(&reply.body).into_owned();
+        assert!(!body.contains("secret") && !body.contains("root:") && !body.contains("walls"), "{path}: {body}");
+    }
+    for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"] {
+        assert_eq!(asked(&format!("{method} /{TOKEN}/maps.json HTTP/1.1"), &host).status, 405, "{method}");
+    }
+    // A page of elsewhere, whose name was made to mean this machine.
+    for name in ["elsewhere.example", "elsewhere.example:80", "", "127.0.0.1.elsewhere.example"] {
+        assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), name).status, 403, "{name}");
+    }
+    assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), "localhost:1").status, 200);
+    let head = asked(&format!("HEAD /{TOKEN}/maps.json HTTP/1.1"), &host);
+    assert_eq!((head.status, head.body.len()), (200, 0));
+    let page = viewer.get("");
+    assert_eq!(page.status, 200);
+    assert!(page.head.contains("frame-ancestors 'none'") && page.head.contains("no-referrer"), "{}", page.head);
+    // Without the slash at the end the page's own links would lead nowhere.
+    let slash = viewer.send(&format!("GET /{TOKEN} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
+    assert!(slash.status == 308 && slash.head.contains(&format!("location: /{TOKEN}/")), "{}", slash.head);
+}
+
+#[test]
+fn many_at_once_and_those_who_stop_in_the_middle_are_no_harm() {
+    let (folder, map) = a_map();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let nodes = viewer.nodes("0");
+    let alone = viewer.get(&nodes[0]).body;
+    // Some send half a request, some ask and never read, some go away at once; all of them stay.
+    let silent: Vec<TcpStream> = (0..100)
+        .map(|number| {
+            let mut stream = viewer.connect();
+            let request = format!("GET /{TOKEN}/{} HTTP/1.1\r\nhost: {}\r\n\r\n", nodes[0], viewer.address);
+            let sent = if number % 2 == 0 { &request[..20] } else { &request[..] };
+            stream.write_all(sent.as_bytes()).unwrap();
+            if number % 5 == 0 {
+                stream.shutdown(std::net::Shutdown::Both).unwrap();
+            }
+            stream
+        })
+        .collect();
+    let before = viewer.resident_bytes();
+    std::thread::scope(|scope| {
+        let ask = |number: usize| {
+            let (viewer, nodes) = (&viewer, &nodes);
+            scope.spawn(move || viewer.get(&nodes[number % nodes.len()]))
+        };
+        let asked: Vec<_> = (0..200).map(ask).collect();
+        for (number, reply) in asked.into_iter().enumerate() {
+            let reply = reply.join().unwrap();
+            assert_eq!(reply.status, 200);
+            if number % nodes.len() == 0 {
+                assert_eq!(reply.body, alone);
+            }
+        }
+    });
+    let grown = viewer.resident_bytes().saturating_sub(before);
+    assert!(grown < 64 << 20, "{grown} bytes more");
+    drop(silent);
+    assert_eq!(viewer.get("maps.json").status, 200);
+}
+
+#[test]
+fn a_flush_is_told_and_only_what_changed_is_another_node() {
+    let (folder, map) = a_map();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let mut events = viewer.connect();
+    events.write_all(format!("GET /{TOKEN}/events HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address).as_bytes()).unwrap();
+    let mut events = BufReader::new(events).lines();
+    let mut next = move || events.find_map(|line| line.unwrap().strip_prefix("data: {\"generation\"").map(str::to_owned));
+    let first = next().unwrap();
+    let before: BTreeSet<String> = viewer.nodes("0").into_iter().collect();
+    build(folder.path(), &map, 3..5);
+    assert_ne!(next().unwrap(), first);
+    let wanted = exported(folder.path(), text(&map));
+    viewer.wait(|maps| maps[0]["scans"] == 5 && maps[0]["pending_tiles"] == 0);
+    let since = Instant::now();
+    while viewer.finest("0").iter().map(|(voxel, _)| *voxel).collect::<BTreeSet<_>>() != wanted {
+        assert!(since.elapsed() < PATIENCE);
+    }
+    let after: BTreeSet<String> = viewer.nodes("0").into_iter().collect();
+    let finest = |nodes: &BTreeSet<String>| nodes.iter().filter(|path| path.contains("/node/0/")).cloned().collect::<BTreeSet<_>>();
+    let (before, after) = (finest(&before), finest(&after));
+    assert!(after.difference(&before).count() > 0);
+    assert!(after.intersection(&before).count() > 0, "tiles that nobody changed have other versions");
+}
+
+#[test]
+fn snapshots_and_what_changed_since_are_shown() {
+    let (folder, map) = a_map();
+    let before = exported(folder.path(), text(&map));
+    run(&["snapshot", text(&map), "monday"]);
+    build(folder.path(), &map, 3..4);
+    // A wall is taken away, one was added.
+    run(&["clear", text(&map), "--region", "3", "-5", "-1", "5", "5", "3", "-q"]);
+    let after = exported(folder.path(), text(&map));
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    assert_eq!(viewer.json("maps.json")["maps"][0]["snapshots"][0]["name"], "monday");
+    let shown = |id: &str| viewer.finest(id).into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>();
+    assert_eq!(shown("0@monday"), before);
+    let mut change = viewer.finest("0~monday");
+    change.sort_unstable();
+    let wanted: Vec<([i64; 3], u8)> = before
+        .union(&after)
+        .map(|voxel| (*voxel, if !before.contains(voxel) { 1 } else if !after.contains(voxel) { 2 } else { 3 }))
+        .collect();
+    assert!([1, 2, 3].iter().all(|value| wanted.iter().any(|(_, found)| found == value)));
+    assert_eq!(change, wanted);
+    assert_eq!(viewer.get("maps/0@tuesday/tileset.json").status, 404);
+    // A snapshot by itself.
+    let path = PathBuf::from(format!("{}@monday", map.display()));
+    let viewer = Viewer::ready(&[&path], &folder.path().join("cache"));
+    assert_eq!(viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>(), before);
+}
+
+#[test]
+fn a_damaged_tile_is_left_out_and_said() {
+    let (folder, map) = a_map();
+    let tables = fs::read_dir(&map).unwrap().map(|entry| entry.unwrap().path().join("iwlo_meta.bin"));
+    let mut tables: Vec<PathBuf> = tables.filter(|path| path.exists()).collect();
+    tables.sort();
+    let all = exported(folder.path(), text(&map));
+    let mut bytes = fs::read(&tables[0]).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&tables[0], bytes).unwrap();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let said = viewer.json("maps.json")["maps"][0]["unreadable"].to_string();
+    let folder_name = tables[0].parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
+    assert!(said.contains(&folder_name), "{said}");
+    let shown = viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>();
+    assert!(shown.len() < all.len() && shown.is_subset(&all));
+}
+
+#[test]
+fn what_is_kept_serves_the_next_time_and_damage_of_it_does_not_show() {
+    let (folder, map) = a_map();
+    let cache = folder.path().join("cache");
+    let wanted: BTreeSet<(String, Vec<u8>)> = {
+        let viewer = Viewer::ready(&[&map], &cache);
+        viewer.nodes("0").into_iter().map(|path| (path.clone(), viewer.get(&path).body)).collect()
+    };
+    let kept = fs::read_dir(cache.join("voxtile")).unwrap().next().unwrap().unwrap().path();
+    let bytes = fs::read(&kept).unwrap();
+    let shown = |viewer: &Viewer| -> BTreeSet<(String, Vec<u8>)> {
+        viewer.nodes("0").into_iter().map(|path| (path.clone(), viewer.get(&path).body)).collect()
+    };
+    {
+        // Two at once: the second keeps nothing.
+        let (one, other) = (Viewer::ready(&[&map], &cache), Viewer::ready(&[&map], &cache));
+        assert_eq!((shown(&one), shown(&other)), (wanted.clone(), wanted.clone()));
+    }
+    assert_eq!(fs::read(&kept).unwrap(), bytes, "it was made again");
+    for damaged in [bytes[..bytes.len() / 2].to_vec(), bytes.iter().map(|byte| byte ^ 0x20).collect(), Vec::new()] {
+        fs::write(&kept, damaged).unwrap();
+        assert_eq!(shown(&Viewer::ready(&[&map], &cache)), wanted);
+    }
+    let mut flipped = bytes.clone();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 0x10;
+    fs::write(&kept, flipped).unwrap();
+    assert_eq!(shown(&Viewer::ready(&[&map], &cache)), wanted);
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |arguments: &[&str]| {
+        let output = Command::new(cargo_bin("voxtile")).arg("view").args(arguments).output().unwrap();
+        assert!(!output.status.success(), "{arguments:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let nothing = folder.path().join("nothing");
+    assert!(refused(&[text(&nothing)]).contains(text(&nothing)));
+    let (_folder, map) = a_map();
+    assert!(refused(&[text(&map), "--token", "short"]).contains("--token"));
+    assert!(refused(&[text(&map), "--listen", "127.0.0.1"]).contains("--listen"));
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    assert!(refused(&[text(&map), "--listen", &taken.local_addr().unwrap().to_string()]).contains("--listen"));
+}
