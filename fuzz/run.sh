@@ -60,6 +60,11 @@ fuzz() {
     [[ -z $outcome ]]
 }
 
+# Readers that take paths get their files here.
+export TMPDIR=$PWD/target/scratch
+mkdir -p "$TMPDIR"
+trap 'rm -rf "$TMPDIR"' EXIT
+
 status=0
 for target in "${targets[@]}"; do
     mkdir -p "corpus/$target" "target/corpus/$target" "artifacts/$target"

@@ -1,0 +1,5 @@
+//! Small recordings that tests make.
+#![allow(dead_code)]
+
+pub mod bag1;
+pub mod message;
