@@ -2,12 +2,13 @@
 
 use super::made::bag1::bag1;
 use super::made::message::{F32, MessageWriter, U32};
+use super::made::voxels::voxel_file;
 use super::targets::choice;
 use std::fs;
 use std::path::Path;
 use voxtile_clouds::ros::Wire;
 use voxtile_clouds::ros::messages::MessageKind;
-use voxtile_clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_clouds::write::VoxelFileFormat;
 
 /// Target, name and content of seeds.
 pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;
@@ -45,36 +46,11 @@ fn surveys() -> Seeds {
         ("cloud_las", "timed-laz", fixture("timed.laz")),
         ("cloud_las", "feet", fixture("feet.las")),
         ("cloud_las", "keys", fixture("survey_feet.las")),
-        ("cloud_las", "layers", voxels(VoxelFileFormat::Laz)),
-        ("cloud_las", "copc", voxels(VoxelFileFormat::Copc)),
+        ("cloud_las", "layers", voxel_file(VoxelFileFormat::Laz)),
+        ("cloud_las", "copc", voxel_file(VoxelFileFormat::Copc)),
         ("cloud_e57", "scans", fixture("scans.e57")),
-        ("cloud_e57", "voxels", voxels(VoxelFileFormat::E57)),
+        ("cloud_e57", "voxels", voxel_file(VoxelFileFormat::E57)),
     ]
-}
-
-/// Some voxels in a format of another program.
-fn voxels(format: VoxelFileFormat) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(format!("a.{}", format.extension().unwrap()));
-    let row = |k: i32| VoxelRow {
-        index: [k, 7 * k, -k],
-        center_m: [k, 7 * k, -k].map(|k| f64::from(k) * 0.5 + 0.25),
-        probability: 0.9,
-        log_odds: 2.0,
-        observation_count: k,
-        tile: [0; 3],
-    };
-    let head = VoxelsHead {
-        voxels: 30,
-        resolution_m: 0.5,
-        bounds_m: [row(0), row(29)].map(|row| row.center_m).map(|[x, y, z]| [x, y, z.min(x - 29.0)]),
-        occupied_from: 0.5,
-        crs_wkt: Some("LOCAL_CS[\"hall\",UNIT[\"metre\",1]]".to_owned()),
-    };
-    let mut sink = open_sink(format, &head, &path, &WriteOptions::beside(&path)).unwrap();
-    (0..30).for_each(|k| sink.put(&row(k)).unwrap());
-    sink.finish().unwrap();
-    fs::read(path).unwrap()
 }
 
 fn poses() -> Seeds {
@@ -127,7 +103,7 @@ fn recordings() -> Seeds {
         ("ros_bag1", "whole", bag),
         ("ros_bag1", "small", bag1(&topics[..1], &messages[..1])),
         ("ros_mcap", "points", fixture("ros/only_points.mcap")),
-        ("ros_mcap", "voxels", voxels(VoxelFileFormat::Mcap)),
+        ("ros_mcap", "voxels", voxel_file(VoxelFileFormat::Mcap)),
         ("ros_metadata", "list", metadata.into()),
         ("ros_metadata", "behind", behind.into()),
     ]

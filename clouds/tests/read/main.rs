@@ -8,6 +8,11 @@ mod e57;
 mod formats;
 #[cfg(feature = "las")]
 mod las;
+/// What is promised of compressed points.
+#[cfg(feature = "las")]
+mod laz_chunks;
+#[path = "../made/mod.rs"]
+mod made;
 /// PLY, text and raw floats.
 mod plain;
 /// Files of poses.
