@@ -60,9 +60,9 @@ fuzz() {
     [[ -z $outcome ]]
 }
 
-# Readers that take paths get their files here.
-export TMPDIR=$PWD/target/scratch
-mkdir -p "$TMPDIR"
+# Readers that take paths get their files here: in memory, where that is possible.
+TMPDIR=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
+export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 status=0

@@ -34,6 +34,10 @@ const LASZIP: &str = "laszip encoded";
 const LASZIP_ID: u16 = 22204;
 /// A header is at most so long in LAS 1.4.
 const HEADER_BYTES: usize = 375;
+/// Three scales and three offsets.
+const SCALES_AT: usize = 131;
+/// Neither scales nor offsets are as large: a hundred times the way to the sun.
+const MOST_COORDINATE: f64 = 1e13;
 /// Records of more bytes, and more of them, have nothing to do with coordinates.
 const MOST_RECORD_BYTES: u64 = 1 << 20;
 const MOST_RECORDS: u32 = 10_000;
@@ -72,6 +76,7 @@ impl Layout {
         {
             return Err(wrong(105, format!("{points} points of {record_bytes} bytes are impossible")));
         }
+        check_scales(&header).map_err(|(at, reason)| wrong(at, reason))?;
         let mut layout = Self {
             header,
             file_bytes,
@@ -157,6 +162,18 @@ impl Layout {
         let record = self.records.iter().find(|record| record.user == user && record.id == id);
         record.map(|record| record.data.as_slice())
     }
+}
+
+/// Scales and offsets make coordinates of whole numbers: from others than these, no finite ones come.
+fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
+    for (k, axis) in ["x", "y", "z", "x", "y", "z"].into_iter().enumerate() {
+        let (at, what) = (SCALES_AT + 8 * k, if k < 3 { "scale" } else { "offset" });
+        let value = f64::from_bits(number(header, at, 8));
+        if !(value.abs() < MOST_COORDINATE && (value != 0.0 || what == "offset")) {
+            return Err((at as u64, format!("the {what} of {axis} is {value}: no coordinates come of it")));
+        }
+    }
+    Ok(())
 }
 
 /// A little-endian number of up to eight bytes; what is missing is zero.

@@ -91,7 +91,7 @@ fn drain(source: &mut dyn CloudSource, bytes: usize) -> bool {
                 let mut points = 0;
                 let read = source.read_points(&mut |point| {
                     assert!(
-                        !point.is_return || point.position_m.iter().all(|axis| !axis.is_nan()),
+                        !point.is_return || point.position_m.iter().all(|axis| axis.is_finite()),
                         "{point:?}"
                     );
                     points += 1;
