@@ -20,7 +20,7 @@ fn ply_of_every_encoding() {
 #[test]
 fn ply_as_text_is_the_same_points_as_in_both_binaries() {
     let folder = tempfile::tempdir().unwrap();
-    let rows = [[0.1, -1e-3, 16_777_217.0], [1.0 / 3.0, 2e30, -0.7]];
+    let rows: [[f64; 3]; 2] = [[0.1, -1e-3, 16_777_217.0], [1.0 / 3.0, 2e30, -0.7]];
     let file = |format: &str, body: &[Vec<u8>]| {
         let head = format!(
             "ply\nformat {format} 1.0\nelement vertex 2\nproperty float x\nproperty double y\nproperty float32 z\n\
