@@ -32,7 +32,7 @@ pub const TARGETS: [(&str, Target); 10] = [
 ];
 
 /// LAZ says a lot in few bytes: so many points of a cloud are enough.
-const MOST_POINTS: u64 = 20_000;
+const MOST_POINTS: u64 = 2_000;
 
 /// PLY in any of its encodings.
 pub fn ply(data: &[u8]) -> bool {

@@ -2,6 +2,8 @@
 
 /// Depth images that the test makes.
 mod depth;
+/// Points of a scanner in motion.
+mod deskew;
 #[cfg(feature = "e57")]
 mod e57;
 /// What a file or a folder is.
