@@ -60,6 +60,11 @@ fuzz() {
     [[ -z $outcome ]]
 }
 
+# Readers that take paths get their files here: in memory, where that is possible.
+TMPDIR=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
+export TMPDIR
+trap 'rm -rf "$TMPDIR"' EXIT
+
 status=0
 for target in "${targets[@]}"; do
     mkdir -p "corpus/$target" "target/corpus/$target" "artifacts/$target"

@@ -9,6 +9,7 @@
 //! Formats that need many crates stand behind features: `las`, `e57`, `ros`, `sqlite`.
 
 mod cloud;
+mod deskew;
 mod error;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod guard;
@@ -22,6 +23,7 @@ mod stamp;
 pub mod write;
 
 pub use cloud::{CloudHead, CloudPoint, CloudSource};
+pub use deskew::Deskew;
 pub use error::{Error, Place, Result};
 pub use pose::RigidPose;
 pub use stamp::in_name as stamp_of_name;

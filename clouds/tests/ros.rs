@@ -1,9 +1,14 @@
 //! Recordings that rosbags and the writer of mcap.dev made (tests/fixtures/make_ros.py) give what was put into them.
 #![cfg(feature = "ros")]
 
+mod made;
+
+use made::bag1::bag1;
+use made::message::{F32, MessageWriter};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::slice::from_ref;
+use voxtile_clouds::read::Format;
 use voxtile_clouds::ros::{BagOptions, PoseSource, open_bag, open_recording};
 use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
 
@@ -337,4 +342,69 @@ fn damaged_files_never_panic_and_end() {
         // Most of it must have got as far as points, or this tests nothing.
         assert!(read > 2_000, "{name}: {read} points");
     }
+}
+
+/// A bag of ROS 1 of one cloud, with the transforms before and after it.
+fn part(number: i64, has_mount: bool) -> Vec<u8> {
+    let stamp_ns = 1_700_000_000_000_000_000 + number * 100_000_000;
+    let moved = |stamp_ns: i64| {
+        let x_m = (stamp_ns - 1_700_000_000_000_000_000) as f64 * 1e-8;
+        MessageWriter::ros1().tf(stamp_ns, "map", "base_link", &[x_m, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    };
+    let mount = MessageWriter::ros1().tf(0, "base_link", "lidar", &[0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0]);
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let points = [[number as f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    let cloud = MessageWriter::ros1().point_cloud2(stamp_ns, "lidar", &fields, &points);
+    let mut topics = vec![("/points", "sensor_msgs/PointCloud2"), ("/tf", "tf2_msgs/TFMessage")];
+    // The transform that frames the cloud's stamp is in the next part.
+    let mut messages = vec![(1, stamp_ns - 60_000_000, moved(stamp_ns - 60_000_000)), (0, stamp_ns, cloud)];
+    if has_mount {
+        topics.push(("/tf_static", "tf2_msgs/TFMessage"));
+        messages.push((2, stamp_ns - 60_000_000, mount));
+    } else {
+        // Connections are numbered anew in each part.
+        topics.swap(0, 1);
+        messages.iter_mut().for_each(|message| message.0 = 1 - message.0);
+    }
+    bag1(&topics, &messages)
+}
+
+#[test]
+fn a_split_bag_is_one_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let names: Vec<String> = (0..11).map(|number| format!("drive_{number}.bag")).collect();
+    for (number, name) in names.iter().enumerate() {
+        std::fs::write(folder.path().join(name), part(number as i64, number == 0)).unwrap();
+    }
+    let files: Vec<PathBuf> = names.iter().map(|name| folder.path().join(name)).collect();
+    assert_eq!(Format::guess(folder.path()).unwrap(), Format::Bag1);
+    for paths in [vec![folder.path().to_owned()], files] {
+        let (clouds, errors, remarks) = read(&paths, &BagOptions::default());
+        assert_eq!((clouds.len(), errors), (11, vec![]), "{paths:?}");
+        for (number, (head, points)) in clouds.iter().enumerate() {
+            assert_eq!(head.name, number.to_string());
+            assert_eq!(points[0].position_m[0], number as f64, "parts are in the natural order of names");
+            // Nothing is known behind the last transform.
+            let position_m = head.world_from_sensor.map(|pose| pose.position_m);
+            match number {
+                10 => assert_eq!(position_m, None),
+                _ => {
+                    let [x, y, z] = position_m.unwrap();
+                    assert!((x - number as f64).abs() < 1e-6 && (y, z) == (0.0, 2.0), "{position_m:?}");
+                }
+            }
+        }
+        assert_eq!(remarks, ["1 clouds have no pose: the stamp is after the last transform of base_link"]);
+    }
+}
+
+#[test]
+fn the_last_part_of_a_split_bag_may_be_cut_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let (first, second) = (part(0, true), part(1, false));
+    std::fs::write(folder.path().join("drive_0.bag"), first).unwrap();
+    std::fs::write(folder.path().join("drive_1.bag.active"), &second[..second.len() - 400]).unwrap();
+    let (clouds, _, remarks) = read(&[folder.path().to_owned()], &BagOptions::default());
+    assert!(clouds.iter().any(|(head, _)| head.world_from_sensor.is_some()));
+    assert!(remarks.iter().any(|remark| remark.contains("drive_1.bag.active has no index")), "{remarks:?}");
 }

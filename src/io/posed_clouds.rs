@@ -6,7 +6,7 @@ use crate::scan::{Pose, no_return};
 use crate::space::Point;
 use std::path::{Path, PathBuf};
 use voxtile_clouds::poses::{Found, Trajectory};
-use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, Place, RigidPose};
+use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, Deskew, Place, RigidPose};
 
 /// How clouds get their poses, and what becomes of their points.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,32 +83,29 @@ impl PosedClouds {
         poses: CloudPoses,
         options: CloudOptions,
     ) -> Result<Self> {
-        if let CloudPoses::File(file, trajectory) = &poses
+        if let CloudPoses::File(_, trajectory) = &poses
             && trajectory.span_ns().is_none()
             && let Some(clouds) = source.len_hint()
-            && trajectory.len() as u64 != clouds
         {
-            let reason = format!(
-                "{} poses without time stamps for {clouds} clouds; there must be one a cloud, in their order",
-                trajectory.len()
-            );
-            return Err(Error::argument(file.display().to_string(), reason));
+            trajectory.check_clouds(clouds)?;
         }
         let (number, without_pose, reasons, fields) = Default::default();
         Ok(Self { source, path: path.to_owned(), poses, options, number, without_pose, reasons, fields })
     }
 
     /// The pose of the body at a time, or of a cloud; or why there is none.
-    fn pose_of(&self, head: &CloudHead, number: u64) -> std::result::Result<RigidPose, String> {
-        match &self.poses {
-            CloudPoses::Identity => Ok(RigidPose::IDENTITY),
-            CloudPoses::Missing => Err("neither the input has poses nor a file of them was named".to_owned()),
-            CloudPoses::Source => {
+    fn pose_of(&self, head: &CloudHead, number: u64) -> Result<std::result::Result<RigidPose, String>> {
+        let tolerance_ns = self.options.pose_tolerance_ns;
+        Ok(match (&self.poses, head.stamp_ns) {
+            (CloudPoses::Identity, _) => Ok(RigidPose::IDENTITY),
+            (CloudPoses::Missing, _) => {
+                Err("neither the input has poses nor a file of them was named".to_owned())
+            }
+            (CloudPoses::Source, _) => {
                 head.world_from_sensor.ok_or_else(|| "the recording has none at its time".to_owned())
             }
-            CloudPoses::File(_, trajectory) if trajectory.span_ns().is_some() && head.stamp_ns.is_some() => {
-                let stamp_ns = head.stamp_ns.unwrap_or_default();
-                match trajectory.at(stamp_ns, self.options.pose_tolerance_ns) {
+            (CloudPoses::File(_, trajectory), Some(stamp_ns)) if trajectory.span_ns().is_some() => {
+                match trajectory.at(stamp_ns, tolerance_ns) {
                     Found::Exact(pose) | Found::Between(pose) => Ok(pose),
                     Found::TooFar { nearest_ns } => {
                         let apart_s = (nearest_ns.saturating_sub(stamp_ns)).unsigned_abs() as f64 * 1e-9;
@@ -119,11 +116,8 @@ impl PosedClouds {
                     Found::WithoutStamps => Err("the poses have no time stamps".to_owned()),
                 }
             }
-            CloudPoses::File(_, trajectory) => usize::try_from(number)
-                .ok()
-                .and_then(|number| trajectory.by_number(number))
-                .ok_or_else(|| format!("the file has {} poses", trajectory.len())),
-        }
+            (CloudPoses::File(_, trajectory), _) => Ok(trajectory.of_cloud(number, self.source.len_hint())?),
+        })
     }
 
     fn note_without_pose(&mut self, head: &CloudHead, why: &str) {
@@ -144,7 +138,11 @@ impl PosedClouds {
         }
         let Self { source, options, poses, .. } = self;
         let stamp_ns = head.stamp_ns.filter(|_| options.is_deskewed && head.has_times);
-        let deskew = stamp_ns.map(|stamp_ns| Deskew::new(&mut **source, poses, options, stamp_ns, &sensor));
+        let deskew = stamp_ns.map(|stamp_ns| {
+            let pose_at =
+                |at_ns| Some(body_at(&mut **source, poses, options, at_ns)?.then(&options.body_from_sensor));
+            Deskew::new(stamp_ns, &sensor, pose_at)
+        });
         points.begin(head.has_intensities);
         let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
         source.read_points(&mut |point| {
@@ -172,59 +170,20 @@ impl PosedClouds {
     }
 }
 
-/// Takes points to where they were at the time of their cloud.
-struct Deskew {
-    stamp_ns: i64,
-    sensor_from_world: RigidPose,
-    /// Where the sensor was around that time, in order.
-    world_from_sensor: Vec<(i64, RigidPose)>,
-}
-
-/// Points are measured so long before or after the stamp of their cloud at most.
-const SWEEP_NS: i64 = 300_000_000;
-/// Between two poses so far apart the sensor moves along a line.
-const POSE_PERIOD_NS: i64 = 1_000_000;
-
-impl Deskew {
-    fn new(
-        source: &mut dyn CloudSource,
-        poses: &CloudPoses,
-        options: &CloudOptions,
-        stamp_ns: i64,
-        sensor: &RigidPose,
-    ) -> Self {
-        let mut pose_at = |at_ns: i64| match poses {
-            CloudPoses::File(_, trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns) {
-                Found::Exact(body) | Found::Between(body) => Some(body),
-                _ => None,
-            },
-            CloudPoses::Source => source.pose_at(at_ns),
-            CloudPoses::Identity | CloudPoses::Missing => None,
-        };
-        let periods = -SWEEP_NS / POSE_PERIOD_NS..=SWEEP_NS / POSE_PERIOD_NS;
-        let times = periods.map(|period| stamp_ns.saturating_add(period * POSE_PERIOD_NS));
-        let around = times.filter_map(|at_ns| Some((at_ns, pose_at(at_ns)?.then(&options.body_from_sensor))));
-        Self { stamp_ns, sensor_from_world: sensor.inverse(), world_from_sensor: around.collect() }
-    }
-
-    /// A point whose own pose is not known stays where it is.
-    fn apply(&self, point: &CloudPoint) -> Point {
-        let after_ns = (point.time_s * 1e9).round();
-        if after_ns == 0.0 || !after_ns.is_finite() {
-            return point.position_m;
-        }
-        // Saturates where the time is beyond all poses.
-        let at_ns = self.stamp_ns.saturating_add(after_ns as i64);
-        let next = self.world_from_sensor.partition_point(|(pose_ns, _)| *pose_ns < at_ns);
-        let before = next.checked_sub(1).and_then(|before| self.world_from_sensor.get(before));
-        let sensor = match (before, self.world_from_sensor.get(next)) {
-            (_, Some((pose_ns, pose))) if *pose_ns == at_ns => *pose,
-            (Some((from_ns, from)), Some((to_ns, to))) if to_ns - from_ns <= 2 * POSE_PERIOD_NS => {
-                from.towards(to, (at_ns - from_ns) as f64 / (to_ns - from_ns) as f64)
-            }
-            _ => return point.position_m,
-        };
-        self.sensor_from_world.apply(sensor.apply(point.position_m))
+/// Where the body was at another time than that of the cloud at hand.
+fn body_at(
+    source: &mut dyn CloudSource,
+    poses: &CloudPoses,
+    options: &CloudOptions,
+    at_ns: i64,
+) -> Option<RigidPose> {
+    match poses {
+        CloudPoses::File(_, trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns) {
+            Found::Exact(body) | Found::Between(body) => Some(body),
+            _ => None,
+        },
+        CloudPoses::Source => source.pose_at(at_ns),
+        CloudPoses::Identity | CloudPoses::Missing => None,
     }
 }
 
@@ -263,7 +222,7 @@ impl ScanSource for PosedClouds {
         while let Some(head) = self.source.next_cloud()? {
             let number = self.number;
             self.number += 1;
-            let found = self.pose_of(&head, number);
+            let found = self.pose_of(&head, number)?;
             let body = match found {
                 Ok(body) => body,
                 Err(why) => {
@@ -289,7 +248,7 @@ impl ScanSource for PosedClouds {
         {
             let number = self.number;
             self.number += 1;
-            match self.pose_of(&head, number) {
+            match self.pose_of(&head, number)? {
                 Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
                 _ => skipped += 1,
             }

@@ -1,11 +1,12 @@
 use super::{npy, text};
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Poses of a sensor, sensor to world, in the order of their file and by time.
 #[derive(Clone, Debug, Default)]
 pub struct Trajectory {
+    path: PathBuf,
     /// In the order of the file.
     poses: Vec<RigidPose>,
     /// Strictly increasing stamps, each with the number of its pose; empty where the file has none.
@@ -60,7 +61,7 @@ impl Trajectory {
         if rows.is_empty() {
             return Err(Error::argument(path.display().to_string(), "holds no pose"));
         }
-        let mut trajectory = Self::of_rows(rows);
+        let mut trajectory = Self::of_rows(path, rows);
         if let Some(calib) = calib {
             let camera_from_lidar = super::calib::read(calib)?;
             let lidar_from_camera = camera_from_lidar.inverse();
@@ -71,7 +72,7 @@ impl Trajectory {
         Ok(trajectory)
     }
 
-    fn of_rows(rows: Vec<Row>) -> Self {
+    fn of_rows(path: &Path, rows: Vec<Row>) -> Self {
         let mut remarks = Vec::new();
         let are_stamped = rows.iter().all(|row| row.stamp_ns.is_some());
         let mut stamps: Vec<(i64, usize)> =
@@ -93,7 +94,8 @@ impl Trajectory {
         if !are_stamped {
             stamps.clear();
         }
-        Self { poses: rows.into_iter().map(|row| row.pose).collect(), stamps, remarks }
+        let poses = rows.into_iter().map(|row| row.pose).collect();
+        Self { path: path.to_owned(), poses, stamps, remarks }
     }
 
     /// The pose at a time. A pose between two others needs one of them within the tolerance; none is ever extrapolated.
@@ -121,6 +123,38 @@ impl Trajectory {
     /// The pose of a number, from 0, in the order of the file.
     pub fn by_number(&self, number: usize) -> Option<RigidPose> {
         self.poses.get(number).copied()
+    }
+
+    /// The pose of a cloud by its number, from 0, where stamps do not tell it. `clouds`: how many there are, if that is
+    /// known.
+    ///
+    /// # Errors
+    ///
+    /// Not as many poses as clouds: which belong together is not known then.
+    pub fn of_cloud(&self, number: u64, clouds: Option<u64>) -> Result<RigidPose> {
+        if let Some(clouds) = clouds {
+            self.check_clouds(clouds)?;
+        }
+        let pose = usize::try_from(number).ok().and_then(|number| self.by_number(number));
+        pose.ok_or_else(|| self.other_number(&format!("at least {}", number.saturating_add(1))))
+    }
+
+    /// Checks that there are as many poses as clouds.
+    ///
+    /// # Errors
+    ///
+    /// There are not.
+    pub fn check_clouds(&self, clouds: u64) -> Result<()> {
+        if self.len() as u64 == clouds { Ok(()) } else { Err(self.other_number(&clouds.to_string())) }
+    }
+
+    fn other_number(&self, clouds: &str) -> Error {
+        let reason = format!(
+            "{} poses for {clouds} clouds, which have no time stamps in common: there must be one pose a cloud, in their \
+             order (files in the natural order of their names, scan2 before scan10)",
+            self.len()
+        );
+        Error::argument(self.path.display().to_string(), reason)
     }
 
     /// Number of poses in the file.

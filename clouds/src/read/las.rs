@@ -19,6 +19,9 @@ use std::path::Path;
 pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let layout = Layout::read(path, &mut file)?;
+    if layout.is_compressed {
+        super::laz_chunks::check(path, &file, &layout)?;
+    }
     let units = Units::of(&layout);
     let points = LasPoints::open(path, &layout, &units)?;
     let format = if layout.is_compressed { "LAZ" } else { "LAS" }.to_owned();

@@ -10,6 +10,8 @@ pub(super) struct Layout {
     pub(super) file_bytes: u64,
     pub(super) points_at: u64,
     pub(super) points: u64,
+    /// Their number stands in the field of LAS 1.4.
+    pub(super) has_large_count: bool,
     /// Bytes of a point that is not compressed.
     pub(super) record_bytes: u64,
     pub(super) is_compressed: bool,
@@ -26,8 +28,16 @@ pub(super) struct Record {
     pub(super) data: Vec<u8>,
 }
 
+/// Who records of coordinates are of, and the one of the compression.
+const PROJECTION: &str = "LASF_Projection";
+const LASZIP: &str = "laszip encoded";
+const LASZIP_ID: u16 = 22204;
 /// A header is at most so long in LAS 1.4.
 const HEADER_BYTES: usize = 375;
+/// Three scales and three offsets.
+const SCALES_AT: usize = 131;
+/// Neither scales nor offsets are as large: a hundred times the way to the sun.
+const MOST_COORDINATE: f64 = 1e13;
 /// Records of more bytes, and more of them, have nothing to do with coordinates.
 const MOST_RECORD_BYTES: u64 = 1 << 20;
 const MOST_RECORDS: u32 = 10_000;
@@ -52,7 +62,8 @@ impl Layout {
         let encoding = number(&header, 6, 2);
         let is_large = minor >= 4 && header.len() == HEADER_BYTES && header_bytes >= HEADER_BYTES as u64;
         let large_points = if is_large { number(&header, 247, 8) } else { 0 };
-        let points = if number(&header, 107, 4) > 0 { number(&header, 107, 4) } else { large_points };
+        let has_large_count = number(&header, 107, 4) == 0;
+        let points = if has_large_count { large_points } else { number(&header, 107, 4) };
         if points_at < header_bytes || points_at > file_bytes {
             let reason = format!("points begin at byte {points_at} of a file of {file_bytes} bytes");
             return Err(wrong(96, reason));
@@ -65,11 +76,13 @@ impl Layout {
         {
             return Err(wrong(105, format!("{points} points of {record_bytes} bytes are impossible")));
         }
+        check_scales(&header).map_err(|(at, reason)| wrong(at, reason))?;
         let mut layout = Self {
             header,
             file_bytes,
             points_at,
             points,
+            has_large_count,
             record_bytes,
             is_compressed: format & 0x80 != 0,
             has_standard_time: encoding & 1 != 0,
@@ -91,7 +104,7 @@ impl Layout {
         Ok(layout)
     }
 
-    /// Reads the records of coordinates between two places. What is cut off is left out.
+    /// Reads the records of coordinates and of the compression between two places. What is cut off is left out.
     fn read_records(
         &mut self,
         file: &mut File,
@@ -116,7 +129,8 @@ impl Layout {
             let data_at = at + head_bytes;
             let Some(next) = data_at.checked_add(bytes).filter(|next| *next <= end) else { break };
             let user = String::from_utf8_lossy(&user).into_owned();
-            if user == "LASF_Projection" && bytes <= MOST_RECORD_BYTES {
+            let is_wanted = user == PROJECTION || (user == LASZIP && id == LASZIP_ID);
+            if is_wanted && bytes <= MOST_RECORD_BYTES {
                 let mut data = Vec::new();
                 (&mut *file).take(bytes).read_to_end(&mut data)?;
                 self.records.push(Record { user, id, data });
@@ -136,11 +150,30 @@ impl Layout {
 
     /// The record of coordinates with this number.
     pub(super) fn record(&self, id: u16) -> Option<&[u8]> {
-        self.records
-            .iter()
-            .find(|record| record.user == "LASF_Projection" && record.id == id)
-            .map(|r| r.data.as_slice())
+        self.record_of(PROJECTION, id)
     }
+
+    /// The record that says how points are compressed.
+    pub(super) fn laszip(&self) -> Option<&[u8]> {
+        self.record_of(LASZIP, LASZIP_ID)
+    }
+
+    fn record_of(&self, user: &str, id: u16) -> Option<&[u8]> {
+        let record = self.records.iter().find(|record| record.user == user && record.id == id);
+        record.map(|record| record.data.as_slice())
+    }
+}
+
+/// Scales and offsets make coordinates of whole numbers: from others than these, no finite ones come.
+fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
+    for (k, axis) in ["x", "y", "z", "x", "y", "z"].into_iter().enumerate() {
+        let (at, what) = (SCALES_AT + 8 * k, if k < 3 { "scale" } else { "offset" });
+        let value = f64::from_bits(number(header, at, 8));
+        if !(value.abs() < MOST_COORDINATE && (value != 0.0 || what == "offset")) {
+            return Err((at as u64, format!("the {what} of {axis} is {value}: no coordinates come of it")));
+        }
+    }
+    Ok(())
 }
 
 /// A little-endian number of up to eight bytes; what is missing is zero.

@@ -28,6 +28,8 @@ mod las_runs;
 mod las_scans;
 #[cfg(feature = "las")]
 mod las_units;
+#[cfg(feature = "las")]
+mod laz_chunks;
 mod listing;
 mod one;
 mod open;

@@ -1,6 +1,7 @@
 use super::columns::{Clock, Meaning};
 use super::one::{Points, Visit};
 use super::ply_header::{Element, Encoding, Header};
+use super::scalar::Scalar;
 use crate::cloud::CloudHead;
 use crate::error::{Error, Place, Result};
 use crate::lines::Lines;
@@ -143,7 +144,7 @@ impl Records {
         Ok(())
     }
 
-    fn value(&mut self, kind: super::scalar::Scalar) -> io::Result<f64> {
+    fn value(&mut self, kind: Scalar) -> io::Result<f64> {
         self.bytes.resize(kind.bytes(), 0);
         self.input.read_exact(&mut self.bytes)?;
         self.at += self.bytes.len() as u64;
@@ -166,7 +167,8 @@ fn values_of(element: &Element, line: &str, values: &mut Vec<f64>) -> std::resul
         let word = words.next().ok_or_else(missing)?;
         let value: f64 = word.parse().map_err(|_| format!("`{word:.40}` is not a number"))?;
         if property.list.is_none() {
-            values.push(value);
+            // More digits than a float holds say nothing: the binary forms have none of them.
+            values.push(if property.kind == Scalar::F32 { f64::from(value as f32) } else { value });
             continue;
         }
         let count: u64 = word.parse().map_err(|_| format!("`{word:.40}` is no length of a list"))?;

@@ -100,7 +100,10 @@ impl Columns {
         let line = line.trim();
         let words = Separator::of(line).split(line);
         let names: Vec<String> = words.iter().map(|word| word.trim_matches('"').to_owned()).collect();
-        let Some(meaning) = Meaning::of(&names, |_| false) else { return false };
+        // Livox counts nanoseconds; that a column holds integers is not known before all of it is read.
+        let is_integer =
+            |at: usize| names.get(at).is_some_and(|name| name.eq_ignore_ascii_case("offset_time"));
+        let Some(meaning) = Meaning::of(&names, is_integer) else { return false };
         self.names = names;
         self.meaning = Some(meaning);
         true

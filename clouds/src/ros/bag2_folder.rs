@@ -9,7 +9,8 @@ use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A folder of `ros2 bag`: `metadata.yaml` and the files that it names, in order.
+/// A folder of `ros2 bag`: `metadata.yaml` and the files that it names, in order. Without one, all recordings in the
+/// folder in the natural order of their names: the parts of a bag that `rosbag record --split` wrote.
 ///
 /// Files that are compressed as a whole are unpacked into a temporary folder, which goes with this.
 pub struct Bag2Folder {
@@ -40,12 +41,15 @@ impl Bag2Folder {
             let files = metadata.files.iter().map(|name| find(path, name)).collect::<Result<Vec<_>>>()?;
             (metadata, files)
         } else {
-            let path = path.display();
-            remarks
-                .push(format!("{path} has no metadata.yaml: its files are read in the order of their names"));
             (Bag2Metadata::default(), Vec::new())
         };
         let files = if files.is_empty() { files_of(path)? } else { files };
+        // Bags of ROS 1 have none.
+        if !metadata_path.is_file() && !files.iter().all(|file| is_bag1(file)) {
+            let path = path.display();
+            remarks
+                .push(format!("{path} has no metadata.yaml: its files are read in the order of their names"));
+        }
         if files.is_empty() {
             let reason = "the folder holds no .mcap, .db3 or .bag file, and no metadata.yaml names one";
             return Err(Error::argument(path.display().to_string(), reason));
@@ -94,6 +98,12 @@ impl Bag2Folder {
     }
 }
 
+/// By its name; one that the recorder did not close ends with `.bag.active`.
+fn is_bag1(file: &Path) -> bool {
+    let name = file.to_string_lossy().to_lowercase();
+    name.ends_with(".bag") || name.ends_with(".bag.active")
+}
+
 fn is_packed(file: &Path) -> bool {
     file.extension().is_some_and(|extension| extension == "zstd" || extension == "zst")
 }
@@ -121,7 +131,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
         let path = entry.map_err(wrong)?.path();
         let name = path.to_string_lossy().to_lowercase();
         let name = name.trim_end_matches(".zstd");
-        if path.is_file() && [".mcap", ".db3", ".bag"].iter().any(|known| name.ends_with(known)) {
+        if path.is_file() && (is_bag1(&path) || [".mcap", ".db3"].iter().any(|known| name.ends_with(known))) {
             files.push(path);
         }
     }

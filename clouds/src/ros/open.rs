@@ -26,7 +26,8 @@ pub fn open_recording(paths: &[PathBuf]) -> Result<Box<dyn Recording>> {
 pub(super) fn open_file(path: &Path) -> Result<Box<dyn Recording>> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
-        Some("bag") => Ok(Box::new(Bag1::open(path)?)),
+        // A recorder that is killed leaves its file as `.bag.active`.
+        Some("bag" | "active") => Ok(Box::new(Bag1::open(path)?)),
         Some("mcap") => Ok(Box::new(McapFile::open(path)?)),
         Some("db3") => open_db3(path),
         _ => {

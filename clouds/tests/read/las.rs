@@ -104,6 +104,25 @@ fn a_file_that_is_cut_off_gives_what_is_whole() {
     }
 }
 
+/// Found by fuzzing: coordinates that were no numbers, and hits all the same.
+#[test]
+fn scales_and_offsets_must_give_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("damaged.las");
+    let bytes = fs::read(fixture("timed.las")).unwrap();
+    for (at, value, what) in [
+        (131, f64::NAN, "byte 131: the scale of x is NaN"),
+        (147, 0.0, "byte 147: the scale of z is 0"),
+        (163, f64::INFINITY, "byte 163: the offset of y is inf"),
+    ] {
+        let mut damaged = bytes.clone();
+        damaged[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        fs::write(&path, &damaged).unwrap();
+        let (error, points) = failure(&path, &OpenOptions::default());
+        assert!(points == 0 && error.contains(what), "{error}");
+    }
+}
+
 #[test]
 fn no_damage_makes_a_panic() {
     let folder = tempfile::tempdir().unwrap();

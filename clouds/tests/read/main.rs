@@ -2,12 +2,19 @@
 
 /// Depth images that the test makes.
 mod depth;
+/// Points of a scanner in motion.
+mod deskew;
 #[cfg(feature = "e57")]
 mod e57;
 /// What a file or a folder is.
 mod formats;
 #[cfg(feature = "las")]
 mod las;
+/// What is promised of compressed points.
+#[cfg(feature = "las")]
+mod laz_chunks;
+#[path = "../made/mod.rs"]
+mod made;
 /// PLY, text and raw floats.
 mod plain;
 /// Files of poses.

@@ -16,6 +16,32 @@ fn ply_of_every_encoding() {
     }
 }
 
+/// Text has more digits than a float holds; a double keeps them.
+#[test]
+fn ply_as_text_is_the_same_points_as_in_both_binaries() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: [[f64; 3]; 2] = [[0.1, -1e-3, 16_777_217.0], [1.0 / 3.0, 2e30, -0.7]];
+    let file = |format: &str, body: &[Vec<u8>]| {
+        let head = format!(
+            "ply\nformat {format} 1.0\nelement vertex 2\nproperty float x\nproperty double y\nproperty float32 z\n\
+             end_header\n"
+        );
+        let path = folder.path().join(format!("{format}.ply"));
+        fs::write(&path, [head.into_bytes(), body.concat()].concat()).unwrap();
+        clouds(&path).remove(0).1
+    };
+    let little = rows.map(|[x, y, z]| {
+        [&(x as f32).to_le_bytes()[..], &y.to_le_bytes(), &(z as f32).to_le_bytes()].concat()
+    });
+    let big = rows.map(|[x, y, z]| {
+        [&(x as f32).to_be_bytes()[..], &y.to_be_bytes(), &(z as f32).to_be_bytes()].concat()
+    });
+    let text = file("ascii", &rows.map(|[x, y, z]| format!("{x:.17} {y} {z:e}\n").into_bytes()));
+    assert_eq!(text, file("binary_little_endian", &little));
+    assert_eq!(text, file("binary_big_endian", &big));
+    assert_eq!(text[0].position_m, [f64::from(0.1_f32), -1e-3, 16_777_216.0]);
+}
+
 #[test]
 fn ply_that_is_cut_off_gives_what_is_whole() {
     let folder = tempfile::tempdir().unwrap();

@@ -67,6 +67,21 @@ fn what_is_no_pose_is_an_error_with_its_line() {
 }
 
 #[test]
+fn poses_by_number_are_as_many_as_clouds() {
+    let trajectory = read(TUM).unwrap();
+    assert_eq!(trajectory.of_cloud(2, Some(3)).unwrap(), trajectory.by_number(2).unwrap());
+    assert_eq!(trajectory.of_cloud(2, None).unwrap(), trajectory.by_number(2).unwrap());
+    for (number, clouds, counts) in [
+        (0, Some(4), "3 poses for 4 clouds"),
+        (0, Some(2), "3 poses for 2 clouds"),
+        (3, None, "3 poses for at least 4 clouds"),
+    ] {
+        let error = trajectory.of_cloud(number, clouds).unwrap_err().to_string();
+        assert!(error.contains("poses.txt: ") && error.contains(counts), "{error}");
+    }
+}
+
+#[test]
 fn tables_name_their_columns() {
     let euroc = "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n\
                  1403636579763555584,1,2,3,0,1,0,0\n";

@@ -9,8 +9,13 @@ pub struct LivoxCustom<'a> {
     pub header: Header,
     /// Number of points.
     pub count: usize,
+    /// From the stamp to where `offset_time` counts from.
+    base_after_stamp_s: f64,
     points: WireReader<'a>,
 }
+
+/// A time base further from the stamp is that of another clock.
+const MOST_BASE_NS: u128 = 1_000_000_000;
 
 /// `offset_time`, x, y, z, `reflectivity`, `tag`, `line`.
 const POINT_BYTES: usize = 4 + 3 * 4 + 3;
@@ -24,24 +29,27 @@ impl<'a> LivoxCustom<'a> {
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         let header = Header::read(&mut reader)?;
-        // `timebase` repeats the stamp; `point_num` repeats the length of the sequence.
-        reader.u64()?;
+        // Mostly `timebase` repeats the stamp; some drivers stamp a cloud when they send it.
+        let base_ns = i128::from(reader.u64()?) - i128::from(header.stamp_ns);
+        let base_after_stamp_s =
+            if base_ns.unsigned_abs() <= MOST_BASE_NS { base_ns as f64 * 1e-9 } else { 0.0 };
+        // `point_num` repeats the length of the sequence.
         reader.u32()?;
         // `lidar_id` and `rsvd`.
         reader.bytes(4)?;
         let count = reader.sequence(POINT_BYTES)?;
-        Ok(Self { header, count, points: reader })
+        Ok(Self { header, count, base_after_stamp_s, points: reader })
     }
 
     /// Its points, in order. A message that is cut off ends with an error.
     pub fn points(&self) -> impl Iterator<Item = Decoded<CloudPoint>> + '_ {
         let mut reader = self.points.clone();
-        (0..self.count).map(move |_| point(&mut reader))
+        (0..self.count).map(move |_| point(&mut reader, self.base_after_stamp_s))
     }
 }
 
-fn point(reader: &mut WireReader<'_>) -> Decoded<CloudPoint> {
-    let time_s = f64::from(reader.u32()?) * 1e-9;
+fn point(reader: &mut WireReader<'_>, base_s: f64) -> Decoded<CloudPoint> {
+    let time_s = base_s + f64::from(reader.u32()?) * 1e-9;
     let position_m = [reader.f32()?, reader.f32()?, reader.f32()?].map(f64::from);
     let intensity = f32::from(reader.u8()?);
     reader.bytes(2)?;

@@ -1,0 +1,47 @@
+//! The corpus of `fuzz/` of this crate's readers, fed to the bodies of its targets. `fuzz/run.sh` looks for more.
+#![cfg(all(feature = "las", feature = "e57", feature = "ros"))]
+
+#[path = "../made/mod.rs"]
+mod made;
+mod seeds;
+mod targets;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use targets::TARGETS;
+
+fn corpus(target: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target)
+}
+
+#[test]
+fn no_file_of_the_corpus_breaks_a_reader() {
+    for (name, target) in TARGETS {
+        let folder = corpus(name);
+        let entries = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+        let files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        assert!(!files.is_empty(), "{} is empty", folder.display());
+        for path in files {
+            // Says which file it was, should the next line panic.
+            println!("{}", path.display());
+            target(&fs::read(&path).unwrap());
+        }
+    }
+}
+
+#[test]
+fn every_seed_is_a_valid_file() {
+    for (target, name, bytes) in seeds::all() {
+        let (_, read) = TARGETS.iter().find(|(of, _)| *of == target).expect("a seed is of a target");
+        assert!(read(&bytes), "{target} {name}");
+    }
+}
+
+#[test]
+#[ignore = "writes into the repository: cargo test --test fuzz_corpus write_the_seeds -- --ignored"]
+fn write_the_seeds() {
+    for (target, name, bytes) in seeds::all() {
+        fs::create_dir_all(corpus(target)).unwrap();
+        fs::write(corpus(target).join(format!("seed-{name}")), bytes).unwrap();
+    }
+}

@@ -1,0 +1,86 @@
+/// Serialises a message of ROS, number after number.
+pub struct MessageWriter {
+    bytes: Vec<u8>,
+    is_cdr: bool,
+}
+
+/// Types of `sensor_msgs/PointField`.
+pub const U32: u8 = 6;
+pub const F32: u8 = 7;
+pub const F64: u8 = 8;
+
+/// A field of points: its name, the bytes before it, its type.
+pub type Field = (&'static str, u32, u8);
+
+impl MessageWriter {
+    /// A message of ROS 1: little-endian, without padding.
+    pub fn ros1() -> Self {
+        Self { bytes: Vec::new(), is_cdr: false }
+    }
+
+    /// A message of ROS 2: numbers are aligned to their size, behind four bytes that say so.
+    pub fn cdr() -> Self {
+        Self { bytes: vec![0, 1, 0, 0], is_cdr: true }
+    }
+
+    /// A number, as its little-endian bytes.
+    pub fn number<const N: usize>(mut self, bytes: [u8; N]) -> Self {
+        while self.is_cdr && !self.bytes.len().wrapping_sub(4).is_multiple_of(N) {
+            self.bytes.push(0);
+        }
+        self.bytes.extend(bytes);
+        self
+    }
+
+    pub fn u32(self, number: u32) -> Self {
+        self.number(number.to_le_bytes())
+    }
+
+    pub fn f32s(self, numbers: &[f32]) -> Self {
+        numbers.iter().fold(self, |message, number| message.number(number.to_le_bytes()))
+    }
+
+    pub fn f64s(self, numbers: &[f64]) -> Self {
+        numbers.iter().fold(self, |message, number| message.number(number.to_le_bytes()))
+    }
+
+    /// Bytes behind their number.
+    pub fn sized(self, bytes: &[u8]) -> Self {
+        let mut message = self.u32(bytes.len() as u32);
+        message.bytes.extend(bytes);
+        message
+    }
+
+    pub fn text(self, text: &str) -> Self {
+        match self.is_cdr {
+            true => self.sized(&[text.as_bytes(), &[0]].concat()),
+            false => self.sized(text.as_bytes()),
+        }
+    }
+
+    /// `std_msgs/Header`.
+    pub fn header(self, stamp_ns: i64, frame: &str) -> Self {
+        let message = if self.is_cdr { self } else { self.u32(0) };
+        let (seconds, ns) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
+        message.u32(seconds as u32).u32(ns as u32).text(frame)
+    }
+
+    /// `sensor_msgs/PointCloud2` of one row.
+    pub fn point_cloud2(self, stamp_ns: i64, frame: &str, fields: &[Field], points: &[Vec<u8>]) -> Vec<u8> {
+        let message = self.header(stamp_ns, frame).u32(1).u32(points.len() as u32).u32(fields.len() as u32);
+        let message = fields.iter().fold(message, |message, &(name, offset, kind)| {
+            message.text(name).u32(offset).number([kind]).u32(1)
+        });
+        let (step, data) = (points.first().map_or(1, Vec::len), points.concat());
+        message.number([0]).u32(step as u32).u32(data.len() as u32).sized(&data).number([1]).done()
+    }
+
+    /// `tf2_msgs/TFMessage` of one transform: a translation and a quaternion, x y z w.
+    pub fn tf(self, stamp_ns: i64, parent: &str, child: &str, numbers: &[f64; 7]) -> Vec<u8> {
+        self.u32(1).header(stamp_ns, parent).text(child).f64s(numbers).done()
+    }
+
+    pub fn done(self) -> Vec<u8> {
+        self.bytes
+    }
+}

@@ -1,0 +1,8 @@
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(
+    init: voxtile_fuzz::catch_panics(),
+    |data: &[u8]| {
+        voxtile_fuzz::clouds::las(data);
+    }
+);
