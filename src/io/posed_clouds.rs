@@ -68,6 +68,8 @@ pub(super) struct PosedClouds {
     /// Clouds so far.
     number: u64,
     without_pose: u64,
+    /// Whether any had one.
+    has_pose: bool,
     /// Why the first ones have none.
     reasons: Vec<String>,
     fields: Vec<String>,
@@ -89,8 +91,18 @@ impl PosedClouds {
         {
             trajectory.check_clouds(clouds)?;
         }
-        let (number, without_pose, reasons, fields) = Default::default();
-        Ok(Self { source, path: path.to_owned(), poses, options, number, without_pose, reasons, fields })
+        let (number, without_pose, has_pose, reasons, fields) = Default::default();
+        Ok(Self {
+            source,
+            path: path.to_owned(),
+            poses,
+            options,
+            number,
+            without_pose,
+            has_pose,
+            reasons,
+            fields,
+        })
     }
 
     /// The pose of the body at a time, or of a cloud; or why there is none.
@@ -111,8 +123,8 @@ impl PosedClouds {
                         let apart_s = (nearest_ns.saturating_sub(stamp_ns)).unsigned_abs() as f64 * 1e-9;
                         Err(format!("the nearest pose is {apart_s:.3} s away, beyond the tolerance"))
                     }
-                    Found::Before { .. } => Err("it is before the first pose".to_owned()),
-                    Found::After { .. } => Err("it is after the last pose".to_owned()),
+                    Found::Before { first_ns } => Err(outside(first_ns, stamp_ns, "before the first pose")),
+                    Found::After { last_ns } => Err(outside(stamp_ns, last_ns, "after the last pose")),
                     Found::WithoutStamps => Err("the poses have no time stamps".to_owned()),
                 }
             }
@@ -213,6 +225,18 @@ impl From<voxtile_clouds::Error> for Error {
     }
 }
 
+/// Why a stamp has no pose, from the later and the earlier of two times.
+fn outside(later_ns: i64, earlier_ns: i64, place: &str) -> String {
+    /// Seconds that clocks are apart: GPS and Unix time, adjusted standard GPS time of LAS.
+    const CLOCKS_S: [f64; 3] = [315_964_800.0, 1e9, 1e9 + 315_964_800.0];
+    let apart_s = (i128::from(later_ns) - i128::from(earlier_ns)) as f64 * 1e-9;
+    // Leap seconds, and a drive of a day.
+    let is_clock = |clock_s: &f64| (apart_s - clock_s).abs() < 100_000.0;
+    let hint =
+        if CLOCKS_S.iter().any(is_clock) { "; do their clocks differ, as GPS and Unix time do?" } else { "" };
+    format!("it is {apart_s:.3} s {place}{hint}")
+}
+
 impl ScanSource for PosedClouds {
     fn len_hint(&self) -> Option<usize> {
         self.source.len_hint().and_then(|clouds| usize::try_from(clouds).ok())
@@ -234,9 +258,16 @@ impl ScanSource for PosedClouds {
                 }
             };
             let world_from_sensor = self.read_points(&head, &body, points)?;
+            self.has_pose = true;
             let CloudHead { name, stamp_ns, fields, .. } = head;
             self.fields = fields;
             return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
+        }
+        if self.without_pose > 0 && !self.has_pose {
+            // A map of nothing would be no answer.
+            let reason =
+                format!("none of its {} clouds has a pose ({})", self.without_pose, self.reasons.join("; "));
+            return Err(Error::argument(self.path.display().to_string(), reason));
         }
         Ok(None)
     }
@@ -250,7 +281,10 @@ impl ScanSource for PosedClouds {
             self.number += 1;
             match self.pose_of(&head, number)? {
                 Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
-                _ => skipped += 1,
+                _ => {
+                    self.has_pose = true;
+                    skipped += 1;
+                }
             }
         }
         Ok(skipped)

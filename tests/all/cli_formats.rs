@@ -207,3 +207,27 @@ fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
     let left = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
     assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
 }
+
+/// Clouds and poses by clocks that differ: a map of nothing would be no answer.
+#[test]
+fn clouds_of_which_none_has_a_pose_make_no_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for stamp in ["1600000000.000000000", "1600000001.000000000"] {
+        fs::write(scans.join(format!("{stamp}.xyz")), "4 0 0\n4 1 0\n").unwrap();
+    }
+    let poses = folder.path().join("gps.txt");
+    fs::write(&poses, "1284035200 0 0 1 0 0 0 1\n1284035210 0 0 1 0 0 0 1\n").unwrap();
+    let map = folder.path().join("map");
+    let told = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
+    for part in ["none of its 2 clouds has a pose", "315964790.000 s after the last pose", "clocks differ"] {
+        assert!(told.contains(part), "{told}");
+    }
+    // One is enough.
+    fs::write(&poses, "1599999999 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
+    let map = folder.path().join("other");
+    let told = output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
+    assert!(told.contains("1 clouds have no pose") || told.contains("scans"), "{told}");
+    assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
+}

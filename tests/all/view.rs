@@ -86,7 +86,10 @@ impl Viewer {
 
     /// A path as it is, with the token in front.
     fn get(&self, path: &str) -> Reply {
-        self.send(&format!("GET /{TOKEN}/{path} HTTP/1.1\r\nhost: {}\r\nconnection: close\r\n\r\n", self.address))
+        self.send(&format!(
+            "GET /{TOKEN}/{path} HTTP/1.1\r\nhost: {}\r\nconnection: close\r\n\r\n",
+            self.address
+        ))
     }
 
     fn json(&self, path: &str) -> Value {
@@ -162,7 +165,9 @@ fn build(folder: &Path, map: &Path, walls: std::ops::Range<usize>) {
     for wall in walls {
         let scans = folder.join(format!("wall{wall}"));
         fs::create_dir(&scans).unwrap();
-        let row = |k: usize| format!("{} {} {}", 4.03 + wall as f64, 0.05 * (k % 160) as f64 - 4.0, 0.1 * (k / 160) as f64);
+        let row = |k: usize| {
+            format!("{} {} {}", 4.03 + wall as f64, 0.05 * (k % 160) as f64 - 4.0, 0.1 * (k / 160) as f64)
+        };
         fs::write(scans.join("0.xyz"), (0..1600).map(row).collect::<Vec<_>>().join("\n")).unwrap();
         fs::write(scans.join("poses_tum.txt"), format!("{wall} {} 0 1 0 0 0 1\n", 12 * wall)).unwrap();
         let mut arguments = vec!["build", text(&scans), "-o", text(map), "--resolution", "0.1", "-q"];
@@ -176,10 +181,14 @@ fn exported(folder: &Path, map: &str) -> BTreeSet<[i64; 3]> {
     run(&["export", map, "-o", text(&file), "-q"]);
     let rows = fs::read_to_string(&file).unwrap();
     let millimetres = |row: &str| {
-        let mut numbers = row.split(',').map(|number| (1000.0 * number.parse::<f64>().unwrap()).round() as i64);
+        let mut numbers =
+            row.split(',').map(|number| (1000.0 * number.parse::<f64>().unwrap()).round() as i64);
         std::array::from_fn(|_| numbers.next().unwrap())
     };
-    rows.lines().filter(|row| row.starts_with(|first: char| first == '-' || first.is_ascii_digit())).map(millimetres).collect()
+    rows.lines()
+        .filter(|row| row.starts_with(|first: char| first == '-' || first.is_ascii_digit()))
+        .map(millimetres)
+        .collect()
 }
 
 fn a_map() -> (TempDir, PathBuf) {
@@ -215,9 +224,9 @@ fn what_is_shown_is_the_map() {
     let way = viewer.json("maps/0/trajectory.json");
     assert_eq!(way["points"], serde_json::json!([[0.0, 0.0, 1.0], [12.0, 0.0, 1.0], [24.0, 0.0, 1.0]]));
     // From the first place to its wall, and beyond it.
-    assert_eq!(viewer.json("maps/0/raycast?from=0,0,1&to=3.5,0,0.5")["visible"], true);
-    assert_eq!(viewer.json("maps/0/raycast?from=0,0,1&to=4.05,0.02,0.95")["visible"], true);
-    let beyond = viewer.json("maps/0/raycast?from=0,0,0.55&to=6,0,0.55");
+    assert_eq!(viewer.json("maps/0/raycast?from=0,0,1&to=3.5,0,1.5")["visible"], true);
+    assert_eq!(viewer.json("maps/0/raycast?from=0,0,1from=0,0,1&to=4.05,0.02,0.95to=4.05,0.02,1.55")["visible"], true);
+    let beyond = viewer.json("maps/0/raycast?from=0,0,1.55&to=6,0,1.55");
     assert_eq!(beyond["visible"], false);
     assert!((beyond["hit"]["distance_m"].as_f64().unwrap() - 4.0).abs() < 0.2, "{beyond}");
 }
@@ -241,7 +250,8 @@ fn strangers_get_nothing() {
     fs::write(&secret, "secret").unwrap();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let host = viewer.address;
-    let asked = |line: &str, host: &str| viewer.send(&format!("{line}\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
+    let asked =
+        |line: &str, host: &str| viewer.send(&format!("{line}\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
     let host = host.to_string();
     assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), &host).status, 200);
     for path in [
@@ -261,7 +271,10 @@ fn strangers_get_nothing() {
         let reply = asked(&format!("GET {path} HTTP/1.1"), &host);
         assert!(reply.status == 404 || reply.status == 400, "{path}: {}", reply.status);
         let body = String::from_utf8_lossy(&reply.body).into_owned();
-        assert!(!body.contains("secret") && !body.contains("root:") && !body.contains("walls"), "{path}: {body}");
+        assert!(
+            !body.contains("secret") && !body.contains("root:") && !body.contains("walls"),
+            "{path}: {body}"
+        );
     }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"] {
         assert_eq!(asked(&format!("{method} /{TOKEN}/maps.json HTTP/1.1"), &host).status, 405, "{method}");
@@ -275,7 +288,11 @@ fn strangers_get_nothing() {
     assert_eq!((head.status, head.body.len()), (200, 0));
     let page = viewer.get("");
     assert_eq!(page.status, 200);
-    assert!(page.head.contains("frame-ancestors 'none'") && page.head.contains("no-referrer"), "{}", page.head);
+    assert!(
+        page.head.contains("frame-ancestors 'none'") && page.head.contains("no-referrer"),
+        "{}",
+        page.head
+    );
     // Without the slash at the end the page's own links would lead nowhere.
     let slash = viewer.send(&format!("GET /{TOKEN} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
     assert!(slash.status == 308 && slash.head.contains(&format!("location: /{TOKEN}/")), "{}", slash.head);
@@ -326,9 +343,13 @@ fn a_flush_is_told_and_only_what_changed_is_another_node() {
     let (folder, map) = a_map();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let mut events = viewer.connect();
-    events.write_all(format!("GET /{TOKEN}/events HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address).as_bytes()).unwrap();
+    events
+        .write_all(format!("GET /{TOKEN}/events HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address).as_bytes())
+        .unwrap();
     let mut events = BufReader::new(events).lines();
-    let mut next = move || events.find_map(|line| line.unwrap().strip_prefix("data: {\"generation\"").map(str::to_owned));
+    let mut next = move || {
+        events.find_map(|line| line.unwrap().strip_prefix("data: {\"generation\"").map(str::to_owned))
+    };
     let first = next().unwrap();
     let before: BTreeSet<String> = viewer.nodes("0").into_iter().collect();
     build(folder.path(), &map, 3..5);
@@ -340,7 +361,9 @@ fn a_flush_is_told_and_only_what_changed_is_another_node() {
         assert!(since.elapsed() < PATIENCE);
     }
     let after: BTreeSet<String> = viewer.nodes("0").into_iter().collect();
-    let finest = |nodes: &BTreeSet<String>| nodes.iter().filter(|path| path.contains("/node/0/")).cloned().collect::<BTreeSet<_>>();
+    let finest = |nodes: &BTreeSet<String>| {
+        nodes.iter().filter(|path| path.contains("/node/0/")).cloned().collect::<BTreeSet<_>>()
+    };
     let (before, after) = (finest(&before), finest(&after));
     assert!(after.difference(&before).count() > 0);
     assert!(after.intersection(&before).count() > 0, "tiles that nobody changed have other versions");
@@ -363,7 +386,18 @@ fn snapshots_and_what_changed_since_are_shown() {
     change.sort_unstable();
     let wanted: Vec<([i64; 3], u8)> = before
         .union(&after)
-        .map(|voxel| (*voxel, if !before.contains(voxel) { 1 } else if !after.contains(voxel) { 2 } else { 3 }))
+        .map(|voxel| {
+            (
+                *voxel,
+                if !before.contains(voxel) {
+                    1
+                } else if !after.contains(voxel) {
+                    2
+                } else {
+                    3
+                },
+            )
+        })
         .collect();
     assert!([1, 2, 3].iter().all(|value| wanted.iter().any(|(_, found)| found == value)));
     assert_eq!(change, wanted);
@@ -412,7 +446,9 @@ fn what_is_kept_serves_the_next_time_and_damage_of_it_does_not_show() {
         assert_eq!((shown(&one), shown(&other)), (wanted.clone(), wanted.clone()));
     }
     assert_eq!(fs::read(&kept).unwrap(), bytes, "it was made again");
-    for damaged in [bytes[..bytes.len() / 2].to_vec(), bytes.iter().map(|byte| byte ^ 0x20).collect(), Vec::new()] {
+    for damaged in
+        [bytes[..bytes.len() / 2].to_vec(), bytes.iter().map(|byte| byte ^ 0x20).collect(), Vec::new()]
+    {
         fs::write(&kept, damaged).unwrap();
         assert_eq!(shown(&Viewer::ready(&[&map], &cache)), wanted);
     }
@@ -437,5 +473,7 @@ fn what_cannot_be_shown_is_refused_at_once() {
     assert!(refused(&[text(&map), "--token", "short"]).contains("--token"));
     assert!(refused(&[text(&map), "--listen", "127.0.0.1"]).contains("--listen"));
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    assert!(refused(&[text(&map), "--listen", &taken.local_addr().unwrap().to_string()]).contains("--listen"));
+    assert!(
+        refused(&[text(&map), "--listen", &taken.local_addr().unwrap().to_string()]).contains("--listen")
+    );
 }

@@ -93,9 +93,10 @@ impl LasScans {
         Ok(())
     }
 
-    /// The window of a time, from 0.
+    /// The window of a time, from 0. Times at its begin may be written a little earlier, as rounding has it.
     fn window_of(&self, time_s: f64) -> u64 {
-        if self.has_one_time { 0 } else { ((time_s - self.first_s) / self.period_s) as u64 }
+        const ROUNDING: f64 = 1e-6;
+        if self.has_one_time { 0 } else { ((time_s - self.first_s) / self.period_s + ROUNDING) as u64 }
     }
 
     /// The middle of a window, in seconds of the file.
