@@ -64,6 +64,7 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<(PathBuf, Format)> {
         }
     }
     match options.open.format {
+        Some(format) if inner.is_dir() && Format::guess(path).is_err() => Ok((inner, format)),
         Some(format) => Ok((path.to_owned(), format)),
         None => match Format::guess(path) {
             Ok(format) => Ok((path.to_owned(), format)),

@@ -94,15 +94,24 @@ fn no_poses(files: &[PathBuf], folder: Option<&Path>) -> Error {
 
 /// The pose file in a folder, or beside it.
 pub(super) fn pose_file_for(folder: &Path) -> Option<PathBuf> {
-    let beside = folder.join("..");
+    let beside = above(folder);
     let places = [folder, &*beside];
     places.iter().flat_map(|place| POSE_FILES.map(|name| place.join(name))).find(|path| path.is_file())
+}
+
+/// The folder that a folder is in, by the name that a person would use for it.
+fn above(folder: &Path) -> PathBuf {
+    let is_named = folder.file_name().is_some();
+    let parent = folder.parent().filter(|parent| is_named && !parent.as_os_str().is_empty());
+    // What a link leads to is somewhere else than its name.
+    let is_link = fs::symlink_metadata(folder).is_ok_and(|metadata| metadata.is_symlink());
+    parent.filter(|_| !is_link).map_or_else(|| folder.join(".."), Path::to_owned)
 }
 
 /// A few files in a folder or beside it that look like pose files.
 fn files_like_poses(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
-    for place in [folder.to_owned(), folder.join("..")] {
+    for place in [folder.to_owned(), above(folder)] {
         let mut paths: Vec<PathBuf> =
             fs::read_dir(place).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
         paths.sort_unstable();

@@ -70,12 +70,12 @@ pub(super) struct PosedClouds {
     without_pose: u64,
     /// Whether any had one.
     has_pose: bool,
-    /// Why the first ones have none.
-    reasons: Vec<String>,
+    /// Why they have none, and the names of the first of each reason.
+    reasons: Vec<(String, Vec<String>)>,
     fields: Vec<String>,
 }
 
-/// Most clouds without a pose that are named.
+/// Most reasons that are told, and most clouds that are named for each.
 const MOST_NAMED: usize = 3;
 
 impl PosedClouds {
@@ -135,9 +135,25 @@ impl PosedClouds {
     fn note_without_pose(&mut self, head: &CloudHead, why: &str) {
         self.without_pose += 1;
         log::debug!("{}: cloud {} has no pose: {why}", self.path.display(), head.name);
-        if self.reasons.len() < MOST_NAMED {
-            self.reasons.push(format!("{}: {why}", head.name));
+        if let Some((_, names)) = self.reasons.iter_mut().find(|(known, _)| known == why) {
+            if names.len() <= MOST_NAMED {
+                names.push(head.name.clone());
+            }
+        } else if self.reasons.len() <= MOST_NAMED {
+            self.reasons.push((why.to_owned(), vec![head.name.clone()]));
         }
+    }
+
+    /// Why clouds have no pose: each reason once.
+    fn why_without_pose(&self) -> String {
+        let list = |names: &[String]| {
+            let more = if names.len() > MOST_NAMED { ", ..." } else { "" };
+            names.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ") + more
+        };
+        let told = self.reasons.iter().take(MOST_NAMED);
+        let told: Vec<String> = told.map(|(why, names)| format!("{}: {why}", list(names))).collect();
+        let more = if self.reasons.len() > MOST_NAMED { "; ..." } else { "" };
+        told.join("; ") + more
     }
 
     /// Reads the points of the cloud at hand.
@@ -250,8 +266,8 @@ impl ScanSource for PosedClouds {
             let body = match found {
                 Ok(body) => body,
                 Err(why) => {
-                    self.note_without_pose(&head, &why);
                     if !self.options.may_lack_poses {
+                        self.note_without_pose(&head, &why);
                         continue;
                     }
                     RigidPose::IDENTITY
@@ -266,7 +282,7 @@ impl ScanSource for PosedClouds {
         if self.without_pose > 0 && !self.has_pose {
             // A map of nothing would be no answer.
             let reason =
-                format!("none of its {} clouds has a pose ({})", self.without_pose, self.reasons.join("; "));
+                format!("none of its {} clouds has a pose ({})", self.without_pose, self.why_without_pose());
             return Err(Error::argument(self.path.display().to_string(), reason));
         }
         Ok(None)
@@ -317,10 +333,9 @@ impl ScanSource for PosedClouds {
             remarks.extend(trajectory.remarks().iter().cloned());
         }
         if self.without_pose > 0 {
-            let more = if self.without_pose as usize > self.reasons.len() { ", and more" } else { "" };
-            let named = self.reasons.join("; ");
-            remarks
-                .push(format!("{} clouds have no pose and are left out ({named}{more})", self.without_pose));
+            let clouds = if self.without_pose == 1 { "cloud has" } else { "clouds have" };
+            let why = self.why_without_pose();
+            remarks.push(format!("{} {clouds} no pose, left out ({why})", self.without_pose));
         }
         remarks
     }

@@ -88,7 +88,8 @@ const FOREIGN: [Foreign; 19] = [
         name: "a map (OctoMap)",
         magic: &[b"# Octomap OcTree"],
         extensions: &["bt", "ot"],
-        way: "it holds no clouds; voxtile reads such maps elsewhere",
+        way: "it holds no clouds; `voxtile import FILE -o MAP` makes a map of it, and info, query, raycast and export take \
+              the file itself",
     },
     Foreign {
         name: "OpenVDB",

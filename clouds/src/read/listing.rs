@@ -81,7 +81,7 @@ impl Listing {
             return Ok(Format::DepthTum);
         }
         let mut counts = BTreeMap::new();
-        for path in &self.files {
+        for path in self.files.iter().filter(|path| !is_beside_clouds(path)) {
             let extension = extension_of(path);
             if let Some(format) = of_extension(&extension) {
                 counts.entry(format.name()).or_insert((format, path, 0_u64)).2 += 1;

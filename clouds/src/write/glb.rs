@@ -22,6 +22,7 @@ pub(super) struct GlbSink {
     out: OutFile,
     head: VoxelsHead,
     scratch_folder: PathBuf,
+    colour_heights_m: Option<[f64; 2]>,
     places: ExternalSort<RECORD_BYTES>,
     lattice: Option<Lattice>,
     least: [i32; 3],
@@ -57,6 +58,7 @@ impl GlbSink {
             out: OutFile::create(path)?,
             head: head.clone(),
             scratch_folder: options.scratch_folder.clone(),
+            colour_heights_m: options.colour_heights_m,
             places: ExternalSort::new(&options.scratch_folder),
             lattice: None,
             least: [i32::MAX; 3],
@@ -112,7 +114,7 @@ impl VoxelSink for GlbSink {
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        let Self { mut out, head, scratch_folder, places, lattice, least, most } = *self;
+        let Self { mut out, head, scratch_folder, colour_heights_m, places, lattice, least, most } = *self;
         let size: [i64; 3] = std::array::from_fn(|k| (i64::from(most[k]) - i64::from(least[k]) + 1).max(0));
         let longest = size.iter().copied().max().unwrap_or(0);
         if longest > 1 << 24 {
@@ -125,6 +127,7 @@ impl VoxelSink for GlbSink {
             vertices: Spool::new(&scratch_folder)?,
             indices: Spool::new(&scratch_folder)?,
             bytes: Vec::new(),
+            colour_heights_m,
             surface: Surface {
                 quads: 0,
                 kind,
@@ -164,6 +167,7 @@ struct Mesh {
     vertices: Spool,
     indices: Spool,
     bytes: Vec<u8>,
+    colour_heights_m: Option<[f64; 2]>,
     surface: Surface,
 }
 
@@ -177,7 +181,7 @@ impl Mesh {
                 let place: [i64; 3] = std::array::from_fn(|k| {
                     index[k] * BRICK as i64 + i64::from(corner[k]) - i64::from(least[k])
                 });
-                let colour = colour(place[2] as f64 / self.surface.size[2].max(1) as f64);
+                let colour = colour(self.share_of_height(place[2]));
                 let turned = [place[0], place[2], self.surface.size[1] - place[1]];
                 for (k, &at) in turned.iter().enumerate() {
                     self.surface.least[k] = self.surface.least[k].min(at);
@@ -194,6 +198,16 @@ impl Mesh {
             self.surface.quads += 1;
         }
         Ok(())
+    }
+
+    /// Where a height is among those that are coloured: 0 is the first colour, 1 the last.
+    fn share_of_height(&self, place: i64) -> f64 {
+        match self.colour_heights_m {
+            Some([low, high]) if high > low => {
+                (self.surface.corner_m[2] + place as f64 * self.surface.resolution_m - low) / (high - low)
+            }
+            _ => place as f64 / self.surface.size[2].max(1) as f64,
+        }
     }
 
     fn write(self, out: &mut OutFile) -> Result<()> {

@@ -18,6 +18,8 @@ pub struct WriteOptions {
     pub cell_m: f64,
     /// Subtracted from coordinates where a format holds them in single precision (Autoware).
     pub origin_m: [f64; 3],
+    /// Meshes: the heights of the first and the last colour, in metres; of the lowest and highest voxel if not given.
+    pub colour_heights_m: Option<[f64; 2]>,
     /// Recordings: the frame of the clouds.
     pub frame: String,
     /// Recordings: the time of the clouds, in nanoseconds since 1970.
@@ -39,6 +41,7 @@ impl WriteOptions {
             z_max_m: None,
             cell_m: 20.0,
             origin_m: [0.0; 3],
+            colour_heights_m: None,
             frame: "map".to_owned(),
             stamp_ns: 0,
         }

@@ -465,6 +465,9 @@ pub enum ExportFormatName {
     Heightmap,
     /// A folder of PCD squares with the metadata of Autoware
     Autoware,
+    /// A folder of 3D Tiles: the surface at every level of detail, as Cesium and others open it
+    #[value(name = "3dtiles")]
+    ThreeDTiles,
 }
 
 impl ExportFormatName {

@@ -290,7 +290,8 @@ fn warn_if_all_is_cut(report: &ScanReport, config: &MapConfig) {
     {
         log::warn!(
             "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise --max-range; are the points \
-             in metres?"
+             in metres? Points that are in the world frame already, far from 0 0 0, need --world-frame with poses, \
+             --sensor-origin or --no-rays"
         );
     }
 }

@@ -1,4 +1,5 @@
 use crate::args::{ExportArgs, ExportFormatName};
+use crate::export_3d_tiles;
 use crate::export_origin::{ExportOrigin, OriginFile};
 use crate::export_voxels;
 use crate::json;
@@ -46,6 +47,9 @@ struct Exported {
 
 /// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
+    if args.format == Some(ExportFormatName::ThreeDTiles) {
+        return export_3d_tiles::run(args);
+    }
     let export = Export::of(args)?;
     if let ExportFormat::Foreign(format) = export.format {
         return export_voxels::run(args, format, export.region.as_ref());

@@ -12,6 +12,7 @@ mod demo;
 mod diff;
 mod digest;
 mod export;
+mod export_3d_tiles;
 mod export_origin;
 mod export_voxels;
 mod failure;

@@ -6,7 +6,7 @@ use super::node_store::NodeStore;
 use super::tileset::{LevelsOf, TilesetNodes};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::Aabb;
+use crate::space::{Aabb, Point};
 use std::collections::BTreeSet;
 
 /// What changed from one state of a map to another, node by node: voxels that appeared (1), vanished (2), or are
@@ -109,6 +109,10 @@ impl<V: MapView> TilesetNodes for Difference<'_, V> {
                 }
             }
         }
+    }
+
+    fn corner_m(&self, key: NodeKey) -> Point {
+        self.after.corner_m(key)
     }
 
     fn voxel_edge_m(&self, level: u8) -> f64 {

@@ -1,4 +1,4 @@
-use super::cells::{Cells, Kind, Scale};
+use super::cells::{Cells, Kind, Scale, axes};
 use super::node_bytes::{self, Head};
 use super::node_key::{MAX_LEVEL, NodeKey};
 use super::node_store::{NodeStore, Stored};
@@ -6,7 +6,7 @@ use super::scheme::Scheme;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::{Aabb, TileIndex};
+use crate::space::{Aabb, Point, TileIndex};
 use parking_lot::Mutex;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -262,6 +262,47 @@ impl Levels {
         Ok(Some(node_bytes::encode(&head, &cells)))
     }
 
+    /// The occupied voxels of a node: the places of each along the axes, counted from the node's lower corner in voxels of
+    /// [`Levels::voxel_edge_m`].
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read, a store that cannot be read.
+    pub fn voxels<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Vec<[u8; 3]>> {
+        let cells = self.cells(map, store, key)?.cells;
+        Ok(cells.iter().map(|cell| axes(cell.place).map(|at| at as u8)).collect())
+    }
+
+    /// Whether a node is a tile.
+    pub fn is_tile(&self, key: NodeKey) -> bool {
+        key.level == self.scheme.tile_level()
+    }
+
+    /// The lower corner of a node, in metres.
+    pub fn corner_m(&self, key: NodeKey) -> Point {
+        self.head(key, Kind::Occupied).corner_m
+    }
+
+    /// The nodes that have occupied voxels, in order, but for those within tiles.
+    pub fn keys(&self) -> Vec<NodeKey> {
+        let occupied = self.nodes.iter().filter(|(_, node)| node.is_occupied);
+        let mut keys: Vec<_> = occupied.map(|(key, _)| *key).collect();
+        keys.sort_unstable();
+        keys
+    }
+
+    /// The nodes within a tile that is divided, which is one itself; none of a tile that is not.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
+    pub fn keys_within<V: MapView>(&self, map: &V, tile: NodeKey) -> Result<Vec<NodeKey>> {
+        match self.scheme.tile_of(tile).filter(|_| tile.level == self.scheme.tile_level() && tile.level > 0) {
+            Some(index) => Ok(self.blocks_of_tile(map, index)?.into_iter().collect()),
+            None => Ok(Vec::new()),
+        }
+    }
+
     /// The finest blocks of a tile that have occupied voxels, and all above them within the tile.
     pub(super) fn blocks_of_tile<V: MapView>(&self, map: &V, tile: TileIndex) -> Result<BTreeSet<NodeKey>> {
         let mut blocks = BTreeSet::new();
@@ -339,8 +380,8 @@ impl Levels {
         })
     }
 
-    /// A box around the occupied voxels of a node: as tight as is known without reading a tile.
-    pub(super) fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
+    /// A box around the occupied voxels of a node, in metres: as tight as is known without reading a tile.
+    pub fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
         let head = self.head(key, Kind::Occupied);
         let stored = self.nodes.get(&key).and_then(|node| store.find(key, node.version));
         let bounds = match stored.filter(|stored| stored.voxels > 0) {

@@ -5,7 +5,7 @@ use super::node_key::NodeKey;
 use super::node_store::NodeStore;
 use crate::error::Result;
 use crate::mapper::MapView;
-use crate::space::Aabb;
+use crate::space::{Aabb, Point};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 pub enum TilesetContent {
     /// [`Levels::node`]'s bytes, `.vox`.
     Voxels,
-    /// Meshes, `.glb`.
+    /// Meshes, `.glb`, whose coordinates begin at the node's corner: `f32` is fine enough anywhere.
     Meshes,
 }
 
@@ -28,6 +28,9 @@ pub trait TilesetNodes {
 
     /// A box around the node, in metres.
     fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb;
+
+    /// The lower corner of a node, in metres.
+    fn corner_m(&self, key: NodeKey) -> Point;
 
     /// Edge of the voxels of a level, in metres.
     fn voxel_edge_m(&self, level: u8) -> f64;
@@ -64,7 +67,8 @@ pub fn tileset(
         boxes.into_iter().reduce(|a, b| union(&a, &b)).unwrap_or(Aabb { min: [0.0; 3], max: [0.0; 3] });
     let writer = Writer { nodes, store, content, to_root: "" };
     let top_level = tops.first().map_or(0, |key| key.level);
-    let children = tops.iter().map(|&key| writer.node(key, FILE_LEVELS, None)).collect::<Result<Vec<_>>>()?;
+    let children =
+        tops.iter().map(|&key| writer.node(key, [0.0; 3], FILE_LEVELS, None)).collect::<Result<Vec<_>>>()?;
     // Larger than that of any child, so that the empty root is always refined.
     let error_m = 4.0 * nodes.voxel_edge_m(top_level) + length(&around);
     let mut root = json!({
@@ -102,7 +106,7 @@ pub fn subtree(
     Ok(Some(json!({
         "asset": { "version": "1.1" },
         "geometricError": nodes.voxel_edge_m(key.level),
-        "root": writer.node(key, FILE_LEVELS, within.as_ref())?,
+        "root": writer.node(key, nodes.corner_m(key), FILE_LEVELS, within.as_ref())?,
     })))
 }
 
@@ -116,11 +120,23 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     /// A node and those below it that belong into the same file. `within` has the nodes below a tile.
-    fn node(&self, key: NodeKey, levels: u8, within: Option<&BTreeSet<NodeKey>>) -> Result<Value> {
+    /// `corner_m` is that of the node above it, which coordinates of meshes are relative to.
+    fn node(
+        &self,
+        key: NodeKey,
+        corner_m: Point,
+        levels: u8,
+        within: Option<&BTreeSet<NodeKey>>,
+    ) -> Result<Value> {
         let version = match within {
             // Parts of a tile change with it.
             Some(_) => self.version_of_tile(key),
             None => self.nodes.version(key).unwrap_or(0),
+        };
+        // Files have no question marks.
+        let version = match self.content {
+            TilesetContent::Voxels => format!("?v={version:016x}"),
+            TilesetContent::Meshes => String::new(),
         };
         let bounds = self.nodes.bounds_m(self.store, key);
         let children: Vec<NodeKey> = match within {
@@ -131,24 +147,31 @@ impl Writer<'_> {
         let is_divided_tile = within.is_none() && key.level == self.nodes.tile_level() && key.level > 0;
         let error_m =
             if children.is_empty() && !is_divided_tile { 0.0 } else { self.nodes.voxel_edge_m(key.level) };
-        let mut node = json!({
-            "boundingVolume": { "box": box_of(&bounds) },
-            "geometricError": error_m,
-        });
+        let own_m = self.nodes.corner_m(key);
+        let mut node = match self.content {
+            TilesetContent::Voxels => json!({ "boundingVolume": { "box": box_of(&bounds) } }),
+            TilesetContent::Meshes => {
+                let mut node = json!({ "boundingVolume": { "box": box_of(&relative(&bounds, own_m)) } });
+                let [x, y, z] = [0, 1, 2].map(|k| own_m[k] - corner_m[k]);
+                if [x, y, z] != [0.0; 3] {
+                    node["transform"] = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]);
+                }
+                node
+            }
+        };
+        node["geometricError"] = error_m.into();
         if is_divided_tile || (levels == 0 && within.is_none() && !children.is_empty()) {
-            node["content"] =
-                json!({ "uri": format!("{}subtree/{key}.json?v={version:016x}", self.to_root) });
+            node["content"] = json!({ "uri": format!("{}subtree/{key}.json{version}", self.to_root) });
             return Ok(node);
         }
         let extension = match self.content {
             TilesetContent::Voxels => "vox",
             TilesetContent::Meshes => "glb",
         };
-        node["content"] =
-            json!({ "uri": format!("{}node/{key}.{extension}?v={version:016x}", self.to_root) });
+        node["content"] = json!({ "uri": format!("{}node/{key}.{extension}{version}", self.to_root) });
         if !children.is_empty() {
             let children =
-                children.into_iter().map(|child| self.node(child, levels.saturating_sub(1), within));
+                children.into_iter().map(|child| self.node(child, own_m, levels.saturating_sub(1), within));
             node["children"] = children.collect::<Result<Vec<_>>>()?.into();
         }
         Ok(node)
@@ -183,6 +206,10 @@ impl<V: MapView> TilesetNodes for LevelsOf<'_, V> {
         self.levels.bounds_m(store, key)
     }
 
+    fn corner_m(&self, key: NodeKey) -> Point {
+        self.levels.corner_m(key)
+    }
+
     fn voxel_edge_m(&self, level: u8) -> f64 {
         self.levels.voxel_edge_m(level)
     }
@@ -201,6 +228,11 @@ fn union(a: &Aabb, b: &Aabb) -> Aabb {
         min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
         max: std::array::from_fn(|k| a.max[k].max(b.max[k])),
     }
+}
+
+fn relative(around: &Aabb, origin: Point) -> Aabb {
+    let less = |corner: Point| [0, 1, 2].map(|k| corner[k] - origin[k]);
+    Aabb { min: less(around.min), max: less(around.max) }
 }
 
 fn length(around: &Aabb) -> f64 {
