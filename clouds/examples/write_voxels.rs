@@ -52,9 +52,9 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         resolution_m: arguments.resolution_m,
         bounds_m,
         occupied_from: 0.5,
-        crs_wkt: Some("LOCAL_CS[\"voxels\",UNIT[\"metre\",1]]".to_owned()),
     };
     let mut options = WriteOptions::beside(&arguments.output);
+    options.crs = Some("LOCAL_CS[\"voxels\",UNIT[\"metre\",1]]".to_owned());
     options.origin_m = arguments.subtract_m;
     options.stamp_ns = 1_700_000_000_123_456_789;
     let mut sink = open_sink(arguments.format, &head, &arguments.output, &options)?;

@@ -78,8 +78,9 @@ pub trait CloudSource: Send {
         Vec::new()
     }
 
-    /// The coordinate reference system, as well-known text, if the source names one.
-    fn crs_wkt(&self) -> Option<&str> {
+    /// The coordinate reference system of the points as they are given, in metres, if the source names one: as
+    /// well-known text, or as `EPSG:25832`. One in other units, whose coordinates were converted, is none of theirs.
+    fn crs(&self) -> Option<&str> {
         None
     }
 }

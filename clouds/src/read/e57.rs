@@ -1,4 +1,5 @@
 use super::one::{Visit, head_of};
+use super::wkt::WktUnits;
 use crate::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::error::{Error, Place, Result};
 use crate::guard::guarded;
@@ -15,7 +16,8 @@ struct E57 {
     scans: Vec<PointCloud>,
     next: usize,
     is_read: bool,
-    crs_wkt: Option<String>,
+    crs: Option<String>,
+    remarks: Vec<String>,
 }
 
 /// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
@@ -25,8 +27,18 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn CloudSource>> {
     let reader = guarded(|| E57Reader::new(BufReader::new(file)))
         .map_err(|reason| Error::format(path, Place::Byte(0), reason))?;
     let scans = reader.pointclouds();
-    let crs_wkt = reader.coordinate_metadata().map(str::to_owned).filter(|wkt| !wkt.trim().is_empty());
-    Ok(Box::new(E57 { path: path.to_owned(), reader, scans, next: 0, is_read: true, crs_wkt }))
+    let mut remarks = Vec::new();
+    let mut crs = reader.coordinate_metadata().map(str::to_owned).filter(|crs| !crs.trim().is_empty());
+    // Coordinates of E57 are metres, whatever is said of them.
+    let units = crs.as_deref().map(WktUnits::of);
+    if units.is_some_and(|units| [units.flat_m, units.high_m].iter().flatten().any(|metres| *metres != 1.0)) {
+        crs = None;
+        remarks.push(
+            "the coordinate system is not in metres as the points are, and the output does not name it"
+                .into(),
+        );
+    }
+    Ok(Box::new(E57 { path: path.to_owned(), reader, scans, next: 0, is_read: true, crs, remarks }))
 }
 
 /// The name of a field, as the library spells it.
@@ -104,8 +116,12 @@ impl CloudSource for E57 {
         Ok(())
     }
 
-    fn crs_wkt(&self) -> Option<&str> {
-        self.crs_wkt.as_deref()
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
+    }
+
+    fn crs(&self) -> Option<&str> {
+        self.crs.as_deref()
     }
 }
 

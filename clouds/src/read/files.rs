@@ -17,7 +17,7 @@ pub(super) struct Files {
     is_one_each: bool,
     open: OpenFile,
     current: Option<(PathBuf, Box<dyn CloudSource>)>,
-    crs_wkt: Option<String>,
+    crs: Option<String>,
     remarks: Vec<String>,
 }
 
@@ -31,7 +31,7 @@ impl Files {
             is_one_each,
             open,
             current: None,
-            crs_wkt: None,
+            crs: None,
             remarks: Vec::new(),
         }
     }
@@ -51,9 +51,9 @@ impl Files {
         for remark in source.remarks() {
             self.remark(format!("{name}: {remark}"));
         }
-        match (&self.crs_wkt, source.crs_wkt()) {
-            (None, Some(wkt)) => self.crs_wkt = Some(wkt.to_owned()),
-            (Some(first), Some(wkt)) if first != wkt => {
+        match (&self.crs, source.crs()) {
+            (None, Some(crs)) => self.crs = Some(crs.to_owned()),
+            (Some(first), Some(crs)) if first != crs => {
                 self.remark(format!(
                     "{name}: another coordinate reference system than that of the files before"
                 ));
@@ -102,7 +102,7 @@ impl CloudSource for Files {
         self.remarks.iter().cloned().chain(now).collect()
     }
 
-    fn crs_wkt(&self) -> Option<&str> {
-        self.crs_wkt.as_deref().or_else(|| self.current.as_ref()?.1.crs_wkt())
+    fn crs(&self) -> Option<&str> {
+        self.crs.as_deref().or_else(|| self.current.as_ref()?.1.crs())
     }
 }

@@ -53,7 +53,7 @@ impl CloudSource for FromOrigin {
         self.source.remarks()
     }
 
-    fn crs_wkt(&self) -> Option<&str> {
-        self.source.crs_wkt()
+    fn crs(&self) -> Option<&str> {
+        self.source.crs()
     }
 }

@@ -84,7 +84,7 @@ impl CloudSource for WholeLas {
         self.units.remarks.iter().cloned().chain(withheld).collect()
     }
 
-    fn crs_wkt(&self) -> Option<&str> {
-        self.units.wkt.as_deref()
+    fn crs(&self) -> Option<&str> {
+        self.units.crs.as_deref()
     }
 }

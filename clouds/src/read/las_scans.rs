@@ -175,7 +175,7 @@ impl CloudSource for LasScans {
         self.units.remarks.iter().chain(&self.remarks).cloned().collect()
     }
 
-    fn crs_wkt(&self) -> Option<&str> {
-        self.units.wkt.as_deref()
+    fn crs(&self) -> Option<&str> {
+        self.units.crs.as_deref()
     }
 }

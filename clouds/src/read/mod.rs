@@ -39,6 +39,8 @@ mod ply_header;
 mod scalar;
 mod text;
 mod text_line;
+#[cfg(any(feature = "las", feature = "e57"))]
+mod wkt;
 
 pub use format::Format;
 pub use intrinsics::Intrinsics;

@@ -9,6 +9,7 @@ use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::sort::{ExternalSort, part};
 use crate::error::{Error, Result};
+use ::las::raw::Vlr;
 use laz::LasZipCompressor;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
@@ -25,6 +26,8 @@ pub(super) struct CopcSink {
     out: OutFile,
     head: VoxelsHead,
     layout: LasLayout,
+    /// Fields and coordinates.
+    common: Vec<Vlr>,
     scratch_folder: PathBuf,
     points: ExternalSort<CODED_BYTES>,
     cube: Option<Cube>,
@@ -51,6 +54,7 @@ impl CopcSink {
             layout: LasLayout::of(head)?,
             out: OutFile::create(path)?,
             head: head.clone(),
+            common: common_vlrs(options)?,
             scratch_folder: options.scratch_folder.clone(),
             points: ExternalSort::new(&options.scratch_folder),
             cube: None,
@@ -104,7 +108,7 @@ impl VoxelSink for CopcSink {
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        let Self { mut out, head, layout, scratch_folder, points, cube } = *self;
+        let Self { mut out, head, layout, common, scratch_folder, points, cube } = *self;
         let Some(cube) = cube else {
             return Err(Error::argument("COPC", "there are no voxels; an octree needs at least one"));
         };
@@ -115,7 +119,7 @@ impl VoxelSink for CopcSink {
             vlr("copc", 1, "COPC info VLR", cube.info(head.resolution_m, 0, 0))?,
             laz_record(&path, &laz)?,
         ];
-        vlrs.extend(common_vlrs(&head)?);
+        vlrs.extend(common);
         let format = POINT_FORMAT | COMPRESSED;
         layout.write_head(&mut out, format, &vlrs, None)?;
 

@@ -1,6 +1,6 @@
 use super::options::WriteOptions;
 use super::out_file::OutFile;
-use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::row::{VoxelRow, VoxelSink};
 use super::sort::part;
 use super::spool::Spool;
 use crate::error::{Error, Result};
@@ -18,13 +18,13 @@ const BATCH: u64 = 4096;
 pub(super) struct E57Sink {
     out: OutFile,
     points: Spool,
-    crs_wkt: Option<String>,
+    crs: Option<String>,
 }
 
 impl E57Sink {
-    pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+    pub(super) fn create(path: &Path, options: &WriteOptions) -> Result<Self> {
         let points = Spool::new(&options.scratch_folder)?;
-        Ok(Self { out: OutFile::create(path)?, points, crs_wkt: head.crs_wkt.clone() })
+        Ok(Self { out: OutFile::create(path)?, points, crs: options.crs.clone() })
     }
 }
 
@@ -35,13 +35,13 @@ impl VoxelSink for E57Sink {
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        let Self { mut out, points, crs_wkt } = *self;
+        let Self { mut out, points, crs } = *self;
         let path: PathBuf = out.path().to_owned();
         let refused = |error: ::e57::Error| Error::io(&path, "write", std::io::Error::other(error));
         let bytes = points.len();
         let mut reader = points.into_reader()?;
         let mut file = E57Writer::new(&mut out, &guid(bytes, 1)).map_err(refused)?;
-        file.set_coordinate_metadata(crs_wkt);
+        file.set_coordinate_metadata(crs);
         let fields = vec![
             Record::CARTESIAN_X_F64,
             Record::CARTESIAN_Y_F64,
@@ -75,7 +75,7 @@ fn guid(bytes: u64, number: u16) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{head_of, row};
+    use super::super::testing::row;
     use super::*;
     use ::e57::{CartesianCoordinate, E57Reader};
 
@@ -84,8 +84,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.e57");
         let rows: Vec<_> = (0..5000).map(|k| row([k, -k, 3], 0.75)).collect();
-        let mut sink =
-            Box::new(E57Sink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap());
+        let mut sink = Box::new(E57Sink::create(&path, &WriteOptions::beside(&path)).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();
         let mut reader = E57Reader::from_file(&path).unwrap();

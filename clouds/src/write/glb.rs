@@ -21,6 +21,7 @@ const COLOURS: [[f64; 3]; 5] =
 pub(super) struct GlbSink {
     out: OutFile,
     head: VoxelsHead,
+    crs: Option<String>,
     scratch_folder: PathBuf,
     colour_heights_m: Option<[f64; 2]>,
     places: ExternalSort<RECORD_BYTES>,
@@ -49,7 +50,7 @@ pub(super) struct Surface {
     /// Bounds of the vertices, as glTF has it: y up.
     pub(super) least: [i64; 3],
     pub(super) most: [i64; 3],
-    pub(super) crs_wkt: Option<String>,
+    pub(super) crs: Option<String>,
 }
 
 impl GlbSink {
@@ -57,6 +58,7 @@ impl GlbSink {
         Ok(Self {
             out: OutFile::create(path)?,
             head: head.clone(),
+            crs: options.crs.clone(),
             scratch_folder: options.scratch_folder.clone(),
             colour_heights_m: options.colour_heights_m,
             places: ExternalSort::new(&options.scratch_folder),
@@ -114,7 +116,7 @@ impl VoxelSink for GlbSink {
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        let Self { mut out, head, scratch_folder, colour_heights_m, places, lattice, least, most } = *self;
+        let Self { mut out, head, crs, scratch_folder, colour_heights_m, places, lattice, least, most } = *self;
         let size: [i64; 3] = std::array::from_fn(|k| (i64::from(most[k]) - i64::from(least[k]) + 1).max(0));
         let longest = size.iter().copied().max().unwrap_or(0);
         if longest > 1 << 24 {
@@ -136,7 +138,7 @@ impl VoxelSink for GlbSink {
                 size,
                 least: [i64::MAX; 3],
                 most: [i64::MIN; 3],
-                crs_wkt: head.crs_wkt,
+                crs,
             },
         };
         let (mut sorted, mut brick, mut last) = (places.into_sorted()?, Brick::new(), None);

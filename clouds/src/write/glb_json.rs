@@ -28,7 +28,7 @@ pub(super) fn of(surface: &Surface) -> Value {
             "extras": {
                 "origin_m": [x, y, z],
                 "resolution_m": resolution_m,
-                "crs_wkt": surface.crs_wkt,
+                "crs": surface.crs,
             },
         }],
         "meshes": [{

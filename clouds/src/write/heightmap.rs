@@ -13,6 +13,7 @@ const VALUES: i64 = u16::MAX as i64;
 pub(super) struct HeightmapSink {
     out: OutFile,
     head: VoxelsHead,
+    crs: Option<String>,
     world_file: PathBuf,
     scale_file: PathBuf,
     grid: Option<ColumnGrid<u16>>,
@@ -21,7 +22,14 @@ pub(super) struct HeightmapSink {
 impl HeightmapSink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
         let (world_file, scale_file) = (options.companion("pgw")?, options.companion("json")?);
-        Ok(Self { out: OutFile::create(path)?, head: head.clone(), world_file, scale_file, grid: None })
+        Ok(Self {
+            out: OutFile::create(path)?,
+            head: head.clone(),
+            crs: options.crs.clone(),
+            world_file,
+            scale_file,
+            grid: None,
+        })
     }
 }
 
@@ -89,7 +97,7 @@ impl VoxelSink for HeightmapSink {
             "no_data": 0,
             "resolution_m": resolution_m,
             "lower_left_corner_m": [x, y],
-            "crs_wkt": self.head.crs_wkt,
+            "crs": self.crs,
         });
         write_text(&self.scale_file, &format!("{scale:#}\n"))?;
         self.out.finish()

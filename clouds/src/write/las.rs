@@ -1,4 +1,5 @@
 use super::las_layout::{COMPRESSED, EXTRA_BYTES, LasLayout, POINT_FORMAT, common_vlrs, not_compressed, vlr};
+use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use crate::error::{Error, Result};
@@ -19,8 +20,13 @@ enum Points {
 }
 
 impl LasSink {
-    pub(super) fn create(head: &VoxelsHead, path: &Path, is_compressed: bool) -> Result<Self> {
-        let (layout, mut vlrs) = (LasLayout::of(head)?, common_vlrs(head)?);
+    pub(super) fn create(
+        head: &VoxelsHead,
+        path: &Path,
+        options: &WriteOptions,
+        is_compressed: bool,
+    ) -> Result<Self> {
+        let (layout, mut vlrs) = (LasLayout::of(head)?, common_vlrs(options)?);
         let mut out = OutFile::create(path)?;
         let points = if is_compressed {
             let laz = laz_vlr(path, LazVlrBuilder::with_fixed_chunk_size, 50_000)?;
@@ -87,11 +93,12 @@ mod tests {
     fn points_come_back_from_both() {
         let folder = tempfile::tempdir().unwrap();
         let rows: Vec<_> = (0..300).map(|k| row([k - 150, 7 * k, -k], 0.9)).collect();
-        let mut head = head_of(&rows);
-        head.crs_wkt = Some("LOCAL_CS[\"hall\"]".to_owned());
         for is_compressed in [false, true] {
             let path = folder.path().join(if is_compressed { "a.laz" } else { "a.las" });
-            let mut sink = Box::new(LasSink::create(&head, &path, is_compressed).unwrap());
+            let mut options = WriteOptions::beside(&path);
+            options.crs = Some("LOCAL_CS[\"hall\"]".to_owned());
+            let mut sink =
+                Box::new(LasSink::create(&head_of(&rows), &path, &options, is_compressed).unwrap());
             for row in &rows {
                 sink.put(row).unwrap();
             }

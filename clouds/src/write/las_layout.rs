@@ -1,3 +1,4 @@
+use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelsHead};
 use crate::error::{Error, Result};
@@ -139,16 +140,30 @@ impl LasLayout {
 }
 
 /// What every file says of its points beside its head: the fields behind format 6, and where the world is.
-pub(super) fn common_vlrs(head: &VoxelsHead) -> Result<Vec<Vlr>> {
+pub(super) fn common_vlrs(options: &WriteOptions) -> Result<Vec<Vlr>> {
     let mut fields = extra_field("log_odds", 10, "log-odds of being occupied");
     fields.extend(extra_field("count", 6, "number of updates"));
     let mut vlrs = vec![vlr("LASF_Spec", 4, "fields of voxels", fields)?];
-    if let Some(wkt) = &head.crs_wkt {
-        let mut text = wkt.as_bytes().to_vec();
-        text.push(0);
-        vlrs.push(vlr("LASF_Projection", 2112, "coordinate system", text)?);
+    if let Some(crs) = &options.crs {
+        vlrs.push(crs_vlr(crs)?);
     }
     Ok(vlrs)
+}
+
+/// The coordinate system. LAS 1.4 wants well-known text with this point format; a number of the EPSG register alone
+/// cannot become one here and goes where older versions keep it, among the keys of GeoTIFF.
+fn crs_vlr(crs: &str) -> Result<Vlr> {
+    let Some(number) = crs.strip_prefix("EPSG:") else {
+        let text = [crs.as_bytes(), &[0]].concat();
+        return vlr("LASF_Projection", 2112, "coordinate system", text);
+    };
+    let number: u16 = number.parse().map_err(|_| {
+        Error::argument("crs", format!("`{crs}` is no number of a projected system; give well-known text"))
+    })?;
+    // Version 1.1.0 and three keys: projected, by this number, in metres.
+    let keys = [[1, 1, 0, 3], [1024, 0, 1, 1], [3072, 0, 1, number], [3076, 0, 1, 9001]];
+    let data = keys.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+    vlr("LASF_Projection", 34735, "coordinate system", data)
 }
 
 /// A record of variable length.

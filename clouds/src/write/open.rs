@@ -44,15 +44,15 @@ pub fn open_sink(
         VoxelFileFormat::Glb => Box::new(glb::GlbSink::create(head, path, options)?),
         VoxelFileFormat::Autoware => Box::new(autoware::AutowareSink::create(head, path, options)?),
         #[cfg(feature = "las")]
-        VoxelFileFormat::Las => Box::new(las::LasSink::create(head, path, false)?),
+        VoxelFileFormat::Las => Box::new(las::LasSink::create(head, path, options, false)?),
         #[cfg(feature = "las")]
-        VoxelFileFormat::Laz => Box::new(las::LasSink::create(head, path, true)?),
+        VoxelFileFormat::Laz => Box::new(las::LasSink::create(head, path, options, true)?),
         #[cfg(feature = "las")]
         VoxelFileFormat::Copc => Box::new(copc::CopcSink::create(head, path, options)?),
         #[cfg(feature = "e57")]
-        VoxelFileFormat::E57 => Box::new(e57::E57Sink::create(head, path, options)?),
+        VoxelFileFormat::E57 => Box::new(e57::E57Sink::create(path, options)?),
         #[cfg(feature = "parquet")]
-        VoxelFileFormat::Parquet => Box::new(parquet::ParquetSink::create(head, path)?),
+        VoxelFileFormat::Parquet => Box::new(parquet::ParquetSink::create(head, path, options)?),
         #[cfg(feature = "ros")]
         VoxelFileFormat::Mcap => Box::new(mcap::McapSink::create(head, path, options)?),
         #[allow(unreachable_patterns)]

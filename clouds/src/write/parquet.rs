@@ -1,3 +1,4 @@
+use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use crate::error::{Error, Result};
@@ -28,11 +29,11 @@ pub(super) struct ParquetSink {
 }
 
 impl ParquetSink {
-    pub(super) fn create(head: &VoxelsHead, path: &Path) -> Result<Self> {
+    pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
         let refused = |error| refused(path, error);
         let schema = parse_message_type(SCHEMA).map_err(refused)?;
         let mut notes = vec![("resolution_m", head.resolution_m.to_string())];
-        notes.extend(head.crs_wkt.clone().map(|wkt| ("crs_wkt", wkt)));
+        notes.extend(options.crs.clone().map(|crs| ("crs", crs)));
         let notes = notes.into_iter().map(|(key, value)| KeyValue::new(key.to_owned(), value)).collect();
         let properties = WriterProperties::builder()
             .set_compression(Compression::ZSTD(ZstdLevel::default()))

@@ -28,8 +28,6 @@ pub struct VoxelsHead {
     pub bounds_m: [[f64; 3]; 2],
     /// Probability from which on a voxel is occupied.
     pub occupied_from: f64,
-    /// The coordinate reference system as well-known text, if it is known.
-    pub crs_wkt: Option<String>,
 }
 
 /// Takes voxels one after the other: tile by tile, in Morton order within each.

@@ -22,6 +22,5 @@ pub(super) fn head_of(rows: &[VoxelRow]) -> VoxelsHead {
         resolution_m: RESOLUTION_M,
         bounds_m: [f64::min, f64::max].map(|pick| std::array::from_fn(|k| bound(k, pick).unwrap_or(0.0))),
         occupied_from: 0.5,
-        crs_wkt: None,
     }
 }

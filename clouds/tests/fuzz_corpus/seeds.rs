@@ -48,9 +48,16 @@ fn surveys() -> Seeds {
         ("cloud_las", "keys", fixture("survey_feet.las")),
         ("cloud_las", "layers", voxel_file(VoxelFileFormat::Laz)),
         ("cloud_las", "copc", voxel_file(VoxelFileFormat::Copc)),
-        ("cloud_e57", "scans", fixture("scans.e57")),
-        ("cloud_e57", "voxels", voxel_file(VoxelFileFormat::E57)),
+        ("cloud_e57", "scans", [&[1], &fixture("scans.e57")[..]].concat()),
+        ("cloud_e57", "plain", [&[0], &voxel_file(VoxelFileFormat::E57)[..]].concat()),
+        ("cloud_e57", "sealed", [&[1], &unsealed(voxel_file(VoxelFileFormat::E57))[..]].concat()),
     ]
+}
+
+/// A file of E57 without the checksums of its pages.
+fn unsealed(mut file: Vec<u8>) -> Vec<u8> {
+    file.chunks_mut(1024).for_each(|page| page[1020..].fill(0));
+    file
 }
 
 fn poses() -> Seeds {

@@ -59,9 +59,23 @@ pub fn las(data: &[u8]) -> bool {
     is_read
 }
 
-/// E57.
+/// E57. Where the lowest bit of the first byte is set, the checksums of its pages are made right before the rest is
+/// read, so that what lies behind them is reached.
 pub fn e57(data: &[u8]) -> bool {
-    clouds(data, "a.e57", Format::E57, 0.0)
+    let Some((&choice, file)) = data.split_first() else { return false };
+    let mut file = file.to_vec();
+    if choice & 1 == 1 {
+        file.as_chunks_mut::<1024>().0.iter_mut().for_each(seal_page);
+    }
+    clouds(&file, "a.e57", Format::E57, 0.0)
+}
+
+/// Makes the last four bytes the CRC-32C of those before, the most significant first.
+fn seal_page(page: &mut [u8; 1024]) {
+    let Some((content, crc)) = page.split_last_chunk_mut::<4>() else { return };
+    let shifted = |sum: u32, _| if sum & 1 == 1 { sum >> 1 ^ 0x82f6_3b78 } else { sum >> 1 };
+    let sum = content.iter().fold(!0, |sum, &byte| (0..8).fold(sum ^ u32::from(byte), shifted));
+    *crc = (!sum).to_be_bytes();
 }
 
 fn clouds(data: &[u8], name: &str, format: Format, scan_period_s: f64) -> bool {

@@ -19,7 +19,7 @@ pub fn voxel(k: i32) -> VoxelRow {
 }
 
 /// Writes the voxels of 0 to [`VOXELS`].
-pub fn write_voxels(format: VoxelFileFormat, path: &Path, crs_wkt: Option<&str>) {
+pub fn write_voxels(format: VoxelFileFormat, path: &Path, crs: Option<&str>) {
     let [first, last] = [voxel(0), voxel(VOXELS - 1)].map(|row| row.center_m);
     let bound = |pick: fn(f64, f64) -> f64| std::array::from_fn(|k| pick(first[k], last[k]));
     let head = VoxelsHead {
@@ -27,9 +27,9 @@ pub fn write_voxels(format: VoxelFileFormat, path: &Path, crs_wkt: Option<&str>)
         resolution_m: 0.5,
         bounds_m: [bound(f64::min), bound(f64::max)],
         occupied_from: 0.5,
-        crs_wkt: crs_wkt.map(str::to_owned),
     };
-    let mut sink = open_sink(format, &head, path, &WriteOptions::beside(path)).unwrap();
+    let options = WriteOptions { crs: crs.map(str::to_owned), ..WriteOptions::beside(path) };
+    let mut sink = open_sink(format, &head, path, &options).unwrap();
     (0..VOXELS).for_each(|k| sink.put(&voxel(k)).unwrap());
     sink.finish().unwrap();
 }

@@ -186,9 +186,12 @@ mod recordings {
         assert_deskews(&points, |at_ns| source.pose_at(at_ns), of);
     }
 
+    /// A field, and its bytes for so many nanoseconds after the stamp.
+    type MessageTime = (Field, fn(u32) -> Vec<u8>);
+
     #[test]
     fn times_of_every_field_of_messages_take_points_to_the_planes() {
-        let times: [(Field, fn(u32) -> Vec<u8>); 5] = [
+        let times: [MessageTime; 5] = [
             (("t", 12, U32), |ns| ns.to_le_bytes().to_vec()),
             (("offset_time", 12, U32), |ns| ns.to_le_bytes().to_vec()),
             (("time", 12, F32), |ns| ((f64::from(ns) * 1e-9) as f32).to_le_bytes().to_vec()),

@@ -1,5 +1,8 @@
 //! Files of other programs, read.
 
+/// Coordinate systems on their way through.
+#[cfg(all(feature = "las", feature = "e57"))]
+mod crs;
 /// Depth images that the test makes.
 mod depth;
 /// Points of a scanner in motion.

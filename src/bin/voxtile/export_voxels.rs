@@ -90,7 +90,6 @@ impl<'a> Chosen<'a> {
             resolution_m: config.grid.resolution_m(),
             bounds_m: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             occupied_from: config.occupancy_threshold,
-            crs_wkt: None,
         };
         self.for_each(map, &mut || (), &mut |row| {
             head.voxels += 1;

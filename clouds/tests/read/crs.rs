@@ -1,0 +1,64 @@
+use crate::made::voxels::write_voxels;
+use std::fs;
+use voxtile_clouds::read::{OpenOptions, open};
+use voxtile_clouds::write::{VoxelFileFormat, WriteOptions};
+
+const FORMATS: [VoxelFileFormat; 4] =
+    [VoxelFileFormat::Las, VoxelFileFormat::Laz, VoxelFileFormat::Copc, VoxelFileFormat::E57];
+const UTM: &str = "PROJCS[\"WGS 84 / UTM zone 32N\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,\
+                   298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],\
+                   PROJECTION[\"Transverse_Mercator\"],UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"32632\"]]";
+
+/// The coordinate system that comes back of a file, and what is remarked.
+fn round_trip(format: VoxelFileFormat, crs: Option<&str>) -> (Option<String>, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("a.{}", format.extension().unwrap()));
+    write_voxels(format, &path, crs);
+    if format != VoxelFileFormat::E57 {
+        let bytes = fs::read(&path).unwrap();
+        // Point format 6 wants the bit, whether or not a system is known.
+        assert_eq!(bytes[6] & 1 << 4, 1 << 4, "{format:?}");
+    }
+    let source = open(&path, &OpenOptions::default()).unwrap();
+    (source.crs().map(str::to_owned), source.remarks())
+}
+
+#[test]
+fn text_and_numbers_come_back() {
+    for format in FORMATS {
+        for crs in [None, Some(UTM), Some("EPSG:25832")] {
+            assert_eq!(round_trip(format, crs), (crs.map(str::to_owned), vec![]), "{format:?}");
+        }
+    }
+}
+
+#[test]
+fn a_system_in_feet_is_not_that_of_metres() {
+    let feet = UTM.replace("UNIT[\"metre\",1]", "UNIT[\"US survey foot\",0.304800609601219]");
+    for format in FORMATS {
+        let (crs, remarks) = round_trip(format, Some(&feet));
+        let said = "the coordinate system is not in metres";
+        assert!(
+            crs.is_none() && remarks.iter().any(|remark| remark.starts_with(said)),
+            "{format:?}: {remarks:?}"
+        );
+    }
+}
+
+#[test]
+fn what_is_no_number_of_a_system_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.las");
+    let head = voxtile_clouds::write::VoxelsHead {
+        voxels: 0,
+        resolution_m: 0.5,
+        bounds_m: [[0.0; 3]; 2],
+        occupied_from: 0.5,
+    };
+    for crs in ["EPSG:", "EPSG:100000", "EPSG:4326+5773"] {
+        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
+        let error =
+            voxtile_clouds::write::open_sink(VoxelFileFormat::Las, &head, &path, &options).err().unwrap();
+        assert!(error.to_string().contains(crs), "{error}");
+    }
+}
