@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 pub use storage::Storage;
 
+/// Texts of coordinate reference systems are far shorter.
+const MOST_CRS_BYTES: usize = 1 << 16;
+
 /// How a map is made and how much memory it may use.
 ///
 /// Resolution, tile size, sensor model and occupancy threshold belong to the map: they are stored with it, and opening
@@ -43,6 +46,9 @@ pub struct MapConfig {
     pub memory: MemoryLimit,
     /// How the tiles of a new map are stored. Default: the original files.
     pub storage: Storage,
+    /// The coordinate reference system of the map's frame: well-known text, or `EPSG:25832`. It changes no voxel; exports
+    /// that can say it do. Default: none.
+    pub crs: Option<String>,
 }
 
 /// How much an out-of-core mapper keeps in memory. The map does not depend on it, only the work to make it.
@@ -147,6 +153,7 @@ impl Default for MapConfig {
             octree: OctreeConfig::default(),
             memory: MemoryLimit::default(),
             storage: Storage::default(),
+            crs: None,
         }
     }
 }
@@ -281,6 +288,10 @@ impl MapConfig {
         if max_range_m.is_some_and(|max| !(max > min_range_m && max.is_finite())) {
             let max = max_range_m.unwrap_or_default();
             return Err(wrong("max range", max, "a length above the min range, in metres"));
+        }
+        if self.crs.as_ref().is_some_and(|crs| crs.len() > MOST_CRS_BYTES) {
+            let reason = format!("a coordinate reference system of more than {MOST_CRS_BYTES} bytes");
+            return Err(Error::argument("crs", reason));
         }
         self.memory.check(&self.grid)?;
         if let OctreeConfig::Pointers(mode) = self.octree

@@ -292,6 +292,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         inputs: Vec::new(),
         decayed_scan: 0,
         storage: layout.storage(),
+        crs: None,
         scan_records: None,
         snapshots: None,
     };

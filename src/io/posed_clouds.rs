@@ -327,6 +327,10 @@ impl ScanSource for PosedClouds {
         self.fields.clone()
     }
 
+    fn crs(&self) -> Option<String> {
+        self.source.crs().map(str::to_owned)
+    }
+
     fn remarks(&self) -> Vec<String> {
         let mut remarks = self.source.remarks();
         if let CloudPoses::File(_, trajectory) = &self.poses {

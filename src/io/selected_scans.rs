@@ -164,6 +164,10 @@ impl ScanSource for SelectedScans {
         self.source.remarks()
     }
 
+    fn crs(&self) -> Option<String> {
+        self.source.crs()
+    }
+
     fn fingerprint(&self) -> Result<String> {
         self.source.fingerprint()
     }

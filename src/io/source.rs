@@ -100,6 +100,11 @@ pub trait ScanSource {
         Vec::new()
     }
 
+    /// The coordinate reference system of the world frame, as far as the input names one by now.
+    fn crs(&self) -> Option<String> {
+        None
+    }
+
     /// The source of the poses.
     fn pose_source(&self) -> PoseSource {
         PoseSource::Scans

@@ -53,6 +53,7 @@ pub fn merge(
     let config = first.config().clone();
     for map in maps {
         check_grid(map, first)?;
+        check_crs(map, first)?;
         if prefer.is_none() {
             check_model(map, first)?;
         }
@@ -76,6 +77,19 @@ pub fn merge(
     let written = writer.finish()?;
     let is_added = matches!(rule, MergeRule::Add { .. });
     Ok(Merged { written, common_voxels: merge.common, related: related(maps), is_added })
+}
+
+/// What is in one place in one system is elsewhere in another. A map that names none goes with any.
+fn check_crs(map: &MapReader, first: &MapReader) -> Result<()> {
+    match (&map.config().crs, &first.config().crs) {
+        (Some(found), Some(wanted)) if found != wanted => {
+            let found = format!("{found:.80}");
+            let wanted = format!("{wanted:.80}");
+            let what = "the coordinate reference system";
+            Err(Error::Mismatch { path: map.folder().to_owned(), what, found, wanted })
+        }
+        _ => Ok(()),
+    }
 }
 
 fn put_merged(

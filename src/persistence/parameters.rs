@@ -18,6 +18,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
         inputs: inputs.to_vec(),
         decayed_scan: 0,
         storage: config.storage,
+        crs: config.crs.clone(),
         scan_records: None,
         snapshots: None,
     };
@@ -38,6 +39,7 @@ pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig>
         config.sensor_model = ext.sensor_model;
         config.occupancy_threshold = ext.occupancy_threshold;
         config.rays = ext.rays;
+        config.crs.clone_from(&ext.crs);
     }
     config.validated().map_err(|error| wrong(error.to_string()))
 }

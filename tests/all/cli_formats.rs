@@ -254,3 +254,77 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
     assert!(told.contains(named), "{told}");
     assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
 }
+
+/// Far clouds with a coordinate reference system: the map keeps it, and files that can say it do.
+#[test]
+fn coordinate_reference_systems_are_kept_and_written_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let points = path("points.xyz");
+    fs::write(&points, "600000.25 5300000.25 400.5\n600001.25 5300000.75 401.5\n").unwrap();
+    let (plain, other) = (path("plain"), path("other"));
+    output(&["build", text(&points), "-o", text(&plain), "--no-rays", "--resolution", "0.5"]);
+    assert!(!output(&["info", text(&plain)]).contains("crs"));
+    // A map that names one, by a file that does.
+    let named = path("named.las");
+    output(&["export", text(&plain), "-o", text(&named), "-q"]);
+    name_crs(&named, "EPSG:25832");
+    output(&["build", text(&named), "-o", text(&other), "--no-rays", "--resolution", "0.5"]);
+    assert!(output(&["info", text(&other)]).contains("25832"), "{}", output(&["info", text(&other)]));
+    assert_eq!(output(&["digest", text(&other)]), output(&["digest", text(&plain)]));
+    let again = path("again.laz");
+    output(&["export", text(&other), "-o", text(&again), "-q"]);
+    let third = path("third");
+    output(&["build", text(&again), "-o", text(&third), "--no-rays", "--resolution", "0.5"]);
+    assert!(output(&["info", text(&third), "--json"]).contains("25832"));
+    // Points of another one are elsewhere.
+    let mixed = path("mixed.las");
+    output(&["export", text(&plain), "-o", text(&mixed), "-q"]);
+    name_crs(&mixed, "EPSG:25833");
+    let told = refusal(&["build", text(&mixed), "-o", text(&other), "--no-rays", "--append"]);
+    assert!(told.contains("25833") && told.contains("25832"), "{told}");
+    let fourth = path("fourth");
+    output(&["build", text(&mixed), "-o", text(&fourth), "--no-rays", "--resolution", "0.5"]);
+    let told = refusal(&["merge", text(&other), text(&fourth), "-o", text(&path("merged"))]);
+    assert!(told.contains("coordinate reference system") && told.contains("25833"), "{told}");
+    // A map that names none goes with any, and parts of a map keep it.
+    output(&["merge", text(&other), text(&plain), "-o", text(&path("merged"))]);
+    output(&[
+        "crop",
+        text(&other),
+        "-o",
+        text(&path("part")),
+        "--region",
+        "600000",
+        "5300000",
+        "0",
+        "600001",
+        "5300001",
+        "999",
+    ]);
+    for map in ["merged", "part"] {
+        assert!(output(&["info", text(&path(map))]).contains("25832"), "{map}");
+    }
+}
+
+/// Gives a LAS file that our writer made without a coordinate reference system one, as GeoTIFF keys.
+fn name_crs(file: &Path, crs: &str) {
+    let mut bytes = fs::read(file).unwrap();
+    let number: u16 = crs.strip_prefix("EPSG:").unwrap().parse().unwrap();
+    let mut record = vec![0_u8; 54];
+    record[2..2 + 16].copy_from_slice(b"LASF_Projection\0");
+    record[18..20].copy_from_slice(&34735_u16.to_le_bytes());
+    record[20..22].copy_from_slice(&24_u16.to_le_bytes());
+    let keys: [u16; 12] = [1, 1, 0, 2, 3072, 0, 1, number, 3076, 0, 1, 9001];
+    record.extend(keys.iter().flat_map(|key| key.to_le_bytes()));
+    let header = u16::from_le_bytes(bytes[94..96].try_into().unwrap()) as usize;
+    let extra = record.len() as u32;
+    let points = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) + extra;
+    let records = u32::from_le_bytes(bytes[100..104].try_into().unwrap()) + 1;
+    bytes[96..100].copy_from_slice(&points.to_le_bytes());
+    bytes[100..104].copy_from_slice(&records.to_le_bytes());
+    bytes.splice(header..header, record);
+    // The flag that says WKT.
+    bytes[6] &= !16;
+    fs::write(file, bytes).unwrap();
+}

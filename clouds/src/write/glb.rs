@@ -116,7 +116,8 @@ impl VoxelSink for GlbSink {
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        let Self { mut out, head, crs, scratch_folder, colour_heights_m, places, lattice, least, most } = *self;
+        let Self { mut out, head, crs, scratch_folder, colour_heights_m, places, lattice, least, most } =
+            *self;
         let size: [i64; 3] = std::array::from_fn(|k| (i64::from(most[k]) - i64::from(least[k]) + 1).max(0));
         let longest = size.iter().copied().max().unwrap_or(0);
         if longest > 1 << 24 {

@@ -37,12 +37,18 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     if !intake.read_lead()? {
         return Ok(stopped_early(args));
     }
+    let crs = intake.crs();
     let mapper = match &mut mapper {
-        Some(mapper) => mapper,
+        Some(mapper) => {
+            check_crs(args, crs.as_ref(), config.crs.as_ref())?;
+            mapper
+        }
         none => {
             // A first scan that cannot be mapped should not leave an empty map behind.
             intake.check_first()?;
             check(intake.first(), &config)?;
+            let mut config = config;
+            config.crs = crs;
             none.insert(OutOfCoreTileMapper::create(whole_map(&args.output)?, config)?)
         }
     };
@@ -251,6 +257,19 @@ fn begin(
     }
     mapper.begin_input(InputRecord { content: Some(intake.content()), ..InputRecord::from(name) })?;
     Ok(Some(0))
+}
+
+/// Points of another coordinate reference system are elsewhere.
+fn check_crs(args: &BuildArgs, found: Option<&String>, own: Option<&String>) -> voxtile::Result<()> {
+    match (found, own) {
+        (Some(found), Some(own)) if found != own => {
+            let reason = format!(
+                "its coordinates are in {found:.80}, those of the map in {own:.80}; convert them first, for instance with pdal"
+            );
+            Err(Error::argument(args.scans.display().to_string(), reason))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {

@@ -96,7 +96,8 @@ impl Export<'_> {
     fn write(&self, next_tile: &(dyn Fn() + Sync)) -> Result<()> {
         self.make_folder(self.folder)?;
         let nodes = LevelsOf { levels: self.levels, map: self.map };
-        let extras = serde_json::json!({ "resolution_m": self.map.config().grid.resolution_m() });
+        let config = self.map.config();
+        let extras = serde_json::json!({ "resolution_m": config.grid.resolution_m(), "crs": config.crs });
         let root = tileset(&nodes, self.store, TilesetContent::Meshes, extras)?;
         self.write_json(&self.folder.join("tileset.json"), &root)?;
         let heights_m = self.heights_m();
@@ -142,7 +143,6 @@ impl Export<'_> {
             resolution_m: edge_m,
             bounds_m: [[0.0; 3]; 2],
             occupied_from: 0.5,
-            crs_wkt: None,
         };
         let mut options = WriteOptions::beside(&path);
         // Coordinates begin at the node's corner.

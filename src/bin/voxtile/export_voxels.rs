@@ -38,6 +38,7 @@ pub fn run(args: &ExportArgs, format: VoxelFileFormat, region: Option<&Aabb>) ->
         let head = chosen.head(map)?;
         let staged = StagedOutput::beside(&args.output)?;
         let mut options = WriteOptions::beside(&args.output);
+        options.crs.clone_from(&map.config().crs);
         options.companion_folder = staged.folder().to_owned();
         (options.z_min_m, options.z_max_m, options.cell_m) = (args.z_min, args.z_max, args.cell);
         let progress = Progress::over_tiles(map.tile_indices().len());

@@ -28,6 +28,7 @@ struct Info {
     scan_number: u64,
     flush_number: u64,
     /// What it was built from, the latest last.
+    crs: Option<String>,
     inputs: Vec<InputRecord>,
     /// Number of the last scan when evidence last faded; 0 if it never has.
     decayed_scan: u64,
@@ -79,6 +80,7 @@ impl Info {
             storage: config.storage,
             scan_number: reader.scan_number(),
             flush_number: reader.flush_number(),
+            crs: config.crs.clone(),
             inputs: ext.map_or(Vec::new(), |ext| ext.inputs.clone()),
             decayed_scan: ext.map_or(0, |ext| ext.decayed_scan),
             tiles: reader.tile_indices().len() as u64,
@@ -114,6 +116,9 @@ impl Info {
         )?;
         for input in self.inputs.iter().rev().take(INPUTS_SHOWN).rev() {
             writeln!(out, "input        from scan {}: {}", HumanCount(input.first_scan), input.name)?;
+        }
+        if let Some(crs) = &self.crs {
+            writeln!(out, "crs          {crs:.100}")?;
         }
         if self.decayed_scan > 0 {
             writeln!(out, "faded        last after scan {}", HumanCount(self.decayed_scan))?;

@@ -90,6 +90,11 @@ impl Intake {
         self.reader.remarks().unwrap_or_default()
     }
 
+    /// The coordinate reference system that the input names.
+    pub fn crs(&mut self) -> Option<String> {
+        self.reader.crs().unwrap_or_default()
+    }
+
     /// What has been taken so far.
     pub fn content(&self) -> InputContent {
         InputContent {

@@ -50,6 +50,7 @@ enum Request {
     Scan,
     Fingerprint,
     Remarks,
+    Crs,
 }
 
 enum Answer {
@@ -57,6 +58,7 @@ enum Answer {
     Read(voxtile::Result<Read>),
     Fingerprint(voxtile::Result<String>),
     Remarks(Vec<String>),
+    Crs(Option<String>),
 }
 
 impl ScanReader {
@@ -122,6 +124,14 @@ impl ScanReader {
         }
     }
 
+    /// The coordinate reference system that the input names so far.
+    pub fn crs(&mut self) -> anyhow::Result<Option<String>> {
+        match self.ask(Request::Crs, &mut || Ok(()))? {
+            Some(Answer::Crs(crs)) => Ok(crs),
+            _ => Ok(None),
+        }
+    }
+
     fn ask(
         &mut self,
         request: Request,
@@ -163,6 +173,7 @@ fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom) -> A
         Request::Scan => Answer::Read(read(source, room)),
         Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
         Request::Remarks => Answer::Remarks(source.remarks()),
+        Request::Crs => Answer::Crs(source.crs()),
     }
 }
 

@@ -56,6 +56,9 @@ pub struct Extension {
     /// How the tiles are stored; maps of the original files do not say.
     #[serde(default, skip_serializing_if = "Storage::is_octomap")]
     pub storage: Storage,
+    /// The coordinate reference system of the map's frame, if one was named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crs: Option<String>,
     /// Number of records in `scans.bin` as of the last flush; `None` if that is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan_records: Option<u64>,
@@ -274,6 +277,7 @@ mod tests {
             inputs: vec![InputRecord { first_scan: 45, ..InputRecord::from("abc") }],
             decayed_scan: 0,
             storage: Storage::OctoMap,
+            crs: None,
             scan_records: None,
             snapshots: None,
         };

@@ -1,0 +1,84 @@
+import * as THREE from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+
+const KEYS = { KeyW: [0, 1], ArrowUp: [0, 1], KeyS: [0, -1], ArrowDown: [0, -1], KeyD: [1, 0], KeyA: [-1, 0] };
+
+// Orbit around a point, or walk: the same camera, two ways to move it.
+export class Flight {
+  constructor(camera, canvas, wake) {
+    Object.assign(this, { camera, canvas, wake });
+    this.orbit = new OrbitControls(camera, canvas);
+    this.orbit.enableDamping = false;
+    this.orbit.zoomToCursor = true;
+    this.orbit.addEventListener('change', wake);
+    this.walks = false;
+    this.keys = new Set();
+    this.step = 1;
+    canvas.addEventListener('pointermove', (event) => this.look(event));
+    window.addEventListener('keydown', (event) => {
+      if (!this.walks || event.target.matches?.('select, input:not([type=range]):not([type=checkbox])')) return;
+      this.keys.add(event.code);
+      wake();
+    });
+    window.addEventListener('keyup', (event) => this.keys.delete(event.code));
+    window.addEventListener('blur', () => this.keys.clear());
+  }
+
+  walk(on) {
+    this.walks = on;
+    this.orbit.enabled = !on;
+    this.keys.clear();
+    if (!on) {
+      const ahead = this.camera.getWorldDirection(new THREE.Vector3());
+      this.orbit.target.copy(this.camera.position).addScaledVector(ahead, 10 * this.step);
+      this.orbit.update();
+    }
+    this.wake();
+  }
+
+  look(event) {
+    if (!this.walks || event.buttons === 0) return;
+    const turn = new THREE.Euler().setFromQuaternion(this.camera.quaternion, 'ZXY');
+    turn.z -= event.movementX * 0.004;
+    turn.x = Math.min(Math.max(turn.x - event.movementY * 0.004, 0.05), Math.PI - 0.05);
+    turn.y = 0;
+    this.camera.quaternion.setFromEuler(turn);
+    this.wake();
+  }
+
+  // Moves while keys are down; whether it moved.
+  update(seconds) {
+    if (!this.walks || this.keys.size === 0) return false;
+    const speed = this.step * (this.keys.has('ShiftLeft') || this.keys.has('ShiftRight') ? 25 : 5) * Math.min(seconds, 0.1);
+    const ahead = this.camera.getWorldDirection(new THREE.Vector3());
+    const right = new THREE.Vector3().crossVectors(ahead, this.camera.up).normalize();
+    let moved = false;
+    for (const key of this.keys) {
+      const [sideways, forward] = KEYS[key] ?? [0, 0];
+      const up = key === 'KeyE' ? 1 : key === 'KeyQ' ? -1 : 0;
+      this.camera.position.addScaledVector(ahead, forward * speed).addScaledVector(right, sideways * speed);
+      this.camera.position.z += up * speed;
+      moved ||= Boolean(sideways || forward || up);
+    }
+    return moved;
+  }
+
+  lookAt(position, target) {
+    this.camera.position.set(...position);
+    this.orbit.target.set(...target);
+    this.camera.lookAt(this.orbit.target);
+    this.orbit.update();
+    this.wake();
+  }
+
+  // All of a box, from a direction.
+  fit(box, from = [-0.6, -1, 0.8]) {
+    const center = box.getCenter(new THREE.Vector3());
+    const radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 0.5);
+    const narrow = Math.min(1, this.camera.aspect);
+    const distance = radius / Math.sin(THREE.MathUtils.degToRad(this.camera.fov / 2)) / narrow;
+    const position = center.clone().addScaledVector(new THREE.Vector3(...from).normalize(), 0.85 * distance);
+    this.step = radius / 30;
+    this.lookAt(position.toArray(), center.toArray());
+  }
+}

@@ -1,0 +1,164 @@
+import * as THREE from 'three';
+import { TilesRenderer } from '3d-tiles-renderer';
+import { KIND, parseNode } from './node.js';
+import { bytesOf, meshOf } from './mesh.js';
+import { makeMaterial, tintLayer } from './material.js';
+
+const MOST_BYTES = 256 * 2 ** 20;
+const MOST_DRAWN = 180;
+const BEST_ERROR = 7;
+// Tiles whose free or unknown voxels are shown at once.
+const MOST_NEAR = 24;
+
+// One map, or one state of it: nodes come and go as the camera moves.
+export class Layer {
+  constructor(viewer, map, id, hue) {
+    Object.assign(this, { viewer, map, id, hue });
+    this.group = new THREE.Group();
+    this.near = new THREE.Group();
+    this.group.add(this.near);
+    const kind = id.includes('~') ? KIND.change : KIND.occupied;
+    this.material = makeMaterial(kind, viewer.shared);
+    this.materials = { free: makeMaterial(KIND.free, viewer.shared), unknown: makeMaterial(KIND.unknown, viewer.shared) };
+    if (hue) tintLayer(this.material, hue);
+    this.extra = new Map();
+    this.tiles = this.open();
+    this.next = null;
+    this.isShown = true;
+  }
+
+  open() {
+    const tiles = new TilesRenderer(`maps/${this.id}/tileset.json`);
+    tiles.errorTarget = BEST_ERROR;
+    tiles.lruCache.maxBytesSize = MOST_BYTES;
+    tiles.lruCache.minBytesSize = MOST_BYTES * 0.75;
+    tiles.registerPlugin({
+      parseToMesh: (buffer, tile, extension) => {
+        if (extension !== 'vox') return null;
+        const node = parseNode(buffer);
+        this.scale = { least: node.least, most: node.most };
+        const mesh = meshOf(node, this.material);
+        const group = new THREE.Group();
+        group.add(mesh);
+        group.userData.mesh = mesh;
+        return group;
+      },
+      calculateBytesUsed: (tile, scene) => {
+        const mesh = scene?.userData.mesh;
+        return mesh ? bytesOf(mesh.userData.node, mesh.userData.faces) : 0;
+      },
+    });
+    tiles.setCamera(this.viewer.camera);
+    tiles.setResolutionFromRenderer(this.viewer.camera, this.viewer.renderer);
+    tiles.addEventListener('load-error', ({ error }) => this.viewer.say(`A part of the map was not loaded: ${error.message}`));
+    tiles.addEventListener('needs-update', () => this.viewer.wake());
+    this.group.add(tiles.group);
+    return tiles;
+  }
+
+  // Loads the map as it is now beside what is shown, and swaps when what is in view has come.
+  refresh() {
+    if (this.next) {
+      this.again = true;
+      return;
+    }
+    this.next = this.open();
+    this.next.group.visible = false;
+    this.next.errorTarget = this.tiles.errorTarget;
+    this.viewer.wake();
+  }
+
+  update() {
+    const { camera, renderer } = this.viewer;
+    for (const tiles of [this.tiles, this.next]) {
+      if (!tiles) continue;
+      tiles.setResolutionFromRenderer(camera, renderer);
+      tiles.update();
+    }
+    if (this.next && this.next.rootTileset && Layer.isQuiet(this.next)) {
+      this.group.remove(this.tiles.group);
+      this.tiles.dispose();
+      [this.tiles, this.next] = [this.next, null];
+      this.tiles.group.visible = true;
+      this.viewer.wake();
+      if (this.again) {
+        this.again = false;
+        this.refresh();
+      }
+    }
+    const drawn = this.tiles.visibleTiles.size;
+    const share = MOST_DRAWN / this.viewer.layers.length;
+    if (drawn > share) this.tiles.errorTarget *= 1.15;
+    else if (drawn < 0.6 * share && this.tiles.errorTarget > BEST_ERROR) {
+      this.tiles.errorTarget = Math.max(BEST_ERROR, this.tiles.errorTarget / 1.05);
+    }
+    this.updateNear();
+  }
+
+  static isQuiet(tiles) {
+    const { queued, downloading, parsing } = tiles.stats;
+    return queued + downloading + parsing === 0 && !tiles.isLoading && tiles.stats.refused === 0;
+  }
+
+  // Whether everything that the view needs is here.
+  get isReady() {
+    return this.tiles.rootTileset && Layer.isQuiet(this.tiles) && !this.next && !this.waits;
+  }
+
+  meshes() {
+    const meshes = [];
+    for (const tile of this.tiles.visibleTiles) {
+      const mesh = tile.engineData?.scene?.userData.mesh;
+      if (mesh) meshes.push([mesh, tile]);
+    }
+    return meshes;
+  }
+
+  // Free and unknown voxels of the tiles in view, the nearest ones.
+  updateNear() {
+    const kinds = ['free', 'unknown'].filter((kind) => this.viewer.shows[kind]);
+    const wanted = new Set();
+    if (kinds.length) {
+      const leaves = this.meshes().filter(([mesh]) => mesh.userData.node.edge < 1.5 * this.map.resolution_m);
+      leaves.sort((a, b) => a[1].traversal.distanceFromCamera - b[1].traversal.distanceFromCamera);
+      for (const [, tile] of leaves.slice(0, MOST_NEAR)) {
+        for (const kind of kinds) wanted.add(`${new URL(tile.content.uri, tile.internal.basePath + '/').href}&what=${kind}`);
+      }
+    }
+    for (const [url, mesh] of this.extra) {
+      if (wanted.has(url)) continue;
+      if (mesh) {
+        this.near.remove(mesh);
+        mesh.geometry.dispose();
+      }
+      this.extra.delete(url);
+    }
+    for (const url of wanted) {
+      if (!this.extra.has(url)) this.loadNear(url, url.endsWith('free') ? 'free' : 'unknown');
+    }
+  }
+
+  async loadNear(url, kind) {
+    this.extra.set(url, null);
+    this.waits = (this.waits ?? 0) + 1;
+    try {
+      const response = await fetch(url);
+      if (!response.ok) throw new Error(`${response.status}`);
+      const mesh = meshOf(parseNode(await response.arrayBuffer()), this.materials[kind]);
+      if (!this.extra.has(url)) return;
+      this.extra.set(url, mesh);
+      this.near.add(mesh);
+    } catch (error) {
+      this.viewer.say(`Voxels of a tile were not loaded: ${error.message}`);
+    } finally {
+      this.waits--;
+      this.viewer.wake();
+    }
+  }
+
+  dispose() {
+    for (const tiles of [this.tiles, this.next]) tiles?.dispose();
+    for (const mesh of this.extra.values()) mesh?.geometry.dispose();
+    this.group.removeFromParent();
+  }
+}

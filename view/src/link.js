@@ -1,0 +1,24 @@
+// What is looked at, in the URL, so that a link shows the same place.
+
+let timer = 0;
+
+export function readLink() {
+  const fields = new URLSearchParams(location.hash.slice(1));
+  const numbers = (name, count) => {
+    const list = (fields.get(name) ?? '').split(',').map(Number);
+    return list.length === count && list.every(Number.isFinite) ? list : null;
+  };
+  return { eye: numbers('eye', 3), to: numbers('to', 3), colour: fields.get('colour'), at: fields.get('at'), since: fields.get('since'),
+    threshold: fields.has('threshold') ? Number(fields.get('threshold')) : null };
+}
+
+export function writeLink(state) {
+  clearTimeout(timer);
+  timer = setTimeout(() => {
+    const fields = new URLSearchParams();
+    for (const [name, value] of Object.entries(state())) {
+      if (value !== null && value !== '' && value !== undefined) fields.set(name, Array.isArray(value) ? value.map((k) => +k.toFixed(3)).join(',') : value);
+    }
+    history.replaceState(null, '', '#' + fields.toString().replaceAll('%2C', ','));
+  }, 300);
+}

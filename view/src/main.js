@@ -1,0 +1,471 @@
+// The page: what its controls do, and what they show.
+
+import { readLink, writeLink } from './link.js';
+import { logOddsOf, observationsOf, probabilityOf } from './node.js';
+import { CHANGES, LAYERS, drawLegend } from './palette.js';
+import { centerOf, pick } from './pick.js';
+import { Viewer } from './viewer.js';
+
+const $ = (id) => document.getElementById(id);
+const json = async (url) => {
+  const response = await fetch(url);
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.error ?? `the server answered ${response.status}`);
+  return answer;
+};
+const metres = (k) => `${k.toFixed(Math.abs(k) < 1000 ? 2 : 1)} m`;
+const place = (point) => point.map((k) => k.toFixed(3)).join('  ');
+
+let messageTimer = 0;
+function say(text) {
+  $('message').textContent = text;
+  $('message').hidden = !text;
+  clearTimeout(messageTimer);
+  if (text) messageTimer = setTimeout(() => say(''), 12000);
+}
+
+let viewer;
+try {
+  viewer = new Viewer($('scene'), say);
+} catch (error) {
+  $('state').textContent = 'no WebGL';
+  say(`This browser draws no 3D: ${error.message}`);
+  throw error;
+}
+const link = readLink();
+let maps = [];
+let tool = 'query';
+let marks = [];
+let answered = null;
+let path = [];
+
+const idOf = (map) => {
+  const at = $('snapshot').value;
+  const since = $('since').value;
+  return map.id + (at ? `@${at}` : '') + (since ? `~${since}` : '');
+};
+
+function answer(rows) {
+  $('answer').replaceChildren(...rows.flatMap(([name, value]) => {
+    const [dt, dd] = [document.createElement('dt'), document.createElement('dd')];
+    dt.textContent = name;
+    dd.textContent = value;
+    return [dt, dd];
+  }));
+}
+
+// --- Maps
+
+function describe() {
+  const map = maps[0];
+  document.title = `${map.name} - voxtile`;
+  $('name').textContent = maps.map((one) => one.name).join(', ');
+  $('layers').replaceChildren(...(maps.length > 1 ? maps : []).map((one, k) => {
+    const label = document.createElement('label');
+    const box = Object.assign(document.createElement('input'), { type: 'checkbox', checked: viewer.layers[k]?.isShown ?? true });
+    box.addEventListener('change', () => {
+      viewer.layers[k].isShown = box.checked;
+      viewer.wake();
+    });
+    const swatch = document.createElement('span');
+    swatch.className = 'swatch';
+    swatch.style.background = `rgb(${LAYERS[k % LAYERS.length]})`;
+    label.append(box, ' ', swatch, one.name);
+    return label;
+  }));
+  for (const [id, first] of [['snapshot', 'as it is now'], ['since', 'none']]) {
+    const chosen = $(id).value;
+    $(id).replaceChildren(new Option(first, ''), ...map.snapshots.map(({ name }) => new Option(name, name)));
+    $(id).value = map.snapshots.some(({ name }) => name === chosen) ? chosen : '';
+  }
+  const tiles = map.tiles.toLocaleString('en');
+  const lost = map.unreadable?.length ? `, ${map.unreadable.length} damaged` : '';
+  const rest = map.pending_tiles ? `; reading the map: ${map.pending_tiles.toLocaleString('en')} tiles left` : '';
+  $('facts').textContent = `${tiles} tiles${lost} of ${map.tile_size_m} m, voxels of ${map.resolution_m} m, ${map.scans ?? 0} scans${rest}`;
+}
+
+async function readMaps() {
+  ({ maps } = await json('maps.json'));
+  for (const map of maps) [map.low, map.high] = map.bounds ? [map.bounds.min[2], map.bounds.max[2]] : [0, 1];
+  describe();
+}
+
+function allBounds() {
+  const known = maps.map((map) => map.bounds).filter(Boolean);
+  if (known.length === 0) return { min: [-1, -1, -1], max: [1, 1, 1] };
+  const end = (name, least) => [0, 1, 2].map((k) => least(...known.map((bounds) => bounds[name][k])));
+  return { min: end('min', Math.min), max: end('max', Math.max) };
+}
+
+// The heights of what is occupied, by the tileset's root, for colours.
+async function readHeights() {
+  await Promise.all(maps.map(async (map) => {
+    const { root } = await json(`maps/${map.id}/tileset.json`);
+    const [, , z, , , , , , , , , half] = root.boundingVolume.box;
+    if (root.children) [map.low, map.high] = [z - half, z + half];
+  }));
+}
+
+function showMaps() {
+  viewer.show(maps.map((map) => ({ map, id: idOf(map) })));
+  viewer.layers.forEach((layer, k) => { layer.isShown = $('layers').querySelectorAll('input')[k]?.checked ?? true; });
+  paint();
+  readPath();
+}
+
+async function readPath() {
+  const map = maps[0];
+  const at = $('snapshot').value;
+  try {
+    path = (await json(`maps/${map.id}${at ? `@${at}` : ''}/trajectory.json`)).points;
+  } catch (error) {
+    path = [];
+    say(`The way of the sensor is not known: ${error.message}`);
+  }
+  $('scan').max = Math.max(path.length - 1, 0);
+  $('scan').value = $('scan').max;
+  $('scan').disabled = path.length < 2;
+  viewer.overlays.path('path', path, 0xff3b6b);
+  showScan();
+}
+
+function showScan() {
+  const at = path[Number($('scan').value)];
+  const on = $('path').checked;
+  viewer.overlays.show('path', on);
+  $('scan-out').value = path.length ? `${Number($('scan').value) + 1} of ${path.length}` : 'none';
+  const size = 1.2 * (maps[0]?.resolution_m ?? 0.1);
+  if (at && on) viewer.overlays.dot('sensor', at, Math.max(2 * size, 0.1), 0xff3b6b);
+  else viewer.overlays.set('sensor', null);
+  viewer.wake();
+}
+
+// --- Colours and cuts
+
+function paint() {
+  viewer.colour = $('colour').value;
+  viewer.threshold = Number($('threshold').value);
+  const scale = viewer.layers[0]?.scale ?? { least: 0, most: 3.5 };
+  $('threshold-out').value = probabilityOf(logOddsOf(scale, viewer.threshold)).toFixed(3);
+  const map = maps[0];
+  const isChange = Boolean($('since').value);
+  const ends = {
+    height: [metres(map.low), metres(map.high)],
+    probability: [0, 255].map((value) => probabilityOf(logOddsOf(scale, value)).toFixed(2)),
+    count: ['1', `${observationsOf(128)}+`],
+    scan: ['1', String(map.scans ?? 1)],
+  }[viewer.colour];
+  $('legend').hidden = isChange;
+  if (isChange) {
+    const told = ['appeared', 'vanished', 'same'].map((name, k) => {
+      const [span, swatch] = [document.createElement('span'), document.createElement('span')];
+      swatch.className = 'swatch';
+      swatch.style.background = `rgb(${CHANGES[k]})`;
+      span.append(swatch, name);
+      return span;
+    });
+    $('legend-ends').replaceChildren(...told);
+  } else {
+    $('legend-ends').replaceChildren(...ends.map((text) => Object.assign(document.createElement('span'), { textContent: text })));
+  }
+  viewer.wake();
+  remember();
+}
+
+function cut() {
+  const bounds = allBounds();
+  const low = Math.min(...maps.map((map) => map.low));
+  const high = Math.max(...maps.map((map) => map.high));
+  const ends = [[bounds.min[0], bounds.max[0]], [bounds.min[1], bounds.max[1]], [low, high]];
+  ['x', 'y', 'z'].forEach((axis, k) => {
+    for (const [end, side] of [['0', 'low'], ['1', 'high']]) {
+      const input = $(axis + end);
+      const at = ends[k][0] + (ends[k][1] - ends[k][0]) * input.value / 1000;
+      const isOpen = end === '0' ? input.value === '0' : input.value === '1000';
+      viewer.cut[side][k] = isOpen ? (end === '0' ? -Infinity : Infinity) : at;
+      $(`${axis}${end}-out`).value = isOpen ? 'all' : metres(at);
+    }
+  });
+  viewer.wake();
+}
+
+// --- Questions
+
+async function click(x, y) {
+  const found = pick(viewer, x, y);
+  if (!found) {
+    answer([['', 'nothing there']]);
+    return null;
+  }
+  const center = centerOf(found);
+  const { node, at, layer } = found;
+  const low = at.map((k, axis) => node.corner[axis] + k * node.edge);
+  viewer.overlays.box('voxel', low, low.map((k) => k + node.edge), 0xff3b6b);
+  viewer.wake();
+  return tool === 'query' ? ask(layer, node, center) : mark(layer, center);
+}
+
+async function ask(layer, node, center) {
+  const isCoarse = node.edge > 1.5 * layer.map.resolution_m;
+  try {
+    const told = await json(`maps/${layer.id.split('~')[0]}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`);
+    answered = { ...told, isCoarse };
+    const number = (k, digits) => (k === null ? 'unknown' : k.toFixed(digits));
+    answer([
+      ['at', place(center)],
+      ...(isCoarse ? [['voxel', `of ${metres(node.edge)}: come nearer for single ones`]] : []),
+      ['state', told.state],
+      ['probability', number(told.probability, 4)],
+      ['log-odds', number(told.log_odds, 4)],
+      ['seen', told.observation_count === null ? 'never' : `${told.observation_count} times`],
+      ['tile', told.tile?.join(' ') ?? 'none'],
+    ]);
+    $('copy').hidden = false;
+    return answered;
+  } catch (error) {
+    say(`The server did not answer: ${error.message}`);
+    return null;
+  }
+}
+
+async function mark(layer, center) {
+  if (marks.length === 2) marks = [];
+  marks.push(center);
+  viewer.overlays.path('measure', marks.length === 2 ? marks : [], 0xffb000);
+  if (marks.length < 2) {
+    answer([['from', place(center)], ['to', 'click the other end']]);
+    return marks;
+  }
+  const [from, to] = marks;
+  const way = to.map((k, axis) => k - from[axis]);
+  const rows = [['from', place(from)], ['to', place(to)], ['distance', metres(Math.hypot(...way))], ['dx dy dz', place(way)]];
+  let told = null;
+  if (tool === 'sight') {
+    try {
+      told = await json(`maps/${layer.id.split('~')[0]}/raycast?from=${from}&to=${to}`);
+      rows.push(['sight', told.visible ? 'free' : `blocked after ${metres(told.hit.distance_m)}`]);
+      if (told.unknown_from_m !== null) rows.push(['unknown', `from ${metres(told.unknown_from_m)} on`]);
+      viewer.overlays.path('measure', told.visible ? marks : [from, told.hit.center_m], told.visible ? 0x2fbf71 : 0xe5484d);
+    } catch (error) {
+      say(`The server did not answer: ${error.message}`);
+    }
+  }
+  answer(rows);
+  viewer.wake();
+  return { marks, ...told };
+}
+
+function choose(name) {
+  tool = name;
+  marks = [];
+  for (const one of ['query', 'measure', 'sight']) $(`tool-${one}`).setAttribute('aria-pressed', String(one === name));
+  viewer.overlays.set('measure', null);
+  viewer.overlays.set('voxel', null);
+  answer([]);
+  $('copy').hidden = true;
+  viewer.wake();
+}
+
+// --- The link
+
+function remember() {
+  writeLink(() => ({
+    eye: viewer.toMap(viewer.camera.position.toArray()),
+    to: viewer.toMap(viewer.flight.orbit.target.toArray()),
+    colour: $('colour').value === 'height' ? null : $('colour').value,
+    threshold: viewer.threshold || null,
+    at: $('snapshot').value,
+    since: $('since').value,
+  }));
+}
+
+// --- Live
+
+function follow() {
+  const events = new EventSource('events');
+  events.addEventListener('open', () => { if ($('state').textContent === 'server gone') $('state').textContent = 'loading'; });
+  events.addEventListener('error', () => { $('state').textContent = 'server gone'; });
+  events.addEventListener('changed', async ({ data }) => {
+    const { map: id, generation } = JSON.parse(data);
+    const known = maps.find((map) => map.id === id);
+    if (!known || known.generation >= generation) return;
+    const [low, high, was] = [known.low, known.high, known.generation];
+    await readMaps();
+    await readHeights().catch(() => {});
+    const map = maps.find((one) => one.id === id);
+    for (const layer of viewer.layers) {
+      layer.map = maps.find((one) => one.id === layer.map.id) ?? layer.map;
+      // A snapshot stays as it is.
+      if (layer.map.id === id && !layer.id.includes('@')) layer.refresh();
+    }
+    if (was === 0 || low === high) start();
+    if (map.pending_tiles === 0 && was > 0) {
+      $('live').hidden = false;
+      $('live').title = `flush ${generation}`;
+    }
+    paint();
+    readPath();
+  });
+}
+
+function start() {
+  viewer.center(allBounds());
+  const low = Math.min(...maps.map((map) => map.low));
+  const high = Math.max(...maps.map((map) => map.high));
+  viewer.box.min.z = low + viewer.world.position.z;
+  viewer.box.max.z = high + viewer.world.position.z;
+  if (link.eye && link.to) viewer.flight.lookAt(viewer.toScene(link.eye), viewer.toScene(link.to));
+  else viewer.flight.fit(viewer.box);
+}
+
+// --- Controls
+
+$('colour').addEventListener('change', paint);
+$('threshold').addEventListener('input', paint);
+for (const id of ['x0', 'x1', 'y0', 'y1', 'z0', 'z1']) $(id).addEventListener('input', cut);
+$('uncut').addEventListener('click', () => {
+  for (const axis of ['x', 'y', 'z']) [$(`${axis}0`).value, $(`${axis}1`).value] = [0, 1000];
+  cut();
+});
+for (const kind of ['occupied', 'free', 'unknown']) {
+  $(kind).addEventListener('change', () => {
+    viewer.shows[kind] = $(kind).checked;
+    viewer.wake();
+  });
+}
+$('path').addEventListener('change', showScan);
+$('scan').addEventListener('input', showScan);
+$('grid').addEventListener('change', () => {
+  if ($('grid').checked) viewer.overlays.tiles('grid', { ...allBounds(), min: [...allBounds().min.slice(0, 2), maps[0].low] }, maps[0].tile_size_m, 0x7d8594);
+  else viewer.overlays.set('grid', null);
+  viewer.wake();
+});
+for (const id of ['snapshot', 'since']) $(id).addEventListener('change', showMaps);
+for (const one of ['query', 'measure', 'sight']) $(`tool-${one}`).addEventListener('click', () => choose(one));
+$('copy').addEventListener('click', () => navigator.clipboard?.writeText(answered.voxel_center_m.join(' ')).catch((error) => say(error.message)));
+$('fit').addEventListener('click', () => viewer.flight.fit(viewer.box));
+$('top').addEventListener('click', () => viewer.flight.fit(viewer.box, [0, -0.001, 1]));
+$('side').addEventListener('click', () => viewer.flight.fit(viewer.box, [0, -1, 0.05]));
+$('walk').addEventListener('click', () => {
+  viewer.flight.walk(!viewer.flight.walks);
+  $('walk').setAttribute('aria-pressed', String(viewer.flight.walks));
+  $('scene').focus();
+});
+$('shot').addEventListener('click', () => {
+  viewer.renderer.render(viewer.scene, viewer.camera);
+  viewer.canvas.toBlob((blob) => {
+    const a = Object.assign(document.createElement('a'), { href: URL.createObjectURL(blob), download: `${maps[0]?.name ?? 'map'}.png` });
+    a.click();
+    setTimeout(() => URL.revokeObjectURL(a.href), 1000);
+  });
+});
+$('help').addEventListener('click', () => $('keys').showModal());
+$('menu').addEventListener('click', () => showPanel($('panel').hidden));
+function showPanel(on) {
+  $('panel').hidden = !on;
+  $('menu').setAttribute('aria-expanded', String(on));
+}
+
+function theme(dark) {
+  document.documentElement.classList.toggle('dark', dark);
+  viewer.scene.background = null;
+  viewer.renderer.setClearColor(dark ? 0x14161b : 0xf4f5f7, 1);
+  viewer.wake();
+}
+const scheme = matchMedia('(prefers-color-scheme: dark)');
+scheme.addEventListener('change', () => theme(scheme.matches));
+$('theme').addEventListener('click', () => theme(!document.documentElement.classList.contains('dark')));
+
+const keys = {
+  KeyF: () => $('fit').click(), KeyT: () => $('top').click(), KeyL: () => $('side').click(), KeyG: () => $('walk').click(),
+  KeyP: () => showPanel($('panel').hidden), KeyM: () => choose('measure'), KeyV: () => choose('sight'), Escape: () => choose('query'),
+  Slash: () => $('help').click(),
+};
+window.addEventListener('keydown', (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || $('keys').open || event.target.matches?.('select')) return;
+  const digit = /^Digit([1-4])$/.exec(event.code);
+  if (digit) {
+    $('colour').selectedIndex = Number(digit[1]) - 1;
+    paint();
+  } else keys[event.code]?.();
+});
+
+// A click is a press that does not move.
+let pressed = null;
+$('scene').addEventListener('pointerdown', (event) => { pressed = [event.clientX, event.clientY]; });
+$('scene').addEventListener('pointerup', (event) => {
+  const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
+  if (pressed && moved < 5 && event.button === 0) clickAt(event.clientX, event.clientY);
+  pressed = null;
+});
+
+function clickAt(x, y) {
+  const { left, top, width, height } = $('scene').getBoundingClientRect();
+  return click(2 * (x - left) / width - 1, 1 - 2 * (y - top) / height);
+}
+
+viewer.listeners.push(() => {
+  const isReady = viewer.settled && maps.every((map) => map.pending_tiles === 0 && map.generation > 0);
+  if ($('state').textContent !== 'server gone') $('state').textContent = isReady ? 'ready' : 'loading';
+  if (viewer.layers[0]?.scale && !viewer.scaled) {
+    viewer.scaled = true;
+    paint();
+  }
+});
+viewer.flight.orbit.addEventListener('change', remember);
+
+// For tests, and for whoever opens the console.
+window.voxtile = {
+  voxels() {
+    const meshes = viewer.layers.flatMap((layer) => layer.meshes().map(([mesh]) => [layer, mesh.userData.node]));
+    const centers = [];
+    for (const [layer, node] of meshes) {
+      for (let i = 0; i < node.count; i++) {
+        const at = [node.x[i], node.y[i], node.z[i]];
+        if (viewer.isSeen(layer, node, i, at)) centers.push(centerOf({ node, at }));
+      }
+    }
+    return { count: centers.length, centers, edges: [...new Set(meshes.map(([, node]) => node.edge))] };
+  },
+  faces: () => viewer.layers.flatMap((layer) => layer.meshes()).reduce((sum, [mesh]) => sum + mesh.userData.faces, 0),
+  drawCalls: () => viewer.renderer.info.render.calls,
+  bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.tiles.lruCache.cachedBytes, 0),
+  clickAt,
+  screenOf(point) {
+    const at = viewer.camera.position.clone().set(...viewer.toScene(point)).project(viewer.camera);
+    const { left, top, width, height } = $('scene').getBoundingClientRect();
+    return [left + (at.x + 1) * width / 2, top + (1 - at.y) * height / 2];
+  },
+  camera: () => ({ eye: viewer.toMap(viewer.camera.position.toArray()), to: viewer.toMap(viewer.flight.orbit.target.toArray()) }),
+  lookAt: (eye, to) => viewer.flight.lookAt(viewer.toScene(eye), viewer.toScene(to)),
+  setThreshold(value) {
+    $('threshold').value = value;
+    paint();
+  },
+  set detail(pixels) {
+    for (const layer of viewer.layers) layer.tiles.errorTarget = pixels;
+    viewer.wake();
+  },
+  get firstPictureMs() { return viewer.firstPictureMs; },
+  get generation() { return maps.map((map) => map.generation); },
+};
+
+theme(scheme.matches);
+drawLegend($('legend'));
+if (matchMedia('(max-width: 700px)').matches) showPanel(false);
+try {
+  await readMaps();
+  await readHeights();
+  if (link.colour) $('colour').value = link.colour;
+  if (link.threshold !== null) $('threshold').value = link.threshold;
+  if (link.at) $('snapshot').value = link.at;
+  if (link.since) $('since').value = link.since;
+  start();
+  showMaps();
+  cut();
+  if (maps.every((map) => map.tiles === 0)) say('This map is empty.');
+  follow();
+} catch (error) {
+  $('state').textContent = 'failed';
+  say(`The map was not loaded: ${error.message}`);
+}

@@ -1,0 +1,96 @@
+import * as THREE from 'three';
+import { CHANGES, ramp } from './palette.js';
+import { KIND } from './node.js';
+
+const vertex = /* glsl */ `
+attribute vec4 place;
+attribute vec4 levels;
+uniform float threshold;
+uniform vec3 low, high;
+uniform int colourBy;
+uniform vec2 range;
+uniform float lastScan;
+uniform int kind;
+varying vec2 corner;
+varying float share;
+varying float light;
+varying float change;
+void main() {
+  int side = int(place.w + 0.5);
+  bool isSeen = kind != 0 || (levels.x >= threshold && (levels.y < 0.5 || levels.y - 1.0 < threshold));
+  vec3 mid = (modelMatrix * vec4(place.xyz + 0.5, 1.0)).xyz;
+  isSeen = isSeen && all(greaterThanEqual(mid, low)) && all(lessThanEqual(mid, high));
+  if (!isSeen) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
+  vec2 uv = position.xy;
+  vec3 at;
+  // Seen from outside, corners go around counterclockwise.
+  if (side == 0) { at = vec3(1.0, uv); light = 0.86; }
+  else if (side == 1) { at = vec3(0.0, uv.y, uv.x); light = 0.66; }
+  else if (side == 2) { at = vec3(uv.y, 1.0, uv.x); light = 0.78; }
+  else if (side == 3) { at = vec3(uv.x, 0.0, uv.y); light = 0.72; }
+  else if (side == 4) { at = vec3(uv, 1.0); light = 1.0; }
+  else { at = vec3(uv.y, uv.x, 0.0); light = 0.5; }
+  corner = uv;
+  change = levels.x;
+  float value = colourBy == 0 ? mid.z : colourBy == 1 ? levels.x : colourBy == 2 ? levels.z : lastScan;
+  share = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0);
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(place.xyz + at, 1.0);
+}`;
+
+const fragment = /* glsl */ `
+uniform sampler2D ramp;
+uniform vec4 tint;
+uniform vec3 changes[3];
+uniform int kind;
+varying vec2 corner;
+varying float share;
+varying float light;
+varying float change;
+void main() {
+  vec3 colour = texture2D(ramp, vec2(share, 0.5)).rgb;
+  if (kind == 3) colour = change < 1.5 ? changes[0] : change < 2.5 ? changes[1] : changes[2];
+  else if (tint.a > 0.0) colour = tint.rgb * (0.55 + 0.45 * share);
+  // Borders, where a voxel is large enough on the screen.
+  vec2 pixel = fwidth(corner);
+  vec2 inside = min(corner, 1.0 - corner) / max(pixel, vec2(1e-6));
+  float border = 1.0 - smoothstep(0.0, 1.5, min(inside.x, inside.y));
+  float near = 1.0 - smoothstep(0.08, 0.25, max(pixel.x, pixel.y));
+  gl_FragColor = vec4(colour * light * (1.0 - 0.35 * border * near), kind == 1 ? 0.10 : kind == 2 ? 0.22 : 1.0);
+  #include <colorspace_fragment>
+}`;
+
+const linear = (rgb) => new THREE.Color().setRGB(...rgb.map((k) => k / 255), THREE.SRGBColorSpace);
+
+// One for each layer and kind; what is common to all is shared.
+export function makeMaterial(kind, shared) {
+  const isClear = kind === KIND.free || kind === KIND.unknown;
+  const tint = kind === KIND.free ? [70, 150, 220] : kind === KIND.unknown ? [200, 120, 200] : null;
+  const own = tint ? linear(tint) : null;
+  return new THREE.ShaderMaterial({
+    vertexShader: vertex,
+    fragmentShader: fragment,
+    transparent: isClear,
+    depthWrite: !isClear,
+    uniforms: {
+      ...shared,
+      kind: { value: kind },
+      ramp: { value: ramp },
+      changes: { value: CHANGES.map(linear) },
+      tint: { value: own ? new THREE.Vector4(own.r, own.g, own.b, 1) : new THREE.Vector4(0, 0, 0, 0) },
+      threshold: { value: 0 },
+      range: { value: new THREE.Vector2(0, 1) },
+      lastScan: { value: 0 },
+    },
+  });
+}
+
+export function tintLayer(material, rgb) {
+  const colour = linear(rgb);
+  material.uniforms.tint.value.set(colour.r, colour.g, colour.b, 1);
+}
+
+export const sharedUniforms = () => ({
+  low: { value: new THREE.Vector3(-Infinity, -Infinity, -Infinity) },
+  high: { value: new THREE.Vector3(Infinity, Infinity, Infinity) },
+  colourBy: { value: 0 },
+});

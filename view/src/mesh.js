@@ -1,0 +1,33 @@
+import * as THREE from 'three';
+import { facesOf } from './node.js';
+
+const corners = new THREE.BufferAttribute(new Float32Array([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0]), 3);
+const quad = new THREE.BufferAttribute(new Uint16Array([0, 1, 2, 0, 2, 3]), 1);
+
+// One draw call: a quad for each face.
+export function meshOf(node, material) {
+  const faces = facesOf(node);
+  const geometry = new THREE.InstancedBufferGeometry();
+  geometry.setAttribute('position', corners);
+  geometry.setIndex(quad);
+  geometry.setAttribute('place', new THREE.InstancedBufferAttribute(faces.places, 4));
+  geometry.setAttribute('levels', new THREE.InstancedBufferAttribute(faces.levels, 4));
+  geometry.instanceCount = faces.count;
+  const half = node.size / 2;
+  geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(half, half, half), Math.sqrt(3) * half);
+  geometry.boundingBox = new THREE.Box3(new THREE.Vector3(), new THREE.Vector3(node.size, node.size, node.size));
+  const mesh = new THREE.Mesh(geometry, material);
+  mesh.position.set(...node.corner);
+  mesh.scale.setScalar(node.edge);
+  mesh.userData.node = node;
+  mesh.userData.faces = faces.count;
+  mesh.raycast = () => {};
+  mesh.onBeforeRender = (renderer, scene, camera, geometry_, drawn) => {
+    drawn.uniforms.lastScan.value = node.lastScan === 0xffffffff ? 0 : node.lastScan;
+    drawn.uniformsNeedUpdate = true;
+  };
+  return mesh;
+}
+
+// What the bytes of a node take here: faces, and voxels for clicks.
+export const bytesOf = (node, faces) => 8 * faces + 5 * node.count;

@@ -1,0 +1,82 @@
+// A node of a map: the bytes that the server sends (docs/view.md), and the faces of its voxels.
+
+const HEAD = 64;
+// One more on each side, so that every voxel has neighbours.
+const MOST = 130;
+const grid = new Uint16Array(MOST * MOST * MOST);
+
+export const KIND = { occupied: 0, free: 1, unknown: 2, change: 3 };
+
+function steps(bytes) {
+  const places = new Uint8Array(bytes.length);
+  let at = 0;
+  for (let i = 0; i < bytes.length; i++) {
+    at = (at + bytes[i]) & 255;
+    places[i] = at;
+  }
+  return places;
+}
+
+export function parseNode(buffer) {
+  const view = new DataView(buffer);
+  if (buffer.byteLength < HEAD || view.getUint32(0, false) !== 0x56584e31) throw new Error('this is no node of a map');
+  const count = view.getUint32(4, true);
+  if (buffer.byteLength !== HEAD + 5 * count) throw new Error('a node of another length than it says');
+  const plane = (k) => new Uint8Array(buffer, HEAD + k * count, count);
+  return {
+    count,
+    corner: [view.getFloat64(8, true), view.getFloat64(16, true), view.getFloat64(24, true)],
+    edge: view.getFloat64(32, true),
+    lastScan: view.getUint32(40, true),
+    size: view.getUint16(44, true),
+    kind: view.getUint8(46),
+    least: view.getFloat32(48, true),
+    most: view.getFloat32(52, true),
+    threshold: view.getFloat32(56, true),
+    x: steps(plane(0)), y: steps(plane(1)), z: steps(plane(2)),
+    value: plane(3).slice(), counts: plane(4).slice(),
+  };
+}
+
+const cell = (x, y, z) => x + 1 + MOST * (y + 1 + MOST * (z + 1));
+const BESIDE = [1, -1, MOST, -MOST, MOST * MOST, -MOST * MOST];
+
+// The faces that any threshold can make visible: place and direction (+x -x +y -y +z -z), the value of the voxel, that of
+// its neighbour plus one (0: there is none), and the count. Only kind 0 has values to compare.
+export function facesOf(node) {
+  const { count, x, y, z, value, counts, kind } = node;
+  for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : 256;
+  let n = 0;
+  for (let i = 0; i < count; i++) {
+    const at = cell(x[i], y[i], z[i]);
+    for (const step of BESIDE) if (grid[at + step] < grid[at]) n++;
+  }
+  const places = new Uint8Array(4 * n);
+  const levels = new Uint8Array(4 * n);
+  n = 0;
+  for (let i = 0; i < count; i++) {
+    const at = cell(x[i], y[i], z[i]);
+    for (let side = 0; side < 6; side++) {
+      const beside = grid[at + BESIDE[side]];
+      if (beside >= grid[at]) continue;
+      places.set([x[i], y[i], z[i], side], 4 * n);
+      levels.set([value[i], beside, counts[i], 0], 4 * n);
+      n++;
+    }
+  }
+  for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = 0;
+  return { places, levels, count: n };
+}
+
+// Where the voxels of a node are, for rays: made when it is first asked for.
+export function placesOf(node) {
+  if (!node.places) {
+    node.places = new Map();
+    for (let i = 0; i < node.count; i++) node.places.set(node.x[i] | node.y[i] << 8 | node.z[i] << 16, i);
+  }
+  return node.places;
+}
+
+export const logOddsOf = (node, value) => node.least + (node.most - node.least) * value / 255;
+export const probabilityOf = (logOdds) => 1 / (1 + Math.exp(-logOdds));
+export const observationsOf = (count) => Math.round(2 ** (count / 16) - 1);

@@ -1,0 +1,75 @@
+import * as THREE from 'three';
+
+const line = (points, colour, closed = false) => {
+  const geometry = new THREE.BufferGeometry().setFromPoints(points.map((p) => new THREE.Vector3(...p)));
+  const material = new THREE.LineBasicMaterial({ color: colour, depthTest: !closed });
+  return closed ? new THREE.LineSegments(geometry, material) : new THREE.Line(geometry, material);
+};
+
+const EDGES = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
+
+// What is drawn over the map, in metres of the map.
+export class Overlays {
+  constructor(parent) {
+    this.group = new THREE.Group();
+    parent.add(this.group);
+    this.named = new Map();
+  }
+
+  set(name, object) {
+    const before = this.named.get(name);
+    if (before) {
+      this.group.remove(before);
+      before.traverse((part) => part.geometry?.dispose());
+    }
+    this.named.delete(name);
+    if (!object) return;
+    this.named.set(name, object);
+    this.group.add(object);
+  }
+
+  show(name, on) {
+    const object = this.named.get(name);
+    if (object) object.visible = on;
+  }
+
+  // Lines relative to their first point: coordinates of millions of metres do not fit `f32`.
+  path(name, points, colour) {
+    if (points.length === 0) return this.set(name, null);
+    const base = points[0];
+    const drawn = line(points.map((p) => p.map((k, axis) => k - base[axis])), colour);
+    drawn.position.set(...base);
+    drawn.renderOrder = 2;
+    this.set(name, drawn);
+  }
+
+  box(name, low, high, colour) {
+    const size = high.map((k, axis) => k - low[axis]);
+    const corner = (k) => [k & 1, k >> 1 & 1, k >> 2].map((on, axis) => on * size[axis]);
+    const drawn = line(EDGES.flatMap(([a, b]) => [corner(a), corner(b)]), colour, true);
+    drawn.position.set(...low);
+    drawn.renderOrder = 3;
+    this.set(name, drawn);
+  }
+
+  dot(name, at, radius, colour) {
+    const ball = new THREE.Mesh(new THREE.SphereGeometry(radius, 16, 8), new THREE.MeshBasicMaterial({ color: colour, depthTest: false }));
+    ball.position.set(...at);
+    ball.renderOrder = 4;
+    this.set(name, ball);
+  }
+
+  // Borders of tiles at the foot of the map; too many are left out.
+  tiles(name, bounds, size, colour) {
+    const [x0, y0, z] = bounds.min;
+    const counts = [0, 1].map((k) => Math.round((bounds.max[k] - bounds.min[k]) / size));
+    if (counts[0] + counts[1] > 4000) return this.set(name, null);
+    const points = [];
+    for (let k = 0; k <= counts[0]; k++) points.push([k * size, 0, 0], [k * size, counts[1] * size, 0]);
+    for (let k = 0; k <= counts[1]; k++) points.push([0, k * size, 0], [counts[0] * size, k * size, 0]);
+    const geometry = new THREE.BufferGeometry().setFromPoints(points.map((p) => new THREE.Vector3(...p)));
+    const drawn = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour, transparent: true, opacity: 0.5 }));
+    drawn.position.set(x0, y0, z);
+    this.set(name, drawn);
+  }
+}

@@ -1,0 +1,32 @@
+import * as THREE from 'three';
+
+// From dark to bright in even steps, so that it reads without colour sight as well.
+const STOPS = [[38, 13, 74], [57, 62, 138], [38, 104, 142], [31, 144, 138], [74, 184, 108], [160, 213, 62], [252, 232, 66]];
+// Told apart by everybody: blue, orange, grey; and hues of layers.
+export const CHANGES = [[0, 114, 208], [230, 126, 0], [150, 154, 162]];
+export const LAYERS = [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [213, 94, 0]];
+
+export function colourAt(share) {
+  const along = Math.min(Math.max(share, 0), 1) * (STOPS.length - 1);
+  const low = Math.min(Math.floor(along), STOPS.length - 2);
+  return STOPS[low].map((from, k) => Math.round(from + (along - low) * (STOPS[low + 1][k] - from)));
+}
+
+const texture = (colours) => {
+  const data = new Uint8Array(colours.flatMap((colour) => [...colour, 255]));
+  const made = new THREE.DataTexture(data, colours.length, 1);
+  made.colorSpace = THREE.SRGBColorSpace;
+  made.magFilter = made.minFilter = THREE.LinearFilter;
+  made.needsUpdate = true;
+  return made;
+};
+
+export const ramp = texture(Array.from({ length: 256 }, (_, k) => colourAt(k / 255)));
+
+export function drawLegend(canvas) {
+  const context = canvas.getContext('2d');
+  for (let k = 0; k < canvas.width; k++) {
+    context.fillStyle = `rgb(${colourAt(k / (canvas.width - 1))})`;
+    context.fillRect(k, 0, 1, canvas.height);
+  }
+}

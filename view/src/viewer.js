@@ -1,0 +1,149 @@
+import * as THREE from 'three';
+import { Flight } from './camera.js';
+import { Layer } from './layer.js';
+import { LAYERS } from './palette.js';
+import { sharedUniforms } from './material.js';
+import { KIND } from './node.js';
+import { Overlays } from './overlays.js';
+
+// The scene: layers, what lies over them, the camera. It draws only when something changed.
+export class Viewer {
+  constructor(canvas, say) {
+    this.say = say;
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.scene = new THREE.Scene();
+    // Coordinates of a map may be millions of metres: the scene's own begin at its middle.
+    this.world = new THREE.Group();
+    this.scene.add(this.world);
+    this.camera = new THREE.PerspectiveCamera(60, 1, 0.05, 1e6);
+    this.camera.up.set(0, 0, 1);
+    this.flight = new Flight(this.camera, canvas, () => this.wake());
+    this.shared = sharedUniforms();
+    this.overlays = new Overlays(this.world);
+    this.layers = [];
+    this.shows = { occupied: true, free: false, unknown: false };
+    this.threshold = 0;
+    this.cut = { low: [-Infinity, -Infinity, -Infinity], high: [Infinity, Infinity, Infinity] };
+    this.colour = 'height';
+    this.listeners = [];
+    this.firstPictureMs = null;
+    this.frames = 0;
+    this.last = performance.now();
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+    this.wake();
+  }
+
+  get middle() {
+    return this.world.position.toArray().map((k) => -k);
+  }
+
+  // Whole metres in the middle of the maps; they are there from the first map on.
+  center(bounds) {
+    const middle = [0, 1, 2].map((k) => Math.round((bounds.min[k] + bounds.max[k]) / 2));
+    this.world.position.set(...middle.map((k) => -k));
+    this.box = new THREE.Box3(...['min', 'max'].map((end) => new THREE.Vector3(...bounds[end].map((k, axis) => k - middle[axis]))));
+    this.world.updateMatrixWorld(true);
+  }
+
+  toScene(point) {
+    return point.map((k, axis) => k + this.world.position.getComponent(axis));
+  }
+
+  toMap(point) {
+    return point.map((k, axis) => k - this.world.position.getComponent(axis));
+  }
+
+  show(maps) {
+    for (const layer of this.layers) layer.dispose();
+    this.layers = maps.map(({ map, id }, k) => {
+      const layer = new Layer(this, map, id, maps.length > 1 ? LAYERS[k % LAYERS.length] : null);
+      this.world.add(layer.group);
+      return layer;
+    });
+    this.paint();
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.wake();
+  }
+
+  // Draws soon.
+  wake() {
+    this.settled = false;
+    if (this.waits) return;
+    this.waits = true;
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  frame(now) {
+    this.waits = false;
+    const seconds = (now - this.last) / 1000;
+    this.last = now;
+    const moved = this.flight.update(seconds);
+    this.fitDepth();
+    for (const layer of this.layers) layer.update();
+    this.paint();
+    for (const layer of this.layers) layer.tiles.group.visible = layer.isShown && this.shows.occupied;
+    for (const layer of this.layers) layer.near.visible = layer.isShown;
+    this.renderer.render(this.scene, this.camera);
+    this.frames++;
+    const meshes = this.layers.reduce((sum, layer) => sum + layer.tiles.visibleTiles.size, 0);
+    if (this.firstPictureMs === null && meshes > 0) this.firstPictureMs = performance.now();
+    // A picture of all that was loaded, and nothing left to load.
+    const isReady = this.layers.every((layer) => layer.isReady);
+    this.settled = isReady && this.wasReady && !moved;
+    this.wasReady = isReady;
+    for (const listener of this.listeners) listener(this);
+    if (!this.settled) this.waitAWhile(moved);
+  }
+
+  // Depth is told apart where the map is, not before and behind it.
+  fitDepth() {
+    const far = this.box ? this.box.getSize(new THREE.Vector3()).length() : 100;
+    const away = this.box ? this.box.distanceToPoint(this.camera.position) : 0;
+    this.camera.near = Math.max(0.02, 0.6 * away, far * 1e-5);
+    this.camera.far = away + 1.5 * far + 10;
+    this.camera.updateProjectionMatrix();
+    this.camera.updateMatrixWorld();
+  }
+
+  waitAWhile(moved) {
+    if (this.waits) return;
+    this.waits = true;
+    const again = () => requestAnimationFrame((now) => this.frame(now));
+    if (moved) again();
+    else setTimeout(again, 30);
+  }
+
+  // What the uniforms say, from what is chosen.
+  paint() {
+    this.shared.colourBy.value = ['height', 'probability', 'count', 'scan'].indexOf(this.colour);
+    this.shared.low.value.set(...this.toScene(this.cut.low));
+    this.shared.high.value.set(...this.toScene(this.cut.high));
+    for (const layer of this.layers) {
+      const uniforms = layer.material.uniforms;
+      uniforms.threshold.value = this.threshold;
+      const z = [layer.map.low, layer.map.high].map((k) => k + this.world.position.z);
+      const range = { height: z, probability: [0, 255], count: [0, 128], scan: [0, Math.max(layer.map.scans ?? 1, 1)] }[this.colour];
+      uniforms.range.value.set(...range);
+    }
+  }
+
+  // Whether a voxel is drawn: above the threshold, and within the cut.
+  isSeen(layer, node, voxel, at) {
+    if (!this.shows.occupied) return false;
+    if (node.kind === KIND.occupied && node.value[voxel] < this.threshold) return false;
+    return at.every((k, axis) => {
+      const mid = node.corner[axis] + (k + 0.5) * node.edge;
+      return mid >= this.cut.low[axis] && mid <= this.cut.high[axis];
+    });
+  }
+}
