@@ -23,6 +23,8 @@ pub struct CloudOptions {
     pub is_deskewed: bool,
     /// A cloud without a pose is in the world frame: for points without rays.
     pub may_lack_poses: bool,
+    /// Whether a cloud without a pose is worth a remark: not where points count alone.
+    pub are_poses_needed: bool,
     /// Points without a return are kept as rays: [`RayConfig::no_return_range_m`](crate::RayConfig).
     pub has_no_returns: bool,
 }
@@ -42,6 +44,7 @@ impl Default for CloudOptions {
             is_world_frame: false,
             is_deskewed: false,
             may_lack_poses: false,
+            are_poses_needed: true,
             has_no_returns: false,
         }
     }
@@ -266,8 +269,10 @@ impl ScanSource for PosedClouds {
             let body = match found {
                 Ok(body) => body,
                 Err(why) => {
-                    if !self.options.may_lack_poses {
+                    if self.options.are_poses_needed {
                         self.note_without_pose(&head, &why);
+                    }
+                    if !self.options.may_lack_poses {
                         continue;
                     }
                     RigidPose::IDENTITY
@@ -279,7 +284,7 @@ impl ScanSource for PosedClouds {
             self.fields = fields;
             return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
         }
-        if self.without_pose > 0 && !self.has_pose {
+        if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {
             // A map of nothing would be no answer.
             let reason =
                 format!("none of its {} clouds has a pose ({})", self.without_pose, self.why_without_pose());

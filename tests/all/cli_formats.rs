@@ -225,7 +225,7 @@ fn texts_beside_clouds_are_none() {
     let set = folder.path().join("set");
     for arguments in [vec!["scans", text(&set)], vec!["scans", text(&set), "--format", "ply"]] {
         let told = output(&arguments);
-        assert!(told.contains("ply") && told.contains("set/poses_tum.txt"), "{told}");
+        assert!(told.contains("PLY") && told.contains("set/poses_tum.txt"), "{told}");
     }
 }
 

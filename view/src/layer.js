@@ -6,7 +6,7 @@ import { makeMaterial, tintLayer } from './material.js';
 
 const MOST_BYTES = 256 * 2 ** 20;
 const MOST_DRAWN = 180;
-const BEST_ERROR = 7;
+const BEST_ERROR = 4;
 // Tiles whose free or unknown voxels are shown at once.
 const MOST_NEAR = 24;
 
@@ -74,8 +74,10 @@ export class Layer {
       if (!tiles) continue;
       tiles.setResolutionFromRenderer(camera, renderer);
       tiles.update();
+      // A file that has come asks for others at the next update.
+      tiles.calm = tiles.rootTileset && Layer.isIdle(tiles) ? (tiles.calm ?? 0) + 1 : 0;
     }
-    if (this.next && this.next.rootTileset && Layer.isQuiet(this.next)) {
+    if (this.next && Layer.isQuiet(this.next)) {
       this.group.remove(this.tiles.group);
       this.tiles.dispose();
       [this.tiles, this.next] = [this.next, null];
@@ -95,14 +97,19 @@ export class Layer {
     this.updateNear();
   }
 
-  static isQuiet(tiles) {
+  static isIdle(tiles) {
     const { queued, downloading, parsing } = tiles.stats;
-    return queued + downloading + parsing === 0 && !tiles.isLoading && tiles.stats.refused === 0;
+    return queued + downloading + parsing === 0 && !tiles.isLoading && !tiles.processNodeQueue.running;
+  }
+
+  static isQuiet(tiles) {
+    const isEmpty = !tiles.root?.children?.length;
+    return tiles.calm > (tiles.visibleTiles.size > 0 || isEmpty ? 2 : 20);
   }
 
   // Whether everything that the view needs is here.
   get isReady() {
-    return this.tiles.rootTileset && Layer.isQuiet(this.tiles) && !this.next && !this.waits;
+    return Layer.isQuiet(this.tiles) && !this.next && !this.waits;
   }
 
   meshes() {

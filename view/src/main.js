@@ -97,12 +97,15 @@ function allBounds() {
   return { min: end('min', Math.min), max: end('max', Math.max) };
 }
 
-// The heights of what is occupied, by the tileset's root, for colours.
-async function readHeights() {
+// Where something is occupied, by the tileset's root: for colours, cuts and the first look.
+async function readExtents() {
   await Promise.all(maps.map(async (map) => {
     const { root } = await json(`maps/${map.id}/tileset.json`);
-    const [, , z, , , , , , , , , half] = root.boundingVolume.box;
-    if (root.children) [map.low, map.high] = [z - half, z + half];
+    if (!root.children) return;
+    const box = root.boundingVolume.box;
+    const half = [box[3], box[7], box[11]];
+    map.bounds = { min: half.map((k, axis) => box[axis] - k), max: half.map((k, axis) => box[axis] + k) };
+    [map.low, map.high] = [map.bounds.min[2], map.bounds.max[2]];
   }));
 }
 
@@ -291,7 +294,7 @@ function follow() {
     if (!known || known.generation >= generation) return;
     const [low, high, was] = [known.low, known.high, known.generation];
     await readMaps();
-    await readHeights().catch(() => {});
+    await readExtents().catch(() => {});
     const map = maps.find((one) => one.id === id);
     for (const layer of viewer.layers) {
       layer.map = maps.find((one) => one.id === layer.map.id) ?? layer.map;
@@ -310,10 +313,6 @@ function follow() {
 
 function start() {
   viewer.center(allBounds());
-  const low = Math.min(...maps.map((map) => map.low));
-  const high = Math.max(...maps.map((map) => map.high));
-  viewer.box.min.z = low + viewer.world.position.z;
-  viewer.box.max.z = high + viewer.world.position.z;
   if (link.eye && link.to) viewer.flight.lookAt(viewer.toScene(link.eye), viewer.toScene(link.to));
   else viewer.flight.fit(viewer.box);
 }
@@ -455,7 +454,7 @@ drawLegend($('legend'));
 if (matchMedia('(max-width: 700px)').matches) showPanel(false);
 try {
   await readMaps();
-  await readHeights();
+  await readExtents();
   if (link.colour) $('colour').value = link.colour;
   if (link.threshold !== null) $('threshold').value = link.threshold;
   if (link.at) $('snapshot').value = link.at;

@@ -4,7 +4,7 @@ use super::point_cloud2::{FieldType, SCHEMA, encode};
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use crate::error::{Error, Result};
 use ::mcap::records::MessageHeader;
-use ::mcap::{Compression, McapError, Writer};
+use ::mcap::{McapError, Writer};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -37,8 +37,7 @@ impl McapSink {
         let writing = ::mcap::WriteOptions::new()
             .profile("ros2")
             .library(concat!("voxtile-clouds ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Zstd))
-            .compression_threads(0);
+            .compression(None);
         let mut writer = writing.create(out).map_err(refused)?;
         let schema = writer
             .add_schema("sensor_msgs/msg/PointCloud2", "ros2msg", SCHEMA.as_bytes())

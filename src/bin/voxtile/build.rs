@@ -142,6 +142,7 @@ fn options_of(args: &BuildArgs) -> voxtile::Result<ReadOptions> {
     options.clouds.has_no_returns = args.clear_no_return.is_some();
     if args.no_rays && options.poses.is_none() {
         options.clouds.may_lack_poses = true;
+        options.clouds.are_poses_needed = false;
     }
     Ok(options)
 }
