@@ -47,6 +47,11 @@ fn a_chunk_table_that_lies_is_refused() {
     let lengths_at = points_at + 8 + 42 + 4;
     let error = of_damaged(&by_layer, lengths_at, &[0xff; 4]);
     assert_says(&error, lengths_at, "the fields of a chunk claim 42949");
+    // Found by fuzzing: where the fields end before their chunk does, the next one is looked for in their bytes.
+    let shorter =
+        (u32::from_le_bytes(by_layer[lengths_at..lengths_at + 4].try_into().unwrap()) - 1).to_le_bytes();
+    let error = of_damaged(&by_layer, lengths_at, &shorter);
+    assert_says(&error, lengths_at, "the fields of a chunk claim ");
 }
 
 #[test]
