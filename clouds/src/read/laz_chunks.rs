@@ -46,6 +46,10 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
         );
         return Err(wrong(105, reason));
     }
+    // The library goes by the version of the parts: those from 3 on are layers, whatever the compressor is said to be.
+    if laz.items().iter().any(|item| (item.version() >= 3) != (compressor == LAYERED)) {
+        return Err(wrong(100, format!("compressor {compressor} does not fit the parts of its points")));
+    }
     if compressor == POINT_WISE {
         return Ok(());
     }

@@ -54,6 +54,21 @@ fn a_chunk_table_that_lies_is_refused() {
     assert_says(&error, lengths_at, "the fields of a chunk claim ");
 }
 
+/// Found by fuzzing: layers that are said to be none are not checked as such.
+#[test]
+fn a_compressor_must_fit_the_versions_of_its_parts() {
+    for (file, compressor) in [
+        (fs::read(fixture("timed.laz")).unwrap(), 2_u16),
+        (voxel_file(VoxelFileFormat::Laz), 2),
+        (voxel_file(VoxelFileFormat::Laz), 1),
+    ] {
+        // The description follows the head of its record, which begins with two bytes and the name.
+        let name_at = file.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
+        let error = of_damaged(&file, name_at - 2 + 54, &compressor.to_le_bytes());
+        assert_says(&error, 100, &format!("compressor {compressor} does not fit"));
+    }
+}
+
 #[test]
 fn more_points_than_the_chunks_have_room_for_are_refused() {
     let by_layer = voxel_file(VoxelFileFormat::Laz);
