@@ -46,6 +46,10 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
         );
         return Err(wrong(105, reason));
     }
+    // The library goes by the version of the parts: those from 3 on are layers, whatever the compressor is said to be.
+    if laz.items().iter().any(|item| (item.version() >= 3) != (compressor == LAYERED)) {
+        return Err(wrong(100, format!("compressor {compressor} does not fit the parts of its points")));
+    }
     if compressor == POINT_WISE {
         return Ok(());
     }
@@ -72,7 +76,8 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
             );
             return Err(wrong(table_at, reason));
         };
-        if compressor == LAYERED && entry.byte_count > 0 {
+        // A chunk behind all points may be empty.
+        if compressor == LAYERED && room < layout.points && entry.point_count > 0 {
             check_layers(path, &mut input, &laz, at, end)?;
         }
         room = room.saturating_add(entry.point_count);
@@ -119,7 +124,8 @@ fn check_layers(path: &Path, input: &mut BufReader<&File>, laz: &LazVlr, at: u64
     let lengths = bytes_at(path, input, lengths_at, lengths_bytes)?;
     let claimed: u64 = lengths.chunks_exact(4).map(|length| number(length, 0, 4)).sum();
     let there = end.saturating_sub(lengths_at + lengths_bytes);
-    if claimed > there {
+    // The library takes what stands behind the fields as the next chunk.
+    if claimed != there {
         let reason = format!("the fields of a chunk claim {claimed} bytes; it has {there}");
         return Err(Error::format(path, Place::Byte(lengths_at), reason));
     }

@@ -1,6 +1,7 @@
 use super::bag1_record::{Record, RecordKind};
 use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress};
-use super::chunk_order::{ChunkOrder, Step};
+use super::chunk_file::ChunkFile;
+use super::chunk_order::ChunkOrder;
 use super::file_bytes::FileBytes;
 use super::recording::{Message, Recording, Topic, TopicList};
 use super::wire::Wire;
@@ -16,7 +17,6 @@ pub struct Bag1 {
     /// The topic of a connection.
     connections: HashMap<u32, usize>,
     chunks: Vec<ChunkPlace>,
-    wanted: Vec<usize>,
     order: ChunkOrder,
     remarks: Vec<String>,
 }
@@ -47,7 +47,6 @@ impl Bag1 {
             topics: TopicList::default(),
             connections: HashMap::new(),
             chunks: Vec::new(),
-            wanted: Vec::new(),
             order: ChunkOrder::default(),
             remarks: Vec::new(),
         };
@@ -171,34 +170,6 @@ impl Bag1 {
         self.connections.insert(id, topic);
     }
 
-    /// Reads a chunk; of its messages those of some topics, or of all.
-    fn load(&mut self, place: &ChunkPlace, wanted: Option<&[usize]>) -> Result<OpenChunk> {
-        let path = self.file.path().to_owned();
-        let wrong = |reason: String| Error::format(&path, Place::Byte(place.offset), reason);
-        let head = self.record(place.offset)?;
-        let Some((record, end)) = head.filter(|(record, _)| record.op == Some(RecordKind::Chunk)) else {
-            return Err(wrong(
-                "there is no chunk where the index says so; `rosbag reindex` makes a new index".into(),
-            ));
-        };
-        let claimed = u64::from(record.u32("size").unwrap_or_default());
-        let compression = record.text("compression").unwrap_or_default();
-        let data_at = place.offset + 8 + record.header_bytes;
-        let data_bytes = end.saturating_sub(data_at);
-        if claimed.max(data_bytes) > MOST_CHUNK_BYTES {
-            let reason =
-                "a chunk of more than 1 GiB is not read; record smaller ones (rosbag record --chunksize)";
-            return Err(wrong(reason.into()));
-        }
-        let data = self.file.read_at(data_at, data_bytes)?;
-        let is_cut = (data.len() as u64) < data_bytes;
-        let (bytes, complaint) = decompress(&compression, data, claimed);
-        let complaint = if is_cut { Some("the file ends in the midst of it".to_owned()) } else { complaint };
-        let mut chunk = OpenChunk { bytes, messages: Vec::new(), complaint };
-        self.find_messages(&mut chunk, wanted);
-        Ok(chunk)
-    }
-
     /// Walks over the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, wanted: Option<&[usize]>) {
         let mut at = 0;
@@ -227,6 +198,43 @@ impl Bag1 {
     }
 }
 
+impl ChunkFile for Bag1 {
+    fn path(&self) -> &Path {
+        self.file.path()
+    }
+
+    fn order(&mut self) -> &mut ChunkOrder {
+        &mut self.order
+    }
+
+    fn load(&mut self, place: &ChunkPlace, wanted: Option<&[usize]>) -> Result<OpenChunk> {
+        let path = self.file.path().to_owned();
+        let wrong = |reason: String| Error::format(&path, Place::Byte(place.offset), reason);
+        let head = self.record(place.offset)?;
+        let Some((record, end)) = head.filter(|(record, _)| record.op == Some(RecordKind::Chunk)) else {
+            return Err(wrong(
+                "there is no chunk where the index says so; `rosbag reindex` makes a new index".into(),
+            ));
+        };
+        let claimed = u64::from(record.u32("size").unwrap_or_default());
+        let compression = record.text("compression").unwrap_or_default();
+        let data_at = place.offset + 8 + record.header_bytes;
+        let data_bytes = end.saturating_sub(data_at);
+        if claimed.max(data_bytes) > MOST_CHUNK_BYTES {
+            let reason =
+                "a chunk of more than 1 GiB is not read; record smaller ones (rosbag record --chunksize)";
+            return Err(wrong(reason.into()));
+        }
+        let data = self.file.read_at(data_at, data_bytes)?;
+        let is_cut = (data.len() as u64) < data_bytes;
+        let (bytes, complaint) = decompress(&compression, data, claimed);
+        let complaint = if is_cut { Some("the file ends in the midst of it".to_owned()) } else { complaint };
+        let mut chunk = OpenChunk { bytes, messages: Vec::new(), complaint };
+        self.find_messages(&mut chunk, wanted);
+        Ok(chunk)
+    }
+}
+
 impl Recording for Bag1 {
     fn format(&self) -> &str {
         "ROS 1 bag"
@@ -237,35 +245,15 @@ impl Recording for Bag1 {
     }
 
     fn begin(&mut self, topics: &[usize]) -> Result<()> {
-        self.wanted = topics.to_vec();
         self.order = ChunkOrder::new(&self.chunks, topics);
         Ok(())
     }
 
     fn next_message(&mut self) -> Result<Option<Message>> {
-        loop {
-            let place = match self.order.step() {
-                Step::Load(place) => place,
-                Step::Message(message) => return Ok(Some(message)),
-                Step::End => return Ok(None),
-            };
-            let wanted = self.wanted.clone();
-            let mut chunk = self.load(&place, Some(&wanted))?;
-            let complaint = chunk.complaint.take();
-            let whole = chunk.messages.len();
-            self.order.open(chunk);
-            if let Some(complaint) = complaint {
-                let reason = format!("a chunk is damaged: {complaint}; {whole} messages of it can be read");
-                return Err(Error::format(self.file.path(), Place::Byte(place.offset), reason));
-            }
-        }
+        self.next_in_order()
     }
 
     fn remarks(&self) -> Vec<String> {
-        let overlap = format!(
-            "{}: its chunks overlap so much that messages come out of order",
-            self.file.path().display()
-        );
-        self.remarks.iter().cloned().chain(self.order.has_given_up.then_some(overlap)).collect()
+        self.remarks.iter().cloned().chain(self.order.remark(self.file.path())).collect()
     }
 }

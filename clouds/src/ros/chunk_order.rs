@@ -1,15 +1,18 @@
 use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk};
 use super::recording::Message;
+use std::path::Path;
 
 /// Puts the messages of chunks in order of time. Chunks overlap a little; those that do are in memory together.
 #[derive(Debug, Default)]
 pub(super) struct ChunkOrder {
+    /// What messages are wanted of.
+    pub(super) topics: Vec<usize>,
     /// In order of their starts.
     places: Vec<ChunkPlace>,
     next: usize,
     open: Vec<Playing>,
-    /// How many messages may be out of order, because too many chunks overlap.
-    pub(super) has_given_up: bool,
+    /// Messages may be out of order, because too many chunks overlap.
+    has_given_up: bool,
 }
 
 #[derive(Debug)]
@@ -40,7 +43,7 @@ impl ChunkOrder {
         };
         let mut places: Vec<_> = places.iter().filter(is_wanted).cloned().collect();
         places.sort_by_key(|place| (place.start_ns, place.offset));
-        Self { places, ..Self::default() }
+        Self { topics: topics.to_vec(), places, ..Self::default() }
     }
 
     /// The next step.
@@ -59,6 +62,13 @@ impl ChunkOrder {
         }
         let message = earliest.and_then(|(index, _)| self.take(index));
         message.map_or(Step::End, Step::Message)
+    }
+
+    /// What a person should know of the order of a file's messages.
+    pub(super) fn remark(&self, path: &Path) -> Option<String> {
+        let text =
+            || format!("{}: its chunks overlap so much that messages come out of order", path.display());
+        self.has_given_up.then(text)
     }
 
     /// Takes a chunk that was asked for.

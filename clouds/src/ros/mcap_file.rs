@@ -1,5 +1,6 @@
 use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress};
-use super::chunk_order::{ChunkOrder, Step};
+use super::chunk_file::ChunkFile;
+use super::chunk_order::ChunkOrder;
 use super::file_bytes::{FileBytes, Pieces};
 use super::mcap_record::{
     Channels, ChunkHead, ChunkIndex, MAGIC, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, Statistics, message_head,
@@ -18,7 +19,6 @@ pub struct McapFile {
     topics: TopicList,
     channels: Channels,
     chunks: Vec<ChunkPlace>,
-    wanted: Vec<usize>,
     order: ChunkOrder,
     remarks: Vec<String>,
 }
@@ -52,7 +52,6 @@ impl McapFile {
             topics: TopicList::default(),
             channels: Channels::default(),
             chunks: Vec::new(),
-            wanted: Vec::new(),
             order: ChunkOrder::default(),
             remarks: Vec::new(),
         };
@@ -205,7 +204,49 @@ impl McapFile {
         }
     }
 
-    /// Reads a chunk; of its messages those of some topics, or of all.
+    /// Walks over the records of a chunk.
+    fn find_messages(&mut self, chunk: &mut OpenChunk, wanted: Option<&[usize]>) {
+        let mut at = 0;
+        while at < chunk.bytes.len() {
+            let Some((kind, range, next)) = record_at(&chunk.bytes, at) else {
+                chunk.complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
+                return;
+            };
+            let contents = chunk.bytes.get(range.clone()).unwrap_or_default();
+            match kind {
+                op::SCHEMA => drop(self.channels.add_schema(contents)),
+                op::CHANNEL => drop(self.channels.add_channel(contents, &mut self.topics)),
+                op::MESSAGE => {
+                    let head = message_head(contents);
+                    let known =
+                        head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
+                    let Some((topic, log_ns)) = known else {
+                        chunk
+                            .complaint
+                            .get_or_insert_with(|| format!("byte {at}: a message without a channel"));
+                        return;
+                    };
+                    if wanted.is_none_or(|wanted| wanted.contains(&topic)) {
+                        let start = range.start + MESSAGE_HEAD_BYTES as usize;
+                        chunk.messages.push(MessagePlace { log_ns, topic, range: start..range.end });
+                    }
+                }
+                _ => {}
+            }
+            at = next;
+        }
+    }
+}
+
+impl ChunkFile for McapFile {
+    fn path(&self) -> &Path {
+        self.file.path()
+    }
+
+    fn order(&mut self) -> &mut ChunkOrder {
+        &mut self.order
+    }
+
     fn load(&mut self, place: &ChunkPlace, wanted: Option<&[usize]>) -> Result<OpenChunk> {
         let path = self.file.path().to_owned();
         let wrong = |reason: &str| Error::format(&path, Place::Byte(place.offset), reason);
@@ -242,39 +283,6 @@ impl McapFile {
         self.find_messages(&mut chunk, wanted);
         Ok(chunk)
     }
-
-    /// Walks over the records of a chunk.
-    fn find_messages(&mut self, chunk: &mut OpenChunk, wanted: Option<&[usize]>) {
-        let mut at = 0;
-        while at < chunk.bytes.len() {
-            let Some((kind, range, next)) = record_at(&chunk.bytes, at) else {
-                chunk.complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
-                return;
-            };
-            let contents = chunk.bytes.get(range.clone()).unwrap_or_default();
-            match kind {
-                op::SCHEMA => drop(self.channels.add_schema(contents)),
-                op::CHANNEL => drop(self.channels.add_channel(contents, &mut self.topics)),
-                op::MESSAGE => {
-                    let head = message_head(contents);
-                    let known =
-                        head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
-                    let Some((topic, log_ns)) = known else {
-                        chunk
-                            .complaint
-                            .get_or_insert_with(|| format!("byte {at}: a message without a channel"));
-                        return;
-                    };
-                    if wanted.is_none_or(|wanted| wanted.contains(&topic)) {
-                        let start = range.start + MESSAGE_HEAD_BYTES as usize;
-                        chunk.messages.push(MessagePlace { log_ns, topic, range: start..range.end });
-                    }
-                }
-                _ => {}
-            }
-            at = next;
-        }
-    }
 }
 
 impl Recording for McapFile {
@@ -288,35 +296,15 @@ impl Recording for McapFile {
     }
 
     fn begin(&mut self, topics: &[usize]) -> Result<()> {
-        self.wanted = topics.to_vec();
         self.order = ChunkOrder::new(&self.chunks, topics);
         Ok(())
     }
 
     fn next_message(&mut self) -> Result<Option<Message>> {
-        loop {
-            let place = match self.order.step() {
-                Step::Load(place) => place,
-                Step::Message(message) => return Ok(Some(message)),
-                Step::End => return Ok(None),
-            };
-            let wanted = self.wanted.clone();
-            let mut chunk = self.load(&place, Some(&wanted))?;
-            let complaint = chunk.complaint.take();
-            let whole = chunk.messages.len();
-            self.order.open(chunk);
-            if let Some(complaint) = complaint {
-                let reason = format!("a chunk is damaged: {complaint}; {whole} messages of it can be read");
-                return Err(Error::format(self.file.path(), Place::Byte(place.offset), reason));
-            }
-        }
+        self.next_in_order()
     }
 
     fn remarks(&self) -> Vec<String> {
-        let overlap = format!(
-            "{}: its chunks overlap so much that messages come out of order",
-            self.file.path().display()
-        );
-        self.remarks.iter().cloned().chain(self.order.has_given_up.then_some(overlap)).collect()
+        self.remarks.iter().cloned().chain(self.order.remark(self.file.path())).collect()
     }
 }

@@ -16,6 +16,7 @@ mod bag_options;
 mod bag_poses;
 mod bag_topic;
 mod chunk;
+mod chunk_file;
 mod chunk_order;
 mod cloud_message;
 #[cfg(feature = "sqlite")]

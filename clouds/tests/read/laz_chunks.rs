@@ -47,6 +47,26 @@ fn a_chunk_table_that_lies_is_refused() {
     let lengths_at = points_at + 8 + 42 + 4;
     let error = of_damaged(&by_layer, lengths_at, &[0xff; 4]);
     assert_says(&error, lengths_at, "the fields of a chunk claim 42949");
+    // Found by fuzzing: where the fields end before their chunk does, the next one is looked for in their bytes.
+    let shorter =
+        (u32::from_le_bytes(by_layer[lengths_at..lengths_at + 4].try_into().unwrap()) - 1).to_le_bytes();
+    let error = of_damaged(&by_layer, lengths_at, &shorter);
+    assert_says(&error, lengths_at, "the fields of a chunk claim ");
+}
+
+/// Found by fuzzing: layers that are said to be none are not checked as such.
+#[test]
+fn a_compressor_must_fit_the_versions_of_its_parts() {
+    for (file, compressor) in [
+        (fs::read(fixture("timed.laz")).unwrap(), 2_u16),
+        (voxel_file(VoxelFileFormat::Laz), 2),
+        (voxel_file(VoxelFileFormat::Laz), 1),
+    ] {
+        // The description follows the head of its record, which begins with two bytes and the name.
+        let name_at = file.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
+        let error = of_damaged(&file, name_at - 2 + 54, &compressor.to_le_bytes());
+        assert_says(&error, 100, &format!("compressor {compressor} does not fit"));
+    }
 }
 
 #[test]
