@@ -404,7 +404,7 @@ function clickAt(x, y) {
 }
 
 viewer.listeners.push(() => {
-  const isReady = viewer.settled && maps.every((map) => map.pending_tiles === 0 && map.generation > 0);
+  const isReady = viewer.settled && viewer.layers.length > 0 && maps.every((map) => map.pending_tiles === 0 && map.generation > 0);
   if ($('state').textContent !== 'server gone') $('state').textContent = isReady ? 'ready' : 'loading';
   if (viewer.layers[0]?.scale && !viewer.scaled) {
     viewer.scaled = true;
