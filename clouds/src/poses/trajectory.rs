@@ -150,8 +150,8 @@ impl Trajectory {
 
     fn other_number(&self, clouds: &str) -> Error {
         let reason = format!(
-            "{} poses for {clouds} clouds, which have no time stamps in common: there must be one pose a cloud, in their \
-             order (files in the natural order of their names, scan2 before scan10)",
+            "{} poses for {clouds} clouds, which have no time stamps in common: there must be one pose a cloud, in \
+             their order (files in the natural order of their names, scan2 before scan10)",
             self.len()
         );
         Error::argument(self.path.display().to_string(), reason)

@@ -71,7 +71,7 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
         let end = at.checked_add(entry.byte_count).filter(|end| *end <= table_at);
         let Some(end) = end else {
             let reason = format!(
-                "the chunk table promises {} bytes for chunk {chunk} at byte {at}, but the chunks end at byte {table_at}",
+                "the chunk table promises {} bytes for chunk {chunk} at byte {at}; the chunks end at byte {table_at}",
                 entry.byte_count
             );
             return Err(wrong(table_at, reason));

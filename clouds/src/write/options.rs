@@ -10,8 +10,8 @@ pub struct WriteOptions {
     pub companion_folder: PathBuf,
     /// Where files without a name are kept until the output is whole. They need about as much room as the output.
     pub scratch_folder: PathBuf,
-    /// The coordinate reference system that the coordinates are in, in metres: well-known text or, where only its number
-    /// is known, `EPSG:25832`. Formats that name none leave it out.
+    /// The coordinate reference system that the coordinates are in, in metres: well-known text or, where only its
+    /// number is known, `EPSG:25832`. Formats that name none leave it out.
     pub crs: Option<String>,
     /// Flat maps: the lowest height that counts, in metres.
     pub z_min_m: Option<f64>,
