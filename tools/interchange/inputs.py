@@ -120,7 +120,7 @@ def write_bag(writer, ros, scans, poses):
 
 
 def write_laz(path, scans, poses):
-    """All points in the world frame, each with the time of its scan; coordinates in tenths of millimetres."""
+    """All points in the world frame, each with its own time; coordinates in tenths of millimetres."""
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = [1e-4] * 3, [0.0] * 3
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
@@ -128,7 +128,7 @@ def write_laz(path, scans, poses):
     world = [xyz.astype(float) @ rotation(pose[3:]).T + pose[:3] for (xyz, _), pose in zip(scans, poses)]
     las.x, las.y, las.z = np.concatenate(world).T
     las.intensity = np.concatenate([intensity for _, intensity in scans]).astype(np.uint16)
-    las.gps_time = np.concatenate([np.full(len(xyz), 1000.05 + 0.1 * k) for k, (xyz, _) in enumerate(scans)])
+    las.gps_time = np.concatenate([1000 + 0.1 * (k + np.arange(len(xyz)) / len(xyz)) for k, (xyz, _) in enumerate(scans)])
     las.write(path)
 
 
@@ -164,9 +164,9 @@ def main():
         e57.write_scan_raw(columns, rotation=pose[[6, 3, 4, 5]], translation=pose[:3])
     e57.close()
     write_laz(folder / "scans.laz", scans, poses)
-    (folder / "laz_poses.txt").write_text(
-        "".join(tum(1_000_050_000_000 + k * PERIOD_NS, pose) for k, pose in enumerate(poses))
-    )
+    # In the middle of each scan. Adjusted standard GPS time is less by 10^9 seconds.
+    middle_ns = 1_000_001_000_050_000_000
+    (folder / "laz_poses.txt").write_text("".join(tum(middle_ns + k * PERIOD_NS, pose) for k, pose in enumerate(poses)))
     with Bag1Writer(folder / "scans.bag") as writer:
         write_bag(writer, Ros(Stores.ROS1_NOETIC, True), scans, poses)
     with Bag2Writer(folder / "rosbag2", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
