@@ -13,9 +13,10 @@ import laspy
 import numpy as np
 import pye57
 from plyfile import PlyData, PlyElement
+from ros import Ros
 from rosbags.rosbag1 import Writer as Bag1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer as Bag2Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores
 
 START_NS = 1_700_000_000_123_456_789
 PERIOD_NS = 100_000_000
@@ -66,46 +67,6 @@ def tum(stamp_ns, pose):
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d} {numbers}\n"
 
 
-class Ros:
-    """Messages of one ROS."""
-
-    def __init__(self, store, has_sequence):
-        self.store, self.has_sequence = get_typestore(store), has_sequence
-        if has_sequence:
-            self.store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
-
-    def make(self, name, *values):
-        return self.store.types[name](*values)
-
-    def header(self, stamp_ns, frame):
-        stamp = self.make("builtin_interfaces/msg/Time", stamp_ns // 10**9, stamp_ns % 10**9)
-        return self.make("std_msgs/msg/Header", *([0] if self.has_sequence else []), stamp, frame)
-
-    def tf(self, stamp_ns, parent, child, pose):
-        transform = self.make(
-            "geometry_msgs/msg/Transform",
-            self.make("geometry_msgs/msg/Vector3", *map(float, pose[:3])),
-            self.make("geometry_msgs/msg/Quaternion", *map(float, pose[3:])),
-        )
-        link = self.make("geometry_msgs/msg/TransformStamped", self.header(stamp_ns, parent), child, transform)
-        return self.make("tf2_msgs/msg/TFMessage", [link])
-
-    def cloud(self, stamp_ns, xyz, intensity):
-        field = lambda name, offset: self.make("sensor_msgs/msg/PointField", name, offset, 7, 1)
-        fields = [field(name, 4 * k) for k, name in enumerate(["x", "y", "z", "intensity"])]
-        data = np.column_stack([xyz, intensity]).astype("<f4").tobytes()
-        data = np.frombuffer(data, dtype=np.uint8)
-        return self.make(
-            "sensor_msgs/msg/PointCloud2", self.header(stamp_ns, "lidar"), 1, len(xyz), fields, False, 16,
-            len(data), data, True,
-        )
-
-    def serialize(self, message, name):
-        if self.has_sequence:
-            return bytes(self.store.serialize_ros1(message, name))
-        return bytes(self.store.serialize_cdr(message, name))
-
-
 def write_bag(writer, ros, scans, poses):
     cloud_type, tf_type = "sensor_msgs/msg/PointCloud2", "tf2_msgs/msg/TFMessage"
     clouds = writer.add_connection("/points", cloud_type, typestore=ros.store)
@@ -120,7 +81,7 @@ def write_bag(writer, ros, scans, poses):
 
 
 def write_laz(path, scans, poses):
-    """All points in the world frame, each with the time of its scan; coordinates in tenths of millimetres."""
+    """All points in the world frame, each with its own time; coordinates in tenths of millimetres."""
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = [1e-4] * 3, [0.0] * 3
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
@@ -128,7 +89,8 @@ def write_laz(path, scans, poses):
     world = [xyz.astype(float) @ rotation(pose[3:]).T + pose[:3] for (xyz, _), pose in zip(scans, poses)]
     las.x, las.y, las.z = np.concatenate(world).T
     las.intensity = np.concatenate([intensity for _, intensity in scans]).astype(np.uint16)
-    las.gps_time = np.concatenate([np.full(len(xyz), 1000.05 + 0.1 * k) for k, (xyz, _) in enumerate(scans)])
+    shares = [k + np.arange(len(xyz)) / len(xyz) for k, (xyz, _) in enumerate(scans)]
+    las.gps_time = 1000 + 0.1 * np.concatenate(shares)
     las.write(path)
 
 
@@ -164,9 +126,9 @@ def main():
         e57.write_scan_raw(columns, rotation=pose[[6, 3, 4, 5]], translation=pose[:3])
     e57.close()
     write_laz(folder / "scans.laz", scans, poses)
-    (folder / "laz_poses.txt").write_text(
-        "".join(tum(1_000_050_000_000 + k * PERIOD_NS, pose) for k, pose in enumerate(poses))
-    )
+    # In the middle of each scan. Adjusted standard GPS time is less by 10^9 seconds.
+    middle_ns = 1_000_001_000_050_000_000
+    (folder / "laz_poses.txt").write_text("".join(tum(middle_ns + k * PERIOD_NS, pose) for k, pose in enumerate(poses)))
     with Bag1Writer(folder / "scans.bag") as writer:
         write_bag(writer, Ros(Stores.ROS1_NOETIC, True), scans, poses)
     with Bag2Writer(folder / "rosbag2", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
