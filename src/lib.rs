@@ -58,7 +58,7 @@
 //!
 //! - `render`: levels of detail for viewers.
 //! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
-//! it, and no feature changes a result.
+//!   it, and no feature changes a result.
 
 mod config;
 mod error;

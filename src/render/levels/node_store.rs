@@ -24,10 +24,13 @@ const MOST_BYTES: u32 = 1 << 27;
 /// Nodes of any state of a map, in a file that may be kept for later or go with the program.
 pub struct NodeStore {
     spool: Mutex<Spool>,
-    nodes: Mutex<FxHashMap<(NodeKey, u64), Stored>>,
+    nodes: Mutex<Nodes>,
     /// How errors name the file.
     path: PathBuf,
 }
+
+/// By key and version.
+type Nodes = FxHashMap<(NodeKey, u64), Stored>;
 
 struct Spool {
     file: Box<dyn Scratch>,
@@ -129,8 +132,8 @@ impl NodeStore {
 }
 
 /// Finds the nodes of a file, up to the first that is not whole, and where it ends.
-fn read_all(file: &mut (impl Read + Seek)) -> io::Result<(FxHashMap<(NodeKey, u64), Stored>, u64)> {
-    let mut nodes = FxHashMap::default();
+fn read_all(file: &mut (impl Read + Seek)) -> io::Result<(Nodes, u64)> {
+    let mut nodes = Nodes::default();
     let length = file.seek(SeekFrom::End(0))?;
     file.seek(SeekFrom::Start(0))?;
     let mut file = io::BufReader::new(file);

@@ -45,7 +45,7 @@ impl Scheme {
         match self.tile_level.checked_sub(key.level) {
             Some(finer) => key.index.map(|k| {
                 let block = i64::from(k & ((1 << finer) - 1));
-                i64::from(k >> finer) * self.tile_edge + (block * MAX_EDGE << key.level)
+                i64::from(k >> finer) * self.tile_edge + ((block * MAX_EDGE) << key.level)
             }),
             None => key.index.map(|k| (i64::from(k) * self.tile_edge) << (key.level - self.tile_level)),
         }

@@ -129,10 +129,9 @@ proptest! {
             let voxels = voxels_of(&levels, &map, &store, key);
             let bounds = levels.bounds_m(&store, key);
             for voxel in voxels.keys() {
-                for k in 0..3 {
-                    let (low, high) = (0.5 * voxel[k] as f64, 0.5 * (voxel[k] + (1 << key.level)) as f64);
-                    prop_assert!(bounds.min[k] <= low && high <= bounds.max[k]);
-                }
+                let low = voxel.map(|at| 0.5 * at as f64);
+                let high = voxel.map(|at| 0.5 * (at + (1 << key.level)) as f64);
+                prop_assert!((0..3).all(|k| bounds.min[k] <= low[k] && high[k] <= bounds.max[k]));
             }
             found.entry(key.level).or_default().extend(voxels);
         }
