@@ -60,8 +60,8 @@ try {
   step('what the page shows is what export writes, to the last voxel');
 
   const told = await browser.value(`(async () => {
-    const at = [1.05, 0.05, 0.05];
-    voxtile.lookAt([-1.5, 0.02, 0.6], at);
+    const at = [1.05, 0.05, -0.25];
+    voxtile.lookAt([-1.5, 0.02, 0.1], at);
     await new Promise((resolve) => setTimeout(resolve, 1500));
     return voxtile.clickAt(...voxtile.screenOf(at));
   })()`);
@@ -80,7 +80,8 @@ try {
   run('snapshot', map, 'monday');
   run('build', scan(1), '-o', map, '--append', '-q');
   await browser.until('voxtile.generation[0] > 1');
-  await browser.value('voxtile.detail = 0.1');
+  await browser.ready();
+  await browser.value('document.getElementById("fit").click(); voxtile.detail = 0.1');
   const wanted = exported(map);
   await browser.until(`document.getElementById('state').textContent === 'ready' && voxtile.voxels().count === ${wanted.size}`);
   assert.deepEqual(await shown(browser), wanted);

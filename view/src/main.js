@@ -302,6 +302,7 @@ function follow() {
       if (layer.map.id === id && !layer.id.includes('@')) layer.refresh();
     }
     if (was === 0 || low === high) start();
+    else viewer.surround(allBounds());
     if (map.pending_tiles === 0 && was > 0) {
       $('live').hidden = false;
       $('live').title = `flush ${generation}`;

@@ -44,8 +44,13 @@ export class Viewer {
   center(bounds) {
     const middle = [0, 1, 2].map((k) => Math.round((bounds.min[k] + bounds.max[k]) / 2));
     this.world.position.set(...middle.map((k) => -k));
-    this.box = new THREE.Box3(...['min', 'max'].map((end) => new THREE.Vector3(...bounds[end].map((k, axis) => k - middle[axis]))));
     this.world.updateMatrixWorld(true);
+    this.surround(bounds);
+  }
+
+  // What `All` shows.
+  surround(bounds) {
+    this.box = new THREE.Box3(...['min', 'max'].map((end) => new THREE.Vector3(...this.toScene(bounds[end]))));
   }
 
   toScene(point) {
