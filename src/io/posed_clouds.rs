@@ -286,8 +286,12 @@ impl ScanSource for PosedClouds {
         }
         if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {
             // A map of nothing would be no answer.
-            let reason =
-                format!("none of its {} clouds has a pose ({})", self.without_pose, self.why_without_pose());
+            let reason = format!(
+                "none of its {} clouds has a pose ({}); name a file of poses with --poses FILE, or map points alone \
+                     with --no-rays",
+                self.without_pose,
+                self.why_without_pose()
+            );
             return Err(Error::argument(self.path.display().to_string(), reason));
         }
         Ok(None)

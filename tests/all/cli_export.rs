@@ -425,3 +425,50 @@ fn outputs_that_refuse_are_told_and_no_panic() {
     }
     assert!(output(&ray).contains("hit at"));
 }
+
+/// What is asked for is what is written, in every format; what a format does not take is refused, not ignored.
+#[test]
+fn which_voxels_are_written_is_for_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let map = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("map_tiles_example");
+    let map = map.to_str().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = assert_cmd::Command::cargo_bin("voxtile").unwrap();
+        command.args(["export", map]).args(arguments).output().unwrap()
+    };
+    let rows = |what: &str, format: &str| {
+        let file = path(&format!("{what}.{format}"));
+        let output = run(&["-o", &file, "--what", what, "--json"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let voxels = summary["voxels"].as_u64().unwrap();
+        let text = String::from_utf8_lossy(&std::fs::read(&file).unwrap()).into_owned();
+        if format != "ply" {
+            let is_row = |line: &&str| line.starts_with(|first: char| first == '-' || first.is_ascii_digit());
+            assert_eq!(text.lines().filter(is_row).count() as u64, voxels, "{file}");
+        } else {
+            assert!(text.contains(&format!("element vertex {voxels}\n")), "{file}");
+        }
+        voxels
+    };
+    let counts =
+        ["csv", "xyz", "ply"].map(|format| ["occupied", "free", "all"].map(|what| rows(what, format)));
+    assert_eq!(counts, [counts[0]; 3]);
+    let [occupied, free, all] = counts[0];
+    assert!(occupied > 0 && free > 0 && occupied + free == all, "{counts:?}");
+    for refused in [
+        vec!["-o", "a.bt", "--what", "free"],
+        vec!["-o", "a.ply", "--z-min", "1"],
+        vec!["-o", "a.laz", "--z-max", "1"],
+        vec!["-o", "a.csv", "--cell", "5"],
+    ] {
+        let output = run(&refused);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && told.contains(refused[2]), "{refused:?}: {told}");
+    }
+    // Squares in single precision, of a map that may be far away.
+    let squares = path("squares");
+    let output = run(&["-o", &squares, "--format", "autoware", "--origin", "10", "0", "0"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}

@@ -410,9 +410,9 @@ pub struct ExportArgs {
     /// .pgm, .png: only voxels whose center is at most this high, in metres
     #[arg(long, value_name = "M")]
     pub z_max: Option<f64>,
-    /// autoware: edge of the square of a file, in whole metres
-    #[arg(long, value_name = "M", default_value_t = 20.0)]
-    pub cell: f64,
+    /// autoware: edge of the square of a file, in whole metres [default: 20]
+    #[arg(long, value_name = "M")]
+    pub cell: Option<f64>,
     /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,

@@ -1,7 +1,7 @@
-use crate::args::{ExportArgs, ExportFormatName};
+use crate::args::{ExportArgs, ExportFormatName, WhatName};
 use crate::export_3d_tiles;
 use crate::export_origin::{ExportOrigin, OriginFile};
-use crate::export_voxels;
+use crate::export_voxels::{self, log_odds_of};
 use crate::json;
 use crate::map_at::{point_of, read_map};
 use crate::memory;
@@ -15,7 +15,6 @@ use std::path::Path;
 use std::process::ExitCode;
 use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
-use voxtile::maths::logit;
 use voxtile::octree::{OctreeFormat, write_bt, write_ot};
 use voxtile::query::OctreeExport;
 use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
@@ -82,6 +81,18 @@ impl<'a> Export<'a> {
             let reason = "an octree file holds free and occupied voxels alike; leave the option out";
             return Err(Error::argument("--min-probability", reason));
         }
+        if matches!(format, ExportFormat::Octree(_)) && args.what.is_some() {
+            let reason = "an octree file holds free and occupied voxels alike; leave the option out";
+            return Err(Error::argument("--what", reason));
+        }
+        let is_flat =
+            matches!(format, ExportFormat::Foreign(VoxelFileFormat::Nav2Map | VoxelFileFormat::Heightmap));
+        if (args.z_min.is_some() || args.z_max.is_some()) && !is_flat {
+            return Err(Error::argument("--z-min, --z-max", "only .pgm and .png take heights; use --region"));
+        }
+        if args.cell.is_some() && !matches!(format, ExportFormat::Foreign(VoxelFileFormat::Autoware)) {
+            return Err(Error::argument("--cell", "only --format autoware has squares"));
+        }
         let is_text = matches!(format, ExportFormat::Voxels(VoxelFormat::Csv));
         if is_standard_output(&args.output) && !is_text && io::stdout().is_terminal() {
             return Err(Error::argument(
@@ -126,7 +137,8 @@ impl<'a> Export<'a> {
     }
 
     fn voxels(&self, format: VoxelFormat, reader: &MapReader) -> anyhow::Result<Exported> {
-        let (grid, min_probability) = (reader.config().grid, self.args.min_probability);
+        let grid = reader.config().grid;
+        let below = self.below(reader);
         let origin =
             self.origin(Some(format), &grid, || hull(&grid, &reader.tile_indices(), self.region.as_ref()))?;
         let voxels = self.count_voxels(reader)?;
@@ -136,7 +148,10 @@ impl<'a> Export<'a> {
             let mut writer = VoxelWriter::new(file, out)?;
             let mut written = Ok(());
             let mut tile = None;
-            reader.for_each_occupied(min_probability, self.region.as_ref(), |voxel| {
+            reader.for_each_occupied(self.least_probability(), self.region.as_ref(), |voxel| {
+                if voxel.evidence.log_odds >= below {
+                    return;
+                }
                 let index = Some(grid.tile_of_voxel(voxel.index));
                 if tile != index {
                     tile = index;
@@ -160,15 +175,32 @@ impl<'a> Export<'a> {
     /// How many voxels there are to export: the headers name it before the first. In constant memory, and without
     /// reading a tile where the log of the map knows.
     fn count_voxels(&self, reader: &MapReader) -> voxtile::Result<u64> {
-        let (min_probability, region) = (self.args.min_probability, self.region.as_ref());
-        match (reader.voxel_counts(), min_probability, region) {
+        let (least, region, below) = (self.least_probability(), self.region.as_ref(), self.below(reader));
+        match (reader.voxel_counts(), least, region) {
             (Some((_, occupied)), None, None) => return Ok(occupied),
-            (Some((voxels, _)), Some(0.0), None) => return Ok(voxels),
+            (Some((voxels, occupied)), Some(0.0), None) => {
+                return Ok(if below == f64::INFINITY { voxels } else { voxels - occupied });
+            }
             _ => {}
         }
         let mut count = 0;
-        reader.for_each_occupied(min_probability, region, |_| count += 1)?;
+        reader
+            .for_each_occupied(least, region, |voxel| count += u64::from(voxel.evidence.log_odds < below))?;
         Ok(count)
+    }
+
+    /// The least probability of a voxel that is written; `None` is the map's threshold.
+    fn least_probability(&self) -> Option<f64> {
+        match self.args.what {
+            Some(WhatName::Free | WhatName::All) => Some(0.0),
+            _ => self.args.min_probability,
+        }
+    }
+
+    /// The log-odds that a voxel must be below to be written.
+    fn below(&self, map: &impl MapView) -> f64 {
+        let [_, below] = log_odds_of(self.args, WhatName::Occupied, map.config().occupied_log_odds());
+        below
     }
 
     /// Writes an octree file of any size. Its parts lie in a file without a name until all of them are known.
@@ -209,13 +241,17 @@ impl<'a> Export<'a> {
             }
         };
         let origin = self.origin(Some(format), &grid, || None)?;
-        let min_log_odds = self.args.min_probability.map_or(0.0, |probability| logit(probability) as f32);
-        let keep = |center_m| self.region.is_none_or(|region| region.contains(center_m));
+        let [from, below] = log_odds_of(self.args, WhatName::Occupied, 0.0);
+        let min_log_odds = from as f32;
+        let inside = |center_m| self.region.is_none_or(|region| region.contains(center_m));
+        let is_free_alone = self.args.what == Some(WhatName::Free);
+        let keep =
+            |voxel: &VoxelRecord| inside(voxel.center_m) && !(is_free_alone && voxel.log_odds >= below);
         let voxels = octree_file::count_voxels(&file, min_log_odds, keep)?;
         let header = VoxelFile { format, voxels, resolution_m: file.resolution_m, origin_m: origin.corner_m };
         self.write(&origin, &grid, |out| {
             let mut writer = VoxelWriter::new(header, out)?;
-            octree_file::for_each_voxel(&file, min_log_odds, |index, voxel| match keep(voxel.center_m) {
+            octree_file::for_each_voxel(&file, min_log_odds, |index, voxel| match keep(voxel) {
                 true => {
                     let center_m = origin.center_m(index, &grid);
                     Ok::<_, anyhow::Error>(writer.write(&VoxelRecord { center_m, ..*voxel })?)

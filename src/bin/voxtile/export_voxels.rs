@@ -2,7 +2,7 @@
 
 use crate::args::{ExportArgs, WhatName};
 use crate::json;
-use crate::map_at::{AnyMap, read_any_map};
+use crate::map_at::{AnyMap, point_of, read_any_map};
 use crate::memory;
 use crate::output_file::{StagedOutput, is_standard_output};
 use crate::progress::Progress;
@@ -29,7 +29,8 @@ pub fn run(args: &ExportArgs, format: VoxelFileFormat, region: Option<&Aabb>) ->
         let reason = format!("{} is not written as a stream; name a file", format.name());
         return Err(Error::argument("--output", reason).into());
     }
-    if args.origin.is_some() {
+    let is_single = format == VoxelFileFormat::Autoware;
+    if args.origin.is_some() && !is_single {
         let reason = format!("{} keeps true coordinates; leave the option out", format.name());
         return Err(Error::argument("--origin", reason).into());
     }
@@ -40,7 +41,9 @@ pub fn run(args: &ExportArgs, format: VoxelFileFormat, region: Option<&Aabb>) ->
         let mut options = WriteOptions::beside(&args.output);
         options.crs.clone_from(&map.config().crs);
         options.companion_folder = staged.folder().to_owned();
-        (options.z_min_m, options.z_max_m, options.cell_m) = (args.z_min, args.z_max, args.cell);
+        (options.z_min_m, options.z_max_m) = (args.z_min, args.z_max);
+        options.cell_m = args.cell.unwrap_or(options.cell_m);
+        options.origin_m = args.origin.as_deref().map_or([0.0; 3], point_of);
         let progress = Progress::over_tiles(map.tile_indices().len());
         let mut sink = open_sink(format, &head, &staged.path()?, &options).map_err(Error::from)?;
         chosen.for_each(map, &mut || progress.step(), &mut |row| Ok(sink.put(row)?))?;
@@ -69,18 +72,22 @@ pub fn run(args: &ExportArgs, format: VoxelFileFormat, region: Option<&Aabb>) ->
     Ok(ExitCode::SUCCESS)
 }
 
+/// The log-odds of the voxels that are asked for: from the first on and below the second.
+pub fn log_odds_of(args: &ExportArgs, default: WhatName, threshold: f64) -> [f64; 2] {
+    match (args.min_probability, args.what.unwrap_or(default)) {
+        (Some(probability), _) if probability <= 0.0 => [f64::NEG_INFINITY, f64::INFINITY],
+        (Some(probability), _) => [logit(probability), f64::INFINITY],
+        (None, WhatName::Occupied) => [threshold, f64::INFINITY],
+        (None, WhatName::Free) => [f64::NEG_INFINITY, threshold],
+        (None, WhatName::All) => [f64::NEG_INFINITY, f64::INFINITY],
+    }
+}
+
 impl<'a> Chosen<'a> {
     fn of(args: &ExportArgs, format: VoxelFileFormat, map: &AnyMap, region: Option<&'a Aabb>) -> Self {
         let threshold = map.config().occupied_log_odds();
         let default = if format.needs_free_voxels() { WhatName::All } else { WhatName::Occupied };
-        let log_odds = match (args.min_probability, args.what.unwrap_or(default)) {
-            (Some(probability), _) if probability <= 0.0 => [f64::NEG_INFINITY, f64::INFINITY],
-            (Some(probability), _) => [logit(probability), f64::INFINITY],
-            (None, WhatName::Occupied) => [threshold, f64::INFINITY],
-            (None, WhatName::Free) => [f64::NEG_INFINITY, threshold],
-            (None, WhatName::All) => [f64::NEG_INFINITY, f64::INFINITY],
-        };
-        Self { region, log_odds }
+        Self { region, log_odds: log_odds_of(args, default, threshold) }
     }
 
     /// Counts the voxels, and finds a box around their centers.

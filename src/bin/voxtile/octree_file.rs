@@ -7,7 +7,7 @@ use std::io::{BufReader, Write};
 use std::path::Path;
 use voxtile::io::VoxelRecord;
 use voxtile::octree::{self, Leaf, OctreeFile};
-use voxtile::space::{Grid, MortonCode, Point, VoxelIndex};
+use voxtile::space::{Grid, MortonCode, VoxelIndex};
 use voxtile::{Error, Result};
 
 /// Most voxels that the pruned leaves of a file may stand for when they are written out one by one: a file of twenty
@@ -56,7 +56,11 @@ pub fn print_info(path: &Path, json: bool, out: &mut impl Write) -> anyhow::Resu
 /// # Errors
 ///
 /// More than [`MAX_VOXELS`].
-pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(Point) -> bool) -> Result<u64> {
+pub fn count_voxels(
+    file: &OctreeFile,
+    min_log_odds: f32,
+    keep: impl Fn(&VoxelRecord) -> bool,
+) -> Result<u64> {
     let size = file.tree.count_voxels(min_log_odds).occupied;
     if size > MAX_VOXELS {
         let hint = "such a file is made by pruning large cubes; export it as .ot or .bt, which stays pruned";
@@ -64,7 +68,7 @@ pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(Point) -
     }
     let mut count = 0;
     for_each_voxel(file, min_log_odds, |_, voxel| {
-        count += u64::from(keep(voxel.center_m));
+        count += u64::from(keep(voxel));
         Ok::<_, Error>(())
     })?;
     Ok(count)
