@@ -63,7 +63,7 @@ pub enum Command {
     Query(QueryArgs),
     /// Find the first occupied voxel on a ray
     Raycast(RaycastArgs),
-    /// Write a map's voxels to a file: .ply .pcd .csv .bt .ot
+    /// Write a map's voxels to a file for other programs, or its surface, or its octree
     Export(ExportArgs),
     /// Print the digest of a map's content: equal for equal maps
     Digest(DigestArgs),

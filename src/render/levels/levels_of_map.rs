@@ -6,7 +6,7 @@ use super::scheme::Scheme;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::{Aabb, Point, TileIndex};
+use crate::space::{Aabb, Point, TileBox, TileIndex};
 use parking_lot::Mutex;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -35,6 +35,8 @@ pub struct Levels {
     /// From the level of tiles on, those without occupied voxels only where one beside them has some.
     nodes: FxHashMap<NodeKey, Node>,
     tops: Vec<NodeKey>,
+    /// Around all tiles.
+    tile_box: Option<TileBox>,
     unreadable: Vec<String>,
 }
 
@@ -100,8 +102,14 @@ impl Levels {
     ) -> Result<Option<Self>> {
         let config = map.config().clone();
         let scheme = Scheme::of(&config.grid);
-        let mut levels =
-            Self { config, scheme, nodes: FxHashMap::default(), tops: Vec::new(), unreadable: Vec::new() };
+        let mut levels = Self {
+            config,
+            scheme,
+            nodes: FxHashMap::default(),
+            tops: Vec::new(),
+            tile_box: TileBox::of(tiles.iter().copied()),
+            unreadable: Vec::new(),
+        };
         let mut level: Vec<(NodeKey, Node)> = tiles
             .iter()
             .filter(|tile| !left_out.contains(tile))
@@ -389,7 +397,14 @@ impl Levels {
             None => [[0; 3], self.scheme.edges(key).map(|edge| (edge - 1).clamp(0, 255) as u8)],
         };
         let [min, max] = node_bytes::bounds_m(&head, bounds);
-        Aabb { min, max }
+        // Coarse voxels reach beyond the tiles.
+        let Some(tiles) = self.tile_box else { return Aabb { min, max } };
+        let edge_m = self.config.grid.tile_size_m();
+        let (low, high) = (tiles.min().to_array(), tiles.max().to_array());
+        Aabb {
+            min: std::array::from_fn(|k| min[k].max(f64::from(low[k]) * edge_m)),
+            max: std::array::from_fn(|k| max[k].min((f64::from(high[k]) + 1.0) * edge_m)),
+        }
     }
 }
 
