@@ -206,6 +206,14 @@ fn what_is_shown_is_the_map() {
     let wanted = exported(folder.path(), text(&map));
     assert_eq!(shown.len(), wanted.len());
     assert_eq!(shown.iter().map(|(voxel, _)| *voxel).collect::<BTreeSet<_>>(), wanted);
+    // A browser keeps what its URL names the version of, and nothing else.
+    let node = &viewer.nodes("0")[0];
+    let (path, version) = node.split_once("?v=").unwrap();
+    assert!(viewer.get(node).head.contains("immutable"));
+    let other = format!("{:016x}", u64::from_str_radix(version, 16).unwrap() ^ 1);
+    for path in [path.to_owned(), format!("{path}?v={other}"), format!("{path}?v=x")] {
+        assert!(viewer.get(&path).head.contains("no-store"), "{path}");
+    }
     // The coarsest are there at once: few, and around everything.
     let tops: u64 = viewer.nodes("0").iter().filter(|path| !path.contains("/node/0/")).count() as u64;
     assert!(tops > 0);

@@ -36,11 +36,11 @@ impl<'a, V: MapView> Difference<'a, V> {
     ///
     /// A tile that cannot be read, a store that cannot be read.
     pub fn node(&self, store: &NodeStore, key: NodeKey) -> Result<Option<Vec<u8>>> {
-        let level = key.level.max(self.tile_level());
-        let above = NodeKey { level, index: key.index.map(|k| k >> (level - key.level)) };
-        if self.version(above).is_none() {
+        if self.version_of(key).is_none() {
             return Ok(None);
         }
+        let level = key.level.max(self.tile_level());
+        let above = NodeKey { level, index: key.index.map(|k| k >> (level - key.level)) };
         let [before, after] = [&self.before, &self.after].map(|state| {
             let is_there = state.levels.get(above).is_some_and(|node| node.is_occupied);
             if is_there { state.levels.cells(state.map, store, key) } else { Ok(Cells::default()) }

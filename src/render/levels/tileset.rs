@@ -26,6 +26,12 @@ pub trait TilesetNodes {
     /// Whether there is such a node, and a number that changes with its content.
     fn version(&self, key: NodeKey) -> Option<u64>;
 
+    /// The version of a node, or of the tile that it is a part of.
+    fn version_of(&self, key: NodeKey) -> Option<u64> {
+        let level = key.level.max(self.tile_level());
+        self.version(NodeKey { level, index: key.index.map(|k| k >> (level - key.level)) })
+    }
+
     /// A box around the node, in metres.
     fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb;
 
@@ -130,9 +136,10 @@ impl Writer<'_> {
     ) -> Result<Value> {
         let version = match within {
             // Parts of a tile change with it.
-            Some(_) => self.version_of_tile(key),
-            None => self.nodes.version(key).unwrap_or(0),
-        };
+            Some(_) => self.nodes.version_of(key),
+            None => self.nodes.version(key),
+        }
+        .unwrap_or_default();
         // Files have no question marks.
         let version = match self.content {
             TilesetContent::Voxels => format!("?v={version:016x}"),
@@ -175,12 +182,6 @@ impl Writer<'_> {
             node["children"] = children.collect::<Result<Vec<_>>>()?.into();
         }
         Ok(node)
-    }
-
-    fn version_of_tile(&self, key: NodeKey) -> u64 {
-        let finer = self.nodes.tile_level().saturating_sub(key.level);
-        let tile = NodeKey { level: self.nodes.tile_level(), index: key.index.map(|k| k >> finer) };
-        self.nodes.version(tile).unwrap_or(0)
     }
 }
 

@@ -47,11 +47,11 @@ fn describe(number: usize, map: &ServedMap) -> Value {
 }
 
 /// What is asked of a map.
-pub fn of_map(maps: &[Arc<ServedMap>], id: &MapId, thing: &Thing, has_version: bool) -> Answer {
+pub fn of_map(maps: &[Arc<ServedMap>], id: &MapId, thing: &Thing, version: Option<u64>) -> Answer {
     let nothing = || Answer::error(StatusCode::NOT_FOUND, "there is no such map, snapshot or node");
     let Some(map) = maps.get(id.number) else { return nothing() };
     let answer = map.shown(id).and_then(|shown| match shown {
-        Some(shown) => of_state(&shown, thing, has_version),
+        Some(shown) => of_state(&shown, thing, version),
         None => Ok(None),
     });
     match answer {
@@ -63,8 +63,14 @@ pub fn of_map(maps: &[Arc<ServedMap>], id: &MapId, thing: &Thing, has_version: b
     }
 }
 
-fn of_state(shown: &Shown, thing: &Thing, has_version: bool) -> Result<Option<Answer>> {
-    let keep = if has_version { Keep::ForEver } else { Keep::No };
+/// `version` is that which the request asks for: an answer of another one, of a newer state, is not kept as if it were.
+fn of_state(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
+    let keep = match thing {
+        Thing::Node(key, _) | Thing::Subtree(key) if version.is_some() && shown.version(*key)? == version => {
+            Keep::ForEver
+        }
+        _ => Keep::No,
+    };
     let kept = |answer: Answer| Answer { keep, ..answer };
     let state = shown.state();
     Ok(match thing {

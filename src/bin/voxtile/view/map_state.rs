@@ -1,7 +1,7 @@
 use crate::map_at::AnyMap;
 use std::sync::Arc;
 use voxtile::render::levels::{
-    Difference, Kind, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset,
+    Difference, Kind, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, TilesetNodes, subtree, tileset,
 };
 use voxtile::{Point, Result};
 
@@ -49,6 +49,14 @@ impl Shown {
             Self::Change { before, after } => {
                 subtree(&difference(before, after)?, &after.store, content, key)
             }
+        }
+    }
+
+    /// The version of a node, or of the tile that it is a part of.
+    pub fn version(&self, key: NodeKey) -> Result<Option<u64>> {
+        match self {
+            Self::State(state) => Ok(state.nodes().version_of(key)),
+            Self::Change { before, after } => Ok(difference(before, after)?.version_of(key)),
         }
     }
 

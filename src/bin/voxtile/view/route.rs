@@ -100,6 +100,11 @@ impl Thing {
     }
 }
 
+/// The version that a URL names, `v=0123456789abcdef`.
+pub fn version_in(question: &str) -> Option<u64> {
+    u64::from_str_radix(field(question, "v")?, 16).ok()
+}
+
 /// The value of a name in `a=1&b=2`.
 fn field<'a>(question: &'a str, name: &str) -> Option<&'a str> {
     question.split('&').find_map(|part| part.strip_prefix(name)?.strip_prefix('='))

@@ -130,13 +130,20 @@ impl ServedMap {
         let work = move || {
             // From before it is read: a flush in between is seen the next time.
             let mut seen = None;
+            let mut told = String::new();
             loop {
                 let stamp = Stamp::of(&self.at.map);
                 if seen.as_ref() != Some(&stamp) {
                     match self.show_newest(&changes) {
                         Ok(()) => seen = Some(stamp),
                         // Flushed again meanwhile, or gone: what is shown stays, and the next look may find more.
-                        Err(error) => log::warn!("{}: {error:#}", self.path.display()),
+                        Err(error) => {
+                            let error = format!("{error:#}");
+                            if told != error {
+                                log::warn!("{}: {error}", self.path.display());
+                                told = error;
+                            }
+                        }
                     }
                 }
                 thread::sleep(LOOK_EVERY);

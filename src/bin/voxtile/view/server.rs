@@ -1,5 +1,5 @@
 use super::response::{Answer, Body, Keep, empty};
-use super::route::Route;
+use super::route::{Route, version_in};
 use super::served_map::ServedMap;
 use super::token::Token;
 use super::{answers, page};
@@ -163,13 +163,12 @@ impl Server {
                 None => Answer::error(StatusCode::NOT_FOUND, "there is no such file"),
             };
         }
-        let has_version =
-            question.is_some_and(|question| question.split('&').any(|part| part.starts_with("v=")));
+        let version = question.and_then(version_in);
         let busy = || Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is ending");
         let Ok(_permit) = self.work.acquire().await else { return busy() };
         let server = self.clone();
         let work = tokio::task::spawn_blocking(move || match &route {
-            Route::Of(id, thing) => answers::of_map(&server.maps, id, thing, has_version),
+            Route::Of(id, thing) => answers::of_map(&server.maps, id, thing, version),
             _ => answers::maps(&server.maps),
         });
         work.await.unwrap_or_else(|_| busy())
