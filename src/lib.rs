@@ -56,8 +56,8 @@
 //!
 //! # Features
 //!
-//! `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
-//! it, and no feature changes a result.
+//! `render`: pictures of maps, and numbers to go with them. `cli` (default): the command `voxtile`, with argument parsing,
+//! progress bars and `render`. The library needs none of them, and no feature changes a result.
 
 mod config;
 mod error;
@@ -74,6 +74,8 @@ pub mod operations;
 pub mod path_text;
 mod persistence;
 pub mod query;
+#[cfg(feature = "render")]
+pub mod render;
 pub mod scan;
 mod scratch;
 pub mod sensor;

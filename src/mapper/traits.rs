@@ -57,6 +57,12 @@ pub trait MapView: Sync {
     /// About how many voxels were observed in a tile, where that is known without reading it.
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64>;
 
+    /// Number of the last scan that the map had taken when a tile was last flushed, where that is known without reading
+    /// it.
+    fn last_scan_of_tile_hint(&self, _index: TileIndex) -> Option<u64> {
+        None
+    }
+
     /// Sizes of the map and of what is in memory.
     fn statistics(&self) -> MapStatistics;
 

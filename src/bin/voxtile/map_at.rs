@@ -95,6 +95,10 @@ impl MapView for AnyMap {
         whichever!(self, voxels_of_tile_hint(index))
     }
 
+    fn last_scan_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        whichever!(self, last_scan_of_tile_hint(index))
+    }
+
     fn statistics(&self) -> MapStatistics {
         whichever!(self, statistics())
     }
