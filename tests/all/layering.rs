@@ -28,7 +28,7 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
 }
 
 /// Every folder and file of the library, and what of ours it may name.
-const LAYERS: [(&str, &[&str]); 23] = [
+const LAYERS: [(&str, &[&str]); 24] = [
     ("maths.rs", &[]),
     ("path_text.rs", &[]),
     ("scratch.rs", &[]),
@@ -57,6 +57,8 @@ const LAYERS: [(&str, &[&str]); 23] = [
         &["config", "error", "mapper", "maths", "persistence", "sensor", "space", "store", "tile"],
     ),
     ("integrity", &["config", "error", "path_text", "persistence", "space", "store", "tile"]),
+    // Maps by the interface of mappers alone: no file, no page, no terminal.
+    ("render", &["error", "local", "mapper", "sensor", "space"]),
     ("simulation", &["maths", "scan", "space"]),
     // It explains, and names what callers use.
     ("lib.rs", &["config", "error", "mapper", "query", "scan", "sensor", "space", "store", "tile"]),
