@@ -45,8 +45,8 @@ pub struct HeightBin {
 const MOST_BINS: u64 = 40;
 
 impl Survey {
-    /// Counts a map, tile by tile, on the threads of the caller's rayon pool; with damaged tiles left out. `progress` is
-    /// told the tiles done and all, from any thread. Memory: the list of tiles, and one tile a thread.
+    /// Counts a map, tile by tile, on the threads of the caller's rayon pool; damaged tiles are left out. `progress`
+    /// is told the tiles done and all, from any thread. Memory: the list of tiles, and one tile a thread.
     ///
     /// # Errors
     ///

@@ -190,8 +190,7 @@ fn survey_map() -> InMemoryMapper {
 
 #[test]
 fn the_picture_does_not_depend_on_threads() {
-    let (map, before) = (survey_map(), wall());
-    let _ = before;
+    let map = survey_map();
     let with_threads = |threads: usize| -> Vec<Image> {
         let pool = rayon_pool(threads);
         pool.install(|| {

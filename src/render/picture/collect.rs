@@ -20,7 +20,7 @@ pub(super) enum Source<'a> {
 
 /// The cells of a picture, and which of them are known.
 pub(super) struct Collected {
-    /// `None` if there is no tile to draw.
+    /// `None` if nothing was observed.
     pub known: Option<Known>,
     pub is_difference: bool,
     pub tiles: u64,
@@ -49,15 +49,16 @@ impl Collected {
             Progress { done: AtomicU64::new(0), all: AtomicU64::new(tiles.len() as u64), tell: progress };
         let mut known = None;
         if let Some(voxels) = collector.bounds(&tiles) {
-            let mut found = collector.collect(&tiles, voxels, &done)?;
+            known = collector.collect(&tiles, voxels, &done)?;
+        }
+        if let Some(found) = &known {
             let seen = found.frame.voxels_of(found.first, found.count);
             let finer = Frame::new(picture.view, seen, picture.most_px);
             if finer.voxels_a_cell < found.frame.voxels_a_cell && tiles.len() <= MOST_TILES_READ_TWICE {
-                drop(found);
+                drop(known.take());
                 done.all.fetch_add(tiles.len() as u64, Ordering::Relaxed);
-                found = collector.collect(&tiles, seen, &done)?;
+                known = collector.collect(&tiles, seen, &done)?;
             }
-            known = Some(found);
         }
         let unread = collector.unread.get_mut().unwrap_or_else(PoisonError::into_inner);
         unread.sort_unstable();
@@ -143,7 +144,7 @@ impl Collector<'_> {
         })
     }
 
-    fn collect(&self, tiles: &[TileIndex], voxels: VoxelBox, progress: &Progress) -> Result<Known> {
+    fn collect(&self, tiles: &[TileIndex], voxels: VoxelBox, progress: &Progress) -> Result<Option<Known>> {
         let frame = Frame::new(self.picture.view, voxels, self.picture.most_px);
         let cells = Cells::new(frame.cells[0] * frame.cells[1]);
         let outcomes = tiles.par_iter().map(|&tile| {
@@ -158,8 +159,8 @@ impl Collector<'_> {
         if let Some(failed) = outcomes.find_first(Result::is_err) {
             failed?;
         }
-        let (first, count) = seen(&frame, &cells);
-        Ok(Known { frame, cells, first, count })
+        let seen = seen(&frame, &cells);
+        Ok(seen.map(|(first, count)| Known { frame, cells, first, count }))
     }
 
     fn skip(&self, tile: TileIndex, error: Error) -> Result<()> {
@@ -227,8 +228,8 @@ impl Collector<'_> {
     }
 }
 
-/// First cell and number of cells of the box around all that is known; all of them if nothing is.
-fn seen(frame: &Frame, cells: &Cells) -> ([usize; 2], [usize; 2]) {
+/// First cell and number of cells of the box around all that is known; `None` if nothing is.
+fn seen(frame: &Frame, cells: &Cells) -> Option<([usize; 2], [usize; 2])> {
     let (mut low, mut high) = (frame.cells, [0; 2]);
     for (place, cell) in cells.iter().enumerate() {
         if cell.rank > Rank::Unknown {
@@ -237,8 +238,5 @@ fn seen(frame: &Frame, cells: &Cells) -> ([usize; 2], [usize; 2]) {
             high = std::array::from_fn(|k| high[k].max(at[k]));
         }
     }
-    if low[0] > high[0] {
-        return ([0; 2], frame.cells);
-    }
-    (low, std::array::from_fn(|k| high[k] + 1 - low[k]))
+    (low[0] <= high[0]).then(|| (low, std::array::from_fn(|k| high[k] + 1 - low[k])))
 }

@@ -110,9 +110,9 @@ impl Picture {
         Ok(Drawing::new(self, map.config().grid, collected).draw())
     }
 
-    /// Draws what became of one state of a map, or map, on the way to another: voxels that are occupied in both, in one,
-    /// or in the other, in three colors. Where one cell has several, what appeared hides what vanished, and that what
-    /// stayed. `progress` is told the tiles done and all, from any thread.
+    /// Draws what became of one map, or state of a map, on the way to another: voxels that are occupied in both, in
+    /// one, or in the other, in three colors. Where a cell has several, what appeared hides what vanished, and that
+    /// what stayed. `progress` is told the tiles done and all, from any thread.
     ///
     /// # Errors
     ///

@@ -31,8 +31,8 @@ const HUE: [f64; 2] = [305.0, 103.0];
 /// More than the screen has; each color is as vivid as it can be up to this.
 const CHROMA: f64 = 0.17;
 
-/// From low to high, so that lightness rises evenly to the eye: also for readers who do not see red and green apart, and
-/// on grey paper.
+/// From low to high, so that lightness rises evenly to the eye: also for readers who do not see red and green apart,
+/// and on grey paper.
 static SCALE: LazyLock<[Rgb; 256]> = LazyLock::new(|| {
     std::array::from_fn(|step| {
         let share = step as f64 / 255.0;

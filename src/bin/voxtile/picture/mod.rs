@@ -124,8 +124,8 @@ impl<'a> Target<'a> {
                 Some(protocol) => Ok(Self::Terminal(protocol)),
                 None if is_terminal => Ok(Self::Terminal(Protocol::of_environment())),
                 None => {
-                    let reason = "standard output is no terminal; name a file with -o map.png, or force --kitty, --sixel or \
-                                  --blocks";
+                    let reason = "standard output is no terminal; name a file with -o map.png, or force --kitty, --sixel \
+                                  or --blocks";
                     Err(Error::argument("--output", reason))
                 }
             },

@@ -129,7 +129,8 @@ impl Report {
 impl Content {
     fn of(map: &AnyMap, path: &Path) -> anyhow::Result<Self> {
         let AnyMap::Map(reader) = map else {
-            let reason = "is a file of OctoMap; make a map of it with `voxtile import`, or draw it with `voxtile picture`";
+            let reason =
+                "is a file of OctoMap; `voxtile import` makes a map of it, `voxtile picture` draws it";
             return Err(Error::argument(path.display().to_string(), reason).into());
         };
         let progress = Progress::over_tiles(0);

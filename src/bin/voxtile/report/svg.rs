@@ -35,10 +35,14 @@ pub fn histogram(bars: &[Bar], what: &str) -> Result<String, fmt::Error> {
         let [red, green, blue] = bar.color;
         write!(
             svg,
-            r#"<rect x="{:.2}" y="{:.2}" width="{:.2}" height="{height:.2}" fill="rgb({red},{green},{blue})"><title>{} to {}: {}</title></rect>"#,
+            r#"<rect x="{:.2}" y="{:.2}" width="{:.2}" height="{height:.2}" fill="rgb({red},{green},{blue})">"#,
             left + 0.05 * pitch,
             ground - height,
-            0.9 * pitch,
+            0.9 * pitch
+        )?;
+        write!(
+            svg,
+            "<title>{} to {}: {}</title></rect>",
             Text(&bar.from),
             Text(&bar.to),
             HumanCount(bar.count)
