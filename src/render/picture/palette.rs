@@ -28,8 +28,8 @@ pub const APPEARED: Rgb = [74, 144, 255];
 const LIGHTNESS: [f64; 2] = [0.36, 0.94];
 /// Hue in degrees of the lowest and of the highest: from violet over green to yellow.
 const HUE: [f64; 2] = [305.0, 103.0];
-/// More than the screen has; each color is as vivid as it can be up to this.
-const CHROMA: f64 = 0.17;
+/// Each color is as vivid as a screen can show it, up to this: more leaves kinks where the screen's colors end.
+const CHROMA: f64 = 0.13;
 
 /// From low to high, so that lightness rises evenly to the eye: also for readers who do not see red and green apart,
 /// and on grey paper.
@@ -93,17 +93,22 @@ pub(super) fn lit(color: Rgb, light: f64) -> Rgb {
 mod tests {
     use super::*;
 
+    /// CIE lightness, 0 to 100.
     fn lightness(rgb: Rgb) -> f64 {
-        0.3 * f64::from(rgb[0]) + 0.59 * f64::from(rgb[1]) + 0.11 * f64::from(rgb[2])
+        let [red, green, blue] = rgb.map(|value| {
+            let value = f64::from(value) / 255.0;
+            if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+        });
+        116.0 * (0.2126 * red + 0.7152 * green + 0.0722 * blue).cbrt() - 16.0
     }
 
     #[test]
     fn higher_is_lighter() {
         let steps: Vec<f64> = (0..=64).map(|i| lightness(color_of(f64::from(i) / 64.0))).collect();
         assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
-        assert!(lightness(UNKNOWN) + 15.0 < lightness(FREE));
-        assert!(lightness(UNKNOWN) + 60.0 < lightness(INFLATED));
-        assert!(lightness(FREE) + 10.0 < steps[0], "{steps:?}");
+        assert!(lightness(UNKNOWN) + 10.0 < lightness(FREE));
+        assert!(lightness(UNKNOWN) + 30.0 < lightness(INFLATED));
+        assert!(lightness(FREE) + 5.0 < steps[0], "{steps:?}");
         assert_eq!(color_of(2.0), color_of(1.0));
         assert_eq!(color_of(f64::NAN), color_of(0.0));
     }
