@@ -56,8 +56,8 @@
 //!
 //! # Features
 //!
-//! - `render`: levels of detail for viewers.
-//! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and pictures. The library needs none of
+//! - `render`: pictures of maps, numbers to go with them, and levels of detail for viewers.
+//! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and `render`. The library needs none of
 //!   it, and no feature changes a result.
 
 mod config;

@@ -237,6 +237,14 @@ impl MapReader {
         })
     }
 
+    /// Bytes on disk of a tile: its table and its octree, of which a snapshot has none; `None` if the map has no such tile
+    /// or is of the original format.
+    pub fn tile_bytes(&self, index: TileIndex) -> Option<u64> {
+        let version = self.version(index).filter(|_| self.is_verified())?;
+        let octree_bytes = if self.snapshot().is_some() { 0 } else { version.octree.bytes };
+        Some(version.table.bytes + octree_bytes)
+    }
+
     /// Where the map is.
     pub(crate) fn disk(&self) -> Arc<dyn Disk> {
         self.disk.clone()

@@ -66,6 +66,12 @@ pub trait MapView: Sync {
         None
     }
 
+    /// Number of the last scan that the map had taken when a tile was last flushed, where that is known without reading
+    /// it.
+    fn last_scan_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.version_of_tile(index).map(|version| version.scan_number)
+    }
+
     /// Sizes of the map and of what is in memory.
     fn statistics(&self) -> MapStatistics;
 

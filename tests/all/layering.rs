@@ -57,8 +57,11 @@ const LAYERS: [(&str, &[&str]); 24] = [
         &["config", "error", "mapper", "maths", "persistence", "sensor", "space", "store", "tile"],
     ),
     ("integrity", &["config", "error", "path_text", "persistence", "space", "store", "tile"]),
-    // Maps to look at; no web, no screen.
-    ("render", &["config", "error", "mapper", "query", "scan", "scratch", "sensor", "space", "tile"]),
+    // Maps to look at, by the interface of mappers: no web, no screen, no file.
+    (
+        "render",
+        &["config", "error", "local", "mapper", "query", "scan", "scratch", "sensor", "space", "tile"],
+    ),
     ("simulation", &["maths", "scan", "space"]),
     // It explains, and names what callers use.
     ("lib.rs", &["config", "error", "mapper", "query", "scan", "sensor", "space", "store", "tile"]),

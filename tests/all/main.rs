@@ -23,6 +23,9 @@ mod cli_json;
 /// What `-q`, `-v` and `RUST_LOG` say beside the answer.
 #[cfg(feature = "cli")]
 mod cli_log;
+/// Pictures, in files and for terminals, and reports.
+#[cfg(feature = "cli")]
+mod cli_pictures;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;
@@ -67,6 +70,9 @@ mod octree_export;
 mod operations;
 /// Maps opened and created by options.
 mod options;
+/// Pictures of known maps, pixel by pixel, and counts of what a map holds.
+#[cfg(feature = "render")]
+mod pictures;
 /// Queries against brute force.
 mod queries;
 /// Scans from files, good and bad.

@@ -1,4 +1,5 @@
 mod edit;
+mod picture;
 mod read;
 mod snapshot;
 #[cfg(feature = "view")]
@@ -10,6 +11,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
 use log::LevelFilter;
+pub use picture::{PictureArgs, ReportArgs, TerminalArgs, ViewName};
 pub use read::{FrameName, ReadArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
@@ -65,6 +67,10 @@ pub enum Command {
     Raycast(RaycastArgs),
     /// Write a map's voxels to a file for other programs, or its surface, or its octree
     Export(ExportArgs),
+    /// Draw a map: from above, cut at a height, from a side, or what has changed; as PNG or into the terminal
+    Picture(PictureArgs),
+    /// Write a page about a map: pictures, numbers, histograms, damage; one file that needs no network
+    Report(ReportArgs),
     /// Print the digest of a map's content: equal for equal maps
     Digest(DigestArgs),
     /// Keep a map as it is under a name, at next to no cost; or delete such a snapshot
@@ -118,6 +124,8 @@ impl Command {
             Self::Query(args) => args.json,
             Self::Raycast(args) => args.json,
             Self::Export(args) => args.json,
+            Self::Picture(args) => args.json,
+            Self::Report(args) => args.json,
             Self::Digest(args) => args.json,
             Self::Snapshot(args) => args.json,
             Self::Snapshots(args) => args.json,
@@ -287,6 +295,10 @@ pub enum ColorName {
     Height,
     /// Highest probability in the column
     Probability,
+    /// Most observations of a voxel in the column
+    Count,
+    /// Number of the scan after which its tile was last flushed
+    LastScan,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -343,6 +355,9 @@ pub struct ImportArgs {
 pub struct InfoArgs {
     /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
+    /// Draw nothing: a terminal gets a small picture of a map that is not large, unless NO_COLOR is set
+    #[arg(long)]
+    pub no_picture: bool,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

@@ -1,8 +1,8 @@
 use crate::INTERRUPTED;
-use crate::args::{ColorName, DemoArgs};
+use crate::args::DemoArgs;
 use crate::failure::JsonTo;
 use crate::octree_choice::octree_config;
-use crate::picture::{ColorBy, TopDown, View};
+use crate::picture::write_png;
 use crate::progress::Progress;
 use crate::stop_signal;
 use crate::summary::Summary;
@@ -11,11 +11,11 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
+use voxtile::render::Picture;
 use voxtile::scan::ScanReport;
 use voxtile::simulation::{City, Drive, Lidar, Survey};
-use voxtile::space::{Aabb, Point};
-use voxtile::store::Bounds;
-use voxtile::{Error, MapConfig, Occupancy};
+use voxtile::space::Point;
+use voxtile::{Error, MapConfig};
 
 /// From scan to scan.
 const SPACING_M: u32 = 2;
@@ -101,33 +101,13 @@ fn another_demo(map: &Path) -> Error {
 }
 
 /// Draws a map on disk from above, tile by tile, and the way of the sensor.
-fn draw(args: &DemoArgs, map: &Path, path: &[Point], picture: &Path) -> anyhow::Result<()> {
+fn draw(args: &DemoArgs, map: &Path, path: &[Point], file: &Path) -> anyhow::Result<()> {
     let reader = MapReader::open(map, 1)?;
-    let config = reader.config();
-    let (resolution_m, tile_size_m) = (config.grid.resolution_m(), config.grid.tile_size_m());
-    let Some(Bounds { min, max }) = Bounds::of(reader.tile_indices().into_iter()) else { return Ok(()) };
-    let corner = |index: [i32; 3], add: f64| index.map(|k| (f64::from(k) + add) * tile_size_m);
-    let mut top_down = TopDown::new(View {
-        bounds: Aabb { min: corner(min, 0.0), max: corner(max, 1.0) },
-        resolution_m,
-        tile_size_m,
-        color_by: match args.color {
-            ColorName::Height => ColorBy::Height,
-            ColorName::Probability => ColorBy::Probability,
-        },
-        title: format!("voxtile demo: {} scans, {resolution_m} m voxels, {tile_size_m} m tiles", path.len()),
-    })?;
-    for tile in reader.tiles() {
-        for voxel in tile?.voxels() {
-            let center_m = config.grid.center_m(voxel.index);
-            match Occupancy::of(config, Some(voxel.evidence)) {
-                Occupancy::Occupied(probability) => top_down.add_occupied(center_m, probability),
-                Occupancy::Free(_) | Occupancy::Unknown => top_down.add_free(center_m),
-            }
-        }
-    }
-    path.iter().for_each(|&place| top_down.add_to_path(place));
-    top_down.write_png(picture)
+    let grid = reader.config().grid;
+    let (scans, resolution_m, tile_size_m) = (path.len(), grid.resolution_m(), grid.tile_size_m());
+    let title = format!("voxtile demo: {scans} scans, {resolution_m} m voxels, {tile_size_m} m tiles");
+    let picture = Picture::new().with_color(args.color.into()).with_path(path.to_vec()).with_title(title);
+    write_png(&picture.draw(&reader, |_, _| {})?, file)
 }
 
 fn say_what_next(folder: &Path, map: &Path, picture: &Path, [x, y, z]: Point) -> std::io::Result<()> {

@@ -1,10 +1,11 @@
 use crate::args::InfoArgs;
 use crate::json;
-use crate::map_at::read_map;
+use crate::map_at::{read_any_map, read_map};
 use crate::octree_file;
+use crate::picture::{is_quick, print_small};
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{KeptBytes, kept_bytes};
@@ -16,37 +17,39 @@ use voxtile::{MapQueries, Result, Storage};
 /// Inputs that are shown to people; JSON has them all.
 const INPUTS_SHOWN: usize = 5;
 
+/// What the map knows of itself, without reading a tile.
 #[derive(Debug, Serialize)]
-struct Info {
-    map_id: Option<String>,
-    verified: bool,
-    resolution_m: f64,
-    tile_size_m: f64,
-    sensor_model: SensorModel,
-    occupancy_threshold: f64,
-    storage: Storage,
-    scan_number: u64,
-    flush_number: u64,
+pub struct Info {
+    pub map_id: Option<String>,
+    pub verified: bool,
+    pub resolution_m: f64,
+    pub tile_size_m: f64,
+    pub sensor_model: SensorModel,
+    pub occupancy_threshold: f64,
+    pub storage: Storage,
+    pub scan_number: u64,
+    pub flush_number: u64,
     /// What it was built from, the latest last.
-    crs: Option<String>,
-    inputs: Vec<InputRecord>,
+    pub crs: Option<String>,
+    pub inputs: Vec<InputRecord>,
     /// Number of the last scan when evidence last faded; 0 if it never has.
-    decayed_scan: u64,
-    tiles: u64,
-    tile_bounds: Option<Bounds>,
-    bounds_m: Option<Aabb>,
-    voxels: u64,
-    occupied: u64,
-    table_bytes: u64,
-    octree_bytes: u64,
+    pub decayed_scan: u64,
+    pub tiles: u64,
+    pub tile_bounds: Option<Bounds>,
+    pub bounds_m: Option<Aabb>,
+    pub voxels: u64,
+    pub occupied: u64,
+    pub table_bytes: u64,
+    pub octree_bytes: u64,
     /// What is kept beside the map as it is; `None` for a snapshot.
-    kept: Option<KeptBytes>,
+    pub kept: Option<KeptBytes>,
 }
 
 pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if OctreeMap::is_named_by(&args.map) {
         octree_file::print_info(&args.map, args.json, &mut out)?;
+        draw(args, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }
     let info = read_map(&args.map, |reader| Ok(Info::of(reader)?))?;
@@ -54,12 +57,34 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
         json::print(&info, &mut out)?;
     } else {
         info.print(&mut out)?;
+        draw(args, &mut out)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
+/// Whether a picture may follow the text: where a person looks at colors.
+pub fn may_draw(args: &InfoArgs) -> bool {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    !(args.json || args.no_picture || set("NO_COLOR").is_some())
+        && set("TERM").is_some_and(|term| term != "dumb")
+        && std::io::stdout().is_terminal()
+}
+
+fn draw(args: &InfoArgs, out: &mut impl Write) -> anyhow::Result<()> {
+    if !may_draw(args) {
+        return Ok(());
+    }
+    let drawn = read_any_map(&args.map, |map| if is_quick(map) { print_small(map, out) } else { Ok(()) });
+    // The text was the answer; what is wrong with a tile is for `verify` to say.
+    drawn.or_else(|error| {
+        log::warn!("no picture: {error:#}");
+        Ok(())
+    })
+}
+
 impl Info {
-    fn of(reader: &MapReader) -> Result<Self> {
+    /// Asks a map.
+    pub fn of(reader: &MapReader) -> Result<Self> {
         let config = reader.config();
         let ext = reader.metadata().ext.as_ref();
         let tile_bounds = Bounds::of(reader.tile_indices().into_iter());

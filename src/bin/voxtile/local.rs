@@ -1,8 +1,7 @@
 use crate::args::{LocalArgs, PresetName};
 use crate::json;
 use crate::local_table::{Row, print_table};
-use crate::output_file::check_picture;
-use crate::picture::{OverTime, Panel};
+use crate::output_file::{OutputFile, check_picture};
 use crate::progress::Progress;
 use crate::read_options::read_options;
 use crate::scan_input::{self, is_standard_input};
@@ -10,6 +9,7 @@ use std::io::Write;
 use std::process::ExitCode;
 use voxtile::io::ScanSource;
 use voxtile::local::{LocalMap, LocalParameters, LocalReader, LocalState};
+use voxtile::render::{OverTime, Panel};
 use voxtile::space::{Grid, Point};
 use voxtile::{Error, Scan};
 
@@ -46,7 +46,11 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
         rows.push(row);
         if let Some(panels) = panels {
             let title = format!("voxtile local: {} m voxels, setup {}", args.resolution, setup.name);
-            OverTime { resolution_m: args.resolution, title, panels }.write_png(&args.output)?;
+            let image = OverTime { resolution_m: args.resolution, title, panels }.draw();
+            let mut file = OutputFile::create(&args.output)?;
+            let written = image.write_png(file.out());
+            file.written(written)?;
+            file.finish()?;
         }
     }
     let mut out = std::io::stdout().lock();

@@ -38,6 +38,7 @@ mod query;
 mod raycast;
 mod read_options;
 mod repair;
+mod report;
 mod revert;
 mod scan_input;
 mod scan_reader;
@@ -47,6 +48,7 @@ mod snapshot;
 mod snapshots;
 mod stop_signal;
 mod summary;
+mod terminal;
 mod threads;
 mod verify;
 #[cfg(feature = "view")]
@@ -79,7 +81,7 @@ fn main() -> ExitCode {
         // Before there is a second thread, and before anything is read from standard input.
         one_heap::begin_with_one_heap();
     }
-    if matches!(command, Command::Build(_) | Command::Local(_) | Command::Demo(_))
+    if is_parallel(&command)
         && let Err(error) = threads::start(threads)
     {
         return json_to.tell(&error);
@@ -92,6 +94,8 @@ fn main() -> ExitCode {
         Command::Query(args) => query::run(&args),
         Command::Raycast(args) => raycast::run(&args),
         Command::Export(args) => export::run(&args, quiet),
+        Command::Picture(args) => picture::run(&args, quiet),
+        Command::Report(args) => report::run(&args, quiet),
         Command::Digest(args) => digest::run(&args),
         Command::Snapshot(args) => snapshot::run(&args),
         Command::Snapshots(args) => snapshots::run(&args),
@@ -113,6 +117,19 @@ fn main() -> ExitCode {
         Command::Man(args) => man::run(&args),
     };
     outcome.unwrap_or_else(|error| json_to.tell(&error))
+}
+
+/// Whether a command works on several threads.
+fn is_parallel(command: &Command) -> bool {
+    match command {
+        Command::Build(_)
+        | Command::Local(_)
+        | Command::Demo(_)
+        | Command::Picture(_)
+        | Command::Report(_) => true,
+        Command::Info(args) => info::may_draw(args),
+        _ => false,
+    }
 }
 
 /// One line for a person. Where standard error refuses it there is nobody to tell.

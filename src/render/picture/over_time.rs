@@ -1,21 +1,26 @@
 use super::canvas::Canvas;
 use super::font;
-use super::frame::{Frame, length_label, round_length_m};
+use super::image::Image;
 use super::palette::{self, color_of, lit};
+use super::scale::{PlaneFrame, length_label, round_length_m};
+use crate::error::Result;
+use crate::local::{LocalState, LocalView};
+use crate::space::{Aabb, Point};
 use std::collections::HashMap;
-use std::path::Path;
-use voxtile::Result;
-use voxtile::local::{LocalState, LocalView};
-use voxtile::space::{Aabb, Point};
 
 /// A local map at several times, from above, side by side.
+#[derive(Debug)]
 pub struct OverTime {
+    /// Edge of a voxel in metres.
     pub resolution_m: f64,
+    /// A line above all.
     pub title: String,
+    /// In the order of time.
     pub panels: Vec<Panel>,
 }
 
 /// A local map at one time: its columns.
+#[derive(Debug)]
 pub struct Panel {
     scan: usize,
     occupied: usize,
@@ -46,12 +51,12 @@ impl Panel {
 }
 
 impl OverTime {
-    /// Draws everything and saves it.
-    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
-        self.draw().write_png(path)
+    /// Draws everything.
+    pub fn draw(&self) -> Image {
+        self.canvas().into_image()
     }
 
-    fn draw(&self) -> Canvas {
+    fn canvas(&self) -> Canvas {
         let frame = self.frame();
         let Ok(frame) = frame else { return Canvas::new(8, 8, palette::UNKNOWN) };
         let zoom = (MAX_CELLS / frame.cells[0].max(frame.cells[1])).clamp(1, 8);
@@ -81,7 +86,7 @@ impl OverTime {
         &self,
         canvas: &mut Canvas,
         panel: &Panel,
-        frame: &Frame,
+        frame: &PlaneFrame,
         zoom: usize,
         [left, top]: [usize; 2],
         [low, high]: [i32; 2],
@@ -104,7 +109,7 @@ impl OverTime {
             }
         }
         let path = panel.path.iter().filter_map(|at| pixel(at[0], at[1]));
-        canvas.path(path.map(|corner| corner.map(|k| k + zoom / 2)), 1);
+        canvas.path(path.map(|corner| corner.map(|k| k + zoom / 2)), 1, palette::PATH);
     }
 
     fn height_m(&self, z: i32) -> f64 {
@@ -112,7 +117,7 @@ impl OverTime {
     }
 
     /// The cells of all panels: around all columns and the way, but for one column in two hundred on each side.
-    fn frame(&self) -> Result<Frame> {
+    fn frame(&self) -> Result<PlaneFrame> {
         let path = self.panels.iter().flat_map(|panel| &panel.path);
         let mut bounds = path.fold(Aabb { min: [f64::MAX; 3], max: [f64::MIN; 3] }, |bounds, at| Aabb {
             min: std::array::from_fn(|k| bounds.min[k].min(at[k] - 2.0)),
@@ -128,7 +133,7 @@ impl OverTime {
                 bounds.max[axis] = bounds.max[axis].max(f64::from(high + 1) * self.resolution_m);
             }
         }
-        Frame::new(&bounds, self.resolution_m, MAX_CELLS)
+        PlaneFrame::new(&bounds, self.resolution_m, MAX_CELLS)
     }
 
     /// Voxel indices along z that the first and the last color stand for.
@@ -165,18 +170,18 @@ fn draw_foot(canvas: &mut Canvas, foot: usize, metres_a_pixel: f64, [low_m, high
 #[cfg(test)]
 mod tests {
     use super::*;
-    use voxtile::Scan;
-    use voxtile::local::{LocalMap, LocalParameters};
+    use crate::Scan;
+    use crate::local::{LocalMap, LocalParameters};
 
     #[test]
     fn any_map_can_be_drawn() {
         let mut map = LocalMap::new(0.1, LocalParameters::local_mapping()).unwrap();
         let mut picture = OverTime { resolution_m: 0.1, title: "a map".into(), panels: Vec::new() };
-        assert!(picture.draw().width() > 0);
+        assert!(picture.canvas().width() > 0);
         for (scan, point) in [[3.0, 1.0, 0.4], [-2.0, 7.0, 3.0], [0.5, 0.5, 0.5]].into_iter().enumerate() {
             map.insert_scan(&Scan { origin: [0.0; 3], points: vec![point], intensities: None }).unwrap();
             picture.panels.push(Panel::of(map.view(), scan, vec![[0.0; 3]]));
-            let canvas = picture.draw();
+            let canvas = picture.canvas();
             assert!((600..4000).contains(&canvas.width()) && canvas.height() < 4000);
         }
         assert_eq!(picture.panels[2].columns.values().flatten().count(), 3);

@@ -1,9 +1,9 @@
-use voxtile::space::Aabb;
-use voxtile::{Error, Result};
+use crate::error::{Error, Result};
+use crate::space::Aabb;
 
 /// How the ground plan is cut into square cells of whole voxels, and what a length looks like in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct PlaneFrame {
     /// Lower corner in metres, world frame.
     pub min_m: [f64; 2],
     /// Edge of a cell in metres: one voxel, or more where the map would be too large.
@@ -12,7 +12,7 @@ pub struct Frame {
     pub cells: [usize; 2],
 }
 
-impl Frame {
+impl PlaneFrame {
     /// The frame of the bounds with at most `max_edge` cells along an edge.
     pub fn new(bounds: &Aabb, resolution_m: f64, max_edge: usize) -> Result<Self> {
         let size_m: [f64; 2] = std::array::from_fn(|k| bounds.max[k] - bounds.min[k]);
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn a_small_map_has_a_cell_a_voxel() {
-        let frame = Frame::new(&bounds(30.0, 10.0), 0.1, 2048).unwrap();
+        let frame = PlaneFrame::new(&bounds(30.0, 10.0), 0.1, 2048).unwrap();
         assert_eq!((frame.cells, frame.cell_m), ([300, 100], 0.1));
         assert_eq!(frame.cell_of(-9.95, 20.05), Some([0, 0]));
         assert_eq!(frame.cell_of(19.95, 29.95), Some([299, 99]));
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_large_map_has_cells_of_whole_voxels_and_stays_bounded() {
-        let frame = Frame::new(&bounds(20_000.0, 500.0), 0.1, 2048).unwrap();
+        let frame = PlaneFrame::new(&bounds(20_000.0, 500.0), 0.1, 2048).unwrap();
         assert!(frame.cells[0] <= 2048);
         assert!((frame.cell_m / 0.1 - (frame.cell_m / 0.1).round()).abs() < 1e-9);
         assert_eq!(frame.cell_of(19_989.0, 25.0).unwrap()[0], frame.cells[0] - 1);
@@ -87,9 +87,9 @@ mod tests {
 
     #[test]
     fn a_map_without_extent_is_an_error() {
-        assert!(Frame::new(&bounds(0.0, 5.0), 0.1, 2048).is_err());
-        assert!(Frame::new(&bounds(f64::NAN, 5.0), 0.1, 2048).is_err());
-        assert!(Frame::new(&bounds(f64::INFINITY, 5.0), 0.1, 2048).is_err());
+        assert!(PlaneFrame::new(&bounds(0.0, 5.0), 0.1, 2048).is_err());
+        assert!(PlaneFrame::new(&bounds(f64::NAN, 5.0), 0.1, 2048).is_err());
+        assert!(PlaneFrame::new(&bounds(f64::INFINITY, 5.0), 0.1, 2048).is_err());
     }
 
     #[test]

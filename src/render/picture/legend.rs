@@ -1,24 +1,33 @@
-use super::ColorBy;
 use super::canvas::Canvas;
 use super::font;
-use super::frame::{length_label, round_length_m};
 use super::palette::{self, color_of};
+use super::scale::{length_label, round_length_m};
+use super::view::ColorBy;
 
 /// What a reader needs to know below the map.
 pub struct Legend {
     pub metres_a_pixel: f64,
     /// Metres from one line over the map to the next, if there are any.
     pub lines_m: Option<f64>,
-    pub color_by: ColorBy,
-    /// What the first and the last color stand for.
-    pub range: [f64; 2],
+    /// The axes that run to the right and up: 0 is x.
+    pub axes: [usize; 2],
+    /// Whether the sensor's way is drawn.
+    pub has_path: bool,
+    pub scale: Scale,
+}
+
+/// What the colors stand for.
+pub enum Scale {
+    /// A value, and what its first and last color stand for if there is one.
+    Values { color_by: ColorBy, range: Option<[f64; 2]> },
+    /// What became of one state on the way to another.
+    Change,
 }
 
 impl Legend {
     /// Draws it below the row `foot`, each dot of a letter `dot` pixels wide: axes, scale bar, what is free and
     /// unknown, the colors.
     pub fn draw(&self, canvas: &mut Canvas, foot: usize, dot: usize) {
-        let [least, most] = self.range;
         let margin = 10 * dot;
         let bottom = foot + 22 * dot;
         let line = bottom - font::HEIGHT * dot;
@@ -37,8 +46,8 @@ impl Legend {
                 1.0,
             );
         }
-        canvas.text(margin + arm + 5 * dot, line, dot, palette::INK, "x");
-        canvas.text(margin + 5 * dot, bottom - arm - 3 * dot, dot, palette::INK, "y");
+        canvas.text(margin + arm + 5 * dot, line, dot, palette::INK, name_of(self.axes[0]));
+        canvas.text(margin + 5 * dot, bottom - arm - 3 * dot, dot, palette::INK, name_of(self.axes[1]));
         // Scale bar.
         let length_m = round_length_m(canvas.width() as f64 * 0.2 * self.metres_a_pixel);
         let length = ((length_m / self.metres_a_pixel).round() as usize).max(1);
@@ -51,34 +60,59 @@ impl Legend {
             let label = format!("lines {}", length_label(every_m));
             canvas.text(left + length + 8 * dot, line, dot, palette::FAINT_INK, &label);
         }
-        // Colors.
         let right = canvas.width() - margin;
         let bar = (canvas.width() / 4).max(1);
-        for x in 0..bar {
-            let color = color_of(x as f64 / (bar - 1).max(1) as f64);
-            canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], color, 1.0);
-        }
-        let (name, low, high) = match self.color_by {
-            ColorBy::Height => ("height", height_label(least), height_label(most)),
-            ColorBy::Probability => ("probability", format!("{least:.2}"), format!("{most:.2}")),
-        };
-        canvas.text(right - bar, foot + 4 * dot, dot, palette::INK, &low);
-        canvas.text_before(right, foot + 4 * dot, dot, palette::INK, &high);
-        let middle = right - bar / 2 + font::width_of(name) * dot / 2;
-        canvas.text_before(middle, foot + 4 * dot, dot, palette::FAINT_INK, name);
+        self.draw_scale(canvas, [right, bar], foot, dot);
         // What is not occupied.
         let swatch = right - bar - 74 * dot;
         for (top, color, label) in
             [(foot + 4 * dot, palette::FREE, "free"), (line, palette::UNKNOWN, "unknown")]
         {
-            canvas.fill(swatch, top, [7 * dot; 2], palette::FAINT_INK, 1.0);
-            canvas.fill(swatch + 1, top + 1, [7 * dot - 2; 2], color, 1.0);
-            canvas.text(swatch + 11 * dot, top, dot, palette::FAINT_INK, label);
+            draw_swatch(canvas, [swatch, top], dot, color, label);
         }
-        let (sensor, top) = (swatch.saturating_sub(60 * dot), foot + 4 * dot);
-        canvas.path(std::iter::once([sensor + 3 * dot, top + 3 * dot]), dot + 1);
-        canvas.text(sensor + 11 * dot, top, dot, palette::FAINT_INK, "sensor");
+        if self.has_path {
+            let (sensor, top) = (swatch.saturating_sub(60 * dot), foot + 4 * dot);
+            let color = if matches!(self.scale, Scale::Change) { palette::INK } else { palette::PATH };
+            canvas.path(std::iter::once([sensor + 3 * dot, top + 3 * dot]), dot + 1, color);
+            canvas.text(sensor + 11 * dot, top, dot, palette::FAINT_INK, "sensor");
+        }
     }
+
+    fn draw_scale(&self, canvas: &mut Canvas, [right, bar]: [usize; 2], foot: usize, dot: usize) {
+        let (top, bottom) = (foot + 4 * dot, foot + 22 * dot);
+        let Scale::Values { color_by, range } = &self.scale else {
+            let (left, line) = (right - bar, bottom - font::HEIGHT * dot);
+            draw_swatch(canvas, [left, top], dot, palette::APPEARED, "appeared");
+            draw_swatch(canvas, [left, line], dot, palette::VANISHED, "vanished");
+            draw_swatch(canvas, [left + 68 * dot, top], dot, palette::SAME, "same");
+            return;
+        };
+        let Some([least, most]) = *range else { return };
+        for x in 0..bar {
+            let color = color_of(x as f64 / (bar - 1).max(1) as f64);
+            canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], color, 1.0);
+        }
+        let (name, low, high) = match color_by {
+            ColorBy::Height => ("height", height_label(least), height_label(most)),
+            ColorBy::Probability => ("probability", format!("{least:.2}"), format!("{most:.2}")),
+            ColorBy::Count => ("count", format!("{least:.0}"), format!("{most:.0}")),
+            ColorBy::LastScan => ("last scan", format!("{least:.0}"), format!("{most:.0}")),
+        };
+        canvas.text(right - bar, top, dot, palette::INK, &low);
+        canvas.text_before(right, top, dot, palette::INK, &high);
+        let middle = right - bar / 2 + font::width_of(name) * dot / 2;
+        canvas.text_before(middle, top, dot, palette::FAINT_INK, name);
+    }
+}
+
+fn draw_swatch(canvas: &mut Canvas, [left, top]: [usize; 2], dot: usize, color: palette::Rgb, label: &str) {
+    canvas.fill(left, top, [7 * dot; 2], palette::FAINT_INK, 1.0);
+    canvas.fill(left + 1, top + 1, [7 * dot - 2; 2], color, 1.0);
+    canvas.text(left + 11 * dot, top, dot, palette::FAINT_INK, label);
+}
+
+fn name_of(axis: usize) -> &'static str {
+    ["x", "y", "z"].get(axis).copied().unwrap_or_default()
 }
 
 fn height_label(height_m: f64) -> String {

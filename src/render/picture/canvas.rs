@@ -1,10 +1,8 @@
 use super::font;
+use super::image::Image;
 use super::palette::{self, Rgb, mixed};
-use crate::output_file::OutputFile;
-use std::io;
-use std::path::Path;
 
-/// Pixels, row by row from the top. What is drawn outside is cut off.
+/// Pixels with alpha, row by row from the top. What is drawn outside is cut off.
 pub struct Canvas {
     width: usize,
     height: usize,
@@ -14,7 +12,7 @@ pub struct Canvas {
 impl Canvas {
     /// A canvas of one color.
     pub fn new(width: usize, height: usize, color: Rgb) -> Self {
-        Self { width, height, bytes: color.repeat(width * height) }
+        Self { width, height, bytes: opaque(color).repeat(width * height) }
     }
 
     pub fn width(&self) -> usize {
@@ -30,7 +28,7 @@ impl Canvas {
     pub fn fill(&mut self, left: usize, top: usize, size: [usize; 2], color: Rgb, cover: f64) {
         for y in top.min(self.height)..top.saturating_add(size[1]).min(self.height) {
             for x in left.min(self.width)..left.saturating_add(size[0]).min(self.width) {
-                let at = 3 * (x + y * self.width);
+                let at = 4 * (x + y * self.width);
                 let pixel = &mut self.bytes[at..at + 3];
                 let new =
                     if cover >= 1.0 { color } else { mixed([pixel[0], pixel[1], pixel[2]], color, cover) };
@@ -53,10 +51,12 @@ impl Canvas {
     }
 
     /// The way of the sensor: a disc around the middle of each pixel, with a dark rim, so that it shows on any color.
-    pub fn path(&mut self, middles: impl Iterator<Item = [usize; 2]>, radius: usize) {
+    pub fn path(&mut self, middles: impl Iterator<Item = [usize; 2]>, radius: usize, color: Rgb) {
         let middles: Vec<[usize; 2]> = middles.collect();
         // All rims first: where discs lie close, they make one line.
-        for (radius, color) in [(radius + 1 + radius / 2, palette::UNKNOWN), (radius, palette::PATH)] {
+        for (radius, color) in
+            [(radius + usize::from(radius > 0) + radius / 2, palette::UNKNOWN), (radius, color)]
+        {
             middles.iter().for_each(|&middle| self.disc(middle, radius, color));
         }
     }
@@ -80,25 +80,14 @@ impl Canvas {
         self.text(right.saturating_sub(font::width_of(text) * dot), top, dot, color, text);
     }
 
-    /// Saves the picture as PNG.
-    pub fn write_png(&self, path: &Path) -> anyhow::Result<()> {
-        let mut file = OutputFile::create(path)?;
-        let encoded = self.encode(file.out());
-        file.written(encoded)?;
-        file.finish()
+    /// What was drawn.
+    pub fn into_image(self) -> Image {
+        Image::new(self.width, self.height, self.bytes)
     }
+}
 
-    fn encode(&self, out: &mut impl io::Write) -> io::Result<()> {
-        let too_large = |_| io::Error::other("the picture is too large for PNG");
-        let width = u32::try_from(self.width).map_err(too_large)?;
-        let height = u32::try_from(self.height).map_err(too_large)?;
-        let mut encoder = png::Encoder::new(out, width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.bytes)?;
-        Ok(writer.finish()?)
-    }
+fn opaque([red, green, blue]: Rgb) -> [u8; 4] {
+    [red, green, blue, 255]
 }
 
 #[cfg(test)]
@@ -112,7 +101,9 @@ mod tests {
         canvas.fill(usize::MAX, 0, [2, 2], [9; 3], 1.0);
         canvas.disc([0, 0], 2, [7; 3]);
         canvas.text(2, 1, 3, [5; 3], "10 m");
-        assert_eq!(canvas.bytes.len(), 36);
-        assert_eq!(canvas.bytes[33..], [9; 3]);
+        let image = canvas.into_image();
+        assert_eq!(image.rgba().len(), 48);
+        assert_eq!(image.pixel(3, 2), Some([9; 3]));
+        assert!(image.rgba().chunks(4).all(|pixel| pixel[3] == 255));
     }
 }

@@ -1,0 +1,138 @@
+use super::view::Change;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+/// What is known of each cell, written by any number of threads: each cell keeps its highest rank, its highest value of
+/// that rank, and what is nearest of it. The order of writing does not matter.
+pub(super) struct Cells {
+    best: Vec<AtomicU64>,
+    near: Vec<AtomicU32>,
+}
+
+/// A cell, once all is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cell {
+    pub rank: Rank,
+    pub value: f32,
+    /// In voxels toward who looks; of what is occupied alone.
+    pub near: i32,
+}
+
+/// What a cell shows: the higher hides the lower.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Rank {
+    Unknown,
+    Free,
+    Occupied,
+    Changed(Change),
+}
+
+impl Rank {
+    fn number(self) -> u64 {
+        match self {
+            Self::Unknown => 0,
+            Self::Free => 1,
+            Self::Occupied => 2,
+            Self::Changed(Change::Same) => 3,
+            Self::Changed(Change::Vanished) => 4,
+            Self::Changed(Change::Appeared) => 5,
+        }
+    }
+
+    fn of(number: u64) -> Self {
+        match number {
+            0 => Self::Unknown,
+            1 => Self::Free,
+            2 => Self::Occupied,
+            3 => Self::Changed(Change::Same),
+            4 => Self::Changed(Change::Vanished),
+            _ => Self::Changed(Change::Appeared),
+        }
+    }
+
+    /// Whether something is, or was, in the way.
+    pub fn is_solid(self) -> bool {
+        self > Self::Free
+    }
+}
+
+impl Cells {
+    /// Unknown cells.
+    pub fn new(count: usize) -> Self {
+        let mut cells = Self { best: Vec::new(), near: Vec::new() };
+        cells.best.resize_with(count, Default::default);
+        cells.near.resize_with(count, Default::default);
+        cells
+    }
+
+    /// Adds what was found at a place.
+    #[inline]
+    pub fn add(&self, place: usize, cell: Cell) {
+        let (Some(best), Some(near)) = (self.best.get(place), self.near.get(place)) else { return };
+        let packed = cell.rank.number() << 32 | u64::from(ordered(cell.value));
+        // Most come to nothing: looking first spares the writing.
+        if best.load(Ordering::Relaxed) < packed {
+            best.fetch_max(packed, Ordering::Relaxed);
+        }
+        if cell.rank.is_solid() {
+            let nearness = cell.near as u32 ^ SIGN;
+            if near.load(Ordering::Relaxed) < nearness {
+                near.fetch_max(nearness, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// The cell at a place.
+    pub fn at(&self, place: usize) -> Cell {
+        let best = self.best[place].load(Ordering::Relaxed);
+        let near = (self.near[place].load(Ordering::Relaxed) ^ SIGN) as i32;
+        Cell { rank: Rank::of(best >> 32), value: unordered(best as u32), near }
+    }
+
+    /// All cells in order.
+    pub fn iter(&self) -> impl Iterator<Item = Cell> {
+        (0..self.best.len()).map(|place| self.at(place))
+    }
+}
+
+const SIGN: u32 = 1 << 31;
+
+/// The bits of a number as an integer of the same order.
+fn ordered(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits & SIGN == 0 { bits | SIGN } else { !bits }
+}
+
+fn unordered(bits: u32) -> f32 {
+    f32::from_bits(if bits & SIGN == 0 { !bits } else { bits & !SIGN })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_highest_rank_counts_and_then_the_highest_value() {
+        let cells = Cells::new(2);
+        let cell = |rank, value, near| Cell { rank, value, near };
+        for added in [
+            cell(Rank::Occupied, -3.5, -7),
+            cell(Rank::Free, 9.0, 100),
+            cell(Rank::Occupied, -1.25, -9),
+            cell(Rank::Occupied, -2.0, -8),
+        ] {
+            cells.add(1, added);
+        }
+        cells.add(77, cell(Rank::Free, 0.0, 0));
+        assert_eq!(cells.at(1), cell(Rank::Occupied, -1.25, -7));
+        assert_eq!(cells.at(0).rank, Rank::Unknown);
+        cells.add(1, cell(Rank::Changed(Change::Same), 0.0, 0));
+        assert_eq!(cells.at(1).rank, Rank::Changed(Change::Same));
+    }
+
+    #[test]
+    fn numbers_keep_their_order_as_integers() {
+        let numbers = [f32::NEG_INFINITY, -2.5, -0.1, 0.0, 1e-9, 3.0, f32::INFINITY];
+        assert!(numbers.windows(2).all(|pair| ordered(pair[0]) < ordered(pair[1])));
+        assert!(numbers.iter().all(|&number| unordered(ordered(number)) == number));
+    }
+}
