@@ -288,7 +288,7 @@ impl<'a> Drawing<'a> {
             let parts = if length <= longest { parts } else { 1 };
             for part in 1..=parts {
                 let share = part as f64 / parts as f64;
-                let at = std::array::from_fn(|k| pair[0][k] + (pair[1][k] - pair[0][k]) * share);
+                let at = std::array::from_fn(|k| pair[0][k] * (1.0 - share) + pair[1][k] * share);
                 if let Some(pixel) = pane.pixel_of(at)
                     && middles.last() != Some(&pixel)
                 {
