@@ -472,3 +472,68 @@ fn which_voxels_are_written_is_for_every_format() {
     let output = run(&["-o", &squares, "--format", "autoware", "--origin", "10", "0", "0"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
+
+/// Every file that a tileset names is there, and its mesh is within the node's box, through all transforms.
+#[test]
+fn a_folder_of_3d_tiles_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let points = folder.path().join("0.xyz");
+    // A wall, and rays far through tiles where nothing is hit.
+    let rows: Vec<String> = (0..400)
+        .map(|k| format!("{} {} 1.5", 12.3 + f64::from(k % 20) * 0.1, 0.1 * f64::from(k / 20)))
+        .collect();
+    std::fs::write(&points, rows.join("\n") + "\n-45 3 1\n500 1 1\n").unwrap();
+    let (map, tiles) = (folder.path().join("map"), folder.path().join("tiles"));
+    let scans = points.to_str().unwrap();
+    output(&["build", scans, "-o", map.to_str().unwrap(), "--max-range", "60"]);
+    let told = output(&[
+        "export",
+        map.to_str().unwrap(),
+        "-o",
+        tiles.to_str().unwrap(),
+        "--format",
+        "3dtiles",
+        "--json",
+    ]);
+    let told: Value = serde_json::from_str(&told).unwrap();
+    let read = |path: &Path| -> Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
+    let mut open = vec![(read(&tiles.join("tileset.json"))["root"].clone(), tiles.clone(), [0.0; 3])];
+    let mut nodes = 0;
+    while let Some((node, base, mut offset)) = open.pop() {
+        for k in 0..3 {
+            offset[k] += node["transform"][12 + k].as_f64().unwrap_or(0.0);
+        }
+        open.extend(
+            node["children"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .map(|child| (child.clone(), base.clone(), offset)),
+        );
+        let Some(uri) = node["content"]["uri"].as_str() else { continue };
+        let path = base.join(uri);
+        if uri.ends_with(".json") {
+            open.push((read(&path)["root"].clone(), path.parent().unwrap().to_owned(), offset));
+            continue;
+        }
+        let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+        let mesh: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+        let number = |value: &Value| value.as_f64().unwrap();
+        let (at, scale) = (&mesh["nodes"][0]["translation"], number(&mesh["nodes"][0]["scale"][0]));
+        let bound = |end: &str, k: usize| number(&at[k]) + scale * number(&mesh["accessors"][0][end][k]);
+        // glTF has y up: its z is -y.
+        let low = [bound("min", 0), -bound("max", 2), bound("min", 1)];
+        let high = [bound("max", 0), -bound("min", 2), bound("max", 1)];
+        let around = &node["boundingVolume"]["box"];
+        for k in 0..3 {
+            let (middle, half) = (number(&around[k]), number(&around[3 + 4 * k]));
+            assert!(middle - half <= low[k] + 1e-9 && high[k] <= middle + half + 1e-9, "{}", path.display());
+            // In the map's frame: the wall, and what the long rays hit.
+            assert!((-61.0..61.0).contains(&(offset[k] + low[k])), "{}", path.display());
+        }
+        nodes += 1;
+    }
+    assert_eq!(told["nodes"], nodes);
+    assert!(told["voxels"].as_u64().unwrap() > 300);
+}

@@ -96,6 +96,10 @@ impl<V: MapView> TilesetNodes for Difference<'_, V> {
         }
     }
 
+    fn is_occupied(&self, key: NodeKey) -> bool {
+        self.before.is_occupied(key) || self.after.is_occupied(key)
+    }
+
     fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
         let has = |state: &LevelsOf<'_, V>| state.version(key).is_some();
         match (has(&self.before), has(&self.after)) {

@@ -26,6 +26,9 @@ pub trait TilesetNodes {
     /// Whether there is such a node, and a number that changes with its content.
     fn version(&self, key: NodeKey) -> Option<u64>;
 
+    /// Whether a node has occupied voxels. Some tiles have only free ones, which a viewer may ask for.
+    fn is_occupied(&self, key: NodeKey) -> bool;
+
     /// The version of a node, or of the tile that it is a part of.
     fn version_of(&self, key: NodeKey) -> Option<u64> {
         let level = key.level.max(self.tile_level());
@@ -125,6 +128,14 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
+    /// Whether a node is there; a mesh of no voxels is not.
+    fn is_written(&self, key: NodeKey) -> bool {
+        match self.content {
+            TilesetContent::Voxels => self.nodes.version(key).is_some(),
+            TilesetContent::Meshes => self.nodes.is_occupied(key),
+        }
+    }
+
     /// A node and those below it that belong into the same file. `within` has the nodes below a tile.
     /// `corner_m` is that of the node above it, which coordinates of meshes are relative to.
     fn node(
@@ -149,7 +160,7 @@ impl Writer<'_> {
         let children: Vec<NodeKey> = match within {
             Some(within) => key.children().filter(|child| within.contains(child)).collect(),
             None if key.level == self.nodes.tile_level() => Vec::new(),
-            None => key.children().filter(|&child| self.nodes.version(child).is_some()).collect(),
+            None => key.children().filter(|&child| self.is_written(child)).collect(),
         };
         let is_divided_tile = within.is_none() && key.level == self.nodes.tile_level() && key.level > 0;
         let error_m =
@@ -201,6 +212,10 @@ impl<V: MapView> TilesetNodes for LevelsOf<'_, V> {
 
     fn version(&self, key: NodeKey) -> Option<u64> {
         self.levels.get(key).map(|node| node.version)
+    }
+
+    fn is_occupied(&self, key: NodeKey) -> bool {
+        self.levels.get(key).is_some_and(|node| node.is_occupied)
     }
 
     fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
