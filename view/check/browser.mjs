@@ -49,8 +49,8 @@ export class Browser {
 
   async open(url) {
     if (!this.session) {
-      const { targetInfos } = await this.call('Target.getTargets', {}, undefined);
-      const { targetId } = targetInfos.find(({ type }) => type === 'page');
+      // A tab of our own: the one that Chromium opens may still be replaced.
+      const { targetId } = await this.call('Target.createTarget', { url: 'about:blank' }, undefined);
       ({ sessionId: this.session } = await this.call('Target.attachToTarget', { targetId, flatten: true }, undefined));
       for (const domain of ['Page', 'Runtime', 'Log']) await this.call(`${domain}.enable`);
     }
@@ -97,6 +97,10 @@ export class Browser {
     const ended = new Promise((resolve) => this.process.once('exit', resolve));
     this.process.kill();
     await ended;
-    rmSync(this.profile, { recursive: true, force: true, maxRetries: 5, retryDelay: 100 });
+    try {
+      rmSync(this.profile, { recursive: true, force: true, maxRetries: 10, retryDelay: 200 });
+    } catch {
+      // Processes of Chromium that end a little later still write there: what is left is the system's to clear.
+    }
   }
 }

@@ -11,9 +11,11 @@ const work = mkdtempSync(join(tmpdir(), 'voxtile-view-'));
 const run = (...args) => execFileSync(voxtile, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'inherit'] });
 const ended = [];
 
+let server;
 async function view(...args) {
-  const server = spawn(voxtile, ['view', ...args, '--json'], { stdio: ['ignore', 'pipe', 'inherit'], env: { ...process.env, XDG_CACHE_HOME: join(work, 'cache') } });
-  ended.push(() => server.kill());
+  server = spawn(voxtile, ['view', ...args, '--json'], { stdio: ['ignore', 'pipe', 'inherit'], env: { ...process.env, XDG_CACHE_HOME: join(work, 'cache') } });
+  const started = server;
+  ended.push(() => started.kill());
   for await (const line of createInterface({ input: server.stdout })) return JSON.parse(line).url;
   throw new Error('the server did not start');
 }
@@ -103,6 +105,21 @@ try {
   }
   step('small and large screens, light and dark');
   assert.deepEqual(browser.told, []);
+
+  const atRest = await browser.value('voxtile.drawCalls()');
+  await browser.value('voxtile.lookAt(...Object.values(voxtile.camera()))');
+  await browser.ready();
+  assert.equal(await browser.value('voxtile.drawCalls()'), atRest, 'what is ready stays as it is');
+  const gone = new Promise((resolve) => server.once('exit', resolve));
+  server.kill();
+  await gone;
+  await browser.until('document.getElementById("state").textContent === "server gone"');
+  const [, address, token] = /\/\/([^/]+)\/([^/]+)\//.exec(url);
+  await view(map, '--listen', address, '--token', token);
+  await browser.ready();
+  step('a server that comes back is noticed');
+  // That it was gone, the browser says as well.
+  assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
 
   if (process.argv[2]) {
     const city = await view(process.argv[2]);

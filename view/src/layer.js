@@ -7,6 +7,7 @@ import { makeMaterial, tintLayer } from './material.js';
 const MOST_BYTES = 256 * 2 ** 20;
 const MOST_DRAWN = 180;
 const BEST_ERROR = 4;
+const MOST_ERROR = 4096;
 // Tiles whose free or unknown voxels are shown at once.
 const MOST_NEAR = 24;
 
@@ -30,8 +31,6 @@ export class Layer {
   open() {
     const tiles = new TilesRenderer(`maps/${this.id}/tileset.json`);
     tiles.errorTarget = BEST_ERROR;
-    tiles.lruCache.maxBytesSize = MOST_BYTES;
-    tiles.lruCache.minBytesSize = MOST_BYTES * 0.75;
     tiles.registerPlugin({
       parseToMesh: (buffer, tile, extension) => {
         if (extension !== 'vox') return null;
@@ -88,13 +87,31 @@ export class Layer {
         this.refresh();
       }
     }
-    const drawn = this.tiles.visibleTiles.size;
-    const share = MOST_DRAWN / this.viewer.layers.length;
-    if (drawn > share) this.tiles.errorTarget *= 1.15;
-    else if (drawn < 0.6 * share && this.tiles.errorTarget > BEST_ERROR) {
-      this.tiles.errorTarget = Math.max(BEST_ERROR, this.tiles.errorTarget / 1.05);
-    }
     this.updateNear();
+    this.adapt();
+  }
+
+  // Keeps within the limits of what is drawn and kept, by coarser levels; `adapts` while it is not at rest.
+  adapt() {
+    const { tiles, viewer } = this;
+    const opened = viewer.layers.reduce((sum, layer) => sum + (layer.next ? 2 : 1), 0);
+    for (const one of [tiles, this.next]) {
+      if (!one) continue;
+      one.lruCache.maxBytesSize = MOST_BYTES / opened;
+      one.lruCache.minBytesSize = 0.75 * one.lruCache.maxBytesSize;
+    }
+    // What was too fine once is not tried again until the view changes: no level comes and goes.
+    const view = [...viewer.camera.matrixWorld.elements, viewer.canvas.width, viewer.canvas.height].join();
+    if (view !== this.view) [this.view, this.finest] = [view, BEST_ERROR];
+    const before = tiles.errorTarget;
+    const share = MOST_DRAWN / viewer.layers.length;
+    const drawn = tiles.visibleTiles.size + this.near.children.length;
+    if (drawn > share || tiles.lruCache.isFull()) {
+      tiles.errorTarget = this.finest = Math.min(1.15 * before, MOST_ERROR);
+    } else if (drawn < 0.6 * share && tiles.calm > 0) {
+      tiles.errorTarget = Math.max(Math.min(this.finest, before), before / 1.15);
+    }
+    this.adapts = tiles.errorTarget !== before;
   }
 
   static isIdle(tiles) {
@@ -109,7 +126,12 @@ export class Layer {
 
   // Whether everything that the view needs is here.
   get isReady() {
-    return Layer.isQuiet(this.tiles) && !this.next && !this.waits;
+    return Layer.isQuiet(this.tiles) && !this.adapts && !this.next && !this.waits;
+  }
+
+  get bytes() {
+    const near = this.near.children.reduce((sum, { userData }) => sum + bytesOf(userData.node, userData.faces), 0);
+    return this.tiles.lruCache.cachedBytes + (this.next?.lruCache.cachedBytes ?? 0) + near;
   }
 
   meshes() {

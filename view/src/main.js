@@ -38,6 +38,7 @@ let tool = 'query';
 let marks = [];
 let answered = null;
 let path = [];
+let pathNumber = 0;
 
 const idOf = (map) => {
   const at = $('snapshot').value;
@@ -110,6 +111,7 @@ async function readExtents() {
 }
 
 function showMaps() {
+  viewer.scaled = false;
   viewer.show(maps.map((map) => ({ map, id: idOf(map) })));
   viewer.layers.forEach((layer, k) => { layer.isShown = $('layers').querySelectorAll('input')[k]?.checked ?? true; });
   paint();
@@ -119,12 +121,16 @@ function showMaps() {
 async function readPath() {
   const map = maps[0];
   const at = $('snapshot').value;
+  const number = ++pathNumber;
+  let points = [];
   try {
-    path = (await json(`maps/${map.id}${at ? `@${at}` : ''}/trajectory.json`)).points;
+    ({ points } = await json(`maps/${map.id}${at ? `@${at}` : ''}/trajectory.json`));
   } catch (error) {
-    path = [];
     say(`The way of the sensor is not known: ${error.message}`);
   }
+  // An answer to an older question comes too late.
+  if (number !== pathNumber) return;
+  path = points;
   $('scan').max = Math.max(path.length - 1, 0);
   $('scan').value = $('scan').max;
   $('scan').disabled = path.length < 2;
@@ -284,31 +290,43 @@ function remember() {
 
 // --- Live
 
+async function change(id) {
+  const known = maps.find((map) => map.id === id);
+  const [low, high, was] = [known.low, known.high, known.generation];
+  await readMaps();
+  await readExtents().catch(() => {});
+  const map = maps.find((one) => one.id === id);
+  for (const layer of viewer.layers) {
+    layer.map = maps.find((one) => one.id === layer.map.id) ?? layer.map;
+    // A snapshot stays as it is.
+    if (layer.map.id === id && !layer.id.includes('@')) layer.refresh();
+  }
+  if (was === 0 || low === high) start();
+  else viewer.surround(allBounds());
+  if (map.pending_tiles === 0 && was > 0) {
+    $('live').hidden = false;
+    $('live').title = `flush ${map.generation}`;
+  }
+  cut();
+  paint();
+  readPath();
+}
+
 function follow() {
   const events = new EventSource('events');
-  events.addEventListener('open', () => { if ($('state').textContent === 'server gone') $('state').textContent = 'loading'; });
+  const tryChange = (id) => change(id).catch((error) => say(`The change was not loaded: ${error.message}`));
+  events.addEventListener('open', async () => {
+    if ($('state').textContent !== 'server gone') return;
+    $('state').textContent = 'loading';
+    // What changed meanwhile was not told; a server that was started again counts from the beginning.
+    for (const { id } of maps) await tryChange(id);
+    viewer.wake();
+  });
   events.addEventListener('error', () => { $('state').textContent = 'server gone'; });
-  events.addEventListener('changed', async ({ data }) => {
+  events.addEventListener('changed', ({ data }) => {
     const { map: id, generation } = JSON.parse(data);
     const known = maps.find((map) => map.id === id);
-    if (!known || known.generation >= generation) return;
-    const [low, high, was] = [known.low, known.high, known.generation];
-    await readMaps();
-    await readExtents().catch(() => {});
-    const map = maps.find((one) => one.id === id);
-    for (const layer of viewer.layers) {
-      layer.map = maps.find((one) => one.id === layer.map.id) ?? layer.map;
-      // A snapshot stays as it is.
-      if (layer.map.id === id && !layer.id.includes('@')) layer.refresh();
-    }
-    if (was === 0 || low === high) start();
-    else viewer.surround(allBounds());
-    if (map.pending_tiles === 0 && was > 0) {
-      $('live').hidden = false;
-      $('live').title = `flush ${generation}`;
-    }
-    paint();
-    readPath();
+    if (known && known.generation !== generation) tryChange(id);
   });
 }
 
@@ -334,6 +352,12 @@ for (const kind of ['occupied', 'free', 'unknown']) {
   });
 }
 $('path').addEventListener('change', showScan);
+$('bounds').addEventListener('change', () => {
+  const { min, max } = allBounds();
+  if ($('bounds').checked) viewer.overlays.box('bounds', min, max, 0x7d8594);
+  else viewer.overlays.set('bounds', null);
+  viewer.wake();
+});
 $('scan').addEventListener('input', showScan);
 $('grid').addEventListener('change', () => {
   if ($('grid').checked) viewer.overlays.tiles('grid', { ...allBounds(), min: [...allBounds().min.slice(0, 2), maps[0].low] }, maps[0].tile_size_m, 0x7d8594);
@@ -429,7 +453,7 @@ window.voxtile = {
   },
   faces: () => viewer.layers.flatMap((layer) => layer.meshes()).reduce((sum, [mesh]) => sum + mesh.userData.faces, 0),
   drawCalls: () => viewer.renderer.info.render.calls,
-  bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.tiles.lruCache.cachedBytes, 0),
+  bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.bytes, 0),
   clickAt,
   screenOf(point) {
     const at = viewer.camera.position.clone().set(...viewer.toScene(point)).project(viewer.camera);

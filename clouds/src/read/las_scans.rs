@@ -93,10 +93,9 @@ impl LasScans {
         Ok(())
     }
 
-    /// The window of a time, from 0. Times at its begin may be written a little earlier, as rounding has it.
+    /// The window of a time, from 0.
     fn window_of(&self, time_s: f64) -> u64 {
-        const ROUNDING: f64 = 1e-6;
-        if self.has_one_time { 0 } else { ((time_s - self.first_s) / self.period_s + ROUNDING) as u64 }
+        if self.has_one_time { 0 } else { window_after(time_s - self.first_s, self.period_s) }
     }
 
     /// The middle of a window, in seconds of the file.
@@ -122,6 +121,14 @@ impl LasScans {
         };
         Ok(Some(point))
     }
+}
+
+/// The window of a time after the first, from 0. One that begins a window may be written a little earlier, as rounding has
+/// it: it is taken as its begin.
+fn window_after(since_s: f64, period_s: f64) -> u64 {
+    /// Of a window.
+    const ROUNDING: f64 = 1e-6;
+    (since_s / period_s + ROUNDING) as u64
 }
 
 /// A remark on points that are left out.
@@ -177,5 +184,21 @@ impl CloudSource for LasScans {
 
     fn crs(&self) -> Option<&str> {
         self.units.crs.as_deref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_that_begins_a_window_is_in_it() {
+        // In the numbers of a file a window is not quite a tenth of a second.
+        for window in 0..10_000 {
+            let first_s = 1_000_000_000.05_f64;
+            let time_s = first_s + 0.1 * f64::from(window);
+            assert_eq!(window_after(time_s - first_s, 0.1), u64::from(window as u32));
+            assert_eq!(window_after(0.1 * (f64::from(window) + 0.999), 0.1), u64::from(window as u32));
+        }
     }
 }

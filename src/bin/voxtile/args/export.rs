@@ -1,0 +1,104 @@
+use bytesize::ByteSize;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub struct ExportArgs {
+    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
+    pub map: PathBuf,
+    /// File to write; its extension says what: .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet .mcap hold
+    /// voxels, .glb their surface, .pgm a flat map of nav2, .png heights, .bt .ot the whole octree. - is standard output
+    #[arg(short = 'o', long = "output", value_name = "FILE")]
+    pub output: PathBuf,
+    /// What to write, whatever the extension
+    #[arg(long, value_name = "FORMAT")]
+    pub format: Option<ExportFormatName>,
+    /// Voxels of at least this probability; 0 takes all observed ones [default: the map's occupancy threshold]
+    #[arg(long, value_name = "P")]
+    pub min_probability: Option<f64>,
+    /// Which voxels [default: occupied; all for .pgm]
+    #[arg(long, value_name = "WHICH", conflicts_with = "min_probability")]
+    pub what: Option<WhatName>,
+    /// .pgm, .png: only voxels whose center is at least this high, in metres
+    #[arg(long, value_name = "M")]
+    pub z_min: Option<f64>,
+    /// .pgm, .png: only voxels whose center is at most this high, in metres
+    #[arg(long, value_name = "M")]
+    pub z_max: Option<f64>,
+    /// autoware: edge of the square of a file, in whole metres [default: 20]
+    #[arg(long, value_name = "M")]
+    pub cell: Option<f64>,
+    /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
+    pub region: Option<Vec<f64>>,
+    /// Coordinates in the file are those of the map less this, in metres: the nearest corner of a voxel, said in the
+    /// summary and in FILE.origin.json. A map far from its origin needs it as .bt or .ot; a .pcd chooses one where
+    /// float32 is too coarse [default: 0 0 0]
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3)]
+    pub origin: Option<Vec<f64>>,
+    /// Memory for putting a .bt or .ot file together, beside that of one tile (64MiB, 1GiB)
+    #[arg(long, value_name = "SIZE", default_value = "64MiB")]
+    pub memory: ByteSize,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormatName {
+    /// Points with doubles, probability, log-odds and count
+    Ply,
+    /// Points with float32, as PCL reads them
+    Pcd,
+    /// Text
+    Csv,
+    /// OctoMap's free and occupied voxels
+    Bt,
+    /// OctoMap's log-odds
+    Ot,
+    /// Text: x y z probability
+    Xyz,
+    /// NumPy arrays: xyz, log_odds, probability, count
+    Npz,
+    /// LAS 1.4 with log-odds and count as extra bytes
+    Las,
+    /// The same, compressed
+    Laz,
+    /// The same with levels of detail
+    Copc,
+    /// ASTM E57
+    E57,
+    /// Apache Parquet, where it was built in
+    Parquet,
+    /// A recording with PointCloud2, as Foxglove opens it
+    Mcap,
+    /// The surface of occupied voxels as binary glTF, Y-up
+    Glb,
+    /// A flat map of nav2: .pgm and .yaml
+    Nav2,
+    /// Heights as a 16-bit PNG with a world file
+    Heightmap,
+    /// A folder of PCD squares with the metadata of Autoware
+    Autoware,
+    /// A folder of 3D Tiles: the surface at every level of detail, as Cesium and others open it
+    #[value(name = "3dtiles")]
+    ThreeDTiles,
+}
+
+impl ExportFormatName {
+    /// The name of the format.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum WhatName {
+    /// From the map's threshold on
+    Occupied,
+    /// Observed and below it
+    Free,
+    /// All that were observed
+    All,
+}
