@@ -60,6 +60,9 @@
 //! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and `render`. The library needs none of
 //!   it, and no feature changes a result.
 
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod command;
 mod config;
 mod error;
 pub mod integrity;

@@ -1,0 +1,317 @@
+use crate::command::args::BuildArgs;
+use crate::command::build_config::{config_to_create, config_to_go_on};
+use crate::command::failure::JsonTo;
+use crate::command::flush_schedule::FlushSchedule;
+use crate::command::intake::{Intake, Next};
+use crate::command::map_at::whole_map;
+use crate::command::progress::Progress;
+use crate::command::read_options::read_options;
+use crate::command::scan_reader::ScanReader;
+use crate::command::stop_signal;
+use crate::command::summary::Summary;
+use crate::command::{INTERRUPTED, say};
+use crate::io::{PointRoom, ReadOptions, StoredScan};
+use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
+use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer};
+use crate::store::InputRecord;
+use crate::{Error, MapConfig, MemoryLimit};
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// The share of the limit of memory that the points of a scan may take, as they are read and as they are mapped.
+const PARTS_OF_MEMORY: usize = 32;
+
+pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
+    let started = Instant::now();
+    let stop = stop_signal::catch()?;
+    let exists = exists(args)?;
+    let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
+    let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room(args, &config), stop.clone())?;
+    let Some((reader, input)) = opened else { return Ok(stopped_early(args)) };
+    let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
+    let mut mapper = match exists {
+        true => Some(OutOfCoreTileMapper::open(&args.output, config.clone())?),
+        false => None,
+    };
+    if !intake.read_lead()? {
+        return Ok(stopped_early(args));
+    }
+    let crs = intake.crs();
+    let mapper = match &mut mapper {
+        Some(mapper) => {
+            check_crs(args, crs.as_ref(), config.crs.as_ref())?;
+            mapper
+        }
+        none => {
+            // A first scan that cannot be mapped should not leave an empty map behind.
+            intake.check_first()?;
+            check(intake.first(), &config)?;
+            let mut config = config;
+            config.crs = crs;
+            none.insert(OutOfCoreTileMapper::create(whole_map(&args.output)?, config)?)
+        }
+    };
+    mapper.stop_with(stop.clone());
+    let Some(resumed_after) = begin(args, mapper, &mut intake, &input.name)? else {
+        return Ok(stopped_early(args));
+    };
+
+    let progress = Progress::over_scans(input.scans);
+    progress.pass(intake.content().scans);
+    let mut build = Build {
+        mapper,
+        intake,
+        schedule: FlushSchedule::new(args.flush_every),
+        progress,
+        report: ScanReport::default(),
+        scans: 0,
+        has_rays: !args.no_rays,
+    };
+    let outcome = build.insert_all();
+    build.progress.say("flushing");
+    // What was accepted is kept, whatever ended the build.
+    let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
+    let Build { report, scans, mut intake, progress, .. } = build;
+    drop(progress);
+    intake.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", args.scans.display()));
+    match (outcome, flushed) {
+        (Err(error), Ok(())) => {
+            return Err(error.context(format!("after {scans} scans, which are in the map")));
+        }
+        (Err(error), Err(flush_error)) => return Err(error.context(format!("{flush_error:#}; before that"))),
+        (Ok(()), flushed) => flushed?,
+    }
+    warn_if_all_is_cut(&report, mapper.config());
+    let interrupted = stop.is_set();
+    let summary = Summary::of(&args.output, scans, report, mapper, started.elapsed())?;
+    let (poses, unread) = (Some(input.poses.to_string()), intake.unread);
+    Summary { interrupted, resumed_after, poses, unread, ..summary }.print(args.json)?;
+    if interrupted {
+        let all = resumed_after + scans;
+        say(format_args!("stopped after {all} scans; all of them are in the map; --resume goes on"));
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+struct Build<'a> {
+    mapper: &'a mut OutOfCoreTileMapper,
+    intake: Intake,
+    schedule: FlushSchedule,
+    progress: Progress,
+    report: ScanReport,
+    scans: u64,
+    has_rays: bool,
+}
+
+impl Build<'_> {
+    fn insert_all(&mut self) -> anyhow::Result<()> {
+        loop {
+            let (mapper, schedule) = (&mut *self.mapper, &mut self.schedule);
+            // An input that is quiet does not keep what came from being made durable.
+            let scan =
+                match self.intake.next(&mut || flush_if(schedule.is_due_waiting(), mapper, schedule))? {
+                    Next::Scan(scan) => scan,
+                    Next::Stopped => return Ok(()),
+                    Next::End => {
+                        // The last scans may have been skipped.
+                        mapper.note_input_content(self.intake.content());
+                        return Ok(());
+                    }
+                };
+            let inserted =
+                if self.has_rays { mapper.insert_points(&scan) } else { insert_hits(mapper, &scan) };
+            match inserted {
+                Ok(report) => self.report += report,
+                Err(Error::Stopped) => return Ok(()),
+                Err(error) => return Err(error.into()),
+            }
+            mapper.note_input_content(self.intake.content());
+            self.scans += 1;
+            self.progress.step();
+            self.progress.show(mapper);
+            flush_if(schedule.is_due(), mapper, schedule)?;
+        }
+    }
+}
+
+/// How the input is read; without rays no poses are needed.
+fn options_of(args: &BuildArgs) -> crate::Result<ReadOptions> {
+    let mut options = read_options(&args.read)?;
+    options.clouds.has_no_returns = args.clear_no_return.is_some();
+    if args.no_rays && options.poses.is_none() {
+        options.clouds.may_lack_poses = true;
+        options.clouds.are_poses_needed = false;
+    }
+    Ok(options)
+}
+
+/// Takes the points of a scan as hits alone, as one batch.
+fn insert_hits(mapper: &mut OutOfCoreTileMapper, scan: &StoredScan) -> crate::Result<ScanReport> {
+    let (mut points, mut intensities) = (Vec::new(), Vec::new());
+    scan.for_each_chunk(0..scan.len(), &mut |chunk, of_chunk| {
+        points.extend_from_slice(chunk);
+        intensities.extend_from_slice(of_chunk.unwrap_or_default());
+        true
+    })?;
+    let intensities = scan.has_intensities().then_some(&*intensities);
+    let is_occupied = vec![true; points.len()];
+    mapper.batch_update(&PointBatch { points: &points, intensities, is_occupied: &is_occupied })
+}
+
+fn flush_if(
+    is_due: bool,
+    mapper: &mut OutOfCoreTileMapper,
+    schedule: &mut FlushSchedule,
+) -> crate::Result<()> {
+    if is_due {
+        mapper.flush()?;
+        schedule.flushed();
+    }
+    Ok(())
+}
+
+/// After a flush that failed: what a user can rely on.
+fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
+    let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
+    anyhow::Error::new(error).context(format!(
+        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command with --resume goes on from there",
+        folder.display()
+    ))
+}
+
+/// It was asked to stop while nothing had been mapped.
+fn stopped_early(args: &BuildArgs) -> ExitCode {
+    let message = "stopped before the first scan; the map is as it was";
+    JsonTo::output_if(args.json).tell_stopped(message);
+    ExitCode::from(INTERRUPTED)
+}
+
+/// Whether there is a map to go on with.
+fn exists(args: &BuildArgs) -> anyhow::Result<bool> {
+    if args.output.is_file() {
+        let reason = "is a file; a map is a folder, name another -o";
+        return Err(Error::argument(args.output.display().to_string(), reason).into());
+    }
+    let exists = match MapReader::open(&args.output, 1) {
+        Err(Error::NoMap { .. }) => false,
+        // Damage is told by the mapper, which opens the map next.
+        _ => true,
+    };
+    if exists && !args.append && !args.resume {
+        let hint = "use --resume to go on with these scans, --append to add them to it, or another -o";
+        return Err(Error::AlreadyExists { path: args.output.clone(), hint }.into());
+    }
+    if !exists && args.append && !args.resume {
+        return Err(Error::NoMap { path: args.output.clone() }.into());
+    }
+    Ok(exists)
+}
+
+/// Goes on with an input of which the map has scans, or begins with one that it does not know; returns how many of its
+/// scans the map has, `None` if it was asked to stop.
+fn begin(
+    args: &BuildArgs,
+    mapper: &mut OutOfCoreTileMapper,
+    intake: &mut Intake,
+    name: &str,
+) -> anyhow::Result<Option<u64>> {
+    let inputs = mapper.inputs();
+    // Of inputs that begin with many scans without points nothing tells one from another but what comes later.
+    let is_this = |input: &InputRecord| {
+        input.content.as_ref().is_some_and(|content| content.begins_with.as_deref() == intake.begins_with())
+    };
+    if let Some(at) = inputs.iter().rposition(is_this).filter(|_| !args.again) {
+        let content = inputs[at].content.clone().unwrap_or_default();
+        if args.resume {
+            if !intake.pass_over(&content)? {
+                return Ok(None);
+            }
+            mapper.check_rays()?;
+            if at + 1 < inputs.len() {
+                // Other inputs came between.
+                mapper.begin_input(inputs[at].clone())?;
+            }
+            return Ok(Some(content.scans - content.skipped.len() as u64));
+        }
+        if content.scans > 0 {
+            return Err(taken_before(args, &inputs[at].name, content.scans));
+        }
+    }
+    if let Some(last) = inputs.last().filter(|last| last.content.is_none() && !args.again) {
+        // Of an earlier version: one name for all of it.
+        let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
+        if fingerprint.is_ok_and(|fingerprint| fingerprint == last.name) {
+            let done = mapper.scan_number().saturating_sub(last.first_scan);
+            if !args.resume {
+                return Err(taken_before(args, name, done));
+            }
+            mapper.check_rays()?;
+            return Ok(intake.pass(done)?.then_some(done));
+        }
+    }
+    if args.resume && !args.append && mapper.scan_number() > 0 {
+        let found = inputs.last().map_or("that it does not know".to_owned(), |last| last.name.clone());
+        let (path, what, wanted) = (args.output.clone(), "been built from input", name.to_owned());
+        return Err(Error::Mismatch { path, what, found, wanted }.into());
+    }
+    mapper.begin_input(InputRecord { content: Some(intake.content()), ..InputRecord::from(name) })?;
+    Ok(Some(0))
+}
+
+/// Points of another coordinate reference system are elsewhere.
+fn check_crs(args: &BuildArgs, found: Option<&String>, own: Option<&String>) -> crate::Result<()> {
+    match (found, own) {
+        (Some(found), Some(own)) if found != own => {
+            let reason = format!(
+                "its coordinates are in {found:.80}, those of the map in {own:.80}; convert them first, for instance with pdal"
+            );
+            Err(Error::argument(args.scans.display().to_string(), reason))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
+    let reason = format!(
+        "the map has {scans} scans of an input that begins as this one does ({name}); --resume takes what came since, and \
+         --append --again adds all of them once more"
+    );
+    Error::argument(args.scans.display().to_string(), reason).into()
+}
+
+/// Points of a scan that the limit of memory has no room for lie in the map's folder or, where that is still to be
+/// made, beside it: not where the system may keep files in memory.
+fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
+    let folder = match args.output.parent() {
+        _ if args.output.is_dir() => &*args.output,
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    match config.memory {
+        MemoryLimit::Bytes(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY, folder),
+        _ => PointRoom::default(),
+    }
+}
+
+fn check(scan: Option<&StoredScan>, config: &MapConfig) -> crate::Result<()> {
+    let Some(scan) = scan else { return Ok(()) };
+    ScanTracer::check(&config.grid, &config.sensor_model, scan)
+}
+
+/// Free space alone is rarely what was wanted.
+fn warn_if_all_is_cut(report: &ScanReport, config: &MapConfig) {
+    let ScanReport { points, skipped, cut_at_max_range, .. } = *report;
+    let skipped: u64 = skipped.by_cause().into_iter().map(|(_, count)| count).sum();
+    if let Some(range_m) = config.rays.max_range_m
+        && cut_at_max_range > 0
+        && cut_at_max_range + skipped == points
+    {
+        log::warn!(
+            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise --max-range; are the points \
+             in metres? Points that are in the world frame already, far from 0 0 0, need --world-frame with poses, \
+             --sensor-origin or --no-rays"
+        );
+    }
+}

@@ -1,0 +1,47 @@
+use crate::command::args::ClearArgs;
+use crate::command::json;
+use crate::command::map_at::whole_map;
+use crate::command::memory;
+use crate::command::part::part_of;
+use crate::command::progress::Progress;
+use crate::operations::{Cleared, clear};
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
+    map: &'a Path,
+    #[serde(flatten)]
+    cleared: Cleared,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let cleared = clear(whole_map(&args.map)?, &part_of(&args.part)?, |done, all| progress.set(done, all))?;
+    drop(progress);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let summary = Summary { map: &args.map, cleared, peak_rss_bytes: memory::peak_bytes() };
+        json::print(&summary, &mut out)?;
+    } else {
+        let Cleared { voxels_cleared, tiles_changed, tiles_removed, tiles, .. } = cleared;
+        writeln!(
+            out,
+            "cleared   {} voxels in {} tiles",
+            HumanCount(voxels_cleared),
+            HumanCount(tiles_changed + tiles_removed)
+        )?;
+        writeln!(
+            out,
+            "tiles     {}; {} are empty now and gone",
+            HumanCount(tiles),
+            HumanCount(tiles_removed)
+        )?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

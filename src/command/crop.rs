@@ -1,0 +1,36 @@
+use crate::command::args::CropArgs;
+use crate::command::json;
+use crate::command::map_at::{read_map, whole_map};
+use crate::command::memory;
+use crate::command::part::part_of;
+use crate::command::progress::Progress;
+use crate::command::written::print_written;
+use crate::operations::{WrittenMap, crop};
+use serde::Serialize;
+use std::path::Path;
+use std::process::ExitCode;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
+    map: &'a Path,
+    #[serde(flatten)]
+    written: WrittenMap,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let (part, output) = (part_of(&args.part)?, whole_map(&args.output)?);
+    let written =
+        read_map(&args.map, |map| Ok(crop(map, &part, output, |done, all| progress.set(done, all))?))?;
+    drop(progress);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let summary = Summary { map: &args.output, written, peak_rss_bytes: memory::peak_bytes() };
+        json::print(&summary, &mut out)?;
+    } else {
+        print_written(&args.output, &written, &mut out)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,24 @@
+use crate::MapQueries;
+use crate::command::args::DigestArgs;
+use crate::command::json;
+use crate::command::map_at::read_any_map;
+use crate::command::memory;
+use crate::mapper::MapView;
+use std::io::Write;
+use std::process::ExitCode;
+
+pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {
+    let (digest, scan_number) =
+        read_any_map(&args.map, |reader| Ok((reader.digest()?, reader.scan_number())))?;
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let digest = digest.to_string();
+        let peak = memory::peak_bytes();
+        let answer =
+            serde_json::json!({ "digest": digest, "scan_number": scan_number, "peak_rss_bytes": peak });
+        json::print(&answer, &mut out)?;
+    } else {
+        writeln!(out, "{digest}")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,201 @@
+use crate::Error;
+use crate::command::scan_reader::{Read, ReadScan, ScanReader};
+use crate::io::{ScanChain, StoredScan};
+use crate::store::InputContent;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+/// Scans among which the first with points is looked for: it tells which input this is.
+const LEAD: usize = 16;
+/// Most scans of an input that may be skipped: a map keeps the number of each.
+const MOST_SKIPPED: usize = 1000;
+
+/// The scans of an input in order, and what the map is to remember of those that it has taken.
+pub struct Intake {
+    reader: ScanReader,
+    scans: PathBuf,
+    /// What was read to tell which input this is, and not taken yet.
+    lead: VecDeque<Read>,
+    chain: ScanChain,
+    begins_with: Option<String>,
+    skipped: Vec<u64>,
+    skips_bad: bool,
+    /// Why scans were skipped by this process.
+    pub unread: Vec<String>,
+}
+
+/// What came of asking for a scan to map.
+pub enum Next {
+    Scan(StoredScan),
+    End,
+    Stopped,
+}
+
+impl Intake {
+    pub fn new(reader: ScanReader, scans: PathBuf, skips_bad: bool) -> Self {
+        let (lead, chain) = (VecDeque::new(), ScanChain::default());
+        Self { reader, scans, lead, chain, begins_with: None, skipped: vec![], skips_bad, unread: vec![] }
+    }
+
+    /// Reads what tells which input this is; `false` if it was asked to stop before that had come.
+    pub fn read_lead(&mut self) -> anyhow::Result<bool> {
+        while self.lead.len() < LEAD && self.begins_with.is_none() {
+            match self.reader.next(&mut || Ok(()))? {
+                Read::Stopped => return Ok(false),
+                Read::End => break,
+                read => {
+                    if let Read::Scan(ReadScan { mark, .. }) = &read
+                        && mark.has_points()
+                    {
+                        self.begins_with = Some(mark.scan_text());
+                    }
+                    self.lead.push_back(read);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// The first scan of what has been read, if there is any.
+    pub fn first(&self) -> Option<&StoredScan> {
+        self.lead.iter().find_map(|read| match read {
+            Read::Scan(ReadScan { scan, .. }) => Some(scan),
+            _ => None,
+        })
+    }
+
+    /// The error of a first scan that cannot be read, where it is not to be skipped.
+    pub fn check_first(&mut self) -> anyhow::Result<()> {
+        match self.lead.pop_front() {
+            Some(Read::Unread(error)) if !self.skips_bad => Err(error.into()),
+            first => {
+                first.into_iter().for_each(|first| self.lead.push_front(first));
+                Ok(())
+            }
+        }
+    }
+
+    /// What the first scan with points is.
+    pub fn begins_with(&self) -> Option<&str> {
+        self.begins_with.as_deref()
+    }
+
+    /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
+    pub fn fingerprint(&mut self) -> anyhow::Result<Option<crate::Result<String>>> {
+        self.reader.fingerprint()
+    }
+
+    /// What a person should know of the input so far.
+    pub fn remarks(&mut self) -> Vec<String> {
+        self.reader.remarks().unwrap_or_default()
+    }
+
+    /// The coordinate reference system that the input names.
+    pub fn crs(&mut self) -> Option<String> {
+        self.reader.crs().unwrap_or_default()
+    }
+
+    /// What has been taken so far.
+    pub fn content(&self) -> InputContent {
+        InputContent {
+            scans: self.chain.scans(),
+            begins_with: self.begins_with.clone(),
+            scan_chain: self.chain.scan_text(),
+            pose_chain: self.chain.pose_text(),
+            skipped: self.skipped.clone(),
+        }
+    }
+
+    /// Passes over scans that a map has taken, which must be the same; `false` if it was asked to stop before the end.
+    ///
+    /// # Errors
+    ///
+    /// Fewer scans, other scans, other poses, a scan that cannot be read any more.
+    pub fn pass_over(&mut self, content: &InputContent) -> anyhow::Result<bool> {
+        self.skipped.clone_from(&content.skipped);
+        if !self.pass(content.scans)? {
+            return Ok(false);
+        }
+        let differs = match (
+            self.chain.scan_text() == content.scan_chain,
+            self.chain.pose_text() == content.pose_chain,
+        ) {
+            (true, true) => return Ok(true),
+            (true, false) => "the same scans have other poses than",
+            (false, _) => "they are not",
+        };
+        Err(self.wrong(format!(
+            "of its first {} scans, the map has taken all, but {differs} those that it took: what changed cannot be taken \
+             back; build another map, or add all of them once more with --append --again",
+            content.scans
+        )))
+    }
+
+    /// The same where the map does not know more than their number.
+    pub fn pass(&mut self, scans: u64) -> anyhow::Result<bool> {
+        while self.chain.scans() < scans {
+            let number = self.chain.scans();
+            let was_skipped = self.skipped.binary_search(&number).is_ok();
+            match self.read(&mut || Ok(()))? {
+                Read::Stopped => return Ok(false),
+                Read::End => {
+                    let reason = format!("has {number} scans, and the map has taken {scans} from it");
+                    return Err(self.wrong(reason));
+                }
+                Read::Scan(_) if was_skipped => {
+                    log::warn!("{}: scan {number} was skipped, and stays so", self.scans.display());
+                    self.chain.add_unread();
+                }
+                Read::Unread(_) if was_skipped => self.chain.add_unread(),
+                Read::Scan(ReadScan { mark, .. }) => self.chain.add(&mark),
+                Read::Unread(error) => {
+                    let context = format!("scan {number}, which the map has taken, cannot be read any more");
+                    return Err(anyhow::Error::new(error).context(context));
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// The next scan, which counts as taken from now on. While it does not come, `idle` is called ten times a second.
+    pub fn next(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Next> {
+        loop {
+            match self.read(idle)? {
+                Read::Stopped => return Ok(Next::Stopped),
+                Read::End => return Ok(Next::End),
+                Read::Scan(ReadScan { scan, mark }) => {
+                    self.chain.add(&mark);
+                    return Ok(Next::Scan(scan));
+                }
+                Read::Unread(error) => self.skip(error)?,
+            }
+        }
+    }
+
+    fn skip(&mut self, error: Error) -> anyhow::Result<()> {
+        if !self.skips_bad {
+            return Err(error.into());
+        }
+        if self.skipped.len() == MOST_SKIPPED {
+            let context = format!("more than {MOST_SKIPPED} scans of one input cannot be read");
+            return Err(anyhow::Error::new(error).context(context));
+        }
+        let number = self.chain.scans();
+        log::warn!("scan {number} is skipped: {error:#}");
+        self.unread.push(format!("scan {number}: {error:#}"));
+        self.skipped.push(number);
+        self.chain.add_unread();
+        Ok(())
+    }
+
+    fn read(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Read> {
+        match self.lead.pop_front() {
+            Some(read) => Ok(read),
+            None => self.reader.next(idle),
+        }
+    }
+
+    fn wrong(&self, reason: String) -> anyhow::Error {
+        Error::argument(self.scans.display().to_string(), reason).into()
+    }
+}

@@ -1,0 +1,62 @@
+use crate::command::args::MergeArgs;
+use crate::command::json;
+use crate::command::map_at::{read_all_maps, whole_map};
+use crate::command::memory;
+use crate::command::progress::Progress;
+use crate::command::written::print_written;
+use crate::operations::{Merged, merge};
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
+    map: &'a Path,
+    #[serde(flatten)]
+    merged: Merged,
+    warnings: Vec<String>,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let prefer = args.prefer.map(Into::into);
+    let merged = read_all_maps(&args.maps, |maps| {
+        Ok(merge(maps, whole_map(&args.output)?, prefer, |done, all| progress.set(done, all))?)
+    })?;
+    drop(progress);
+    let warnings = warnings_of(&args.maps, &merged);
+    for warning in &warnings {
+        log::warn!("{warning}");
+    }
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let peak_rss_bytes = memory::peak_bytes();
+        let summary = Summary { map: &args.output, merged, warnings, peak_rss_bytes };
+        json::print(&summary, &mut out)?;
+    } else {
+        print_written(&args.output, &merged.written, &mut out)?;
+        writeln!(
+            out,
+            "merged    {} maps, {} voxels in two or more",
+            args.maps.len(),
+            HumanCount(merged.common_voxels)
+        )?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn warnings_of(maps: &[PathBuf], merged: &Merged) -> Vec<String> {
+    let related = merged.related.iter().filter(|_| merged.is_added);
+    let warning = |&(earlier, later): &(usize, usize)| {
+        format!(
+            "{} and {} go back to the same map: evidence that both have counts twice; --prefer takes it once",
+            maps[earlier].display(),
+            maps[later].display()
+        )
+    };
+    related.map(warning).collect()
+}

@@ -1,0 +1,63 @@
+//! The command `voxtile`: parse, run one command, exit code.
+//!
+//! One file a subcommand. It is part of the library so that other programs can carry the command (the Python package
+//! does); it uses the library as anybody else would, by its public items.
+
+mod args;
+mod build;
+mod build_config;
+mod clear;
+mod completions;
+mod convert;
+mod crop;
+mod decay;
+mod demo;
+mod diff;
+mod digest;
+mod export;
+mod export_3d_tiles;
+mod export_origin;
+mod export_voxels;
+mod failure;
+mod flush_schedule;
+mod import;
+mod info;
+mod intake;
+mod json;
+mod local;
+mod local_table;
+mod man;
+mod map_at;
+mod memory;
+mod merge;
+mod octree_choice;
+mod octree_file;
+mod one_heap;
+mod output_file;
+mod part;
+mod picture;
+mod progress;
+mod query;
+mod raycast;
+mod read_options;
+mod repair;
+mod report;
+mod revert;
+mod run;
+mod scan_input;
+mod scan_reader;
+mod scans;
+mod share;
+mod snapshot;
+mod snapshots;
+mod stop_signal;
+mod summary;
+mod terminal;
+mod threads;
+mod verify;
+#[cfg(feature = "view")]
+mod view;
+mod written;
+
+use run::{INTERRUPTED, say};
+pub use run::{main, run};

@@ -1,0 +1,65 @@
+use crate::command::args::RepairArgs;
+use crate::command::json;
+use crate::command::map_at::whole_map;
+use crate::command::progress::Progress;
+use crate::integrity::{Action, Repair, repair};
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// More actions than a person reads; the rest are counted.
+const MAX_ACTIONS: usize = 10_000;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
+    map: &'a std::path::Path,
+    #[serde(flatten)]
+    repair: Repair,
+    done: Vec<Action>,
+}
+
+pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let mut done = Vec::new();
+    let repair = repair(
+        whole_map(&args.map)?,
+        |action| {
+            if !args.json {
+                progress.print(&action.to_string());
+            } else if done.len() < MAX_ACTIONS {
+                done.push(action.clone());
+            }
+        },
+        |tiles, all| progress.set(tiles, all),
+    )?;
+    drop(progress);
+    let is_complete = repair.is_complete();
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        json::print(&Report { map: &args.map, repair, done }, &mut out)?;
+    } else if repair.actions == 0 {
+        writeln!(out, "nothing to repair in {} tiles", HumanCount(repair.tiles))?;
+    } else {
+        let (tiles, lost) = (HumanCount(repair.tiles), HumanCount(repair.tiles_lost));
+        writeln!(
+            out,
+            "repaired: the map has {tiles} tiles; {lost} could not stay, their space is unknown again"
+        )?;
+        if repair.snapshots_lost + repair.snapshot_tiles_lost > 0 {
+            let (snapshots, tiles) =
+                (HumanCount(repair.snapshots_lost), HumanCount(repair.snapshot_tiles_lost));
+            writeln!(out, "snapshots: {snapshots} could not stay; others lost {tiles} tiles")?;
+        }
+        if repair.left > 0 {
+            let left = HumanCount(repair.left);
+            writeln!(
+                out,
+                "still damaged: {left} tiles, because the disk refuses; copy the map to another one"
+            )?;
+        }
+    }
+    // A script must not take a map with holes for a whole one.
+    Ok(if is_complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

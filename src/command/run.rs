@@ -1,0 +1,101 @@
+//! From a command line to an exit code.
+
+use super::args::{Cli, Command};
+use super::failure::JsonTo;
+#[cfg(feature = "view")]
+use super::view;
+use super::{
+    build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
+    merge, one_heap, picture, progress, query, raycast, repair, report, revert, scans, share, snapshot,
+    snapshots, threads, verify,
+};
+use clap::Parser;
+use std::ffi::OsString;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// The command with the arguments of this process.
+pub fn main() -> ExitCode {
+    run(std::env::args_os())
+}
+
+/// The command with `arguments`, the program's name first. It ends the process where they make no sense or ask for
+/// help, and it expects a process of its own: it sets up logging, threads and signals.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = Cli::parse_from(arguments);
+    // The command line before the environment, where it says something.
+    let mut log = env_logger::Builder::new();
+    log.filter_level(cli.log_level()).format_timestamp(None);
+    if !cli.quiet && cli.verbose == 0 {
+        log.parse_default_env();
+    }
+    log.init();
+    let Cli { command, threads, quiet, .. } = cli;
+    let json_to = JsonTo::of(&command);
+    if quiet {
+        progress::hide_all();
+    }
+    if let Command::Build(args) = &command
+        && args.cache_tiles.is_none()
+    {
+        // Before there is a second thread, and before anything is read from standard input.
+        one_heap::begin_with_one_heap();
+    }
+    if is_parallel(&command)
+        && let Err(error) = threads::start(threads)
+    {
+        return json_to.tell(&error);
+    }
+    let outcome = match command {
+        Command::Build(args) => build::run(&args),
+        Command::Scans(args) => scans::run(&args),
+        Command::Import(args) => import::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Query(args) => query::run(&args),
+        Command::Raycast(args) => raycast::run(&args),
+        Command::Export(args) => export::run(&args, quiet),
+        Command::Picture(args) => picture::run(&args, quiet),
+        Command::Report(args) => report::run(&args, quiet),
+        Command::Digest(args) => digest::run(&args),
+        Command::Snapshot(args) => snapshot::run(&args),
+        Command::Snapshots(args) => snapshots::run(&args),
+        Command::Diff(args) => diff::run(&args),
+        Command::Revert(args) => revert::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Crop(args) => crop::run(&args),
+        Command::Clear(args) => clear::run(&args),
+        Command::Decay(args) => decay::run(&args),
+        Command::Convert(args) => convert::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Repair(args) => repair::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
+        Command::Local(args) => local::run(&args),
+        Command::Share(args) => share::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
+    };
+    outcome.unwrap_or_else(|error| json_to.tell(&error))
+}
+
+/// Whether a command works on several threads.
+fn is_parallel(command: &Command) -> bool {
+    match command {
+        Command::Build(_)
+        | Command::Local(_)
+        | Command::Demo(_)
+        | Command::Picture(_)
+        | Command::Report(_) => true,
+        Command::Info(args) => info::may_draw(args),
+        _ => false,
+    }
+}
+
+/// One line for a person. Where standard error refuses it there is nobody to tell.
+pub fn say(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr().lock(), "voxtile: {line}");
+}
+
+/// Ended by Ctrl-C or SIGTERM, after everything so far was flushed.
+pub const INTERRUPTED: u8 = 130;

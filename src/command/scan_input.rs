@@ -1,0 +1,41 @@
+use crate::io::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
+use crate::{Error, Result};
+use std::io::{BufReader, stdin};
+use std::path::Path;
+
+/// Most letters of an input's name that a map keeps.
+const MOST_LETTERS: usize = 200;
+
+/// Whether scans are to come from standard input.
+pub fn is_standard_input(scans: &Path) -> bool {
+    scans == Path::new("-")
+}
+
+/// Opens scans, which are a scan stream if they come from standard input.
+pub fn open(scans: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    if !is_standard_input(scans) {
+        return open_any_scans(scans, options);
+    }
+    if options.poses.is_some() {
+        return Err(Error::argument("--poses", "a scan stream has its own poses; leave the option out"));
+    }
+    let input = BufReader::with_capacity(1 << 18, stdin());
+    let stream = read_scan_stream(input, Path::new("standard input"), false)?;
+    Ok(options.selection.clone().of(Box::new(stream)))
+}
+
+/// What a map calls an input, for people: the last part of its path (the last two, where that is `scans`), or the label
+/// of a stream.
+pub fn name_of(scans: &Path, source: &dyn ScanSource) -> String {
+    if is_standard_input(scans) {
+        return source.fingerprint().unwrap_or_else(|_| "standard input".to_owned());
+    }
+    let path = scans.canonicalize().unwrap_or_else(|_| scans.to_owned());
+    let part = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let last = part(&path).unwrap_or_else(|| scans.display().to_string());
+    let name = match path.parent().and_then(part) {
+        Some(parent) if last == "scans" => format!("{parent}/{last}"),
+        _ => last,
+    };
+    name.chars().take(MOST_LETTERS).collect()
+}

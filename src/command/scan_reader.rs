@@ -1,0 +1,190 @@
+use crate::Error;
+use crate::command::scan_input;
+use crate::io::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
+use crate::scan::Stop;
+use anyhow::bail;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::Duration;
+
+/// How long an input may keep us waiting before we look up.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Reads an input on a thread of its own, scan by scan and only when asked to: whoever asks can stop waiting, whatever
+/// the input does, and no scan lies about that was not asked for. Where the system gives no thread, it reads here.
+pub struct ScanReader {
+    place: Place,
+    stop: Stop,
+}
+
+/// What is known of an input once it is open.
+pub struct Opened {
+    pub name: String,
+    pub scans: Option<usize>,
+    pub poses: PoseSource,
+}
+
+/// A scan, and what tells it from others.
+pub struct ReadScan {
+    pub scan: StoredScan,
+    pub mark: ScanMark,
+}
+
+/// What came of asking for a scan.
+pub enum Read {
+    Scan(ReadScan),
+    /// One that cannot be read; the next call gives the one behind it.
+    Unread(Error),
+    End,
+    /// It was asked to stop before there was a scan.
+    Stopped,
+}
+
+enum Place {
+    Thread { requests: Sender<Request>, answers: Receiver<Answer> },
+    Here(Box<dyn ScanSource + Send>, PointRoom),
+}
+
+enum Request {
+    Scan,
+    Fingerprint,
+    Remarks,
+    Crs,
+}
+
+enum Answer {
+    Opened(crate::Result<Opened>),
+    Read(crate::Result<Read>),
+    Fingerprint(crate::Result<String>),
+    Remarks(Vec<String>),
+    Crs(Option<String>),
+}
+
+impl ScanReader {
+    /// Opens an input; `None` if it was asked to stop before that had come to an end.
+    pub fn open(
+        scans: PathBuf,
+        options: ReadOptions,
+        room: PointRoom,
+        stop: Stop,
+    ) -> anyhow::Result<Option<(Self, Opened)>> {
+        let (requests, requests_in) = channel();
+        let (answers_out, answers) = channel();
+        let (path, own_options, here) = (scans.clone(), options.clone(), room.clone());
+        let read = move || {
+            let mut source = match scan_input::open(&path, &own_options) {
+                Ok(source) => source,
+                Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
+            };
+            let opened = Opened::of(&path, &*source);
+            let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
+            while is_wanted && let Ok(request) = requests_in.recv() {
+                is_wanted = answers_out.send(answer(&mut *source, &request, &room)).is_ok();
+            }
+        };
+        match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
+            Ok(_) => {
+                let mut reader = Self { place: Place::Thread { requests, answers }, stop };
+                match reader.wait(&mut || Ok(()))? {
+                    Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
+                    _ => Ok(None),
+                }
+            }
+            Err(error) => {
+                log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
+                let source = scan_input::open(&scans, &options)?;
+                let opened = Opened::of(&scans, &*source);
+                Ok(Some((Self { place: Place::Here(source, here), stop }, opened)))
+            }
+        }
+    }
+
+    /// The next scan. While it does not come, `idle` is called ten times a second.
+    pub fn next(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Read> {
+        match self.ask(Request::Scan, idle)? {
+            Some(Answer::Read(read)) => Ok(read?),
+            _ => Ok(Read::Stopped),
+        }
+    }
+
+    /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
+    pub fn fingerprint(&mut self) -> anyhow::Result<Option<crate::Result<String>>> {
+        match self.ask(Request::Fingerprint, &mut || Ok(()))? {
+            Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
+            _ => Ok(None),
+        }
+    }
+
+    /// What a person should know of the input so far.
+    pub fn remarks(&mut self) -> anyhow::Result<Vec<String>> {
+        match self.ask(Request::Remarks, &mut || Ok(()))? {
+            Some(Answer::Remarks(remarks)) => Ok(remarks),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// The coordinate reference system that the input names so far.
+    pub fn crs(&mut self) -> anyhow::Result<Option<String>> {
+        match self.ask(Request::Crs, &mut || Ok(()))? {
+            Some(Answer::Crs(crs)) => Ok(crs),
+            _ => Ok(None),
+        }
+    }
+
+    fn ask(
+        &mut self,
+        request: Request,
+        idle: &mut dyn FnMut() -> crate::Result<()>,
+    ) -> anyhow::Result<Option<Answer>> {
+        match &mut self.place {
+            Place::Here(..) if self.stop.is_set() => return Ok(None),
+            Place::Here(source, room) => return Ok(Some(answer(&mut **source, &request, room))),
+            // A thread that is gone is noticed by waiting for it.
+            Place::Thread { requests, .. } => drop(requests.send(request)),
+        }
+        self.wait(idle)
+    }
+
+    fn wait(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Option<Answer>> {
+        let Place::Thread { answers, .. } = &self.place else { return Ok(None) };
+        loop {
+            if self.stop.is_set() {
+                return Ok(None);
+            }
+            match answers.recv_timeout(PATIENCE) {
+                Ok(answer) => return Ok(Some(answer)),
+                Err(RecvTimeoutError::Timeout) => idle()?,
+                Err(RecvTimeoutError::Disconnected) => bail!("the thread that reads the scans is gone"),
+            }
+        }
+    }
+}
+
+impl Opened {
+    fn of(scans: &std::path::Path, source: &dyn ScanSource) -> Self {
+        let name = scan_input::name_of(scans, source);
+        Self { name, scans: source.len_hint(), poses: source.pose_source() }
+    }
+}
+
+fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom) -> Answer {
+    match request {
+        Request::Scan => Answer::Read(read(source, room)),
+        Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
+        Request::Remarks => Answer::Remarks(source.remarks()),
+        Request::Crs => Answer::Crs(source.crs()),
+    }
+}
+
+fn read(source: &mut dyn ScanSource, room: &PointRoom) -> crate::Result<Read> {
+    match source.next_stored(room) {
+        Ok(Some(scan)) => {
+            let mark = ScanMark::of(&scan)?;
+            Ok(Read::Scan(ReadScan { scan, mark }))
+        }
+        Ok(None) => Ok(Read::End),
+        Err(error) if source.pass_unread() => Ok(Read::Unread(error)),
+        Err(error) => Err(error),
+    }
+}

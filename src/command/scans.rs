@@ -1,0 +1,155 @@
+use crate::command::args::ScansArgs;
+use crate::command::json;
+use crate::command::map_at::read_map;
+use crate::command::progress::Progress;
+use crate::command::read_options::read_options;
+use crate::command::scan_input;
+use crate::io::{PointRoom, ScanSource};
+use crate::space::Point;
+use anyhow::Context;
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Bytes of memory for the points of one scan; more go to a temporary file.
+const ROOM_BYTES: usize = 64 << 20;
+
+/// What an input or a map has of scans.
+#[derive(Debug, Default, Serialize)]
+struct Overview {
+    format: String,
+    scans: u64,
+    /// `None` for a map, which does not keep them.
+    points: Option<u64>,
+    first_stamp_ns: Option<i64>,
+    last_stamp_ns: Option<i64>,
+    fields: Vec<String>,
+    poses: Option<String>,
+    /// What a person should know beside.
+    remarks: Vec<String>,
+}
+
+/// One scan.
+#[derive(Debug, Serialize)]
+struct Row {
+    number: u64,
+    name: Option<String>,
+    stamp_ns: Option<i64>,
+    points: Option<u64>,
+    origin_m: Point,
+}
+
+pub fn run(args: &ScansArgs) -> anyhow::Result<ExitCode> {
+    let mut out = BufWriter::new(std::io::stdout().lock());
+    let overview = if is_map(&args.data) { of_map(args, &mut out)? } else { of_input(args, &mut out)? };
+    if args.json {
+        json::print(&overview, &mut out)?;
+    } else {
+        overview.print(&args.data, &mut out)?;
+    }
+    out.flush()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn is_map(path: &Path) -> bool {
+    let has_metadata = |path: &Path| path.join("metadata.json").is_file();
+    let text = path.to_str().and_then(|text| text.rsplit_once('@'));
+    has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map)))
+}
+
+fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
+    let scans = read_map(&args.data, |reader| Ok(reader.scans()?))?;
+    let mut overview = Overview { format: "map".to_owned(), ..Overview::default() };
+    for scan in scans {
+        let row = Row {
+            number: scan.number,
+            name: None,
+            stamp_ns: scan.stamp_ns,
+            points: None,
+            origin_m: scan.origin_m,
+        };
+        overview.add(&row, args, out)?;
+    }
+    Ok(overview)
+}
+
+fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
+    let mut options = read_options(&args.read)?;
+    // What a build would leave out is listed all the same, and said.
+    options.clouds.may_lack_poses = true;
+    let mut source: Box<dyn ScanSource + Send> = scan_input::open(&args.data, &options)?;
+    let progress = Progress::over_scans(source.len_hint());
+    let room = PointRoom::new(ROOM_BYTES, &std::env::temp_dir());
+    let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
+    overview.poses = Some(source.pose_source().to_string());
+    while let Some(scan) =
+        source.next_stored(&room).with_context(|| format!("after {} scans", overview.scans))?
+    {
+        let row = Row {
+            number: overview.scans,
+            name: Some(scan.name.clone()),
+            stamp_ns: scan.stamp_ns,
+            points: Some(scan.points_in_sensor.len() as u64),
+            origin_m: scan.world_from_sensor.position_m(),
+        };
+        overview.add(&row, args, out)?;
+        progress.step();
+    }
+    overview.fields = source.fields();
+    overview.remarks = source.remarks();
+    Ok(overview)
+}
+
+impl Overview {
+    fn add(&mut self, row: &Row, args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<()> {
+        self.scans += 1;
+        self.points = self.points.map(|points| points + row.points.unwrap_or_default());
+        if let Some(stamp_ns) = row.stamp_ns {
+            self.first_stamp_ns = Some(self.first_stamp_ns.map_or(stamp_ns, |first| first.min(stamp_ns)));
+            self.last_stamp_ns = Some(self.last_stamp_ns.map_or(stamp_ns, |last| last.max(stamp_ns)));
+        }
+        match (args.each, args.json) {
+            (false, _) => {}
+            (true, true) => json::print(row, out)?,
+            (true, false) => row.print(out)?,
+        }
+        Ok(())
+    }
+
+    fn print(&self, data: &Path, out: &mut impl Write) -> std::io::Result<()> {
+        writeln!(out, "input     {}: {}", data.display(), self.format)?;
+        let points = self.points.map_or(String::new(), |points| format!(", {} points", HumanCount(points)));
+        writeln!(out, "scans     {}{points}", HumanCount(self.scans))?;
+        if let (Some(first), Some(last)) = (self.first_stamp_ns, self.last_stamp_ns) {
+            let (first, span) = (seconds(first), last.saturating_sub(first));
+            writeln!(out, "time      {first} to {} s: {:.1} s", seconds(last), span as f64 * 1e-9)?;
+        }
+        if !self.fields.is_empty() {
+            writeln!(out, "fields    {}", self.fields.join(" "))?;
+        }
+        if let Some(poses) = &self.poses {
+            writeln!(out, "poses     {poses}")?;
+        }
+        self.remarks.iter().try_for_each(|remark| writeln!(out, "note      {remark}"))
+    }
+}
+
+impl Row {
+    fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let stamp = self.stamp_ns.map_or("-".to_owned(), seconds);
+        let [x, y, z] = self.origin_m;
+        write!(out, "{:>8}  {stamp:>20}  {x:.3} {y:.3} {z:.3}", self.number)?;
+        if let Some(points) = self.points {
+            write!(out, "  {points} points")?;
+        }
+        writeln!(out, "  {}", self.name.as_deref().unwrap_or_default())
+    }
+}
+
+/// Nanoseconds as seconds, exactly.
+fn seconds(stamp_ns: i64) -> String {
+    let (whole, rest) = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+    format!("{whole}.{rest:09}")
+}

@@ -1,0 +1,31 @@
+use crate::command::args::SnapshotArgs;
+use crate::command::json;
+use crate::command::map_at::whole_map;
+use crate::operations::{SnapshotInfo, delete_snapshot, snapshot, snapshots};
+use std::io::Write;
+use std::process::ExitCode;
+
+pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
+    let find = || -> crate::Result<Option<SnapshotInfo>> {
+        Ok(snapshots(&args.map)?.into_iter().find(|info| info.name == args.name.as_str()))
+    };
+    let info = if args.delete {
+        // What it was, before it is gone.
+        let info = find()?;
+        delete_snapshot(whole_map(&args.map)?, &args.name)?;
+        info
+    } else {
+        snapshot(whole_map(&args.map)?, &args.name)?;
+        find()?
+    };
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let answer = serde_json::json!({ "map": args.map.display().to_string(), "deleted": args.delete, "snapshot": info });
+        json::print(&answer, &mut out)?;
+    } else if args.delete {
+        writeln!(out, "deleted   {}", args.name)?;
+    } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {
+        writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

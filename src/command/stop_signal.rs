@@ -1,0 +1,63 @@
+use crate::command::INTERRUPTED;
+use crate::scan::Stop;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use signal_hook::iterator::Signals;
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A signal so soon after the first is no second one: a shell and what runs in it may both send one.
+const GRACE: Duration = Duration::from_millis(500);
+
+/// Catches Ctrl-C and SIGTERM. The first asks to stop and says what a second will lose; the second ends the process at
+/// once.
+///
+/// A thread of its own waits for them, so that nothing else that goes on keeps it from answering.
+pub fn catch() -> anyhow::Result<Stop> {
+    let stop = Stop::default();
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    let asked = stop.clone();
+    let answer = move || {
+        let mut first: Option<Instant> = None;
+        for _ in signals.forever() {
+            match first {
+                None => {
+                    first = Some(Instant::now());
+                    asked.set();
+                    say(
+                        "stopping: what is mapped so far is made durable first; a second Ctrl-C or SIGTERM ends at once and \
+                         loses what is not",
+                    );
+                }
+                Some(first) if first.elapsed() < GRACE => {}
+                Some(_) => {
+                    say("ended at once: scans since the last flush are not in the map");
+                    std::process::exit(i32::from(INTERRUPTED));
+                }
+            }
+        }
+    };
+    if let Err(error) = thread::Builder::new().name("voxtile-signals".to_owned()).spawn(answer) {
+        log::warn!("no thread for signals, which are answered a little later: {error}");
+        catch_without_thread(&stop)?;
+    }
+    Ok(stop)
+}
+
+/// The first signal asks to stop, unannounced; the second ends the process.
+fn catch_without_thread(stop: &Stop) -> anyhow::Result<()> {
+    let asked: Arc<AtomicBool> = stop.flag();
+    for signal in [SIGINT, SIGTERM] {
+        flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), asked.clone())?;
+        flag::register(signal, asked.clone())?;
+    }
+    Ok(())
+}
+
+fn say(line: &str) {
+    // Where nobody listens there is nothing else to do.
+    writeln!(std::io::stderr(), "voxtile: {line}").unwrap_or_default();
+}

@@ -1,0 +1,120 @@
+//! What is computed for a request: it may read tiles, so a thread that may wait does it.
+
+use super::map_state::{MapState, Shown};
+use super::response::{Answer, Keep};
+use super::route::{MapId, Thing};
+use super::served_map::ServedMap;
+use crate::command::query::answer_at;
+use crate::mapper::MapView;
+use crate::query::UnknownAs;
+use crate::space::{Aabb, VoxelIndex};
+use crate::{Point, Queries, Result};
+use hyper::StatusCode;
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// Most places of a trajectory.
+const TRAJECTORY: usize = 20_000;
+
+/// `maps.json`: which maps there are.
+pub fn maps(maps: &[Arc<ServedMap>]) -> Answer {
+    let maps: Vec<Value> = maps.iter().enumerate().map(|(number, map)| describe(number, map)).collect();
+    Answer::json(json!({ "maps": maps }))
+}
+
+fn describe(number: usize, map: &ServedMap) -> Value {
+    let state = map.now();
+    let grid = state.map.config().grid;
+    let edge_m = grid.tile_size_m();
+    let bounds = state.map.tile_bounds().map(|tiles| {
+        let corner = |tile: [i32; 3], more: i64| tile.map(|k| (i64::from(k) + more) as f64 * edge_m);
+        json!({ "min": corner(tiles.min().to_array(), 0), "max": corner(tiles.max().to_array(), 1) })
+    });
+    let snapshots = map.snapshots().into_iter().map(|(name, tiles)| json!({ "name": name, "tiles": tiles }));
+    json!({
+        "id": number.to_string(),
+        "name": map.name(),
+        "resolution_m": grid.resolution_m(),
+        "tile_size_m": edge_m,
+        "tiles": state.map.tile_indices().len(),
+        "generation": state.generation,
+        "bounds": bounds,
+        "scans": state.map.scan_number(),
+        "snapshots": snapshots.collect::<Vec<_>>(),
+        "pending_tiles": state.pending_tiles,
+        "unreadable": state.levels.unreadable(),
+    })
+}
+
+/// What is asked of a map.
+pub fn of_map(maps: &[Arc<ServedMap>], id: &MapId, thing: &Thing, version: Option<u64>) -> Answer {
+    let nothing = || Answer::error(StatusCode::NOT_FOUND, "there is no such map, snapshot or node");
+    let Some(map) = maps.get(id.number) else { return nothing() };
+    let answer = map.shown(id).and_then(|shown| match shown {
+        Some(shown) => of_state(&shown, thing, version),
+        None => Ok(None),
+    });
+    match answer {
+        Ok(answer) => answer.unwrap_or_else(nothing),
+        Err(error) => {
+            log::warn!("{error:#}");
+            Answer::error(StatusCode::INTERNAL_SERVER_ERROR, &format!("{error:#}"))
+        }
+    }
+}
+
+/// `version` is that which the request asks for: an answer of another one, of a newer state, is not kept as if it were.
+fn of_state(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
+    let keep = match thing {
+        Thing::Node(key, _) | Thing::Subtree(key) if version.is_some() && shown.version(*key)? == version => {
+            Keep::ForEver
+        }
+        _ => Keep::No,
+    };
+    let kept = |answer: Answer| Answer { keep, ..answer };
+    let state = shown.state();
+    Ok(match thing {
+        Thing::Tileset => Some(Answer::json(shown.tileset()?)),
+        Thing::Subtree(key) => shown.subtree(*key)?.map(Answer::json).map(kept),
+        Thing::Node(key, kind) => shown.node(*key, *kind)?.map(|bytes| Answer::node(bytes, keep)),
+        Thing::Query(point) => Some(Answer::json(query(state, *point)?)),
+        Thing::Raycast(from, to) => Some(Answer::json(raycast(state, *from, *to)?)),
+        Thing::Trajectory => {
+            let (scans, points) = state.trajectory(TRAJECTORY)?;
+            Some(Answer::json(json!({ "scans": scans, "points": points })))
+        }
+    })
+}
+
+/// As `voxtile query --json`, and which voxel and tile it is.
+fn query(state: &MapState, point: Point) -> Result<Value> {
+    let grid = state.map.config().grid;
+    let mut answer = json!(answer_at(&state.map, point)?);
+    if let (Some(voxel), Some(object)) = (grid.voxel_of(point), answer.as_object_mut()) {
+        object.insert("voxel_m".into(), json!(extent(&grid, voxel)));
+        object.insert("tile".into(), json!(grid.tile_of_voxel(voxel).to_array()));
+    }
+    Ok(answer)
+}
+
+fn extent(grid: &crate::Grid, voxel: VoxelIndex) -> Aabb {
+    Aabb { min: voxel.map(|k| grid.corner_m(k)), max: voxel.map(|k| grid.corner_m(k.saturating_add(1))) }
+}
+
+/// Whether one point is seen from another: the voxel of the second may be occupied itself.
+fn raycast(state: &MapState, from: Point, to: Point) -> Result<Value> {
+    let grid = state.map.config().grid;
+    let is_end = |center: Point| grid.voxel_of(center) == grid.voxel_of(to);
+    let hit = state.map.cast_segment(from, to, UnknownAs::Free)?;
+    let first = state.map.cast_segment(from, to, UnknownAs::Obstacle)?;
+    let blocked = hit.filter(|hit| !is_end(hit.center_m));
+    let unknown = first.filter(|hit| hit.probability.is_none() && !is_end(hit.center_m));
+    Ok(json!({
+        "from_m": from,
+        "to_m": to,
+        "visible": blocked.is_none(),
+        "hit": blocked,
+        // How far the way is known; null if all of it is.
+        "unknown_from_m": unknown.map(|hit| hit.distance_m),
+    }))
+}

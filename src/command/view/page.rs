@@ -1,0 +1,25 @@
+use std::sync::LazyLock;
+
+/// A file of the page.
+pub struct PageFile {
+    pub name: &'static str,
+    pub kind: &'static str,
+    /// Compressed as gzip.
+    pub gzip: Vec<u8>,
+}
+
+/// Made by `view/bundle.sh`.
+const FILES: [(&str, &str, &[u8]); 4] = [
+    ("index.html", "text/html; charset=utf-8", include_bytes!("../../../view/dist/index.html")),
+    ("page.js", "text/javascript; charset=utf-8", include_bytes!("../../../view/dist/page.js")),
+    ("page.css", "text/css; charset=utf-8", include_bytes!("../../../view/dist/page.css")),
+    ("licences.txt", "text/plain; charset=utf-8", include_bytes!("../../../view/dist/licences.txt")),
+];
+
+static PAGE: LazyLock<Vec<PageFile>> = LazyLock::new(|| {
+    FILES.map(|(name, kind, bytes)| PageFile { name, kind, gzip: super::response::gzip(bytes) }).into()
+});
+
+pub fn file(name: &str) -> Option<&'static PageFile> {
+    PAGE.iter().find(|file| file.name == name)
+}

@@ -1,0 +1,195 @@
+use super::map_state::{MapState, Shown};
+use super::node_cache;
+use super::route::{At, MapId};
+use crate::command::map_at::{AnyMap, MapAt, open_any_map};
+use crate::command::progress::Progress;
+use crate::mapper::MapView;
+use crate::operations::snapshots;
+use crate::render::levels::{Levels, NodeStore};
+use crate::store::SnapshotName;
+use anyhow::Context;
+use parking_lot::{Mutex, RwLock};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant, SystemTime};
+use tokio::sync::watch;
+
+/// A map that is shown, followed while somebody writes it.
+pub struct ServedMap {
+    path: PathBuf,
+    at: MapAt,
+    name: String,
+    store: Arc<NodeStore>,
+    now: RwLock<Arc<MapState>>,
+    /// Snapshots that were looked at, those used last at the end.
+    snapshots: Mutex<Vec<(SnapshotName, Arc<MapState>)>>,
+}
+
+/// How often a map is looked at for a new flush.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+/// Tiles of the first coarse levels of a large map, which are shown while the others are read.
+const FIRST_TILES: usize = 512;
+/// Each time so many times as many.
+const GROWTH: usize = 4;
+/// What is not complete is shown this often at most.
+const SHOW_EVERY: Duration = Duration::from_secs(1);
+/// Tiles whose coarse nodes are made together, along each axis, as a power of two.
+const GROUP: u32 = 3;
+/// Snapshots whose levels stay in memory.
+const SNAPSHOTS_KEPT: usize = 4;
+
+/// What tells whether a map was flushed: length and time of its log and its metadata.
+#[derive(PartialEq)]
+struct Stamp([Option<(u64, SystemTime)>; 2]);
+
+impl Stamp {
+    fn of(map: &Path) -> Self {
+        Self(["commits.log", "metadata.json"].map(|name| {
+            let metadata = std::fs::metadata(map.join(name)).ok()?;
+            Some((metadata.len(), metadata.modified().ok()?))
+        }))
+    }
+}
+
+impl ServedMap {
+    /// Opens a map; its levels come with [`ServedMap::follow`].
+    pub fn open(path: &Path, is_kept: bool) -> anyhow::Result<Self> {
+        let map = open_any_map(path).with_context(|| format!("cannot show {}", path.display()))?;
+        let id = match &map {
+            AnyMap::Map(map) => map.metadata().ext.as_ref().map(|ext| ext.map_id.clone()),
+            AnyMap::Octree(_) => None,
+        };
+        let store = Arc::new(node_cache::open(id.as_deref().filter(|_| is_kept))?);
+        let levels = Levels::build(&map, &[], &store, &|_| true)?;
+        let levels = levels.context("the levels of a map without tiles")?;
+        let pending_tiles = map.tile_indices().len() as u64;
+        let now = MapState { map, levels, store: store.clone(), generation: 0, pending_tiles };
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        Ok(Self {
+            path: path.to_owned(),
+            at: MapAt::of(path)?,
+            name,
+            store,
+            now: RwLock::new(Arc::new(now)),
+            snapshots: Mutex::default(),
+        })
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The map as it is known now.
+    pub fn now(&self) -> Arc<MapState> {
+        self.now.read().clone()
+    }
+
+    /// The snapshots that can be shown; none of a map that is shown as one.
+    pub fn snapshots(&self) -> Vec<(String, u64)> {
+        let is_map = self.at.snapshot.is_none() && matches!(self.now().map, AnyMap::Map(_));
+        let found = if is_map { snapshots(&self.at.map).unwrap_or_default() } else { Vec::new() };
+        found.into_iter().filter(|info| info.damage.is_none()).map(|info| (info.name, info.tiles)).collect()
+    }
+
+    /// The state that a path names; `None` if there is no such snapshot.
+    pub fn shown(&self, id: &MapId) -> crate::Result<Option<Shown>> {
+        let Some(after) = self.state(&id.at)? else { return Ok(None) };
+        let Some(since) = &id.since else { return Ok(Some(Shown::State(after))) };
+        Ok(self.state(since)?.map(|before| Shown::Change { before, after }))
+    }
+
+    fn state(&self, at: &At) -> crate::Result<Option<Arc<MapState>>> {
+        let At::Snapshot(name) = at else { return Ok(Some(self.now())) };
+        if !self.snapshots().iter().any(|(known, _)| known == name.as_str()) {
+            return Ok(None);
+        }
+        // Held while the levels are made: others wait for the same, and memory stays bounded.
+        let mut kept = self.snapshots.lock();
+        if let Some(at) = kept.iter().position(|(known, _)| known == name) {
+            let found = kept.remove(at);
+            kept.push(found.clone());
+            return Ok(Some(found.1));
+        }
+        let at = MapAt { map: self.at.map.clone(), snapshot: Some(name.clone()) };
+        let map = AnyMap::Map(Box::new(at.open()?));
+        let tiles = map.tile_indices();
+        let Some(levels) = Levels::build(&map, &tiles, &self.store, &|_| true)? else { return Ok(None) };
+        let state = MapState { map, levels, store: self.store.clone(), generation: 0, pending_tiles: 0 };
+        let state = Arc::new(state);
+        if kept.len() == SNAPSHOTS_KEPT {
+            kept.remove(0);
+        }
+        kept.push((name.clone(), state.clone()));
+        Ok(Some(state))
+    }
+
+    /// Makes the levels, and makes them anew whenever the map was flushed, in a thread of its own that ends with the
+    /// process.
+    pub fn follow(self: Arc<Self>, changes: watch::Sender<u64>) -> anyhow::Result<()> {
+        let work = move || {
+            // From before it is read: a flush in between is seen the next time.
+            let mut seen = None;
+            let mut told = String::new();
+            loop {
+                let stamp = Stamp::of(&self.at.map);
+                if seen.as_ref() != Some(&stamp) {
+                    match self.show_newest(&changes) {
+                        Ok(()) => seen = Some(stamp),
+                        // Flushed again meanwhile, or gone: what is shown stays, and the next look may find more.
+                        Err(error) => {
+                            let error = format!("{error:#}");
+                            if told != error {
+                                log::warn!("{}: {error}", self.path.display());
+                                told = error;
+                            }
+                        }
+                    }
+                }
+                thread::sleep(LOOK_EVERY);
+            }
+        };
+        thread::Builder::new()
+            .name("voxtile-follow".into())
+            .spawn(work)
+            .context("no thread to read the map")?;
+        Ok(())
+    }
+
+    fn show_newest(&self, changes: &watch::Sender<u64>) -> anyhow::Result<()> {
+        let open = || open_any_map(&self.path);
+        let mut tiles = open()?.tile_indices();
+        tiles.sort_by_key(|tile| (tile.to_array().map(|k| k >> GROUP), *tile));
+        let is_first = self.now().generation == 0;
+        let progress = is_first.then(|| Progress::over_tiles(tiles.len()));
+        let mut shown = Instant::now();
+        let mut end = if is_first { FIRST_TILES.min(tiles.len()) } else { tiles.len() };
+        loop {
+            let map = open()?;
+            let step = |_| true;
+            let levels = Levels::build(&map, &tiles[..end], &self.store, &step)?.context("stopped")?;
+            if let Some(progress) = &progress {
+                progress.set(end as u64, tiles.len() as u64);
+            }
+            let is_complete = end == tiles.len();
+            if is_complete || shown.elapsed() > SHOW_EVERY {
+                self.show(map, levels, (tiles.len() - end) as u64, changes);
+                shown = Instant::now();
+            }
+            if is_complete {
+                return Ok(());
+            }
+            end = end.saturating_mul(GROWTH).min(tiles.len());
+        }
+    }
+
+    fn show(&self, map: AnyMap, levels: Levels, pending_tiles: u64, changes: &watch::Sender<u64>) {
+        for reason in levels.unreadable() {
+            log::warn!("not shown: {reason}");
+        }
+        let generation = self.now().generation + 1;
+        let state = MapState { map, levels, store: self.store.clone(), generation, pending_tiles };
+        *self.now.write() = Arc::new(state);
+        changes.send_modify(|count| *count += 1);
+    }
+}
