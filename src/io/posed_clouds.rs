@@ -71,6 +71,7 @@ pub(super) struct PosedClouds {
     /// Clouds so far.
     number: u64,
     without_pose: u64,
+    is_at_end: bool,
     /// Whether any had one.
     has_pose: bool,
     /// Why they have none, and the names of the first of each reason.
@@ -94,7 +95,7 @@ impl PosedClouds {
         {
             trajectory.check_clouds(clouds)?;
         }
-        let (number, without_pose, has_pose, reasons, fields) = Default::default();
+        let (number, without_pose, is_at_end, has_pose, reasons, fields) = Default::default();
         Ok(Self {
             source,
             path: path.to_owned(),
@@ -102,6 +103,7 @@ impl PosedClouds {
             options,
             number,
             without_pose,
+            is_at_end,
             has_pose,
             reasons,
             fields,
@@ -133,6 +135,21 @@ impl PosedClouds {
             }
             (CloudPoses::File(_, trajectory), _) => Ok(trajectory.of_cloud(number, self.source.len_hint())?),
         })
+    }
+
+    /// The next cloud and its number. One that cannot be read has a number too: those behind it keep theirs.
+    fn next_cloud(&mut self) -> Result<Option<(u64, CloudHead)>> {
+        let found = self.source.next_cloud();
+        let number = self.number;
+        self.number += u64::from(!matches!(found, Ok(None)));
+        Ok(found?.map(|head| (number, head)))
+    }
+
+    /// How many poses are by number, and left where the clouds end.
+    fn poses_left(&self) -> Option<u64> {
+        let CloudPoses::File(_, trajectory) = &self.poses else { return None };
+        let left = (trajectory.len() as u64).saturating_sub(self.number);
+        (self.is_at_end && trajectory.span_ns().is_none() && left > 0).then_some(left)
     }
 
     fn note_without_pose(&mut self, head: &CloudHead, why: &str) {
@@ -262,9 +279,7 @@ impl ScanSource for PosedClouds {
     }
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
-        while let Some(head) = self.source.next_cloud()? {
-            let number = self.number;
-            self.number += 1;
+        while let Some((number, head)) = self.next_cloud()? {
             let found = self.pose_of(&head, number)?;
             let body = match found {
                 Ok(body) => body,
@@ -284,6 +299,7 @@ impl ScanSource for PosedClouds {
             self.fields = fields;
             return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
         }
+        self.is_at_end = true;
         if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {
             // A map of nothing would be no answer.
             let reason = format!(
@@ -300,10 +316,8 @@ impl ScanSource for PosedClouds {
     fn skip(&mut self, scans: usize) -> Result<usize> {
         let mut skipped = 0;
         while skipped < scans
-            && let Some(head) = self.source.next_cloud()?
+            && let Some((number, head)) = self.next_cloud()?
         {
-            let number = self.number;
-            self.number += 1;
             match self.pose_of(&head, number)? {
                 Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
                 _ => {
@@ -344,6 +358,12 @@ impl ScanSource for PosedClouds {
         let mut remarks = self.source.remarks();
         if let CloudPoses::File(_, trajectory) = &self.poses {
             remarks.extend(trajectory.remarks().iter().cloned());
+        }
+        if let Some(left) = self.poses_left() {
+            let clouds = self.number;
+            remarks.push(format!(
+                "{left} more poses than clouds ({clouds}): do the poses, which have no time stamps, begin with the first cloud?"
+            ));
         }
         if self.without_pose > 0 {
             let clouds = if self.without_pose == 1 { "cloud has" } else { "clouds have" };

@@ -255,6 +255,48 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
     assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
 }
 
+/// A cloud that cannot be opened has a number and a pose as the others do; poses that are left at the end are told.
+#[test]
+fn poses_by_number_stay_with_their_clouds() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n4 0 0\n";
+    for (name, text) in [("0", cloud), ("1", "ply\nformat of no kind\n"), ("2", cloud)] {
+        fs::write(scans.join(format!("{name}.ply")), text).unwrap();
+    }
+    let poses = folder.path().join("poses.txt");
+    let rows: Vec<String> = (0..3).map(|k| format!("1 0 0 {} 0 1 0 0 0 0 1 0\n", 10 * k)).collect();
+    fs::write(&poses, rows.concat()).unwrap();
+    let map = folder.path().join("map");
+    output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
+    let told: serde_json::Value = serde_json::from_str(&output(&["scans", text(&map), "--json"])).unwrap();
+    let origins: Vec<f64> =
+        told["scans"].as_array().unwrap().iter().map(|scan| scan["origin_m"][0].as_f64().unwrap()).collect();
+    assert_eq!(origins, [0.0, 20.0]);
+
+    // The scans of a folder of E57 are not counted before they are read.
+    let several = folder.path().join("several");
+    fs::create_dir(&several).unwrap();
+    fs::copy(repository("clouds/tests/data/scans.e57"), several.join("a.e57")).unwrap();
+    fs::copy(repository("clouds/tests/data/scans.e57"), several.join("b.e57")).unwrap();
+    fs::write(&poses, rows.concat().repeat(10)).unwrap();
+    let told = output(&["scans", text(&several), "--poses", text(&poses)]);
+    assert!(told.contains("more poses than clouds"), "{told}");
+}
+
+/// A recorder of ROS 1 that was killed leaves its file as `.bag.active`, perhaps as the only one.
+#[test]
+fn a_recording_that_was_not_closed_is_found_in_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = PathBuf::from(repository("clouds/tests/data/ros/none.bag"));
+    let alone = output(&["scans", text(&bag), "--json"]);
+    fs::copy(&bag, folder.path().join("drive.bag.active")).unwrap();
+    let told = output(&["scans", text(folder.path()), "--json"]);
+    let scans = |json: &str| serde_json::from_str::<serde_json::Value>(json).unwrap()["scans"].clone();
+    assert_eq!(scans(&told), scans(&alone));
+}
+
 /// Far clouds with a coordinate reference system: the map keeps it, and files that can say it do.
 #[test]
 fn coordinate_reference_systems_are_kept_and_written_back() {

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
-import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
@@ -32,9 +32,9 @@ function scan(number) {
   return folder;
 }
 
-function exported(map) {
+function exported(map, ...options) {
   const file = join(work, 'voxels.csv');
-  run('export', map, '-o', file, '-q');
+  run('export', map, '-o', file, '-q', ...options);
   const rows = readFileSync(file, 'utf8').split('\n').filter((row) => /^-?\d/.test(row));
   return new Set(rows.map((row) => row.split(',').slice(0, 3).map((k) => Math.round(1000 * k)).join(' ')));
 }
@@ -44,6 +44,47 @@ const shown = async (browser) => {
   assert.deepEqual(edges.map((edge) => edge.toFixed(6)), ['0.100000'], 'the finest level is in view');
   return new Set(centers.map((center) => center.map((k) => Math.round(1000 * k)).join(' ')));
 };
+
+// Fingers on the screen: each list is where they are next.
+async function fingers(...places) {
+  const touchPoints = (points) => points.map(([x, y], id) => ({ x, y, id }));
+  for (const [k, points] of places.entries()) {
+    await browser.call('Input.dispatchTouchEvent', { type: k ? 'touchMove' : 'touchStart', touchPoints: touchPoints(points) });
+  }
+  return () => browser.call('Input.dispatchTouchEvent', { type: 'touchEnd', touchPoints: [] });
+}
+
+async function touch() {
+  const away = ({ eye, to }) => Math.hypot(...eye.map((k, axis) => k - to[axis]));
+  const camera = () => browser.value('voxtile.camera()');
+  const moved = (one, other) => Math.hypot(...one.eye.map((k, axis) => k - other.eye[axis]));
+  await browser.call('Emulation.setTouchEmulationEnabled', { enabled: true, maxTouchPoints: 5 });
+  await browser.value('document.getElementById("fit").click()');
+  const before = await camera();
+  await (await fingers([[300, 300]], [[340, 310]], [[400, 320]]))();
+  const turned = await camera();
+  assert.ok(moved(before, turned) > 0.1 && Math.abs(away(before) - away(turned)) < 1e-3, 'one finger turns');
+  await (await fingers([[300, 300], [360, 300]], [[280, 300], [380, 300]], [[200, 300], [460, 300]]))();
+  const nearer = await camera();
+  assert.ok(away(nearer) < 0.8 * away(turned), `two fingers come near: ${away(turned)} m, then ${away(nearer)} m`);
+  const at = [1.05, 0.05, -0.25];
+  await browser.value(`voxtile.lookAt([-1.5, 0.02, 0.1], ${JSON.stringify(at)})`);
+  await browser.ready();
+  const [x, y] = await browser.value(`voxtile.screenOf(${JSON.stringify(at)})`);
+  await (await fingers([[x, y]]))();
+  await browser.until('document.getElementById("answer").textContent.includes("occupied")', 10);
+  await browser.value('document.getElementById("walk").click()');
+  const standing = await camera();
+  const lift = await fingers([[300, 300], [400, 300]]);
+  await browser.until(`Math.hypot(...voxtile.camera().eye.map((k, axis) => k - ${JSON.stringify(standing.eye)}[axis])) > 0.2`, 10);
+  await lift();
+  const walked = await camera();
+  assert.ok(walked.eye[0] > standing.eye[0] + 0.1, 'two fingers go ahead');
+  await (await fingers([[300, 300]], [[340, 300]]))();
+  await browser.value('document.getElementById("walk").click()');
+  await browser.call('Emulation.setTouchEmulationEnabled', { enabled: false });
+  await browser.ready();
+}
 
 const browser = new Browser();
 ended.push(() => browser.close());
@@ -78,6 +119,37 @@ try {
   assert.ok(certain.size < exported(map).size, `${certain.size} voxels are certain; ${log}`);
   await browser.value('voxtile.setThreshold(0)');
   step('the slider of probability hides voxels, and shows them again');
+
+  await browser.value('document.getElementById("free").click(); document.getElementById("unknown").click()');
+  await browser.until('voxtile.near().free && voxtile.near().unknown && document.getElementById("state").textContent === "ready"');
+  const near = await browser.value('voxtile.near()');
+  assert.equal(near.free, exported(map, '--what', 'free').size, 'free voxels');
+  await browser.value('document.getElementById("free").click(); document.getElementById("unknown").click()');
+  await browser.ready();
+  assert.deepEqual(await browser.value('voxtile.near()'), {});
+  step(`free space and where knowledge ends: ${near.free} and ${near.unknown} voxels`);
+
+  await browser.call('Browser.setDownloadBehavior', { behavior: 'allow', downloadPath: work }, undefined);
+  await browser.value('document.getElementById("shot").click()');
+  const saved = join(work, 'room.png');
+  for (let k = 0; !existsSync(saved); k++) {
+    assert.ok(k < 100, 'the picture is saved');
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+  const colours = await browser.value(`(async () => {
+    const bytes = await (await fetch('data:image/png;base64,${readFileSync(saved).toString('base64')}')).blob();
+    const image = await createImageBitmap(bytes);
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
+    return [image.width, image.height, new Set(pixels).size];
+  })()`);
+  assert.ok(colours[2] > 20, 'the picture shows the map');
+  step(`a picture of ${colours[0]} x ${colours[1]} is saved`);
+
+  await touch();
+  step('a touch screen turns, comes near, asks and walks');
 
   run('snapshot', map, 'monday');
   run('build', scan(1), '-o', map, '--append', '-q');

@@ -13,7 +13,10 @@ export class Flight {
     this.orbit.addEventListener('change', wake);
     this.walks = false;
     this.keys = new Set();
+    this.fingers = new Map();
     this.step = 1;
+    canvas.addEventListener('pointerdown', (event) => this.touch(event, true));
+    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, (event) => this.touch(event, false));
     canvas.addEventListener('pointermove', (event) => this.look(event));
     window.addEventListener('keydown', (event) => {
       if (!this.walks || event.target.matches?.('select, input:not([type=range]):not([type=checkbox])')) return;
@@ -36,11 +39,25 @@ export class Flight {
     this.wake();
   }
 
+  // Two fingers go ahead, three go back: a touch screen has no keys.
+  touch(event, isDown) {
+    if (event.pointerType !== 'touch') return;
+    if (isDown) this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    else this.fingers.delete(event.pointerId);
+    for (const key of ['ArrowUp', 'ArrowDown']) this.keys.delete(key);
+    if (this.walks && this.fingers.size > 1) this.keys.add(this.fingers.size > 2 ? 'ArrowDown' : 'ArrowUp');
+    this.wake();
+  }
+
   look(event) {
     if (!this.walks || event.buttons === 0) return;
+    // Browsers tell no movement of fingers.
+    const before = this.fingers.get(event.pointerId) ?? [event.clientX - event.movementX, event.clientY - event.movementY];
+    if (this.fingers.has(event.pointerId)) this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    const [right, down] = [event.clientX - before[0], event.clientY - before[1]];
     const turn = new THREE.Euler().setFromQuaternion(this.camera.quaternion, 'ZXY');
-    turn.z -= event.movementX * 0.004;
-    turn.x = Math.min(Math.max(turn.x - event.movementY * 0.004, 0.05), Math.PI - 0.05);
+    turn.z -= right * 0.004;
+    turn.x = Math.min(Math.max(turn.x - down * 0.004, 0.05), Math.PI - 0.05);
     turn.y = 0;
     this.camera.quaternion.setFromEuler(turn);
     this.wake();

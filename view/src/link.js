@@ -9,7 +9,7 @@ export function readLink() {
     return list.length === count && list.every(Number.isFinite) ? list : null;
   };
   return { eye: numbers('eye', 3), to: numbers('to', 3), colour: fields.get('colour'), at: fields.get('at'), since: fields.get('since'),
-    threshold: fields.has('threshold') ? Number(fields.get('threshold')) : null };
+    threshold: fields.has('threshold') ? Number(fields.get('threshold')) : null, cut: numbers('cut', 6) };
 }
 
 export function writeLink(state) {

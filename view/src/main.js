@@ -32,13 +32,16 @@ try {
   say(`This browser draws no 3D: ${error.message}`);
   throw error;
 }
-const link = readLink();
+let link = readLink();
 let maps = [];
 let tool = 'query';
 let marks = [];
 let answered = null;
 let path = [];
 let pathNumber = 0;
+// The sliders of the cut, and where they leave the map whole.
+const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
+const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
 
 const idOf = (map) => {
   const at = $('snapshot').value;
@@ -82,7 +85,7 @@ function describe() {
   const tiles = map.tiles.toLocaleString('en');
   const lost = map.unreadable?.length ? `, ${map.unreadable.length} damaged` : '';
   const rest = map.pending_tiles ? `; reading the map: ${map.pending_tiles.toLocaleString('en')} tiles left` : '';
-  $('facts').textContent = `${tiles} tiles${lost} of ${map.tile_size_m} m, voxels of ${map.resolution_m} m, ${map.scans ?? 0} scans${rest}`;
+  $('facts').textContent = `${tiles} tiles${lost} of ${map.tile_size_m} m, voxels of ${map.resolution_m} m${map.scans ? `, ${map.scans.toLocaleString('en')} scans` : ''}${rest}`;
 }
 
 async function readMaps() {
@@ -196,6 +199,7 @@ function cut() {
     }
   });
   viewer.wake();
+  remember();
 }
 
 // --- Questions
@@ -285,8 +289,30 @@ function remember() {
     threshold: viewer.threshold || null,
     at: $('snapshot').value,
     since: $('since').value,
+    cut: CUTS.some((id, k) => $(id).value !== OPEN[k]) ? CUTS.map((id) => Number($(id).value)) : null,
   }));
 }
+
+// What a link says, in the controls; a colour, snapshot or number that there is not changes nothing.
+function applyLink() {
+  const choose = (id, value) => {
+    const select = $(id);
+    select.value = [...select.options].some((option) => option.value === value) ? value : select.options[0].value;
+  };
+  choose('colour', link.colour);
+  choose('snapshot', link.at ?? '');
+  choose('since', link.since ?? '');
+  $('threshold').value = link.threshold ?? 0;
+  CUTS.forEach((id, k) => { $(id).value = link.cut?.[k] ?? OPEN[k]; });
+}
+
+window.addEventListener('hashchange', () => {
+  link = readLink();
+  applyLink();
+  start();
+  showMaps();
+  cut();
+});
 
 // --- Live
 
@@ -340,9 +366,9 @@ function start() {
 
 $('colour').addEventListener('change', paint);
 $('threshold').addEventListener('input', paint);
-for (const id of ['x0', 'x1', 'y0', 'y1', 'z0', 'z1']) $(id).addEventListener('input', cut);
+for (const id of CUTS) $(id).addEventListener('input', cut);
 $('uncut').addEventListener('click', () => {
-  for (const axis of ['x', 'y', 'z']) [$(`${axis}0`).value, $(`${axis}1`).value] = [0, 1000];
+  CUTS.forEach((id, k) => { $(id).value = OPEN[k]; });
   cut();
 });
 for (const kind of ['occupied', 'free', 'unknown']) {
@@ -451,6 +477,10 @@ window.voxtile = {
     }
     return { count: centers.length, centers, edges: [...new Set(meshes.map(([, node]) => node.edge))] };
   },
+  near: () => viewer.layers.flatMap((layer) => layer.near.children).reduce((sum, { userData }) => {
+    const kind = ['occupied', 'free', 'unknown'][userData.node.kind];
+    return { ...sum, [kind]: (sum[kind] ?? 0) + userData.node.count };
+  }, {}),
   faces: () => viewer.layers.flatMap((layer) => layer.meshes()).reduce((sum, [mesh]) => sum + mesh.userData.faces, 0),
   drawCalls: () => viewer.renderer.info.render.calls,
   bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.bytes, 0),
@@ -480,10 +510,7 @@ if (matchMedia('(max-width: 700px)').matches) showPanel(false);
 try {
   await readMaps();
   await readExtents();
-  if (link.colour) $('colour').value = link.colour;
-  if (link.threshold !== null) $('threshold').value = link.threshold;
-  if (link.at) $('snapshot').value = link.at;
-  if (link.since) $('since').value = link.since;
+  applyLink();
   start();
   showMaps();
   cut();

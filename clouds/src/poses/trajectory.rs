@@ -11,6 +11,8 @@ pub struct Trajectory {
     poses: Vec<RigidPose>,
     /// Strictly increasing stamps, each with the number of its pose; empty where the file has none.
     stamps: Vec<(i64, usize)>,
+    /// How far a stamp may be from the time that it was rounded from.
+    rounding_ns: u64,
     remarks: Vec<String>,
 }
 
@@ -95,10 +97,12 @@ impl Trajectory {
             stamps.clear();
         }
         let poses = rows.into_iter().map(|row| row.pose).collect();
-        Self { path: path.to_owned(), poses, stamps, remarks }
+        let rounding_ns = rounding_of(&stamps);
+        Self { path: path.to_owned(), poses, stamps, rounding_ns, remarks }
     }
 
     /// The pose at a time. A pose between two others needs one of them within the tolerance; none is ever extrapolated.
+    /// A time that is before the first stamp or after the last one only because that was rounded has the pose there.
     pub fn at(&self, stamp_ns: i64, tolerance_ns: i64) -> Found {
         let after = self.stamps.partition_point(|&(stamp, _)| stamp < stamp_ns);
         let later = self.stamps.get(after).copied();
@@ -113,6 +117,11 @@ impl Trajectory {
                 }
                 let share = since as f64 / before_ns.abs_diff(after_ns) as f64;
                 Found::Between(pose(before).towards(&pose(after), share))
+            }
+            (None, Some((end_ns, number))) | (Some((end_ns, number)), None)
+                if end_ns.abs_diff(stamp_ns) <= self.rounding_ns =>
+            {
+                Found::Exact(pose(number))
             }
             (None, Some((first_ns, _))) => Found::Before { first_ns },
             (Some((last_ns, _)), None) => Found::After { last_ns },
@@ -181,4 +190,15 @@ impl Trajectory {
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
+}
+
+/// Half of the digit that all stamps end with: programs write them with a few decimals. At most half a millisecond,
+/// for stamps of whole seconds need not be rounded.
+fn rounding_of(stamps: &[(i64, usize)]) -> u64 {
+    const MOST_NS: i64 = 1_000_000;
+    let mut digit_ns = 1;
+    while digit_ns < MOST_NS && stamps.iter().all(|(stamp_ns, _)| stamp_ns % (10 * digit_ns) == 0) {
+        digit_ns *= 10;
+    }
+    if stamps.is_empty() { 0 } else { digit_ns.unsigned_abs() / 2 }
 }

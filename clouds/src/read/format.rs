@@ -95,7 +95,8 @@ impl Format {
             Self::Las | Self::Laz | Self::Copc => &["las", "laz"],
             Self::E57 => &["e57"],
             Self::DepthTum | Self::DepthImages => &["png"],
-            Self::Bag1 => &["bag"],
+            // A recorder that is killed leaves `.bag.active`.
+            Self::Bag1 => &["bag", "active"],
             Self::Mcap => &["mcap"],
             Self::Db3 | Self::Bag2Folder => &["db3"],
         }

@@ -1,12 +1,9 @@
+use super::mcap_file::{McapFile, Topic};
 use super::options::WriteOptions;
-use super::out_file::OutFile;
 use super::point_cloud2::{FieldType, SCHEMA, encode};
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
-use crate::error::{Error, Result};
-use ::mcap::records::MessageHeader;
-use ::mcap::{McapError, Writer};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use crate::error::Result;
+use std::path::Path;
 
 /// Most points of a cloud.
 const MOST_POINTS: usize = 1 << 20;
@@ -16,9 +13,7 @@ const TOPIC: &str = "/voxels";
 ///
 /// Coordinates are in single precision, which all viewers know, unless that is too coarse where the map is.
 pub(super) struct McapSink {
-    path: PathBuf,
-    writer: Writer<OutFile>,
-    channel: u16,
+    file: McapFile,
     frame: String,
     stamp_ns: u64,
     fields: Vec<(&'static str, FieldType)>,
@@ -32,17 +27,8 @@ pub(super) struct McapSink {
 
 impl McapSink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
-        let refused = |error| refused(path, error);
-        let out = OutFile::create(path)?;
-        let writing = ::mcap::WriteOptions::new()
-            .profile("ros2")
-            .library(concat!("voxtile-clouds ", env!("CARGO_PKG_VERSION")))
-            .compression(None);
-        let mut writer = writing.create(out).map_err(refused)?;
-        let schema = writer
-            .add_schema("sensor_msgs/msg/PointCloud2", "ros2msg", SCHEMA.as_bytes())
-            .map_err(refused)?;
-        let channel = writer.add_channel(schema, TOPIC, "cdr", &BTreeMap::new()).map_err(refused)?;
+        let topic = Topic { name: TOPIC, type_name: "sensor_msgs/msg/PointCloud2", definition: SCHEMA };
+        let file = McapFile::create(path, &topic)?;
         let fits = head.bounds_m.as_flattened().iter().all(|bound| {
             // Half the distance of neighbouring numbers of single precision at that place.
             bound.abs() * f64::from(f32::EPSILON) <= head.resolution_m / 16.0
@@ -57,9 +43,7 @@ impl McapSink {
             ("count", FieldType::Int32),
         ];
         Ok(Self {
-            path: path.to_owned(),
-            writer,
-            channel,
+            file,
             frame: options.frame.clone(),
             stamp_ns: options.stamp_ns,
             fields,
@@ -84,10 +68,8 @@ impl McapSink {
         let rest = self.points.split_off(end);
         let data = encode(self.stamp_ns, &self.frame, &self.fields, &self.points);
         // A nanosecond apart, so that players keep their order.
-        let log_time = self.stamp_ns.saturating_add(u64::from(self.clouds));
-        let (channel_id, publish_time) = (self.channel, self.stamp_ns);
-        let header = MessageHeader { channel_id, sequence: self.clouds, log_time, publish_time };
-        self.writer.write_to_known_channel(&header, &data).map_err(|error| refused(&self.path, error))?;
+        let log_ns = self.stamp_ns.saturating_add(u64::from(self.clouds));
+        self.file.write(log_ns, self.stamp_ns, &data)?;
         self.clouds = self.clouds.saturating_add(1);
         self.points = rest;
         self.tile_start = self.tile_start.saturating_sub(end);
@@ -120,13 +102,8 @@ impl VoxelSink for McapSink {
 
     fn finish(mut self: Box<Self>) -> Result<()> {
         self.write_cloud(self.points.len())?;
-        self.writer.finish().map_err(|error| refused(&self.path, error))?;
-        self.writer.into_inner().finish()
+        self.file.finish()
     }
-}
-
-fn refused(path: &Path, error: McapError) -> Error {
-    Error::io(path, "write", std::io::Error::other(error))
 }
 
 #[cfg(test)]
@@ -153,5 +130,22 @@ mod tests {
         let widths: Vec<u32> = messages.iter().map(|message| width(&message.data)).collect();
         assert_eq!(widths, [32, 16, 40, 24]);
         assert!(messages.is_sorted_by_key(|message| message.log_time));
+
+        // By the index alone, each chunk is found and its sum is right.
+        let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+        let stats = summary.stats.as_ref().unwrap();
+        assert_eq!((stats.message_count, stats.chunk_count, stats.channel_count), (4, 4, 1));
+        let channel = summary.channels.values().next().unwrap();
+        assert_eq!((channel.topic.as_str(), channel.message_encoding.as_str()), ("/voxels", "cdr"));
+        assert_eq!(channel.schema.as_ref().unwrap().name, "sensor_msgs/msg/PointCloud2");
+        for (chunk, message) in summary.chunk_indexes.iter().zip(&messages) {
+            let found: Vec<_> =
+                summary.stream_chunk(&bytes, chunk).unwrap().map(|found| found.unwrap()).collect();
+            assert_eq!(found.len(), 1);
+            assert_eq!(found[0].data, message.data);
+            let index = summary.read_message_indexes(&bytes, chunk).unwrap();
+            let entry = index.values().next().unwrap()[0];
+            assert_eq!(summary.seek_message(&bytes, chunk, &entry).unwrap().data, message.data);
+        }
     }
 }

@@ -29,6 +29,8 @@ mod las_layout;
 mod lattice;
 #[cfg(feature = "ros")]
 mod mcap;
+#[cfg(feature = "ros")]
+mod mcap_file;
 mod nav2;
 mod npz;
 mod open;

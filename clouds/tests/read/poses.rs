@@ -40,6 +40,21 @@ fn stamps_are_exact_and_poses_lie_between() {
 }
 
 #[test]
+fn a_time_beyond_an_end_by_rounding_alone_has_the_pose_there() {
+    let trajectory = read("10.0000 1 0 0 0 0 0 1\n10.1001 2 0 0 0 0 0 1\n10.2003 3 0 0 0 0 0 1\n").unwrap();
+    let last_ns = 10_200_300_000;
+    let Found::Exact(last) = trajectory.at(last_ns + 50_000, 0) else { panic!() };
+    assert_eq!(last.position_m[0], 3.0);
+    assert_eq!(trajectory.at(last_ns + 50_001, i64::MAX), Found::After { last_ns });
+    assert!(matches!(trajectory.at(9_999_950_000, 0), Found::Exact(_)));
+    assert!(matches!(trajectory.at(9_999_949_999, 0), Found::Before { .. }));
+    // Whole seconds need not be rounded.
+    let trajectory = read("10 1 0 0 0 0 0 1\n11 2 0 0 0 0 0 1\n").unwrap();
+    assert!(matches!(trajectory.at(11_000_500_000, 0), Found::Exact(_)));
+    assert!(matches!(trajectory.at(11_000_500_001, 0), Found::After { .. }));
+}
+
+#[test]
 fn stamps_out_of_order_and_twice_are_remarked() {
     let trajectory = read("2 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n").unwrap();
     assert_eq!(trajectory.stamps_ns().collect::<Vec<_>>(), [1_000_000_000, 2_000_000_000]);
