@@ -49,7 +49,7 @@ fuzz() {
     if [[ -e dictionaries/$target.dict ]]; then dictionary=("-dict=dictionaries/$target.dict"); fi
     "$program" -max_total_time="$seconds" -max_len=65536 -timeout=10 -rss_limit_mb=1024 \
         -artifact_prefix="artifacts/$target/" "${dictionary[@]}" \
-        "target/corpus/$target" "corpus/$target" >"target/$target.log" 2>&1 || outcome="FINDING, see target/$target.log"
+        "target/corpus/$target" "corpus/$target" >"target/$target.log" 2>&1 || outcome="FINDING (exit status $?), see target/$target.log"
     # The program leaves its numbers in the last line that has them, and its runs as `#N`.
     awk -v target="$target" -v outcome="$outcome" '
         /^#[0-9]+/ { runs = substr($1, 2) }

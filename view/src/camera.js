@@ -91,11 +91,19 @@ export class Flight {
   // All of a box, from a direction.
   fit(box, from = [-0.6, -1, 0.8]) {
     const center = box.getCenter(new THREE.Vector3());
-    const radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 0.5);
-    const narrow = Math.min(1, this.camera.aspect);
-    const distance = radius / Math.sin(THREE.MathUtils.degToRad(this.camera.fov / 2)) / narrow;
-    const position = center.clone().addScaledVector(new THREE.Vector3(...from).normalize(), 0.85 * distance);
-    this.step = radius / 30;
-    this.lookAt(position.toArray(), center.toArray());
+    const half = box.getSize(new THREE.Vector3()).multiplyScalar(0.5).max(new THREE.Vector3(0.25, 0.25, 0.25));
+    const back = new THREE.Vector3(...from).normalize();
+    const right = new THREE.Vector3().crossVectors(this.camera.up, back).normalize();
+    const up = new THREE.Vector3().crossVectors(back, right);
+    const high = Math.tan(THREE.MathUtils.degToRad(this.camera.fov / 2));
+    // As near as every corner allows.
+    let distance = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const at = half.clone().multiply(new THREE.Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
+      const aside = Math.max(Math.abs(at.dot(up)) / high, Math.abs(at.dot(right)) / (high * this.camera.aspect));
+      distance = Math.max(distance, at.dot(back) + 1.05 * aside);
+    }
+    this.step = half.length() / 30;
+    this.lookAt(center.clone().addScaledVector(back, distance).toArray(), center.toArray());
   }
 }

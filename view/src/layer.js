@@ -6,7 +6,7 @@ import { makeMaterial, tintLayer } from './material.js';
 
 const MOST_BYTES = 256 * 2 ** 20;
 const MOST_DRAWN = 180;
-const BEST_ERROR = 4;
+const BEST_ERROR = 2;
 const MOST_ERROR = 4096;
 // Tiles whose free or unknown voxels are shown at once.
 const MOST_NEAR = 24;

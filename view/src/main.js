@@ -319,6 +319,8 @@ window.addEventListener('hashchange', () => {
 async function change(id) {
   const known = maps.find((map) => map.id === id);
   const [low, high, was] = [known.low, known.high, known.generation];
+  // Before that, the map was only being read.
+  const wasShown = known.pending_tiles === 0 && was > 0;
   await readMaps();
   await readExtents().catch(() => {});
   const map = maps.find((one) => one.id === id);
@@ -329,7 +331,7 @@ async function change(id) {
   }
   if (was === 0 || low === high) start();
   else viewer.surround(allBounds());
-  if (map.pending_tiles === 0 && was > 0) {
+  if (wasShown && map.generation !== was) {
     $('live').hidden = false;
     $('live').title = `flush ${map.generation}`;
   }

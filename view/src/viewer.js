@@ -82,7 +82,10 @@ export class Viewer {
 
   // Draws soon.
   wake() {
-    this.settled = false;
+    if (this.settled) {
+      this.settled = false;
+      for (const listener of this.listeners) listener(this);
+    }
     if (this.waits) return;
     this.waits = true;
     requestAnimationFrame((now) => this.frame(now));

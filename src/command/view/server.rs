@@ -7,7 +7,9 @@ use bytes::Bytes;
 use http_body_util::BodyExt;
 use http_body_util::channel::Channel;
 use hyper::body::Incoming;
-use hyper::header::{ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_TYPE, HOST, HeaderValue, LOCATION};
+use hyper::header::{
+    ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONNECTION, CONTENT_TYPE, HOST, HeaderValue, LOCATION,
+};
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
@@ -21,7 +23,9 @@ use tokio_io_timeout::TimeoutStream;
 
 /// Connections at once; others wait to be accepted.
 const CONNECTIONS: usize = 512;
-/// A connection that sends no request, or takes nothing of an answer, for so long is closed.
+/// A connection that sends no request for so long is closed: whoever holds connections back holds them no longer.
+const SILENCE: Duration = Duration::from_secs(5);
+/// One that takes nothing of an answer for so long, too.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Something is sent this often to those who wait for events.
 const ALIVE_EVERY: Duration = Duration::from_secs(15);
@@ -87,7 +91,7 @@ impl Server {
                 });
                 let connection = http1::Builder::new()
                     .timer(TokioTimer::new())
-                    .header_read_timeout(PATIENCE)
+                    .header_read_timeout(SILENCE)
                     .serve_connection(TokioIo::new(Box::pin(stream)), service);
                 if let Err(error) = connection.await {
                     log::debug!("a connection ended: {error}");
@@ -113,6 +117,8 @@ impl Server {
             Err(answer) => {
                 let is_wrong_method = answer.status == StatusCode::METHOD_NOT_ALLOWED;
                 let mut response = answer.into_response(takes_gzip);
+                // Strangers keep no connection.
+                response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
                 if is_wrong_method {
                     response.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
                 }

@@ -61,10 +61,10 @@ impl Legend {
             canvas.text(left + length + 8 * dot, line, dot, palette::FAINT_INK, &label);
         }
         let right = canvas.width() - margin;
-        let bar = (canvas.width() / 4).max(1);
+        let bar = self.bar_width(canvas.width(), dot);
         self.draw_scale(canvas, [right, bar], foot, dot);
         // What is not occupied.
-        let swatch = right - bar - 74 * dot;
+        let swatch = right.saturating_sub(bar + 74 * dot);
         for (top, color, label) in
             [(foot + 4 * dot, palette::FREE, "free"), (line, palette::UNKNOWN, "unknown")]
         {
@@ -87,22 +87,48 @@ impl Legend {
             draw_swatch(canvas, [left + 68 * dot, top], dot, palette::SAME, "same");
             return;
         };
-        let Some([least, most]) = *range else { return };
+        let Some(range) = *range else { return };
         for x in 0..bar {
             let color = color_of(x as f64 / (bar - 1).max(1) as f64);
             canvas.fill(right - bar + x, bottom - 7 * dot, [1, 7 * dot], color, 1.0);
         }
-        let (name, low, high) = match color_by {
-            ColorBy::Height => ("height", height_label(least), height_label(most)),
-            ColorBy::Probability => ("probability", format!("{least:.2}"), format!("{most:.2}")),
-            ColorBy::Count => ("count", format!("{least:.0}"), format!("{most:.0}")),
-            ColorBy::LastScan => ("last scan", format!("{least:.0}"), format!("{most:.0}")),
-        };
+        let (name, [low, high]) = labels(*color_by, range);
         canvas.text(right - bar, top, dot, palette::INK, &low);
         canvas.text_before(right, top, dot, palette::INK, &high);
-        let middle = right - bar / 2 + font::width_of(name) * dot / 2;
-        canvas.text_before(middle, top, dot, palette::FAINT_INK, name);
+        if bar >= needed_width(name, [&low, &high], dot) {
+            let space = [font::width_of(&low), font::width_of(&high)];
+            let middle = right - bar / 2 + (space[0] + font::width_of(name)) * dot / 2 - space[1] * dot / 2;
+            canvas.text_before(middle, top, dot, palette::FAINT_INK, name);
+        }
     }
+
+    /// Pixels that the colors take: a quarter of the picture, and up to half of it for what is written above them.
+    fn bar_width(&self, width: usize, dot: usize) -> usize {
+        let needed = match &self.scale {
+            Scale::Values { color_by, range: Some(range) } => {
+                let (name, [low, high]) = labels(*color_by, *range);
+                needed_width(name, [&low, &high], dot)
+            }
+            _ => 0,
+        };
+        needed.min(width / 2).max(width / 4).max(1)
+    }
+}
+
+/// What is written above the colors: what they stand for, and the value of the first and the last.
+fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [String; 2]) {
+    match color_by {
+        ColorBy::Height => ("height", [least, most].map(height_label)),
+        ColorBy::Probability => ("probability", [least, most].map(|value| format!("{value:.2}"))),
+        ColorBy::Count => ("count", [least, most].map(|value| format!("{value:.0}"))),
+        ColorBy::LastScan => ("last scan", [least, most].map(|value| format!("{value:.0}"))),
+    }
+}
+
+/// Pixels of a name between two values, with gaps.
+fn needed_width(name: &str, ends: [&str; 2], dot: usize) -> usize {
+    let letters = font::width_of(name) + ends.map(font::width_of).iter().sum::<usize>();
+    (letters + 2 * 6) * dot
 }
 
 fn draw_swatch(canvas: &mut Canvas, [left, top]: [usize; 2], dot: usize, color: palette::Rgb, label: &str) {
@@ -128,5 +154,16 @@ mod tests {
     fn a_height_just_below_zero_is_written_as_zero() {
         assert_eq!(height_label(-0.04), "0.0 m");
         assert_eq!(height_label(-1.26), "-1.3 m");
+    }
+
+    #[test]
+    fn a_name_and_its_values_do_not_overlap() {
+        for (width, dot, is_named) in [(2000, 2, true), (600, 3, true), (240, 2, false)] {
+            let scale = Scale::Values { color_by: ColorBy::Height, range: Some([-12.5, 108.6]) };
+            let legend = Legend { metres_a_pixel: 0.1, lines_m: None, axes: [0, 2], has_path: false, scale };
+            let bar = legend.bar_width(width, dot);
+            assert!(bar <= width / 2);
+            assert_eq!(bar >= needed_width("height", ["-12.5 m", "108.6 m"], dot), is_named, "{width}");
+        }
     }
 }
