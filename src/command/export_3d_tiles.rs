@@ -102,7 +102,7 @@ impl Export<'_> {
         self.write_json(&self.folder.join("tileset.json"), &root)?;
         let heights_m = self.heights_m();
         self.levels.keys().into_par_iter().try_for_each(|key| {
-            let within = self.levels.keys_within(self.map, key)?;
+            let within = self.levels.keys_within(self.map, self.store, key)?;
             if self.levels.is_tile(key) {
                 next_tile();
             }

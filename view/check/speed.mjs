@@ -17,7 +17,7 @@ const server = spawn(process.env.VOXTILE, ['view', map, '--json'], { stdio: ['ig
 const agent = new Agent({ keepAlive: true, maxSockets: 8 });
 
 const bytes = (url) => new Promise((resolve, reject) => {
-  get(url, { agent }, (response) => {
+  get(url, { agent, headers: { 'accept-encoding': 'gzip' } }, (response) => {
     const parts = [];
     response.on('data', (part) => parts.push(part)).on('error', reject);
     response.on('end', () => (response.statusCode === 200 ? resolve(Buffer.concat(parts)) : reject(new Error(`${response.statusCode} ${url}`))));
@@ -52,8 +52,9 @@ async function nodes(url) {
   return [...found];
 }
 
-async function round(urls) {
+async function round(url) {
   const [since, before] = [performance.now(), cpu()];
+  const urls = await nodes(url);
   const sum = { nodes: urls.length, wire_bytes: 0, voxels: 0 };
   const left = [...urls];
   await Promise.all(Array.from({ length: 8 }, async () => {
@@ -81,8 +82,7 @@ try {
     }
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
-  const urls = await nodes(url);
-  for (const what of ['made and sent', 'sent again']) console.log(JSON.stringify({ what, ...(await round(urls)) }));
+  for (const what of ['made and sent', 'sent again']) console.log(JSON.stringify({ what, ...(await round(url)) }));
 } finally {
   agent.destroy();
   server.kill();

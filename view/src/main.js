@@ -85,7 +85,7 @@ function describe() {
   const tiles = map.tiles.toLocaleString('en');
   const lost = map.unreadable?.length ? `, ${map.unreadable.length} damaged` : '';
   const rest = map.pending_tiles ? `; reading the map: ${map.pending_tiles.toLocaleString('en')} tiles left` : '';
-  $('facts').textContent = `${tiles} tiles${lost} of ${map.tile_size_m} m, voxels of ${map.resolution_m} m${map.scans ? `, ${map.scans.toLocaleString('en')} scans` : ''}${rest}`;
+  $('facts').textContent = `${tiles} tiles${lost} of ${map.tile_size_m} m, voxels of ${map.resolution_m} m${map.scans ? `, ${map.scans.toLocaleString('en')} ${map.scans === 1 ? 'scan' : 'scans'}` : ''}${rest}`;
 }
 
 async function readMaps() {

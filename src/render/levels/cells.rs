@@ -4,6 +4,7 @@ use crate::config::MapConfig;
 use crate::sensor::{Evidence, SensorModel};
 use crate::tile::Tile;
 use rustc_hash::FxHashSet;
+use std::collections::BTreeMap;
 
 /// What the voxels of a node are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -114,6 +115,34 @@ impl Cells {
             }
         }
         Self { cells: merged(cells), last_scan }
+    }
+
+    /// The occupied voxels of all nodes of a tile: of itself, and of each block of it.
+    pub(super) fn of_nodes_of_tile(
+        scheme: Scheme,
+        tile: &Tile,
+        config: &MapConfig,
+        last_scan: u64,
+    ) -> BTreeMap<NodeKey, Self> {
+        let index = tile.index();
+        let keys = scheme.nodes_of_tile(index).into_iter();
+        let mut nodes: BTreeMap<_, _> =
+            keys.map(|key| (key, Self { cells: Vec::new(), last_scan })).collect();
+        let (threshold, scale) = (config.occupied_log_odds(), Scale::of(config, Kind::Occupied));
+        for voxel in tile.voxels().filter(|voxel| voxel.evidence.log_odds >= threshold) {
+            let value = scale.value(voxel.evidence.log_odds);
+            let count = count_of(voxel.evidence.observation_count);
+            for level in 0..=scheme.tile_level() {
+                let (key, at) = scheme.node_of_voxel(index, voxel.index, level);
+                if let Some(node) = nodes.get_mut(&key) {
+                    node.cells.push(Cell { place: place(at), value, count });
+                }
+            }
+        }
+        for node in nodes.values_mut() {
+            node.cells = merged(std::mem::take(&mut node.cells));
+        }
+        nodes
     }
 
     /// Takes in the voxels of a node within this one's: each becomes a part of a coarser one, which has the largest of

@@ -127,9 +127,9 @@ impl<V: MapView> TilesetNodes for Difference<'_, V> {
         self.after.tile_level()
     }
 
-    fn within_tile(&self, key: NodeKey) -> Result<BTreeSet<NodeKey>> {
-        let mut blocks = self.before.within_tile(key)?;
-        blocks.append(&mut self.after.within_tile(key)?);
+    fn within_tile(&self, store: &NodeStore, key: NodeKey) -> Result<BTreeSet<NodeKey>> {
+        let mut blocks = self.before.within_tile(store, key)?;
+        blocks.append(&mut self.after.within_tile(store, key)?);
         Ok(blocks)
     }
 }

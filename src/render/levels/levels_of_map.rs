@@ -10,7 +10,7 @@ use crate::space::{Aabb, Point, TileBox, TileIndex};
 use parking_lot::Mutex;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The levels of detail of one state of a map, or of some of its tiles.
 ///
@@ -218,12 +218,15 @@ impl Levels {
 
     /// The occupied voxels of a node.
     pub(super) fn cells<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
-        if let Some(tile) = self.scheme.tile_of(key) {
-            return self.cells_of_tile(map, key, tile, Kind::Occupied);
-        }
-        let Some(node) = self.get(key) else { return Ok(Cells::default()) };
-        match store.get(key, node.version)?.map(|bytes| node_bytes::decode(&bytes)) {
-            Some(Ok(cells)) => Ok(cells),
+        let tile = self.scheme.tile_of(key);
+        let Some(node) = self.get(tile.map_or(key, |tile| self.scheme.key_of_tile(tile))) else {
+            return Ok(Cells::default());
+        };
+        let store_of_key = tile.map_or(Some(store), |tile| Self::store_of_tile(map, store, tile));
+        let kept = store_of_key.map(|store| store.get(key, node.version)).transpose()?.flatten();
+        match (kept.map(|bytes| node_bytes::decode(&bytes)), tile) {
+            (Some(Ok(cells)), _) => Ok(cells),
+            (_, Some(tile)) => self.cells_of_tile(map, key, tile, Kind::Occupied),
             // What is kept for later may have been damaged: it is made again.
             _ => {
                 let cells = self.pooled(map, store, key)?;
@@ -236,6 +239,40 @@ impl Levels {
         let last_scan = self.nodes.get(&self.scheme.key_of_tile(tile)).map_or(0, |node| node.last_scan);
         let Some(tile) = map.tile_uncached(tile)? else { return Ok(Cells::default()) };
         Ok(Cells::of_tile(self.scheme, key, &tile, &self.config, kind, last_scan))
+    }
+
+    /// The store for nodes of a tile, if its version tells what is in them: those of OctoMap's files have none.
+    fn store_of_tile<'s, V: MapView>(
+        map: &V,
+        store: &'s NodeStore,
+        tile: TileIndex,
+    ) -> Option<&'s NodeStore> {
+        map.version_of_tile(tile).map(|_| store)
+    }
+
+    /// Makes and stores all nodes of a tile; whoever asks for one of them will ask for the others. The bytes of each, and
+    /// how many voxels it has.
+    fn make_nodes_of_tile<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        tile: TileIndex,
+    ) -> Result<BTreeMap<NodeKey, (Vec<u8>, usize)>> {
+        let Some(node) = self.nodes.get(&self.scheme.key_of_tile(tile)) else { return Ok(BTreeMap::new()) };
+        let Some(read) = map.tile_uncached(tile)? else { return Ok(BTreeMap::new()) };
+        let made = Cells::of_nodes_of_tile(self.scheme, &read, &self.config, node.last_scan).into_iter();
+        let store = Self::store_of_tile(map, store, tile);
+        let made = made.map(|(key, cells)| {
+            let bytes = node_bytes::encode(&self.head(key, Kind::Occupied), &cells);
+            let (bounds, voxels) = (cells.bounds().unwrap_or_default(), cells.cells.len());
+            // They can be made again: a full disk is no reason to show nothing.
+            let put = store.map(|store| store.put(key, node.version, &bytes, bounds, voxels as u32));
+            if let Some(Err(error)) = put {
+                log::debug!("{error:#}");
+            }
+            (key, (bytes, voxels))
+        });
+        Ok(made.collect())
     }
 
     /// The bytes of a node (`docs/view.md`), compressed as gzip; `None` if there is no such node. Only nodes that are
@@ -265,6 +302,13 @@ impl Levels {
         };
         let cells = match kind {
             Kind::Occupied if !node.is_occupied => Cells { last_scan: node.last_scan, ..Cells::default() },
+            Kind::Occupied => {
+                let kept = Self::store_of_tile(map, store, tile).map(|store| store.get(key, node.version));
+                if let Some(bytes) = kept.transpose()?.flatten() {
+                    return Ok(Some(bytes));
+                }
+                return Ok(self.make_nodes_of_tile(map, store, tile)?.remove(&key).map(|(bytes, _)| bytes));
+            }
             _ => self.cells_of_tile(map, key, tile, kind)?,
         };
         Ok(Some(node_bytes::encode(&head, &cells)))
@@ -304,33 +348,35 @@ impl Levels {
     /// # Errors
     ///
     /// A tile that cannot be read.
-    pub fn keys_within<V: MapView>(&self, map: &V, tile: NodeKey) -> Result<Vec<NodeKey>> {
+    pub fn keys_within<V: MapView>(&self, map: &V, store: &NodeStore, tile: NodeKey) -> Result<Vec<NodeKey>> {
         match self.scheme.tile_of(tile).filter(|_| tile.level == self.scheme.tile_level() && tile.level > 0) {
-            Some(index) => Ok(self.blocks_of_tile(map, index)?.into_iter().collect()),
+            Some(index) => Ok(self.blocks_of_tile(map, store, index)?.into_iter().collect()),
             None => Ok(Vec::new()),
         }
     }
 
-    /// The finest blocks of a tile that have occupied voxels, and all above them within the tile.
-    pub(super) fn blocks_of_tile<V: MapView>(&self, map: &V, tile: TileIndex) -> Result<BTreeSet<NodeKey>> {
-        let mut blocks = BTreeSet::new();
+    /// The blocks of a tile that have occupied voxels, at every level.
+    pub(super) fn blocks_of_tile<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        tile: TileIndex,
+    ) -> Result<BTreeSet<NodeKey>> {
         let own = self.scheme.key_of_tile(tile);
-        let mut level = vec![own];
-        while let Some(key) = level.pop() {
-            if key.level == 0 {
-                if !self.cells_of_tile(map, key, tile, Kind::Occupied)?.cells.is_empty() {
-                    let mut above = key;
-                    while above != own && blocks.insert(above) {
-                        above = above.parent();
-                    }
-                }
-                continue;
+        let Some(node) = self.nodes.get(&own) else { return Ok(BTreeSet::new()) };
+        let keys = self.scheme.nodes_of_tile(tile).into_iter();
+        let kept = Self::store_of_tile(map, store, tile);
+        let known: Option<Vec<_>> =
+            keys.map(|key| Some((key, kept?.find(key, node.version)?.voxels as usize))).collect();
+        let voxels = match known {
+            Some(known) => known,
+            None => {
+                let made = self.make_nodes_of_tile(map, store, tile)?.into_iter();
+                made.map(|(key, (_, voxels))| (key, voxels)).collect()
             }
-            level.extend(
-                key.children().filter(|&child| self.scheme.edges(child).iter().all(|&edge| edge > 0)),
-            );
-        }
-        Ok(blocks)
+        };
+        let blocks = voxels.into_iter().filter(|&(key, voxels)| key != own && voxels > 0);
+        Ok(blocks.map(|(key, _)| key).collect())
     }
 
     pub(super) fn head(&self, key: NodeKey, kind: Kind) -> Head {

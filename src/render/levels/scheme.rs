@@ -40,6 +40,27 @@ impl Scheme {
         Some(key.index.map(|k| k >> finer).into())
     }
 
+    /// The nodes of a tile: itself and all blocks of it, at every level.
+    pub(super) fn nodes_of_tile(self, tile: TileIndex) -> Vec<NodeKey> {
+        let mut keys = vec![self.key_of_tile(tile)];
+        let mut next = 0;
+        while let Some(key) = keys.get(next).copied().filter(|key| key.level > 0) {
+            keys.extend(key.children().filter(|&child| self.edges(child).iter().all(|&edge| edge > 0)));
+            next += 1;
+        }
+        keys
+    }
+
+    /// The node of a level that a voxel of a tile is in, and its place there.
+    pub(super) fn node_of_voxel(self, tile: TileIndex, voxel: [i32; 3], level: u8) -> (NodeKey, [i64; 3]) {
+        let index = tile.to_array();
+        let own = [0, 1, 2].map(|k| (i64::from(voxel[k]) - i64::from(index[k]) * self.tile_edge) >> level);
+        let finer = self.tile_level - level;
+        let block = own.map(|k| (k / MAX_EDGE) as i32);
+        let key = NodeKey { level, index: [0, 1, 2].map(|k| (index[k] << finer) + block[k]) };
+        (key, own.map(|k| k % MAX_EDGE))
+    }
+
     /// The lowest voxel of a node, in voxels of the map.
     pub(super) fn first_voxel(self, key: NodeKey) -> [i64; 3] {
         match self.tile_level.checked_sub(key.level) {

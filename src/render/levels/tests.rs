@@ -198,7 +198,7 @@ proptest! {
         let mut found = BTreeMap::new();
         for tile in before.tile_indices().into_iter().chain(after.tile_indices()) {
             let top = new.scheme.key_of_tile(tile);
-            let within = difference.within_tile(top).unwrap();
+            let within = difference.within_tile(&store, top).unwrap();
             let keys: Vec<_> = if top.level == 0 { vec![top] } else { within.into_iter().filter(|key| key.level == 0).collect() };
             for key in keys {
                 let bytes = difference.node(&store, key).unwrap().unwrap();

@@ -52,7 +52,7 @@ pub trait TilesetNodes {
     /// # Errors
     ///
     /// A tile that cannot be read.
-    fn within_tile(&self, key: NodeKey) -> Result<BTreeSet<NodeKey>>;
+    fn within_tile(&self, store: &NodeStore, key: NodeKey) -> Result<BTreeSet<NodeKey>>;
 }
 
 /// Levels of a file.
@@ -110,7 +110,7 @@ pub fn subtree(
     if nodes.version(NodeKey { level, ..key }).is_none() || key.level != level {
         return Ok(None);
     }
-    let within = if key.level == nodes.tile_level() { Some(nodes.within_tile(key)?) } else { None };
+    let within = if key.level == nodes.tile_level() { Some(nodes.within_tile(store, key)?) } else { None };
     let writer = Writer { nodes, store, content, to_root: "../../../../" };
     Ok(Some(json!({
         "asset": { "version": "1.1" },
@@ -234,8 +234,8 @@ impl<V: MapView> TilesetNodes for LevelsOf<'_, V> {
         self.levels.scheme.tile_level()
     }
 
-    fn within_tile(&self, key: NodeKey) -> Result<BTreeSet<NodeKey>> {
-        self.levels.blocks_of_tile(self.map, key.index.into())
+    fn within_tile(&self, store: &NodeStore, key: NodeKey) -> Result<BTreeSet<NodeKey>> {
+        self.levels.blocks_of_tile(self.map, store, key.index.into())
     }
 }
 

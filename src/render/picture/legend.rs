@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_name_and_its_values_do_not_overlap() {
-        for (width, dot, is_named) in [(2000, 2, true), (600, 3, true), (240, 2, false)] {
+        for (width, dot, is_named) in [(2000, 2, true), (600, 2, true), (600, 3, false), (240, 2, false)] {
             let scale = Scale::Values { color_by: ColorBy::Height, range: Some([-12.5, 108.6]) };
             let legend = Legend { metres_a_pixel: 0.1, lines_m: None, axes: [0, 2], has_path: false, scale };
             let bar = legend.bar_width(width, dot);
