@@ -207,6 +207,9 @@ try {
     await browser.ready(300);
     const [calls, bytes] = [await browser.value('voxtile.drawCalls()'), await browser.value('voxtile.bytes()')];
     assert.ok(calls <= 200 && bytes <= 256 * 2 ** 20);
+    // Nor meanwhile.
+    const most = await browser.value('voxtile.mostDrawCalls()');
+    assert.ok(most >= calls && most <= 200, `${most} draw calls`);
     const { tiles } = await maps();
     step(`${tiles} tiles: first picture after ${(first / 1000).toFixed(2)} s of the page (${faces} faces by then); in all ${calls} draw calls, ${(bytes / 2 ** 20).toFixed(1)} MiB`);
   }

@@ -485,6 +485,7 @@ window.voxtile = {
   }, {}),
   faces: () => viewer.layers.flatMap((layer) => layer.meshes()).reduce((sum, [mesh]) => sum + mesh.userData.faces, 0),
   drawCalls: () => viewer.renderer.info.render.calls,
+  mostDrawCalls: () => viewer.mostCalls,
   bytes: () => viewer.layers.reduce((sum, layer) => sum + layer.bytes, 0),
   clickAt,
   screenOf(point) {

@@ -6,6 +6,10 @@ import { sharedUniforms } from './material.js';
 import { KIND } from './node.js';
 import { Overlays } from './overlays.js';
 
+const MOST_CALLS = 200;
+// Way, sensor, marks, grid, bounding box.
+const OVERLAY_CALLS = 8;
+
 // The scene: layers, what lies over them, the camera. It draws only when something changed.
 export class Viewer {
   constructor(canvas, say) {
@@ -30,6 +34,7 @@ export class Viewer {
     this.listeners = [];
     this.firstPictureMs = null;
     this.frames = 0;
+    this.mostCalls = 0;
     this.last = performance.now();
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
@@ -101,8 +106,10 @@ export class Viewer {
     this.paint();
     for (const layer of this.layers) layer.tiles.group.visible = layer.isShown && this.shows.occupied;
     for (const layer of this.layers) layer.near.visible = layer.isShown;
+    this.leaveOutFarthest();
     this.renderer.render(this.scene, this.camera);
     this.frames++;
+    this.mostCalls = Math.max(this.mostCalls, this.renderer.info.render.calls);
     const meshes = this.layers.reduce((sum, layer) => sum + layer.tiles.visibleTiles.size, 0);
     if (this.firstPictureMs === null && meshes > 0) this.firstPictureMs = performance.now();
     // A picture of all that was loaded, and nothing left to load.
@@ -111,6 +118,15 @@ export class Viewer {
     this.wasReady = isReady;
     for (const listener of this.listeners) listener(this);
     if (!this.settled) this.waitAWhile(moved);
+  }
+
+  // Where a view needs more nodes than may be drawn, the farthest are left out until coarser ones are there.
+  leaveOutFarthest() {
+    const near = this.layers.reduce((sum, layer) => sum + (layer.isShown ? layer.near.children.length : 0), 0);
+    const shown = this.layers.filter((layer) => layer.isShown).flatMap((layer) => layer.meshes());
+    const most = MOST_CALLS - OVERLAY_CALLS - near;
+    if (shown.length > most) shown.sort((a, b) => a[1].traversal.distanceFromCamera - b[1].traversal.distanceFromCamera);
+    shown.forEach(([mesh], k) => { mesh.visible = k < most; });
   }
 
   // Depth is told apart where the map is, not before and behind it.
