@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Builds the Python package, installs it into an empty environment, and tests it there: behaviour, types, stubs.
+#
+#   python/check.sh [PYTEST ARGUMENTS]
+#
+# Needs python3 with venv, and the network for maturin, pytest and mypy. The build is that of the tests, which is made
+# in a few minutes; `maturin build --release` makes the wheel to hand out.
+set -euo pipefail
+cd "$(dirname "$0")"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+python3 -m venv "$work/venv"
+python=$work/venv/bin/python
+"$python" -m pip install --quiet --disable-pip-version-check matplotlib mypy pytest
+MATURIN_PEP517_ARGS="--profile dev --locked" "$python" -m pip install --quiet --disable-pip-version-check .
+# Beside the sources, Python would find the package without its module.
+cp -r tests "$work/tests"
+mkdir "$work/docs"
+cp ../docs/python.md "$work/docs"
+mkdir "$work/python"
+mv "$work/tests" "$work/python/tests"
+cd "$work/python"
+"$python" -m pytest --quiet tests "$@"
+"$python" -m mypy --strict --package voxtile
+"$python" -m mypy.stubtest voxtile
+"$python" -c '
+import pathlib, subprocess, sys, voxtile
+began = "import time; began = time.perf_counter(); import numpy; between = time.perf_counter(); import voxtile; "
+took = subprocess.check_output([sys.executable, "-c", began + "print(round(1e3 * (time.perf_counter() - between)))"])
+size = next(pathlib.Path(voxtile.__file__).parent.glob("_voxtile*.so")).stat().st_size
+print(f"module: {size / 1e6:.1f} MB; import after numpy: {int(took)} ms")
+'

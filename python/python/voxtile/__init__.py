@@ -1,0 +1,60 @@
+"""Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
+
+A ``Map`` takes scans (``insert``) and answers questions about many points, rays and boxes at once; lengths are in
+metres, points are arrays of N x 3. Functions of this module work on whole maps on disk, and raise the exceptions of
+``voxtile.errors``. Progress callbacks get what is done and how much there is.
+
+Where processes are forked with maps open, threads are missing in the child: start processes with ``spawn``, and open
+maps there.
+"""
+
+from . import errors
+from ._voxtile import (
+    InsertReport,
+    Map,
+    ScanIterator,
+    TileIterator,
+    build,
+    clear,
+    convert,
+    crop,
+    decay,
+    delete_snapshot,
+    diff,
+    import_octree,
+    merge,
+    repair,
+    revert,
+    scans,
+    snapshots,
+    verify,
+)
+from .errors import VoxtileError
+from .whole_maps import digest, export, open, snapshot
+
+__all__ = [
+    "InsertReport",
+    "Map",
+    "ScanIterator",
+    "TileIterator",
+    "VoxtileError",
+    "build",
+    "clear",
+    "convert",
+    "crop",
+    "decay",
+    "delete_snapshot",
+    "diff",
+    "digest",
+    "errors",
+    "export",
+    "import_octree",
+    "merge",
+    "open",
+    "repair",
+    "revert",
+    "scans",
+    "snapshot",
+    "snapshots",
+    "verify",
+]

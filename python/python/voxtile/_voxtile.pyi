@@ -1,0 +1,251 @@
+from collections.abc import Callable, Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+from subprocess import Popen
+from types import TracebackType
+from typing import Any, Literal, NoReturn, TypeAlias, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "InsertReport",
+    "Map",
+    "ScanIterator",
+    "TileIterator",
+    "build",
+    "clear",
+    "convert",
+    "crop",
+    "decay",
+    "delete_snapshot",
+    "diff",
+    "import_octree",
+    "merge",
+    "repair",
+    "revert",
+    "run_command",
+    "scans",
+    "snapshots",
+    "verify",
+]
+
+_Path: TypeAlias = str | PathLike[str]
+_MapOrSnapshot: TypeAlias = _Path | tuple[_Path, str]
+_Progress: TypeAlias = Callable[[int, int], object]
+_Pose: TypeAlias = ArrayLike | tuple[ArrayLike, ArrayLike]
+_Scan: TypeAlias = tuple[ArrayLike, _Pose] | tuple[ArrayLike, _Pose, ArrayLike | None]
+_Unknown: TypeAlias = Literal["free", "obstacle"]
+_Storage: TypeAlias = Literal["octomap", "compact"]
+_InsertMode: TypeAlias = Literal["per-scan", "per-ray"]
+_SensorModel: TypeAlias = Literal["log-odds", "iwlo"]
+_Probabilities: TypeAlias = Sequence[float]
+
+@final
+class InsertReport:
+    @property
+    def points(self) -> int: ...
+    @property
+    def skipped(self) -> int: ...
+    @property
+    def not_finite(self) -> int: ...
+    @property
+    def out_of_range(self) -> int: ...
+    @property
+    def no_return(self) -> int: ...
+    @property
+    def too_near(self) -> int: ...
+    @property
+    def ray_too_long(self) -> int: ...
+    @property
+    def no_intensity(self) -> int: ...
+    @property
+    def cut_at_max_range(self) -> int: ...
+    @property
+    def hits(self) -> int: ...
+    @property
+    def misses(self) -> int: ...
+    @property
+    def tiles_touched(self) -> int: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+
+@final
+class Map:
+    @staticmethod
+    def create(
+        path: _Path,
+        resolution: float = 0.1,
+        *,
+        tile_size: float = 10.0,
+        min_range: float = 0.0,
+        max_range: float | None = None,
+        insert_mode: _InsertMode = "per-scan",
+        sensor_model: _SensorModel = "log-odds",
+        probabilities: _Probabilities | None = None,
+        occupancy_threshold: float = 0.5,
+        storage: _Storage = "octomap",
+        memory: int | str | None = None,
+    ) -> Map: ...
+    @staticmethod
+    def open(
+        path: _Path,
+        mode: Literal["r", "r+"] = "r+",
+        *,
+        snapshot: str | None = None,
+        memory: int | str | None = None,
+    ) -> Map: ...
+    @property
+    def path(self) -> Path: ...
+    @property
+    def resolution(self) -> float: ...
+    @property
+    def tile_size(self) -> float: ...
+    @property
+    def occupancy_threshold(self) -> float: ...
+    @property
+    def closed(self) -> bool: ...
+    @property
+    def writable(self) -> bool: ...
+    @property
+    def scan_number(self) -> int: ...
+    @property
+    def bounds(self) -> NDArray[np.float64] | None: ...
+    @property
+    def tiles(self) -> NDArray[np.int32]: ...
+    def insert(
+        self,
+        points: ArrayLike,
+        pose: _Pose | None = None,
+        *,
+        origin: ArrayLike | None = None,
+        intensities: ArrayLike | None = None,
+    ) -> InsertReport: ...
+    def insert_many(self, scans: Iterable[_Scan]) -> InsertReport: ...
+    def flush(self) -> None: ...
+    def close(self, *, flush: bool = True) -> None: ...
+    def __enter__(self) -> Map: ...
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> Literal[False]: ...
+    def refresh(self) -> bool: ...
+    def snapshot(self, name: str) -> None: ...
+    def statistics(self) -> dict[str, Any]: ...
+    def occupancy(self, points: ArrayLike) -> NDArray[np.int8]: ...
+    def probability(self, points: ArrayLike) -> NDArray[np.float64]: ...
+    def log_odds(self, points: ArrayLike) -> NDArray[np.float64]: ...
+    def counts(self, points: ArrayLike) -> NDArray[np.int32]: ...
+    def cast_rays(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        *,
+        max_range: float | None = None,
+        unknown: _Unknown = "free",
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
+    def nearest(
+        self, points: ArrayLike, max_distance: float = 10.0
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]: ...
+    def collides(self, boxes: ArrayLike, *, unknown: _Unknown = "free") -> NDArray[np.bool_]: ...
+    def occupied(
+        self, region: ArrayLike | None = None, min_probability: float | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float32]]: ...
+    def occupied_by_tile(self, min_probability: float | None = None) -> TileIterator: ...
+    def to_dense(
+        self, region: ArrayLike, values: Literal["occupancy", "probability", "log_odds"] = "occupancy"
+    ) -> tuple[NDArray[Any], NDArray[np.float64]]: ...
+    def digest(self) -> str: ...
+    def plot(self, **options: Any) -> Any: ...
+    def view(self) -> Popen[bytes]: ...
+    def _repr_html_(self) -> str: ...
+    def __reduce__(self) -> NoReturn: ...
+
+@final
+class TileIterator:
+    def __iter__(self) -> TileIterator: ...
+    def __next__(self) -> tuple[tuple[int, int, int], NDArray[np.float64], NDArray[np.float32]]: ...
+
+@final
+class ScanIterator:
+    def __iter__(self) -> ScanIterator: ...
+    def __next__(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32] | None]: ...
+    def __length_hint__(self) -> int: ...
+
+def scans(
+    path: _Path,
+    *,
+    poses: _Path | None = None,
+    topic: str | None = None,
+    odometry: str | None = None,
+    fixed_frame: str | None = None,
+    first: int = 0,
+    count: int | None = None,
+    every: int = 1,
+) -> ScanIterator: ...
+def build(
+    path: _Path,
+    output: _Path,
+    *,
+    resolution: float = 0.1,
+    tile_size: float = 10.0,
+    min_range: float = 0.0,
+    max_range: float | None = None,
+    insert_mode: _InsertMode = "per-scan",
+    sensor_model: _SensorModel = "log-odds",
+    probabilities: _Probabilities | None = None,
+    occupancy_threshold: float = 0.5,
+    storage: _Storage = "octomap",
+    memory: int | str | None = None,
+    poses: _Path | None = None,
+    topic: str | None = None,
+    odometry: str | None = None,
+    fixed_frame: str | None = None,
+    first: int = 0,
+    count: int | None = None,
+    every: int = 1,
+    progress: _Progress | None = None,
+) -> InsertReport: ...
+def snapshots(map: _Path) -> list[dict[str, Any]]: ...
+def delete_snapshot(map: _Path, name: str) -> None: ...
+def diff(first: _MapOrSnapshot, second: _MapOrSnapshot, *, progress: _Progress | None = None) -> dict[str, Any]: ...
+def revert(
+    map: _Path, name: str, *, keep_as: str | None = None, progress: _Progress | None = None
+) -> dict[str, Any]: ...
+def merge(
+    maps: Sequence[_MapOrSnapshot],
+    output: _Path,
+    *,
+    prefer: Literal["first", "last", "more-observed"] | None = None,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def crop(
+    map: _MapOrSnapshot,
+    output: _Path,
+    region: ArrayLike,
+    *,
+    outside: bool = False,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def convert(
+    map: _MapOrSnapshot, output: _Path, storage: _Storage, *, progress: _Progress | None = None
+) -> dict[str, Any]: ...
+def import_octree(
+    file: _Path, output: _Path, *, storage: _Storage = "octomap", progress: _Progress | None = None
+) -> dict[str, Any]: ...
+def clear(
+    map: _Path, region: ArrayLike, *, outside: bool = False, progress: _Progress | None = None
+) -> dict[str, Any]: ...
+def decay(
+    map: _Path,
+    halflife_scans: float,
+    *,
+    scans: int | None = None,
+    forget_below: float = 0.0,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def verify(map: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
+def repair(map: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
+def run_command(arguments: Sequence[str]) -> None: ...

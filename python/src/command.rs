@@ -1,0 +1,16 @@
+//! The command `voxtile` of the wheel.
+
+use pyo3::prelude::*;
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// The command with `arguments`, the program's name first. Ends the process with its exit code.
+#[pyfunction]
+pub fn run_command(py: Python<'_>, arguments: Vec<OsString>) {
+    py.detach(|| {
+        let code = voxtile::command::run(arguments);
+        // The only way to a code's number.
+        let failed = (1..=u8::MAX).find(|&number| ExitCode::from(number) == code);
+        std::process::exit(failed.map_or(0, i32::from))
+    })
+}

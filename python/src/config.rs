@@ -1,0 +1,83 @@
+//! How a map is made, from keyword arguments.
+
+use crate::errors::{exception, wrong};
+use bytesize::ByteSize;
+use pyo3::prelude::*;
+use voxtile::sensor::{Iwlo, LogOdds};
+use voxtile::{InsertMode, MapConfig, MemoryLimit, SensorModel, Storage};
+
+/// What a map may use of memory unless something else is asked for.
+const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
+
+/// What [`config_of`] makes a configuration of.
+pub struct ConfigArguments<'a, 'py> {
+    pub resolution: f64,
+    pub tile_size: f64,
+    pub min_range: f64,
+    pub max_range: Option<f64>,
+    pub insert_mode: &'a str,
+    pub sensor_model: &'a str,
+    pub probabilities: Option<[f64; 4]>,
+    pub occupancy_threshold: f64,
+    pub storage: &'a str,
+    pub memory: Option<Bound<'py, PyAny>>,
+}
+
+/// The configuration of a new map.
+pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResult<MapConfig> {
+    let raised = |error: voxtile::Error| exception(py, &error);
+    let insert_mode = match arguments.insert_mode {
+        "per-scan" => InsertMode::PerScan,
+        "per-ray" => InsertMode::PerRay,
+        other => {
+            return Err(wrong(py, "insert_mode", format!("{other:?} is neither 'per-scan' nor 'per-ray'")));
+        }
+    };
+    let sensor_model = match (arguments.sensor_model, arguments.probabilities) {
+        ("log-odds", None) => SensorModel::default(),
+        ("log-odds", Some([hit, miss, min, max])) => {
+            SensorModel::LogOdds(LogOdds::from_probabilities(hit, miss, min, max).map_err(raised)?)
+        }
+        ("iwlo", None) => SensorModel::Iwlo(Iwlo::default()),
+        ("iwlo", Some(_)) => {
+            return Err(wrong(py, "probabilities", "are of the sensor model 'log-odds' alone"));
+        }
+        (other, _) => {
+            return Err(wrong(py, "sensor_model", format!("{other:?} is neither 'log-odds' nor 'iwlo'")));
+        }
+    };
+    let mut config = MapConfig::new(arguments.resolution, arguments.tile_size)
+        .map_err(raised)?
+        .with_sensor_model(sensor_model)
+        .with_range(arguments.min_range, arguments.max_range)
+        .with_insert_mode(insert_mode)
+        .with_storage(storage_of(py, arguments.storage)?);
+    config.occupancy_threshold = arguments.occupancy_threshold;
+    let bytes = match &arguments.memory {
+        Some(memory) => bytes_of(memory)?,
+        None => MemoryLimit::least_bytes(&config.grid).max(DEFAULT_MEMORY_BYTES),
+    };
+    config.with_memory_bytes(bytes).validated().map_err(raised)
+}
+
+/// The storage of a new map, by its name.
+pub fn storage_of(py: Python<'_>, storage: &str) -> PyResult<Storage> {
+    match storage {
+        "octomap" => Ok(Storage::OctoMap),
+        "compact" => Ok(Storage::Compact),
+        other => Err(wrong(py, "storage", format!("{other:?} is neither 'octomap' nor 'compact'"))),
+    }
+}
+
+/// Bytes of memory: a number, or a text such as `"512MiB"`.
+pub fn bytes_of(memory: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let py = memory.py();
+    if let Ok(bytes) = memory.extract::<usize>() {
+        return Ok(bytes);
+    }
+    let no_bytes =
+        || wrong(py, "memory", format!("{memory:?} is no number of bytes; give one, or a text as '512MiB'"));
+    let text: String = memory.extract().map_err(|_| no_bytes())?;
+    let size: ByteSize = text.parse().map_err(|_| no_bytes())?;
+    usize::try_from(size.as_u64()).map_err(|_| no_bytes())
+}

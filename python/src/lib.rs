@@ -1,0 +1,44 @@
+//! The module `voxtile._voxtile`: voxtile's library for Python, with numpy arrays.
+//!
+//! ```text
+//! map         Map: lifetime, scans in, questions
+//! questions   what arrays of points, rays and boxes are answered
+//! operations  whole maps on disk
+//! builds      files of scans: read, or made a map of
+//! command     the command `voxtile`
+//! watched     work beside the interpreter, which Ctrl-C ends
+//! ```
+//!
+//! The package around it is `python/voxtile/`; its documentation for users is `docs/python.md`.
+
+mod arrays;
+mod builds;
+mod command;
+mod config;
+mod errors;
+mod map;
+mod operations;
+mod pose;
+mod questions;
+mod report;
+mod source;
+mod stoppable;
+mod watched;
+
+/// The module.
+#[pyo3::pymodule]
+mod _voxtile {
+    #[pymodule_export]
+    use super::builds::{ScanIterator, build, scans};
+    #[pymodule_export]
+    use super::command::run_command;
+    #[pymodule_export]
+    use super::map::{Map, TileIterator};
+    #[pymodule_export]
+    use super::operations::{
+        clear, convert, crop, decay, delete_snapshot, diff, import_octree, merge, repair, revert, snapshots,
+        verify,
+    };
+    #[pymodule_export]
+    use super::report::InsertReport;
+}

@@ -1,0 +1,687 @@
+//! `voxtile.Map`: an open map.
+
+use crate::arrays::{PointSlice, Points, column, doubles, object, rows, singles};
+use crate::config::{ConfigArguments, bytes_of, config_of};
+use crate::errors::{exception, exception_of_kind, wrong};
+use crate::pose::{point_of, pose_of};
+use crate::questions;
+use crate::report::InsertReport;
+use crate::source::Source;
+use crate::watched::{at_once, watched};
+use numpy::{PyArray1, PyArray2};
+use parking_lot::RwLock;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use voxtile::mapper::{MapReader, MapView, Mapper, OctreeMap};
+use voxtile::{
+    Aabb, MapConfig, MapOptions, MapQueries, Pose, RayQuery, Result, ScanRef, ScanReport, Shape,
+    SnapshotName, Stop, TileIndex, UnknownAs,
+};
+
+/// Questions and points that take less time than anybody waits for Ctrl-C. They are worth no thread of their own.
+const FEW: usize = 128;
+
+/// A map: what is occupied, free and unknown.
+///
+/// Made by `Map.create`, `Map.open` or `voxtile.open`, and closed by `close` or at the end of a `with` block. Points are
+/// arrays of N x 3 in metres, `float32` or `float64`; answers are arrays in the order of the questions. Any thread may
+/// ask while another inserts: it sees whole scans.
+#[pyclass(frozen, module = "voxtile")]
+pub struct Map {
+    /// `None` once it is closed.
+    source: RwLock<Option<Arc<Source>>>,
+    config: MapConfig,
+    path: PathBuf,
+}
+
+type Found<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<i32>>);
+type Nearest<'py> = (Bound<'py, PyArray2<i32>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+type Occupied<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f32>>);
+
+impl Map {
+    fn of(path: PathBuf, source: Source) -> Self {
+        let config = source.config();
+        Self { source: RwLock::new(Some(Arc::new(source))), config, path }
+    }
+
+    fn source(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
+        self.source.read().clone().ok_or_else(|| closed(py, &self.path))
+    }
+
+    /// Changes the map in a thread of its own, or at once if it is `short`.
+    fn change<T: Send>(
+        &self,
+        py: Python<'_>,
+        short: bool,
+        change: impl FnOnce(&mut voxtile::OutOfCoreTileMapper) -> Result<T> + Send,
+    ) -> PyResult<T> {
+        let source = self.source(py)?;
+        if !matches!(*source, Source::Writer { .. }) {
+            let message =
+                format!("{}: open for reading alone; open it with mode=\"r+\"", self.path.display());
+            return Err(exception_of_kind(py, "read_only", &message));
+        }
+        let work = |stop: &Stop| source.change(stop, change);
+        let changed = if short { at_once(py, work)? } else { watched(py, work)? };
+        changed.ok_or_else(|| closed(py, &self.path))
+    }
+
+    /// Asks the map in a thread of its own, or at once if there are few questions.
+    fn ask<T: Send>(
+        &self,
+        py: Python<'_>,
+        questions: usize,
+        ask: impl FnOnce(&Source, &Stop) -> Result<T> + Send,
+    ) -> PyResult<T> {
+        let source = self.source(py)?;
+        let work = |stop: &Stop| ask(&source, stop);
+        if questions <= FEW { at_once(py, work) } else { watched(py, work) }
+    }
+}
+
+#[pymethods]
+impl Map {
+    /// Makes a new map in a folder that is empty or not there.
+    ///
+    /// Lengths are in metres. `memory` bounds all that grows with the map: bytes, or a text such as "512MiB" (the
+    /// default). `insert_mode` is "per-scan" or "per-ray", `sensor_model` "log-odds" or "iwlo", `storage` "octomap" or
+    /// "compact". `probabilities` are hit, miss, least and most of the log-odds model.
+    #[staticmethod]
+    #[pyo3(signature = (path, resolution=0.1, *, tile_size=10.0, min_range=0.0, max_range=None, insert_mode="per-scan",
+        sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+    fn create(
+        py: Python<'_>,
+        path: PathBuf,
+        resolution: f64,
+        tile_size: f64,
+        min_range: f64,
+        max_range: Option<f64>,
+        insert_mode: &str,
+        sensor_model: &str,
+        probabilities: Option<[f64; 4]>,
+        occupancy_threshold: f64,
+        storage: &str,
+        memory: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let config = config_of(
+            py,
+            &ConfigArguments {
+                resolution,
+                tile_size,
+                min_range,
+                max_range,
+                insert_mode,
+                sensor_model,
+                probabilities,
+                occupancy_threshold,
+                storage,
+                memory,
+            },
+        )?;
+        let options = MapOptions::new().config(config).create_new(true);
+        let source = watched(py, |_| Source::writer(options.open(&path)?))?;
+        Ok(Self::of(path, source))
+    }
+
+    /// Opens a map: to insert scans (mode "r+"), or to be asked (mode "r"), beside a writer too.
+    ///
+    /// Of `snapshot` there is only reading. A file of OctoMap (`.bt`, `.ot`) is read whole.
+    #[staticmethod]
+    #[pyo3(signature = (path, mode="r+", *, snapshot=None, memory=None))]
+    fn open(
+        py: Python<'_>,
+        path: PathBuf,
+        mode: &str,
+        snapshot: Option<&str>,
+        memory: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let memory = memory.as_ref().map(bytes_of).transpose()?;
+        let options = MapOptions::new().memory_bytes(memory.unwrap_or(512 << 20));
+        let name = snapshot.map(SnapshotName::new).transpose().map_err(|error| exception(py, &error))?;
+        let is_octree = OctreeMap::is_named_by(&path);
+        let reader = |reader: MapReader| Source::Reader(Box::new(RwLock::new(reader)));
+        let source = match (mode, name) {
+            ("r", Some(name)) => watched(py, |_| options.open_snapshot(&path, &name).map(reader))?,
+            ("r", None) if is_octree => watched(py, |_| Source::octree(&path))?,
+            ("r", None) => watched(py, |_| options.open_read_only(&path).map(reader))?,
+            ("r+", None) if !is_octree => watched(py, |_| Source::writer(options.open(&path)?))?,
+            ("r+", _) => {
+                return Err(wrong(py, "mode", "snapshots and files of OctoMap are read alone: mode=\"r\""));
+            }
+            (other, _) => return Err(wrong(py, "mode", format!("{other:?} is neither 'r+' nor 'r'"))),
+        };
+        Ok(Self::of(path, source))
+    }
+
+    /// The folder, or the file.
+    #[getter]
+    fn path(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        Ok(py.import("pathlib")?.call_method1("Path", (&self.path,))?.unbind())
+    }
+
+    /// Edge of a voxel in metres.
+    #[getter]
+    fn resolution(&self) -> f64 {
+        self.config.grid.resolution_m()
+    }
+
+    /// Edge of a tile in metres.
+    #[getter]
+    fn tile_size(&self) -> f64 {
+        self.config.grid.tile_size_m()
+    }
+
+    /// Probability from which a voxel counts as occupied.
+    #[getter]
+    fn occupancy_threshold(&self) -> f64 {
+        self.config.occupancy_threshold
+    }
+
+    /// Whether the map is closed.
+    #[getter]
+    fn closed(&self) -> bool {
+        self.source.read().is_none()
+    }
+
+    /// Whether the map takes scans.
+    #[getter]
+    fn writable(&self) -> bool {
+        self.source.read().as_ref().is_some_and(|source| matches!(**source, Source::Writer { .. }))
+    }
+
+    /// Number of the last scan in the map; 0 for none.
+    #[getter]
+    fn scan_number(&self, py: Python<'_>) -> PyResult<u64> {
+        self.ask(py, 1, |source, stop| source.ask(stop, |map| Ok(map.scan_number())))
+    }
+
+    /// A box around all that was observed, in whole tiles: an array of 2 x 3, lower and upper corner in metres. `None`
+    /// for an empty map.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let tiles = self.tile_indices(py)?;
+        let boxes = tiles.iter().map(|&tile| self.box_of(tile));
+        let hull = boxes.reduce(|a, b| Aabb {
+            min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
+            max: std::array::from_fn(|k| a.max[k].max(b.max[k])),
+        });
+        hull.map(|hull| rows(py, vec![hull.min, hull.max])).transpose()
+    }
+
+    /// Adds a scan: rays from the sensor to its points.
+    ///
+    /// With `pose` (world_from_sensor: a matrix of 4 x 4, seven numbers x y z qx qy qz qw, or a tuple of position and
+    /// quaternion) points are in the sensor's frame, with `origin` in the world's. Points that are NaN or masked are
+    /// skipped and counted. After an error the map is as it was.
+    #[pyo3(signature = (points, pose=None, *, origin=None, intensities=None))]
+    fn insert(
+        &self,
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        pose: Option<&Bound<'_, PyAny>>,
+        origin: Option<&Bound<'_, PyAny>>,
+        intensities: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<InsertReport> {
+        let points = Points::of("points", points)?;
+        let frame = match (pose, origin) {
+            (Some(pose), None) => Frame::Sensor(pose_of(pose)?),
+            (None, Some(origin)) => Frame::World(point_of("origin", origin)?),
+            _ => {
+                return Err(wrong(
+                    py,
+                    "pose",
+                    "name either the pose of the sensor, or its origin for points of the world",
+                ));
+            }
+        };
+        let intensities = intensities.map(|intensities| singles("intensities", intensities)).transpose()?;
+        let intensities = intensities.as_ref().map(|intensities| intensities.as_slice()).transpose()?;
+        let points = points.slice()?;
+        let scan = match (frame, points) {
+            (Frame::Sensor(pose), PointSlice::F32(points)) => ScanRef::in_sensor(pose, points),
+            (Frame::Sensor(pose), PointSlice::F64(points)) => ScanRef::in_sensor(pose, points),
+            (Frame::World(origin), PointSlice::F32(points)) => ScanRef::in_world(origin, points),
+            (Frame::World(origin), PointSlice::F64(points)) => ScanRef::in_world(origin, points),
+        };
+        let scan = match intensities {
+            Some(intensities) => scan.with_intensities(intensities).map_err(|error| exception(py, &error))?,
+            None => scan,
+        };
+        let report = self.change(py, points.len() <= FEW, |mapper| mapper.insert_points(&scan))?;
+        Ok(report.into())
+    }
+
+    /// Adds scans from an iterable of `(points, pose)` or `(points, pose, intensities)`; returns one report of all.
+    ///
+    /// After an error the scans before it are in the map.
+    fn insert_many(&self, py: Python<'_>, scans: &Bound<'_, PyAny>) -> PyResult<InsertReport> {
+        let mut all = InsertReport::from(ScanReport::default());
+        for scan in scans.try_iter()? {
+            let scan = scan?;
+            let (points, pose, intensities) = match scan.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>() {
+                Ok((points, pose)) => (points, pose, None),
+                Err(_) => {
+                    let (points, pose, intensities): (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>) =
+                        scan.extract().map_err(|_| {
+                            wrong(
+                                py,
+                                "scans",
+                                "must be pairs of points and pose, or triples with intensities",
+                            )
+                        })?;
+                    (points, pose, Some(intensities).filter(|intensities| !intensities.is_none()))
+                }
+            };
+            all.add(&self.insert(py, &points, Some(&pose), None, intensities.as_ref())?);
+            py.check_signals()?;
+        }
+        Ok(all)
+    }
+
+    /// Makes everything so far durable, as a whole. Nothing to do for a map that is read.
+    fn flush(&self, py: Python<'_>) -> PyResult<()> {
+        if !matches!(*self.source(py)?, Source::Writer { .. }) {
+            return Ok(());
+        }
+        self.change(py, false, Mapper::flush)
+    }
+
+    /// Flushes and closes. A closed map may be closed again.
+    ///
+    /// If the flush fails the map stays open, so that the disk can be seen to and the map closed again; `flush=False`
+    /// gives up what no flush has made durable.
+    #[pyo3(signature = (*, flush=true))]
+    fn close(&self, py: Python<'_>, flush: bool) -> PyResult<()> {
+        if self.closed() {
+            return Ok(());
+        }
+        if flush {
+            self.flush(py)?;
+        }
+        let Some(source) = self.source.write().take() else { return Ok(()) };
+        watched(py, |stop| {
+            // Another thread may still ask; the lock on the map's files goes now.
+            if let Some(mut mapper) = source.mapper(stop)? {
+                drop(mapper.take());
+            }
+            drop(source);
+            Ok(())
+        })
+    }
+
+    fn __enter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    #[pyo3(signature = (kind, error, traceback))]
+    fn __exit__(
+        &self,
+        py: Python<'_>,
+        kind: &Bound<'_, PyAny>,
+        error: &Bound<'_, PyAny>,
+        traceback: &Bound<'_, PyAny>,
+    ) -> PyResult<bool> {
+        let _ = (kind, error, traceback);
+        self.close(py, true)?;
+        Ok(false)
+    }
+
+    /// Sees what a writer has flushed since the map was opened for reading. Returns whether there was something.
+    fn refresh(&self, py: Python<'_>) -> PyResult<bool> {
+        self.ask(py, usize::MAX, |source, _| match source {
+            Source::Reader(reader) => reader.write().refresh(),
+            Source::Writer { .. } | Source::Octree(_) => Ok(false),
+        })
+    }
+
+    /// Flushes, and keeps the map as it is now under a name.
+    fn snapshot(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        let name = SnapshotName::new(name).map_err(|error| exception(py, &error))?;
+        self.change(py, false, |mapper| mapper.snapshot(&name))
+    }
+
+    /// Sizes of the map and of what is in memory, as a dict.
+    fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let statistics = self.ask(py, 1, |source, stop| source.ask(stop, |map| Ok(map.statistics())))?;
+        object(py, &statistics)
+    }
+
+    /// The occupancy at points: an array of `int8`, 1 occupied, 0 free, -1 unknown.
+    fn occupancy<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<i8>>> {
+        let points = Points::of("points", points)?;
+        let points = points.slice()?;
+        let answers = self.ask(py, points.len(), |source, stop| {
+            questions::occupancies(source, stop, points, questions::occupancy_code)
+        })?;
+        Ok(column(py, answers))
+    }
+
+    /// Probabilities of being occupied at points: `float64`, NaN for unknown.
+    fn probability<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points = Points::of("points", points)?;
+        let points = points.slice()?;
+        let answers = self.ask(py, points.len(), |source, stop| {
+            questions::occupancies(source, stop, points, questions::probability_or_nan)
+        })?;
+        Ok(column(py, answers))
+    }
+
+    /// Exact log-odds at points: `float64`, NaN for unknown.
+    fn log_odds<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points = Points::of("points", points)?;
+        let points = points.slice()?;
+        let answers = self.ask(py, points.len(), |source, stop| {
+            questions::evidences(source, stop, points, |evidence| evidence.map_or(f64::NAN, |of| of.log_odds))
+        })?;
+        Ok(column(py, answers))
+    }
+
+    /// Numbers of updates at points: `int32`, 0 for unknown.
+    fn counts<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<i32>>> {
+        let points = Points::of("points", points)?;
+        let points = points.slice()?;
+        let answers = self.ask(py, points.len(), |source, stop| {
+            questions::evidences(source, stop, points, |evidence| {
+                evidence.map_or(0, |of| of.observation_count)
+            })
+        })?;
+        Ok(column(py, answers))
+    }
+
+    /// The first occupied voxel on each ray: distances in metres from the origin (infinite where nothing is hit), and
+    /// indices of voxels, `int32` of N x 3 (the least integers where nothing is hit).
+    ///
+    /// `origins` is one point or as many as directions. `unknown` is "free" or "obstacle".
+    #[pyo3(signature = (origins, directions, *, max_range=None, unknown="free"))]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        max_range: Option<f64>,
+        unknown: &str,
+    ) -> PyResult<Found<'py>> {
+        let unknown = unknown_of(py, unknown)?;
+        let directions = Points::of("directions", directions)?.slice()?.to_vec();
+        let origins = match doubles("origins", origins)? {
+            (shape, numbers) if shape == [3] => vec![[numbers[0], numbers[1], numbers[2]]; directions.len()],
+            _ => Points::of("origins", origins)?.slice()?.to_vec(),
+        };
+        if origins.len() != directions.len() {
+            let reason = format!("has {} points for {} directions", origins.len(), directions.len());
+            return Err(wrong(py, "origins", reason));
+        }
+        let hits = self.ask(py, directions.len(), |source, stop| {
+            let ray = |(origin, direction)| RayQuery { origin, direction, max_range_m: max_range, unknown };
+            let rays: Vec<RayQuery> = origins.into_iter().zip(directions).map(ray).collect();
+            questions::rays(source, stop, &rays)
+        })?;
+        let distances = hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.distance_m)).collect();
+        let voxels = hits.iter().map(|hit| hit.map_or([i32::MIN; 3], |hit| hit.voxel)).collect();
+        Ok((column(py, distances), rows(py, voxels)?))
+    }
+
+    /// The occupied voxel with the nearest center to each point, at most `max_distance` metres away: indices (`int32`,
+    /// N x 3), distances (infinite where there is none), and directions to it (unit vectors, NaN where there is none or
+    /// the point is the center).
+    #[pyo3(signature = (points, max_distance=10.0))]
+    fn nearest<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        max_distance: f64,
+    ) -> PyResult<Nearest<'py>> {
+        let points = Points::of("points", points)?.slice()?.to_vec();
+        let hits = self
+            .ask(py, points.len(), |source, stop| questions::nearest(source, stop, &points, max_distance))?;
+        let voxels = hits.iter().map(|hit| hit.map_or([i32::MIN; 3], |hit| hit.voxel)).collect();
+        let distances = hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.distance_m)).collect();
+        let towards = |(hit, point): (&Option<voxtile::Hit>, &voxtile::Point)| match hit {
+            Some(hit) if hit.distance_m > 0.0 => {
+                std::array::from_fn(|k| (hit.center_m[k] - point[k]) / hit.distance_m)
+            }
+            _ => [f64::NAN; 3],
+        };
+        let directions = hits.iter().zip(&points).map(towards).collect();
+        Ok((rows(py, voxels)?, column(py, distances), rows(py, directions)?))
+    }
+
+    /// Whether boxes touch something occupied: an array of `bool`. A box is six numbers, lower corner and upper corner in
+    /// metres: N x 6 or N x 2 x 3.
+    #[pyo3(signature = (boxes, *, unknown="free"))]
+    fn collides<'py>(
+        &self,
+        py: Python<'py>,
+        boxes: &Bound<'py, PyAny>,
+        unknown: &str,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let unknown = unknown_of(py, unknown)?;
+        let (shape, corners) = doubles("boxes", boxes)?;
+        if !matches!(shape[..], [_, 6] | [_, 2, 3] | [0]) {
+            return Err(wrong(
+                py,
+                "boxes",
+                format!("must be an array of N x 6 or N x 2 x 3, not of {shape:?}"),
+            ));
+        }
+        let body =
+            |&[x0, y0, z0, x1, y1, z1]: &[f64; 6]| Shape::Box(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] });
+        let bodies: Vec<Shape> = corners.as_chunks().0.iter().map(body).collect();
+        // A box may be large.
+        let answers =
+            self.ask(py, usize::MAX, |source, stop| questions::collisions(source, stop, &bodies, unknown))?;
+        Ok(column(py, answers))
+    }
+
+    /// The occupied voxels: centers in metres (`float64`, N x 3) and probabilities (`float32`), tile by tile.
+    ///
+    /// `region` is a box, lower and upper corner in metres; `min_probability` the map's threshold if it is not named.
+    /// For maps larger than memory use `occupied_by_tile`.
+    #[pyo3(signature = (region=None, min_probability=None))]
+    fn occupied<'py>(
+        &self,
+        py: Python<'py>,
+        region: Option<&Bound<'py, PyAny>>,
+        min_probability: Option<f64>,
+    ) -> PyResult<Occupied<'py>> {
+        let region = region.map(region_of).transpose()?;
+        let (centers, probabilities) = self.ask(py, usize::MAX, |source, stop| {
+            source.ask(stop, |map| questions::occupied(map, region.as_ref(), min_probability))
+        })?;
+        Ok((rows(py, centers)?, column(py, probabilities)))
+    }
+
+    /// Iterates over the occupied voxels, a tile at a time, in constant memory: index of the tile, centers, probabilities.
+    #[pyo3(signature = (min_probability=None))]
+    fn occupied_by_tile(&self, py: Python<'_>, min_probability: Option<f64>) -> PyResult<TileIterator> {
+        let tiles = self.tile_indices(py)?;
+        let boxes = tiles.into_iter().map(|tile| (tile, self.box_of(tile))).collect::<Vec<_>>().into_iter();
+        Ok(TileIterator { source: self.source(py)?, tiles: RwLock::new(boxes), min_probability })
+    }
+
+    /// Indices of the tiles in which something was observed: `int32`, N x 3.
+    #[getter]
+    fn tiles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
+        rows(py, self.tile_indices(py)?.into_iter().map(|tile| [tile.x, tile.y, tile.z]).collect())
+    }
+
+    /// A region as an array of three axes, x, y, z, and the lower corner of its first voxel in metres.
+    ///
+    /// `values` says what is in it: "occupancy" (`int8`: 1, 0, -1 unknown), "probability" or "log_odds" (`float64`, NaN
+    /// unknown).
+    #[pyo3(signature = (region, values="occupancy"))]
+    fn to_dense<'py>(
+        &self,
+        py: Python<'py>,
+        region: &Bound<'py, PyAny>,
+        values: &str,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray1<f64>>)> {
+        let region = region_of(region)?;
+        let (voxels, array) = match values {
+            "occupancy" => {
+                let least = self.config.occupied_log_odds();
+                let (voxels, values) = self.ask(py, usize::MAX, |source, stop| {
+                    source.ask(stop, |map| {
+                        questions::dense(map, &region, -1_i8, |evidence| i8::from(evidence.log_odds >= least))
+                    })
+                })?;
+                (voxels, column(py, values).into_any())
+            }
+            "probability" | "log_odds" => {
+                let is_probability = values == "probability";
+                let (voxels, values) = self.ask(py, usize::MAX, |source, stop| {
+                    source.ask(stop, |map| {
+                        questions::dense(map, &region, f64::NAN, |evidence| {
+                            if is_probability { evidence.probability() } else { evidence.log_odds }
+                        })
+                    })
+                })?;
+                (voxels, column(py, values).into_any())
+            }
+            other => {
+                let reason = format!("{other:?} is none of 'occupancy', 'probability', 'log_odds'");
+                return Err(wrong(py, "values", reason));
+            }
+        };
+        let edges: [i64; 3] =
+            std::array::from_fn(|k| (i64::from(voxels.end[k]) - i64::from(voxels.min[k])).max(0));
+        let corner = voxels.min.map(|index| self.config.grid.corner_m(index));
+        Ok((array.call_method1("reshape", (edges,))?, column(py, corner.to_vec())))
+    }
+
+    /// The digest of the map's content, equal for equal maps, as the command prints it.
+    fn digest(&self, py: Python<'_>) -> PyResult<String> {
+        let digest = self.ask(py, usize::MAX, |source, stop| source.ask(stop, |map| map.digest()))?;
+        Ok(digest.to_hex().to_string())
+    }
+
+    /// A matplotlib figure of the map from above; see `voxtile.pictures.plot`.
+    #[pyo3(signature = (**options))]
+    fn plot(slf: &Bound<'_, Self>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyAny>> {
+        let pictures = slf.py().import("voxtile.pictures")?;
+        Ok(pictures.getattr("plot")?.call((slf,), options)?.unbind())
+    }
+
+    /// Opens the viewer in a browser, in a process of its own, which is returned. What is not flushed is not seen.
+    fn view(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().source(slf.py())?;
+        Ok(slf.py().import("voxtile.pictures")?.call_method1("view", (&slf.get().path,))?.unbind())
+    }
+
+    fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
+        slf.py().import("voxtile.pictures")?.call_method1("summary_html", (slf,))?.extract()
+    }
+
+    fn __repr__(&self) -> String {
+        let state = if self.closed() {
+            "closed"
+        } else if self.writable() {
+            "r+"
+        } else {
+            "r"
+        };
+        format!("<voxtile.Map {} {} m, {state}>", self.path.display(), self.resolution())
+    }
+
+    /// A map is not copied to another process: it is opened there.
+    fn __reduce__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let message =
+            "a map cannot be pickled: give the other process its path, and open it there with mode=\"r\"";
+        Err(exception_of_kind(py, "no_pickle", message))
+    }
+}
+
+impl Map {
+    fn tile_indices(&self, py: Python<'_>) -> PyResult<Vec<TileIndex>> {
+        self.ask(py, 1, |source, stop| source.ask(stop, |map| Ok(map.tile_indices())))
+    }
+
+    /// The box of a tile in metres.
+    fn box_of(&self, tile: TileIndex) -> Aabb {
+        let grid = &self.config.grid;
+        let voxels = grid.voxels_of_tile(tile);
+        Aabb { min: voxels.min.map(|k| grid.corner_m(k)), max: voxels.end.map(|k| grid.corner_m(k)) }
+    }
+}
+
+/// The frame of a scan's points.
+enum Frame {
+    Sensor(Pose),
+    World(voxtile::Point),
+}
+
+/// The occupied voxels of a map, a tile at a time: `(tile, centers, probabilities)`.
+#[pyclass(frozen, module = "voxtile")]
+pub struct TileIterator {
+    source: Arc<Source>,
+    tiles: RwLock<std::vec::IntoIter<(TileIndex, Aabb)>>,
+    min_probability: Option<f64>,
+}
+
+type OccupiedOfTile<'py> = ((i32, i32, i32), Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f32>>);
+
+#[pymethods]
+impl TileIterator {
+    fn __iter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<OccupiedOfTile<'py>>> {
+        let Some((tile, region)) = self.tiles.write().next() else { return Ok(None) };
+        if let Source::Writer { mapper, .. } = &*self.source
+            && mapper.try_lock().is_some_and(|mapper| mapper.is_none())
+        {
+            return Err(closed(py, Path::new("map")));
+        }
+        let (centers, probabilities) = at_once(py, |stop| {
+            self.source.ask(stop, |map| questions::occupied(map, Some(&region), self.min_probability))
+        })?;
+        Ok(Some(((tile.x, tile.y, tile.z), rows(py, centers)?, column(py, probabilities))))
+    }
+}
+
+/// A box: lower and upper corner, six numbers or 2 x 3.
+pub fn region_of(region: &Bound<'_, PyAny>) -> PyResult<Aabb> {
+    let (shape, corners) = doubles("region", region)?;
+    match (&shape[..], &corners[..]) {
+        ([2, 3] | [6], &[x0, y0, z0, x1, y1, z1]) if x0 < x1 && y0 < y1 && z0 < z1 => {
+            Ok(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] })
+        }
+        _ => {
+            let reason =
+                format!("must be a lower and a higher corner, 2 x 3 numbers in metres, not {corners:?}");
+            Err(wrong(region.py(), "region", reason))
+        }
+    }
+}
+
+fn unknown_of(py: Python<'_>, unknown: &str) -> PyResult<UnknownAs> {
+    match unknown {
+        "free" => Ok(UnknownAs::Free),
+        "obstacle" => Ok(UnknownAs::Obstacle),
+        other => Err(wrong(py, "unknown", format!("{other:?} is neither 'free' nor 'obstacle'"))),
+    }
+}
+
+fn closed(py: Python<'_>, path: &Path) -> PyErr {
+    exception_of_kind(py, "closed", &format!("{}: the map is closed; open it again", path.display()))
+}

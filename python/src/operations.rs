@@ -1,0 +1,248 @@
+//! What is done with whole maps on disk. Answers are dicts with the fields that the command prints.
+
+use crate::arrays::object;
+use crate::config::storage_of;
+use crate::errors::{exception, wrong};
+use crate::map::region_of;
+use crate::watched::{Progress, watched_with_progress};
+use pyo3::prelude::*;
+use serde::Serialize;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+use voxtile::mapper::{MapReader, OctreeMap};
+use voxtile::operations::{self, Decay, Part, Prefer};
+use voxtile::{Error, Result, SnapshotName, Stop, integrity, octree};
+
+/// Tiles of each map that is read.
+const CACHE_TILES: usize = 32;
+
+/// A map, or a snapshot of it as a tuple with its name.
+#[derive(FromPyObject)]
+pub enum MapOrSnapshot {
+    /// A folder.
+    Map(PathBuf),
+    /// A folder and a name.
+    Snapshot(PathBuf, String),
+}
+
+impl MapOrSnapshot {
+    fn open(&self) -> Result<MapReader> {
+        match self {
+            Self::Map(path) => MapReader::open(path, CACHE_TILES),
+            Self::Snapshot(path, name) => {
+                MapReader::open_snapshot(path, &SnapshotName::new(name)?, CACHE_TILES)
+            }
+        }
+    }
+}
+
+type Callback = Option<Py<PyAny>>;
+
+/// Does work and returns what it tells.
+fn told<'py, T: Serialize + Send>(
+    py: Python<'py>,
+    progress: Callback,
+    work: impl FnOnce(&Stop, &Progress<'_>) -> Result<T> + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    object(py, &watched_with_progress(py, progress, work)?)
+}
+
+fn name_of(py: Python<'_>, name: &str) -> PyResult<SnapshotName> {
+    SnapshotName::new(name).map_err(|error| exception(py, &error))
+}
+
+fn part_of(region: &Bound<'_, PyAny>, outside: bool) -> PyResult<Part> {
+    let region = region_of(region)?;
+    Ok(if outside { Part::Outside(region) } else { Part::Inside(region) })
+}
+
+/// The snapshots of a map, by flush and then by name: a list of dicts.
+#[pyfunction]
+pub fn snapshots<'py>(py: Python<'py>, map: PathBuf) -> PyResult<Bound<'py, PyAny>> {
+    told(py, None, |_, _| operations::snapshots(&map))
+}
+
+/// Deletes a snapshot; what it alone kept is freed.
+#[pyfunction]
+pub fn delete_snapshot(py: Python<'_>, map: PathBuf, name: &str) -> PyResult<()> {
+    let name = name_of(py, name)?;
+    watched_with_progress(py, None, |_, _| operations::delete_snapshot(&map, &name))
+}
+
+/// Compares two maps, or snapshots `(map, name)`: a dict of sums, with a list of the tiles that differ in `"differing"`.
+#[pyfunction]
+#[pyo3(signature = (first, second, *, progress=None))]
+pub fn diff<'py>(
+    py: Python<'py>,
+    first: MapOrSnapshot,
+    second: MapOrSnapshot,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut tiles = Vec::new();
+    let sums = told(py, progress, |_, progress| {
+        operations::diff(
+            &first.open()?,
+            &second.open()?,
+            |tile| tiles.push(tile),
+            |done, all| progress.tell(done, all),
+        )
+    })?;
+    sums.set_item("differing", object(py, &tiles)?)?;
+    Ok(sums)
+}
+
+/// Makes a map what a snapshot of it is; `keep_as` keeps what it was as another snapshot.
+#[pyfunction]
+#[pyo3(signature = (map, name, *, keep_as=None, progress=None))]
+pub fn revert<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    name: &str,
+    keep_as: Option<&str>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (name, keep_as) = (name_of(py, name)?, keep_as.map(|name| name_of(py, name)).transpose()?);
+    told(py, progress, |_, progress| {
+        operations::revert(&map, &name, keep_as.as_ref(), |done, all| progress.tell(done, all))
+    })
+}
+
+/// Makes one map of several of the same resolution and tile size. `prefer` is "first", "last" or "more-observed"; without
+/// it the log-odds of a voxel are added.
+#[pyfunction]
+#[pyo3(signature = (maps, output, *, prefer=None, progress=None))]
+pub fn merge<'py>(
+    py: Python<'py>,
+    maps: Vec<MapOrSnapshot>,
+    output: PathBuf,
+    prefer: Option<&str>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let prefer = match prefer {
+        None => None,
+        Some("first") => Some(Prefer::First),
+        Some("last") => Some(Prefer::Last),
+        Some("more-observed") => Some(Prefer::MoreObserved),
+        Some(other) => {
+            let reason = format!("{other:?} is none of 'first', 'last', 'more-observed'");
+            return Err(wrong(py, "prefer", reason));
+        }
+    };
+    told(py, progress, |_, progress| {
+        let maps = maps.iter().map(MapOrSnapshot::open).collect::<Result<Vec<_>>>()?;
+        operations::merge(&maps, &output, prefer, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Makes a map of the part of another that is in a box, or outside it.
+#[pyfunction]
+#[pyo3(signature = (map, output, region, *, outside=false, progress=None))]
+pub fn crop<'py>(
+    py: Python<'py>,
+    map: MapOrSnapshot,
+    output: PathBuf,
+    region: &Bound<'py, PyAny>,
+    outside: bool,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let part = part_of(region, outside)?;
+    told(py, progress, |_, progress| {
+        operations::crop(&map.open()?, &part, &output, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Makes a map of the same content with another storage, "octomap" or "compact".
+#[pyfunction]
+#[pyo3(signature = (map, output, storage, *, progress=None))]
+pub fn convert<'py>(
+    py: Python<'py>,
+    map: MapOrSnapshot,
+    output: PathBuf,
+    storage: &str,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let storage = storage_of(py, storage)?;
+    told(py, progress, |_, progress| {
+        operations::convert(&map.open()?, &output, storage, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Makes a map of a file of OctoMap.
+#[pyfunction]
+#[pyo3(signature = (file, output, *, storage="octomap", progress=None))]
+pub fn import_octree<'py>(
+    py: Python<'py>,
+    file: PathBuf,
+    output: PathBuf,
+    storage: &str,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let storage = storage_of(py, storage)?;
+    told(py, progress, |_, progress| {
+        let opened = File::open(&file).map_err(|error| Error::io(&file, "open", error))?;
+        let map =
+            OctreeMap::of(octree::read(BufReader::new(opened)).map_err(|error| error.in_input(&file))?)?;
+        operations::import(&map, &output, storage, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Forgets what is in a box, or outside it.
+#[pyfunction]
+#[pyo3(signature = (map, region, *, outside=false, progress=None))]
+pub fn clear<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    region: &Bound<'py, PyAny>,
+    outside: bool,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let part = part_of(region, outside)?;
+    told(py, progress, |_, progress| operations::clear(&map, &part, |done, all| progress.tell(done, all)))
+}
+
+/// Lets evidence fade: log-odds halve in so many scans. `scans` is how many have passed, those since the last decay if it
+/// is not named; log-odds nearer to 0 than `forget_below` are forgotten.
+#[pyfunction]
+#[pyo3(signature = (map, halflife_scans, *, scans=None, forget_below=0.0, progress=None))]
+pub fn decay<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    halflife_scans: f64,
+    scans: Option<u64>,
+    forget_below: f64,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut how = Decay::new(halflife_scans).with_forget_below(forget_below);
+    how.scans = scans;
+    told(py, progress, |_, progress| operations::decay(&map, &how, |done, all| progress.tell(done, all)))
+}
+
+/// Checks every file of a map: a dict of sums, with a list of what was found in `"findings"`. The map is whole if
+/// `"damage"` is 0.
+#[pyfunction]
+#[pyo3(signature = (map, *, progress=None))]
+pub fn verify<'py>(py: Python<'py>, map: PathBuf, progress: Callback) -> PyResult<Bound<'py, PyAny>> {
+    let mut findings = Vec::new();
+    let sums = told(py, progress, |_, progress| {
+        integrity::verify(
+            &map,
+            |finding| findings.push(finding.clone()),
+            |done, all| progress.tell(done, all),
+        )
+    })?;
+    sums.set_item("findings", object(py, &findings)?)?;
+    Ok(sums)
+}
+
+/// Repairs what can be repaired, and puts the rest aside: a dict of sums, with a list of what was done in `"done"`.
+#[pyfunction]
+#[pyo3(signature = (map, *, progress=None))]
+pub fn repair<'py>(py: Python<'py>, map: PathBuf, progress: Callback) -> PyResult<Bound<'py, PyAny>> {
+    let mut done = Vec::new();
+    let sums = told(py, progress, |_, progress| {
+        integrity::repair(&map, |action| done.push(action.clone()), |done, all| progress.tell(done, all))
+    })?;
+    sums.set_item("done", object(py, &done)?)?;
+    Ok(sums)
+}

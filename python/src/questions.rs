@@ -1,0 +1,153 @@
+//! Questions about many points, rays and boxes. Answers are lists in the order of the questions.
+
+use crate::arrays::PointSlice;
+use crate::source::Source;
+use crate::stoppable::Stoppable;
+use voxtile::mapper::MapView;
+use voxtile::space::VoxelBox;
+use voxtile::{
+    Aabb, Error, Evidence, Hit, MapQueries, Occupancy, Point, Queries, RayQuery, Result, Shape, Stop,
+    UnknownAs,
+};
+
+/// Points that are asked before looking whether to stop.
+const POINTS_AT_A_TIME: usize = 1 << 16;
+/// Rays likewise: each may cross a million voxels.
+const RAYS_AT_A_TIME: usize = 1 << 10;
+/// Most voxels of a dense array.
+const MOST_DENSE_VOXELS: u64 = 1 << 31;
+
+/// What the occupancy is called in arrays.
+pub fn occupancy_code(occupancy: Occupancy) -> i8 {
+    match occupancy {
+        Occupancy::Unknown => -1,
+        Occupancy::Free(_) => 0,
+        Occupancy::Occupied(_) => 1,
+    }
+}
+
+/// The probability in arrays: NaN where nothing is known.
+pub fn probability_or_nan(occupancy: Occupancy) -> f64 {
+    occupancy.probability().unwrap_or(f64::NAN)
+}
+
+/// The occupancy at each point, as `of` writes it.
+pub fn occupancies<T>(
+    source: &Source,
+    stop: &Stop,
+    points: PointSlice<'_>,
+    of: impl Fn(Occupancy) -> T,
+) -> Result<Vec<T>> {
+    source.ask(stop, |map| {
+        let mut answers = Vec::with_capacity(points.len());
+        points.in_chunks(POINTS_AT_A_TIME, |chunk| {
+            stop.check()?;
+            answers.extend(map.occupancy_at_points(chunk)?.into_iter().map(&of));
+            Ok::<(), Error>(())
+        })?;
+        Ok(answers)
+    })
+}
+
+/// The exact evidence at each point, as `of` writes it.
+pub fn evidences<T>(
+    source: &Source,
+    stop: &Stop,
+    points: PointSlice<'_>,
+    of: impl Fn(Option<Evidence>) -> T,
+) -> Result<Vec<T>> {
+    source.ask(stop, |map| {
+        let grid = map.config().grid;
+        let mut answers = Vec::with_capacity(points.len());
+        points.in_chunks(POINTS_AT_A_TIME, |chunk| {
+            stop.check()?;
+            for &point in chunk {
+                let evidence = grid.voxel_of(point).map_or(Ok(None), |voxel| map.evidence(voxel))?;
+                answers.push(of(evidence));
+            }
+            Ok::<(), Error>(())
+        })?;
+        Ok(answers)
+    })
+}
+
+/// What each ray hits first.
+pub fn rays(source: &Source, stop: &Stop, rays: &[RayQuery]) -> Result<Vec<Option<Hit>>> {
+    source.ask(stop, |map| {
+        let mut hits = Vec::with_capacity(rays.len());
+        for chunk in rays.chunks(RAYS_AT_A_TIME) {
+            stop.check()?;
+            hits.extend(map.cast_rays(chunk)?);
+        }
+        Ok(hits)
+    })
+}
+
+/// The occupied voxel nearest to each point.
+pub fn nearest(
+    source: &Source,
+    stop: &Stop,
+    points: &[Point],
+    max_distance_m: f64,
+) -> Result<Vec<Option<Hit>>> {
+    source.ask(stop, |map| {
+        let mut hits = Vec::with_capacity(points.len());
+        for &point in points {
+            stop.check()?;
+            hits.push(map.nearest_occupied(point, max_distance_m)?);
+        }
+        Ok(hits)
+    })
+}
+
+/// Whether each body touches something.
+pub fn collisions(source: &Source, stop: &Stop, bodies: &[Shape], unknown: UnknownAs) -> Result<Vec<bool>> {
+    source.ask(stop, |map| {
+        let mut collide = Vec::with_capacity(bodies.len());
+        for body in bodies {
+            stop.check()?;
+            collide.push(map.collision(body, unknown)?.is_some());
+        }
+        Ok(collide)
+    })
+}
+
+/// Centers in metres and probabilities of occupied voxels, tile by tile.
+pub fn occupied(
+    map: &Stoppable<'_>,
+    region: Option<&Aabb>,
+    least: Option<f64>,
+) -> Result<(Vec<Point>, Vec<f32>)> {
+    let grid = map.config().grid;
+    let (mut centers, mut probabilities) = (Vec::new(), Vec::new());
+    map.for_each_occupied(least, region, |voxel| {
+        centers.push(grid.center_m(voxel.index));
+        probabilities.push(voxel.evidence.probability() as f32);
+    })?;
+    Ok((centers, probabilities))
+}
+
+/// The box of a region in voxels, and a value for each of them, the last axis first.
+pub fn dense<T: Clone>(
+    map: &Stoppable<'_>,
+    region: &Aabb,
+    unknown: T,
+    of: impl Fn(Evidence) -> T,
+) -> Result<(VoxelBox, Vec<T>)> {
+    let voxels = map.config().grid.voxels_in(region);
+    let edges: [u64; 3] =
+        std::array::from_fn(|k| (i64::from(voxels.end[k]) - i64::from(voxels.min[k])).max(0) as u64);
+    let count = edges.iter().try_fold(1_u64, |count, &edge| count.checked_mul(edge)).unwrap_or(u64::MAX);
+    if count > MOST_DENSE_VOXELS {
+        let hint = "ask for a smaller region, or for the occupied voxels alone";
+        let what = "number of voxels of the array";
+        return Err(Error::TooLarge { what, size: count, limit: MOST_DENSE_VOXELS, hint });
+    }
+    let mut values = vec![unknown; count as usize];
+    map.for_each_voxel_in(region, |voxel| {
+        let [x, y, z]: [usize; 3] =
+            std::array::from_fn(|k| (i64::from(voxel.index[k]) - i64::from(voxels.min[k])) as usize);
+        values[(x * edges[1] as usize + y) * edges[2] as usize + z] = of(voxel.evidence);
+    })?;
+    Ok((voxels, values))
+}

@@ -1,0 +1,98 @@
+//! What can be asked: a map that takes scans, one that is read, a file of OctoMap.
+
+use crate::stoppable::Stoppable;
+use parking_lot::{Mutex, MutexGuard, RwLock};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+use std::time::Duration;
+use voxtile::mapper::{LiveReader, MapReader, MapView, OctreeMap};
+use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop, octree};
+
+/// An open map.
+pub enum Source {
+    /// A map that takes scans. Questions go to the reader, which waits for no scan and no flush.
+    Writer {
+        /// Gone once the map is closed, or once a defect has left it half changed.
+        mapper: Mutex<Option<Box<OutOfCoreTileMapper>>>,
+        /// Sees the map after each scan.
+        reader: LiveReader,
+    },
+    /// A map or a snapshot as it is on disk.
+    Reader(Box<RwLock<MapReader>>),
+    /// A file of OctoMap.
+    Octree(Box<OctreeMap>),
+}
+
+/// How often a view is taken anew because so much changed while it was held.
+const ATTEMPTS: usize = 8;
+/// How long to wait for another thread's scan before looking whether to stop.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+
+impl Source {
+    /// A map that takes scans.
+    pub fn writer(mapper: OutOfCoreTileMapper) -> Result<Self> {
+        let reader = mapper.reader()?;
+        Ok(Self::Writer { mapper: Mutex::new(Some(Box::new(mapper))), reader })
+    }
+
+    /// A file of OctoMap.
+    pub fn octree(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
+        let file = octree::read(BufReader::new(file)).map_err(|error| error.in_input(path))?;
+        OctreeMap::of(file).map(|map| Self::Octree(Box::new(map)))
+    }
+
+    /// How the map is made.
+    pub fn config(&self) -> MapConfig {
+        match self {
+            Self::Writer { reader, .. } => reader.config().clone(),
+            Self::Reader(reader) => reader.read().config().clone(),
+            Self::Octree(map) => map.config().clone(),
+        }
+    }
+
+    /// Asks the map as it is after its latest scan.
+    pub fn ask<T>(&self, stop: &Stop, mut question: impl FnMut(&Stoppable<'_>) -> Result<T>) -> Result<T> {
+        let mut ask = |view: &dyn MapView| question(&Stoppable { view, stop });
+        match self {
+            Self::Reader(reader) => ask(&*reader.read()),
+            Self::Octree(map) => ask(&**map),
+            Self::Writer { reader, .. } => {
+                let mut answer = Err(Error::Expired);
+                for _ in 0..ATTEMPTS {
+                    answer = ask(&reader.view());
+                    if !matches!(answer, Err(Error::Expired)) {
+                        break;
+                    }
+                }
+                answer
+            }
+        }
+    }
+
+    /// The mapper, once no other thread uses it; `None` if there is none (any more).
+    pub fn mapper(&self, stop: &Stop) -> Result<Option<MutexGuard<'_, Option<Box<OutOfCoreTileMapper>>>>> {
+        let Self::Writer { mapper, .. } = self else { return Ok(None) };
+        loop {
+            if let Some(guard) = mapper.try_lock_for(BETWEEN_LOOKS) {
+                return Ok(Some(guard));
+            }
+            stop.check()?;
+        }
+    }
+
+    /// Changes the map. A defect on the way closes it: what it was left as is on no disk.
+    pub fn change<T>(
+        &self,
+        stop: &Stop,
+        change: impl FnOnce(&mut OutOfCoreTileMapper) -> Result<T>,
+    ) -> Result<Option<T>> {
+        let Some(mut guard) = self.mapper(stop)? else { return Ok(None) };
+        let Some(mut mapper) = guard.take() else { return Ok(None) };
+        mapper.stop_with(stop.clone());
+        let changed = change(&mut mapper);
+        *guard = Some(mapper);
+        changed.map(Some)
+    }
+}

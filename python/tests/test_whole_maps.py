@@ -1,0 +1,145 @@
+"""Whole maps on disk, files of scans, and the command."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import voxtile
+from conftest import Scan, matrix_of
+from voxtile import errors
+
+
+@pytest.fixture
+def city(tmp_path: Path, room: list[Scan]) -> Path:
+    with voxtile.Map.create(tmp_path / "city", 0.25, tile_size=4.0) as found:
+        found.insert_many(room[:2])
+        found.snapshot("early")
+        found.insert_many(room[2:])
+    return tmp_path / "city"
+
+
+@pytest.fixture
+def scans(tmp_path: Path, room: list[Scan]) -> Path:
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    header = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+    for number, (points, _) in enumerate(room):
+        sizes = f"WIDTH {len(points)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(points)}\nDATA binary\n"
+        (folder / f"{number}.pcd").write_bytes((header + sizes).encode() + points.tobytes())
+    np.savetxt(folder / "poses_kitti.txt", [matrix_of(pose)[:3].reshape(-1) for _, pose in room], fmt="%.17g")
+    return folder
+
+
+def voxtile_command(*arguments: object) -> str:
+    command = [sys.executable, "-m", "voxtile", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_build_makes_the_map_of_the_command(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
+    told: list[tuple[int, int]] = []
+    report = voxtile.build(
+        scans, tmp_path / "built", resolution=0.25, max_range=4.0, progress=lambda *done: told.append(done)
+    )
+    assert report.points == sum(len(points) for points, _ in room) and told[-1] == (len(room), len(room))
+    voxtile_command("build", scans, "-o", tmp_path / "commanded", "--resolution", 0.25, "--max-range", 4.0)
+    with voxtile.Map.create(tmp_path / "inserted", 0.25, max_range=4.0) as inserted:
+        inserted.insert_many(voxtile.scans(scans))
+        digest = inserted.digest()
+    assert voxtile.digest(tmp_path / "built") == voxtile.digest(tmp_path / "commanded") == digest
+    assert voxtile_command("digest", tmp_path / "built").split()[0] == digest
+
+
+def test_scans_are_what_the_files_hold(scans: Path, room: list[Scan]) -> None:
+    for (points, pose, intensities), (expected, expected_pose) in zip(voxtile.scans(scans), room, strict=True):
+        assert intensities is None and np.array_equal(points, expected)
+        np.testing.assert_allclose(pose, matrix_of(expected_pose), atol=1e-12)
+    assert len(list(voxtile.scans(scans, first=1, every=2))) == 2
+    with pytest.raises(errors.ArgumentError, match="nothing: there is no such file"):
+        voxtile.scans(scans / "nothing")
+
+
+def test_snapshots(city: Path, tmp_path: Path) -> None:
+    assert [snapshot["name"] for snapshot in voxtile.snapshots(city)] == ["early"]
+    now, early = voxtile.digest(city), voxtile.digest(city, snapshot="early")
+    sums = voxtile.diff((city, "early"), city)
+    assert sums["appeared"] > 0 and sums["differing"]
+    assert voxtile.diff(city, city)["differing"] == []
+    voxtile.revert(city, "early", keep_as="late")
+    assert voxtile.digest(city) == early and voxtile.digest(city, snapshot="late") == now
+    voxtile.delete_snapshot(city, "early")
+    assert [snapshot["name"] for snapshot in voxtile.snapshots(city)] == ["late"]
+    voxtile.snapshot(city, "again")
+    assert len(voxtile.snapshots(city)) == 2
+
+
+def test_crop_clear_merge(city: Path, tmp_path: Path) -> None:
+    digest, region = voxtile.digest(city), [[-2, -2, -9], [2, 2, 9]]
+    voxtile.crop(city, tmp_path / "inside", region)
+    voxtile.crop(city, tmp_path / "outside", region, outside=True)
+    voxtile.merge([tmp_path / "inside", tmp_path / "outside"], tmp_path / "merged")
+    assert voxtile.digest(tmp_path / "merged") == digest
+    voxtile.clear(city, region)
+    assert voxtile.digest(city) == voxtile.digest(tmp_path / "outside")
+    with pytest.raises(errors.ArgumentError, match="prefer"):
+        voxtile.merge([tmp_path / "inside", tmp_path / "outside"], tmp_path / "no", prefer="none")
+
+
+def test_decay_verify_repair(city: Path) -> None:
+    sums = voxtile.decay(city, 2.0, scans=2)
+    assert sums["factor"] == 0.5 and sums["voxels"] > 0
+    assert voxtile.verify(city)["damage"] == 0
+    damaged = next(city.glob("tile_*/iwlo_meta.bin"))
+    damaged.write_bytes(damaged.read_bytes()[:-1] + b"\xff")
+    findings = voxtile.verify(city)["findings"]
+    assert any(Path(finding["path"]).parent == damaged.parent for finding in findings)
+    with voxtile.open(city) as found, pytest.raises(errors.DamagedError) as error:
+        found.occupied()
+    assert error.value.path == damaged and error.value.tile is not None
+    assert voxtile.repair(city)["tiles_lost"] == 1
+    assert voxtile.verify(city)["damage"] == 0
+
+
+def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
+    voxtile.export(city, tmp_path / "city.ot")
+    voxtile.export(city, tmp_path / "city.ply")
+    assert (tmp_path / "city.ply").read_bytes().startswith(b"ply\n")
+    with voxtile.open(city) as ours, voxtile.open(tmp_path / "city.ot") as theirs:
+        at = np.random.default_rng(5).uniform(-6, 6, (4000, 3))
+        assert np.array_equal(ours.occupancy(at), theirs.occupancy(at))
+        assert not theirs.writable
+    voxtile.import_octree(tmp_path / "city.ot", tmp_path / "imported", storage="compact")
+    with voxtile.open(tmp_path / "imported") as imported, voxtile.open(city) as ours:
+        assert len(imported.occupied()[0]) == len(ours.occupied()[0])
+    with pytest.raises(errors.NoMapError) as missing:
+        voxtile.export(tmp_path / "none", tmp_path / "none.ply")
+    assert missing.value.path == tmp_path / "none"
+
+
+def test_the_command(city: Path) -> None:
+    info = json.loads(voxtile_command("info", city, "--json"))
+    assert info["version"] == 1
+    script = Path(sys.executable).parent / "voxtile"
+    assert script.exists() and os.access(script, os.X_OK)
+    done = subprocess.run([script, "info", city / "nothing"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "no map here" in done.stderr
+    done = subprocess.run([script, "no-such-command"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+
+
+def test_pictures(city: Path) -> None:
+    from voxtile.pictures import heights
+
+    with voxtile.open(city) as found:
+        values, extent = heights(found)
+        centers, _ = found.occupied()
+        assert np.nanmax(values) == centers[:, 2].max() and extent[0] <= centers[:, 0].min()
+        columns = {tuple(at) for at in np.floor(centers[:, :2] / 0.25).astype(int).tolist()}
+        assert np.count_nonzero(~np.isnan(values)) == len(columns)
+        assert "0.25 m" in found._repr_html_()
+        pytest.importorskip("matplotlib")
+        assert found.plot().axes[0].get_xlabel() == "x in m"
+        assert "data:image/png" in found._repr_html_()
