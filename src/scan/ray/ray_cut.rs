@@ -16,6 +16,8 @@ pub(crate) struct RayCut<'a> {
     /// A box around the selected tiles, relative to the origin, in units of voxels and with [`MARGIN`] on all sides;
     /// `None` if no tile is selected.
     around: Option<(Point, Point)>,
+    /// The voxels of a box around the selected tiles.
+    voxels: VoxelBox,
 }
 
 /// In voxels: far above what rounding moves a ray by.
@@ -31,7 +33,14 @@ impl<'a> RayCut<'a> {
                 std::array::from_fn(|k| (f64::from(high[k]) + 1.0) * edge + MARGIN - origin.point[k]),
             )
         });
-        Self { grid, tiles, around }
+        let voxels = match tiles.bounds() {
+            Some(bounds) => VoxelBox {
+                min: grid.voxels_of_tile(bounds.min()).min,
+                end: grid.voxels_of_tile(bounds.max()).end,
+            },
+            None => VoxelBox { min: [0; 3], end: [0; 3] },
+        };
+        Self { grid, tiles, around, voxels }
     }
 
     /// The ray to `end`, cut; `None` if it says nothing about a selected tile.
@@ -54,27 +63,31 @@ impl<'a> RayCut<'a> {
         high: Local,
         mut holds: impl FnMut(Local, Local) -> bool,
     ) -> bool {
-        let Some(bounds) = self.tiles.bounds() else { return true };
         let base = window.base();
-        let voxel = |local: Local| -> VoxelIndex { std::array::from_fn(|k| base[k] + local[k] as i32) };
-        let (low, high) = (voxel(low), voxel(high));
-        let tiles = TileBox::new(self.grid.tile_of_voxel(low), self.grid.tile_of_voxel(high));
-        let Some(tiles) = tiles.intersection(bounds) else { return true };
-        let mut holds_between = |first: TileIndex, last: TileIndex| {
-            let (first, last) = (self.grid.voxels_of_tile(first), self.grid.voxels_of_tile(last));
-            let region = VoxelBox { min: first.min, end: last.end };
+        let voxel = |local: Local, k: usize| base[k] + local[k] as i32;
+        let wanted = VoxelBox {
+            min: std::array::from_fn(|k| voxel(low, k)),
+            // A window ends before the last voxel of the range.
+            end: std::array::from_fn(|k| voxel(high, k) + 1),
+        };
+        let wanted = wanted.intersection(&self.voxels);
+        if wanted.is_empty() {
+            return true;
+        }
+        let mut holds_in = |region: &VoxelBox| {
             let local = |voxel: i32, k: usize| voxel.wrapping_sub(base[k]) as u32;
             holds(
-                std::array::from_fn(|k| local(low[k].max(region.min[k]), k)),
-                std::array::from_fn(|k| local(high[k].min(region.end[k] - 1), k)),
+                std::array::from_fn(|k| local(region.min[k], k)),
+                std::array::from_fn(|k| local(region.end[k] - 1, k)),
             )
         };
-        match self.tiles.is_box() {
-            true => holds_between(tiles.min(), tiles.max()),
-            false => {
-                tiles.tiles().filter(|tile| self.tiles.contains(*tile)).all(|tile| holds_between(tile, tile))
-            }
+        if self.tiles.is_box() {
+            return holds_in(&wanted);
         }
+        let last: VoxelIndex = wanted.end.map(|end| end - 1);
+        let tiles = TileBox::new(self.grid.tile_of_voxel(wanted.min), self.grid.tile_of_voxel(last));
+        let mut selected = tiles.tiles().filter(|tile| self.tiles.contains(*tile));
+        selected.all(|tile| holds_in(&wanted.intersection(&self.grid.voxels_of_tile(tile))))
     }
 
     fn span(&self, ray: &SlabRay) -> Option<SlabSpan> {
@@ -157,5 +170,62 @@ impl<'a> RayCut<'a> {
             self.tiles.contains(TileIndex::from(tile))
         };
         along_b.into_iter().any(|b| along_c.clone().any(|c| is_selected(b, c)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays all around from one origin, each with the slabs, first and last, in which it visits selected tiles.
+    fn rays(origin: &RayOrigin, grid: &Grid, tiles: &TileSelection) -> Vec<(RayEnd, Option<(u32, u32)>)> {
+        let ray = |k: u32| {
+            let (azimuth, up) = (f64::from(k) * 2.399_963, f64::from(k % 199) / 99.0 - 1.0);
+            let (flat, reach) = ((1.0 - up * up).max(0.0).sqrt(), 40.0 + f64::from(k % 997));
+            let way = [flat * azimuth.cos(), flat * azimuth.sin(), up];
+            let point: Point = std::array::from_fn(|axis| origin.point[axis] + reach * way[axis]);
+            let voxel = point.map(|x| x.floor() as i32);
+            let end = RayEnd { point, voxel, hit: None, span: SlabSpan::WHOLE };
+            let ray = SlabRay::new(origin, end);
+            let mut visited = None;
+            ray.walk().for_each_before_end(|voxel| {
+                if tiles.contains(grid.tile_of_voxel(voxel)) {
+                    let slab = voxel[ray.axis].abs_diff(origin.voxel[ray.axis]);
+                    visited = Some((visited.map_or(slab, |(first, _)| first), slab));
+                }
+            });
+            (end, visited)
+        };
+        (0..3000).map(ray).collect()
+    }
+
+    #[test]
+    fn what_is_left_of_rays_holds_the_selected_tiles_and_little_else() {
+        let grid = Grid::new(0.1, 10.0).unwrap();
+        let near = TileBox::new([1, -2, -1].into(), [3, 0, 0].into());
+        let selections: [TileSelection; 4] = [
+            near.into(),
+            near.tiles().collect(),
+            TileBox::new([0, 0, 0].into(), [0, 0, 0].into()).into(),
+            [TileIndex::new(-6, 2, 0), TileIndex::new(-6, 3, 0)].into_iter().collect(),
+        ];
+        for point in [[3.5, 40.25, 7.125], [17.0, 99.0, 60.0]] {
+            let origin = &RayOrigin::new(point, point.map(|x| x.floor() as i32));
+            for tiles in &selections {
+                let cut = RayCut::new(&grid, tiles, origin);
+                let (mut wanted, mut left) = (0, 0);
+                for (end, visited) in rays(origin, &grid, tiles) {
+                    let span = cut.apply(origin, end).map(|end| end.span);
+                    if let Some((first, last)) = visited {
+                        let span = span.unwrap();
+                        assert!(span.from <= first && last < span.until, "{end:?}: {span:?}");
+                        wanted += last - first + 1;
+                    }
+                    let slabs = SlabRay::new(origin, end).slabs() + 1;
+                    left += span.map_or(0, |span| span.until.min(slabs) - span.from);
+                }
+                assert!(wanted > 0 && left < wanted + wanted / 5, "{left} slabs for {wanted}: {tiles:?}");
+            }
+        }
     }
 }
