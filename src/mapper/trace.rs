@@ -1,6 +1,6 @@
 use crate::config::{MapConfig, OctreeConfig};
 use crate::error::Result;
-use crate::scan::{Overflow, ScanPoints, ScanTracer, ScanUpdates, UpdateOrder};
+use crate::scan::{MappedTiles, Overflow, ScanPoints, ScanTracer, ScanUpdates, UpdateOrder};
 use crate::space::TileSelection;
 
 /// What a scan says about the voxels of a selection of tiles or of all, in the form that the map's tiles want. What there is no room for overflows, if there
@@ -18,5 +18,6 @@ pub(super) fn trace(
         // A voxel cache is about the order in which rays update voxels, and so is what it is compared with.
         OctreeConfig::Pointers(_) => UpdateOrder::OfRays,
     };
-    tracer.trace_points(grid, sensor_model, rays, scan, tiles, order, overflow)
+    let mapped = MappedTiles { grid, selection: tiles };
+    tracer.trace_points(mapped, sensor_model, rays, scan, order, overflow)
 }

@@ -1,7 +1,9 @@
 //! Scans under a memory limit give the same updates as without.
 
 use super::updates::brick_code;
-use super::{Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder};
+use super::{
+    MappedTiles, Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder,
+};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::Result;
 use crate::scratch::Scratch;
@@ -73,8 +75,9 @@ struct Setting {
 impl Setting {
     fn whole(&self, scan: &Scan) -> (Said, ScanReport) {
         let Self { grid, model, rays, order, tiles } = self;
+        let mapped = MappedTiles { grid, selection: tiles.as_ref() };
         let tracer = &mut ScanTracer::default();
-        let updates = tracer.trace_points(grid, model, rays, scan, tiles.as_ref(), *order, None).unwrap();
+        let updates = tracer.trace_points(mapped, model, rays, scan, *order, None).unwrap();
         let mut said = Said::new();
         updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         (said, updates.report)
@@ -88,6 +91,7 @@ impl Setting {
         max_bytes: usize,
     ) -> Result<(Said, ScanReport, usize)> {
         let Self { grid, model, rays, order, tiles } = self;
+        let mapped = MappedTiles { grid, selection: tiles.as_ref() };
         let (mut said, mut times) = (Said::new(), 0);
         let mut spill = |part: Vec<(TileIndex, PackedUpdates)>| {
             times += 1;
@@ -100,7 +104,7 @@ impl Setting {
         let folder = Path::new("map");
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =
-            tracer.trace_points(grid, model, rays, scan, tiles.as_ref(), *order, Some(overflow))?;
+            tracer.trace_points(mapped, model, rays, scan, *order, Some(overflow))?;
         tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         Ok((said, report, times))
     }
@@ -174,7 +178,14 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
         let (folder, spill) = (Path::new("some_map"), &mut |_| Ok(()));
         let overflow = Overflow { max_bytes: 1 << 16, max_tiles: usize::MAX, folder, make_scratch, spill };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
-        let traced = tracer.trace_points(grid, model, rays, &scan, None, *order, Some(overflow));
+        let traced = tracer.trace_points(
+            MappedTiles { grid, selection: None },
+            model,
+            rays,
+            &scan,
+            *order,
+            Some(overflow),
+        );
         assert!(traced.unwrap_err().to_string().contains("some_map"));
     }
 }

@@ -61,7 +61,8 @@ impl ScanTracer {
         rays: &RayConfig,
         scan: &Scan,
     ) -> Result<ScanUpdates> {
-        self.trace_points(grid, model, rays, scan, None, UpdateOrder::OfVoxels, None)
+        let mapped = MappedTiles { grid, selection: None };
+        self.trace_points(mapped, model, rays, scan, UpdateOrder::OfVoxels, None)
     }
 
     /// The same, but in insertion per ray a tile's updates are in the order of the rays, one by one: for octrees whose
@@ -77,11 +78,11 @@ impl ScanTracer {
         rays: &RayConfig,
         scan: &Scan,
     ) -> Result<ScanUpdates> {
-        self.trace_points(grid, model, rays, scan, None, UpdateOrder::OfRays, None)
+        let mapped = MappedTiles { grid, selection: None };
+        self.trace_points(mapped, model, rays, scan, UpdateOrder::OfRays, None)
     }
 
-    /// The same for any source of points, and with a selection for these tiles alone: their updates are those of the
-    /// whole scan. With `overflow`, updates that exceed the memory limit are spilled and the
+    /// The same for any source of points and for the mapped tiles alone: their updates are those of the whole scan. With `overflow`, updates that exceed the memory limit are spilled and the
     /// rest is returned. The report covers both.
     ///
     /// # Errors
@@ -89,21 +90,21 @@ impl ScanTracer {
     /// As for [`ScanTracer::trace`], points that cannot be read, and errors of the spill.
     pub(crate) fn trace_points(
         &mut self,
-        grid: &Grid,
+        mapped: MappedTiles<'_>,
         model: &SensorModel,
         rays: &RayConfig,
         scan: &dyn ScanPoints,
-        tiles: Option<&TileSelection>,
         order: UpdateOrder,
         overflow: Option<Overflow<'_>>,
     ) -> Result<ScanUpdates> {
-        Self::check(grid, model, scan)?;
-        let selection = match (tiles, rays.region) {
+        let MappedTiles { grid, selection } = mapped;
+        let selection = match (selection, rays.region) {
             (Some(tiles), Some(region)) => Some(Cow::Owned(tiles.within(region))),
             (Some(tiles), None) => Some(Cow::Borrowed(tiles)),
             (None, region) => region.map(|region| Cow::Owned(TileSelection::from(region))),
         };
         let mapped = MappedTiles { grid, selection: selection.as_deref() };
+        Self::check(grid, model, scan)?;
         let scan_rays = ScanRays::new(mapped, model, rays, scan, &self.stop)?;
         let is_per_scan = rays.insert_mode == InsertMode::PerScan;
         let in_order = !is_per_scan && order == UpdateOrder::OfRays;
