@@ -1,8 +1,9 @@
-//! How long does a scan take into the map: in memory, out of core with room, out of core with next to none?
+//! How long does a scan take into the map: in memory, a quarter of its tiles, out of core with room and with next to none?
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use voxtile::mapper::MapView;
 use voxtile::simulation::Survey;
-use voxtile::{InMemoryMapper, InsertMode, MapConfig, Mapper, OutOfCoreTileMapper, Scan};
+use voxtile::{InMemoryMapper, InsertMode, MapConfig, Mapper, OutOfCoreTileMapper, Scan, TileSelection};
 
 fn config() -> MapConfig {
     MapConfig::new(0.2, 10.0).expect("whole voxels").with_range(0.0, 60.0)
@@ -29,6 +30,19 @@ fn street(criterion: &mut Criterion) {
             bencher.iter_batched_ref(mapper, |mapper| insert_all(mapper, &scans), BatchSize::PerIteration);
         });
     }
+    let mut whole = InMemoryMapper::new(config()).expect("a valid configuration");
+    insert_all(&mut whole, &scans);
+    let tiles = whole.tile_indices();
+    let quarter: TileSelection = tiles[..tiles.len() / 4].iter().copied().collect();
+    group.bench_function("in memory, a quarter of the tiles", |bencher| {
+        let mapper = || InMemoryMapper::new(config()).expect("a valid configuration");
+        let insert = |mapper: &mut InMemoryMapper| {
+            for scan in &scans {
+                mapper.insert_points_in(scan, &quarter).expect("a scan that can be mapped");
+            }
+        };
+        bencher.iter_batched_ref(mapper, insert, BatchSize::PerIteration);
+    });
     for (name, cache_tiles, write_buffer_bytes) in [("with room", 1000, 0), ("four tiles", 4, 1 << 20)] {
         group.bench_function(format!("out of core, {name}, flushed"), |bencher| {
             let config = config().with_cache_tiles(cache_tiles).with_write_buffer_bytes(write_buffer_bytes);

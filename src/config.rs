@@ -3,7 +3,7 @@ mod storage;
 use crate::error::{Error, Result};
 use crate::maths::logit;
 use crate::sensor::SensorModel;
-use crate::space::Grid;
+use crate::space::{Grid, TileBox};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 pub use storage::Storage;
@@ -86,6 +86,9 @@ pub struct RayConfig {
     /// point 1e9 m away or more: see [`no_return`](crate::scan::no_return). Default: they are treated as other points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_return_range_m: Option<f64>,
+    /// Only these tiles are mapped: what scans say about others is left out. Default: all of space.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub region: Option<TileBox>,
     /// How often a voxel is updated by one scan. Default: once.
     pub insert_mode: InsertMode,
 }
@@ -170,6 +173,7 @@ impl Default for RayConfig {
             min_range_m: 0.0,
             max_range_m: None,
             no_return_range_m: None,
+            region: None,
             insert_mode: InsertMode::PerScan,
         }
     }
@@ -205,6 +209,12 @@ impl MapConfig {
     /// The same with rays from `min_range_m` to `max_range_m`, in metres.
     pub fn with_range(mut self, min_range_m: f64, max_range_m: impl Into<Option<f64>>) -> Self {
         (self.rays.min_range_m, self.rays.max_range_m) = (min_range_m, max_range_m.into());
+        self
+    }
+
+    /// The same with a region: only these tiles are mapped.
+    pub fn with_region(mut self, region: impl Into<Option<TileBox>>) -> Self {
+        self.rays.region = region.into();
         self
     }
 

@@ -103,6 +103,6 @@ pub use nalgebra;
 pub use query::{Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy};
 pub use scan::{Pose, Scan, ScanPoints, ScanRef, ScanReport, Stop};
 pub use sensor::{Evidence, SensorModel};
-pub use space::{Aabb, Grid, Point, TileIndex, VoxelIndex};
+pub use space::{Aabb, Grid, Point, TileBox, TileIndex, TileSelection, VoxelIndex};
 pub use store::{MapPath, SnapshotName};
 pub use tile::Voxel;

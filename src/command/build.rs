@@ -13,6 +13,7 @@ use crate::command::{INTERRUPTED, say};
 use crate::io::{PointRoom, ReadOptions, StoredScan};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer};
+use crate::space::Point;
 use crate::store::InputRecord;
 use crate::{Error, MapConfig, MemoryLimit};
 use std::path::Path;
@@ -147,17 +148,27 @@ fn options_of(args: &BuildArgs) -> crate::Result<ReadOptions> {
     Ok(options)
 }
 
-/// Takes the points of a scan as hits alone, as one batch.
+/// Takes the points of a scan as hits alone, as one batch; those outside the map's region are left out.
 fn insert_hits(mapper: &mut OutOfCoreTileMapper, scan: &StoredScan) -> crate::Result<ScanReport> {
+    let (grid, region) = (mapper.config().grid, mapper.config().rays.region);
+    // A point without a tile is skipped and counted.
+    let is_inside = |point: Point| match (region, grid.tile_of(point)) {
+        (Some(region), Some(tile)) => region.contains(tile),
+        _ => true,
+    };
     let (mut points, mut intensities) = (Vec::new(), Vec::new());
     scan.for_each_chunk(0..scan.len(), &mut |chunk, of_chunk| {
-        points.extend_from_slice(chunk);
-        intensities.extend_from_slice(of_chunk.unwrap_or_default());
+        for (number, &point) in chunk.iter().enumerate().filter(|(_, point)| is_inside(**point)) {
+            points.push(point);
+            intensities.extend(of_chunk.map(|intensities| intensities[number]));
+        }
         true
     })?;
     let intensities = scan.has_intensities().then_some(&*intensities);
     let is_occupied = vec![true; points.len()];
-    mapper.batch_update(&PointBatch { points: &points, intensities, is_occupied: &is_occupied })
+    let batch = PointBatch { points: &points, intensities, is_occupied: &is_occupied };
+    let report = mapper.batch_update(&batch)?;
+    Ok(ScanReport { points: scan.len() as u64, ..report })
 }
 
 fn flush_if(

@@ -1,5 +1,6 @@
 use crate::command::args::{BuildArgs, InsertName, ModelName};
 use crate::command::octree_choice::octree_config;
+use crate::command::region_tiles::tiles_of;
 use crate::mapper::{MapReader, MapView};
 use crate::sensor::{Iwlo, SensorModel};
 use crate::space::{Grid, GridError};
@@ -80,6 +81,10 @@ fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig
         }
     };
     config.rays.no_return_range_m = args.clear_no_return.or(begun.and_then(|rays| rays.no_return_range_m));
+    config.rays.region = match &args.region {
+        Some(corners) => Some(tiles_of(corners, &config.grid)?),
+        None => begun.and_then(|rays| rays.region),
+    };
     config.rays.min_range_m = min_range_m;
     config.rays.max_range_m = args.max_range.or(begun_max_m);
     Ok(config)

@@ -3,10 +3,11 @@ use crate::command::json;
 use crate::command::map_at::{read_any_map, read_map};
 use crate::command::octree_file;
 use crate::command::picture::{is_quick, print_small};
+use crate::command::region_tiles;
 use crate::mapper::{MapReader, MapView, OctreeMap};
 use crate::operations::{KeptBytes, kept_bytes};
 use crate::sensor::SensorModel;
-use crate::space::Aabb;
+use crate::space::{Aabb, Grid, TileBox};
 use crate::store::{Bounds, InputRecord};
 use crate::{MapQueries, Result, Storage};
 use indicatif::{HumanBytes, HumanCount};
@@ -35,6 +36,9 @@ pub struct Info {
     /// Number of the last scan when evidence last faded; 0 if it never has.
     pub decayed_scan: u64,
     pub tiles: u64,
+    /// The tiles that are mapped; missing where that is all of space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub region_tiles: Option<TileBox>,
     pub tile_bounds: Option<Bounds>,
     pub bounds_m: Option<Aabb>,
     pub voxels: u64,
@@ -109,6 +113,7 @@ impl Info {
             inputs: ext.map_or(Vec::new(), |ext| ext.inputs.clone()),
             decayed_scan: ext.map_or(0, |ext| ext.decayed_scan),
             tiles: reader.tile_indices().len() as u64,
+            region_tiles: config.rays.region,
             tile_bounds,
             bounds_m: tile_bounds
                 .map(|bounds| Aabb { min: corner(bounds.min, 0), max: corner(bounds.max, 1) }),
@@ -132,6 +137,11 @@ impl Info {
             SensorModel::Iwlo(_) => "iwlo",
         };
         writeln!(out, "model        {model}, occupied from probability {}", self.occupancy_threshold)?;
+        if let Some(tiles) = self.region_tiles
+            && let Ok(grid) = Grid::new(self.resolution_m, self.tile_size_m)
+        {
+            writeln!(out, "region       {}", region_tiles::text(tiles, &grid))?;
+        }
         writeln!(
             out,
             "scans        {} in {} flushes",

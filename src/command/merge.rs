@@ -45,6 +45,12 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
             args.maps.len(),
             HumanCount(merged.common_voxels)
         )?;
+        if merged.is_one_build {
+            writeln!(
+                out,
+                "scans     those of each map: regions of one build, which build --resume goes on with"
+            )?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -40,6 +40,7 @@ mod progress;
 mod query;
 mod raycast;
 mod read_options;
+mod region_tiles;
 mod repair;
 mod report;
 mod revert;

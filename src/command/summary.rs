@@ -1,8 +1,10 @@
 use crate::OctreeConfig;
 use crate::command::json;
 use crate::command::memory;
+use crate::command::region_tiles;
 use crate::mapper::{IoCounts, MapReader, MapView, MemoryCounts, StallCounts};
 use crate::scan::ScanReport;
+use crate::space::{Grid, TileBox};
 use crate::tile::{OctreeStatistics, TileCounts};
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -22,9 +24,14 @@ pub struct Summary {
     /// Where the poses come from.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poses: Option<String>,
+    /// The tiles that are mapped; missing where that is all of space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub region_tiles: Option<TileBox>,
     /// The scans that were skipped, with the reason of each.
     #[serde(rename = "unread_scans")]
     pub unread: Vec<String>,
+    #[serde(skip)]
+    pub grid: Grid,
     #[serde(flatten)]
     pub report: ScanReport,
     pub scan_number: u64,
@@ -79,7 +86,9 @@ impl Summary {
             resumed_after: 0,
             interrupted: false,
             poses: None,
+            region_tiles: mapper.config().rays.region,
             unread: Vec::new(),
+            grid: mapper.config().grid,
             report,
             scan_number: reader.scan_number(),
             voxels,
@@ -114,6 +123,9 @@ impl Summary {
         }
         if let Some(poses) = &self.poses {
             writeln!(out, "poses     {poses}")?;
+        }
+        if let Some(tiles) = self.region_tiles {
+            writeln!(out, "region    {}", region_tiles::text(tiles, &self.grid))?;
         }
         if !self.unread.is_empty() {
             writeln!(out, "unread    {} scans, skipped", HumanCount(self.unread.len() as u64))?;

@@ -5,7 +5,7 @@ use crate::config::MapConfig;
 use crate::error::Result;
 use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
-use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::tile::{OctreeFactory, Tile};
 use rayon::prelude::*;
 
@@ -126,7 +126,12 @@ impl MapView for InMemoryMapper {
 
 impl Mapper for InMemoryMapper {
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
-        let updates = trace(&mut self.tracer, &self.config, scan, None)?;
+        let updates = trace(&mut self.tracer, &self.config, scan, None, None)?;
+        Ok(self.accept(updates))
+    }
+
+    fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport> {
+        let updates = trace(&mut self.tracer, &self.config, scan, Some(tiles), None)?;
         Ok(self.accept(updates))
     }
 

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
-use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::store::{InputContent, InputRecord, MapPath, Metadata, SnapshotName, TileStore};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -221,6 +221,29 @@ impl OutOfCoreTileMapper {
         self.pager().reload(tile, discard_changes)
     }
 
+    /// Inserts what a scan says about a selection of tiles, or about all.
+    fn insert(&mut self, scan: &dyn ScanPoints, selection: Option<&TileSelection>) -> Result<ScanReport> {
+        let plan = MemoryPlan::new(self.config.memory);
+        let tiles = &self.tiles;
+        let (disk, folder, max_tiles) = {
+            let pager = tiles.pager();
+            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.most_tiles_of_scan())
+        };
+        let make_scratch = &|| disk.scratch(&folder);
+        let spill = &mut |part| tiles.pager().stage(part);
+        let max_bytes = plan.updates_bytes;
+        let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
+        let overflow = (max_bytes < usize::MAX).then_some(overflow);
+        let traced = trace(&mut self.tracer, &self.config, scan, selection, overflow);
+        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
+        let inserted = traced.and_then(|updates| self.accept(updates));
+        match inserted {
+            Ok(_) => self.pager().note_scan(scan.stamp_ns(), scan.origin()),
+            Err(_) => self.pager().discard_staged(),
+        }
+        inserted
+    }
+
     fn accept(&mut self, updates: ScanUpdates) -> Result<ScanReport> {
         let report = updates.report;
         let scan_bytes = self.tracer.bytes() + updates.bytes();
@@ -285,25 +308,11 @@ impl MapView for OutOfCoreTileMapper {
 
 impl Mapper for OutOfCoreTileMapper {
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
-        let plan = MemoryPlan::new(self.config.memory);
-        let tiles = &self.tiles;
-        let (disk, folder, max_tiles) = {
-            let pager = tiles.pager();
-            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.most_tiles_of_scan())
-        };
-        let make_scratch = &|| disk.scratch(&folder);
-        let spill = &mut |part| tiles.pager().stage(part);
-        let max_bytes = plan.updates_bytes;
-        let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
-        let overflow = (max_bytes < usize::MAX).then_some(overflow);
-        let traced = trace(&mut self.tracer, &self.config, scan, overflow);
-        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
-        let inserted = traced.and_then(|updates| self.accept(updates));
-        match inserted {
-            Ok(_) => self.pager().note_scan(scan.stamp_ns(), scan.origin()),
-            Err(_) => self.pager().discard_staged(),
-        }
-        inserted
+        self.insert(scan, None)
+    }
+
+    fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport> {
+        self.insert(scan, Some(tiles))
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
@@ -333,6 +342,14 @@ fn check_rays(store: &TileStore, rays: &RayConfig) -> Result<()> {
     };
     if range(&ext.rays) != range(rays) {
         return mismatch("been built with ranges of", range(&ext.rays), range(rays));
+    }
+    if ext.rays.region != rays.region {
+        let region = |rays: &RayConfig| {
+            rays.region.map_or("all of space".to_owned(), |tiles| {
+                format!("tiles {} to {}", tiles.min(), tiles.max())
+            })
+        };
+        return mismatch("been built of", region(&ext.rays), region(rays));
     }
     if ext.rays.insert_mode != rays.insert_mode {
         let mode = |rays: &RayConfig| rays.insert_mode.to_string();

@@ -1,13 +1,15 @@
 use crate::config::{MapConfig, OctreeConfig};
 use crate::error::Result;
-use crate::scan::{Overflow, ScanPoints, ScanTracer, ScanUpdates, UpdateOrder};
+use crate::scan::{MappedTiles, Overflow, ScanPoints, ScanTracer, ScanUpdates, UpdateOrder};
+use crate::space::TileSelection;
 
-/// What a scan says about voxels, in the form that the map's tiles want. What there is no room for overflows, if there
+/// What a scan says about the voxels of a selection of tiles or of all, in the form that the map's tiles want. What there is no room for overflows, if there
 /// is a limit.
 pub(super) fn trace(
     tracer: &mut ScanTracer,
     config: &MapConfig,
     scan: &dyn ScanPoints,
+    tiles: Option<&TileSelection>,
     overflow: Option<Overflow<'_>>,
 ) -> Result<ScanUpdates> {
     let MapConfig { grid, sensor_model, rays, .. } = config;
@@ -16,5 +18,6 @@ pub(super) fn trace(
         // A voxel cache is about the order in which rays update voxels, and so is what it is compared with.
         OctreeConfig::Pointers(_) => UpdateOrder::OfRays,
     };
-    tracer.trace_points(grid, sensor_model, rays, scan, order, overflow)
+    let mapped = MappedTiles { grid, selection: tiles };
+    tracer.trace_points(mapped, sensor_model, rays, scan, order, overflow)
 }

@@ -3,7 +3,7 @@ use crate::config::MapConfig;
 use crate::error::Result;
 use crate::scan::{PointBatch, Scan, ScanPoints, ScanReport};
 use crate::sensor::Evidence;
-use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::store::TileVersion;
 
 /// A map of tiles. All of [`Queries`](crate::query::Queries) and [`MapQueries`](crate::query::MapQueries) use these few.
@@ -97,6 +97,15 @@ pub trait Mapper: MapView + Send {
     /// An origin without a voxel, intensities that are missing or not one a point, points that cannot be read, a tile
     /// that cannot be read or written.
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport>;
+
+    /// Adds what a scan says about some tiles: these are afterwards as after [`Mapper::insert_points`], to the bit, and
+    /// all others as before. Rays are cut before they are walked, so it costs what the tiles cost. The report counts all
+    /// points, but only the updates of these tiles.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Mapper::insert_points`].
+    fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport>;
 
     /// [`Mapper::insert_points`] for a [`Scan`].
     ///

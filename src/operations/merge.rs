@@ -1,8 +1,11 @@
 use super::map_writer::{MapWriter, WrittenMap};
 use super::merge_rule::{MergeRule, Prefer};
+use super::regions::OneBuild;
 use super::table_merge::TableMerge;
+use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView, TileRef};
+use crate::persistence::{new_map_id, new_metadata};
 use crate::space::TileIndex;
 use crate::store::MapPath;
 use crate::tile::Table;
@@ -24,6 +27,8 @@ pub struct Merged {
     pub related: Vec<(usize, usize)>,
     /// Whether evidence was added, so that what related maps have in common counts twice.
     pub is_added: bool,
+    /// Whether the maps are regions of one build, which can go on with the new map: that has their scans.
+    pub is_one_build: bool,
 }
 
 /// Makes one map of several: of a voxel that one map knows its evidence, of one that several know what `prefer` says.
@@ -31,10 +36,12 @@ pub struct Merged {
 /// Without a preference log-odds are added, in the order of the maps, and clamped once; counts are added, too. That is
 /// what one map of all scans would have, but for the clamps on the way and the order of additions. It takes maps of the
 /// model [`LogOdds`](crate::sensor::LogOdds) with equal parameters, because evidence of the other model depends on what
-/// was there before. With a preference any models go together; sensor model, occupancy threshold and storage are those
+/// was there before, unless no tile is in two maps. With a preference any models go together; sensor model, occupancy threshold and storage are those
 /// of the first map.
 ///
-/// The new map has an id of its own and no scans, and is there as a whole or not at all, see [`MapWriter`]; it is made
+/// The new map has an id of its own and no scans, unless the maps are regions of one build
+/// ([`RayConfig::region`](crate::RayConfig)) that together are a box: then it is what one build of that box would
+/// be, which goes on with it. It is there as a whole or not at all, see [`MapWriter`]; it is made
 /// on the disk of the first. `progress` is told the tiles done and all.
 ///
 /// # Errors
@@ -50,7 +57,10 @@ pub fn merge(
     let [first, .., _] = maps else {
         return Err(Error::argument("maps", "name two maps or more to be merged"));
     };
-    let config = first.config().clone();
+    let mut config = first.config().clone();
+    if maps.iter().any(|map| map.config().rays.region != config.rays.region) {
+        config.rays.region = None;
+    }
     for map in maps {
         check_grid(map, first)?;
         check_crs(map, first)?;
@@ -58,7 +68,9 @@ pub fn merge(
             check_model(map, first)?;
         }
     }
-    let Some(rule) = MergeRule::of(&config, prefer) else {
+    // With no tile in common there is nothing to prefer, as with maps of regions.
+    let without_choice = || have_no_common_tile(maps).then_some(MergeRule::Take(Prefer::First));
+    let Some(rule) = MergeRule::of(&config, prefer).or_else(without_choice) else {
         let reason = format!(
             "the maps' sensor model is {}, whose evidence does not add up: say which map's voxels to take with --prefer \
              first, last or more-observed",
@@ -66,7 +78,11 @@ pub fn merge(
         );
         return Err(Error::argument("maps", reason));
     };
-    let mut writer = MapWriter::create(MapPath::on(first.disk(), output.as_ref()), &config)?;
+    let one_build = OneBuild::of(maps);
+    let mut writer = match one_build {
+        Some(build) => writer_of_build(first, output.as_ref(), &config, build)?,
+        None => MapWriter::create(MapPath::on(first.disk(), output.as_ref()), &config)?,
+    };
     let tiles: BTreeSet<TileIndex> = maps.iter().flat_map(MapView::tile_indices).collect();
     let mut merge = TableMerge::new(rule);
     for (done, &tile) in (0..).zip(&tiles) {
@@ -76,7 +92,38 @@ pub fn merge(
     progress(tiles.len() as u64, tiles.len() as u64);
     let written = writer.finish()?;
     let is_added = matches!(rule, MergeRule::Add { .. });
-    Ok(Merged { written, common_voxels: merge.common, related: related(maps), is_added })
+    Ok(Merged {
+        written,
+        common_voxels: merge.common,
+        related: related(maps),
+        is_added,
+        is_one_build: one_build.is_some(),
+    })
+}
+
+/// Begins the map that one build of all parts would have made; `first` is one of them.
+fn writer_of_build(
+    first: &MapReader,
+    output: &Path,
+    config: &MapConfig,
+    build: OneBuild,
+) -> Result<MapWriter> {
+    let mut config = config.clone();
+    config.rays.region = build.region;
+    let part = first.metadata().ext.as_ref();
+    let mut metadata = new_metadata(&config, new_map_id(), part.map_or(&[], |ext| &ext.inputs));
+    if let (Some(ext), Some(part)) = (&mut metadata.ext, part) {
+        (ext.scan_number, ext.decayed_scan) = (part.scan_number, part.decayed_scan);
+    }
+    let mut writer = MapWriter::create_as(first.disk(), output, metadata)?;
+    writer.take_scans_of(first)?;
+    Ok(writer)
+}
+
+/// Whether every tile is in one map only.
+fn have_no_common_tile(maps: &[MapReader]) -> bool {
+    let mut seen = BTreeSet::new();
+    maps.iter().flat_map(MapView::tile_indices).all(|tile| seen.insert(tile))
 }
 
 /// What is in one place in one system is elsewhere in another. A map that names none goes with any.

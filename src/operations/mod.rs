@@ -25,6 +25,7 @@ mod map_writer;
 mod merge;
 mod merge_rule;
 mod part;
+mod regions;
 mod revert;
 mod snapshot;
 mod table_change;

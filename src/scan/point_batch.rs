@@ -1,5 +1,6 @@
 use super::per_ray::OrderedCollector;
 use super::trace::check_intensities;
+use super::updates::MappedTiles;
 use super::{ScanReport, ScanUpdates};
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
@@ -29,7 +30,8 @@ impl PointBatch<'_> {
                 format!("{} for {} points; give one a point", self.is_occupied.len(), self.points.len());
             return Err(Error::argument("is_occupied", reason));
         }
-        let mut collector = OrderedCollector::new(grid, model.needs_intensity());
+        let mut collector =
+            OrderedCollector::new(MappedTiles { grid, selection: None }, model.needs_intensity());
         let mut report = ScanReport { points: self.points.len() as u64, ..ScanReport::default() };
         for (number, (&point, &is_occupied)) in self.points.iter().zip(self.is_occupied).enumerate() {
             let intensity = self.intensities.map_or(0.0, |intensities| intensities[number]);

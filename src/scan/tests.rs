@@ -1,12 +1,16 @@
 //! Scans under a memory limit give the same updates as without.
 
 use super::updates::brick_code;
-use super::{Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder};
+use super::{
+    MappedTiles, Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder,
+};
 use crate::config::{InsertMode, RayConfig};
 use crate::error::Result;
 use crate::scratch::Scratch;
 use crate::sensor::{Iwlo, Observation, SensorModel};
-use crate::space::{BRICK_EDGE, Grid, Point, TileIndex, VoxelIndex, place_of_voxel, places};
+use crate::space::{
+    BRICK_EDGE, Grid, Point, TileBox, TileIndex, TileSelection, VoxelIndex, place_of_voxel, places,
+};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::io::{self, Cursor};
@@ -64,13 +68,16 @@ struct Setting {
     model: SensorModel,
     rays: RayConfig,
     order: UpdateOrder,
+    /// `None` for all of space.
+    tiles: Option<TileSelection>,
 }
 
 impl Setting {
     fn whole(&self, scan: &Scan) -> (Said, ScanReport) {
-        let Self { grid, model, rays, order } = self;
+        let Self { grid, model, rays, order, tiles } = self;
+        let mapped = MappedTiles { grid, selection: tiles.as_ref() };
         let tracer = &mut ScanTracer::default();
-        let updates = tracer.trace_points(grid, model, rays, scan, *order, None).unwrap();
+        let updates = tracer.trace_points(mapped, model, rays, scan, *order, None).unwrap();
         let mut said = Said::new();
         updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         (said, updates.report)
@@ -83,7 +90,8 @@ impl Setting {
         scan: &Scan,
         max_bytes: usize,
     ) -> Result<(Said, ScanReport, usize)> {
-        let Self { grid, model, rays, order } = self;
+        let Self { grid, model, rays, order, tiles } = self;
+        let mapped = MappedTiles { grid, selection: tiles.as_ref() };
         let (mut said, mut times) = (Said::new(), 0);
         let mut spill = |part: Vec<(TileIndex, PackedUpdates)>| {
             times += 1;
@@ -96,7 +104,7 @@ impl Setting {
         let folder = Path::new("map");
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =
-            tracer.trace_points(grid, model, rays, scan, *order, Some(overflow))?;
+            tracer.trace_points(mapped, model, rays, scan, *order, Some(overflow))?;
         tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         Ok((said, report, times))
     }
@@ -113,6 +121,7 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
         model: SensorModel::Iwlo(Iwlo::default()),
         rays: RayConfig { insert_mode, ..RayConfig::default() },
         order,
+        tiles: None,
     };
     modes.map(setting).into()
 }
@@ -164,18 +173,119 @@ fn long_rays_keep_to_their_memory() {
 fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
     let scan = dense(100, 200.0);
     for setting in settings(10.0) {
-        let Setting { grid, model, rays, order } = &setting;
+        let Setting { grid, model, rays, order, .. } = &setting;
         let make_scratch = &|| Err(io::Error::from(io::ErrorKind::StorageFull));
         let (folder, spill) = (Path::new("some_map"), &mut |_| Ok(()));
         let overflow = Overflow { max_bytes: 1 << 16, max_tiles: usize::MAX, folder, make_scratch, spill };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
-        let traced = tracer.trace_points(grid, model, rays, &scan, *order, Some(overflow));
+        let traced = tracer.trace_points(
+            MappedTiles { grid, selection: None },
+            model,
+            rays,
+            &scan,
+            *order,
+            Some(overflow),
+        );
         assert!(traced.unwrap_err().to_string().contains("some_map"));
+    }
+}
+
+/// What a whole scan says about a selection of tiles, which counts the updates anew.
+fn restricted(whole: &(Said, ScanReport), tiles: &TileSelection) -> (Said, ScanReport) {
+    let (said, mut report) = whole.clone();
+    let said: Said = said.into_iter().filter(|((tile, ..), _)| tiles.contains(*tile)).collect();
+    let updates = || said.values().flatten();
+    report.hits = updates().filter(|said| said.is_some()).count() as u64;
+    report.misses = updates().filter(|said| said.is_none()).count() as u64;
+    let mut touched: Vec<TileIndex> = said.keys().map(|(tile, ..)| *tile).collect();
+    touched.dedup();
+    report.tiles_touched = touched.len() as u64;
+    (said, report)
+}
+
+/// Boxes and sets of tiles near to and far from the origin, and none at all.
+fn selections(center: TileIndex, sparse: u32) -> Vec<TileSelection> {
+    let at = |x, y, z| {
+        let [a, b, c] = center.to_array();
+        TileIndex::new(a + x, b + y, c + z)
+    };
+    let around = TileBox::new(at(-9, -9, -9), at(9, 9, 9));
+    let some = |tile: &TileIndex| {
+        let [x, y, z] = tile.to_array();
+        let hash =
+            (x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791)) as u32;
+        (hash >> 3).is_multiple_of(sparse)
+    };
+    vec![
+        TileBox::new(at(0, 0, 0), at(0, 0, 0)).into(),
+        TileBox::new(at(1, -3, -1), at(2, 4, 0)).into(),
+        TileBox::new(at(-1_000_000, i32::MIN / 2, -4), at(0, 0, 1_000_000)).into(),
+        around.tiles().filter(some).collect(),
+        [at(0, 0, 0), at(3, 1, 0), at(-2, 0, 1)].into_iter().collect(),
+        TileSelection::from_iter([]),
+    ]
+}
+
+#[test]
+fn dense_rays_say_of_some_tiles_what_they_say_of_them_as_a_whole() {
+    let mut scan = dense(9_000, 5.0);
+    // Rays that end far outside the pages around the sensor.
+    scan.points[100] = [900.0, 20.0, -7.0];
+    scan.points[4_500] = [-3.0, 1000.0, 800.0];
+    for mut setting in settings(1.6) {
+        let whole = setting.whole(&scan);
+        for tiles in selections(TileIndex::new(0, 0, 0), 5) {
+            let wanted = restricted(&whole, &tiles);
+            setting.tiles = Some(tiles);
+            assert!(setting.whole(&scan) == wanted, "{:?} {:?}", setting.rays, setting.tiles);
+            let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
+            let (said, report, _) = setting.in_parts(&mut tracer, &scan, 1 << 19).unwrap();
+            assert!((said, report) == wanted, "{:?} {:?}", setting.rays, setting.tiles);
+        }
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn some_tiles_of_random_scans_are_as_after_the_whole_scan(
+        origin in prop::array::uniform3(-50.0..50.0_f64),
+        is_on_border in prop::array::uniform3(prop::bool::ANY),
+        far in prop::sample::select(vec![0.0, 0.0, 1.0e6]),
+        ends in prop::collection::vec((prop::array::uniform3(-30.0..30.0_f64), 0.0..255_f32), 1..60),
+        is_along_axis in prop::bool::ANY,
+        stray in any::<bool>(),
+        sparse in 1..9_u32,
+        tile_size_m in prop::sample::select(vec![10.0, 0.4, 3.7]),
+    ) {
+        let origin: Point = std::array::from_fn(|k| {
+            let x = origin[k] + far;
+            if is_on_border[k] { (x * 4.0).floor() / 4.0 } else { x }
+        });
+        let mut points: Vec<Point> =
+            ends.iter().map(|(way, _)| std::array::from_fn(|k| origin[k] + way[k])).collect();
+        if is_along_axis {
+            points[0] = [origin[0], origin[1] - 17.25, origin[2]];
+        }
+        if stray {
+            points.push([origin[0] + 900.0, origin[1], origin[2] - 400.0]);
+        }
+        let intensities = Some((0..points.len()).map(|k| (k * 91 % 256) as f32).collect());
+        let scan = Scan { origin, points, intensities };
+        for mut setting in settings(tile_size_m) {
+            let whole = setting.whole(&scan);
+            let center = setting.grid.tile_of(origin).unwrap();
+            for tiles in selections(center, sparse) {
+                let wanted = restricted(&whole, &tiles);
+                setting.tiles = Some(tiles);
+                prop_assert!(setting.whole(&scan) == wanted, "{:?}", setting.tiles);
+                let mut tracer = ScanTracer::with_memory_bytes(1 << 16);
+                let (said, report, _) = setting.in_parts(&mut tracer, &scan, 1 << 12).unwrap();
+                prop_assert!((said, report) == wanted, "{:?}", setting.tiles);
+            }
+        }
+    }
 
     #[test]
     fn little_memory_makes_the_same_updates(

@@ -16,6 +16,7 @@ mod key;
 mod morton;
 mod tile_box;
 mod tile_index;
+mod tile_selection;
 mod tile_table;
 mod torus;
 
@@ -31,6 +32,7 @@ pub use key::VoxelKey;
 pub use morton::MortonCode;
 pub use tile_box::TileBox;
 pub use tile_index::TileIndex;
+pub use tile_selection::TileSelection;
 pub(crate) use tile_table::take_u32;
 pub use tile_table::{TileTable, TileValue, put_number, take_number};
 pub use torus::Torus;

@@ -1,10 +1,31 @@
-use super::TileIndex;
+use super::{Aabb, Grid, TileIndex};
+use serde::{Deserialize, Serialize};
 
 /// The tiles from one corner to another, both included.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Corners")]
 pub struct TileBox {
     min: [i32; 3],
     max: [i32; 3],
+}
+
+/// The corners as they are written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Corners {
+    min: [i32; 3],
+    max: [i32; 3],
+}
+
+impl TryFrom<Corners> for TileBox {
+    type Error = &'static str;
+
+    fn try_from(Corners { min, max }: Corners) -> Result<Self, Self::Error> {
+        let is_ordered = (0..3).all(|k| min[k] <= max[k]);
+        is_ordered
+            .then_some(Self { min, max })
+            .ok_or("the lower corner of a box of tiles is above the upper one")
+    }
 }
 
 /// Most tiles that lie ahead of a box; a scan that spans more is no vehicle's.
@@ -14,6 +35,16 @@ impl TileBox {
     /// The box from one corner to another, both included; `min` is not above `max` along any axis.
     pub fn new(min: TileIndex, max: TileIndex) -> Self {
         Self { min: min.to_array(), max: max.to_array() }
+    }
+
+    /// The tiles whose center is in a box; `None` if there are none. So boxes that partition space make boxes of tiles
+    /// that do. Bounds of the box may be infinite.
+    pub fn with_centers_in(region: &Aabb, grid: &Grid) -> Option<Self> {
+        // Saturates: no voxel is in the last tiles of the range.
+        let first_from = |bound_m: f64| (bound_m / grid.tile_size_m() - 0.5).ceil() as i32;
+        let (min, end) = (region.min.map(first_from), region.max.map(first_from));
+        let is_empty = (0..3).any(|k| min[k] >= end[k]);
+        (!is_empty).then(|| Self { min, max: end.map(|end| end - 1) })
     }
 
     /// The smallest box around these tiles; `None` if there are none.
@@ -102,6 +133,24 @@ mod tests {
         // Down, and south as well: the center moved by half a tile.
         let south = (0..3).flat_map(|x| [-1, 0].map(|z| TileIndex::new(x, -1, z)));
         assert_eq!(down.ahead(&before), south.chain(below).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn boxes_that_partition_space_make_boxes_of_tiles_that_do() {
+        let grid = Grid::new(0.1, 10.0).unwrap();
+        let of = |from: f64, to: f64| {
+            let region = Aabb { min: [from, -15.0, f64::NEG_INFINITY], max: [to, 5.0, f64::INFINITY] };
+            TileBox::with_centers_in(&region, &grid)
+        };
+        assert_eq!(of(0.0, 20.0), Some(TileBox::new([0, -2, i32::MIN].into(), [1, -1, i32::MAX - 1].into())));
+        assert_eq!(of(5.1, 14.9), None);
+        let cuts = [f64::NEG_INFINITY, -1e12, -30.0, -7.3, 4.999, 5.0, 5.001, 60.0, 1e12, f64::INFINITY];
+        let parts: Vec<_> = cuts.windows(2).filter_map(|cut| of(cut[0], cut[1])).collect();
+        for x in [i32::MIN, -4, -3, -2, -1, 0, 1, 2, 5, 6, 7, i32::MAX - 1] {
+            let tile = TileIndex::new(x, -1, 0);
+            assert_eq!(parts.iter().filter(|part| part.contains(tile)).count(), 1, "{x}");
+        }
+        assert_eq!(of(9.0, f64::NAN), None);
     }
 
     #[test]

@@ -26,6 +26,9 @@ mod cli_log;
 /// Pictures, in files and for terminals, and reports.
 #[cfg(feature = "cli")]
 mod cli_pictures;
+/// Maps of a region from the command line.
+#[cfg(feature = "cli")]
+mod cli_region;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;
@@ -92,6 +95,8 @@ mod space;
 /// Files of a map: what a flush leaves, what damage is told, what is never overwritten.
 mod store;
 mod support;
+/// Scans that count in some tiles only, and maps of a region.
+mod tile_selection;
 /// Drives that a cache of tiles likes and some that it does not.
 mod trajectories;
 /// Files that the medium does not give back.

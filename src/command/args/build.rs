@@ -50,6 +50,10 @@ pub struct BuildArgs {
     /// How often one scan updates a voxel [default: per-scan, or as begun with --resume]
     #[arg(long, value_name = "MODE")]
     pub insert: Option<InsertName>,
+    /// Map only the tiles whose center is in this box: X0 <= x < X1 and so on, in metres, -inf and inf included; maps of
+    /// boxes that partition space merge to the map of the whole [default: all of space, or as begun with --resume]
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, allow_hyphen_values = true)]
+    pub region: Option<Vec<f64>>,
     /// Rays without a return clear up to so many metres, or --max-range if that is less: laser scans, depth images,
     /// e57 [default: they clear nothing, or as begun with --resume]
     #[arg(long, value_name = "M")]

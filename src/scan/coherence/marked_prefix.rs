@@ -1,6 +1,6 @@
 use super::cone::{CELLS, CELLS_PER_SIDE, Cone, SIDES, cell_of};
 use crate::scan::pages::{MarkedPage, PageMap};
-use crate::scan::ray::{RayOrigin, SlabRay};
+use crate::scan::ray::{RayCut, RayOrigin, SlabRay};
 
 /// How many slabs at the start of a ray are marked already, by rays of nearly the same direction.
 ///
@@ -45,20 +45,27 @@ impl MarkedPrefixes {
     pub(crate) fn of(&mut self, ray: &SlabRay) -> Option<u32> {
         let Some(cell) = cell_of(ray) else { return Some(0) };
         let cone = &mut self.cones[cell];
-        let last = ray.slabs().min(u16::MAX.into()) as u16;
+        let last = ray.last_slab().min(u16::MAX.into()) as u16;
         cone.farthest = cone.farthest.max(last);
         (last >= cone.slabs).then_some(cone.slabs.into())
     }
 
     /// Extends the prefixes by the present marks, in squares of cells with these edges (powers of two). Large squares
-    /// are few and quickly cover what is near the sensor; small ones go on from there.
-    pub(crate) fn extend(&mut self, pages: &PageMap<MarkedPage>, origin: &RayOrigin, edges: &[usize]) {
+    /// are few and quickly cover what is near the sensor; small ones go on from there. What `cut` does not select need
+    /// not be marked.
+    pub(crate) fn extend(
+        &mut self,
+        pages: &PageMap<MarkedPage>,
+        origin: &RayOrigin,
+        edges: &[usize],
+        cut: Option<&RayCut<'_>>,
+    ) {
         for (side, cones) in self.cones.chunks_mut(CELLS_PER_SIDE).enumerate() {
             for &edge in edges {
                 match side / 2 {
-                    0 => extend_side::<0, 1, 2>(cones, side, pages, origin, edge),
-                    1 => extend_side::<1, 0, 2>(cones, side, pages, origin, edge),
-                    _ => extend_side::<2, 0, 1>(cones, side, pages, origin, edge),
+                    0 => extend_side::<0, 1, 2>(cones, side, pages, origin, edge, cut),
+                    1 => extend_side::<1, 0, 2>(cones, side, pages, origin, edge, cut),
+                    _ => extend_side::<2, 0, 1>(cones, side, pages, origin, edge, cut),
                 }
             }
         }
@@ -71,6 +78,7 @@ fn extend_side<const A: usize, const B: usize, const C: usize>(
     pages: &PageMap<MarkedPage>,
     origin: &RayOrigin,
     edge: usize,
+    cut: Option<&RayCut<'_>>,
 ) {
     let window = pages.window();
     let corners = (0..CELLS).step_by(edge).flat_map(|b| (0..CELLS).step_by(edge).map(move |c| [b, c]));
@@ -85,7 +93,14 @@ fn extend_side<const A: usize, const B: usize, const C: usize>(
         let cone = Cone::new::<A, B, C>(origin, window.base(), side, corner, edge);
         let is_marked = |slab: u16| {
             let (low, high) = cone.in_slab::<A, B, C>(slab.into());
-            window.holds(low) && window.holds(high) && pages.are_marked(low, high)
+            window.holds(low)
+                && window.holds(high)
+                && match cut {
+                    None => pages.are_marked(low, high),
+                    Some(cut) => {
+                        cut.for_all_selected(window, low, high, |low, high| pages.are_marked(low, high))
+                    }
+                }
         };
         while slabs <= farthest && is_marked(slabs) {
             slabs += 1;

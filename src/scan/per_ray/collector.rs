@@ -5,7 +5,8 @@ use crate::scan::ray::SlabRay;
 use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
 use crate::scan::updates::{
-    BrickRuns, Run, ScanUpdates, TileUpdates, brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile,
+    BrickRuns, MappedTiles, Run, ScanUpdates, TileUpdates, brick_code, bricks_by_tile, in_order_of_tiles,
+    part_in_tile,
 };
 use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex, is_in_mask};
 use rayon::prelude::*;
@@ -62,7 +63,7 @@ impl PerRayCollector {
     /// Whether another ray may exceed the limit. The first ray never does.
     #[inline]
     pub(crate) fn is_full_for(&mut self, ray: &SlabRay) -> bool {
-        let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs() as usize;
+        let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs_after(0) as usize;
         self.allowance.is_spent_by(new_bytes) && self.look_whether_full(new_bytes)
     }
 
@@ -110,18 +111,8 @@ impl PerRayCollector {
         self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
     }
 
-    /// Number of hits and of misses.
-    fn hits_and_misses(&self) -> (u64, u64) {
-        // Fits: at most 2^16 times 2^9.
-        let of_brick =
-            |counts: &Counts| u64::from(counts.iter().map(|&misses| u32::from(misses)).sum::<u32>());
-        let passed = self.pages.pages().iter().flat_map(CountedPage::bricks).map(of_brick);
-        let ended = self.ended.iter().map(|run| u64::from(run.misses));
-        (self.ended.len() as u64, passed.sum::<u64>() + ended.sum::<u64>())
-    }
-
-    /// The updates by tile. Bricks across a tile border are split.
-    fn runs_by_tile(&self, grid: &Grid) -> Vec<(TileIndex, Vec<BrickRuns>)> {
+    /// The updates by mapped tile. Bricks across a tile border are split.
+    fn runs_by_tile(&self, mapped: MappedTiles<'_>) -> Vec<(TileIndex, Vec<BrickRuns>)> {
         let (bricks, indices) = self.bricks();
         let ended = self.ended_by_brick(&bricks);
         let runs_of_tile = |(tile, numbers): (TileIndex, Vec<u32>)| {
@@ -129,12 +120,12 @@ impl PerRayCollector {
             let runs_of_brick = |number: u32| {
                 let index = indices[number as usize];
                 let brick = Brick { counts: bricks[number as usize], ended: ended.of_brick(number) };
-                let runs = brick.runs(&part_in_tile(grid, tile, index), &mut scratch);
+                let runs = brick.runs(&part_in_tile(mapped.grid, tile, index), &mut scratch);
                 (!runs.is_empty()).then(|| BrickRuns { brick: brick_code(index), runs })
             };
             (tile, numbers.into_iter().filter_map(runs_of_brick).collect())
         };
-        bricks_by_tile(grid, &indices).into_par_iter().map(runs_of_tile).collect()
+        bricks_by_tile(mapped, &indices).into_par_iter().map(runs_of_tile).collect()
     }
 
     /// The bricks of all pages, page by page, and their indices: their voxels' indices divided by 8.
@@ -235,12 +226,14 @@ impl Brick<'_> {
 }
 
 /// Moves the updates of several collectors to `parts`; the first collector saw the first rays.
-pub(crate) fn drain_in_order(grid: &Grid, collectors: &mut [PerRayCollector], parts: &ScanParts<'_>) {
+pub(crate) fn drain_in_order(
+    mapped: MappedTiles<'_>,
+    collectors: &mut [PerRayCollector],
+    parts: &ScanParts<'_>,
+) {
     for collector in collectors {
-        for (tile, bricks) in collector.runs_by_tile(grid) {
-            let runs = || bricks.iter().flat_map(|brick| &brick.runs);
-            let hits = runs().filter(|run| run.hit.is_some()).count() as u64;
-            let misses = runs().map(|run| u64::from(run.misses)).sum();
+        for (tile, bricks) in collector.runs_by_tile(mapped) {
+            let (hits, misses) = hits_and_misses(&bricks);
             if hits + misses > 0 {
                 parts.add(std::iter::once((tile, TileUpdates::Runs(bricks), (hits, misses))));
             }
@@ -251,19 +244,26 @@ pub(crate) fn drain_in_order(grid: &Grid, collectors: &mut [PerRayCollector], pa
     }
 }
 
+/// Number of hits and of misses.
+fn hits_and_misses(bricks: &[BrickRuns]) -> (u64, u64) {
+    let runs = || bricks.iter().flat_map(|brick| &brick.runs);
+    let hits = runs().filter(|run| run.hit.is_some()).count() as u64;
+    (hits, runs().map(|run| u64::from(run.misses)).sum())
+}
+
 /// The updates of several collectors; the first collector saw the first rays.
 pub(crate) fn updates_in_order(
-    grid: &Grid,
+    mapped: MappedTiles<'_>,
     collectors: &mut [PerRayCollector],
     mut report: ScanReport,
 ) -> ScanUpdates {
     let mut tiles: FxHashMap<TileIndex, Vec<BrickRuns>> = FxHashMap::default();
     for collector in collectors {
-        let (hits, misses) = collector.hits_and_misses();
-        report.hits += hits;
-        report.misses += misses;
-        for (tile, runs) in collector.runs_by_tile(grid) {
+        for (tile, runs) in collector.runs_by_tile(mapped) {
             if !runs.is_empty() {
+                let (hits, misses) = hits_and_misses(&runs);
+                report.hits += hits;
+                report.misses += misses;
                 tiles.entry(tile).or_default().extend(runs);
             }
         }
@@ -273,5 +273,5 @@ pub(crate) fn updates_in_order(
         bricks.sort_by_key(|runs| runs.brick);
         (tile, TileUpdates::Runs(bricks))
     };
-    in_order_of_tiles(grid, tiles.into_iter().map(in_order).collect(), report)
+    in_order_of_tiles(mapped.grid, tiles.into_iter().map(in_order).collect(), report)
 }

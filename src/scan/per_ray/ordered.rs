@@ -1,13 +1,13 @@
 use crate::scan::ScanReport;
 use crate::scan::spill::ScanParts;
-use crate::scan::updates::{OrderedUpdates, ScanUpdates, TileUpdates, in_order_of_tiles};
+use crate::scan::updates::{MappedTiles, OrderedUpdates, ScanUpdates, TileUpdates, in_order_of_tiles};
 use crate::sensor::Observation;
-use crate::space::{Grid, TileIndex, VoxelIndex};
+use crate::space::{TileIndex, VoxelIndex};
 use rustc_hash::FxHashMap;
 
 /// Collects updates of voxels in the order in which they count, one list per tile.
 pub(crate) struct OrderedCollector<'a> {
-    grid: &'a Grid,
+    mapped: MappedTiles<'a>,
     keep_intensities: bool,
     lists: Vec<(TileIndex, VoxelIndex, OrderedUpdates)>,
     slots: FxHashMap<TileIndex, usize>,
@@ -23,34 +23,41 @@ const BYTES_PER_UPDATE: usize = 16;
 const BYTES_PER_TILE: usize = 256;
 
 impl<'a> OrderedCollector<'a> {
-    pub(crate) fn new(grid: &'a Grid, keep_intensities: bool) -> Self {
+    pub(crate) fn new(mapped: MappedTiles<'a>, keep_intensities: bool) -> Self {
         let (lists, slots) = Default::default();
-        Self { grid, keep_intensities, lists, slots, latest: 0, hits: 0, misses: 0 }
+        Self { mapped, keep_intensities, lists, slots, latest: 0, hits: 0, misses: 0 }
     }
 
     pub(crate) fn push(&mut self, voxel: VoxelIndex, observation: Observation) {
-        match observation {
-            Observation::Hit(_) => self.hits += 1,
-            Observation::Miss => self.misses += 1,
-        }
         let offset_in =
             |min: VoxelIndex| -> VoxelIndex { std::array::from_fn(|k| voxel[k].wrapping_sub(min[k])) };
-        let edge = self.grid.voxels_per_tile_edge();
+        let edge = self.mapped.grid.voxels_per_tile_edge();
         let in_latest = |(_, min, _): &&mut (_, VoxelIndex, _)| {
             (0..3).all(|k| min[k] <= voxel[k] && i64::from(voxel[k]) - i64::from(min[k]) < i64::from(edge))
         };
         if let Some((_, min, updates)) = self.lists.get_mut(self.latest).filter(in_latest) {
             updates.push(offset_in(*min), observation, self.keep_intensities);
+            return self.count(observation);
+        }
+        let tile = self.mapped.grid.tile_of_voxel(voxel);
+        if !self.mapped.has(tile) {
             return;
         }
-        let tile = self.grid.tile_of_voxel(voxel);
         self.latest = *self.slots.entry(tile).or_insert_with(|| {
-            let min = self.grid.voxels_of_tile(tile).min;
+            let min = self.mapped.grid.voxels_of_tile(tile).min;
             self.lists.push((tile, min, OrderedUpdates::default()));
             self.lists.len() - 1
         });
         let (_, min, updates) = &mut self.lists[self.latest];
         updates.push(offset_in(*min), observation, self.keep_intensities);
+        self.count(observation);
+    }
+
+    fn count(&mut self, observation: Observation) {
+        match observation {
+            Observation::Hit(_) => self.hits += 1,
+            Observation::Miss => self.misses += 1,
+        }
     }
 
     /// Upper bound of the bytes of memory.
@@ -73,6 +80,6 @@ impl<'a> OrderedCollector<'a> {
         report.misses += self.misses;
         let tiles =
             self.lists.into_iter().map(|(tile, _, updates)| (tile, TileUpdates::Ordered(updates))).collect();
-        in_order_of_tiles(self.grid, tiles, report)
+        in_order_of_tiles(self.mapped.grid, tiles, report)
     }
 }

@@ -1,5 +1,5 @@
 use crate::scan::pages::MarkedBrick;
-use crate::scan::updates::{BrickUpdate, brick_code, bricks_by_tile, part_in_tile};
+use crate::scan::updates::{BrickUpdate, MappedTiles, brick_code, bricks_by_tile, part_in_tile};
 use crate::space::{BRICK_EDGE, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, VoxelKey, places};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -7,16 +7,16 @@ use rustc_hash::FxHashMap;
 /// The largest intensity of every hit voxel; empty for sensor models that need none.
 pub(crate) type Intensities = FxHashMap<VoxelIndex, f32>;
 
-/// The updates of marked bricks by tile, in Morton order. Bricks across a tile border are split.
+/// The updates of marked bricks by mapped tile, in Morton order. Bricks across a tile border are split.
 pub(crate) fn updates_by_tile(
-    grid: &Grid,
+    mapped: MappedTiles<'_>,
     bricks: &[MarkedBrick],
     intensities: &Intensities,
 ) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
     let indices: Vec<VoxelIndex> = bricks.iter().map(|brick| brick.index).collect();
-    let updates = bricks_by_tile(grid, &indices)
+    let updates = bricks_by_tile(mapped, &indices)
         .into_par_iter()
-        .map(|(tile, numbers)| (tile, updates_of_tile(grid, tile, bricks, &numbers, intensities)));
+        .map(|(tile, numbers)| (tile, updates_of_tile(mapped.grid, tile, bricks, &numbers, intensities)));
     let mut tiles: Vec<(TileIndex, Vec<BrickUpdate>)> = updates.collect();
     tiles.retain(|(_, bricks)| !bricks.is_empty());
     tiles

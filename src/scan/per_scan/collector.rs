@@ -3,11 +3,11 @@ use super::far_bricks::FarBricks;
 use crate::scan::ScanReport;
 use crate::scan::coherence::MarkedPrefixes;
 use crate::scan::pages::{Footprint, MarkedBrick, MarkedPage, PAGE_EDGE, PageMap, Window};
-use crate::scan::ray::{RayEnd, RayOrigin, SlabRay};
+use crate::scan::ray::{RayCut, RayEnd, RayOrigin, SlabRay};
 use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
-use crate::scan::updates::{ScanUpdates, TileUpdates, in_order_of_tiles};
-use crate::space::{Grid, VoxelIndex, hash_table_bytes};
+use crate::scan::updates::{MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles};
+use crate::space::{VoxelIndex, hash_table_bytes};
 use rayon::prelude::*;
 
 /// Most rays per call of [`PerScanCollector::take`].
@@ -89,8 +89,7 @@ impl PerScanCollector {
             let end = ends[number];
             let ray = SlabRay::new(origin, end);
             if let Some(parts) = parts {
-                let new_bytes =
-                    BYTES_PER_RAY + BYTES_PER_SLAB * (ray.slabs() - slabs.min(ray.slabs())) as usize;
+                let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs_after(slabs) as usize;
                 if self.allowance.is_spent_by(new_bytes) {
                     self.keep_to_limit(new_bytes, parts);
                 }
@@ -108,8 +107,8 @@ impl PerScanCollector {
     }
 
     /// Lets later rays skip what is marked so far; see [`MarkedPrefixes::extend`] for `edges`.
-    pub(crate) fn extend_prefixes(&mut self, origin: &RayOrigin, edges: &[usize]) {
-        self.prefixes.extend(&self.pages, origin, edges);
+    pub(crate) fn extend_prefixes(&mut self, origin: &RayOrigin, edges: &[usize], cut: Option<&RayCut<'_>>) {
+        self.prefixes.extend(&self.pages, origin, edges, cut);
     }
 
     fn hit(&mut self, voxel: VoxelIndex, intensity: Option<f32>) {
@@ -171,18 +170,18 @@ impl PerScanCollector {
     }
 
     /// The updates. Bricks across a tile border are split.
-    pub(crate) fn updates(&mut self, grid: &Grid, mut report: ScanReport) -> ScanUpdates {
+    pub(crate) fn updates(&mut self, mapped: MappedTiles<'_>, mut report: ScanReport) -> ScanUpdates {
         let pages = self.pages.pages().par_iter().zip(self.pages.indices());
         let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
         bricks.extend(self.far.take());
-        let tiles = updates_by_tile(grid, &bricks, &self.intensities);
+        let tiles = updates_by_tile(mapped, &bricks, &self.intensities);
         for (_, bricks) in &tiles {
             let (hits, misses) = hits_and_misses(bricks);
             report.hits += hits;
             report.misses += misses;
         }
         let tiles = tiles.into_iter().map(|(tile, bricks)| (tile, TileUpdates::Masks(bricks))).collect();
-        in_order_of_tiles(grid, tiles, report)
+        in_order_of_tiles(mapped.grid, tiles, report)
     }
 }
 
@@ -196,12 +195,18 @@ fn keep_largest(intensities: &mut Intensities, voxel: VoxelIndex, intensity: f32
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scan::ray::SlabSpan;
     use crate::space::{BRICK_EDGE, Point, is_in_mask};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
     fn end(point: Point, hit: bool) -> RayEnd {
-        RayEnd { point, voxel: point.map(|x| x.floor() as i32), hit: hit.then_some(0.0) }
+        RayEnd {
+            point,
+            voxel: point.map(|x| x.floor() as i32),
+            hit: hit.then_some(0.0),
+            span: SlabSpan::WHOLE,
+        }
     }
 
     /// Ends of rays in all directions of a part of a sphere, near and far as over a rough surface.
@@ -299,7 +304,7 @@ mod tests {
                     .filter(|end| collector.prefixes.of(&SlabRay::new(origin, **end)) != Some(0))
                     .count();
                 part.chunks(BATCH).for_each(|batch| collector.take(origin, batch, false, None));
-                collector.extend_prefixes(origin, &[8, 4, 2, 1]);
+                collector.extend_prefixes(origin, &[8, 4, 2, 1], None);
             }
             prop_assert_eq!(collected(&collector), walked(origin, &ends));
             prop_assert!(shared > 100, "only {} rays were spared something", shared);

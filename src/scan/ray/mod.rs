@@ -2,19 +2,23 @@
 //!
 //! [`RayWalk`] is the definition, one voxel after the other in closed form. [`SlabRay`] crosses the same voxels many
 //! times faster, in slabs one voxel thick with fixed-point sums, and leaves to the definition what the sums cannot
-//! decide.
+//! decide. [`RayCut`] says beforehand which slabs can be in the tiles that are asked for.
 
 mod range;
+mod ray_cut;
 mod ray_end;
 mod ray_origin;
 mod ray_walk;
 mod slab_path;
 mod slab_ray;
+mod slab_span;
 
 pub use range::no_return;
 pub(crate) use range::{NO_RETURN_M, RangeRule, Ranged};
+pub(crate) use ray_cut::RayCut;
 pub(crate) use ray_end::RayEnd;
 pub(crate) use ray_origin::RayOrigin;
 pub use ray_walk::{MAX_RAY_STEPS, RayWalk};
 pub(crate) use slab_path::Stretch;
 pub(crate) use slab_ray::{SlabRay, voxel};
+pub(crate) use slab_span::SlabSpan;

@@ -1,3 +1,4 @@
+use super::slab_span::SlabSpan;
 use crate::space::{Point, VoxelIndex};
 
 /// Where a ray ends.
@@ -9,4 +10,6 @@ pub(crate) struct RayEnd {
     pub(crate) voxel: VoxelIndex,
     /// The intensity at the end, if the end is evidence of a hit.
     pub(crate) hit: Option<f32>,
+    /// The slabs that are to be walked.
+    pub(crate) span: SlabSpan,
 }

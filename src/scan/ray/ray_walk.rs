@@ -69,6 +69,11 @@ impl RayWalk {
         (0..3).map(|k| u64::from(self.voxel[k].abs_diff(self.last[k]))).sum()
     }
 
+    /// Number of steps from the present voxel to another one that the walk visits, ahead or behind.
+    pub(crate) fn steps_to(&self, voxel: VoxelIndex) -> u64 {
+        (0..3).map(|k| u64::from(self.voxel[k].abs_diff(voxel[k]))).sum()
+    }
+
     /// The present voxel.
     pub fn voxel(&self) -> VoxelIndex {
         self.voxel
@@ -94,7 +99,14 @@ impl RayWalk {
     ///
     /// The same steps as [`RayWalk::advance`], with everything in registers: a scan takes millions of them.
     #[inline]
-    pub fn for_each_before_end(self, mut visit: impl FnMut(VoxelIndex)) {
+    pub fn for_each_before_end(self, visit: impl FnMut(VoxelIndex)) {
+        let steps = self.steps();
+        self.for_each_of_next(steps, visit);
+    }
+
+    /// Visits so many voxels, from the present one on; no more than there are before the last.
+    #[inline]
+    pub(crate) fn for_each_of_next(self, steps: u64, mut visit: impl FnMut(VoxelIndex)) {
         let [ox, oy, oz] = self.origin;
         let [ix, iy, iz] = self.inv_direction;
         let [lx, ly, lz] = self.last;
@@ -102,7 +114,7 @@ impl RayWalk {
         let [bx, by, bz] = self.step.map(|step| f64::from(step > 0));
         let [mut x, mut y, mut z] = self.voxel;
         let [mut tx, mut ty, mut tz] = self.next;
-        for _ in 0..self.steps() {
+        for _ in 0..steps.min(self.steps()) {
             visit([x, y, z]);
             if tx <= ty && tx <= tz {
                 x += sx;

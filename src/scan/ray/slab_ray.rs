@@ -2,8 +2,9 @@ use super::ray_end::RayEnd;
 use super::ray_origin::RayOrigin;
 use super::ray_walk::RayWalk;
 use super::slab_path::SlabPath;
+use super::slab_span::SlabSpan;
 use crate::scan::pages::{Footprint, Local, PageMap};
-use crate::space::{Point, VoxelIndex};
+use crate::space::{Point, VoxelBox, VoxelIndex};
 
 /// A ray from a scan's origin, in units of voxels, world frame; see [`RayWalk`].
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +18,8 @@ pub(crate) struct SlabRay<'a> {
     pub(crate) axis: usize,
     /// One over the largest component; infinite if that is almost 0.
     pub(crate) per_slab: f64,
+    /// The slabs that are to be walked.
+    pub(crate) span: SlabSpan,
 }
 
 /// At most so many slabs of a ray are walked by the closed form one at a time; after that, the rest of the ray is.
@@ -25,7 +28,7 @@ const MAX_WALKED: u32 = 4;
 impl<'a> SlabRay<'a> {
     /// The ray from `origin` to `end`.
     #[inline]
-    pub(crate) fn new(origin: &'a RayOrigin, RayEnd { point: end, voxel: last, .. }: RayEnd) -> Self {
+    pub(crate) fn new(origin: &'a RayOrigin, RayEnd { point: end, voxel: last, span, .. }: RayEnd) -> Self {
         let direction: Point = std::array::from_fn(|k| end[k] - origin.point[k]);
         let [x, y, z] = direction.map(f64::abs);
         let (axis, longest) = if x >= y && x >= z {
@@ -35,7 +38,7 @@ impl<'a> SlabRay<'a> {
         } else {
             (2, z)
         };
-        Self { origin, end, last, direction, axis, per_slab: 1.0 / longest }
+        Self { origin, end, last, direction, axis, per_slab: 1.0 / longest, span }
     }
 
     /// Number of slabs after the origin's.
@@ -50,15 +53,66 @@ impl<'a> SlabRay<'a> {
         }
     }
 
+    /// The last slab to be walked, counted from the origin's.
+    #[inline]
+    pub(crate) fn last_slab(&self) -> u32 {
+        self.slabs().min(self.span.until.saturating_sub(1))
+    }
+
+    /// Number of slabs to be walked if the first `skipped`, counted from the origin's, are left out, too.
+    #[inline]
+    pub(crate) fn slabs_after(&self, skipped: u32) -> u32 {
+        self.slabs().min(self.span.until).saturating_sub(skipped.max(self.span.from))
+    }
+
     /// The exact walk of the ray, voxel by voxel.
     pub(crate) fn walk(&self) -> RayWalk {
         RayWalk::between(self.origin.point, self.origin.voxel, self.end, self.last)
     }
 
+    /// Visits, by the closed form, the voxels of the ray's span, in order and without the ray's last.
+    pub(crate) fn for_each_exactly(&self, visit: impl FnMut(VoxelIndex)) {
+        self.for_each_from(self.origin.voxel, visit);
+    }
+
+    /// The same from a voxel on that the ray visits.
+    fn for_each_from(&self, from: VoxelIndex, visit: impl FnMut(VoxelIndex)) {
+        let mut walk = self.walk().resumed_at(from);
+        if self.span == SlabSpan::WHOLE {
+            return walk.for_each_before_end(visit);
+        }
+        let done = from[self.axis].abs_diff(self.origin.voxel[self.axis]);
+        if done >= self.span.until {
+            return;
+        }
+        if done < self.span.from.min(self.slabs()) {
+            walk.leave(&self.first_slabs(self.span.from.min(self.slabs())));
+        }
+        let steps = if self.span.until > self.slabs() {
+            walk.steps()
+        } else {
+            let mut end = walk.clone();
+            end.leave(&self.first_slabs(self.span.until));
+            walk.steps_to(end.voxel())
+        };
+        walk.for_each_of_next(steps, visit);
+    }
+
+    /// All voxels of space in the origin's slab and those before this one.
+    fn first_slabs(&self, until: u32) -> VoxelBox {
+        let (mut min, mut end) = ([i32::MIN; 3], [i32::MAX; 3]);
+        let at = self.origin.voxel[self.axis];
+        match self.direction[self.axis] > 0.0 {
+            true => end[self.axis] = at.saturating_add_unsigned(until),
+            false => min[self.axis] = at.saturating_sub_unsigned(until).saturating_add(1),
+        }
+        VoxelBox { min, end }
+    }
+
     /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last. Voxels outside the
     /// pages' window go to `pass_far`.
     ///
-    /// The first `skipped` slabs, counted from the origin's, may be left out. With `may_pass_last` the last voxel may
+    /// Slabs outside the ray's span, and the first `skipped`, counted from the origin's, may be left out. With `may_pass_last` the last voxel may
     /// be passed, too.
     #[inline]
     pub(crate) fn pass<F: Footprint>(
@@ -68,6 +122,7 @@ impl<'a> SlabRay<'a> {
         may_pass_last: bool,
         pass_far: impl FnMut(VoxelIndex),
     ) {
+        let skipped = skipped.max(self.span.from);
         let passed = match self.axis {
             0 => self.pass_slabs::<0, 1, 2, F>(pages, skipped, may_pass_last),
             1 => self.pass_slabs::<1, 0, 2, F>(pages, skipped, may_pass_last),
@@ -86,7 +141,7 @@ impl<'a> SlabRay<'a> {
         from: VoxelIndex,
         mut pass_far: impl FnMut(VoxelIndex),
     ) {
-        self.walk().resumed_at(from).for_each_before_end(|voxel| match pages.window().local(voxel) {
+        self.for_each_from(from, |voxel| match pages.window().local(voxel) {
             Some(near) => pages.at(near).pass::<0>(near[0], F::cell::<1, 2>(near[1], near[2])),
             None => pass_far(voxel),
         });
@@ -119,13 +174,15 @@ impl<'a> SlabRay<'a> {
             let local = voxel::<A, B, C>(a, b, c);
             Err(std::array::from_fn(|k| base[k] + local[k] as i32))
         };
-        let slabs = last[A].abs_diff(a);
+        // Leaving a border may have counted as a slab.
+        let left = a.abs_diff((self.origin.voxel[A] - base[A]) as u32);
+        let until = self.span.until.saturating_sub(left);
+        let all_slabs = last[A].abs_diff(a);
+        let slabs = all_slabs.min(until);
         if slabs > 0 {
             let is_up = last[A] > a;
             let path = SlabPath::along::<A, B, C>(self, base, a, is_up);
-            // Leaving a border may have counted as a slab.
-            let mut done =
-                skipped.saturating_sub(a.abs_diff((self.origin.voxel[A] - base[A]) as u32)).min(slabs);
+            let mut done = skipped.saturating_sub(left).min(slabs);
             if done > 0 {
                 let crossing = path.after(done - 1);
                 if crossing.is_near_border() {
@@ -161,6 +218,9 @@ impl<'a> SlabRay<'a> {
                 (b, c, done) = (exit_b, exit_c, done + 1);
                 a = if is_up { a + 1 } else { a - 1 };
             }
+        }
+        if until <= all_slabs {
+            return Ok(());
         }
         let ahead = |axis: usize, at: u32| match last[axis] < start[axis] {
             true => at.wrapping_sub(last[axis]),
@@ -324,7 +384,12 @@ mod tests {
         let origin = &RayOrigin::new(origin, voxel_of(origin));
         let rays: Vec<_> = ends
             .iter()
-            .map(|&end| SlabRay::new(origin, RayEnd { point: end, voxel: voxel_of(end), hit: None }))
+            .map(|&end| {
+                SlabRay::new(
+                    origin,
+                    RayEnd { point: end, voxel: voxel_of(end), hit: None, span: SlabSpan::WHOLE },
+                )
+            })
             .collect();
         let window = Window::around(origin.voxel, bounds);
         let mut marked = PageMap::<MarkedPage>::default();

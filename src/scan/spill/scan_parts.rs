@@ -3,9 +3,9 @@ use super::part_log::{MakeScratch, NONE, PartLog};
 use crate::scan::pages::MarkedBrick;
 use crate::scan::per_scan::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
 use crate::scan::stop::Stop;
-use crate::scan::updates::{BrickUpdate, ScanUpdates, TileUpdates, in_order_of_tiles};
+use crate::scan::updates::{BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles};
 use crate::scan::{PackedUpdates, ScanReport};
-use crate::space::{Grid, TileIndex, TileTable, TileValue, put_number, take_number};
+use crate::space::{TileIndex, TileTable, TileValue, put_number, take_number};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -16,7 +16,7 @@ use std::sync::{Mutex, PoisonError};
 /// Per scan, a voxel may be in several parts, which are merged at the end. Per ray, the parts of a tile follow each
 /// other.
 pub(crate) struct ScanParts<'a> {
-    grid: &'a Grid,
+    mapped: MappedTiles<'a>,
     parts: Mutex<Parts<'a>>,
     is_empty: AtomicBool,
     has_failed: AtomicBool,
@@ -73,7 +73,7 @@ const BRICKS_AT_A_TIME: usize = 4096;
 impl<'a> ScanParts<'a> {
     /// Parts of more than `max_bytes` go to a file that is made then.
     pub(crate) fn new(
-        grid: &'a Grid,
+        mapped: MappedTiles<'a>,
         max_bytes: usize,
         max_tiles: usize,
         make_scratch: &'a MakeScratch<'a>,
@@ -81,7 +81,7 @@ impl<'a> ScanParts<'a> {
         let log = PartLog::new(max_bytes, make_scratch);
         let (record, lists, failure) = Default::default();
         Self {
-            grid,
+            mapped,
             parts: Mutex::new(Parts { log, record, lists, max_tiles, failure }),
             is_empty: AtomicBool::new(true),
             has_failed: AtomicBool::new(false),
@@ -107,7 +107,7 @@ impl<'a> ScanParts<'a> {
             some.clear();
             // A page adds at most 512 more.
             some.extend(bricks.by_ref().take(BRICKS_AT_A_TIME));
-            let tiles = updates_by_tile(self.grid, &some, intensities).into_iter();
+            let tiles = updates_by_tile(self.mapped, &some, intensities).into_iter();
             self.add(tiles.map(|(tile, bricks)| {
                 let counts = hits_and_misses(&bricks);
                 (tile, TileUpdates::Masks(bricks), counts)
@@ -115,14 +115,14 @@ impl<'a> ScanParts<'a> {
         }
     }
 
-    /// Adds updates of tiles, with their numbers of hits and misses.
+    /// Adds updates of tiles, the mapped ones of these, with their numbers of hits and misses.
     pub(crate) fn add(&self, tiles: impl Iterator<Item = (TileIndex, TileUpdates, (u64, u64))>) {
         if self.has_failed() {
             return;
         }
         self.is_empty.store(false, Ordering::Relaxed);
         let mut parts = self.parts.lock().unwrap_or_else(PoisonError::into_inner);
-        for (tile, updates, counts) in tiles {
+        for (tile, updates, counts) in tiles.filter(|(tile, ..)| self.mapped.has(*tile)) {
             if let Err(failure) = parts.add(tile, &updates, counts) {
                 parts.failure.get_or_insert(failure);
                 self.has_failed.store(true, Ordering::Relaxed);
@@ -174,7 +174,7 @@ impl<'a> ScanParts<'a> {
         }
         let tiles =
             output.tiles.into_iter().map(|(tile, packed)| (tile, TileUpdates::Packed(packed))).collect();
-        let mut updates = in_order_of_tiles(self.grid, tiles, report);
+        let mut updates = in_order_of_tiles(self.mapped.grid, tiles, report);
         updates.report.tiles_touched = lists.len() as u64;
         Ok(updates)
     }

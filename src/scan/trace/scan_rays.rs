@@ -7,11 +7,13 @@ use crate::scan::coherence::{sampling_passes, single_pass};
 use crate::scan::pages::{MAX_RAYS, Window};
 use crate::scan::per_ray::{OrderedCollector, PerRayCollector, drain_in_order, updates_in_order};
 use crate::scan::per_scan::{BATCH, PerScanCollector};
-use crate::scan::ray::{MAX_RAY_STEPS, NO_RETURN_M, RangeRule, Ranged, RayEnd, RayOrigin, SlabRay};
+use crate::scan::ray::{
+    MAX_RAY_STEPS, NO_RETURN_M, RangeRule, Ranged, RayCut, RayEnd, RayOrigin, SlabRay, SlabSpan,
+};
 use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::ScanParts;
 use crate::scan::stop::Stop;
-use crate::scan::updates::ScanUpdates;
+use crate::scan::updates::{MappedTiles, ScanUpdates};
 use crate::sensor::{Observation, SensorModel};
 use crate::space::{Grid, Point};
 use rayon::prelude::*;
@@ -25,12 +27,14 @@ const FIRST_RAYS: usize = 1024;
 
 /// The rays of a scan, from one origin.
 pub(crate) struct ScanRays<'a> {
-    grid: &'a Grid,
+    mapped: MappedTiles<'a>,
     model: &'a SensorModel,
     rays: &'a RayConfig,
     points: &'a dyn ScanPoints,
     origin_m: Point,
     origin: RayOrigin,
+    /// What is left of a ray in the mapped tiles; `None` if that is all of space.
+    cut: Option<RayCut<'a>>,
     window: Window,
     range: RangeRule,
     stop: &'a Stop,
@@ -46,18 +50,20 @@ pub(crate) enum PerScanUpdates {
 
 impl<'a> ScanRays<'a> {
     pub(crate) fn new(
-        grid: &'a Grid,
+        mapped: MappedTiles<'a>,
         model: &'a SensorModel,
         rays: &'a RayConfig,
         points: &'a dyn ScanPoints,
         stop: &'a Stop,
     ) -> Result<Self> {
         let origin_m = points.origin();
+        let grid = mapped.grid;
         let voxel = origin_voxel(grid, origin_m)?;
         let origin = RayOrigin::new(grid.to_voxel_units(origin_m), voxel);
+        let cut = mapped.selection.map(|tiles| RayCut::new(grid, tiles, &origin));
         let range = RangeRule::new(rays, origin_m);
         let window = Window::default();
-        let mut scan_rays = Self { grid, model, rays, points, origin_m, origin, window, range, stop };
+        let mut scan_rays = Self { mapped, model, rays, points, origin_m, origin, cut, window, range, stop };
         scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
         Ok(scan_rays)
     }
@@ -90,7 +96,7 @@ impl<'a> ScanRays<'a> {
     fn merge(&self, collectors: &mut [PerScanCollector], report: ScanReport) -> ScanUpdates {
         let (first, others) = collectors.split_at_mut(1);
         others.iter().for_each(|other| first[0].absorb(other));
-        first[0].updates(self.grid, report)
+        first[0].updates(self.mapped, report)
     }
 
     fn collect_per_scan<'c>(
@@ -116,7 +122,7 @@ impl<'a> ScanRays<'a> {
                 for pass in
                     if extends { sampling_passes(0..points.len()) } else { single_pass(0..points.len()) }
                 {
-                    collector.extend_prefixes(&self.origin, pass.squares);
+                    collector.extend_prefixes(&self.origin, pass.squares, self.cut.as_ref());
                     for number in pass.points() {
                         batch.extend(self.ray(points[number], intensity(intensities, number), &mut report));
                         if batch.len() == BATCH {
@@ -145,7 +151,7 @@ impl<'a> ScanRays<'a> {
             self.take_rays(collector, range, |_, _| false, &mut report)?;
             Ok(report)
         })?;
-        Ok(updates_in_order(self.grid, collectors, report))
+        Ok(updates_in_order(self.mapped, collectors, report))
     }
 
     /// The same under a memory limit: as many rays at a time as fit. A part is added after the parts of all earlier
@@ -165,7 +171,7 @@ impl<'a> ScanRays<'a> {
             let some = next..all.min(next + threads * at_a_time.min(MAX_RAYS));
             let threads = threads.min(some.len().div_ceil(FIRST_RAYS));
             let reports = self.collect_each(collectors, some.clone(), threads, |collector, range| {
-                collector.clear(self.window, Some((&each, self.grid)));
+                collector.clear(self.window, Some((&each, self.mapped.grid)));
                 let mut report = ScanReport::default();
                 self.take_rays(collector, range, PerRayCollector::is_full_for, &mut report)?;
                 Ok(report)
@@ -181,7 +187,7 @@ impl<'a> ScanRays<'a> {
                     break;
                 }
             }
-            drain_in_order(self.grid, &mut collectors[..used], parts);
+            drain_in_order(self.mapped, &mut collectors[..used], parts);
             at_a_time = match next < some.end {
                 true => ((next - some.start) / threads).max(1),
                 false => at_a_time.saturating_mul(2),
@@ -219,7 +225,7 @@ impl<'a> ScanRays<'a> {
 
     /// Insertion per ray, as a list of all updates.
     pub(crate) fn per_ray_in_order(&self) -> Result<ScanUpdates> {
-        let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
+        let mut collector = OrderedCollector::new(self.mapped, self.model.needs_intensity());
         let report = self.in_order(&mut collector, |_| ())?;
         Ok(collector.into_updates(report))
     }
@@ -230,7 +236,7 @@ impl<'a> ScanRays<'a> {
         limit: &TraceLimit,
         parts: &ScanParts<'_>,
     ) -> Result<ScanReport> {
-        let mut collector = OrderedCollector::new(self.grid, self.model.needs_intensity());
+        let mut collector = OrderedCollector::new(self.mapped, self.model.needs_intensity());
         let max_bytes = limit.of_collector(1).small_bytes;
         let report = self.in_order(&mut collector, |collector| {
             if collector.bytes() > max_bytes {
@@ -253,8 +259,8 @@ impl<'a> ScanRays<'a> {
                 let Some(end) = self.ray(point, intensity(intensities, number), &mut report) else {
                     continue;
                 };
-                let walk = SlabRay::new(&self.origin, end).walk();
-                walk.for_each_before_end(|voxel| collector.push(voxel, Observation::Miss));
+                let ray = SlabRay::new(&self.origin, end);
+                ray.for_each_exactly(|voxel| collector.push(voxel, Observation::Miss));
                 if let Some(intensity) = end.hit {
                     collector.push(end.voxel, Observation::Hit(intensity));
                 }
@@ -332,10 +338,11 @@ impl<'a> ScanRays<'a> {
                 high[axis] = high[axis].min(self.origin_m[axis] + range_m);
             }
         }
-        Ok((self.grid.to_voxel_units(low), self.grid.to_voxel_units(high)))
+        let grid = self.mapped.grid;
+        Ok((grid.to_voxel_units(low), grid.to_voxel_units(high)))
     }
 
-    /// Where the ray to a point ends; `None` if the point is skipped.
+    /// Where the ray to a point ends; `None` if the point is skipped, or its ray is nowhere in the mapped tiles.
     #[inline]
     fn ray(&self, point: Point, intensity: f32, report: &mut ScanReport) -> Option<RayEnd> {
         if self.stop.is_set() {
@@ -351,7 +358,7 @@ impl<'a> ScanRays<'a> {
             Ranged::Cut(point) => (point, false),
             Ranged::Skipped => return None,
         };
-        let end = self.grid.to_voxel_units(end_m);
+        let end = self.mapped.grid.to_voxel_units(end_m);
         let Some(last) = Grid::voxel_of_units(end) else {
             skipped.out_of_range += 1;
             return None;
@@ -364,7 +371,11 @@ impl<'a> ScanRays<'a> {
         report.cut_at_max_range += u64::from(!is_hit);
         let hit = Observation::Hit(intensity);
         let hit = (is_hit && self.model.is_evidence(hit)).then_some(intensity);
-        Some(RayEnd { point: end, voxel: last, hit })
+        let end = RayEnd { point: end, voxel: last, hit, span: SlabSpan::WHOLE };
+        match &self.cut {
+            None => Some(end),
+            Some(cut) => cut.apply(&self.origin, end),
+        }
     }
 }
 

@@ -7,9 +7,11 @@ use crate::scan::per_scan::PerScanCollector;
 use crate::scan::scan_points::ScanPoints;
 use crate::scan::spill::{Overflow, ScanParts};
 use crate::scan::stop::Stop;
+use crate::scan::updates::MappedTiles;
 use crate::scan::{Scan, ScanUpdates};
 use crate::sensor::SensorModel;
-use crate::space::{Grid, Point, VoxelIndex};
+use crate::space::{Grid, Point, TileSelection, VoxelIndex};
+use std::borrow::Cow;
 
 /// Computes the updates of scans. It keeps its memory from scan to scan.
 #[derive(Clone, Debug, Default)]
@@ -59,7 +61,8 @@ impl ScanTracer {
         rays: &RayConfig,
         scan: &Scan,
     ) -> Result<ScanUpdates> {
-        self.trace_points(grid, model, rays, scan, UpdateOrder::OfVoxels, None)
+        let mapped = MappedTiles { grid, selection: None };
+        self.trace_points(mapped, model, rays, scan, UpdateOrder::OfVoxels, None)
     }
 
     /// The same, but in insertion per ray a tile's updates are in the order of the rays, one by one: for octrees whose
@@ -75,10 +78,11 @@ impl ScanTracer {
         rays: &RayConfig,
         scan: &Scan,
     ) -> Result<ScanUpdates> {
-        self.trace_points(grid, model, rays, scan, UpdateOrder::OfRays, None)
+        let mapped = MappedTiles { grid, selection: None };
+        self.trace_points(mapped, model, rays, scan, UpdateOrder::OfRays, None)
     }
 
-    /// The same for any source of points. With `overflow`, updates that exceed the memory limit are spilled and the
+    /// The same for any source of points and for the mapped tiles alone: their updates are those of the whole scan. With `overflow`, updates that exceed the memory limit are spilled and the
     /// rest is returned. The report covers both.
     ///
     /// # Errors
@@ -86,15 +90,22 @@ impl ScanTracer {
     /// As for [`ScanTracer::trace`], points that cannot be read, and errors of the spill.
     pub(crate) fn trace_points(
         &mut self,
-        grid: &Grid,
+        mapped: MappedTiles<'_>,
         model: &SensorModel,
         rays: &RayConfig,
         scan: &dyn ScanPoints,
         order: UpdateOrder,
         overflow: Option<Overflow<'_>>,
     ) -> Result<ScanUpdates> {
+        let MappedTiles { grid, selection } = mapped;
+        let selection = match (selection, rays.region) {
+            (Some(tiles), Some(region)) => Some(Cow::Owned(tiles.within(region))),
+            (Some(tiles), None) => Some(Cow::Borrowed(tiles)),
+            (None, region) => region.map(|region| Cow::Owned(TileSelection::from(region))),
+        };
+        let mapped = MappedTiles { grid, selection: selection.as_deref() };
         Self::check(grid, model, scan)?;
-        let scan_rays = ScanRays::new(grid, model, rays, scan, &self.stop)?;
+        let scan_rays = ScanRays::new(mapped, model, rays, scan, &self.stop)?;
         let is_per_scan = rays.insert_mode == InsertMode::PerScan;
         let in_order = !is_per_scan && order == UpdateOrder::OfRays;
         let Some(mut overflow) = overflow else {
@@ -104,7 +115,7 @@ impl ScanTracer {
                 _ => scan_rays.per_ray(&mut self.per_ray),
             };
         };
-        let parts = ScanParts::new(grid, overflow.max_bytes / 4, overflow.max_tiles, overflow.make_scratch);
+        let parts = ScanParts::new(mapped, overflow.max_bytes / 4, overflow.max_tiles, overflow.make_scratch);
         let report = match (is_per_scan, in_order) {
             (true, _) => match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
                 PerScanUpdates::Whole(updates) => return Ok(updates),

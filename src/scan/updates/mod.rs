@@ -1,9 +1,11 @@
 //! The updates of a scan or batch: grouped by tile, in brick masks, runs or lists, and packed while they are stored.
 
+mod mapped_tiles;
 mod packed_updates;
 mod tile_order;
 mod tile_updates;
 
+pub(crate) use mapped_tiles::MappedTiles;
 pub use packed_updates::PackedUpdates;
 pub(crate) use tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
 pub use tile_updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, ScanUpdates, TileUpdates};

@@ -1,15 +1,16 @@
+use super::mapped_tiles::MappedTiles;
 use super::tile_updates::{ScanUpdates, TileUpdates};
 use crate::scan::ScanReport;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, mask_of_box};
 use rustc_hash::FxHashMap;
 
-/// For each tile the numbers of the bricks that overlap it, in Morton order. `indices` are the bricks': their voxels'
+/// For each mapped tile the numbers of the bricks that overlap it, in Morton order. `indices` are the bricks': their voxels'
 /// indices divided by 8.
-pub(crate) fn bricks_by_tile(grid: &Grid, indices: &[VoxelIndex]) -> Vec<(TileIndex, Vec<u32>)> {
+pub(crate) fn bricks_by_tile(mapped: MappedTiles<'_>, indices: &[VoxelIndex]) -> Vec<(TileIndex, Vec<u32>)> {
     let mut tiles: FxHashMap<TileIndex, Vec<(BrickCode, u32)>> = FxHashMap::default();
     for (number, &index) in indices.iter().enumerate() {
         let code = brick_code(index);
-        for tile in tiles_of_brick(grid, index) {
+        for tile in tiles_of_brick(mapped.grid, index).filter(|tile| mapped.has(*tile)) {
             tiles.entry(tile).or_default().push((code, number as u32));
         }
     }

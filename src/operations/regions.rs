@@ -1,0 +1,88 @@
+//! Maps of the same scans, each of a region of its own: parts of one build.
+
+use crate::mapper::{MapReader, MapView};
+use crate::space::{Grid, LAST_VOXEL_INDEX, TileBox};
+use crate::store::Extension;
+
+/// What maps are parts of: one build with this region, `None` for all of space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct OneBuild {
+    pub(super) region: Option<TileBox>,
+}
+
+impl OneBuild {
+    /// The build that these maps are parts of, if they are: the same scans of the same inputs in the same way, in boxes
+    /// of tiles that have none in common and are together a box.
+    pub(super) fn of(maps: &[MapReader]) -> Option<Self> {
+        let [first, others @ ..] = maps else { return None };
+        let scans = first.metadata().ext.as_ref()?;
+        if scans.inputs.is_empty() || scans.inputs.iter().any(|input| input.content.is_none()) {
+            return None;
+        }
+        let regions = maps.iter().map(own_region).collect::<Option<Vec<TileBox>>>()?;
+        let has_these_scans =
+            |map: &MapReader| map.metadata().ext.as_ref().is_some_and(|ext| are_same_scans(ext, scans));
+        if !others.iter().all(has_these_scans) {
+            return None;
+        }
+        let region = united(&regions)?;
+        Some(Self { region: (!is_all_of_space(region, &first.config().grid)).then_some(region) })
+    }
+}
+
+/// The region of a map that has tiles nowhere else.
+fn own_region(map: &MapReader) -> Option<TileBox> {
+    let region = map.config().rays.region?;
+    map.tile_indices().into_iter().all(|tile| region.contains(tile)).then_some(region)
+}
+
+fn are_same_scans(a: &Extension, b: &Extension) -> bool {
+    let rays = |ext: &Extension| crate::config::RayConfig { region: None, ..ext.rays };
+    rays(a) == rays(b)
+        && a.inputs == b.inputs
+        && a.scan_number == b.scan_number
+        && a.decayed_scan == b.decayed_scan
+        && a.sensor_model == b.sensor_model
+        && a.occupancy_threshold == b.occupancy_threshold
+        && a.crs == b.crs
+}
+
+/// The box that these are together, if they are one and have no tile in common.
+fn united(regions: &[TileBox]) -> Option<TileBox> {
+    let are_apart =
+        regions.iter().enumerate().all(|(k, a)| regions[..k].iter().all(|b| a.intersection(*b).is_none()));
+    let hull = regions.iter().copied().reduce(TileBox::union)?;
+    let tiles = |region: TileBox| {
+        let (min, max) = (region.min().to_array(), region.max().to_array());
+        (0..3).map(|k| u128::from(min[k].abs_diff(max[k])) + 1).product::<u128>()
+    };
+    // Boxes without a tile in common fill their hull when they have as many tiles.
+    (are_apart && regions.iter().map(|region| tiles(*region)).sum::<u128>() == tiles(hull)).then_some(hull)
+}
+
+fn is_all_of_space(region: TileBox, grid: &Grid) -> bool {
+    region.contains(grid.tile_of_voxel([i32::MIN; 3]))
+        && region.contains(grid.tile_of_voxel([LAST_VOXEL_INDEX; 3]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_that_fill_a_box_are_one() {
+        let tiles = |min: [i32; 3], max: [i32; 3]| TileBox::new(min.into(), max.into());
+        let (low, high) = (i32::MIN, i32::MAX - 1);
+        let west = tiles([low; 3], [-1, high, high]);
+        let east = tiles([0, low, low], [high; 3]);
+        let all = united(&[east, west]).unwrap();
+        let grid = Grid::new(0.1, 10.0).unwrap();
+        assert!(is_all_of_space(all, &grid) && !is_all_of_space(east, &grid));
+        let (a, b) = (tiles([0; 3], [1, 0, 0]), tiles([2, 0, 0], [2, 0, 0]));
+        assert_eq!(united(&[a, b]), Some(tiles([0; 3], [2, 0, 0])));
+        // One twice, and a hole between two.
+        assert_eq!(united(&[a, b, a]), None);
+        assert_eq!(united(&[a, tiles([3, 0, 0], [3, 0, 0])]), None);
+        assert_eq!(united(&[a, tiles([1, 0, 0], [2, 0, 0])]), None);
+    }
+}

@@ -1,0 +1,133 @@
+use crate::cli::{failure, json, output, scans, text, voxtile};
+use std::path::Path;
+use tempfile::TempDir;
+
+const WEST: [&str; 7] = ["--region", "-inf", "-inf", "-inf", "3.1", "inf", "inf"];
+const SOUTH_EAST: [&str; 7] = ["--region", "3.1", "-inf", "-inf", "inf", "-0.4", "inf"];
+const NORTH_EAST: [&str; 7] = ["--region", "3.1", "-0.4", "-inf", "inf", "inf", "inf"];
+
+fn build<'a>(scans: &'a Path, map: &'a str, how: &[&'a str]) -> Vec<&'a str> {
+    [&["build", text(scans), "-o", map, "--tile-size", "1"], how].concat()
+}
+
+fn digest(map: &str) -> String {
+    output(&["digest", map])
+}
+
+#[test]
+fn maps_of_regions_that_partition_space_merge_to_the_map_of_the_whole() {
+    let modes: [&[&str]; 4] = [&[], &["--insert", "per-ray"], &["--sensor-model", "iwlo"], &["--no-rays"]];
+    for mode in modes {
+        let folder = TempDir::new().unwrap();
+        let scans = scans(&folder);
+        let path = |name: &str| text(&folder.path().join(name)).to_owned();
+        let whole = path("whole");
+        output(&build(&scans, &whole, mode));
+        let parts = ["west", "south_east", "north_east"].map(path);
+        for (part, region) in parts.iter().zip([WEST, SOUTH_EAST, NORTH_EAST]) {
+            let built = json(&build(&scans, part, &[mode, &region, &["--json"]].concat()));
+            assert_eq!(built["points"], 126, "{mode:?}");
+            assert_eq!(built["scan_number"], 3);
+            // Tiles with the center at 2.5 m are west, those at 3.5 m east.
+            assert_eq!(json(&["info", part, "--json"])["region_tiles"], built["region_tiles"]);
+            assert!(output(&["info", part]).contains("region       whole tiles: x "));
+            let (bound, index) = if *part == parts[0] { ("max", 2) } else { ("min", 3) };
+            assert_eq!(built["region_tiles"][bound][0], index);
+        }
+        let merged = path("merged");
+        let told = json(&["merge", &parts[0], &parts[1], &parts[2], "-o", &merged, "--json"]);
+        assert_eq!(told["is_one_build"], true);
+        assert_eq!(digest(&merged), digest(&whole), "{mode:?}");
+        let [merged, whole] = [merged, whole].map(|map| json(&["info", &map, "--json"]));
+        for same in ["scan_number", "inputs", "voxels", "occupied", "region_tiles"] {
+            assert_eq!(merged[same], whole[same], "{same}");
+        }
+        assert!(merged["map_id"] != whole["map_id"]);
+    }
+}
+
+#[test]
+fn the_summary_says_which_whole_tiles_a_region_is_made_of() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = (scans(&folder), folder.path().join("map"));
+    let box_m = ["--region", "0.4", "-1.6", "-inf", "3.6", "1", "1.5"];
+    let told = output(&build(&scans, text(&map), &box_m));
+    assert!(told.contains("region    whole tiles: x 0 to 4, y -2 to 1, z -inf to 1 m"), "{told}");
+}
+
+/// Does something while the last scan is not there yet.
+fn before_the_last_scan(scans: &Path, does: impl FnOnce()) {
+    let (last, poses) = (scans.join("002.pcd"), scans.join("poses_kitti.txt"));
+    let [scan, all_poses] = [&last, &poses].map(|path| std::fs::read_to_string(path).unwrap());
+    std::fs::remove_file(&last).unwrap();
+    let first_poses: String = all_poses.lines().take(2).flat_map(|line| [line, "\n"]).collect();
+    std::fs::write(&poses, first_poses).unwrap();
+    does();
+    std::fs::write(&last, scan).unwrap();
+    std::fs::write(&poses, all_poses).unwrap();
+}
+
+#[test]
+fn a_build_goes_on_with_the_merged_map_of_its_regions() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let path = |name: &str| text(&folder.path().join(name)).to_owned();
+    let [west, south_east, north_east, east, merged] =
+        ["west", "south_east", "north_east", "east", "merged"].map(path);
+    before_the_last_scan(&scans, || {
+        output(&build(&scans, &west, &WEST));
+        output(&build(&scans, &south_east, &SOUTH_EAST));
+        output(&build(&scans, &north_east, &NORTH_EAST));
+    });
+    // Two of three, together a box: a map of that region.
+    output(&["merge", &south_east, &north_east, "-o", &east]);
+    let told = output(&["merge", &east, &west, "-o", &merged]);
+    assert!(told.contains("scans     those of each map"), "{told}");
+    assert_eq!(output(&["scans", &merged]).lines().count(), output(&["scans", &west]).lines().count());
+    output(&build(&scans, &merged, &["--resume"]));
+    let at_once = path("at_once");
+    output(&build(&scans, &at_once, &[]));
+    assert_eq!(digest(&merged), digest(&at_once));
+    assert!(output(&["verify", &merged]).contains("whole"));
+
+    // Regions that are no box together, or are as of different scans, are maps like any others.
+    let is_other = |name: &str, parts: [&str; 2]| {
+        let other = json(&["merge", parts[0], parts[1], "-o", &path(name), "--json"]);
+        assert_eq!(other["is_one_build"], false, "{name}");
+        assert_eq!(json(&["info", &path(name), "--json"])["scan_number"], 0);
+    };
+    is_other("apart", [&west, &north_east]);
+    output(&build(&scans, &west, &["--resume"]));
+    is_other("uneven", [&west, &east]);
+}
+
+#[test]
+fn a_map_of_a_region_goes_on_with_its_region_and_no_other() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = (scans(&folder), folder.path().join("map"));
+    before_the_last_scan(&scans, || drop(output(&build(&scans, text(&map), &WEST))));
+    let (code, message) = failure(&build(&scans, text(&map), &[&["--resume"], &NORTH_EAST[..]].concat()));
+    assert_eq!(code, 2, "{message}");
+    assert!(message.contains("been built of tiles"), "{message}");
+    output(&build(&scans, text(&map), &["--resume"]));
+    let at_once = folder.path().join("at_once");
+    output(&build(&scans, text(&at_once), &WEST));
+    assert_eq!(digest(text(&map)), digest(text(&at_once)));
+}
+
+#[test]
+fn a_region_without_a_tile_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = (scans(&folder), folder.path().join("map"));
+    let regions: [[&str; 6]; 3] = [
+        ["0.6", "0", "0", "1.4", "1", "1"],
+        ["1", "0", "0", "0", "1", "1"],
+        ["nan", "0", "0", "1", "1", "1"],
+    ];
+    for region in regions {
+        let (code, message) = failure(&build(&scans, text(&map), &[&["--region"], &region[..]].concat()));
+        assert_eq!(code, 2, "{message}");
+        assert!(message.contains("--region") && !map.exists(), "{message}");
+    }
+    voxtile(&build(&scans, text(&map), &["--region", "0", "0"])).assert().code(2);
+}
