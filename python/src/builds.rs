@@ -75,8 +75,8 @@ pub fn scans(
 
 /// Makes a map of a file or folder of scans, as `voxtile build` does; returns one report of all scans.
 ///
-/// Keywords are those of `Map.create` and of `scans`. `progress` is called with the scans done and their number, 0 if it
-/// is not known. If it ends early, the map has the scans of the last flush.
+/// Keywords are those of `Map.create` and of `scans`. `progress` is called with the scans done and their number, 0 if
+/// it is not known. If it ends early, the map has the scans of the last flush.
 #[pyfunction]
 #[pyo3(signature = (path, output, *, resolution=0.1, tile_size=10.0, min_range=0.0, max_range=None,
     insert_mode="per-scan", sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap",

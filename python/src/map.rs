@@ -25,9 +25,9 @@ const FEW: usize = 128;
 
 /// A map: what is occupied, free and unknown.
 ///
-/// Made by `Map.create`, `Map.open` or `voxtile.open`, and closed by `close` or at the end of a `with` block. Points are
-/// arrays of N x 3 in metres, `float32` or `float64`; answers are arrays in the order of the questions. Any thread may
-/// ask while another inserts: it sees whole scans.
+/// Made by `Map.create`, `Map.open` or `voxtile.open`, and closed by `close` or at the end of a `with` block. Points
+/// are arrays of N x 3 in metres, `float32` or `float64`; answers are arrays in the order of the questions. Any
+/// thread may ask while another inserts: it sees whole scans.
 #[pyclass(frozen, module = "voxtile")]
 pub struct Map {
     /// `None` once it is closed.
@@ -465,8 +465,8 @@ impl Map {
         Ok((rows(py, voxels)?, column(py, distances), rows(py, directions)?))
     }
 
-    /// Whether boxes touch something occupied: an array of `bool`. A box is six numbers, lower corner and upper corner in
-    /// metres: N x 6 or N x 2 x 3.
+    /// Whether boxes touch something occupied: an array of `bool`. A box is six numbers, lower corner and upper
+    /// corner in metres: N x 6 or N x 2 x 3.
     #[pyo3(signature = (boxes, *, unknown="free"))]
     fn collides<'py>(
         &self,
@@ -510,7 +510,8 @@ impl Map {
         Ok((rows(py, centers)?, column(py, probabilities)))
     }
 
-    /// Iterates over the occupied voxels, a tile at a time, in constant memory: index of the tile, centers, probabilities.
+    /// Iterates over the occupied voxels, a tile at a time, in constant memory: index of the tile, centers,
+    /// probabilities.
     #[pyo3(signature = (min_probability=None))]
     fn occupied_by_tile(&self, py: Python<'_>, min_probability: Option<f64>) -> PyResult<TileIterator> {
         let tiles = self.tile_indices(py)?;

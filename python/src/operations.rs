@@ -70,7 +70,8 @@ pub fn delete_snapshot(py: Python<'_>, map: PathBuf, name: &str) -> PyResult<()>
     watched_with_progress(py, None, |_, _| operations::delete_snapshot(&map, &name))
 }
 
-/// Compares two maps, or snapshots `(map, name)`: a dict of sums, with a list of the tiles that differ in `"differing"`.
+/// Compares two maps, or snapshots `(map, name)`: a dict of sums, with a list of the tiles that differ in
+/// `"differing"`.
 #[pyfunction]
 #[pyo3(signature = (first, second, *, progress=None))]
 pub fn diff<'py>(
@@ -108,8 +109,8 @@ pub fn revert<'py>(
     })
 }
 
-/// Makes one map of several of the same resolution and tile size. `prefer` is "first", "last" or "more-observed"; without
-/// it the log-odds of a voxel are added.
+/// Makes one map of several of the same resolution and tile size. `prefer` is "first", "last" or "more-observed";
+/// without it the log-odds of a voxel are added.
 #[pyfunction]
 #[pyo3(signature = (maps, output, *, prefer=None, progress=None))]
 pub fn merge<'py>(
@@ -201,8 +202,8 @@ pub fn clear<'py>(
     told(py, progress, |_, progress| operations::clear(&map, &part, |done, all| progress.tell(done, all)))
 }
 
-/// Lets evidence fade: log-odds halve in so many scans. `scans` is how many have passed, those since the last decay if it
-/// is not named; log-odds nearer to 0 than `forget_below` are forgotten.
+/// Lets evidence fade: log-odds halve in so many scans. `scans` is how many have passed, those since the last decay
+/// if it is not named; log-odds nearer to 0 than `forget_below` are forgotten.
 #[pyfunction]
 #[pyo3(signature = (map, halflife_scans, *, scans=None, forget_below=0.0, progress=None))]
 pub fn decay<'py>(

@@ -30,9 +30,9 @@ def heights(
 ) -> tuple[NDArray[np.float64], tuple[float, float, float, float]]:
     """The height of the highest occupied voxel of each column, from above, in metres; NaN where there is none.
 
-    Returns an array of rows (y) and columns (x), and what it covers: left, right, bottom, top. Columns are whole voxels,
-    several of them where there would be more than ``most_pixels`` along an edge. Takes the memory of one tile and of the
-    picture.
+    Returns an array of rows (y) and columns (x), and what it covers: left, right, bottom, top. Columns are whole
+    voxels, several of them where there would be more than ``most_pixels`` along an edge. Takes the memory of one tile
+    and of the picture.
     """
     bounds = map.bounds if region is None else np.asarray(region, np.float64).reshape(2, 3)
     if bounds is None:

@@ -32,8 +32,8 @@ def snapshot(path: str | os.PathLike[str], name: str) -> None:
 def export(path: str | os.PathLike[str], output: str | os.PathLike[str], *options: str) -> dict[str, Any]:
     """Writes a map for other programs; the name's ending says in which format, as for ``voxtile export``.
 
-    ``options`` are those of the command (``"--region", "0", "0", "0", "5", "5", "5"``). It runs in a process of its own:
-    what is not flushed is not exported. Returns what the command prints with ``--json``.
+    ``options`` are those of the command (``"--region", "0", "0", "0", "5", "5", "5"``). It runs in a process of its
+    own: what is not flushed is not exported. Returns what the command prints with ``--json``.
     """
     # Names are paths here, even those that begin with a dash.
     paths = [os.path.abspath(path), "-o", os.path.abspath(output)]
