@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Builds the Python package, installs it into an empty environment, and tests it there: behaviour, types, stubs.
+# Builds the Python package, installs it into an empty environment, and tests it there: behaviour, guide, notebooks,
+# types, stubs.
 #
 #   python/check.sh [PYTEST ARGUMENTS]
 #
-# Needs python3 with venv, and the network for maturin, pytest and mypy. The build is that of the tests, which is made
+# Needs python3 with venv, and the network for maturin, pytest, mypy and the like. The build is that of the tests, which is made
 # in a few minutes; `maturin build --release` makes the wheel to hand out.
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -11,18 +12,22 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python3 -m venv "$work/venv"
 python=$work/venv/bin/python
-"$python" -m pip install --quiet --disable-pip-version-check matplotlib mypy pytest
-MATURIN_PEP517_ARGS="--profile dev --locked" "$python" -m pip install --quiet --disable-pip-version-check .
+install() { "$python" -m pip install --quiet --disable-pip-version-check "$@"; }
+install ipykernel matplotlib mypy nbclient pyright pytest
+install --only-binary :all: pyoctomap || echo "skipped: pyoctomap, which has no wheel for this Python"
+MATURIN_PEP517_ARGS="--profile dev --locked" install .
 # Beside the sources, Python would find the package without its module.
 cp -r tests "$work/tests"
+cp -r examples "$work/examples"
 mkdir "$work/docs"
 cp ../docs/python.md "$work/docs"
 mkdir "$work/python"
-mv "$work/tests" "$work/python/tests"
+mv "$work/tests" "$work/examples" "$work/python"
 cd "$work/python"
 "$python" -m pytest --quiet tests "$@"
 "$python" -m mypy --strict --package voxtile
 "$python" -m mypy.stubtest voxtile
+"$python" -m pyright --pythonpath "$python" "$("$python" -c 'import os, voxtile; print(os.path.dirname(voxtile.__file__))')"
 "$python" -c '
 import pathlib, subprocess, sys, voxtile
 began = "import time; began = time.perf_counter(); import numpy; between = time.perf_counter(); import voxtile; "
