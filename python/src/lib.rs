@@ -3,6 +3,7 @@
 //! ```text
 //! map         Map: lifetime, scans in, questions
 //! questions   what arrays of points, rays and boxes are answered
+//! local_map   LocalMap: what is near the robot
 //! operations  whole maps on disk
 //! builds      files of scans: read, or made a map of
 //! command     the command `voxtile`
@@ -16,11 +17,13 @@ mod builds;
 mod command;
 mod config;
 mod errors;
+mod local_map;
 mod map;
 mod operations;
 mod pose;
 mod questions;
 mod report;
+mod scan;
 mod source;
 mod stoppable;
 mod watched;
@@ -32,6 +35,8 @@ mod _voxtile {
     use super::builds::{ScanIterator, build, scans};
     #[pymodule_export]
     use super::command::run_command;
+    #[pymodule_export]
+    use super::local_map::LocalMap;
     #[pymodule_export]
     use super::map::{Map, TileIterator};
     #[pymodule_export]

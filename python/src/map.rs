@@ -1,11 +1,11 @@
 //! `voxtile.Map`: an open map.
 
-use crate::arrays::{PointSlice, Points, column, doubles, object, rows, singles};
+use crate::arrays::{Points, column, doubles, object, rows, singles};
 use crate::config::{ConfigArguments, bytes_of, config_of};
 use crate::errors::{exception, exception_of_kind, wrong};
-use crate::pose::{point_of, pose_of};
-use crate::questions;
+use crate::questions::{self, bodies_of};
 use crate::report::InsertReport;
+use crate::scan::Frame;
 use crate::source::Source;
 use crate::watched::{at_once, watched};
 use numpy::{PyArray1, PyArray2};
@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use voxtile::mapper::{MapReader, MapView, Mapper, OctreeMap};
 use voxtile::{
-    Aabb, MapConfig, MapOptions, MapQueries, Pose, RayQuery, Result, ScanRef, ScanReport, Shape,
-    SnapshotName, Stop, TileIndex, UnknownAs,
+    Aabb, MapConfig, MapOptions, MapQueries, RayQuery, Result, ScanReport, SnapshotName, Stop, TileIndex,
+    UnknownAs,
 };
 
 /// Questions and points that take less time than anybody waits for Ctrl-C. They are worth no thread of their own.
@@ -226,26 +226,11 @@ impl Map {
         intensities: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<InsertReport> {
         let points = Points::of("points", points)?;
-        let frame = match (pose, origin) {
-            (Some(pose), None) => Frame::Sensor(pose_of(pose)?),
-            (None, Some(origin)) => Frame::World(point_of("origin", origin)?),
-            _ => {
-                return Err(wrong(
-                    py,
-                    "pose",
-                    "name either the pose of the sensor, or its origin for points of the world",
-                ));
-            }
-        };
+        let frame = Frame::of(py, pose, origin)?;
         let intensities = intensities.map(|intensities| singles("intensities", intensities)).transpose()?;
         let intensities = intensities.as_ref().map(|intensities| intensities.as_slice()).transpose()?;
         let points = points.slice()?;
-        let scan = match (frame, points) {
-            (Frame::Sensor(pose), PointSlice::F32(points)) => ScanRef::in_sensor(pose, points),
-            (Frame::Sensor(pose), PointSlice::F64(points)) => ScanRef::in_sensor(pose, points),
-            (Frame::World(origin), PointSlice::F32(points)) => ScanRef::in_world(origin, points),
-            (Frame::World(origin), PointSlice::F64(points)) => ScanRef::in_world(origin, points),
-        };
+        let scan = frame.scan(points);
         let scan = match intensities {
             Some(intensities) => scan.with_intensities(intensities).map_err(|error| exception(py, &error))?,
             None => scan,
@@ -475,17 +460,7 @@ impl Map {
         unknown: &str,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let unknown = unknown_of(py, unknown)?;
-        let (shape, corners) = doubles("boxes", boxes)?;
-        if !matches!(shape[..], [_, 6] | [_, 2, 3] | [0]) {
-            return Err(wrong(
-                py,
-                "boxes",
-                format!("must be an array of N x 6 or N x 2 x 3, not of {shape:?}"),
-            ));
-        }
-        let body =
-            |&[x0, y0, z0, x1, y1, z1]: &[f64; 6]| Shape::Box(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] });
-        let bodies: Vec<Shape> = corners.as_chunks().0.iter().map(body).collect();
+        let bodies = bodies_of(boxes)?;
         // A box may be large.
         let answers =
             self.ask(py, usize::MAX, |source, stop| questions::collisions(source, stop, &bodies, unknown))?;
@@ -622,12 +597,6 @@ impl Map {
         let voxels = grid.voxels_of_tile(tile);
         Aabb { min: voxels.min.map(|k| grid.corner_m(k)), max: voxels.end.map(|k| grid.corner_m(k)) }
     }
-}
-
-/// The frame of a scan's points.
-enum Frame {
-    Sensor(Pose),
-    World(voxtile::Point),
 }
 
 /// The occupied voxels of a map, a tile at a time: `(tile, centers, probabilities)`.

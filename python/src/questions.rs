@@ -1,8 +1,10 @@
 //! Questions about many points, rays and boxes. Answers are lists in the order of the questions.
 
-use crate::arrays::PointSlice;
+use crate::arrays::{PointSlice, doubles};
+use crate::errors::wrong;
 use crate::source::Source;
 use crate::stoppable::Stoppable;
+use pyo3::prelude::*;
 use voxtile::mapper::MapView;
 use voxtile::space::VoxelBox;
 use voxtile::{
@@ -16,6 +18,18 @@ const POINTS_AT_A_TIME: usize = 1 << 16;
 const RAYS_AT_A_TIME: usize = 1 << 10;
 /// Most voxels of a dense array.
 const MOST_DENSE_VOXELS: u64 = 1 << 31;
+
+/// Boxes of an array of N x 6 or N x 2 x 3: lower and upper corner, in metres.
+pub fn bodies_of(boxes: &Bound<'_, PyAny>) -> PyResult<Vec<Shape>> {
+    let (shape, corners) = doubles("boxes", boxes)?;
+    if !matches!(shape[..], [_, 6] | [_, 2, 3] | [0]) {
+        let reason = format!("must be an array of N x 6 or N x 2 x 3, not of {shape:?}");
+        return Err(wrong(boxes.py(), "boxes", reason));
+    }
+    let body =
+        |&[x0, y0, z0, x1, y1, z1]: &[f64; 6]| Shape::Box(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] });
+    Ok(corners.as_chunks().0.iter().map(body).collect())
+}
 
 /// What the occupancy is called in arrays.
 pub fn occupancy_code(occupancy: Occupancy) -> i8 {

@@ -11,6 +11,7 @@ maps there.
 from . import errors
 from ._voxtile import (
     InsertReport,
+    LocalMap,
     Map,
     ScanIterator,
     TileIterator,
@@ -34,6 +35,7 @@ from .whole_maps import digest, export, open, snapshot
 
 __all__ = [
     "InsertReport",
+    "LocalMap",
     "Map",
     "ScanIterator",
     "TileIterator",

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "InsertReport",
+    "LocalMap",
     "Map",
     "ScanIterator",
     "TileIterator",
@@ -69,6 +70,33 @@ class InsertReport:
     def tiles_touched(self) -> int: ...
     def __eq__(self, value: object, /) -> bool: ...
     def __ne__(self, value: object, /) -> bool: ...
+
+@final
+class LocalMap:
+    def __new__(
+        cls,
+        resolution: float = 0.1,
+        *,
+        preset: Literal["local-mapping", "autonomous-mapping", "passive-perception"] = "local-mapping",
+        max_voxels: int | None = None,
+        min_range: float | None = None,
+        max_range: float | None = None,
+        inflation_range: float | None = None,
+        inflation_radius: float | None = None,
+    ) -> LocalMap: ...
+    @property
+    def position(self) -> list[float] | None: ...
+    @property
+    def resolution(self) -> float: ...
+    @property
+    def updates(self) -> int: ...
+    def insert(
+        self, points: ArrayLike, pose: _Pose | None = None, *, origin: ArrayLike | None = None
+    ) -> dict[str, Any]: ...
+    def state(self, points: ArrayLike) -> NDArray[np.int8]: ...
+    def occupied(self) -> NDArray[np.float64]: ...
+    def inflated(self) -> NDArray[np.float64]: ...
+    def collides(self, boxes: ArrayLike, *, inflated: bool = True) -> NDArray[np.bool_]: ...
 
 @final
 class Map:

@@ -1,0 +1,178 @@
+//! `voxtile.LocalMap`: what is near the robot, inflated for a planner.
+
+use crate::arrays::{Points, column, object, rows};
+use crate::errors::{exception, wrong};
+use crate::questions::bodies_of;
+use crate::scan::Frame;
+use crate::watched::{at_once, watched};
+use numpy::{PyArray1, PyArray2};
+use parking_lot::Mutex;
+use pyo3::prelude::*;
+use voxtile::local::{LocalParameters, LocalReader, LocalState, Obstacle};
+use voxtile::{Point, Queries, Result, UnknownAs};
+
+/// Points that take less time than anybody waits for Ctrl-C.
+const FEW: usize = 1 << 14;
+
+/// The local map: occupied voxels around the robot, and those too near to them. It is in memory alone.
+///
+/// `preset` is "local-mapping" (the latest 50,000 voxels within 40 m, inflated within 8 m), "autonomous-mapping"
+/// (everything, inflated within 8 m) or "passive-perception" (points at any distance, all inflated). Lengths are in
+/// metres. Any thread may ask while another inserts: it sees whole updates.
+#[pyclass(frozen, module = "voxtile")]
+pub struct LocalMap {
+    map: Mutex<voxtile::local::LocalMap>,
+    reader: LocalReader,
+}
+
+#[pymethods]
+impl LocalMap {
+    #[new]
+    #[pyo3(signature = (resolution=0.1, *, preset="local-mapping", max_voxels=None, min_range=None, max_range=None, inflation_range=None, inflation_radius=None))]
+    #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
+    fn new(
+        py: Python<'_>,
+        resolution: f64,
+        preset: &str,
+        max_voxels: Option<usize>,
+        min_range: Option<f64>,
+        max_range: Option<f64>,
+        inflation_range: Option<f64>,
+        inflation_radius: Option<f64>,
+    ) -> PyResult<Self> {
+        let mut parameters = match preset {
+            "local-mapping" => LocalParameters::local_mapping(),
+            "autonomous-mapping" => LocalParameters::autonomous_mapping(),
+            "passive-perception" => LocalParameters::passive_perception(),
+            _ => {
+                let known = "local-mapping, autonomous-mapping or passive-perception";
+                return Err(wrong(py, "preset", format!("is {known}, not `{preset}`")));
+            }
+        };
+        parameters.max_voxels = max_voxels.or(parameters.max_voxels);
+        for (place, given) in [
+            (&mut parameters.min_input_range_m, min_range),
+            (&mut parameters.input_range_m, max_range),
+            (&mut parameters.inflation_range_m, inflation_range),
+            (&mut parameters.inflation_radius_m, inflation_radius),
+        ] {
+            *place = given.unwrap_or(*place);
+        }
+        let map =
+            voxtile::local::LocalMap::new(resolution, parameters).map_err(|error| exception(py, &error))?;
+        Ok(Self { reader: map.reader(), map: Mutex::new(map) })
+    }
+
+    /// Adds a scan, as `Map.insert` does; returns what the update did, as a dict.
+    #[pyo3(signature = (points, pose=None, *, origin=None))]
+    fn insert<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        pose: Option<&Bound<'py, PyAny>>,
+        origin: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let points = Points::of("points", points)?;
+        let scan = Frame::of(py, pose, origin)?.scan(points.slice()?);
+        let report = at_once(py, |_| self.map.lock().insert_points(&scan))?;
+        object(py, &report)
+    }
+
+    /// 2 for points in occupied voxels, 1 for those in inflated ones, 0 for all others, free or unknown: `int8`.
+    fn state<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i8>>> {
+        let points = Points::of("points", points)?;
+        let slice = points.slice()?;
+        let view = self.reader.view();
+        let code = |point: &Point| match view.state_at(*point) {
+            LocalState::None => 0,
+            LocalState::Inflated => 1,
+            LocalState::Occupied => 2,
+        };
+        let states = at_once(py, |_| {
+            let mut states = Vec::with_capacity(slice.len());
+            slice.in_chunks(FEW, |chunk| {
+                states.extend(chunk.iter().map(code));
+                Ok::<(), voxtile::Error>(())
+            })?;
+            Ok(states)
+        })?;
+        Ok(column(py, states))
+    }
+
+    /// Centers of the occupied voxels: N x 3.
+    fn occupied<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.centers(py, LocalState::Occupied)
+    }
+
+    /// Centers of the voxels that are inflated and not occupied: N x 3.
+    fn inflated<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.centers(py, LocalState::Inflated)
+    }
+
+    /// Whether boxes (N x 6 or N x 2 x 3: lower and upper corner) touch something occupied or, with `inflated`,
+    /// something inflated: an array of `bool`.
+    #[pyo3(signature = (boxes, *, inflated=true))]
+    fn collides<'py>(
+        &self,
+        py: Python<'py>,
+        boxes: &Bound<'py, PyAny>,
+        inflated: bool,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let bodies = bodies_of(boxes)?;
+        let view = self.reader.view();
+        let answers: Vec<bool> = watched(py, |stop| {
+            let obstacles = view.obstacles(obstacle(inflated));
+            let ask = |body| {
+                stop.check()?;
+                Ok(obstacles.collision(body, UnknownAs::Free)?.is_some())
+            };
+            bodies.iter().map(ask).collect::<Result<_>>()
+        })?;
+        Ok(column(py, answers))
+    }
+
+    /// Where the sensor was at the last update; `None` before the first.
+    #[getter]
+    fn position(&self) -> Option<Point> {
+        self.reader.view().position()
+    }
+
+    /// Edge of a voxel, in metres.
+    #[getter]
+    fn resolution(&self) -> f64 {
+        self.reader.view().resolution_m()
+    }
+
+    /// Updates so far.
+    #[getter]
+    fn updates(&self) -> u64 {
+        self.reader.view().update_number()
+    }
+
+    fn __repr__(&self) -> String {
+        let view = self.reader.view();
+        let (occupied, inflated) = (view.occupied_voxels(), view.inflated_voxels());
+        format!("<voxtile.LocalMap of {} m: {occupied} occupied, {inflated} inflated>", view.resolution_m())
+    }
+}
+
+impl LocalMap {
+    fn centers<'py>(&self, py: Python<'py>, wanted: LocalState) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let view = self.reader.view();
+        let centers = py.detach(|| {
+            let grid = view.resolution_m();
+            let mut centers = Vec::new();
+            view.for_each(|voxel, state| {
+                if state == wanted {
+                    centers.push(voxel.map(|k| (f64::from(k) + 0.5) * grid));
+                }
+            });
+            centers
+        });
+        rows(py, centers)
+    }
+}
+
+fn obstacle(inflated: bool) -> Obstacle {
+    if inflated { Obstacle::Inflated } else { Obstacle::Occupied }
+}
