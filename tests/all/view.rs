@@ -262,6 +262,13 @@ fn strangers_get_nothing() {
         |line: &str, host: &str| viewer.send(&format!("{line}\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
     let host = host.to_string();
     assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), &host).status, 200);
+    // Strangers keep no connection, whatever they ask for; others do.
+    let is_closed = |token: &str| {
+        let mut stream = viewer.connect();
+        write!(stream, "GET /{token}/maps.json HTTP/1.1\r\nhost: {host}\r\n\r\n").unwrap();
+        read_reply(stream).head.to_lowercase().contains("connection: close")
+    };
+    assert_eq!([is_closed("wrong_token"), is_closed(TOKEN)], [true, false]);
     for path in [
         "/".to_owned(),
         "/maps.json".to_owned(),
