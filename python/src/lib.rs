@@ -26,6 +26,7 @@ mod report;
 mod scan;
 mod source;
 mod stoppable;
+mod tile_iterator;
 mod watched;
 
 /// The module.
@@ -38,7 +39,7 @@ mod _voxtile {
     #[pymodule_export]
     use super::local_map::LocalMap;
     #[pymodule_export]
-    use super::map::{Map, TileIterator};
+    use super::map::Map;
     #[pymodule_export]
     use super::operations::{
         clear, convert, crop, decay, delete_snapshot, diff, import_octree, merge, repair, revert, snapshots,
@@ -46,4 +47,6 @@ mod _voxtile {
     };
     #[pymodule_export]
     use super::report::InsertReport;
+    #[pymodule_export]
+    use super::tile_iterator::TileIterator;
 }

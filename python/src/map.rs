@@ -7,6 +7,7 @@ use crate::questions::{self, bodies_of};
 use crate::report::InsertReport;
 use crate::scan::Frame;
 use crate::source::Source;
+use crate::tile_iterator::TileIterator;
 use crate::watched::{at_once, watched};
 use numpy::{PyArray1, PyArray2};
 use parking_lot::RwLock;
@@ -491,7 +492,7 @@ impl Map {
     fn occupied_by_tile(&self, py: Python<'_>, min_probability: Option<f64>) -> PyResult<TileIterator> {
         let tiles = self.tile_indices(py)?;
         let boxes = tiles.into_iter().map(|tile| (tile, self.box_of(tile))).collect::<Vec<_>>().into_iter();
-        Ok(TileIterator { source: self.source(py)?, tiles: RwLock::new(boxes), min_probability })
+        Ok(TileIterator::new(self.source(py)?, self.path.clone(), boxes, min_probability))
     }
 
     /// Indices of the tiles in which something was observed: `int32`, N x 3.
@@ -599,36 +600,6 @@ impl Map {
     }
 }
 
-/// The occupied voxels of a map, a tile at a time: `(tile, centers, probabilities)`.
-#[pyclass(frozen, module = "voxtile")]
-pub struct TileIterator {
-    source: Arc<Source>,
-    tiles: RwLock<std::vec::IntoIter<(TileIndex, Aabb)>>,
-    min_probability: Option<f64>,
-}
-
-type OccupiedOfTile<'py> = ((i32, i32, i32), Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f32>>);
-
-#[pymethods]
-impl TileIterator {
-    fn __iter__(slf: Py<Self>) -> Py<Self> {
-        slf
-    }
-
-    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<OccupiedOfTile<'py>>> {
-        let Some((tile, region)) = self.tiles.write().next() else { return Ok(None) };
-        if let Source::Writer { mapper, .. } = &*self.source
-            && mapper.try_lock().is_some_and(|mapper| mapper.is_none())
-        {
-            return Err(closed(py, Path::new("map")));
-        }
-        let (centers, probabilities) = at_once(py, |stop| {
-            self.source.ask(stop, |map| questions::occupied(map, Some(&region), self.min_probability))
-        })?;
-        Ok(Some(((tile.x, tile.y, tile.z), rows(py, centers)?, column(py, probabilities))))
-    }
-}
-
 /// A box: lower and upper corner, six numbers or 2 x 3.
 pub fn region_of(region: &Bound<'_, PyAny>) -> PyResult<Aabb> {
     let (shape, corners) = doubles("region", region)?;
@@ -652,6 +623,7 @@ fn unknown_of(py: Python<'_>, unknown: &str) -> PyResult<UnknownAs> {
     }
 }
 
-fn closed(py: Python<'_>, path: &Path) -> PyErr {
+/// What a question to a closed map is answered.
+pub fn closed(py: Python<'_>, path: &Path) -> PyErr {
     exception_of_kind(py, "closed", &format!("{}: the map is closed; open it again", path.display()))
 }
