@@ -18,6 +18,7 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) struct ScanParts<'a> {
     mapped: MappedTiles<'a>,
     parts: Mutex<Parts<'a>>,
+    stop: &'a Stop,
     is_empty: AtomicBool,
     has_failed: AtomicBool,
 }
@@ -71,9 +72,10 @@ impl TileValue for PartList {
 const BRICKS_AT_A_TIME: usize = 4096;
 
 impl<'a> ScanParts<'a> {
-    /// Parts of more than `max_bytes` go to a file that is made then.
+    /// Parts of more than `max_bytes` go to a file that is made then. Once `stop` is set, parts are dropped.
     pub(crate) fn new(
         mapped: MappedTiles<'a>,
+        stop: &'a Stop,
         max_bytes: usize,
         max_tiles: usize,
         make_scratch: &'a MakeScratch<'a>,
@@ -83,6 +85,7 @@ impl<'a> ScanParts<'a> {
         Self {
             mapped,
             parts: Mutex::new(Parts { log, record, lists, max_tiles, failure }),
+            stop,
             is_empty: AtomicBool::new(true),
             has_failed: AtomicBool::new(false),
         }
@@ -103,7 +106,7 @@ impl<'a> ScanParts<'a> {
     pub(crate) fn add_marked(&self, bricks: impl Iterator<Item = MarkedBrick>, intensities: &Intensities) {
         let mut some = Vec::with_capacity(BRICKS_AT_A_TIME);
         let mut bricks = bricks.peekable();
-        while bricks.peek().is_some() {
+        while !self.stop.is_set() && bricks.peek().is_some() {
             some.clear();
             // A page adds at most 512 more.
             some.extend(bricks.by_ref().take(BRICKS_AT_A_TIME));

@@ -73,6 +73,7 @@ impl<'a> ScanRays<'a> {
     pub(crate) fn per_scan(&self, collectors: &mut Vec<PerScanCollector>) -> Result<ScanUpdates> {
         let (collectors, report) =
             self.collect_per_scan(collectors, self.threads(), &CollectorLimit::NONE, None)?;
+        self.stop.check()?;
         Ok(self.merge(collectors, report))
     }
 
@@ -86,6 +87,7 @@ impl<'a> ScanRays<'a> {
         let threads = limit.collectors(self.threads());
         let (collectors, report) =
             self.collect_per_scan(collectors, threads, &limit.of_collector(threads), Some(parts))?;
+        self.stop.check()?;
         if parts.is_empty() && limit.has_room_for(collectors) {
             return Ok(PerScanUpdates::Whole(self.merge(collectors, report)));
         }

@@ -115,7 +115,13 @@ impl ScanTracer {
                 _ => scan_rays.per_ray(&mut self.per_ray),
             };
         };
-        let parts = ScanParts::new(mapped, overflow.max_bytes / 4, overflow.max_tiles, overflow.make_scratch);
+        let parts = ScanParts::new(
+            mapped,
+            &self.stop,
+            overflow.max_bytes / 4,
+            overflow.max_tiles,
+            overflow.make_scratch,
+        );
         let report = match (is_per_scan, in_order) {
             (true, _) => match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
                 PerScanUpdates::Whole(updates) => return Ok(updates),
