@@ -49,6 +49,9 @@ pub struct MapConfig {
     /// The coordinate reference system of the map's frame: well-known text, or `EPSG:25832`. It changes no voxel; exports
     /// that can say it do. Default: none.
     pub crs: Option<String>,
+    /// Whether the map keeps the scans that it takes, so that it can be mapped again when poses change. A map that
+    /// does goes on doing so, whatever is asked for. Default: no.
+    pub keeps_scans: bool,
 }
 
 /// How much an out-of-core mapper keeps in memory. The map does not depend on it, only the work to make it.
@@ -157,6 +160,7 @@ impl Default for MapConfig {
             memory: MemoryLimit::default(),
             storage: Storage::default(),
             crs: None,
+            keeps_scans: false,
         }
     }
 }
@@ -216,6 +220,11 @@ impl MapConfig {
     pub fn with_region(mut self, region: impl Into<Option<TileBox>>) -> Self {
         self.rays.region = region.into();
         self
+    }
+
+    /// The same, keeping the scans that the map takes or not.
+    pub fn with_kept_scans(self, keeps_scans: bool) -> Self {
+        Self { keeps_scans, ..self }
     }
 
     /// The same with another insert mode.

@@ -293,6 +293,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         decayed_scan: 0,
         storage: layout.storage(),
         crs: None,
+        keeps_scans: false,
         scan_records: None,
         snapshots: None,
     };

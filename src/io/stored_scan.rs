@@ -44,4 +44,12 @@ impl ScanPoints for StoredScan {
             take(&in_world, intensities)
         })
     }
+
+    fn world_from_sensor(&self) -> Option<Pose> {
+        Some(self.world_from_sensor)
+    }
+
+    fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.points_in_sensor.for_each_chunk(range, take)
+    }
 }

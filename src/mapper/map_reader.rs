@@ -1,3 +1,4 @@
+use super::kept_scan::KeptScan;
 use super::statistics::IoCounts;
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::{MapConfig, MemoryLimit};
@@ -5,7 +6,10 @@ use crate::error::{Error, Result};
 use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
 use crate::space::{TileBox, TileIndex};
-use crate::store::{Disk, MapPath, Metadata, ScanRecord, SnapshotName, TileStore, TileVersion, read_scans};
+use crate::store::{
+    CatalogEntry, Disk, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileStore, TileVersion,
+    read_scans,
+};
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
@@ -222,8 +226,42 @@ impl MapReader {
     ///
     /// A list that cannot be read or is damaged.
     pub fn scans(&self) -> Result<Vec<ScanRecord>> {
+        if self.keeps_scans() {
+            let (mut records, mut scans) = (self.kept_records()?, Vec::new());
+            while let Some(entry) = records.next_entry().map_err(|error| self.explain(error))? {
+                match entry {
+                    CatalogEntry::Kept(scan) => {
+                        scans.push(ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m()));
+                    }
+                    CatalogEntry::Listed(scan) => scans.push(scan),
+                    _ => {}
+                }
+            }
+            return Ok(scans);
+        }
         let records = self.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
         read_scans(&*self.disk, self.store.layout(), self.flush_number(), records)
+    }
+
+    /// Whether the map keeps its scans.
+    pub fn keeps_scans(&self) -> bool {
+        self.store.keeps_scans()
+    }
+
+    /// The scans that the map keeps, in order.
+    ///
+    /// # Errors
+    ///
+    /// A map that keeps none, with a hint; a list that cannot be read or is damaged.
+    pub fn kept_scans(&self) -> Result<KeptScans<'_>> {
+        if !self.keeps_scans() {
+            return Err(Error::argument(self.folder().display().to_string(), NOT_KEPT));
+        }
+        Ok(KeptScans { reader: self, records: self.kept_records()? })
+    }
+
+    pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
+        self.store.kept_records().map_err(|error| self.explain(error))
     }
 
     /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the original format.
@@ -280,6 +318,33 @@ impl MapReader {
             return Error::Changed { path: folder.to_owned() };
         }
         error
+    }
+}
+
+/// What to do about a map without kept scans.
+pub(crate) const NOT_KEPT: &str =
+    "keeps no scans, so that it cannot be mapped again; build it with --keep-scans to have them";
+
+/// Most points of a kept scan that are read into memory: 7 MiB. Those of a larger one are read again when needed.
+const MOST_POINTS_IN_MEMORY: u64 = 1 << 18;
+
+/// The scans that a map keeps, one at a time, in order.
+#[derive(Debug)]
+pub struct KeptScans<'a> {
+    reader: &'a MapReader,
+    records: KeptRecords,
+}
+
+impl Iterator for KeptScans<'_> {
+    type Item = Result<KeptScan>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (disk, layout) = (&self.reader.disk, self.reader.store.layout());
+        let scan = match self.records.next_kept() {
+            Ok(record) => KeptScan::open(disk, layout, record?, MOST_POINTS_IN_MEMORY),
+            Err(error) => Err(error),
+        };
+        Some(scan.map_err(|error| self.reader.explain(error)))
     }
 }
 

@@ -15,12 +15,14 @@
 //! How tiles move between memory and disk is in `paging`.
 
 mod in_memory;
+mod kept_scan;
 mod live;
 mod map_reader;
 mod octree_map;
 mod options;
 mod out_of_core;
 mod paging;
+mod remapper;
 mod statistics;
 mod tile_map;
 mod tile_ref;
@@ -28,11 +30,15 @@ mod trace;
 mod traits;
 
 pub use in_memory::InMemoryMapper;
+pub use kept_scan::KeptScan;
+pub(crate) use kept_scan::{pose_numbers, pose_of_numbers};
 pub use live::{LiveReader, LiveView};
-pub use map_reader::MapReader;
+pub(crate) use map_reader::NOT_KEPT;
+pub use map_reader::{KeptScans, MapReader};
 pub use octree_map::OctreeMap;
 pub use options::MapOptions;
 pub use out_of_core::OutOfCoreTileMapper;
+pub(crate) use remapper::Remapper;
 pub use statistics::{IoCounts, MapStatistics, MemoryCounts, StallCounts};
 pub use tile_ref::TileRef;
 pub use traits::{MapView, Mapper};

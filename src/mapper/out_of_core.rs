@@ -1,3 +1,4 @@
+use super::kept_scan::pose_numbers;
 use super::paging::{MemoryPlan, PagedTiles, TilePager};
 use super::trace::trace;
 use super::{LiveReader, MapStatistics, MapView, Mapper, TileRef};
@@ -7,7 +8,10 @@ use crate::persistence::{new_map_id, new_metadata};
 use crate::scan::{Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
-use crate::store::{InputContent, InputRecord, MapPath, Metadata, SnapshotName, TileStore};
+use crate::store::{
+    InputContent, InputRecord, KeptFrame, KeptRecord, MapPath, Metadata, SegmentPlace, SnapshotName,
+    TileStore,
+};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -71,7 +75,12 @@ impl OutOfCoreTileMapper {
         Ok(Self::new(config, store))
     }
 
-    fn new(config: MapConfig, store: TileStore) -> Self {
+    fn new(mut config: MapConfig, mut store: TileStore) -> Self {
+        // A map of the original format gets what this needs with its first change.
+        if config.keeps_scans {
+            store.keep_scans();
+        }
+        config.keeps_scans = store.keeps_scans();
         let scan_bytes = MemoryPlan::new(config.memory).scan_bytes;
         let tiles = PagedTiles::new(config.clone(), store);
         Self { tiles, live: OnceLock::new(), config, tracer: ScanTracer::with_memory_bytes(scan_bytes) }
@@ -221,8 +230,32 @@ impl OutOfCoreTileMapper {
         self.pager().reload(tile, discard_changes)
     }
 
-    /// Inserts what a scan says about a selection of tiles, or about all.
+    /// Inserts what a scan says about a selection of tiles, or about all, and keeps the scan if the map keeps scans.
     fn insert(&mut self, scan: &dyn ScanPoints, selection: Option<&TileSelection>) -> Result<ScanReport> {
+        let place = if self.pager().keeps_scans() { Some(self.pager().keep(scan)?) } else { None };
+        let inserted = self.map(scan, selection);
+        let mut pager = self.pager();
+        match inserted {
+            Ok((report, tiles)) => {
+                let kept = place.map(|place| kept_record(scan, &self.config.rays, place, &report, tiles));
+                pager.note_scan(scan, kept);
+                Ok(report)
+            }
+            Err(error) => {
+                if place.is_some() {
+                    pager.give_up_kept();
+                }
+                Err(error)
+            }
+        }
+    }
+
+    /// Maps what a scan says about a selection of tiles, or about all; returns the tiles that it touched, too.
+    fn map(
+        &mut self,
+        scan: &dyn ScanPoints,
+        selection: Option<&TileSelection>,
+    ) -> Result<(ScanReport, Vec<TileIndex>)> {
         let plan = MemoryPlan::new(self.config.memory);
         let tiles = &self.tiles;
         let (disk, folder, max_tiles) = {
@@ -237,21 +270,64 @@ impl OutOfCoreTileMapper {
         let traced = trace(&mut self.tracer, &self.config, scan, selection, overflow);
         let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
         let inserted = traced.and_then(|updates| self.accept(updates));
-        match inserted {
-            Ok(_) => self.pager().note_scan(scan.stamp_ns(), scan.origin()),
-            Err(_) => self.pager().discard_staged(),
+        if inserted.is_err() {
+            self.pager().discard_staged();
         }
         inserted
     }
 
-    fn accept(&mut self, updates: ScanUpdates) -> Result<ScanReport> {
+    fn accept(&mut self, updates: ScanUpdates) -> Result<(ScanReport, Vec<TileIndex>)> {
         let report = updates.report;
         let scan_bytes = self.tracer.bytes() + updates.bytes();
         let mut pager = self.pager();
         pager.prepare(&updates, scan_bytes)?;
         pager.prefetch(&updates.tiles);
-        pager.accept(updates);
-        Ok(report)
+        let tiles = pager.accept(updates);
+        Ok((report, tiles))
+    }
+
+    // Mapping again.
+
+    /// Opens a map of which some tiles are empty, to map them again from scans that it keeps.
+    pub(super) fn without_tiles(
+        mut store: TileStore,
+        config: MapConfig,
+        tiles: impl IntoIterator<Item = TileIndex>,
+    ) -> Result<Self> {
+        for tile in tiles {
+            store.remove(tile)?;
+        }
+        Ok(Self::new(config, store))
+    }
+
+    /// Maps a kept scan again, in the tiles of a selection or in all; returns the tiles that it touched, too.
+    pub(super) fn map_again(
+        &mut self,
+        number: u64,
+        scan: &dyn ScanPoints,
+        rays: &RayConfig,
+        selection: Option<&TileSelection>,
+    ) -> Result<(ScanReport, Vec<TileIndex>)> {
+        self.config.rays = *rays;
+        self.pager().set_scan_number(number.saturating_sub(1));
+        self.map(scan, selection)
+    }
+
+    /// The store, to write a catalog of kept scans.
+    pub(super) fn with_store<T>(&mut self, work: impl FnOnce(&mut TileStore) -> T) -> T {
+        work(self.pager().store_mut())
+    }
+
+    /// Writes the points of a scan to where kept scans lie.
+    pub(super) fn pager_keep(&self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+        self.pager().keep(scan)
+    }
+
+    /// Commits what was mapped again; the map has as many scans as before.
+    pub(super) fn commit_again(&mut self, scan_number: u64) -> Result<()> {
+        let mut pager = self.pager();
+        pager.set_scan_number(scan_number);
+        pager.flush()
     }
 
     /// The pager, for one call. Queries take `&self` and may load tiles.
@@ -317,7 +393,9 @@ impl Mapper for OutOfCoreTileMapper {
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
         let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
-        self.accept(updates)
+        let (report, _) = self.accept(updates)?;
+        self.pager().note_batch();
+        Ok(report)
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -326,6 +404,31 @@ impl Mapper for OutOfCoreTileMapper {
 
     fn sync_octrees(&mut self) {
         self.pager().sync_octrees();
+    }
+}
+
+/// What is kept of a scan; the number comes with its place in the map.
+fn kept_record(
+    scan: &dyn ScanPoints,
+    rays: &RayConfig,
+    place: SegmentPlace,
+    report: &ScanReport,
+    tiles: Vec<TileIndex>,
+) -> KeptRecord {
+    let frame = match scan.world_from_sensor() {
+        Some(pose) => KeptFrame::Sensor(pose_numbers(&pose)),
+        None => KeptFrame::World(scan.origin()),
+    };
+    KeptRecord {
+        number: 0,
+        stamp_ns: scan.stamp_ns(),
+        frame,
+        rays: *rays,
+        points: scan.len() as u64,
+        has_intensities: scan.has_intensities(),
+        updates: report.hits + report.misses,
+        place,
+        tiles,
     }
 }
 

@@ -44,7 +44,7 @@ pub fn clear(map: impl Into<MapPath>, part: &Part, mut progress: impl FnMut(u64,
         progress(tiles.len() as u64, tiles.len() as u64);
         cleared.tiles = all - cleared.tiles_removed;
         if cleared.tiles_changed + cleared.tiles_removed > 0 {
-            editor.commit(|_| {})?;
+            editor.commit("clear", |_| {})?;
         }
         Ok(cleared)
     })

@@ -134,7 +134,7 @@ pub fn decay(map: impl Into<MapPath>, decay: &Decay, mut progress: impl FnMut(u6
         progress(tiles.len() as u64, tiles.len() as u64);
         decayed.tiles -= decayed.tiles_removed;
         if scans > 0 || decayed.voxels_forgotten > 0 {
-            editor.commit(|ext| ext.decayed_scan = now)?;
+            editor.commit("decay", |ext| ext.decayed_scan = now)?;
         }
         Ok(decayed)
     })

@@ -4,7 +4,7 @@ use crate::persistence::TileSaver;
 use crate::persistence::upgrade;
 use crate::persistence::{config_from, load, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{Disk, Extension, TileStore, TileVersion};
+use crate::store::{CatalogEntry, Disk, Extension, TileStore, TileVersion};
 use crate::tile::Table;
 use std::path::Path;
 use std::sync::Arc;
@@ -90,9 +90,10 @@ impl MapEditor {
         self.store.remove(tile)
     }
 
-    /// Commits every change, and what `note` changes in the map's metadata.
-    pub(super) fn commit(&mut self, note: impl FnOnce(&mut Extension)) -> Result<()> {
+    /// Commits every change, and what `note` changes in the map's metadata. `what` names the change.
+    pub(super) fn commit(&mut self, what: &str, note: impl FnOnce(&mut Extension)) -> Result<()> {
         self.begin_writing()?;
+        self.store.note_entry(CatalogEntry::Operation(what.to_owned()));
         let mut metadata = self.store.metadata().clone();
         if let Some(ext) = &mut metadata.ext {
             note(ext);

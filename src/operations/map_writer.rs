@@ -70,6 +70,11 @@ impl MapWriter {
     ///
     /// As for [`MapWriter::create`], and metadata of the original format, which does not say it all.
     pub fn create_as(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata) -> Result<Self> {
+        let mut metadata = metadata;
+        if let Some(ext) = &mut metadata.ext {
+            // Of the map that it is made of, whose scans are not copied.
+            ext.keeps_scans = false;
+        }
         let config = config_from(&metadata, folder)?;
         let ext = metadata.ext.as_ref();
         let Some((map_id, ext)) = ext.and_then(|ext| Some((id_from_hex(&ext.map_id)?, ext))) else {

@@ -83,7 +83,7 @@ fn revert_to(
             reverted.tiles_removed += 1;
         }
     }
-    store.note_rewind(past.commits().flush_number);
+    store.note_rewind(past)?;
     store.commit(past.metadata().clone(), past.commits().scan_number)?;
     reverted.scan_number = store.commits().scan_number;
     reverted.flush_number = store.commits().flush_number;

@@ -19,6 +19,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
         decayed_scan: 0,
         storage: config.storage,
         crs: config.crs.clone(),
+        keeps_scans: config.keeps_scans,
         scan_records: None,
         snapshots: None,
     };
@@ -39,6 +40,7 @@ pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig>
         config.sensor_model = ext.sensor_model;
         config.occupancy_threshold = ext.occupancy_threshold;
         config.rays = ext.rays;
+        config.keeps_scans = ext.keeps_scans;
         config.crs.clone_from(&ext.crs);
     }
     config.validated().map_err(|error| wrong(error.to_string()))

@@ -1,4 +1,4 @@
-use super::{Scan, ScanRef};
+use super::{Pose, Scan, ScanRef};
 use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
@@ -34,6 +34,21 @@ pub trait ScanPoints: Sync {
     ///
     /// A file that cannot be read, intensities that do not match the points.
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()>;
+
+    /// The pose of the sensor, if the points are known in the sensor's frame.
+    fn world_from_sensor(&self) -> Option<Pose> {
+        None
+    }
+
+    /// As [`ScanPoints::for_each_chunk`], but in the sensor's frame where [`ScanPoints::world_from_sensor`] is known. The
+    /// pose takes these points to the others, to the bit.
+    ///
+    /// # Errors
+    ///
+    /// As for [`ScanPoints::for_each_chunk`].
+    fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.for_each_chunk(range, take)
+    }
 
     /// All points at once, if they lie in memory as [`ScanPoints::for_each_chunk`] passes them.
     fn in_memory(&self) -> Option<&[Point]> {

@@ -114,6 +114,24 @@ impl ScanPoints for ScanRef<'_> {
         Ok(())
     }
 
+    fn world_from_sensor(&self) -> Option<Pose> {
+        match self.frame {
+            Frame::World(_) => None,
+            Frame::Sensor(pose) => Some(pose),
+        }
+    }
+
+    fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        let intensities = self.intensities.map(|all| part(all, &range)).transpose()?;
+        match self.points {
+            PointSlice::F64(points) => {
+                take(part(points, &range)?, intensities);
+            }
+            PointSlice::F32(points) => convert(part(points, &range)?, intensities, widened, take),
+        }
+        Ok(())
+    }
+
     fn in_memory(&self) -> Option<&[Point]> {
         match (self.points, &self.frame) {
             (PointSlice::F64(points), Frame::World(_)) => Some(points),

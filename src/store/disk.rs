@@ -12,6 +12,12 @@ use std::time::Duration;
 pub trait Disk: Debug + Send + Sync {
     /// Opens a file for reading. Anything else, a symbolic link too, is an error of the kind `InvalidInput`.
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
+    /// Opens a file for reading from `offset` on.
+    fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        let mut input = self.open(path)?;
+        io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
+        Ok(input)
+    }
     /// Opens a file for reading and counts as its reader until the result is dropped: [`Disk::watch`] tells. Where
     /// the file system has no locks, the file is opened and nobody can tell.
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;

@@ -1,7 +1,7 @@
 use super::disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
 use crate::scratch::Scratch;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Read};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,6 +24,13 @@ impl Disk for FsDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         let file = File::open(only_a_file(path)?)?;
         let bytes = file.metadata()?.len();
+        Ok(Box::new(FsRead { file, bytes }))
+    }
+
+    fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        let mut file = File::open(only_a_file(path)?)?;
+        let bytes = file.metadata()?.len();
+        file.seek(SeekFrom::Start(offset))?;
         Ok(Box::new(FsRead { file, bytes }))
     }
 

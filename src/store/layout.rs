@@ -89,6 +89,31 @@ impl Layout {
         self.folder.join("scans.bin")
     }
 
+    /// The folder of the scans that the map keeps.
+    pub fn kept_scans(&self) -> PathBuf {
+        self.folder.join(KEPT_SCANS)
+    }
+
+    /// A catalog of these scans: which there are from a flush on.
+    pub(super) fn catalog(&self, generation: u64) -> PathBuf {
+        self.kept_scans().join(format!("{CATALOG_PREFIX}{generation}"))
+    }
+
+    /// The generation of a catalog's name; `None` for another name.
+    pub(super) fn generation_of(name: &str) -> Option<u64> {
+        number_behind(CATALOG_PREFIX, name)
+    }
+
+    /// A file with the points of some of them.
+    pub(super) fn segment(&self, segment: u64) -> PathBuf {
+        self.kept_scans().join(format!("{SEGMENT_PREFIX}{segment}"))
+    }
+
+    /// The number of a segment's name; `None` for another name.
+    pub(super) fn segment_of(name: &str) -> Option<u64> {
+        number_behind(SEGMENT_PREFIX, name)
+    }
+
     /// The file that a writer holds locked.
     pub fn lock(&self) -> PathBuf {
         self.folder.join("writer.lock")
@@ -113,9 +138,7 @@ impl Layout {
 
     /// The flush number of a kept table's name; `None` for another name.
     pub fn flush_of_kept(&self, name: &str) -> Option<u64> {
-        let number = name.strip_prefix(TileFile::Table.name(self.storage))?.strip_prefix(KEPT_SUFFIX)?;
-        // Only the canonical spelling: the store would look for 7, not for 007.
-        number.parse().ok().filter(|flush_number: &u64| flush_number.to_string() == number)
+        number_behind(KEPT_SUFFIX, name.strip_prefix(TileFile::Table.name(self.storage))?)
     }
 
     /// Spilled updates of a tile, while the map is written to.
@@ -161,7 +184,19 @@ pub const SNAPSHOTS: &str = "snapshots";
 /// The name of the file in it that is being written.
 pub const SNAPSHOT_NEXT: &str = ".next";
 
+/// The name of the folder of the scans that a map keeps.
+pub const KEPT_SCANS: &str = "kept_scans";
+
+const CATALOG_PREFIX: &str = "catalog.";
+const SEGMENT_PREFIX: &str = "segment.";
 const KEPT_SUFFIX: &str = ".flush";
+
+/// The number behind a prefix; `None` for another name.
+fn number_behind(prefix: &str, name: &str) -> Option<u64> {
+    let number = name.strip_prefix(prefix)?;
+    // Only the canonical spelling: the store would look for 7, not for 007.
+    number.parse().ok().filter(|parsed: &u64| parsed.to_string() == number)
+}
 
 /// The name of a tile's folder, such as `tile_0_1_-1`.
 pub fn folder_name(tile: TileIndex) -> String {

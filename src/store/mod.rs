@@ -37,15 +37,17 @@ pub use commit::input_record::{InputContent, InputRecord};
 pub use commit::metadata::{Bounds, Extension, MapParameters, Metadata};
 pub use disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
 pub use fs_disk::FsDisk;
-pub use layout::{Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, TileFile, folder_name, tile_of_folder};
+pub use layout::{
+    KEPT_SCANS, Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, TileFile, folder_name, tile_of_folder,
+};
 pub use map_folder::read_log;
 pub use map_path::MapPath;
 pub use place::check_outside_of_maps;
 pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;
 pub use recovery::staged_map::{StagedMap, staging_folder};
-pub use scans::ScanRecord;
-pub(crate) use scans::{check_scans, read_scans};
+pub use scans::{CatalogEntry, KeptFrame, KeptRecord, ScanRecord, SegmentPlace};
+pub(crate) use scans::{KeptRecords, SegmentScan, check_points, check_scans, read_scans};
 pub use snapshots::snapshot_file::Snapshot;
 pub use snapshots::snapshot_list::SnapshotList;
 pub use snapshots::snapshot_name::SnapshotName;

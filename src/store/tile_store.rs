@@ -9,7 +9,7 @@ use super::map_files::MapFiles;
 use super::map_folder;
 use super::place;
 use super::recovery::recover::{recover, remove_uncommitted};
-use super::scans::ScanList;
+use super::scans::{ScanKeeper, ScanList};
 use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
 use super::snapshots::snapshot_name::SnapshotName;
@@ -42,10 +42,12 @@ pub struct TileStore {
     pub(super) checkpoint: Checkpoint,
     /// Which scans are in the map.
     pub(super) scans: ScanList,
+    /// The scans that the map keeps.
+    pub(super) keeper: ScanKeeper,
     /// Replaced tables that readers and snapshots see; a writer's.
     pub(super) kept: KeptTables,
     /// How many files of an earlier writer opening has removed.
-    leftovers_removed: u64,
+    pub(super) leftovers_removed: u64,
     /// The snapshot that was opened in place of the map as it is.
     pub(super) opened_snapshot: Option<SnapshotName>,
     /// Held by a reader, so that a writer keeps what it sees.
@@ -128,6 +130,7 @@ impl TileStore {
         self.leftovers_removed = found.removed;
         let removed = &self.versions.commits().last_removed;
         self.checkpoint = Checkpoint::of_leftovers(found.unrenamed, found.renamed, removed);
+        self.remove_unneeded_scans();
         self.run_checkpoint()
     }
 
@@ -213,12 +216,15 @@ impl TileStore {
         commits: Commits,
     ) -> Self {
         let layout = layout.with_storage(metadata.storage());
+        let mut keeper = ScanKeeper::default();
+        keeper.set_on(metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans));
         Self {
             files: MapFiles::new(disk, layout),
             versions: TileVersions::new(commits),
             committer: Committer::new(log, metadata, None),
             checkpoint: Checkpoint::default(),
             scans: ScanList::default(),
+            keeper,
             kept: KeptTables::default(),
             leftovers_removed: 0,
             opened_snapshot: None,
@@ -307,7 +313,7 @@ impl TileStore {
 
     /// Bytes of memory that the next commit takes beside the index.
     pub fn commit_bytes(&self) -> usize {
-        self.versions.commit_bytes() + self.scans.bytes()
+        self.versions.commit_bytes() + self.scans.bytes() + self.keeper.bytes()
     }
 
     /// What is known of the latest version of a tile on disk without reading it.

@@ -3,10 +3,11 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{IoCounts, MapStatistics};
 use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
-use crate::scan::{PackedUpdates, TileUpdates};
+use crate::scan::{PackedUpdates, ScanPoints, TileUpdates};
 use crate::space::{TileIndex, TileTable};
 use crate::store::{
-    InputRecord, Metadata, ScanRecord, SnapshotName, SpillFile, TileStore, TileVersion, TileWriter,
+    CatalogEntry, InputRecord, Metadata, SegmentPlace, SnapshotName, SpillFile, TileStore, TileVersion,
+    TileWriter,
 };
 use crate::tile::{Table, Tile};
 use std::time::Instant;
@@ -275,9 +276,41 @@ impl TileDisk {
         upgrade(store, saver, config, |map_id| new_metadata(config, map_id, inputs))
     }
 
-    /// Records a scan of the next commit.
-    pub(super) fn note_scan(&mut self, scan: ScanRecord) {
-        self.store.note_scan(scan);
+    /// Writes the points of a scan that is to be kept.
+    ///
+    /// # Errors
+    ///
+    /// Points that cannot be read, a disk that refuses; nothing is kept then.
+    pub(super) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+        self.store.begin_kept_scan()?;
+        let mut written = Ok(());
+        let read = scan.for_each_own_chunk(0..scan.len(), &mut |points, intensities| {
+            written = self.store.push_kept_points(points, intensities);
+            written.is_ok()
+        });
+        let kept = read.and(written).and_then(|()| self.store.end_kept_scan(scan.has_intensities()));
+        if kept.is_err() {
+            self.store.give_up_kept_scan();
+        }
+        kept
+    }
+
+    /// Takes back a scan that was written and not noted.
+    pub(super) fn give_up_kept(&mut self) {
+        self.store.give_up_kept_scan();
+    }
+
+    /// Records a scan or a batch of the next commit.
+    pub(super) fn note(&mut self, entry: CatalogEntry) {
+        match entry {
+            CatalogEntry::Listed(scan) => self.store.note_scan(scan),
+            entry => self.store.note_entry(entry),
+        }
+    }
+
+    /// The store, to write a catalog.
+    pub(super) fn store_mut(&mut self) -> &mut TileStore {
+        &mut self.store
     }
 
     /// Commits all that was written.

@@ -5,10 +5,12 @@ use super::write_buffer::WriteBuffer;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{MapStatistics, MemoryCounts};
-use crate::scan::{PackedUpdates, ScanUpdates, TileUpdates};
+use crate::scan::{PackedUpdates, ScanPoints, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
-use crate::space::{Point, TileBox, TileIndex, VoxelIndex};
-use crate::store::{InputRecord, ScanRecord, SnapshotName, TileReader, TileStore};
+use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::store::{
+    CatalogEntry, InputRecord, KeptRecord, ScanRecord, SegmentPlace, SnapshotName, TileReader, TileStore,
+};
 use crate::tile::{Table, Tile};
 use rustc_hash::FxHashMap;
 use std::sync::{Arc, MutexGuard};
@@ -94,15 +96,19 @@ impl TilePager<'_> {
     }
 
     /// Accepts the updates, staged parts first: resident tiles take theirs at once, those of other tiles are buffered.
-    /// Cannot fail.
-    pub(in crate::mapper) fn accept(&mut self, updates: ScanUpdates) {
+    /// Cannot fail. Returns the tiles that were touched, in order.
+    pub(in crate::mapper) fn accept(&mut self, updates: ScanUpdates) -> Vec<TileIndex> {
         let touched =
             updates.tiles.iter().map(|(index, _)| *index).chain(self.contents.buffer.staged_tiles());
-        let touched: Vec<_> = touched.collect();
+        let mut touched: Vec<_> = touched.collect();
+        touched.sort_unstable();
+        touched.dedup();
         self.shared.wait_for_views(&mut self.contents);
         self.contents.keep_for_views(touched.iter().copied());
-        let bounds =
-            TileBox::of(touched.into_iter()).into_iter().chain(self.contents.bounds).reduce(TileBox::union);
+        let bounds = TileBox::of(touched.iter().copied())
+            .into_iter()
+            .chain(self.contents.bounds)
+            .reduce(TileBox::union);
         self.contents.bounds = bounds;
         self.contents.buffer.accept_staged();
         let mut resident = FxHashMap::default();
@@ -132,12 +138,48 @@ impl TilePager<'_> {
         }
         self.make_tiles(new);
         self.contents.scan_number += 1;
+        touched
     }
 
-    /// Notes where and when the last scan was taken.
-    pub(in crate::mapper) fn note_scan(&mut self, stamp_ns: Option<i64>, origin_m: Point) {
+    /// Whether the map keeps its scans.
+    pub(in crate::mapper) fn keeps_scans(&self) -> bool {
+        self.store().keeps_scans()
+    }
+
+    /// Writes the points of a scan that is to be kept. That it is kept is to be noted, or it is given up.
+    pub(in crate::mapper) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+        self.upgrade()?;
+        self.wait(|disk| disk.keep(scan))
+    }
+
+    /// Takes back a scan that was written and not noted.
+    pub(in crate::mapper) fn give_up_kept(&mut self) {
+        self.disk.give_up_kept();
+    }
+
+    /// Notes the last scan: where and when it was taken, or what is kept of it.
+    pub(in crate::mapper) fn note_scan(&mut self, scan: &dyn ScanPoints, kept: Option<KeptRecord>) {
         let number = self.contents.scan_number;
-        self.disk.note_scan(ScanRecord::new(number, stamp_ns, origin_m));
+        self.disk.note(match kept {
+            Some(kept) => CatalogEntry::Kept(Box::new(KeptRecord { number, ..kept })),
+            None => CatalogEntry::Listed(ScanRecord::new(number, scan.stamp_ns(), scan.origin())),
+        });
+    }
+
+    /// Notes that the last number is that of a batch.
+    pub(in crate::mapper) fn note_batch(&mut self) {
+        let number = self.contents.scan_number;
+        self.disk.note(CatalogEntry::Unlisted(number, number));
+    }
+
+    /// Goes on counting scans behind this number.
+    pub(in crate::mapper) fn set_scan_number(&mut self, number: u64) {
+        self.contents.scan_number = number;
+    }
+
+    /// The store, to write a catalog.
+    pub(in crate::mapper) fn store_mut(&mut self) -> &mut TileStore {
+        self.disk.store_mut()
     }
 
     /// Makes tiles of what was observed first in them.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use crate::store::layout::TileFile;
 use crate::store::map_files::MapFiles;
-use crate::store::scans::ScanRecord;
+use crate::store::scans::{CatalogEntry, ScanRecord};
 use crate::store::tile_store::TileStore;
 use crate::store::tiles::file_checksum::FileChecksum;
 use crate::store::tiles::tile_version::TileVersion;
@@ -61,9 +61,12 @@ impl TileStore {
         Ok(())
     }
 
-    /// Records a scan of the next commit.
+    /// Records a scan of the next commit whose points are not kept.
     pub fn note_scan(&mut self, scan: ScanRecord) {
-        self.scans.note_scan(scan);
+        match self.keeper.is_on() {
+            true => self.keeper.note(CatalogEntry::Listed(scan)),
+            false => self.scans.note_scan(scan),
+        }
     }
 
     /// Cuts the list of scans to what is whole and committed.
@@ -78,9 +81,18 @@ impl TileStore {
         self.write_metadata()
     }
 
-    /// Records that from the next commit on the map consists of the scans as of an earlier flush again.
-    pub fn note_rewind(&mut self, to_flush: u64) {
-        self.scans.note_rewind(to_flush);
+    /// Records that from the next commit on the map consists of the scans of an earlier one again, which is open as
+    /// `past`.
+    ///
+    /// # Errors
+    ///
+    /// A list of kept scans that is damaged, a disk that refuses.
+    pub fn note_rewind(&mut self, past: &Self) -> Result<()> {
+        self.rewind_kept(past)?;
+        if !past.keeps_scans() {
+            self.scans.note_rewind(past.commits().flush_number);
+        }
+        Ok(())
     }
 
     /// Forgets the next version of a tile, as if it had not been written.
@@ -115,12 +127,16 @@ impl TileStore {
         let number = self.commits().flush_number + 1;
         let mut metadata =
             self.committer.fill_in(metadata, &self.files, &self.versions, [number, scan_number]);
+        if let Some(ext) = &mut metadata.ext {
+            ext.keeps_scans = self.keeper.is_on();
+        }
         let is_new = self.committer.is_new(&metadata);
         let removed = self.versions.removed();
         let has_changed = !self.versions.next().is_empty() || !removed.is_empty();
-        if has_changed || is_new || scan_number != self.commits().scan_number {
+        if has_changed || is_new || self.keeper.has_news() || scan_number != self.commits().scan_number {
             sync_next(&self.files, &mut self.versions)?;
             let scans = self.scans.write(&self.files, number - 1)?;
+            let kept = self.write_kept()?;
             if let Some(ext) = &mut metadata.ext {
                 ext.scan_records = Some(scans.records);
             }
@@ -133,11 +149,13 @@ impl TileStore {
             if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
                 // At once if it goes: another process may come next, and would see a record that is not on the medium.
                 let _ = self.finish_earlier_work();
+                self.keeper.not_committed();
                 return Err(error);
             }
             // Committed.
             self.note_added(number);
             self.scans.commit(scans);
+            self.keeper.commit(kept);
             let changed = self.versions.committed(number, scan_number);
             log::info!(
                 "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",

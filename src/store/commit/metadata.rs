@@ -59,6 +59,9 @@ pub struct Extension {
     /// The coordinate reference system of the map's frame, if one was named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crs: Option<String>,
+    /// Whether the map keeps its scans.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub keeps_scans: bool,
     /// Number of records in `scans.bin` as of the last flush; `None` if that is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan_records: Option<u64>,
@@ -278,6 +281,7 @@ mod tests {
             decayed_scan: 0,
             storage: Storage::OctoMap,
             crs: None,
+            keeps_scans: false,
             scan_records: None,
             snapshots: None,
         };

@@ -9,9 +9,22 @@
 //! Records are synced before the commit that they belong to. One of a later flush than the last commit was left behind
 //! by a crash: readers pass over it, and the next writer cuts it off.
 
+mod catalog;
+mod catalog_entry;
+mod codec;
+mod kept_scan_store;
+mod scan_keeper;
 mod scan_list;
 mod scan_record;
+mod segment;
 
+pub(super) use catalog::CatalogReader;
+pub(crate) use catalog::KeptRecords;
+pub(super) use catalog::generation_of;
+pub use catalog_entry::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace};
+pub(crate) use scan_keeper::check_points;
+pub(super) use scan_keeper::{ScanKeeper, remove_unneeded};
 pub(super) use scan_list::ScanList;
 pub(crate) use scan_list::{check_scans, read_scans};
 pub use scan_record::ScanRecord;
+pub(crate) use segment::SegmentScan;

@@ -252,6 +252,7 @@ impl TileStore {
             SeenTables::read_all(&**self.disk(), self.layout(), map_id, self.commits(), listed, pinned)?;
         self.kept.set_snapshots(snapshots);
         self.kept.release(&self.files);
+        self.remove_unneeded_scans();
         for tile in tiles.into_iter().filter(|tile| !self.commits().tiles.contains(*tile)) {
             // Of a removed tile: it goes if that was all that was in it.
             let _ = self.disk().remove_folder(&self.layout().tile_folder(tile));

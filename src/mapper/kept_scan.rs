@@ -1,0 +1,157 @@
+use crate::config::RayConfig;
+use crate::error::Result;
+use crate::scan::{Pose, ScanPoints, TakePoints};
+use crate::space::Point;
+use crate::store::{Disk, KeptFrame, KeptRecord, Layout, SegmentScan};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A scan that a map keeps: what it was inserted as, to the bit.
+///
+/// As [`ScanPoints`] its points are in the world frame, by the pose that it has now.
+#[derive(Clone, Debug)]
+pub struct KeptScan {
+    record: KeptRecord,
+    world_from_sensor: Option<Pose>,
+    points: Points,
+}
+
+/// Where the points are.
+#[derive(Clone, Debug)]
+enum Points {
+    InMemory(Vec<Point>, Vec<f32>),
+    /// Read again each time.
+    OnDisk(Arc<dyn Disk>, Layout),
+}
+
+impl KeptScan {
+    /// Opens a scan; if it has at most so many points, they are read into memory.
+    ///
+    /// # Errors
+    ///
+    /// Damage, or a disk that refuses.
+    pub(crate) fn open(
+        disk: &Arc<dyn Disk>,
+        layout: &Layout,
+        record: KeptRecord,
+        most_points: u64,
+    ) -> Result<Self> {
+        let world_from_sensor = match record.frame {
+            KeptFrame::Sensor(pose) => Some(pose_of_numbers(&pose)),
+            KeptFrame::World(_) => None,
+        };
+        let points = Points::OnDisk(disk.clone(), layout.clone());
+        let mut scan = Self { record, world_from_sensor, points };
+        if scan.record.points <= most_points {
+            let (mut points, mut intensities) = (Vec::new(), Vec::new());
+            scan.for_each_own_chunk(0..scan.len(), &mut |some, of_some| {
+                points.extend_from_slice(some);
+                intensities.extend_from_slice(of_some.unwrap_or_default());
+                true
+            })?;
+            scan.points = Points::InMemory(points, intensities);
+        }
+        Ok(scan)
+    }
+
+    /// Its number in the map, from 1.
+    pub fn number(&self) -> u64 {
+        self.record.number
+    }
+
+    /// Which part of its rays counted.
+    pub fn rays(&self) -> &RayConfig {
+        &self.record.rays
+    }
+
+    /// What the map knows of it without its points.
+    pub fn record(&self) -> &KeptRecord {
+        &self.record
+    }
+
+    /// The same scan, taken with another pose.
+    #[must_use]
+    pub fn with_pose(mut self, world_from_sensor: Pose) -> Self {
+        self.world_from_sensor = Some(world_from_sensor);
+        self.record.frame = KeptFrame::Sensor(pose_numbers(&world_from_sensor));
+        self
+    }
+}
+
+impl ScanPoints for KeptScan {
+    fn origin(&self) -> Point {
+        self.record.origin_m()
+    }
+
+    fn stamp_ns(&self) -> Option<i64> {
+        self.record.stamp_ns
+    }
+
+    fn len(&self) -> usize {
+        usize::try_from(self.record.points).unwrap_or(usize::MAX)
+    }
+
+    fn has_intensities(&self) -> bool {
+        self.record.has_intensities
+    }
+
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        let Some(pose) = self.world_from_sensor else { return self.for_each_own_chunk(range, take) };
+        let (to_world, mut in_world) = (pose.to_world(), Vec::new());
+        self.for_each_own_chunk(range, &mut |points, intensities| {
+            in_world.clear();
+            in_world.extend(points.iter().copied().map(to_world));
+            take(&in_world, intensities)
+        })
+    }
+
+    fn world_from_sensor(&self) -> Option<Pose> {
+        self.world_from_sensor
+    }
+
+    fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        let has_intensities = self.record.has_intensities;
+        let (disk, layout) = match &self.points {
+            Points::OnDisk(disk, layout) => (disk, layout),
+            Points::InMemory(points, intensities) => {
+                let of = |range: Range<usize>| {
+                    let intensities = intensities.get(range.clone()).filter(|_| has_intensities);
+                    points.get(range).map(|points| (points, intensities))
+                };
+                if let Some((points, intensities)) = of(range) {
+                    take(points, intensities);
+                }
+                return Ok(());
+            }
+        };
+        let mut input = SegmentScan::open(&**disk, layout, self.record.place)?;
+        let (mut points, mut intensities, mut first) = (Vec::new(), Vec::new(), 0);
+        while first < range.end && input.next(&mut points, &mut intensities)? {
+            input.check_intensities(points.len(), intensities.len(), has_intensities)?;
+            let end = first + points.len();
+            let wanted = range.start.max(first)..range.end.min(end);
+            if wanted.start < wanted.end {
+                let some = wanted.start - first..wanted.end - first;
+                let of_some = has_intensities.then(|| &intensities[some.clone()]);
+                if !take(&points[some], of_some) {
+                    return Ok(());
+                }
+            }
+            first = end;
+        }
+        if range.end == self.len() { input.check_count(first as u64, &self.record) } else { Ok(()) }
+    }
+}
+
+/// A pose as a catalog has it: position in metres, quaternion x, y, z, w.
+pub(crate) fn pose_numbers(pose: &Pose) -> [f64; 7] {
+    let ([x, y, z], [qx, qy, qz, qw]) = (pose.position_m(), pose.quaternion());
+    [x, y, z, qx, qy, qz, qw]
+}
+
+/// The pose of such numbers, to the bit.
+pub(crate) fn pose_of_numbers(&[x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> Pose {
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(qw, qx, qy, qz));
+    Pose::from(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+}

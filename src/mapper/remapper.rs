@@ -1,0 +1,63 @@
+use super::OutOfCoreTileMapper;
+use super::kept_scan::KeptScan;
+use crate::config::MapConfig;
+use crate::error::Result;
+use crate::scan::{ScanReport, Stop};
+use crate::space::{TileIndex, TileSelection};
+use crate::store::{CatalogEntry, SegmentPlace, TileStore};
+
+/// Maps some tiles of a map again, from scans that it keeps, and writes the catalog of these scans anew: one commit,
+/// until which the map is as it was.
+#[derive(Debug)]
+pub(crate) struct Remapper {
+    mapper: OutOfCoreTileMapper,
+    /// Of the map, before and after.
+    scan_number: u64,
+}
+
+impl Remapper {
+    /// Begins with `tiles` as if nothing had been observed in them.
+    pub(crate) fn begin(
+        mut store: TileStore,
+        config: MapConfig,
+        tiles: impl IntoIterator<Item = TileIndex>,
+        stop: Stop,
+    ) -> Result<Self> {
+        let scan_number = store.commits().scan_number;
+        store.begin_catalog()?;
+        let mut mapper = OutOfCoreTileMapper::without_tiles(store, config, tiles)?;
+        mapper.stop_with(stop);
+        Ok(Self { mapper, scan_number })
+    }
+
+    /// Maps what a scan says about a selection of tiles, or about all; returns the tiles that it touched, too.
+    pub(crate) fn map(
+        &mut self,
+        scan: &KeptScan,
+        selection: Option<&TileSelection>,
+    ) -> Result<(ScanReport, Vec<TileIndex>)> {
+        self.mapper.map_again(scan.number(), scan, scan.rays(), selection)
+    }
+
+    /// Adds an entry to the new catalog; every scan of the map has its own.
+    pub(crate) fn put(&mut self, entry: &CatalogEntry) -> Result<()> {
+        self.mapper.with_store(|store| store.put_entry(entry))
+    }
+
+    /// Copies the points of a scan to where nothing lies that is to go.
+    pub(crate) fn copy_points(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
+        self.mapper.with_store(|store| store.copy_kept_points(place))
+    }
+
+    /// Writes points in place of those that a scan has.
+    pub(crate) fn write_points(&mut self, scan: &dyn crate::scan::ScanPoints) -> Result<SegmentPlace> {
+        self.mapper.pager_keep(scan)
+    }
+
+    /// Commits; then removes what nothing needs any more.
+    pub(crate) fn finish(mut self) -> Result<()> {
+        self.mapper.commit_again(self.scan_number)?;
+        self.mapper.with_store(TileStore::release_scans);
+        Ok(())
+    }
+}

@@ -1,0 +1,323 @@
+use super::scan_record::ScanRecord;
+use crate::config::RayConfig;
+use crate::space::{Point, TileIndex, put_number, take_number};
+
+/// Where the points of a kept scan lie: bytes of a segment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SegmentPlace {
+    /// Number of the segment.
+    pub segment: u64,
+    /// Where the scan begins in it.
+    pub offset: u64,
+    /// Bytes of the scan.
+    pub bytes: u64,
+}
+
+/// The frame that the points of a kept scan are in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum KeptFrame {
+    /// The sensor's, whose pose was: position in metres, and quaternion x, y, z, w.
+    Sensor([f64; 7]),
+    /// The world's; the sensor was at this position in metres.
+    World(Point),
+}
+
+/// What a map knows of a scan that it keeps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeptRecord {
+    /// Its number in the map, from 1.
+    pub number: u64,
+    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    pub stamp_ns: Option<i64>,
+    /// The frame of its points.
+    pub frame: KeptFrame,
+    /// Which part of its rays counted.
+    pub rays: RayConfig,
+    /// Number of points.
+    pub points: u64,
+    /// Whether each has an intensity.
+    pub has_intensities: bool,
+    /// Voxels that it updated when it was mapped, each as often as it was.
+    pub updates: u64,
+    /// Where its points are.
+    pub place: SegmentPlace,
+    /// The tiles that it touched, in order.
+    pub tiles: Vec<TileIndex>,
+}
+
+/// What a record of the catalog says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CatalogEntry {
+    /// A scan whose points are kept.
+    Kept(Box<KeptRecord>),
+    /// A scan whose points are not.
+    Listed(ScanRecord),
+    /// Numbers, first and last, of batches, and of scans of which nothing is known.
+    Unlisted(u64, u64),
+    /// Numbers, first and last, of scans that were removed.
+    Removed(u64, u64),
+    /// A change of the map that was no scan, such as `clear`.
+    Operation(String),
+}
+
+const KEPT: u8 = 1;
+const LISTED: u8 = 2;
+const UNLISTED: u8 = 3;
+const REMOVED: u8 = 4;
+const OPERATION: u8 = 5;
+
+const IS_IN_WORLD: u8 = 1;
+const HAS_INTENSITIES: u8 = 2;
+const HAS_STAMP: u8 = 4;
+
+impl KeptRecord {
+    /// Where the sensor was, in metres in the world frame.
+    pub fn origin_m(&self) -> Point {
+        match self.frame {
+            KeptFrame::Sensor([x, y, z, ..]) | KeptFrame::World([x, y, z]) => [x, y, z],
+        }
+    }
+}
+
+impl CatalogEntry {
+    /// The first and the last number that it is about; `None` for none.
+    pub fn numbers(&self) -> Option<(u64, u64)> {
+        match self {
+            Self::Kept(scan) => Some((scan.number, scan.number)),
+            Self::Listed(scan) => Some((scan.number, scan.number)),
+            Self::Unlisted(first, last) | Self::Removed(first, last) => Some((*first, *last)),
+            Self::Operation(_) => None,
+        }
+    }
+
+    /// Bytes of memory on the heap, about.
+    pub(super) fn heap_bytes(&self) -> usize {
+        match self {
+            Self::Kept(scan) => size_of::<KeptRecord>() + scan.tiles.capacity() * size_of::<TileIndex>(),
+            Self::Operation(what) => what.capacity(),
+            _ => 0,
+        }
+    }
+
+    /// Appends the payload of the record, as of a flush.
+    pub(super) fn write(&self, flush_number: u64, out: &mut Vec<u8>) {
+        out.extend(flush_number.to_le_bytes());
+        match self {
+            Self::Kept(scan) => write_kept(scan, out),
+            Self::Listed(scan) => {
+                out.push(LISTED);
+                out.extend(scan.number.to_le_bytes());
+                write_stamp(scan.stamp_ns, out);
+                scan.origin_m.iter().for_each(|x| out.extend(x.to_le_bytes()));
+            }
+            Self::Unlisted(first, last) | Self::Removed(first, last) => {
+                out.push(if matches!(self, Self::Removed(..)) { REMOVED } else { UNLISTED });
+                [first, last].iter().for_each(|number| out.extend(number.to_le_bytes()));
+            }
+            Self::Operation(what) => {
+                out.push(OPERATION);
+                out.extend(what.as_bytes());
+            }
+        }
+    }
+
+    /// Reads the payload of a record: its flush and the entry; `None` where it is none.
+    pub(super) fn read(payload: &[u8]) -> Option<(u64, Self)> {
+        let mut input = Input(payload);
+        let flush_number = input.number()?;
+        let entry = match input.byte()? {
+            KEPT => Self::Kept(Box::new(read_kept(&mut input)?)),
+            LISTED => {
+                let (number, stamp_ns) = (input.number()?, input.stamp()?);
+                Self::Listed(ScanRecord::new(number, stamp_ns, input.doubles()?))
+            }
+            UNLISTED => Self::Unlisted(input.number()?, input.number()?),
+            REMOVED => Self::Removed(input.number()?, input.number()?),
+            OPERATION => Self::Operation(String::from_utf8(std::mem::take(&mut input.0).to_vec()).ok()?),
+            _ => return None,
+        };
+        input.0.is_empty().then_some((flush_number, entry))
+    }
+}
+
+fn write_kept(scan: &KeptRecord, out: &mut Vec<u8>) {
+    let is_in_world = matches!(scan.frame, KeptFrame::World(_));
+    out.push(KEPT);
+    out.extend(scan.number.to_le_bytes());
+    write_stamp(scan.stamp_ns, out);
+    let flags = [(is_in_world, IS_IN_WORLD), (scan.has_intensities, HAS_INTENSITIES)];
+    out.push(flags.iter().map(|(is_set, flag)| if *is_set { *flag } else { 0 }).sum());
+    match &scan.frame {
+        KeptFrame::Sensor(pose) => pose.iter().for_each(|x| out.extend(x.to_le_bytes())),
+        KeptFrame::World(origin) => origin.iter().for_each(|x| out.extend(x.to_le_bytes())),
+    }
+    let SegmentPlace { segment, offset, bytes } = scan.place;
+    [scan.points, scan.updates, segment, offset, bytes].iter().for_each(|n| out.extend(n.to_le_bytes()));
+    let rays = serde_json::to_string(&scan.rays).unwrap_or_default();
+    put_number(rays.len() as u64, out);
+    out.extend(rays.as_bytes());
+    put_number(scan.tiles.len() as u64, out);
+    let mut before = [0_i32; 3];
+    for tile in &scan.tiles {
+        let tile = tile.to_array();
+        for axis in 0..3 {
+            put_number(i64::from(tile[axis]) - i64::from(before[axis]), out);
+        }
+        before = tile;
+    }
+}
+
+fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
+    let (number, stamp_ns, flags) = (input.number()?, input.stamp()?, input.byte()?);
+    let frame = match flags & IS_IN_WORLD {
+        0 => KeptFrame::Sensor(input.doubles()?),
+        _ => KeptFrame::World(input.doubles()?),
+    };
+    let [points, updates, segment, offset, bytes] = input.numbers()?;
+    let rays_bytes = input.packed_u64()?;
+    let rays = serde_json::from_slice(input.take(usize::try_from(rays_bytes).ok()?)?).ok()?;
+    let count = input.packed_u64()?;
+    // A tile takes three bytes at least.
+    let count = usize::try_from(count).ok().filter(|&count| count <= input.0.len() / 3)?;
+    let mut tiles = Vec::with_capacity(count);
+    let mut before = [0_i64; 3];
+    for _ in 0..count {
+        for index in &mut before {
+            *index = index.checked_add(input.packed_i64()?)?;
+        }
+        let [x, y, z] = before;
+        tiles.push(TileIndex::new(x.try_into().ok()?, y.try_into().ok()?, z.try_into().ok()?));
+    }
+    Some(KeptRecord {
+        number,
+        stamp_ns,
+        frame,
+        rays,
+        points,
+        has_intensities: flags & HAS_INTENSITIES != 0,
+        updates,
+        place: SegmentPlace { segment, offset, bytes },
+        tiles,
+    })
+}
+
+fn write_stamp(stamp_ns: Option<i64>, out: &mut Vec<u8>) {
+    out.push(if stamp_ns.is_some() { HAS_STAMP } else { 0 });
+    out.extend(stamp_ns.unwrap_or_default().to_le_bytes());
+}
+
+/// What is left of a payload.
+struct Input<'a>(&'a [u8]);
+
+impl Input<'_> {
+    fn take(&mut self, bytes: usize) -> Option<&[u8]> {
+        let (taken, rest) = self.0.split_at_checked(bytes)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn byte(&mut self) -> Option<u8> {
+        self.take(1)?.first().copied()
+    }
+
+    fn number(&mut self) -> Option<u64> {
+        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?))
+    }
+
+    fn numbers<const N: usize>(&mut self) -> Option<[u64; N]> {
+        let mut numbers = [0; N];
+        for number in &mut numbers {
+            *number = self.number()?;
+        }
+        Some(numbers)
+    }
+
+    fn doubles<const N: usize>(&mut self) -> Option<[f64; N]> {
+        self.numbers().map(|numbers| numbers.map(f64::from_bits))
+    }
+
+    fn stamp(&mut self) -> Option<Option<i64>> {
+        let flag = self.byte()?;
+        let stamp_ns = self.number()? as i64;
+        Some((flag == HAS_STAMP).then_some(stamp_ns))
+    }
+
+    fn packed_u64(&mut self) -> Option<u64> {
+        self.packed()
+    }
+
+    fn packed_i64(&mut self) -> Option<i64> {
+        self.packed()
+    }
+
+    fn packed<T: integer_encoding::VarInt>(&mut self) -> Option<T> {
+        let (value, bytes) = T::decode_var(self.0)?;
+        self.take(bytes)?;
+        Some(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries() -> Vec<CatalogEntry> {
+        let rays = RayConfig { max_range_m: Some(60.5), ..RayConfig::default() };
+        let scan = KeptRecord {
+            number: 7,
+            stamp_ns: Some(-3),
+            frame: KeptFrame::Sensor([1.0, -0.0, 3.5e-300, 0.1, 0.2, 0.3, 0.9]),
+            rays,
+            points: 12,
+            has_intensities: true,
+            updates: 99,
+            place: SegmentPlace { segment: 3, offset: 1 << 40, bytes: 77 },
+            tiles: vec![TileIndex::new(-5, i32::MAX, 0), TileIndex::new(i32::MAX, i32::MIN, 2)],
+        };
+        let in_world = KeptRecord {
+            frame: KeptFrame::World([0.5; 3]),
+            has_intensities: false,
+            stamp_ns: None,
+            tiles: vec![],
+            ..scan.clone()
+        };
+        vec![
+            CatalogEntry::Kept(Box::new(scan)),
+            CatalogEntry::Kept(Box::new(in_world)),
+            CatalogEntry::Listed(ScanRecord::new(8, None, [1.0, 2.0, 3.0])),
+            CatalogEntry::Unlisted(1, 6),
+            CatalogEntry::Removed(9, 9),
+            CatalogEntry::Operation("clear".to_owned()),
+        ]
+    }
+
+    #[test]
+    fn entries_come_back_as_they_were_written() {
+        for entry in entries() {
+            let mut payload = Vec::new();
+            entry.write(5, &mut payload);
+            assert_eq!(CatalogEntry::read(&payload), Some((5, entry.clone())));
+            payload.push(0);
+            let longer = CatalogEntry::read(&payload);
+            assert!(longer.is_none() || matches!(entry, CatalogEntry::Operation(_)), "{longer:?}");
+        }
+    }
+
+    #[test]
+    fn bytes_cut_or_changed_anywhere_are_entries_or_none() {
+        for entry in entries() {
+            let mut payload = Vec::new();
+            entry.write(5, &mut payload);
+            for length in 0..payload.len() {
+                let _ = CatalogEntry::read(&payload[..length]);
+            }
+            for at in 0..payload.len() {
+                for by in [1, 0x7f, 0x80, 0xff] {
+                    let mut changed = payload.clone();
+                    changed[at] ^= by;
+                    let _ = CatalogEntry::read(&changed);
+                }
+            }
+        }
+    }
+}

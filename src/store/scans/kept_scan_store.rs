@@ -1,0 +1,173 @@
+//! The scans that a map keeps, as part of a [`TileStore`].
+
+use super::catalog::KeptRecords;
+use super::catalog_entry::{CatalogEntry, SegmentPlace};
+use super::scan_keeper::{Catalog, remove_unneeded};
+use super::scan_list::read_scans;
+use crate::error::Result;
+use crate::space::Point;
+use crate::store::map_files::MapFiles;
+use crate::store::tile_store::TileStore;
+
+impl TileStore {
+    /// Whether the map keeps its scans.
+    pub fn keeps_scans(&self) -> bool {
+        self.keeper.is_on()
+    }
+
+    /// From the next commit on the map keeps the scans that it takes.
+    pub fn keep_scans(&mut self) {
+        self.keeper.begin();
+    }
+
+    /// Begins to write the points of a scan, in place of one that was begun before and not noted.
+    ///
+    /// # Errors
+    ///
+    /// A catalog that is damaged, a disk that refuses.
+    pub fn begin_kept_scan(&mut self) -> Result<()> {
+        self.keeper.begin_scan(&self.files, self.versions.commits().flush_number)
+    }
+
+    /// Adds points to it; all with intensities or all without.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn push_kept_points(&mut self, points: &[Point], intensities: Option<&[f32]>) -> Result<()> {
+        self.keeper.push_points(points, intensities)
+    }
+
+    /// Ends the scan. It is kept if it is noted and committed.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn end_kept_scan(&mut self, has_intensities: bool) -> Result<SegmentPlace> {
+        self.keeper.end_scan(has_intensities)
+    }
+
+    /// Takes back the scan that was written last and was not noted.
+    pub fn give_up_kept_scan(&mut self) {
+        self.keeper.give_up_scan(&**self.files.disk());
+    }
+
+    /// Copies the points of a kept scan to a segment of its own that the map has no other name for.
+    ///
+    /// # Errors
+    ///
+    /// Damage, a disk that refuses.
+    pub fn copy_kept_points(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
+        self.keeper.copy(&self.files, self.versions.commits().flush_number, place)
+    }
+
+    /// Records an entry of the next commit, if the map keeps its scans.
+    pub fn note_entry(&mut self, entry: CatalogEntry) {
+        if self.keeper.is_on() {
+            self.keeper.note(entry);
+        }
+    }
+
+    /// Begins a catalog that takes the place of the committed one with the next commit.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn begin_catalog(&mut self) -> Result<()> {
+        self.keeper.begin_replacement(&self.files, self.versions.commits().flush_number)
+    }
+
+    /// Adds an entry to that catalog; the number of each scan follows that of the one before.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn put_entry(&mut self, entry: &CatalogEntry) -> Result<()> {
+        self.keeper.put(&self.files, entry)
+    }
+
+    /// The scans that the map keeps as of the last commit, in order.
+    ///
+    /// # Errors
+    ///
+    /// Damage, a disk that refuses.
+    pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
+        let commits = self.commits();
+        KeptRecords::open(&**self.disk(), self.layout(), commits.flush_number, commits.scan_number)
+    }
+
+    /// Writes what belongs to the next commit, synced.
+    pub(in crate::store) fn write_kept(&mut self) -> Result<Option<Catalog>> {
+        let commits = self.versions.commits();
+        let (flush_number, scan_number, has_tiles) =
+            (commits.flush_number, commits.scan_number, !commits.tiles.is_empty());
+        let files = &self.files;
+        let before = || entries_before(files, flush_number, scan_number, has_tiles);
+        self.keeper.write(files, flush_number, before)
+    }
+
+    /// Removes catalogs and segments that neither the map nor a snapshot needs.
+    pub(in crate::store) fn remove_unneeded_scans(&mut self) {
+        if !self.keeper.is_on() {
+            return;
+        }
+        let snapshots = self.committer.snapshots();
+        let flushes =
+            snapshots.into_iter().flat_map(|listed| listed.names().map(|name| listed.flush_of(name)));
+        // A snapshot of which nobody knows the flush may need any.
+        let Some(mut flushes) = flushes.collect::<Option<Vec<u64>>>() else { return };
+        flushes.push(self.versions.commits().flush_number);
+        let is_new = |segment| self.keeper.is_writing(segment);
+        match remove_unneeded(&**self.files.disk(), self.files.layout(), &flushes, is_new) {
+            Ok(removed) => self.leftovers_removed += removed,
+            Err(error) => log::warn!("kept scans that nothing needs stay: {error:#}"),
+        }
+    }
+
+    /// Removes what neither the map nor a snapshot needs of kept scans.
+    pub fn release_scans(&mut self) {
+        self.remove_unneeded_scans();
+    }
+
+    /// Makes the kept scans those of an earlier commit again, which is open as `past`.
+    pub(in crate::store) fn rewind_kept(&mut self, past: &Self) -> Result<()> {
+        self.keeper.set_on(past.keeps_scans());
+        if !past.keeps_scans() {
+            return Ok(());
+        }
+        self.begin_catalog()?;
+        let mut records = past.kept_records()?;
+        while let Some(entry) = records.next_entry()? {
+            self.put_entry(&entry)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a map had before its scans were kept: its list of scans, and what is not in it.
+fn entries_before(
+    files: &MapFiles,
+    flush_number: u64,
+    scan_number: u64,
+    has_tiles: bool,
+) -> Result<Vec<CatalogEntry>> {
+    let mut entries = Vec::new();
+    let mut last = 0;
+    for scan in read_scans(&**files.disk(), files.layout(), flush_number, None)? {
+        if scan.number <= last || scan.number > scan_number {
+            continue;
+        }
+        if scan.number > last + 1 {
+            entries.push(CatalogEntry::Unlisted(last + 1, scan.number - 1));
+        }
+        last = scan.number;
+        entries.push(CatalogEntry::Listed(scan));
+    }
+    if last < scan_number {
+        entries.push(CatalogEntry::Unlisted(last + 1, scan_number));
+    }
+    if scan_number == 0 && has_tiles {
+        entries.push(CatalogEntry::Operation("what it had before its scans were kept".to_owned()));
+    }
+    Ok(entries)
+}

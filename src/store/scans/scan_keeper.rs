@@ -1,0 +1,439 @@
+use super::catalog::{CatalogReader, CatalogWriter, generation_of};
+use super::catalog_entry::{CatalogEntry, KeptRecord, SegmentPlace};
+use super::segment::{SegmentScan, SegmentWriter};
+use crate::error::{Error, Result};
+use crate::space::Point;
+use crate::store::disk::Disk;
+use crate::store::layout::Layout;
+use crate::store::map_files::MapFiles;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::io;
+use std::sync::{Mutex, PoisonError};
+
+/// What a writer knows of the scans that its map keeps.
+#[derive(Debug, Default)]
+pub(in crate::store) struct ScanKeeper {
+    /// Whether the map keeps its scans.
+    is_on: bool,
+    /// The catalog as of the last commit, nothing before the first; `None` before it was looked for.
+    committed: Option<Option<Catalog>>,
+    /// Entries of the next commit, behind the committed ones or, if there is one, the replacement.
+    pending: Vec<CatalogEntry>,
+    /// The catalog that takes the place of the committed one.
+    replacement: Option<Replacement>,
+    segment: Option<SegmentWriter>,
+    /// Where the scan begins that is being written.
+    scan_offset: u64,
+    /// Segments with scans that are not durable.
+    unsynced: BTreeSet<u64>,
+    /// What the disk says of these proves nothing any more: it failed to sync them.
+    suspects: BTreeSet<u64>,
+    has_new_names: bool,
+    /// A catalog that was begun for a commit, which may not have come.
+    begun: Option<u64>,
+}
+
+/// A catalog's file, up to where it counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::store) struct Catalog {
+    generation: u64,
+    bytes: u64,
+    /// Whether the file may go on behind that.
+    has_excess: bool,
+}
+
+enum Replacement {
+    Open {
+        generation: u64,
+        out: Mutex<CatalogWriter>,
+    },
+    /// Synced, and not committed yet.
+    Whole(Catalog),
+}
+
+impl fmt::Debug for Replacement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Open { .. } => "Open",
+            Self::Whole(_) => "Whole",
+        })
+    }
+}
+
+impl fmt::Debug for SegmentWriter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SegmentWriter").field("segment", &self.segment).finish_non_exhaustive()
+    }
+}
+
+impl ScanKeeper {
+    /// Whether the map keeps its scans.
+    pub(in crate::store) fn is_on(&self) -> bool {
+        self.is_on
+    }
+
+    /// Of a map that is opened, or is another state's again.
+    pub(in crate::store) fn set_on(&mut self, is_on: bool) {
+        self.is_on = is_on;
+    }
+
+    /// Begins to keep scans.
+    pub(in crate::store) fn begin(&mut self) {
+        if !self.is_on {
+            self.is_on = true;
+            // Catalogs that are there belong to snapshots.
+            self.committed = Some(None);
+        }
+    }
+
+    /// Whether a segment may have scans that no commit names yet.
+    pub(in crate::store) fn is_writing(&self, segment: u64) -> bool {
+        self.unsynced.contains(&segment) || self.segment.as_ref().is_some_and(|open| open.segment == segment)
+    }
+
+    /// Whether there is something for the next commit.
+    pub(in crate::store) fn has_news(&self) -> bool {
+        !self.pending.is_empty() || self.replacement.is_some()
+    }
+
+    /// Bytes of memory.
+    pub(in crate::store) fn bytes(&self) -> usize {
+        let heap: usize = self.pending.iter().map(CatalogEntry::heap_bytes).sum();
+        self.pending.capacity() * size_of::<CatalogEntry>() + heap
+    }
+
+    // Points.
+
+    /// Begins a scan.
+    pub(in crate::store) fn begin_scan(&mut self, files: &MapFiles, committed_flush: u64) -> Result<()> {
+        // A catalog that is damaged is told before anything is written.
+        self.find_committed(files, committed_flush)?;
+        let (disk, layout) = (&**files.disk(), files.layout());
+        if self.segment.as_ref().is_none_or(SegmentWriter::is_full) {
+            self.make_folder(files)?;
+            let segment = segments_in(disk, layout)?.last().map_or(1, |last| last + 1);
+            self.segment = Some(SegmentWriter::create(disk, layout, segment)?);
+            self.has_new_names = true;
+        }
+        self.scan_offset = self.segment.as_ref().map_or(0, SegmentWriter::bytes);
+        Ok(())
+    }
+
+    /// Adds points to the scan.
+    pub(in crate::store) fn push_points(
+        &mut self,
+        points: &[Point],
+        intensities: Option<&[f32]>,
+    ) -> Result<()> {
+        self.segment.as_mut().map_or(Ok(()), |segment| segment.push(points, intensities))
+    }
+
+    /// Ends the scan. It is nothing until it is noted.
+    pub(in crate::store) fn end_scan(&mut self, has_intensities: bool) -> Result<SegmentPlace> {
+        let Some(segment) = &mut self.segment else { return Ok(SegmentPlace::default()) };
+        self.unsynced.insert(segment.segment);
+        segment.end(self.scan_offset, has_intensities)
+    }
+
+    /// Takes back the scan that was written last.
+    pub(in crate::store) fn give_up_scan(&mut self, disk: &dyn Disk) {
+        if let Some(segment) = &mut self.segment
+            && segment.cut(disk, self.scan_offset).is_err()
+        {
+            // What lies in it and is noted stays; the next scan goes to another.
+            self.segment = None;
+        }
+    }
+
+    /// Copies the points of a scan to the segment that is being written.
+    pub(in crate::store) fn copy(
+        &mut self,
+        files: &MapFiles,
+        committed_flush: u64,
+        place: SegmentPlace,
+    ) -> Result<SegmentPlace> {
+        let mut scan = SegmentScan::open(&**files.disk(), files.layout(), place)?;
+        self.begin_scan(files, committed_flush)?;
+        let Some(segment) = &mut self.segment else { return Ok(place) };
+        self.unsynced.insert(segment.segment);
+        segment.copy(&mut scan)
+    }
+
+    // Entries.
+
+    /// Records an entry of the next commit.
+    pub(in crate::store) fn note(&mut self, entry: CatalogEntry) {
+        if let (Some(CatalogEntry::Unlisted(_, last)), CatalogEntry::Unlisted(first, new_last)) =
+            (self.pending.last_mut(), &entry)
+            && *last + 1 == *first
+        {
+            *last = *new_last;
+            return;
+        }
+        self.pending.push(entry);
+    }
+
+    /// Begins a catalog that takes the place of the committed one with the next commit.
+    pub(in crate::store) fn begin_replacement(
+        &mut self,
+        files: &MapFiles,
+        committed_flush: u64,
+    ) -> Result<()> {
+        self.make_folder(files)?;
+        let generation = committed_flush + 1;
+        let out = CatalogWriter::create(&**files.disk(), files.layout(), generation)
+            .map_err(|error| Error::io(&files.layout().catalog(generation), "create", error))?;
+        self.has_new_names = true;
+        self.replacement = Some(Replacement::Open { generation, out: Mutex::new(out) });
+        Ok(())
+    }
+
+    /// Adds an entry to the catalog that takes the place of the committed one.
+    pub(in crate::store) fn put(&mut self, files: &MapFiles, entry: &CatalogEntry) -> Result<()> {
+        let Some(Replacement::Open { generation, out }) = &mut self.replacement else { return Ok(()) };
+        let out = out.get_mut().unwrap_or_else(PoisonError::into_inner);
+        out.put(entry, *generation)
+            .map_err(|error| Error::io(&files.layout().catalog(*generation), "write", error))
+    }
+
+    // Commits.
+
+    /// Writes what belongs to a commit, synced; `committed_flush` is the flush before it. `before` are the entries of
+    /// what the map had before its scans were kept, for the first catalog. Returns what [`ScanKeeper::commit`] is to be
+    /// told.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses: the next call writes it again.
+    pub(in crate::store) fn write(
+        &mut self,
+        files: &MapFiles,
+        committed_flush: u64,
+        before: impl FnOnce() -> Result<Vec<CatalogEntry>>,
+    ) -> Result<Option<Catalog>> {
+        if !self.is_on {
+            return Ok(None);
+        }
+        let committed = self.find_committed(files, committed_flush)?;
+        self.move_suspects(files, committed_flush)?;
+        self.sync_segments(files)?;
+        let written = self.write_catalog(files, committed_flush, committed, before)?;
+        if self.has_new_names {
+            files.sync_folder(&files.layout().kept_scans())?;
+            self.has_new_names = false;
+        }
+        Ok(written)
+    }
+
+    fn write_catalog(
+        &mut self,
+        files: &MapFiles,
+        committed_flush: u64,
+        committed: Option<Catalog>,
+        before: impl FnOnce() -> Result<Vec<CatalogEntry>>,
+    ) -> Result<Option<Catalog>> {
+        let (disk, layout, flush_number) = (&**files.disk(), files.layout(), committed_flush + 1);
+        let in_place = match self.replacement.take() {
+            Some(Replacement::Open { generation, out }) => {
+                let out = out.into_inner().unwrap_or_else(PoisonError::into_inner);
+                let bytes = out.finish();
+                let bytes = bytes.map_err(|error| Error::io(&layout.catalog(generation), "write", error))?;
+                let whole = Catalog { generation, bytes, has_excess: false };
+                self.replacement = Some(Replacement::Whole(whole));
+                Some(whole)
+            }
+            Some(Replacement::Whole(whole)) => {
+                // Of a commit that failed behind it, perhaps with more entries.
+                self.replacement = Some(Replacement::Whole(whole));
+                Some(Catalog { has_excess: true, ..whole })
+            }
+            None => committed,
+        };
+        if in_place.is_some_and(|catalog| !catalog.has_excess) && self.pending.is_empty() {
+            return Ok(in_place);
+        }
+        let earlier = if in_place.is_none() { before()? } else { Vec::new() };
+        if in_place.is_none() && earlier.is_empty() && self.pending.is_empty() {
+            return Ok(None);
+        }
+        self.make_folder(files)?;
+        if let Some(begun) = self.begun.take().filter(|&begun| begun != flush_number) {
+            // Another commit came in between.
+            files.remove_file(&layout.catalog(begun))?;
+        }
+        self.begun = in_place.is_none().then_some(flush_number);
+        let generation = in_place.map_or(flush_number, |catalog| catalog.generation);
+        self.has_new_names |= in_place.is_none();
+        let write = || -> io::Result<u64> {
+            let mut out = match in_place {
+                Some(catalog) => CatalogWriter::append(disk, layout, generation, catalog.bytes)?,
+                None => CatalogWriter::create(disk, layout, generation)?,
+            };
+            earlier.iter().chain(&self.pending).try_for_each(|entry| out.put(entry, flush_number))?;
+            out.finish()
+        };
+        let bytes = write().map_err(|error| Error::io(&layout.catalog(generation), "write", error));
+        if let (Err(_), Some(Some(committed))) = (&bytes, &mut self.committed) {
+            committed.has_excess = true;
+        }
+        Ok(Some(Catalog { generation, bytes: bytes?, has_excess: false }))
+    }
+
+    /// Notes that what was written is committed.
+    pub(in crate::store) fn commit(&mut self, written: Option<Catalog>) {
+        if self.is_on {
+            self.committed = Some(written);
+        }
+        (self.pending, self.replacement, self.begun) = (Vec::new(), None, None);
+    }
+
+    /// Notes that what was written is not committed: its records may be in the file.
+    pub(in crate::store) fn not_committed(&mut self) {
+        if let Some(Some(committed)) = &mut self.committed {
+            committed.has_excess = true;
+        }
+    }
+
+    fn find_committed(&mut self, files: &MapFiles, committed_flush: u64) -> Result<Option<Catalog>> {
+        if let Some(committed) = self.committed {
+            return Ok(committed);
+        }
+        let (disk, layout) = (&**files.disk(), files.layout());
+        remove_catalogs_after(files, committed_flush)?;
+        let found = match generation_of(disk, layout, committed_flush)? {
+            None => None,
+            Some(generation) => {
+                let mut reader = CatalogReader::open(disk, layout, generation, committed_flush)?;
+                while reader.next()?.is_some() {}
+                Some(Catalog { generation, bytes: reader.bytes(), has_excess: reader.has_excess() })
+            }
+        };
+        self.committed = Some(found);
+        Ok(found)
+    }
+
+    fn sync_segments(&mut self, files: &MapFiles) -> Result<()> {
+        for &segment in &self.unsynced {
+            let path = files.layout().segment(segment);
+            if let Err(error) = files.disk().sync_file(&path) {
+                self.suspects = std::mem::take(&mut self.unsynced);
+                self.segment = None;
+                return Err(Error::io(&path, "sync", error));
+            }
+        }
+        self.unsynced.clear();
+        Ok(())
+    }
+
+    /// Copies scans of segments that could not be synced to another: what can still be read of them is checked.
+    fn move_suspects(&mut self, files: &MapFiles, committed_flush: u64) -> Result<()> {
+        if self.suspects.is_empty() {
+            return Ok(());
+        }
+        if self.replacement.is_some() {
+            let error = io::Error::other("an earlier sync failed; begin again");
+            return Err(Error::io(&files.layout().kept_scans(), "trust", error));
+        }
+        let mut pending = std::mem::take(&mut self.pending);
+        let mut moved = Ok(());
+        for entry in &mut pending {
+            if let CatalogEntry::Kept(scan) = entry
+                && self.suspects.contains(&scan.place.segment)
+            {
+                moved = self.copy(files, committed_flush, scan.place).map(|place| scan.place = place);
+                if moved.is_err() {
+                    break;
+                }
+            }
+        }
+        self.pending = pending;
+        moved?;
+        self.suspects.clear();
+        Ok(())
+    }
+
+    fn make_folder(&mut self, files: &MapFiles) -> Result<()> {
+        let folder = files.layout().kept_scans();
+        if files.kind(&folder)?.is_none() {
+            files.disk().create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
+            files.sync_map_folder()?;
+        }
+        Ok(())
+    }
+}
+
+/// Removes the catalogs and segments that no flush in `flushes` needs, but no new segments. A catalog that cannot be
+/// read keeps all.
+pub(in crate::store) fn remove_unneeded(
+    disk: &dyn Disk,
+    layout: &Layout,
+    flushes: &[u64],
+    is_new: impl Fn(u64) -> bool,
+) -> Result<u64> {
+    let (mut generations, mut segments) = (BTreeSet::new(), BTreeSet::new());
+    for &flush_number in flushes {
+        let Some(generation) = generation_of(disk, layout, flush_number)? else { continue };
+        generations.insert(generation);
+        let mut reader = CatalogReader::open(disk, layout, generation, flush_number)?;
+        while let Some(entry) = reader.next()? {
+            if let CatalogEntry::Kept(scan) = entry {
+                segments.insert(scan.place.segment);
+            }
+        }
+    }
+    let folder = layout.kept_scans();
+    let names = match disk.list(&folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
+        names => names.map_err(|error| Error::io(&folder, "list", error))?,
+    };
+    let mut removed = 0;
+    for name in names {
+        let is_needed = match (Layout::generation_of(&name), Layout::segment_of(&name)) {
+            (Some(generation), _) => generations.contains(&generation),
+            (_, Some(segment)) => segments.contains(&segment) || is_new(segment),
+            // Not voxtile's.
+            _ => true,
+        };
+        if !is_needed {
+            let path = folder.join(name);
+            disk.remove_file(&path).map_err(|error| Error::io(&path, "remove", error))?;
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
+/// Removes catalogs of commits that never happened.
+fn remove_catalogs_after(files: &MapFiles, committed_flush: u64) -> Result<()> {
+    let folder = files.layout().kept_scans();
+    let names = match files.disk().list(&folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        names => names.map_err(|error| Error::io(&folder, "list", error))?,
+    };
+    for generation in names.iter().filter_map(|name| Layout::generation_of(name)) {
+        if generation > committed_flush {
+            files.remove_file(&files.layout().catalog(generation))?;
+        }
+    }
+    Ok(())
+}
+
+/// The segments of a map, in order.
+fn segments_in(disk: &dyn Disk, layout: &Layout) -> Result<Vec<u64>> {
+    let folder = layout.kept_scans();
+    let names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;
+    let mut segments: Vec<u64> = names.iter().filter_map(|name| Layout::segment_of(name)).collect();
+    segments.sort_unstable();
+    Ok(segments)
+}
+
+/// Checks that the points of a kept scan are whole.
+pub(crate) fn check_points(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
+    let mut input = SegmentScan::open(disk, layout, scan.place)?;
+    let (mut points, mut intensities, mut count) = (Vec::new(), Vec::new(), 0);
+    while input.next(&mut points, &mut intensities)? {
+        count += points.len() as u64;
+    }
+    input.check_count(count, scan)
+}
