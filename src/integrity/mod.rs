@@ -9,6 +9,7 @@
 //! Both need memory for the list of tiles and one tile. What is promised is in `docs/durability.md`.
 
 mod finding;
+mod kept_scans;
 mod rebuild;
 mod repair;
 mod repair_snapshots;

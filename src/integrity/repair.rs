@@ -1,4 +1,5 @@
 use super::finding::Finding;
+use super::kept_scans::whole_entries;
 use super::rebuild::{self, Index};
 use super::tile_check::{check_tile, write_octree};
 use crate::config::MapConfig;
@@ -13,6 +14,7 @@ use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// One thing that a repair did.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -57,6 +59,8 @@ pub struct Repair {
     pub snapshot_tiles_lost: u64,
     /// Snapshots that the map no longer has.
     pub snapshots_lost: u64,
+    /// Damages among the scans that the map keeps: it cannot be mapped again from them.
+    pub scans_lost: u64,
     /// Tiles that are no longer part of the map: their space is unknown again.
     pub tiles_lost: u64,
     /// Damage that is still there, because the medium refused.
@@ -68,7 +72,7 @@ pub struct Repair {
 impl Repair {
     /// Whether all that the map and its snapshots held is there, and nothing is damaged any more.
     pub fn is_complete(&self) -> bool {
-        self.tiles_lost + self.snapshot_tiles_lost + self.snapshots_lost + self.left == 0
+        self.tiles_lost + self.scans_lost + self.snapshot_tiles_lost + self.snapshots_lost + self.left == 0
     }
 }
 
@@ -100,6 +104,7 @@ pub fn repair(
     let config = config_from(store.metadata(), &store.layout().metadata())?;
     repairer.layout = store.layout().clone();
     repairer.repair_scans(&mut store)?;
+    repairer.repair_kept_scans(&disk, &mut store)?;
     repairer.repair_tiles(&mut store, &config)?;
     Ok(repairer.counts)
 }
@@ -161,6 +166,35 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Lists scans whose points are damaged as scans without points, so that the map can be mapped on.
+    fn repair_kept_scans(&mut self, disk: &Arc<dyn Disk>, store: &mut TileStore) -> Result<()> {
+        if !store.keeps_scans() {
+            return Ok(());
+        }
+        let (layout, scan_number) = (store.layout().clone(), store.commits().scan_number);
+        let damage = whole_entries(&**disk, &layout, store.kept_records(), scan_number, |_| Ok(()))?;
+        if damage.is_empty() {
+            return Ok(());
+        }
+        for error in &damage {
+            if let Some(path) = error.path()
+                && self.kind(path)?.is_some()
+            {
+                self.quarantine_copy(path, &format!("{error:#}"))?;
+            }
+        }
+        let records = store.kept_records();
+        store.begin_catalog()?;
+        whole_entries(&**disk, &layout, records, scan_number, |entry| store.put_entry(entry))?;
+        store.commit(store.metadata().clone(), scan_number)?;
+        self.counts.scans_lost += damage.len() as u64;
+        let folder = self.layout.kept_scans();
+        let reason =
+            "what is damaged is no longer among the kept scans, so that the map cannot be mapped again";
+        self.note(ActionKind::Forgotten, &folder, reason);
+        Ok(())
     }
 
     /// Keeps what is whole of the list of scans, from its beginning.

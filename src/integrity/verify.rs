@@ -1,4 +1,5 @@
 use super::finding::{Finding, Severity};
+use super::kept_scans::check_kept_scans;
 use super::rebuild::{self, Index};
 use super::snapshots::{WholeTables, lost_tiles};
 use super::tile_check::{check_tile, first_difference, write_octree};
@@ -7,8 +8,8 @@ use crate::error::{Error, FormatError, Result};
 use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage, SnapshotList,
-    SnapshotName, TileFile, TileStore, TileVersion, check_scans, read_log, tile_of_folder,
+    Disk, EntryKind, KEPT_SCANS, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage,
+    SnapshotList, SnapshotName, TileFile, TileStore, TileVersion, check_scans, read_log, tile_of_folder,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -138,6 +139,11 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         if let Err(error) = check_scans(self.disk, &self.layout, self.counts.flush_number, records) {
             let finding = Finding::of(error)?;
             self.report(finding);
+        }
+        if store.keeps_scans() {
+            for error in check_kept_scans(disk, store)? {
+                self.report(error);
+            }
         }
         let mut tiles: Vec<_> = store.tiles().collect();
         tiles.sort_unstable();
@@ -280,6 +286,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                         self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
                     }
                 }
+                // What of it belongs to the map has been read; the rest goes when a writer opens the map.
+                (KEPT_SCANS, _) => {}
                 (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
                 (QUARANTINE, _) => {
                     self.report(Finding::note(&path, None, "taken out of the map by a repair"))

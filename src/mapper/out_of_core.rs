@@ -286,6 +286,16 @@ impl OutOfCoreTileMapper {
         Ok((report, tiles))
     }
 
+    /// Which part of a ray counts from the next scan on.
+    ///
+    /// # Errors
+    ///
+    /// A wrong configuration.
+    pub(crate) fn set_rays(&mut self, rays: RayConfig) -> Result<()> {
+        self.config = MapConfig { rays, ..self.config.clone() }.validated()?;
+        Ok(())
+    }
+
     // Mapping again.
 
     /// Opens a map of which some tiles are empty, to map them again from scans that it keeps.

@@ -1,8 +1,7 @@
 use super::OutOfCoreTileMapper;
-use super::kept_scan::KeptScan;
-use crate::config::MapConfig;
+use crate::config::{MapConfig, RayConfig};
 use crate::error::Result;
-use crate::scan::{ScanReport, Stop};
+use crate::scan::{ScanPoints, ScanReport, Stop};
 use crate::space::{TileIndex, TileSelection};
 use crate::store::{CatalogEntry, SegmentPlace, TileStore};
 
@@ -33,10 +32,12 @@ impl Remapper {
     /// Maps what a scan says about a selection of tiles, or about all; returns the tiles that it touched, too.
     pub(crate) fn map(
         &mut self,
-        scan: &KeptScan,
+        number: u64,
+        scan: &dyn ScanPoints,
+        rays: &RayConfig,
         selection: Option<&TileSelection>,
     ) -> Result<(ScanReport, Vec<TileIndex>)> {
-        self.mapper.map_again(scan.number(), scan, scan.rays(), selection)
+        self.mapper.map_again(number, scan, rays, selection)
     }
 
     /// Adds an entry to the new catalog; every scan of the map has its own.
@@ -50,7 +51,7 @@ impl Remapper {
     }
 
     /// Writes points in place of those that a scan has.
-    pub(crate) fn write_points(&mut self, scan: &dyn crate::scan::ScanPoints) -> Result<SegmentPlace> {
+    pub(crate) fn write_points(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
         self.mapper.pager_keep(scan)
     }
 

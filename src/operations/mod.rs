@@ -8,6 +8,7 @@
 //! clear, decay   MapEditor: tiles read, changed, written beside -> one commit
 //! a flush  -> snapshot -> snapshots/NAME, and the tables that it sees stay
 //! snapshot -> revert   -> one commit
+//! kept scans, some moved or gone -> remapping: tiles mapped again -> one commit
 //! two maps, or snapshots of one, tile by tile -> diff
 //! ```
 //!
@@ -26,6 +27,7 @@ mod merge;
 mod merge_rule;
 mod part;
 mod regions;
+mod remapping;
 mod revert;
 mod snapshot;
 mod table_change;
@@ -42,5 +44,9 @@ pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::Part;
+pub use remapping::{
+    MappedAgain, MappedAnew, NewPoses, PointsRemoved, Remap, Remapped, Rework, ScanSelection, ScansRemoved,
+    map_anew, remap, remove_points, remove_scans,
+};
 pub use revert::{Reverted, revert};
 pub use snapshot::{SnapshotInfo, delete_snapshot, snapshot, snapshots};

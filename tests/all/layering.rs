@@ -54,7 +54,7 @@ const LAYERS: [(&str, &[&str]); 24] = [
     // Whole maps on disk, tile by tile.
     (
         "operations",
-        &["config", "error", "mapper", "maths", "persistence", "sensor", "space", "store", "tile"],
+        &["config", "error", "mapper", "maths", "persistence", "scan", "sensor", "space", "store", "tile"],
     ),
     ("integrity", &["config", "error", "path_text", "persistence", "space", "store", "tile"]),
     // Maps to look at, by the interface of mappers: no web, no screen, no file.

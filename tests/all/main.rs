@@ -80,6 +80,8 @@ mod pictures;
 mod queries;
 /// Scans from files, good and bad.
 mod readers;
+/// Maps that follow their scans: poses move, scans and points go.
+mod remapping;
 /// The list of scans that a map keeps.
 mod scan_list;
 /// The stream of scans, in files and from standard input.

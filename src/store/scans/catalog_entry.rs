@@ -1,6 +1,6 @@
 use super::scan_record::ScanRecord;
 use crate::config::RayConfig;
-use crate::space::{Point, TileIndex, put_number, take_number};
+use crate::space::{Point, TileIndex, put_number};
 
 /// Where the points of a kept scan lie: bytes of a segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

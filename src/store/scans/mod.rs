@@ -18,12 +18,10 @@ mod scan_list;
 mod scan_record;
 mod segment;
 
-pub(super) use catalog::CatalogReader;
 pub(crate) use catalog::KeptRecords;
-pub(super) use catalog::generation_of;
 pub use catalog_entry::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace};
+pub(super) use scan_keeper::ScanKeeper;
 pub(crate) use scan_keeper::check_points;
-pub(super) use scan_keeper::{ScanKeeper, remove_unneeded};
 pub(super) use scan_list::ScanList;
 pub(crate) use scan_list::{check_scans, read_scans};
 pub use scan_record::ScanRecord;

@@ -108,7 +108,9 @@ impl ScanKeeper {
     /// Begins a scan.
     pub(in crate::store) fn begin_scan(&mut self, files: &MapFiles, committed_flush: u64) -> Result<()> {
         // A catalog that is damaged is told before anything is written.
-        self.find_committed(files, committed_flush)?;
+        if self.replacement.is_none() {
+            self.find_committed(files, committed_flush)?;
+        }
         let (disk, layout) = (&**files.disk(), files.layout());
         if self.segment.as_ref().is_none_or(SegmentWriter::is_full) {
             self.make_folder(files)?;
@@ -181,6 +183,7 @@ impl ScanKeeper {
         committed_flush: u64,
     ) -> Result<()> {
         self.make_folder(files)?;
+        remove_catalogs_after(files, committed_flush)?;
         let generation = committed_flush + 1;
         let out = CatalogWriter::create(&**files.disk(), files.layout(), generation)
             .map_err(|error| Error::io(&files.layout().catalog(generation), "create", error))?;
@@ -215,7 +218,9 @@ impl ScanKeeper {
         if !self.is_on {
             return Ok(None);
         }
-        let committed = self.find_committed(files, committed_flush)?;
+        // Where another takes its place, the committed one may be damaged.
+        let committed =
+            if self.replacement.is_some() { None } else { self.find_committed(files, committed_flush)? };
         self.move_suspects(files, committed_flush)?;
         self.sync_segments(files)?;
         let written = self.write_catalog(files, committed_flush, committed, before)?;

@@ -1,0 +1,48 @@
+use super::paging::MemoryPlan;
+use super::trace::trace;
+use crate::config::{MapConfig, RayConfig};
+use crate::error::Result;
+use crate::scan::{Overflow, PackedUpdates, ScanPoints, ScanTracer, Stop};
+use crate::space::TileIndex;
+use crate::store::Disk;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Finds out which tiles a scan touches, without a map.
+pub(crate) struct TileFinder {
+    config: MapConfig,
+    tracer: ScanTracer,
+    disk: Arc<dyn Disk>,
+}
+
+impl TileFinder {
+    /// Finds tiles of maps with this configuration, in as much memory as it allows for a scan.
+    pub(crate) fn new(config: &MapConfig, disk: Arc<dyn Disk>, stop: Stop) -> Self {
+        let bytes = MemoryPlan::new(config.memory).scan_bytes;
+        let mut tracer = ScanTracer::with_memory_bytes(bytes);
+        tracer.stop_with(stop);
+        Self { config: config.clone(), tracer, disk }
+    }
+
+    /// The tiles that a scan touches. What memory has no room for goes to files without a name in `folder`.
+    pub(crate) fn tiles_of(
+        &mut self,
+        scan: &dyn ScanPoints,
+        rays: &RayConfig,
+        folder: &Path,
+    ) -> Result<Vec<TileIndex>> {
+        self.config.rays = *rays;
+        let max_bytes = MemoryPlan::new(self.config.memory).updates_bytes;
+        let mut tiles = Vec::new();
+        let make_scratch = &|| self.disk.scratch(folder);
+        let spill = &mut |part: Vec<(TileIndex, PackedUpdates)>| {
+            tiles.extend(part.into_iter().map(|(tile, _)| tile));
+            Ok(())
+        };
+        let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill };
+        let updates = trace(&mut self.tracer, &self.config, scan, None, Some(overflow))?;
+        self.tracer.stop().check()?;
+        tiles.extend(updates.tiles.into_iter().map(|(tile, _)| tile));
+        Ok(tiles)
+    }
+}

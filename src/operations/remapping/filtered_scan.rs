@@ -1,0 +1,95 @@
+use crate::error::Result;
+use crate::mapper::KeptScan;
+use crate::scan::{Pose, ScanPoints, TakePoints};
+use crate::space::{Aabb, Point};
+use std::ops::Range;
+
+/// The points of a kept scan that are in a box, or those that are not. They are picked out each time they are read.
+pub(super) struct FilteredScan<'a> {
+    scan: &'a KeptScan,
+    region: Aabb,
+    is_inside: bool,
+    points: usize,
+}
+
+impl<'a> FilteredScan<'a> {
+    pub(super) fn new(scan: &'a KeptScan, region: Aabb, is_inside: bool) -> Result<Self> {
+        let mut filtered = Self { scan, region, is_inside, points: 0 };
+        let mut points = 0;
+        scan.for_each_chunk(0..scan.len(), &mut |some, _| {
+            points += some.iter().filter(|point| filtered.takes(point)).count();
+            true
+        })?;
+        filtered.points = points;
+        Ok(filtered)
+    }
+
+    fn takes(&self, in_world: &Point) -> bool {
+        let Aabb { min, max } = &self.region;
+        (0..3).all(|axis| min[axis] <= in_world[axis] && in_world[axis] < max[axis]) == self.is_inside
+    }
+
+    fn pick(
+        &self,
+        range: Range<usize>,
+        to_world: impl Fn(Point) -> Point,
+        gives_own: bool,
+        take: &mut TakePoints<'_>,
+    ) -> Result<()> {
+        let (mut number, mut goes_on) = (0, true);
+        let (mut points, mut picked) = (Vec::new(), Vec::new());
+        self.scan.for_each_own_chunk(0..self.scan.len(), &mut |some, intensities| {
+            points.clear();
+            picked.clear();
+            for (at, &own) in some.iter().enumerate() {
+                let in_world = to_world(own);
+                if self.takes(&in_world) {
+                    if range.contains(&number) {
+                        points.push(if gives_own { own } else { in_world });
+                        picked.extend(intensities.map(|intensities| intensities[at]));
+                    }
+                    number += 1;
+                }
+            }
+            if !points.is_empty() {
+                goes_on = take(&points, intensities.map(|_| &*picked));
+            }
+            goes_on && number < range.end
+        })
+    }
+
+    fn to_world(&self) -> impl Fn(Point) -> Point {
+        let to_world = self.scan.world_from_sensor().map(|pose| pose.to_world());
+        move |point| to_world.map_or(point, |to_world| to_world(point))
+    }
+}
+
+impl ScanPoints for FilteredScan<'_> {
+    fn origin(&self) -> Point {
+        self.scan.origin()
+    }
+
+    fn stamp_ns(&self) -> Option<i64> {
+        self.scan.stamp_ns()
+    }
+
+    fn len(&self) -> usize {
+        self.points
+    }
+
+    fn has_intensities(&self) -> bool {
+        self.scan.has_intensities()
+    }
+
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.pick(range, self.to_world(), false, take)
+    }
+
+    fn world_from_sensor(&self) -> Option<Pose> {
+        self.scan.world_from_sensor()
+    }
+
+    fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.pick(range, self.to_world(), true, take)
+    }
+}

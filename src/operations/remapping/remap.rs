@@ -1,0 +1,128 @@
+use super::new_poses::NewPoses;
+use super::revision::{Fate, MappedAgain, Rework, has_pose, rework};
+use crate::error::{Error, Result};
+use crate::mapper::{MapReader, pose_of_numbers};
+use crate::scan::Pose;
+use crate::store::{KeptFrame, KeptRecord, MapPath};
+use rustc_hash::FxHashMap;
+use serde::Serialize;
+
+/// How a map follows new poses.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+#[must_use]
+pub struct Remap {
+    /// What every rework can do.
+    pub rework: Rework,
+    /// Scans that move by no more than so many metres and turn by no more than so many radians stay where they are.
+    /// Default: every scan gets its new pose.
+    pub tolerance: Option<(f64, f64)>,
+}
+
+impl Remap {
+    /// Remaps in this way.
+    pub fn new(rework: Rework) -> Self {
+        Self { rework, tolerance: None }
+    }
+
+    /// The same, leaving scans alone that hardly move: metres and radians.
+    pub fn with_tolerance(self, tolerance: impl Into<Option<(f64, f64)>>) -> Self {
+        Self { tolerance: tolerance.into(), ..self }
+    }
+}
+
+/// What became of a map by new poses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Remapped {
+    /// What was mapped again.
+    #[serde(flatten)]
+    pub mapped: MappedAgain,
+    /// Scans whose new pose differs by no more than the tolerance; they keep the pose that they had.
+    pub scans_within_tolerance: u64,
+    /// The longest way between an old and a new pose, in metres.
+    pub largest_move_m: f64,
+    /// The largest angle between an old and a new pose, in degrees.
+    pub largest_turn_deg: f64,
+    /// The same of the scans that kept their pose: how far the map is from the new poses at most, in metres.
+    pub largest_move_left_m: f64,
+    /// Likewise, in degrees.
+    pub largest_turn_left_deg: f64,
+}
+
+/// Gives the scans of a map new poses: what they touch under the old or the new ones is mapped again, from all scans
+/// that touch it. One commit; the map is then as if it had been built with these poses, to the bit.
+///
+/// Work: the tiles touched, in the memory that `how` allows. `progress` is told the scans done and all.
+///
+/// # Errors
+///
+/// A map that keeps no scans or consists of more than these; poses that are not finite, missing or too many; scans
+/// whose points are in the world frame, which no pose moves; a damaged segment or catalog; another writer; a disk that
+/// refuses; a request to stop. The map is as it was then; the snapshot that keeps it may have been made.
+pub fn remap(
+    map: impl Into<MapPath>,
+    poses: &NewPoses,
+    how: &Remap,
+    progress: impl FnMut(u64, u64),
+) -> Result<Remapped> {
+    let (disk, folder) = map.into().into_parts();
+    if let Some((moved_m, turned)) = how.tolerance
+        && !(moved_m >= 0.0 && turned >= 0.0)
+    {
+        return Err(Error::argument("tolerance", "two lengths that are not negative: metres and an angle"));
+    }
+    let mut remapped = Remapped::default();
+    let poses = {
+        let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
+        // What it says of a map without scans.
+        drop(reader.kept_scans()?);
+        let poses = poses.by_number(reader.kept_records()?)?;
+        let mut records = reader.kept_records()?;
+        let mut moves = FxHashMap::default();
+        while let Some(record) = records.next_kept()? {
+            if let Some(pose) = poses.get(&record.number)
+                && remapped.moves(&record, pose, how.tolerance)?
+            {
+                moves.insert(record.number, *pose);
+            }
+        }
+        moves
+    };
+    let fate = |record: &KeptRecord| match poses.get(&record.number) {
+        Some(pose) => Fate::Moves(Box::new(*pose)),
+        None => Fate::Stays,
+    };
+    remapped.mapped = rework(MapPath::on(disk, &folder), &how.rework, fate, progress)?;
+    Ok(remapped)
+}
+
+impl Remapped {
+    /// Whether a scan gets a new pose.
+    fn moves(&mut self, record: &KeptRecord, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
+        let KeptFrame::Sensor(numbers) = &record.frame else {
+            debug_assert!(!has_pose(record));
+            let reason = format!(
+                "scan {} has its points in the world frame, so that no pose moves it; insert scans in the frame of \
+                 their sensor",
+                record.number
+            );
+            return Err(Error::argument("poses", reason));
+        };
+        let old = pose_of_numbers(numbers);
+        if old == *new {
+            return Ok(false);
+        }
+        let between = old.isometry().inv_mul(new.isometry());
+        let (moved_m, turned) = (between.translation.vector.norm(), between.rotation.angle());
+        self.largest_move_m = self.largest_move_m.max(moved_m);
+        self.largest_turn_deg = self.largest_turn_deg.max(turned.to_degrees());
+        if !tolerance.is_some_and(|(most_m, most)| moved_m <= most_m && turned <= most) {
+            return Ok(true);
+        }
+        self.scans_within_tolerance += 1;
+        self.largest_move_left_m = self.largest_move_left_m.max(moved_m);
+        self.largest_turn_left_deg = self.largest_turn_left_deg.max(turned.to_degrees());
+        Ok(false)
+    }
+}

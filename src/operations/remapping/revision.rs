@@ -1,0 +1,375 @@
+use super::filtered_scan::FilteredScan;
+use crate::config::{MapConfig, MemoryLimit};
+use crate::error::{Error, Result};
+use crate::mapper::{KeptScan, NOT_KEPT, Remapper, TileFinder};
+use crate::operations::snapshot::check_is_free;
+use crate::persistence::config_from;
+use crate::scan::{Pose, ScanPoints, Stop};
+use crate::space::{Aabb, TileIndex, TileSelection};
+use crate::store::{CatalogEntry, Disk, KeptFrame, KeptRecord, MapPath, SnapshotName, TileStore};
+use rustc_hash::FxHashSet;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How a map is mapped again.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+#[must_use]
+pub struct Rework {
+    /// Most bytes of memory of all that grows with the map. Default: 512 MiB.
+    pub memory_bytes: usize,
+    /// Name of a snapshot that keeps the map as it was. Default: none.
+    pub keep_as: Option<SnapshotName>,
+    /// Tells what would be done, and does nothing. Default: no.
+    pub is_dry_run: bool,
+    /// Ends the work when it is set; the map is as it was then.
+    pub stop: Stop,
+}
+
+impl Default for Rework {
+    fn default() -> Self {
+        Self { memory_bytes: 512 << 20, keep_as: None, is_dry_run: false, stop: Stop::default() }
+    }
+}
+
+impl Rework {
+    /// The same with another limit of memory.
+    pub fn with_memory_bytes(self, memory_bytes: usize) -> Self {
+        Self { memory_bytes, ..self }
+    }
+
+    /// The same with a snapshot that keeps the map as it was.
+    pub fn with_keep_as(self, keep_as: impl Into<Option<SnapshotName>>) -> Self {
+        Self { keep_as: keep_as.into(), ..self }
+    }
+
+    /// The same, only telling what would be done.
+    pub fn with_dry_run(self, is_dry_run: bool) -> Self {
+        Self { is_dry_run, ..self }
+    }
+
+    /// The same with a request to stop.
+    pub fn with_stop(self, stop: Stop) -> Self {
+        Self { stop, ..self }
+    }
+}
+
+/// What was mapped again, or would be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct MappedAgain {
+    /// Scans that the map keeps.
+    pub scans: u64,
+    /// Scans that differ from what they were: moved, removed, or without some of their points.
+    pub scans_changed: u64,
+    /// Scans that were mapped again, in whole or in part.
+    pub scans_mapped: u64,
+    /// Tiles that the map had.
+    pub tiles: u64,
+    /// Tiles that were emptied and mapped again.
+    pub tiles_mapped: u64,
+    /// Updates of voxels of all scans that the map kept.
+    pub updates: u64,
+    /// Updates of voxels that were done again; of a dry run an estimate.
+    pub updates_mapped: u64,
+    /// Of a dry run: about how many seconds the rest takes.
+    pub estimated_s: Option<f64>,
+}
+
+/// What becomes of a scan.
+pub(super) enum Fate {
+    Stays,
+    Moves(Box<Pose>),
+    Goes,
+    /// Its points in a box go.
+    Loses(Aabb),
+}
+
+/// Where more than this part of all updates is of scans that changed, all is mapped again: looking for what they touch
+/// would cost more than it spares.
+const PART_FOR_ALL: u64 = 3;
+/// Points of a kept scan that are read into memory; those of a larger one are read again when needed.
+const MOST_POINTS_IN_MEMORY: u64 = 1 << 18;
+
+/// Maps again what scans touch whose fate is not to stay. `progress` is told the scans done and all.
+pub(super) fn rework(
+    map: MapPath,
+    how: &Rework,
+    fate: impl Fn(&KeptRecord) -> Fate,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<MappedAgain> {
+    let (disk, folder) = map.into_parts();
+    let mut store = TileStore::open(disk.clone(), &folder)?;
+    let revision = Revision { disk: disk.clone(), how, fate, counts: MappedAgain::default() };
+    let Some((revision, touched)) = revision.look(&store)? else {
+        return Ok(MappedAgain::default());
+    };
+    if how.is_dry_run || revision.counts.scans_changed == 0 {
+        return Ok(revision.counts);
+    }
+    if let Some(name) = &how.keep_as {
+        check_is_free(&store, name)?;
+        store.create_snapshot(name)?;
+    }
+    let outcome = revision.map(store, touched, &mut progress);
+    // What was written in vain gives its room back.
+    if outcome.is_err()
+        && let Err(error) = TileStore::open(disk, &folder)
+    {
+        log::warn!("{}: not tidied up after an error: {error:#}", folder.display());
+    }
+    outcome
+}
+
+struct Revision<'a, F> {
+    disk: Arc<dyn Disk>,
+    how: &'a Rework,
+    fate: F,
+    counts: MappedAgain,
+}
+
+/// What has to be mapped again.
+struct Touched {
+    config: MapConfig,
+    /// `None` for all.
+    tiles: Option<FxHashSet<TileIndex>>,
+    /// Segments with points that go.
+    segments: BTreeSet<u64>,
+}
+
+impl Touched {
+    fn has(&self, tile: TileIndex) -> bool {
+        self.tiles.as_ref().is_none_or(|tiles| tiles.contains(&tile))
+    }
+}
+
+impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
+    /// Finds out what the change touches; `None` for a map without scans.
+    fn look(mut self, store: &TileStore) -> Result<Option<(Self, Touched)>> {
+        let config = self.config_of(store)?;
+        check_keeps_all(store)?;
+        let changed_updates = self.count(store)?;
+        self.counts.tiles = store.count_tiles() as u64;
+        let mut touched = Touched { config, tiles: None, segments: BTreeSet::new() };
+        let are_all = changed_updates > self.counts.updates / PART_FOR_ALL;
+        let mut tiles = FxHashSet::default();
+        let mut finder = TileFinder::new(&touched.config, self.disk.clone(), self.how.stop.clone());
+        let (began, mut looked_at) = (Instant::now(), 0);
+        let mut records = store.kept_records()?;
+        while let Some(record) = records.next_kept()? {
+            self.how.stop.check()?;
+            let fate = (self.fate)(&record);
+            if let Fate::Goes | Fate::Loses(_) = fate {
+                touched.segments.insert(record.place.segment);
+            }
+            if are_all || matches!(fate, Fate::Stays) {
+                continue;
+            }
+            if !matches!(fate, Fate::Loses(_)) {
+                tiles.extend(record.tiles.iter().copied());
+            }
+            if matches!(fate, Fate::Goes) {
+                continue;
+            }
+            let scan = self.open(store, record)?;
+            let (rays, updates) = (*scan.rays(), scan.record().updates);
+            tiles.extend(match fate {
+                Fate::Moves(pose) => finder.tiles_of(&scan.with_pose(*pose), &rays, store.folder())?,
+                Fate::Loses(region) => {
+                    let lost = FilteredScan::new(&scan, region, true)?;
+                    finder.tiles_of(&lost, &rays, store.folder())?
+                }
+                Fate::Stays | Fate::Goes => Vec::new(),
+            });
+            looked_at += updates;
+        }
+        touched.tiles = (!are_all).then_some(tiles);
+        self.counts.tiles_mapped =
+            touched.tiles.as_ref().map_or(self.counts.tiles, |tiles| tiles.len() as u64);
+        if self.how.is_dry_run {
+            self.estimate(store, &touched, began.elapsed().as_secs_f64(), looked_at)?;
+        }
+        Ok(Some((self, touched)))
+    }
+
+    /// Counts scans and updates; returns the updates of those that change.
+    fn count(&mut self, store: &TileStore) -> Result<u64> {
+        let mut changed = 0;
+        let mut records = store.kept_records()?;
+        while let Some(record) = records.next_kept()? {
+            self.counts.scans += 1;
+            self.counts.updates += record.updates;
+            if !matches!((self.fate)(&record), Fate::Stays) {
+                self.counts.scans_changed += 1;
+                changed += record.updates;
+            }
+        }
+        Ok(changed)
+    }
+
+    /// What is to be done, by what is known without doing it.
+    fn estimate(&mut self, store: &TileStore, touched: &Touched, took_s: f64, looked_at: u64) -> Result<()> {
+        let mut records = store.kept_records()?;
+        let (mut updates, mut scans) = (0.0, 0);
+        while let Some(record) = records.next_kept()? {
+            let is_moved = !matches!((self.fate)(&record), Fate::Stays);
+            let hit = record.tiles.iter().filter(|tile| touched.has(**tile)).count();
+            if (is_moved || hit > 0) && !matches!((self.fate)(&record), Fate::Goes) {
+                scans += 1;
+                let share = if is_moved { 1.0 } else { hit as f64 / record.tiles.len().max(1) as f64 };
+                updates += record.updates as f64 * share;
+            }
+        }
+        (self.counts.scans_mapped, self.counts.updates_mapped) = (scans, updates as u64);
+        // Some 20 million updates a second where nothing was timed; applying and writing take a half on top.
+        let rate = if looked_at > 0 { looked_at as f64 / took_s.max(1e-6) } else { 20e6 };
+        self.counts.estimated_s = Some(1.5 * updates / rate);
+        Ok(())
+    }
+
+    fn config_of(&self, store: &TileStore) -> Result<MapConfig> {
+        let config = config_from(store.metadata(), &store.layout().metadata())?;
+        MapConfig { memory: MemoryLimit::Bytes(self.how.memory_bytes), ..config }.validated()
+    }
+
+    fn open(&self, store: &TileStore, record: KeptRecord) -> Result<KeptScan> {
+        KeptScan::open(&self.disk, store.layout(), record, MOST_POINTS_IN_MEMORY)
+    }
+
+    /// Maps the touched tiles again and commits.
+    fn map(
+        mut self,
+        store: TileStore,
+        touched: Touched,
+        progress: &mut impl FnMut(u64, u64),
+    ) -> Result<MappedAgain> {
+        let layout = store.layout().clone();
+        let mut records = store.kept_records()?;
+        let tiles: Vec<_> = store.tiles().filter(|&tile| touched.has(tile)).collect();
+        self.counts.tiles_mapped = tiles.len() as u64;
+        let mut remapper = Remapper::begin(store, touched.config.clone(), tiles, self.how.stop.clone())?;
+        let mut done = 0;
+        while let Some(entry) = records.next_entry()? {
+            self.how.stop.check()?;
+            let CatalogEntry::Kept(record) = entry else {
+                remapper.put(&entry)?;
+                continue;
+            };
+            progress(done, self.counts.scans);
+            done += 1;
+            let (number, fate) = (record.number, (self.fate)(&record));
+            if matches!(fate, Fate::Goes) {
+                remapper.put(&CatalogEntry::Removed(number, number))?;
+                continue;
+            }
+            let is_changed = !matches!(fate, Fate::Stays);
+            let is_touched = is_changed || record.tiles.iter().any(|&tile| touched.has(tile));
+            let mut record = *record;
+            if is_touched {
+                let scan = KeptScan::open(&self.disk, &layout, record, MOST_POINTS_IN_MEMORY)?;
+                record = self.map_scan(&mut remapper, scan, fate, &touched)?;
+            } else if touched.segments.contains(&record.place.segment) {
+                record.place = remapper.copy_points(record.place)?;
+            }
+            remapper.put(&CatalogEntry::Kept(Box::new(record)))?;
+        }
+        progress(done, self.counts.scans);
+        remapper.finish()?;
+        Ok(self.counts)
+    }
+
+    /// Maps what a scan says about touched tiles; returns its new record.
+    fn map_scan(
+        &mut self,
+        remapper: &mut Remapper,
+        scan: KeptScan,
+        fate: Fate,
+        touched: &Touched,
+    ) -> Result<KeptRecord> {
+        let is_moved = matches!(fate, Fate::Moves(_));
+        let scan = match &fate {
+            Fate::Moves(pose) => scan.with_pose(**pose),
+            Fate::Stays | Fate::Goes | Fate::Loses(_) => scan,
+        };
+        let mut record = scan.record().clone();
+        // All tiles of a scan that moved are touched.
+        let selection = touched.tiles.as_ref().filter(|_| !is_moved).map(|tiles| {
+            record.tiles.iter().copied().filter(|tile| tiles.contains(tile)).collect::<TileSelection>()
+        });
+        let (report, tiles) = match fate {
+            Fate::Loses(region) => {
+                let rest = FilteredScan::new(&scan, region, false)?;
+                record.place = remapper.write_points(&rest)?;
+                record.points = rest.len() as u64;
+                remapper.map(record.number, &rest, &record.rays, selection.as_ref())?
+            }
+            _ => {
+                if touched.segments.contains(&record.place.segment) {
+                    record.place = remapper.copy_points(record.place)?;
+                }
+                remapper.map(record.number, &scan, &record.rays, selection.as_ref())?
+            }
+        };
+        self.counts.scans_mapped += 1;
+        self.counts.updates_mapped += report.hits + report.misses;
+        if selection.is_none() {
+            record.updates = report.hits + report.misses;
+        }
+        record.tiles = match &touched.tiles {
+            None => tiles,
+            Some(touched) => {
+                let mut all: Vec<_> = record
+                    .tiles
+                    .iter()
+                    .copied()
+                    .filter(|tile| !touched.contains(tile))
+                    .chain(tiles)
+                    .collect();
+                all.sort_unstable();
+                all.dedup();
+                all
+            }
+        };
+        Ok(record)
+    }
+}
+
+/// A map that consists of more than the scans that it keeps cannot be mapped again from these.
+fn check_keeps_all(store: &TileStore) -> Result<()> {
+    let refuse = |reason: String| Err(Error::argument(store.folder().display().to_string(), reason));
+    if !store.keeps_scans() {
+        return refuse(NOT_KEPT.to_owned());
+    }
+    let mut records = store.kept_records()?;
+    while let Some(entry) = records.next_entry()? {
+        let what = match entry {
+            CatalogEntry::Kept(_) | CatalogEntry::Removed(..) => continue,
+            CatalogEntry::Listed(scan) => format!("scan {}, whose points are not kept", scan.number),
+            CatalogEntry::Unlisted(first, last) if first == last => {
+                format!("number {first}, which is no scan")
+            }
+            CatalogEntry::Unlisted(first, last) => format!("numbers {first} to {last}, which are no scans"),
+            CatalogEntry::Operation(what) => format!("a change that is no scan: {what}"),
+        };
+        return refuse(format!("cannot be mapped again from its scans, for it also consists of {what}"));
+    }
+    Ok(())
+}
+
+/// Whether a scan is one that can be moved: its points are in the frame of its sensor.
+pub(super) fn has_pose(record: &KeptRecord) -> bool {
+    matches!(record.frame, KeptFrame::Sensor(_))
+}
+
+/// A box as an argument.
+pub(super) fn check_region(region: &Aabb, map: &Path) -> Result<()> {
+    let is_box = (0..3).all(|axis| region.min[axis] < region.max[axis]);
+    if is_box {
+        return Ok(());
+    }
+    let reason = format!("of {}: not a box; the lower corner comes first", map.display());
+    Err(Error::argument("region", reason))
+}

@@ -1,0 +1,384 @@
+//! Maps that keep their scans: random lives against the naive map of the scans that are left, under the poses as of
+//! now; faults and power cuts in the middle.
+
+use crate::support::{message_of, some_of};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
+use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
+use voxtile::integrity::{Finding, Severity, verify};
+use voxtile::operations::{
+    NewPoses, Part, Remap, Rework, ScanSelection, clear, delete_snapshot, remap, remove_points, remove_scans,
+    revert, snapshot,
+};
+use voxtile::scan::ScanPoints;
+use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::store::{SnapshotName, TileStore};
+use voxtile::{
+    Aabb, Error, InsertMode, MapConfig, MapPath, MapReader, MapView, Mapper, MemoryLimit,
+    OutOfCoreTileMapper, Pose, Result, Scan, ScanRef,
+};
+
+fn map() -> &'static Path {
+    Path::new("/city/map")
+}
+
+fn at(disk: &FaultyDisk) -> MapPath {
+    MapPath::on(disk.shared(), map())
+}
+
+fn config() -> MapConfig {
+    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_kept_scans(true);
+    config.with_cache_tiles(2).with_write_buffer_bytes(600)
+}
+
+fn rework() -> Rework {
+    Rework::default().with_memory_bytes(MemoryLimit::least_bytes(&config().grid))
+}
+
+/// A scan as it was measured, and where from.
+#[derive(Clone, Debug)]
+struct Taken {
+    points: Vec<[f64; 3]>,
+    intensities: Vec<f32>,
+    pose: Pose,
+}
+
+impl Taken {
+    fn new(seed: u64, points: usize) -> Self {
+        let mut random = Random(seed);
+        let scan = random_scan(&mut random, [0.0; 3], points);
+        let mut points = scan.points;
+        points.push([0.0; 3]);
+        let mut intensities = scan.intensities.unwrap();
+        intensities.push(-0.0);
+        Self { points, intensities, pose: random_pose(&mut random, seed) }
+    }
+
+    fn in_world(&self) -> Scan {
+        Scan::from_sensor_frame(&self.points, Some(self.intensities.clone()), self.pose)
+    }
+
+    fn bits(&self) -> (Vec<[u64; 3]>, Vec<u32>, [u64; 7]) {
+        let points = self.points.iter().map(|point| point.map(f64::to_bits)).collect();
+        let intensities = self.intensities.iter().map(|intensity| intensity.to_bits()).collect();
+        (points, intensities, bits_of_pose(&self.pose))
+    }
+}
+
+fn bits_of_pose(pose: &Pose) -> [u64; 7] {
+    let ([x, y, z], [a, b, c, d]) = (pose.position_m(), pose.quaternion());
+    [x, y, z, a, b, c, d].map(f64::to_bits)
+}
+
+/// Somewhere on a short drive; neighbours see the same places.
+fn random_pose(random: &mut Random, number: u64) -> Pose {
+    let along = [0.0, 3.0, 6.0, 9.0, 6.0, 3.0][number as usize % 6];
+    let turn = random.between(-3.0, 3.0);
+    let position = random.point([along, 0.0, 0.5], 0.3);
+    Pose::from_quaternion(position, [0.1, 0.0, (turn / 2.0_f64).sin(), (turn / 2.0_f64).cos()]).unwrap()
+}
+
+/// What people do with a map, each in a process of its own.
+#[derive(Clone, Debug)]
+enum Act {
+    /// Insert scans with these seeds and flush.
+    Scans(std::ops::Range<u64>),
+    /// Some scans get other poses: those whose number leaves this rest when it is divided by four, or all.
+    Move {
+        seed: u64,
+        rest: Option<u64>,
+    },
+    RemoveScans(u64, u64),
+    RemovePoints(Aabb),
+    Snapshot(&'static str),
+    Delete(&'static str),
+    Revert(&'static str),
+}
+
+/// Scans by their numbers, and the number of the last.
+type Scans = (BTreeMap<u64, Taken>, u64);
+
+#[derive(Clone, Debug, Default)]
+struct State {
+    scans: Scans,
+    snapshots: BTreeMap<String, Scans>,
+}
+
+fn naive_map(config: &MapConfig, scans: &BTreeMap<u64, Taken>) -> Voxels {
+    let mut map = ReferenceMap::new(config);
+    scans.values().for_each(|scan| map.insert_scan(&scan.in_world()));
+    map.voxels
+}
+
+fn new_poses(scans: &BTreeMap<u64, Taken>, seed: u64, rest: Option<u64>) -> Vec<(u64, Pose)> {
+    let numbers = scans.keys().copied().filter(|number| rest.is_none_or(|rest| number % 4 == rest));
+    numbers.map(|number| (number, random_pose(&mut Random(seed ^ number), number))).collect()
+}
+
+fn naive(mut state: State, act: &Act) -> State {
+    let (scans, scan_number) = &mut state.scans;
+    match act {
+        Act::Scans(seeds) => {
+            for seed in seeds.clone() {
+                *scan_number += 1;
+                scans.insert(*scan_number, Taken::new(seed, 5));
+            }
+        }
+        Act::Move { seed, rest } => {
+            for (number, pose) in new_poses(scans, *seed, *rest) {
+                scans.get_mut(&number).unwrap().pose = pose;
+            }
+        }
+        Act::RemoveScans(first, last) => scans.retain(|number, _| !(first..=last).contains(&number)),
+        Act::RemovePoints(region) => {
+            for scan in scans.values_mut() {
+                let world = scan.in_world();
+                let stays =
+                    |point: &[f64; 3]| !(0..3).all(|k| region.min[k] <= point[k] && point[k] < region.max[k]);
+                let kept: Vec<_> = (0..world.points.len()).filter(|&k| stays(&world.points[k])).collect();
+                scan.points = kept.iter().map(|&k| scan.points[k]).collect();
+                scan.intensities = kept.iter().map(|&k| scan.intensities[k]).collect();
+            }
+        }
+        Act::Snapshot(name) => drop(state.snapshots.insert((*name).to_owned(), state.scans.clone())),
+        Act::Delete(name) => assert!(state.snapshots.remove(*name).is_some()),
+        Act::Revert(name) => state.scans = state.snapshots[*name].clone(),
+    }
+    state
+}
+
+fn name(name: &str) -> SnapshotName {
+    SnapshotName::new(name).unwrap()
+}
+
+fn open_or_create(disk: &FaultyDisk, config: &MapConfig) -> Result<OutOfCoreTileMapper> {
+    match OutOfCoreTileMapper::open(at(disk), config.clone()) {
+        Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(at(disk), config.clone()),
+        opened => opened,
+    }
+}
+
+fn insert(mapper: &mut OutOfCoreTileMapper, scan: &Taken) -> Result<()> {
+    let points = ScanRef::in_sensor(scan.pose, &scan.points).with_intensities(&scan.intensities)?;
+    mapper.insert_points(&points).map(drop)
+}
+
+fn act(disk: &FaultyDisk, config: &MapConfig, before: &State, act: &Act) -> Result<()> {
+    match act {
+        Act::Scans(seeds) => {
+            let mut mapper = open_or_create(disk, config)?;
+            for seed in seeds.clone() {
+                insert(&mut mapper, &Taken::new(seed, 5))?;
+            }
+            mapper.flush()
+        }
+        Act::Move { seed, rest } => {
+            let poses = NewPoses::Numbered(new_poses(&before.scans.0, *seed, *rest));
+            remap(at(disk), &poses, &Remap::new(rework()), |_, _| ()).map(drop)
+        }
+        Act::RemoveScans(first, last) => {
+            let scans = ScanSelection::Numbers(*first, *last);
+            remove_scans(at(disk), &scans, false, &rework(), |_, _| ()).map(drop)
+        }
+        Act::RemovePoints(region) => remove_points(at(disk), region, &rework(), |_, _| ()).map(drop),
+        Act::Snapshot(of) => snapshot(at(disk), &name(of)),
+        Act::Delete(of) => delete_snapshot(at(disk), &name(of)),
+        Act::Revert(to) => revert(at(disk), &name(to), None, |_, _| ()).map(drop),
+    }
+}
+
+fn is_as(reader: &MapReader, config: &MapConfig, scans: &Scans) -> bool {
+    let is_kept = |taken: &BTreeMap<u64, Taken>| {
+        let kept = reader.kept_scans().unwrap().map(|scan| {
+            let scan = scan.unwrap();
+            let (mut points, mut intensities) = (Vec::new(), Vec::new());
+            scan.for_each_own_chunk(0..scan.len(), &mut |some, of_some| {
+                points.extend_from_slice(some);
+                intensities.extend_from_slice(of_some.unwrap());
+                true
+            })
+            .unwrap();
+            let pose = scan.world_from_sensor().unwrap();
+            (scan.number(), Taken { points, intensities, pose }.bits())
+        });
+        kept.eq(taken.iter().map(|(number, scan)| (*number, scan.bits())))
+    };
+    let is_scan_number = reader.scan_number() == scans.1;
+    is_scan_number && is_kept(&scans.0) && voxels_of(reader) == naive_map(config, &scans.0)
+}
+
+fn is_in_state(disk: &FaultyDisk, config: &MapConfig, state: &State) -> bool {
+    let reader = match MapReader::open(at(disk), 1) {
+        Err(Error::NoMap { .. }) => return state.scans.1 == 0,
+        opened => opened.unwrap(),
+    };
+    let infos = voxtile::operations::snapshots(at(disk)).unwrap();
+    let names: BTreeSet<_> = infos.iter().map(|info| info.name.clone()).collect();
+    names.iter().eq(state.snapshots.keys())
+        && is_as(&reader, config, &state.scans)
+        && state.snapshots.iter().all(|(of, scans)| {
+            is_as(&MapReader::open_snapshot(at(disk), &name(of), 1).unwrap(), config, scans)
+        })
+}
+
+fn check_whole(disk: &FaultyDisk, what: &str) {
+    let is_damage = |finding: &Finding| finding.severity == Severity::Damage;
+    let found = |finding: &Finding| assert!(!is_damage(finding), "{what}: {finding}");
+    verify(at(disk), found, |_, _| ()).unwrap();
+}
+
+fn region(low: f64, high: f64) -> Aabb {
+    Aabb { min: [low, -1.0, -1.0], max: [high, 1.5, 1.5] }
+}
+
+fn a_life() -> Vec<Act> {
+    vec![
+        Act::Scans(0..5),
+        Act::Move { seed: 7, rest: Some(1) },
+        Act::Snapshot("a"),
+        Act::RemoveScans(2, 3),
+        Act::Scans(5..7),
+        Act::RemovePoints(region(2.0, 4.0)),
+        Act::Move { seed: 9, rest: None },
+        Act::Revert("a"),
+        Act::Scans(7..8),
+        Act::Delete("a"),
+        Act::RemoveScans(6, 6),
+        Act::Scans(8..9),
+    ]
+}
+
+/// A life, and the naive state after each of its acts.
+struct Life {
+    acts: Vec<Act>,
+    states: Vec<State>,
+    config: MapConfig,
+}
+
+impl Life {
+    fn new(acts: Vec<Act>, config: MapConfig) -> Self {
+        let mut states = vec![State::default()];
+        for act in &acts {
+            states.push(naive(states.last().unwrap().clone(), act));
+        }
+        Self { acts, states, config }
+    }
+
+    fn live(&self, disk: &FaultyDisk, from: usize) -> std::result::Result<(), (usize, Error)> {
+        for number in from..self.acts.len() {
+            act(disk, &self.config, &self.states[number], &self.acts[number])
+                .map_err(|error| (number, error))?;
+        }
+        Ok(())
+    }
+
+    /// The map is in the state before an act or after it, whole, and life goes on to the same end.
+    fn check_after_crash(&self, disk: &FaultyDisk, number: usize, what: &str) {
+        let found = [number, number + 1]
+            .into_iter()
+            .find(|&number| is_in_state(disk, &self.config, &self.states[number]));
+        let from =
+            found.unwrap_or_else(|| panic!("{what}: neither before nor after {:?}", self.acts[number]));
+        if from > 0 {
+            check_whole(disk, what);
+        }
+        self.live(disk, from)
+            .unwrap_or_else(|(number, error)| panic!("{what}: then {:?}: {error:#}", self.acts[number]));
+        assert!(is_in_state(disk, &self.config, self.states.last().unwrap()), "{what}: another end");
+        check_files(disk, what);
+    }
+}
+
+/// Nothing lies around among the kept scans: one catalog, and no more points than there are.
+fn check_files(disk: &FaultyDisk, what: &str) {
+    drop(TileStore::open(disk.shared(), map()).unwrap());
+    let files = disk.files();
+    let kept = files.keys().filter(|path| path.to_string_lossy().contains("kept_scans"));
+    let catalogs = kept.filter(|path| path.to_string_lossy().contains("catalog")).count();
+    assert_eq!(catalogs, 1, "{what}");
+    check_whole(disk, what);
+}
+
+fn random_acts(random: &mut Random) -> Vec<Act> {
+    let (mut acts, mut snapshots) = (vec![Act::Scans(0..4)], Vec::new());
+    for step in 1..12 {
+        let act = match random.below(8) {
+            0 | 1 => Act::Scans(10 * step..10 * step + 1 + random.below(3)),
+            2 | 3 => Act::Move { seed: random.next(), rest: Some(random.below(4)) },
+            4 => Act::Move { seed: random.next(), rest: None },
+            5 => Act::RemovePoints(region(random.between(-2.0, 8.0), 9.0)),
+            6 => {
+                let name = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l"][step as usize];
+                snapshots.push(name);
+                Act::Snapshot(name)
+            }
+            _ => match snapshots.len() {
+                0 => Act::Scans(10 * step..10 * step + 2),
+                all => Act::Revert(snapshots[random.below(all as u64) as usize]),
+            },
+        };
+        acts.push(act);
+        let state = Life::new(acts.clone(), config()).states.pop().unwrap();
+        let scans: Vec<_> = state.scans.0.keys().copied().collect();
+        if scans.len() > 3 && random.below(3) == 0 {
+            let first = scans[random.below(scans.len() as u64 - 1) as usize];
+            acts.push(Act::RemoveScans(first, first + random.below(2)));
+        }
+    }
+    acts
+}
+
+#[test]
+fn random_lives_are_the_naive_map_of_the_scans_that_are_left() {
+    let mut configs = Vec::new();
+    for sensor_model in [SensorModel::default(), SensorModel::Iwlo(Iwlo::default())] {
+        for insert_mode in [InsertMode::PerScan, InsertMode::PerRay] {
+            configs.push(config().with_sensor_model(sensor_model).with_insert_mode(insert_mode));
+        }
+    }
+    for seed in 0..24 {
+        let life = Life::new(random_acts(&mut Random(seed)), configs[seed as usize % 4].clone());
+        let disk = FaultyDisk::new(Fault::None);
+        for (number, action) in life.acts.iter().enumerate() {
+            act(&disk, &life.config, &life.states[number], action)
+                .unwrap_or_else(|error| panic!("seed {seed}, {action:?}: {error:#}"));
+            let is_right = is_in_state(&disk, &life.config, &life.states[number + 1]);
+            assert!(is_right, "seed {seed}, {action:?} of {:?}", life.acts);
+        }
+        check_files(&disk, &format!("seed {seed}"));
+    }
+}
+
+#[test]
+fn an_operation_fails_and_the_next_attempt_goes() {
+    let life = Life::new(a_life(), config());
+    let undisturbed = FaultyDisk::new(Fault::None);
+    life.live(&undisturbed, 0).unwrap();
+    println!("{} operations", undisturbed.operations());
+    for at in some_of(0..undisturbed.operations(), 12) {
+        let disk = FaultyDisk::new(Fault::Fails(at));
+        if let Err((number, _)) = life.live(&disk, 0) {
+            life.check_after_crash(&disk.after_kill(), number, &format!("operation {at} fails"));
+        }
+    }
+}
+
+#[test]
+fn the_power_goes_at_every_change() {
+    let life = Life::new(a_life(), config());
+    let undisturbed = FaultyDisk::new(Fault::None);
+    life.live(&undisturbed, 0).unwrap();
+    println!("{} changes", undisturbed.changes());
+    for at in some_of(0..undisturbed.changes(), 12) {
+        let disk = FaultyDisk::new(Fault::Crashes(at));
+        let lived = life.live(&disk, 0);
+        assert!(disk.has_crashed());
+        let number = lived.map_or_else(|(number, _)| number, |()| life.acts.len() - 1);
+        for unsynced in [Unsynced::Shuffled(31 * at), Unsynced::Dropped, Unsynced::Kept] {
+            let left = disk.after_crash(unsynced);
+            life.check_after_crash(&left, number, &format!("crash at {at}, {unsynced:?}"));
+        }
+    }
+}
