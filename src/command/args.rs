@@ -4,6 +4,7 @@ mod export;
 mod local;
 mod picture;
 mod read;
+mod remap;
 mod snapshot;
 #[cfg(feature = "view")]
 mod view;
@@ -17,6 +18,7 @@ pub use local::{LocalArgs, PresetName};
 use log::LevelFilter;
 pub use picture::{PictureArgs, ReportArgs, TerminalArgs, ViewName};
 pub use read::{FrameName, ReadArgs};
+pub use remap::{RemapArgs, RemovePointsArgs, RemoveScansArgs, ReworkArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -92,6 +94,13 @@ pub enum Command {
     Clear(ClearArgs),
     /// Let the evidence of a map fade by the scans that have come since, in place
     Decay(DecayArgs),
+    /// Give the scans that a map keeps new poses, and map again what that touches, in place; or make another map of the
+    /// same scans
+    Remap(RemapArgs),
+    /// Take scans out of a map that keeps them, as if they had never been, in place
+    RemoveScans(RemoveScansArgs),
+    /// Take all points in a box out of the scans that a map keeps, and map again what their rays touched, in place
+    RemovePoints(RemovePointsArgs),
     /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit, and
     /// snapshots are not taken along
     Convert(ConvertArgs),
@@ -139,6 +148,9 @@ impl Command {
             Self::Clear(args) => args.json,
             Self::Decay(args) => args.json,
             Self::Convert(args) => args.json,
+            Self::Remap(args) => args.rework.json,
+            Self::RemoveScans(args) => args.rework.json,
+            Self::RemovePoints(args) => args.rework.json,
             Self::Verify(args) => args.json,
             Self::Repair(args) => args.json,
             #[cfg(feature = "view")]

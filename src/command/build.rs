@@ -28,6 +28,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let stop = stop_signal::catch()?;
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
+    check_no_rays(args, &config)?;
     let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room(args, &config), stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(stopped_early(args)) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
@@ -146,6 +147,15 @@ fn options_of(args: &BuildArgs) -> crate::Result<ReadOptions> {
         options.clouds.are_poses_needed = false;
     }
     Ok(options)
+}
+
+/// Batches have no rays to map again.
+fn check_no_rays(args: &BuildArgs, config: &MapConfig) -> crate::Result<()> {
+    if !(args.no_rays && config.keeps_scans) {
+        return Ok(());
+    }
+    let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build another map";
+    Err(Error::argument("--no-rays, --keep-scans", reason))
 }
 
 /// Takes the points of a scan as hits alone, as one batch; those outside the map's region are left out.

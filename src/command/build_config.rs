@@ -80,6 +80,7 @@ fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig
             config.with_memory_bytes(least.max(DEFAULT_MEMORY_BYTES))
         }
     };
+    config.keeps_scans |= args.keep_scans;
     config.rays.no_return_range_m = args.clear_no_return.or(begun.and_then(|rays| rays.no_return_range_m));
     config.rays.region = match &args.region {
         Some(corners) => Some(tiles_of(corners, &config.grid)?),

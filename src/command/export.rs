@@ -1,6 +1,7 @@
 use crate::command::args::{ExportArgs, ExportFormatName, WhatName};
 use crate::command::export_3d_tiles;
 use crate::command::export_origin::{ExportOrigin, OriginFile};
+use crate::command::export_scans;
 use crate::command::export_voxels::{self, log_odds_of};
 use crate::command::json;
 use crate::command::map_at::{point_of, read_map};
@@ -46,6 +47,9 @@ struct Exported {
 
 /// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
+    if let Some(folder) = &args.scans {
+        return export_scans::run(args, folder);
+    }
     if args.format == Some(ExportFormatName::ThreeDTiles) {
         return export_3d_tiles::run(args);
     }

@@ -59,7 +59,7 @@ pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
 }
 
 /// A pose of 7 numbers (position, quaternion) or of a 3x4 matrix; and in the 9 numbers of a 3x3 matrix a rotation.
-fn pose_of(numbers: &[f64]) -> Result<(RigidPose, Pose)> {
+pub fn pose_of(numbers: &[f64]) -> Result<(RigidPose, Pose)> {
     let pose = match *numbers {
         [x, y, z, qx, qy, qz, qw] => {
             let pose = Pose::from_quaternion([x, y, z], [qx, qy, qz, qw])?;

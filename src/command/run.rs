@@ -6,8 +6,8 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, one_heap, picture, progress, query, raycast, repair, report, revert, scans, share, snapshot,
-    snapshots, threads, verify,
+    merge, one_heap, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report,
+    revert, scans, share, snapshot, snapshots, threads, verify,
 };
 use clap::Parser;
 use std::ffi::OsString;
@@ -66,6 +66,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Clear(args) => clear::run(&args),
         Command::Decay(args) => decay::run(&args),
         Command::Convert(args) => convert::run(&args),
+        Command::Remap(args) => remap::run(&args),
+        Command::RemoveScans(args) => remove_scans::run(&args),
+        Command::RemovePoints(args) => remove_points::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
         #[cfg(feature = "view")]
@@ -83,6 +86,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 fn is_parallel(command: &Command) -> bool {
     match command {
         Command::Build(_)
+        | Command::Remap(_)
+        | Command::RemoveScans(_)
+        | Command::RemovePoints(_)
         | Command::Local(_)
         | Command::Demo(_)
         | Command::Picture(_)

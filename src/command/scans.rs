@@ -6,8 +6,9 @@ use crate::command::read_options::read_options;
 use crate::command::scan_input;
 use crate::io::{PointRoom, ScanSource};
 use crate::space::Point;
+use crate::store::ScanRecord;
 use anyhow::Context;
-use indicatif::HumanCount;
+use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -21,8 +22,10 @@ const ROOM_BYTES: usize = 64 << 20;
 struct Overview {
     format: String,
     scans: u64,
-    /// `None` for a map, which does not keep them.
+    /// `None` for a map that does not keep them.
     points: Option<u64>,
+    /// Bytes on disk of the scans that a map keeps.
+    kept_bytes: Option<u64>,
     first_stamp_ns: Option<i64>,
     last_stamp_ns: Option<i64>,
     fields: Vec<String>,
@@ -38,6 +41,10 @@ struct Row {
     name: Option<String>,
     stamp_ns: Option<i64>,
     points: Option<u64>,
+    /// How many tiles it touched, if the map keeps it.
+    tiles: Option<u64>,
+    /// Bytes on disk, if the map keeps it.
+    kept_bytes: Option<u64>,
     origin_m: Point,
 }
 
@@ -60,18 +67,28 @@ fn is_map(path: &Path) -> bool {
 }
 
 fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
-    let scans = read_map(&args.data, |reader| Ok(reader.scans()?))?;
     let mut overview = Overview { format: "map".to_owned(), ..Overview::default() };
-    for scan in scans {
-        let row = Row {
-            number: scan.number,
-            name: None,
-            stamp_ns: scan.stamp_ns,
-            points: None,
-            origin_m: scan.origin_m,
-        };
-        overview.add(&row, args, out)?;
-    }
+    read_map(&args.data, |reader| {
+        overview = Overview { format: overview.format.clone(), ..Overview::default() };
+        if !reader.keeps_scans() {
+            overview.remarks.push("it keeps no scans; build with --keep-scans to have them".to_owned());
+            return reader.scans()?.iter().try_for_each(|scan| overview.add(&Row::of(scan), args, out));
+        }
+        overview.points = Some(0);
+        let mut scans = reader.kept_scans()?;
+        while let Some(scan) = scans.next_record()? {
+            let listed = ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m());
+            let (points, tiles) = (Some(scan.points), Some(scan.tiles.len() as u64));
+            let row = Row { points, tiles, kept_bytes: Some(scan.place.bytes), ..Row::of(&listed) };
+            overview.kept_bytes = Some(overview.kept_bytes.unwrap_or_default() + scan.place.bytes);
+            overview.add(&row, args, out)?;
+        }
+        let not_kept = (reader.scans()?.len() as u64).saturating_sub(overview.scans);
+        if not_kept > 0 {
+            overview.remarks.push(format!("{not_kept} more scans are in the map, whose points are not kept"));
+        }
+        Ok(())
+    })?;
     Ok(overview)
 }
 
@@ -92,6 +109,8 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
             name: Some(scan.name.clone()),
             stamp_ns: scan.stamp_ns,
             points: Some(scan.points_in_sensor.len() as u64),
+            tiles: None,
+            kept_bytes: None,
             origin_m: scan.world_from_sensor.position_m(),
         };
         overview.add(&row, args, out)?;
@@ -122,6 +141,10 @@ impl Overview {
         writeln!(out, "input     {}: {}", data.display(), self.format)?;
         let points = self.points.map_or(String::new(), |points| format!(", {} points", HumanCount(points)));
         writeln!(out, "scans     {}{points}", HumanCount(self.scans))?;
+        if let (Some(bytes), Some(points)) = (self.kept_bytes, self.points) {
+            let a_point = bytes as f64 / points.max(1) as f64;
+            writeln!(out, "kept      {}, {a_point:.2} bytes a point", HumanBytes(bytes))?;
+        }
         if let (Some(first), Some(last)) = (self.first_stamp_ns, self.last_stamp_ns) {
             let (first, span) = (seconds(first), last.saturating_sub(first));
             writeln!(out, "time      {first} to {} s: {:.1} s", seconds(last), span as f64 * 1e-9)?;
@@ -137,12 +160,27 @@ impl Overview {
 }
 
 impl Row {
+    fn of(scan: &ScanRecord) -> Self {
+        Self {
+            number: scan.number,
+            name: None,
+            stamp_ns: scan.stamp_ns,
+            points: None,
+            tiles: None,
+            kept_bytes: None,
+            origin_m: scan.origin_m,
+        }
+    }
+
     fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
         let stamp = self.stamp_ns.map_or("-".to_owned(), seconds);
         let [x, y, z] = self.origin_m;
         write!(out, "{:>8}  {stamp:>20}  {x:.3} {y:.3} {z:.3}", self.number)?;
         if let Some(points) = self.points {
             write!(out, "  {points} points")?;
+        }
+        if let Some(tiles) = self.tiles {
+            write!(out, "  {tiles} tiles")?;
         }
         writeln!(out, "  {}", self.name.as_deref().unwrap_or_default())
     }

@@ -17,6 +17,18 @@ const GRACE: Duration = Duration::from_millis(500);
 ///
 /// A thread of its own waits for them, so that nothing else that goes on keeps it from answering.
 pub fn catch() -> anyhow::Result<Stop> {
+    catch_saying(
+        "stopping: what is mapped so far is made durable first; a second Ctrl-C or SIGTERM ends at once and loses what is not",
+        "ended at once: scans since the last flush are not in the map",
+    )
+}
+
+/// The same for work that is done as a whole or not at all.
+pub fn catch_undone() -> anyhow::Result<Stop> {
+    catch_saying("stopping: the map stays as it was", "ended at once: the map is as it was")
+}
+
+fn catch_saying(first_answer: &'static str, second_answer: &'static str) -> anyhow::Result<Stop> {
     let stop = Stop::default();
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let asked = stop.clone();
@@ -27,14 +39,11 @@ pub fn catch() -> anyhow::Result<Stop> {
                 None => {
                     first = Some(Instant::now());
                     asked.set();
-                    say(
-                        "stopping: what is mapped so far is made durable first; a second Ctrl-C or SIGTERM ends at once and \
-                         loses what is not",
-                    );
+                    say(first_answer);
                 }
                 Some(first) if first.elapsed() < GRACE => {}
                 Some(_) => {
-                    say("ended at once: scans since the last flush are not in the map");
+                    say(second_answer);
                     std::process::exit(i32::from(INTERRUPTED));
                 }
             }

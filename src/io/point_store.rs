@@ -73,7 +73,7 @@ impl PointStore {
     }
 
     /// Removes all points; the next ones come with intensities or without.
-    pub(super) fn begin(&mut self, has_intensities: bool) {
+    pub(crate) fn begin(&mut self, has_intensities: bool) {
         self.points.clear();
         self.intensities = has_intensities.then(Vec::new);
         (self.filed, self.file) = (0, None);
@@ -84,7 +84,7 @@ impl PointStore {
     }
 
     /// Reserves memory for so many points.
-    pub(super) fn reserve(&mut self, points: usize) {
+    pub(crate) fn reserve(&mut self, points: usize) {
         let points = points.min(self.room.most_points);
         self.points.reserve_exact(points);
         if let Some(intensities) = &mut self.intensities {
@@ -98,7 +98,7 @@ impl PointStore {
     ///
     /// A file that cannot be written.
     #[inline]
-    pub(super) fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
+    pub(crate) fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
         if self.points.len() == self.room.most_points {
             self.put_in_file()?;
         }

@@ -1,4 +1,4 @@
-use super::kept_scan::KeptScan;
+use super::kept_scans::KeptScans;
 use super::statistics::IoCounts;
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::{MapConfig, MemoryLimit};
@@ -253,11 +253,12 @@ impl MapReader {
     /// # Errors
     ///
     /// A map that keeps none, with a hint; a list that cannot be read or is damaged.
-    pub fn kept_scans(&self) -> Result<KeptScans<'_>> {
+    pub fn kept_scans(&self) -> Result<KeptScans> {
         if !self.keeps_scans() {
             return Err(Error::argument(self.folder().display().to_string(), NOT_KEPT));
         }
-        Ok(KeptScans { reader: self, records: self.kept_records()? })
+        let flush_number = self.snapshot().is_none().then(|| self.flush_number());
+        Ok(KeptScans::new(self.disk.clone(), self.store.layout().clone(), self.kept_records()?, flush_number))
     }
 
     pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
@@ -324,29 +325,6 @@ impl MapReader {
 /// What to do about a map without kept scans.
 pub(crate) const NOT_KEPT: &str =
     "keeps no scans, so that it cannot be mapped again; build it with --keep-scans to have them";
-
-/// Most points of a kept scan that are read into memory: 7 MiB. Those of a larger one are read again when needed.
-const MOST_POINTS_IN_MEMORY: u64 = 1 << 18;
-
-/// The scans that a map keeps, one at a time, in order.
-#[derive(Debug)]
-pub struct KeptScans<'a> {
-    reader: &'a MapReader,
-    records: KeptRecords,
-}
-
-impl Iterator for KeptScans<'_> {
-    type Item = Result<KeptScan>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let (disk, layout) = (&self.reader.disk, self.reader.store.layout());
-        let scan = match self.records.next_kept() {
-            Ok(record) => KeptScan::open(disk, layout, record?, MOST_POINTS_IN_MEMORY),
-            Err(error) => Err(error),
-        };
-        Some(scan.map_err(|error| self.reader.explain(error)))
-    }
-}
 
 impl MapView for MapReader {
     fn config(&self) -> &MapConfig {

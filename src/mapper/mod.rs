@@ -16,6 +16,7 @@
 
 mod in_memory;
 mod kept_scan;
+mod kept_scans;
 mod live;
 mod map_reader;
 mod octree_map;
@@ -33,9 +34,10 @@ mod traits;
 pub use in_memory::InMemoryMapper;
 pub use kept_scan::KeptScan;
 pub(crate) use kept_scan::pose_of_numbers;
+pub use kept_scans::KeptScans;
 pub use live::{LiveReader, LiveView};
+pub use map_reader::MapReader;
 pub(crate) use map_reader::NOT_KEPT;
-pub use map_reader::{KeptScans, MapReader};
 pub use octree_map::OctreeMap;
 pub use options::MapOptions;
 pub use out_of_core::OutOfCoreTileMapper;

@@ -1,4 +1,5 @@
 use bytesize::ByteSize;
+use clap::builder::ArgPredicate;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -9,8 +10,17 @@ pub struct ExportArgs {
     pub map: PathBuf,
     /// File to write; its extension says what: .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet .mcap hold
     /// voxels, .glb their surface, .pgm a flat map of nav2, .png heights, .bt .ot the whole octree. - is standard output
-    #[arg(short = 'o', long = "output", value_name = "FILE")]
+    #[arg(
+        short = 'o',
+        long = "output",
+        value_name = "FILE",
+        required_unless_present = "scans",
+        default_value_if("scans", ArgPredicate::IsPresent, "")
+    )]
     pub output: PathBuf,
+    /// In place of voxels, write the scans that the map keeps into this folder: a .pcd each, and poses_tum.txt
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "format", "what", "region", "origin"])]
+    pub scans: Option<PathBuf>,
     /// What to write, whatever the extension
     #[arg(long, value_name = "FORMAT")]
     pub format: Option<ExportFormatName>,

@@ -3,14 +3,16 @@ use crate::error::Result;
 use crate::mapper::{MapReader, Mapper, OutOfCoreTileMapper};
 use crate::scan::{ScanReport, Stop};
 use crate::store::{InputRecord, MapPath};
+use serde::Serialize;
 
 /// What came of mapping the scans of a map anew.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct MappedAnew {
     /// Scans of the new map.
     pub scans: u64,
     /// What happened to their points.
+    #[serde(flatten)]
     pub report: ScanReport,
 }
 

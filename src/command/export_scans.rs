@@ -1,0 +1,131 @@
+//! The scans that a map keeps, as a folder that `build` and others read: a PCD file each, and their poses.
+
+use crate::command::args::ExportArgs;
+use crate::command::json;
+use crate::command::map_at::MapAt;
+use crate::command::progress::Progress;
+use crate::mapper::KeptScan;
+use crate::scan::ScanPoints;
+use crate::{Error, Result};
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// What was written.
+#[derive(Debug, Default, Serialize)]
+struct Exported {
+    scans: u64,
+    points: u64,
+    /// Whether the points are in the world frame, so that reading them takes `--world-frame`.
+    world_frame: bool,
+}
+
+/// The poses, in the format of TUM: seconds, position, quaternion.
+const POSES: &str = "poses_tum.txt";
+
+pub fn run(args: &ExportArgs, folder: &Path) -> anyhow::Result<ExitCode> {
+    let reader = MapAt::of(&args.map)?.open()?;
+    let (mut records, mut all, mut are_stamped) = (reader.kept_scans()?, 0, true);
+    while let Some(record) = records.next_record()? {
+        all += 1;
+        are_stamped &= record.stamp_ns.is_some();
+    }
+    make_empty(folder)?;
+    let progress = Progress::over_scans(Some(all));
+    let poses = folder.join(POSES);
+    let open = File::create_new(&poses).map_err(|error| Error::io(&poses, "create", error))?;
+    let mut lines = BufWriter::new(open);
+    let mut exported = Exported::default();
+    // Names in the order of the scans.
+    let digits = all.to_string().len().max(6);
+    for scan in reader.kept_scans()? {
+        let scan = scan?;
+        let is_in_world = scan.world_from_sensor().is_none();
+        if exported.scans > 0 && is_in_world != exported.world_frame {
+            let reason = "has scans in the world frame and others in the frame of their sensor; one folder cannot hold both";
+            return Err(Error::argument(args.map.display().to_string(), reason).into());
+        }
+        let path = folder.join(format!("{:0digits$}.pcd", scan.number()));
+        write_pcd(&scan, &path)?;
+        write_pose(&scan, are_stamped, &mut lines).map_err(|error| Error::io(&poses, "write", error))?;
+        exported.world_frame = is_in_world;
+        exported.scans += 1;
+        exported.points += scan.len() as u64;
+        progress.step();
+    }
+    lines.flush().map_err(|error| Error::io(&poses, "write", error))?;
+    drop(progress);
+    let mut out = io::stdout().lock();
+    if args.json {
+        json::print(&exported, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (scans, points) = (HumanCount(exported.scans), HumanCount(exported.points));
+    writeln!(out, "exported  {scans} scans, {points} points, and {POSES}, to {}", folder.display())?;
+    if exported.world_frame {
+        writeln!(out, "note      the points are in the world frame: build them with --world-frame")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A folder that is not there yet or has nothing in it.
+fn make_empty(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|error| Error::io(folder, "create", error))?;
+    let mut names = fs::read_dir(folder).map_err(|error| Error::io(folder, "list", error))?;
+    match names.next() {
+        None => Ok(()),
+        Some(_) => {
+            let hint = "choose a folder that is empty or does not exist yet";
+            Err(Error::AlreadyExists { path: folder.to_owned(), hint })
+        }
+    }
+}
+
+fn write_pose(scan: &KeptScan, is_stamped: bool, out: &mut impl Write) -> io::Result<()> {
+    let stamp_ns = scan.stamp_ns().filter(|_| is_stamped).unwrap_or_default();
+    let [x, y, z] = scan.origin();
+    let [qx, qy, qz, qw] = scan.world_from_sensor().map_or([0.0, 0.0, 0.0, 1.0], |pose| pose.quaternion());
+    let (whole, rest) = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+    // The shortest decimals that read back to the same bits.
+    writeln!(out, "{whole}.{rest:09} {x} {y} {z} {qx} {qy} {qz} {qw}")
+}
+
+/// Writes the points as they were inserted: `float32` where that is all there is, else `float64`.
+fn write_pcd(scan: &KeptScan, path: &Path) -> Result<()> {
+    let mut is_narrow = true;
+    scan.for_each_own_chunk(0..scan.len(), &mut |points, _| {
+        let is_f32 = |x: &f64| f64::from(*x as f32).to_bits() == x.to_bits() || x.is_nan();
+        is_narrow &= points.iter().flatten().all(is_f32);
+        is_narrow
+    })?;
+    let (size, points) = (if is_narrow { 4 } else { 8 }, scan.len());
+    let (field, four, float, one) = match scan.has_intensities() {
+        true => (" intensity", " 4", " F", " 1"),
+        false => ("", "", "", ""),
+    };
+    let header = format!(
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z{field}\nSIZE {size} {size} {size}{four}\n\
+         TYPE F F F{float}\nCOUNT 1 1 1{one}\nWIDTH {points}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\n\
+         DATA binary\n"
+    );
+    let cannot = |error| Error::io(path, "write", error);
+    let mut out = BufWriter::with_capacity(1 << 18, File::create_new(path).map_err(cannot)?);
+    out.write_all(header.as_bytes()).map_err(cannot)?;
+    let mut written = Ok(());
+    scan.for_each_own_chunk(0..points, &mut |points, intensities| {
+        written = points.iter().enumerate().try_for_each(|(at, point)| {
+            for x in point {
+                match is_narrow {
+                    true => out.write_all(&(*x as f32).to_le_bytes())?,
+                    false => out.write_all(&x.to_le_bytes())?,
+                }
+            }
+            intensities.map_or(Ok(()), |intensities| out.write_all(&intensities[at].to_le_bytes()))
+        });
+        written.is_ok()
+    })?;
+    written.and_then(|()| out.flush()).map_err(cannot)
+}

@@ -1,0 +1,96 @@
+use crate::command::args::RemapArgs;
+use crate::command::read_options::pose_of;
+use crate::io::read_poses;
+use crate::operations::NewPoses;
+use crate::scan::Pose;
+use crate::store::KeptRecord;
+use crate::{Error, Result};
+use std::path::Path;
+use voxtile_clouds::RigidPose;
+use voxtile_clouds::poses::{Found, Trajectory};
+
+/// Most scans that an error names.
+const MOST_NAMED: usize = 5;
+
+/// The poses of a file for the scans that a map keeps, as a build with that file would give them.
+pub fn poses_for(args: &RemapArgs, file: &Path, scans: &[KeptRecord]) -> Result<NewPoses> {
+    let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
+    let is_plain = args.calib.is_none() && body_from_sensor.is_none();
+    let tolerance_ns = (args.pose_tolerance * 1e9).round() as i64;
+    let trajectory = Trajectory::read(file, args.calib.as_deref())?;
+    trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
+    if trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns) {
+        // As a folder of PCD takes them, to the bit.
+        if is_plain
+            && let Ok(poses) = read_poses(file)
+            && poses.len() == scans.len()
+        {
+            return Ok(NewPoses::InOrder(poses));
+        }
+        let poses = (0..scans.len()).filter_map(|number| trajectory.by_number(number));
+        let poses = poses.map(|pose| sensor_pose(&pose, body_from_sensor.as_ref()));
+        return Ok(NewPoses::InOrder(poses.collect::<Result<_>>()?));
+    }
+    if trajectory.span_ns().is_none() || scans.iter().any(|scan| scan.stamp_ns.is_none()) {
+        let reason = other_number(trajectory.len(), scans);
+        return Err(Error::argument(file.display().to_string(), reason));
+    }
+    by_time(&trajectory, file, scans, tolerance_ns, body_from_sensor.as_ref())
+}
+
+/// Whether the poses are those of the scans in order, as far as time stamps tell.
+fn is_in_step(trajectory: &Trajectory, scans: &[KeptRecord], tolerance_ns: i64) -> bool {
+    let (stamps, most) = (trajectory.stamps_ns(), u64::try_from(tolerance_ns).unwrap_or(0));
+    let mut pairs = stamps.zip(scans).filter_map(|(stamp_ns, scan)| Some((stamp_ns, scan.stamp_ns?)));
+    pairs.all(|(of_pose, of_scan)| of_pose.abs_diff(of_scan) <= most)
+}
+
+fn other_number(poses: usize, scans: &[KeptRecord]) -> String {
+    let all = scans.len();
+    match scans.get(poses) {
+        Some(scan) => format!(
+            "{poses} poses for {all} scans that the map keeps: none from scan {} on, and there are no time stamps to tell \
+             which belong together",
+            scan.number
+        ),
+        None => format!(
+            "{poses} poses for {all} scans that the map keeps: {} too many, and there are no time stamps to tell which \
+             belong together",
+            poses - all
+        ),
+    }
+}
+
+fn by_time(
+    trajectory: &Trajectory,
+    file: &Path,
+    scans: &[KeptRecord],
+    tolerance_ns: i64,
+    body_from_sensor: Option<&RigidPose>,
+) -> Result<NewPoses> {
+    let (mut poses, mut missing) = (Vec::with_capacity(scans.len()), Vec::new());
+    for scan in scans {
+        let stamp_ns = scan.stamp_ns.unwrap_or_default();
+        match trajectory.at(stamp_ns, tolerance_ns) {
+            Found::Exact(pose) | Found::Between(pose) => {
+                poses.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
+            }
+            _ => missing.push(format!("{} at {:.6} s", scan.number, stamp_ns as f64 * 1e-9)),
+        }
+    }
+    if missing.is_empty() {
+        return Ok(NewPoses::Numbered(poses));
+    }
+    let named = missing[..missing.len().min(MOST_NAMED)].join(", ");
+    let more = match missing.len().saturating_sub(MOST_NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let reason = format!("has no pose near in time for scan {named}{more}; --pose-tolerance allows for more");
+    Err(Error::argument(file.display().to_string(), reason))
+}
+
+fn sensor_pose(body: &RigidPose, body_from_sensor: Option<&RigidPose>) -> Result<Pose> {
+    let sensor = body_from_sensor.map_or(*body, |sensor| body.then(sensor));
+    Pose::from_quaternion(sensor.position_m, sensor.quaternion)
+}
