@@ -334,8 +334,11 @@ impl OutOfCoreTileMapper {
     }
 
     /// Commits what was mapped again; the map has as many scans as before.
-    pub(super) fn commit_again(&mut self, scan_number: u64) -> Result<()> {
+    pub(super) fn commit_again(&mut self, scan_number: u64, have_poses_changed: bool) -> Result<()> {
         let mut pager = self.pager();
+        if have_poses_changed {
+            pager.forget_poses_of_inputs();
+        }
         pager.set_scan_number(scan_number);
         pager.flush()
     }

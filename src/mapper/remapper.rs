@@ -55,9 +55,9 @@ impl Remapper {
         self.mapper.pager_keep(scan)
     }
 
-    /// Commits; then removes what nothing needs any more.
-    pub(crate) fn finish(mut self) -> Result<()> {
-        self.mapper.commit_again(self.scan_number)?;
+    /// Commits, with a note where the poses are no longer those of the map's inputs; then removes what nothing needs any more.
+    pub(crate) fn finish(mut self, have_poses_changed: bool) -> Result<()> {
+        self.mapper.commit_again(self.scan_number, have_poses_changed)?;
         self.mapper.with_store(TileStore::release_scans);
         Ok(())
     }

@@ -7,16 +7,16 @@ use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
-use voxtile::integrity::{Finding, Severity, verify};
+use voxtile::integrity::{Finding, Severity, repair, verify};
 use voxtile::operations::{
     NewPoses, Part, Remap, Rework, ScanSelection, clear, delete_snapshot, remap, remove_points, remove_scans,
     revert, snapshot,
 };
-use voxtile::scan::ScanPoints;
+use voxtile::scan::{PointBatch, ScanPoints, Stop};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::{SnapshotName, TileStore};
 use voxtile::{
-    Aabb, Error, InsertMode, MapConfig, MapPath, MapReader, MapView, Mapper, MemoryLimit,
+    Aabb, Error, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
     OutOfCoreTileMapper, Pose, Result, Scan, ScanRef,
 };
 
@@ -295,9 +295,9 @@ impl Life {
 fn check_files(disk: &FaultyDisk, what: &str) {
     drop(TileStore::open(disk.shared(), map()).unwrap());
     let files = disk.files();
-    let kept = files.keys().filter(|path| path.to_string_lossy().contains("kept_scans"));
-    let catalogs = kept.filter(|path| path.to_string_lossy().contains("catalog")).count();
-    assert_eq!(catalogs, 1, "{what}");
+    let catalogs = files.keys().filter(|path| path.to_string_lossy().contains("kept_scans/catalog")).count();
+    let snapshots = voxtile::operations::snapshots(at(disk)).unwrap().len();
+    assert!((1..=1 + snapshots).contains(&catalogs), "{what}: {catalogs} catalogs");
     check_whole(disk, what);
 }
 
@@ -381,4 +381,223 @@ fn the_power_goes_at_every_change() {
             life.check_after_crash(&left, number, &format!("crash at {at}, {unsynced:?}"));
         }
     }
+}
+
+fn a_map_with_kept_scans() -> (FaultyDisk, State) {
+    let disk = FaultyDisk::new(Fault::None);
+    let state = naive(State::default(), &Act::Scans(0..5));
+    act(&disk, &config(), &State::default(), &Act::Scans(0..5)).unwrap();
+    (disk, state)
+}
+
+/// Whatever byte of the kept scans is damaged: it is found, or it is none that counts; and then nothing is changed.
+#[test]
+fn damage_among_kept_scans_is_named_and_nothing_is_changed() {
+    let (whole, state) = a_map_with_kept_scans();
+    let files = whole.files();
+    let kept = files.iter().filter(|(path, _)| path.to_string_lossy().contains("kept_scans"));
+    let mut found = 0;
+    for (path, bytes) in kept {
+        for offset in (0..bytes.len()).step_by(7) {
+            let disk = whole.copy();
+            let mut damaged = bytes.clone();
+            damaged[offset] ^= 0x20;
+            disk.put(path, &damaged);
+            let what = format!("{} at {offset}", path.display());
+            let mut findings = Vec::new();
+            verify(at(&disk), |finding| findings.push(finding.to_string()), |_, _| ()).unwrap();
+            let poses = NewPoses::Numbered(new_poses(&state.scans.0, 3, None));
+            let before = disk.files();
+            let remapped = remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ());
+            match remapped {
+                Ok(_) => {
+                    let moved = naive(state.clone(), &Act::Move { seed: 3, rest: None });
+                    assert!(findings.is_empty() && is_in_state(&disk, &config(), &moved), "{what}");
+                }
+                Err(error) => {
+                    found += 1;
+                    assert!(matches!(error, Error::Damaged { .. }), "{what}: {error:#}");
+                    assert!(!findings.is_empty(), "{what}: {error:#} was not found before");
+                    assert!(format!("{error:#}").contains("kept_scans"), "{what}: {error:#}");
+                    let tables = |files: &BTreeMap<std::path::PathBuf, Vec<u8>>| {
+                        let tables =
+                            files.iter().filter(|(path, _)| path.to_string_lossy().contains("tile_"));
+                        tables.map(|(path, bytes)| (path.clone(), bytes.clone())).collect::<Vec<_>>()
+                    };
+                    assert_eq!(tables(&before), tables(&disk.files()), "{what}");
+                }
+            }
+            // What is left is a map like any other, whose scans are not all kept.
+            repair(at(&disk), |_| (), |_, _| ()).unwrap();
+            check_whole(&disk, &what);
+        }
+    }
+    assert!(found > 100, "{found}");
+}
+
+#[test]
+fn segments_and_catalogs_that_are_missing_are_damage() {
+    let (whole, state) = a_map_with_kept_scans();
+    let names: Vec<_> = whole.files().into_keys().collect();
+    let names = names.iter().filter(|path| path.to_string_lossy().contains("kept_scans"));
+    for path in names {
+        let disk = whole.copy();
+        disk.take(path);
+        let poses = NewPoses::Numbered(new_poses(&state.scans.0, 3, None));
+        let message = message_of(remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()));
+        assert!(message.contains("missing"), "{message}");
+        let mut damage = 0;
+        verify(at(&disk), |_| damage += 1, |_, _| ()).unwrap();
+        assert!(damage > 0);
+        repair(at(&disk), |_| (), |_, _| ()).unwrap();
+        check_whole(&disk, "repaired");
+        let reader = MapReader::open(at(&disk), 1).unwrap();
+        assert_eq!(voxels_of(&reader), naive_map(&config(), &state.scans.0));
+    }
+}
+
+#[test]
+fn what_is_no_scan_is_named_and_refused() {
+    let refused = |disk: &FaultyDisk| {
+        let poses = NewPoses::Numbered(vec![(1, Pose::identity())]);
+        message_of(remap(at(disk), &poses, &Remap::new(rework()), |_, _| ()))
+    };
+    let (disk, _) = a_map_with_kept_scans();
+    clear(at(&disk), &Part::Inside(region(0.0, 1.0)), |_, _| ()).unwrap();
+    assert!(refused(&disk).contains("a change that is no scan: clear"), "{}", refused(&disk));
+
+    let (disk, _) = a_map_with_kept_scans();
+    let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
+    let batch = PointBatch { points: &[[0.1; 3]], intensities: Some(&[9.0]), is_occupied: &[true] };
+    mapper.batch_update(&batch).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    assert!(refused(&disk).contains("number 6, which is no scan"), "{}", refused(&disk));
+
+    // Scans from before, and a map without any.
+    let disk = FaultyDisk::new(Fault::None);
+    let without = config().with_kept_scans(false);
+    act(&disk, &without, &State::default(), &Act::Scans(0..2)).unwrap();
+    assert!(refused(&disk).contains("keeps no scans"), "{}", refused(&disk));
+    let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
+    insert(&mut mapper, &Taken::new(3, 5)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    assert!(refused(&disk).contains("scan 1, whose points are not kept"), "{}", refused(&disk));
+    assert_eq!(MapReader::open(at(&disk), 1).unwrap().scans().unwrap().len(), 3);
+
+    // In the world frame there is no pose that could change.
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
+    mapper.insert_scan(&Taken::new(3, 5).in_world()).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    assert!(refused(&disk).contains("scan 1 has its points in the world frame"), "{}", refused(&disk));
+    let region = region(-9.0, 9.0);
+    let removed = remove_points(at(&disk), &region, &rework(), |_, _| ()).unwrap();
+    assert!(removed.points_removed > 0);
+}
+
+#[test]
+fn new_poses_that_do_not_fit_are_named() {
+    let (disk, _) = a_map_with_kept_scans();
+    let wrong = |poses: NewPoses| message_of(remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()));
+    let identity = Pose::identity();
+    let message = wrong(NewPoses::InOrder(vec![identity; 3]));
+    assert!(message.contains("3 poses for 5 scans: none from scan 4 of the map on"), "{message}");
+    let message = wrong(NewPoses::InOrder(vec![identity; 7]));
+    assert!(message.contains("7 poses for 5 scans: 2 too many"), "{message}");
+    let message = wrong(NewPoses::Numbered(vec![(2, identity), (9, identity)]));
+    assert!(message.contains("no scan with the number 9"), "{message}");
+    let message = wrong(NewPoses::Numbered(vec![(2, identity), (2, identity)]));
+    assert!(message.contains("two poses for scan 2"), "{message}");
+    let message = wrong(NewPoses::Stamped { poses: vec![(0, identity)], tolerance_ns: 5 });
+    assert!(message.contains("no time stamp in the map"), "{message}");
+    let mut isometry = *identity.isometry();
+    isometry.translation.vector.y = f64::NAN;
+    let message = wrong(NewPoses::Numbered(vec![(4, isometry.into())]));
+    assert!(message.contains("the pose of scan 4 is not finite"), "{message}");
+}
+
+#[test]
+fn scans_that_hardly_move_are_left_alone_and_told() {
+    let (disk, state) = a_map_with_kept_scans();
+    let digest = MapReader::open(at(&disk), 1).unwrap().digest().unwrap();
+    let moved = |by_m: f64| {
+        let poses = state.scans.0.iter().map(|(&number, scan)| {
+            let mut isometry = *scan.pose.isometry();
+            isometry.translation.vector.x += by_m * number as f64;
+            (number, isometry.into())
+        });
+        NewPoses::Numbered(poses.collect())
+    };
+    let how = Remap::new(rework()).with_tolerance((0.045, 0.01));
+    let remapped = remap(at(&disk), &moved(0.01), &how, |_, _| ()).unwrap();
+    assert_eq!((remapped.scans_within_tolerance, remapped.mapped.scans_changed), (4, 1), "{remapped:?}");
+    let left_m = remapped.largest_move_left_m;
+    assert!((left_m - 0.04).abs() < 1e-9 && (remapped.largest_move_m - 0.05).abs() < 1e-9);
+    assert!(MapReader::open(at(&disk), 1).unwrap().digest().unwrap() != digest);
+    let wide = Remap::new(rework().with_dry_run(true)).with_tolerance((9.0, 9.0));
+    assert_eq!(remap(at(&disk), &moved(0.02), &wide, |_, _| ()).unwrap().mapped.scans_changed, 0);
+}
+
+/// The same scans in little memory, and a request to stop in the middle.
+#[test]
+fn a_dry_run_and_a_stop_change_nothing() {
+    let (disk, state) = a_map_with_kept_scans();
+    let poses = NewPoses::Numbered(new_poses(&state.scans.0, 5, Some(1)));
+    let before = disk.files();
+    let dry = Remap::new(rework().with_dry_run(true));
+    let told = remap(at(&disk), &poses, &dry, |_, _| ()).unwrap().mapped;
+    assert!(told.estimated_s.is_some() && told.scans_changed == 2 && told.tiles_mapped > 0, "{told:?}");
+    let is_lock = |path: &std::path::PathBuf| path.ends_with("writer.lock");
+    let without_lock = |files: BTreeMap<std::path::PathBuf, Vec<u8>>| {
+        files.into_iter().filter(|(path, _)| !is_lock(path)).collect::<Vec<_>>()
+    };
+    assert!(without_lock(before) == without_lock(disk.files()));
+    let stop = Stop::default();
+    let how = Remap::new(rework().with_stop(stop.clone()));
+    let stopped = remap(at(&disk), &poses, &how, |done, _| {
+        if done == 1 {
+            stop.set()
+        }
+    });
+    assert!(matches!(stopped, Err(Error::Stopped)));
+    assert!(is_in_state(&disk, &config(), &state));
+    check_whole(&disk, "stopped");
+    let done = remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()).unwrap().mapped;
+    assert_eq!((done.tiles_mapped > 0, done.scans_changed), (true, 2));
+}
+
+#[test]
+fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
+    for (input, seeds) in [("first", 0..3), ("second", 3..5)] {
+        mapper.begin_input(input).unwrap();
+        seeds.for_each(|seed| insert(&mut mapper, &Taken::new(seed, 5)).unwrap());
+    }
+    mapper.snapshot(&name("old")).unwrap();
+    drop(mapper);
+    let remove = |scans: ScanSelection, from_snapshots| {
+        remove_scans(at(&disk), &scans, from_snapshots, &rework(), |_, _| ())
+    };
+    assert!(message_of(remove(ScanSelection::Time(0, 9), false)).contains("the map keeps none"));
+    let message = message_of(remove(ScanSelection::Input("third".to_owned()), false));
+    assert!(message.contains("it has first, second"), "{message}");
+    let removed = remove(ScanSelection::Input("second".to_owned()), false).unwrap();
+    assert_eq!((removed.scans_removed, removed.snapshots_with_them.len()), (2, 1));
+    let reader = MapReader::open(at(&disk), 1).unwrap();
+    let left: BTreeMap<_, _> = (0..3).map(|seed| (seed + 1, Taken::new(seed, 5))).collect();
+    assert!(is_as(&reader, &config(), &(left, 5)));
+    // Their numbers stay theirs: the next scan is the sixth.
+    drop(reader);
+    let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
+    insert(&mut mapper, &Taken::new(7, 5)).unwrap();
+    assert_eq!(mapper.scan_number(), 6);
+    mapper.flush().unwrap();
+    drop(mapper);
+    let removed = remove(ScanSelection::Numbers(1, 1), true).unwrap();
+    assert_eq!(removed.snapshots_deleted, [name("old")]);
+    check_files(&disk, "nothing is left of them");
 }

@@ -14,6 +14,7 @@ pub struct ExportArgs {
         short = 'o',
         long = "output",
         value_name = "FILE",
+        required = false,
         required_unless_present = "scans",
         default_value_if("scans", ArgPredicate::IsPresent, "")
     )]

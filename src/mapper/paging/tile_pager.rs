@@ -177,6 +177,12 @@ impl TilePager<'_> {
         self.contents.scan_number = number;
     }
 
+    /// Notes that the poses of the map's inputs are not known any more.
+    pub(in crate::mapper) fn forget_poses_of_inputs(&mut self) {
+        let contents = self.contents.inputs.iter_mut().filter_map(|input| input.content.as_mut());
+        contents.for_each(|content| content.pose_chain.clear());
+    }
+
     /// The store, to write a catalog.
     pub(in crate::mapper) fn store_mut(&mut self) -> &mut TileStore {
         self.disk.store_mut()

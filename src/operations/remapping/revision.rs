@@ -251,7 +251,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
         let tiles: Vec<_> = store.tiles().filter(|&tile| touched.has(tile)).collect();
         self.counts.tiles_mapped = tiles.len() as u64;
         let mut remapper = Remapper::begin(store, touched.config.clone(), tiles, self.how.stop.clone())?;
-        let mut done = 0;
+        let (mut done, mut have_poses_changed) = (0, false);
         while let Some(entry) = records.next_entry()? {
             self.how.stop.check()?;
             let CatalogEntry::Kept(record) = entry else {
@@ -266,6 +266,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
                 continue;
             }
             let is_changed = !matches!(fate, Fate::Stays);
+            have_poses_changed |= matches!(fate, Fate::Moves(_));
             let is_touched = is_changed || record.tiles.iter().any(|&tile| touched.has(tile));
             let mut record = *record;
             if is_touched {
@@ -277,7 +278,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
             remapper.put(&CatalogEntry::Kept(Box::new(record)))?;
         }
         progress(done, self.counts.scans);
-        remapper.finish()?;
+        remapper.finish(have_poses_changed)?;
         Ok(self.counts)
     }
 

@@ -29,7 +29,7 @@ pub struct InputContent {
     pub begins_with: Option<String>,
     /// The chain of the scans, 32 hexadecimal digits.
     pub scan_chain: String,
-    /// The chain of their poses, likewise.
+    /// The chain of their poses, likewise; empty once the map was mapped again by others.
     pub pose_chain: String,
     /// Numbers of the scans, from 0, that were skipped because they could not be read.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

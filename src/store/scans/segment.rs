@@ -100,8 +100,8 @@ impl SegmentWriter {
     fn put(&mut self, points: &[Point], intensities: Option<&[f32]>) -> Result<()> {
         let mut block = std::mem::take(&mut self.block);
         block.clear();
-        self.encoder.encode(points, intensities, &mut block);
-        let written = self.write(&block);
+        let encoded = self.encoder.encode(points, intensities, &mut block);
+        let written = encoded.and_then(|()| self.write(&block));
         self.block = block;
         written.map_err(|error| Error::io(&self.path, "write", error))
     }

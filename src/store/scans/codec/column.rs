@@ -1,0 +1,257 @@
+use super::grid::{multiple, step_of, value_of};
+use super::pinhole::Pinhole;
+use super::planes::{BlockInput, PlaneReader, PlaneWriter};
+use super::words::{Width, unzigzag, zigzag};
+use crate::error::FormatError;
+use std::io;
+
+/// How the values of a column are turned to words.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Form {
+    /// Their bits.
+    Bits(Width),
+    /// Differences from the value so many places before.
+    Differences(Width, u8),
+    /// Differences of multiples of a step from the one before; some are a few units of the last place off.
+    Steps(Width, f64),
+    /// Differences of pixels from the one before.
+    Pixels(Pinhole),
+}
+
+const BITS: u8 = 0;
+const DIFFERENCES: u8 = 1;
+const STEPS: u8 = 2;
+const PIXELS: u8 = 3;
+const IS_WIDE: u8 = 0x80;
+
+/// Distances in a scan at which values are alike: neighbours, and the beams of sensors that fire in turn.
+const LAGS: [u8; 3] = [1, 2, 4];
+/// Values by which the form of a column is chosen.
+const LOOKED_AT: usize = 4096;
+
+/// Writes columns.
+#[derive(Default)]
+pub(super) struct ColumnWriter {
+    planes: PlaneWriter,
+    words: Vec<u64>,
+    apart: Vec<u64>,
+    sample: Vec<u8>,
+}
+
+impl ColumnWriter {
+    /// Appends a column. `depths` are the values of z for x and y: what a camera made is known by both.
+    pub(super) fn put(
+        &mut self,
+        values: &[f64],
+        depths: Option<&[f64]>,
+        out: &mut Vec<u8>,
+    ) -> io::Result<()> {
+        let width = Width::of(values);
+        if let Some(camera) = depths.filter(|_| width == Width::Wide).and_then(|z| Pinhole::of(values, z))
+            && self.put_form(values, depths, Form::Pixels(camera), out)?
+        {
+            return Ok(());
+        }
+        let form = self.choose(values, width)?;
+        if !self.put_form(values, depths, form, out)? {
+            self.put_form(values, depths, Form::Bits(width), out)?;
+        }
+        Ok(())
+    }
+
+    /// The form that makes a part of the column the smallest.
+    fn choose(&mut self, values: &[f64], width: Width) -> io::Result<Form> {
+        let first = values.len().saturating_sub(LOOKED_AT) / 2;
+        // A sample of a short column costs as much as the column.
+        let length = (values.len() / 8).max(256).min(LOOKED_AT);
+        let part = &values[first..values.len().min(first + length)];
+        let steps = step_of(values, width).map(|step| Form::Steps(width, step));
+        let differences = LAGS.map(|lag| Form::Differences(width, lag));
+        let mut best = (usize::MAX, Form::Bits(width));
+        for form in steps.into_iter().chain(differences).chain([Form::Bits(width)]) {
+            if !self.fill_words(part, None, form) {
+                continue;
+            }
+            let bytes = self.size_of_sample(form)?;
+            if bytes < best.0 {
+                best = (bytes, form);
+            }
+        }
+        Ok(best.1)
+    }
+
+    /// Bytes that the words take, about: what is noise is not compressed.
+    fn size_of_sample(&mut self, form: Form) -> io::Result<usize> {
+        let mut size = 0;
+        for byte in (0..bytes_of(form, &self.words)).rev() {
+            self.sample.clear();
+            self.sample.extend(self.words.iter().map(|word| (word >> (8 * byte)) as u8));
+            let is_of_steps = matches!(form, Form::Steps(..));
+            let is_high = is_of_steps || byte + 2 >= bytes_of(form, &self.words);
+            size += if is_high {
+                self.planes.compress(&self.sample)?.min(self.sample.len())
+            } else {
+                self.sample.len()
+            };
+        }
+        Ok(size)
+    }
+
+    /// Appends the column in a form; false if it cannot be written so.
+    fn put_form(
+        &mut self,
+        values: &[f64],
+        depths: Option<&[f64]>,
+        form: Form,
+        out: &mut Vec<u8>,
+    ) -> io::Result<bool> {
+        if !self.fill_words(values, depths, form) {
+            return Ok(false);
+        }
+        let bytes = bytes_of(form, &self.words);
+        match form {
+            Form::Bits(width) => out.push(BITS | flag_of(width)),
+            Form::Differences(width, lag) => out.extend([DIFFERENCES | flag_of(width), lag]),
+            Form::Steps(width, step) => {
+                out.push(STEPS | flag_of(width));
+                out.extend(step.to_le_bytes());
+                out.push(bytes as u8);
+            }
+            Form::Pixels(camera) => {
+                out.push(PIXELS);
+                out.extend(camera.focal.to_le_bytes());
+                out.extend(camera.center.to_le_bytes());
+                out.push(bytes as u8);
+            }
+        }
+        self.planes.put(&self.words, bytes, out)?;
+        if matches!(form, Form::Steps(..)) {
+            self.planes.put(&self.apart, 1, out)?;
+        }
+        Ok(true)
+    }
+
+    /// Turns values to words; false if they have none in this form.
+    fn fill_words(&mut self, values: &[f64], depths: Option<&[f64]>, form: Form) -> bool {
+        let words = &mut self.words;
+        words.clear();
+        match form {
+            Form::Bits(width) => words.extend(values.iter().map(|value| width.bits(*value))),
+            Form::Differences(width, lag) => {
+                let ordered = |value: &f64| width.ordered(width.bits(*value));
+                words.extend(values.iter().map(ordered));
+                for at in (usize::from(lag)..words.len()).rev() {
+                    words[at] = width.difference(words[at], words[at - usize::from(lag)]);
+                }
+            }
+            Form::Steps(width, step) => {
+                self.apart.clear();
+                let mut before = 0;
+                for value in values {
+                    let Some((steps, apart)) = multiple(*value, step, width) else { return false };
+                    words.push(zigzag(steps - before));
+                    self.apart.push(u64::from(apart as u8));
+                    before = steps;
+                }
+            }
+            Form::Pixels(camera) => {
+                let mut before = 0;
+                for (value, z) in values.iter().zip(depths.unwrap_or_default()) {
+                    let Some(pixel) = camera.pixel(*value, *z) else { return false };
+                    words.push(zigzag(pixel - before));
+                    before = pixel;
+                }
+            }
+        }
+        true
+    }
+}
+
+fn flag_of(width: Width) -> u8 {
+    if width == Width::Wide { IS_WIDE } else { 0 }
+}
+
+/// Bytes that count of the words of a form.
+fn bytes_of(form: Form, words: &[u64]) -> usize {
+    match form {
+        Form::Bits(width) | Form::Differences(width, _) => width.bytes(),
+        Form::Steps(..) | Form::Pixels(_) => {
+            let most = words.iter().fold(0, |all, word| all | word);
+            (64 - most.leading_zeros() as usize).div_ceil(8)
+        }
+    }
+}
+
+/// Reads columns.
+#[derive(Default)]
+pub(super) struct ColumnReader {
+    planes: PlaneReader,
+    words: Vec<u64>,
+    apart: Vec<u64>,
+}
+
+impl ColumnReader {
+    /// Reads a column of `points` values in place of those in the list.
+    pub(super) fn take(
+        &mut self,
+        points: usize,
+        depths: Option<&[f64]>,
+        values: &mut Vec<f64>,
+        input: &mut BlockInput<'_>,
+    ) -> Result<(), FormatError> {
+        values.clear();
+        self.words.clear();
+        self.words.resize(points, 0);
+        let kind = input.byte()?;
+        let width = if kind & IS_WIDE == 0 { Width::Narrow } else { Width::Wide };
+        match kind & !IS_WIDE {
+            BITS => {
+                self.planes.take(&mut self.words, width.bytes(), input)?;
+                values.extend(self.words.iter().map(|word| width.value(*word)));
+            }
+            DIFFERENCES => {
+                let lag = usize::from(input.byte()?);
+                if lag == 0 {
+                    return Err(input.wrong("differences from the value itself"));
+                }
+                self.planes.take(&mut self.words, width.bytes(), input)?;
+                for at in lag..points {
+                    self.words[at] = width.sum(self.words[at], self.words[at - lag]);
+                }
+                values.extend(self.words.iter().map(|word| width.value(width.unordered(*word))));
+            }
+            STEPS => {
+                let (step, bytes) = (input.double()?, word_bytes(input)?);
+                self.planes.take(&mut self.words, bytes, input)?;
+                self.apart.clear();
+                self.apart.resize(points, 0);
+                self.planes.take(&mut self.apart, 1, input)?;
+                let mut steps = 0_i64;
+                values.extend(self.words.iter().zip(&self.apart).map(|(word, apart)| {
+                    steps = steps.wrapping_add(unzigzag(*word));
+                    value_of(steps, *apart as u8 as i8, step, width)
+                }));
+            }
+            PIXELS => {
+                let camera = Pinhole { focal: input.double()?, center: input.double()? };
+                let bytes = word_bytes(input)?;
+                self.planes.take(&mut self.words, bytes, input)?;
+                let depths = depths.ok_or_else(|| input.wrong("pixels without depths"))?;
+                let mut pixel = 0_i64;
+                values.extend(self.words.iter().zip(depths).map(|(word, z)| {
+                    pixel = pixel.wrapping_add(unzigzag(*word));
+                    camera.value(pixel, *z)
+                }));
+            }
+            _ => return Err(input.wrong("a column of no known form")),
+        }
+        Ok(())
+    }
+}
+
+fn word_bytes(input: &mut BlockInput<'_>) -> Result<usize, FormatError> {
+    match usize::from(input.byte()?) {
+        bytes @ 0..=8 => Ok(bytes),
+        _ => Err(input.wrong("words of more than eight bytes")),
+    }
+}

@@ -1,0 +1,341 @@
+use crate::error::FormatError;
+use crate::space::put_number;
+use integer_encoding::VarInt;
+use std::io;
+use zstd::zstd_safe::{CCtx, CParameter, DCtx, compress_bound, get_error_name};
+
+/// How a plane is written.
+const STORED: u8 = 0;
+const COMPRESSED: u8 = 1;
+const CONSTANT: u8 = 2;
+/// By the byte above of each word: bytes that share it, together.
+const GROUPED: u8 = 3;
+
+/// Fast, and as small as the higher ones on what is left here.
+const LEVEL: i32 = 1;
+/// Groups of fewer bytes go together: each has a table of its own.
+const LEAST_GROUP: usize = 1024;
+/// What such a table takes, about, in bytes.
+const TABLE_BYTES: f64 = 80.0;
+/// Bytes that vary more than this, in bits a byte, are stored.
+const NOISE_BITS: f64 = 7.9;
+
+/// Writes words as planes of bytes, the highest first.
+#[derive(Default)]
+pub(super) struct PlaneWriter {
+    zstd: Option<CCtx<'static>>,
+    compressed: Vec<u8>,
+    above: Vec<u8>,
+    plane: Vec<u8>,
+    grouped: Vec<u8>,
+    counts: Vec<u32>,
+}
+
+impl PlaneWriter {
+    /// Appends the lowest `bytes` bytes of each word.
+    pub(super) fn put(&mut self, words: &[u64], bytes: usize, out: &mut Vec<u8>) -> io::Result<()> {
+        let (mut plane, mut above) = (std::mem::take(&mut self.plane), std::mem::take(&mut self.above));
+        above.clear();
+        for byte in (0..bytes).rev() {
+            plane.clear();
+            plane.extend(words.iter().map(|word| (word >> (8 * byte)) as u8));
+            self.put_plane(&plane, &above, out)?;
+            std::mem::swap(&mut plane, &mut above);
+        }
+        (self.plane, self.above) = (plane, above);
+        Ok(())
+    }
+
+    fn put_plane(&mut self, plane: &[u8], above: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
+        let Some(&first) = plane.first() else { return Ok(()) };
+        let counts = histogram(plane);
+        if counts[usize::from(first)] as usize == plane.len() {
+            out.extend([CONSTANT, first]);
+            return Ok(());
+        }
+        let bits = bits_of(&counts) * plane.len() as f64;
+        let by_group = if above.is_empty() { f64::INFINITY } else { self.bits_by_group(plane, above) };
+        if by_group < bits && by_group < NOISE_BITS * plane.len() as f64 {
+            out.push(GROUPED);
+            return self.put_groups(plane, above, out);
+        }
+        if bits < NOISE_BITS * plane.len() as f64 {
+            let length = self.compress(plane)?;
+            if length < plane.len() {
+                out.push(COMPRESSED);
+                put_number(length as u64, out);
+                out.extend_from_slice(&self.compressed[..length]);
+                return Ok(());
+            }
+        }
+        out.push(STORED);
+        out.extend_from_slice(plane);
+        Ok(())
+    }
+
+    /// Entropy of a plane where the bytes above are known, and what the tables of the groups take.
+    fn bits_by_group(&mut self, plane: &[u8], above: &[u8]) -> f64 {
+        self.counts.clear();
+        self.counts.resize(1 << 16, 0);
+        for (byte, above) in plane.iter().zip(above) {
+            self.counts[usize::from(*above) << 8 | usize::from(*byte)] += 1;
+        }
+        let mut bits = 0.0;
+        let mut rest = [0; 256];
+        for counts in self.counts.chunks_exact(256) {
+            let bytes: u32 = counts.iter().sum();
+            if bytes as usize >= LEAST_GROUP {
+                bits += entropy(counts, bytes) + 8.0 * TABLE_BYTES;
+            } else if bytes > 0 {
+                rest.iter_mut().zip(counts).for_each(|(all, count)| *all += count);
+            }
+        }
+        bits + entropy(&rest, rest.iter().sum())
+    }
+
+    fn put_groups(&mut self, plane: &[u8], above: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
+        let groups = Groups::of(above);
+        let mut grouped = std::mem::take(&mut self.grouped);
+        grouped.clear();
+        grouped.resize(plane.len(), 0);
+        let mut next = groups.starts;
+        for (byte, above) in plane.iter().zip(above) {
+            let at = &mut next[usize::from(groups.of_byte[usize::from(*above)])];
+            grouped[*at] = *byte;
+            *at += 1;
+        }
+        let mut start = 0;
+        for end in groups.ends() {
+            let group = &grouped[start..end];
+            start = end;
+            let length = if group.is_empty() { 0 } else { self.compress(group)? };
+            if length < group.len() {
+                put_number(length as u64, out);
+                out.extend_from_slice(&self.compressed[..length]);
+            } else {
+                put_number(group.len() as u64, out);
+                out.extend_from_slice(group);
+            }
+        }
+        self.grouped = grouped;
+        Ok(())
+    }
+
+    /// Compresses bytes; returns how many they become.
+    pub(super) fn compress(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let zstd = match &mut self.zstd {
+            Some(zstd) => zstd,
+            none => none.insert(compressor()?),
+        };
+        let bound = compress_bound(bytes.len());
+        if self.compressed.len() < bound {
+            self.compressed.resize(bound, 0);
+        }
+        zstd.compress2(&mut self.compressed[..bound], bytes).map_err(refused)
+    }
+}
+
+/// Which bytes are together: a group for each byte above that is frequent, and a last one for the others.
+struct Groups {
+    of_byte: [u16; 256],
+    starts: [usize; 257],
+    groups: usize,
+    bytes: usize,
+}
+
+impl Groups {
+    fn of(above: &[u8]) -> Self {
+        let counts = histogram(above);
+        let is_own = |byte: usize| counts[byte] as usize >= LEAST_GROUP;
+        let groups = (0..256).filter(|&byte| is_own(byte)).count() + 1;
+        let (mut of_byte, mut starts, mut next, mut start) = ([groups as u16 - 1; 256], [0; 257], 0, 0);
+        for byte in (0..256).filter(|&byte| is_own(byte)) {
+            of_byte[byte] = next;
+            starts[usize::from(next)] = start;
+            next += 1;
+            start += counts[byte] as usize;
+        }
+        starts[groups - 1] = start;
+        Self { of_byte, starts, groups, bytes: above.len() }
+    }
+
+    fn ends(&self) -> impl Iterator<Item = usize> {
+        (1..=self.groups).map(|group| if group < self.groups { self.starts[group] } else { self.bytes })
+    }
+}
+
+fn histogram(plane: &[u8]) -> [u32; 256] {
+    let mut counts = [0; 256];
+    plane.iter().for_each(|byte| counts[usize::from(*byte)] += 1);
+    counts
+}
+
+/// Entropy in bits a byte.
+fn bits_of(counts: &[u32; 256]) -> f64 {
+    let all: u32 = counts.iter().sum();
+    entropy(counts, all) / f64::from(all.max(1))
+}
+
+/// Entropy in bits of all.
+fn entropy(counts: &[u32], all: u32) -> f64 {
+    let all = f64::from(all);
+    let bits =
+        |&count: &u32| if count == 0 { 0.0 } else { f64::from(count) * (all / f64::from(count)).log2() };
+    counts.iter().map(bits).sum()
+}
+
+/// Reads planes as words.
+#[derive(Default)]
+pub(super) struct PlaneReader {
+    zstd: Option<DCtx<'static>>,
+    above: Vec<u8>,
+    plane: Vec<u8>,
+    grouped: Vec<u8>,
+}
+
+impl PlaneReader {
+    /// Reads words of `bytes` bytes in place of those in the list, whose number stays.
+    pub(super) fn take(
+        &mut self,
+        words: &mut [u64],
+        bytes: usize,
+        input: &mut BlockInput<'_>,
+    ) -> Result<(), FormatError> {
+        words.fill(0);
+        self.above.clear();
+        for _ in 0..bytes {
+            self.plane.clear();
+            self.plane.resize(words.len(), 0);
+            self.take_plane(input)?;
+            words.iter_mut().zip(&self.plane).for_each(|(word, byte)| *word = *word << 8 | u64::from(*byte));
+            std::mem::swap(&mut self.plane, &mut self.above);
+        }
+        Ok(())
+    }
+
+    fn take_plane(&mut self, input: &mut BlockInput<'_>) -> Result<(), FormatError> {
+        if self.plane.is_empty() {
+            return Ok(());
+        }
+        match input.byte()? {
+            STORED => {
+                let bytes = input.bytes(self.plane.len())?;
+                self.plane.copy_from_slice(bytes);
+            }
+            CONSTANT => self.plane.fill(input.byte()?),
+            COMPRESSED => {
+                let length = input.number()?;
+                decompress(&mut self.zstd, input.bytes(length)?, &mut self.plane, input)?;
+            }
+            GROUPED if self.above.len() == self.plane.len() => self.take_groups(input)?,
+            _ => return Err(input.wrong("a plane of no known form")),
+        }
+        Ok(())
+    }
+
+    fn take_groups(&mut self, input: &mut BlockInput<'_>) -> Result<(), FormatError> {
+        let groups = Groups::of(&self.above);
+        self.grouped.clear();
+        self.grouped.resize(self.plane.len(), 0);
+        let mut start = 0;
+        for end in groups.ends() {
+            let group = &mut self.grouped[start..end];
+            start = end;
+            let length = input.number()?;
+            let bytes = input.bytes(length)?;
+            if length == group.len() {
+                group.copy_from_slice(bytes);
+            } else {
+                decompress(&mut self.zstd, bytes, group, input)?;
+            }
+        }
+        let mut next = groups.starts;
+        for (byte, above) in self.plane.iter_mut().zip(&self.above) {
+            let at = &mut next[usize::from(groups.of_byte[usize::from(*above)])];
+            *byte = self.grouped[*at];
+            *at += 1;
+        }
+        Ok(())
+    }
+}
+
+fn decompress(
+    zstd: &mut Option<DCtx<'static>>,
+    bytes: &[u8],
+    plane: &mut [u8],
+    input: &BlockInput<'_>,
+) -> Result<(), FormatError> {
+    let zstd = match zstd {
+        Some(zstd) => zstd,
+        none => none.insert(DCtx::try_create().ok_or_else(|| input.wrong("no memory to decompress it"))?),
+    };
+    match zstd.decompress(plane, bytes) {
+        Ok(length) if length == plane.len() => Ok(()),
+        _ => Err(input.wrong("a plane that cannot be decompressed")),
+    }
+}
+
+/// A compressor that omits headers and checksums.
+fn compressor() -> io::Result<CCtx<'static>> {
+    // `zstd::bulk` would panic.
+    let mut zstd = CCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
+    for parameter in [
+        CParameter::CompressionLevel(LEVEL),
+        CParameter::ChecksumFlag(false),
+        CParameter::ContentSizeFlag(false),
+        CParameter::DictIdFlag(false),
+    ] {
+        zstd.set_parameter(parameter).map_err(refused)?;
+    }
+    Ok(zstd)
+}
+
+/// An error of zstd, most likely a lack of memory.
+fn refused(code: usize) -> io::Error {
+    io::Error::other(get_error_name(code))
+}
+
+/// What is left of a block.
+pub(super) struct BlockInput<'a> {
+    block: &'a [u8],
+    at: usize,
+}
+
+impl<'a> BlockInput<'a> {
+    pub(super) fn new(block: &'a [u8]) -> Self {
+        Self { block, at: 0 }
+    }
+
+    pub(super) fn wrong(&self, reason: &str) -> FormatError {
+        FormatError::at_offset(self.at as u64, reason)
+    }
+
+    pub(super) fn bytes(&mut self, length: usize) -> Result<&'a [u8], FormatError> {
+        let end = self.at.checked_add(length);
+        let bytes = end.and_then(|end| self.block.get(self.at..end));
+        let bytes = bytes.ok_or_else(|| self.wrong("a block of points ends early"))?;
+        self.at += length;
+        Ok(bytes)
+    }
+
+    pub(super) fn byte(&mut self) -> Result<u8, FormatError> {
+        Ok(self.bytes(1)?.first().copied().unwrap_or_default())
+    }
+
+    pub(super) fn number(&mut self) -> Result<usize, FormatError> {
+        let rest = self.block.get(self.at..).unwrap_or_default();
+        let (number, length) = u64::decode_var(rest).ok_or_else(|| self.wrong("no number"))?;
+        let number = usize::try_from(number).map_err(|_| self.wrong("a number that is too large"))?;
+        self.at += length;
+        Ok(number)
+    }
+
+    pub(super) fn double(&mut self) -> Result<f64, FormatError> {
+        let bytes = self.bytes(8)?.try_into().unwrap_or_default();
+        Ok(f64::from_le_bytes(bytes))
+    }
+
+    pub(super) fn is_at_end(&self) -> bool {
+        self.at == self.block.len()
+    }
+}

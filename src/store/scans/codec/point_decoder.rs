@@ -1,0 +1,61 @@
+use super::column::ColumnReader;
+use super::planes::BlockInput;
+use super::words::Width;
+use super::{MOST_POINTS, VERSION};
+use crate::error::FormatError;
+use crate::space::Point;
+use std::fmt;
+
+/// Decodes blocks of points. It keeps its memory from block to block.
+#[derive(Default)]
+pub(in crate::store) struct PointDecoder {
+    columns: ColumnReader,
+    values: [Vec<f64>; 3],
+}
+
+impl PointDecoder {
+    /// Appends the points of a block and their intensities; returns whether it has these.
+    ///
+    /// # Errors
+    ///
+    /// Damage, with its offset in the block.
+    pub(in crate::store) fn decode(
+        &mut self,
+        block: &[u8],
+        points: &mut Vec<Point>,
+        intensities: &mut Vec<f32>,
+    ) -> Result<bool, FormatError> {
+        let mut input = BlockInput::new(block);
+        if input.byte()? != VERSION {
+            return Err(input.wrong("a block of points of a newer version"));
+        }
+        let has_intensities = match input.byte()? {
+            0 => false,
+            1 => true,
+            _ => return Err(input.wrong("a block of points with unknown columns")),
+        };
+        let count = input.number()?;
+        if count > MOST_POINTS {
+            return Err(input.wrong("a block of too many points"));
+        }
+        let Self { columns, values: [z, x, y] } = self;
+        columns.take(count, None, z, &mut input)?;
+        columns.take(count, Some(z), x, &mut input)?;
+        columns.take(count, Some(z), y, &mut input)?;
+        points.extend(x.iter().zip(&*y).zip(&*z).map(|((x, y), z)| [*x, *y, *z]));
+        if has_intensities {
+            columns.take(count, None, z, &mut input)?;
+            intensities.extend(z.iter().map(|value| f32::from_bits(Width::Narrow.bits(*value) as u32)));
+        }
+        match input.is_at_end() {
+            true => Ok(has_intensities),
+            false => Err(input.wrong("bytes behind a block of points")),
+        }
+    }
+}
+
+impl fmt::Debug for PointDecoder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PointDecoder").finish_non_exhaustive()
+    }
+}

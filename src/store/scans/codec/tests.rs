@@ -1,0 +1,157 @@
+use super::*;
+use crate::space::Point;
+use proptest::prelude::*;
+
+fn encoded(points: &[Point], intensities: Option<&[f32]>) -> Vec<u8> {
+    let mut block = Vec::new();
+    PointEncoder::default().encode(points, intensities, &mut block).unwrap();
+    block
+}
+
+/// Bytes of a block, which comes back to the bit.
+fn round_trip(points: &[Point], intensities: Option<&[f32]>) -> usize {
+    let block = encoded(points, intensities);
+    let (mut decoded, mut of_decoded) = (Vec::new(), Vec::new());
+    let has = PointDecoder::default().decode(&block, &mut decoded, &mut of_decoded).unwrap();
+    assert_eq!(has, intensities.is_some());
+    let bits = |points: &[Point]| points.iter().map(|point| point.map(f64::to_bits)).collect::<Vec<_>>();
+    assert!(bits(&decoded) == bits(points), "{} points", points.len());
+    let wanted: Vec<u32> = intensities.unwrap_or_default().iter().map(|x| x.to_bits()).collect();
+    assert_eq!(of_decoded.iter().map(|x| x.to_bits()).collect::<Vec<_>>(), wanted);
+    block.len()
+}
+
+/// A generator of numbers (SplitMix64).
+fn random(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ z >> 31
+}
+
+fn unit(state: &mut u64) -> f64 {
+    (random(state) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A lidar's turn: neighbours are alike, and ranges have noise.
+fn turn(points: usize, state: &mut u64) -> Vec<Point> {
+    let point = |k: usize| {
+        let (angle, up) = (k as f64 * 1e-3, (k % 16) as f64 * 0.03 - 0.2);
+        let range = 8.0 + 4.0 * (3.0 * angle).sin() + 0.02 * unit(state);
+        [range * angle.cos(), range * angle.sin(), range * up]
+    };
+    (0..points).map(point).collect()
+}
+
+#[test]
+fn blocks_of_every_kind_come_back_to_the_bit() {
+    let state = &mut 1;
+    for points in [0, 1, 2, 5, 255, 4096, MOST_POINTS] {
+        let turn = turn(points, state);
+        let narrow: Vec<Point> = turn.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
+        let millimetres: Vec<Point> =
+            turn.iter().map(|point| point.map(|x| (x * 1e3).round() * 1e-3)).collect();
+        let survey: Vec<Point> = turn
+            .iter()
+            .map(|point| {
+                std::array::from_fn(|k| (point[k] * 100.0).round() * 0.01 + [512_000.0, 5.4e6, 30.0][k])
+            })
+            .collect();
+        let noise: Vec<Point> = turn.iter().map(|_| [0; 3].map(|_| f64::from_bits(random(state)))).collect();
+        let constant = vec![[1.5, -0.0, f64::INFINITY]; points];
+        let intensities: Vec<f32> = turn.iter().map(|_| (random(state) % 200) as f32).collect();
+        let bits: Vec<f32> = turn.iter().map(|_| f32::from_bits(random(state) as u32)).collect();
+        for scan in [&turn, &narrow, &millimetres, &survey, &noise, &constant] {
+            round_trip(scan, None);
+            round_trip(scan, Some(&intensities));
+            round_trip(scan, Some(&bits));
+        }
+    }
+}
+
+#[test]
+fn what_lies_on_a_grid_is_stored_as_integers() {
+    let points = 30_000;
+    let turn = turn(points, &mut 2);
+    let a_point = |scan: &[Point]| round_trip(scan, None) as f64 / points as f64;
+    let millimetres: Vec<Point> = turn.iter().map(|point| point.map(|x| (x * 1e3).round() * 1e-3)).collect();
+    assert!(a_point(&millimetres) < 6.0, "{}", a_point(&millimetres));
+    let as_f32: Vec<Point> = millimetres.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
+    assert!(a_point(&as_f32) < 6.0, "{}", a_point(&as_f32));
+    let narrow: Vec<Point> = turn.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
+    assert!(a_point(&narrow) < 11.0, "{}", a_point(&narrow));
+}
+
+#[test]
+fn depth_images_are_stored_as_pixels() {
+    for (focal, center) in [([585.0, 585.0], [320.0, 240.0]), ([517.3, 516.5], [318.6, 255.3])] {
+        let (mut points, state) = (Vec::new(), &mut 3);
+        for row in 100..180 {
+            for column in (0..640).filter(|column| (row + column) % 11 > 0) {
+                let z = (1500 + (column / 3 + row) % 400 + (random(state) % 4) as usize) as f64 * 0.001;
+                let direction = [(column as f64 - center[0]) / focal[0], (row as f64 - center[1]) / focal[1]];
+                points.push([direction[0] * z, direction[1] * z, z]);
+            }
+        }
+        points.truncate(MOST_POINTS);
+        let a_point = round_trip(&points, None) as f64 / points.len() as f64;
+        assert!(a_point < 2.5, "{a_point} bytes a point");
+    }
+}
+
+#[test]
+fn bytes_cut_or_changed_are_damage_or_points_and_nothing_else() {
+    let turn = turn(3000, &mut 4);
+    let intensities: Vec<f32> = (0..3000).map(|k| (k % 97) as f32).collect();
+    let grid: Vec<Point> = turn.iter().map(|point| point.map(|x| (x * 1e3).round() * 1e-3)).collect();
+    for scan in [&turn, &grid] {
+        let block = encoded(scan, Some(&intensities));
+        let decode = |block: &[u8]| {
+            let (mut points, mut of_points) = (Vec::new(), Vec::new());
+            PointDecoder::default().decode(block, &mut points, &mut of_points).is_ok()
+        };
+        for length in (0..block.len()).step_by(37) {
+            assert!(!decode(&block[..length]), "{length}");
+        }
+        for at in (0..block.len()).step_by(13) {
+            let mut changed = block.clone();
+            changed[at] ^= 1 << (at % 8);
+            decode(&changed);
+        }
+    }
+}
+
+/// Numbers as sensors give them, and as nobody does.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        any::<u64>().prop_map(f64::from_bits),
+        any::<u32>().prop_map(|bits| f64::from(f32::from_bits(bits))),
+        (-100_000_i32..100_000).prop_map(|steps| f64::from(steps) * 0.001),
+        (-100.0..100.0_f64),
+        prop::sample::select(vec![0.0, -0.0, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE, 5e-324, f64::MAX]),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn any_points_come_back_to_the_bit(
+        points in prop::collection::vec(prop::array::uniform3(number()), 0..300),
+        is_with_intensities in prop::bool::ANY,
+        seed in any::<u64>(),
+    ) {
+        let mut state = seed;
+        let intensities: Vec<f32> = points.iter().map(|_| f32::from_bits(random(&mut state) as u32)).collect();
+        round_trip(&points, is_with_intensities.then_some(&*intensities));
+    }
+
+    #[test]
+    fn any_bytes_are_damage_or_points(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let mut block = vec![1, 1];
+        block.extend(&bytes);
+        let (mut points, mut intensities) = (Vec::new(), Vec::new());
+        let _ = PointDecoder::default().decode(&block, &mut points, &mut intensities);
+        prop_assert!(points.len() <= MOST_POINTS);
+    }
+}

@@ -1,0 +1,112 @@
+//! Numbers as words of four or eight bytes whose order is that of the numbers, and back.
+
+/// How many bytes of a word count, and what a word stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Width {
+    /// `f32`, or an `f64` that is one.
+    Narrow,
+    /// `f64`.
+    Wide,
+}
+
+impl Width {
+    pub(super) fn bytes(self) -> usize {
+        match self {
+            Self::Narrow => 4,
+            Self::Wide => 8,
+        }
+    }
+
+    /// The least width that has every bit of these numbers.
+    pub(super) fn of(values: &[f64]) -> Self {
+        if values.iter().all(|value| narrow(*value).is_some()) { Self::Narrow } else { Self::Wide }
+    }
+
+    /// The bits of a number.
+    #[inline]
+    pub(super) fn bits(self, value: f64) -> u64 {
+        match self {
+            Self::Narrow => u64::from(narrow(value).unwrap_or_else(|| (value as f32).to_bits())),
+            Self::Wide => value.to_bits(),
+        }
+    }
+
+    /// The number with these bits.
+    #[inline]
+    pub(super) fn value(self, bits: u64) -> f64 {
+        match self {
+            Self::Narrow => widen(bits as u32),
+            Self::Wide => f64::from_bits(bits),
+        }
+    }
+
+    fn sign(self) -> u64 {
+        1 << (8 * self.bytes() - 1)
+    }
+
+    fn mask(self) -> u64 {
+        u64::MAX >> (64 - 8 * self.bytes())
+    }
+
+    /// Bits whose order as integers is the order of the numbers.
+    #[inline]
+    pub(super) fn ordered(self, bits: u64) -> u64 {
+        if bits & self.sign() != 0 { !bits & self.mask() } else { bits | self.sign() }
+    }
+
+    #[inline]
+    pub(super) fn unordered(self, ordered: u64) -> u64 {
+        if ordered & self.sign() != 0 { ordered & !self.sign() } else { !ordered & self.mask() }
+    }
+
+    /// A difference modulo the width, small ones first: 0, -1, 1, -2.
+    #[inline]
+    pub(super) fn difference(self, value: u64, before: u64) -> u64 {
+        let shift = 64 - 8 * self.bytes() as u32;
+        let difference = (value.wrapping_sub(before) << shift) as i64 >> shift;
+        zigzag(difference) & self.mask()
+    }
+
+    #[inline]
+    pub(super) fn sum(self, difference: u64, before: u64) -> u64 {
+        before.wrapping_add(unzigzag(difference) as u64) & self.mask()
+    }
+}
+
+/// Mantissa bits that an `f64` has more than an `f32`.
+const MORE_BITS: u32 = 29;
+
+/// The `f32` that an `f64` is, to the bit; `None` if it is none. What is no number keeps its bits, too: conversions by
+/// the processor may change them.
+#[inline]
+fn narrow(value: f64) -> Option<u32> {
+    if value.is_nan() {
+        let bits = value.to_bits();
+        let mantissa = (bits >> MORE_BITS) as u32 & 0x007f_ffff;
+        let is_narrow = bits.trailing_zeros() >= MORE_BITS;
+        return is_narrow.then_some((bits >> 32) as u32 & 0x8000_0000 | 0x7f80_0000 | mantissa);
+    }
+    let narrow = value as f32;
+    (f64::from(narrow).to_bits() == value.to_bits()).then(|| narrow.to_bits())
+}
+
+/// An `f32` as `f64`, to the bit.
+#[inline]
+pub(super) fn widen(bits: u32) -> f64 {
+    let value = f32::from_bits(bits);
+    if !value.is_nan() {
+        return f64::from(value);
+    }
+    let sign = u64::from(bits & 0x8000_0000) << 32;
+    f64::from_bits(sign | 0x7ff0_0000_0000_0000 | u64::from(bits & 0x007f_ffff) << MORE_BITS)
+}
+
+#[inline]
+pub(super) fn zigzag(number: i64) -> u64 {
+    ((number << 1) ^ (number >> 63)) as u64
+}
+
+#[inline]
+pub(super) fn unzigzag(number: u64) -> i64 {
+    (number >> 1) as i64 ^ -((number & 1) as i64)
+}
