@@ -27,7 +27,11 @@ const IS_WIDE: u8 = 0x80;
 /// Distances in a scan at which values are alike: neighbours, and the beams of sensors that fire in turn.
 const LAGS: [u8; 3] = [1, 2, 4];
 /// Values by which the form of a column is chosen.
-const LOOKED_AT: usize = 4096;
+const LOOKED_AT: usize = 1 << 14;
+/// Blocks that take the form of the one before without a look at others.
+const BLOCKS_ALIKE: u32 = 32;
+/// Columns whose forms are remembered.
+const COLUMNS: usize = 4;
 
 /// Writes columns.
 #[derive(Default)]
@@ -36,35 +40,54 @@ pub(super) struct ColumnWriter {
     words: Vec<u64>,
     apart: Vec<u64>,
     sample: Vec<u8>,
+    /// The form of each column's last block, and how many blocks before it had it.
+    chosen: [Option<(Form, u32)>; COLUMNS],
 }
 
 impl ColumnWriter {
-    /// Appends a column. `depths` are the values of z for x and y: what a camera made is known by both.
+    /// Appends a column, the first, second or so of its block. `depths` are the values of z for x and y: what a camera
+    /// made is known by both.
     pub(super) fn put(
         &mut self,
+        column: usize,
         values: &[f64],
         depths: Option<&[f64]>,
         out: &mut Vec<u8>,
     ) -> io::Result<()> {
-        let width = Width::of(values);
-        if let Some(camera) = depths.filter(|_| width == Width::Wide).and_then(|z| Pinhole::of(values, z))
-            && self.put_form(values, depths, Form::Pixels(camera), out)?
+        // The blocks of a sensor are alike: what was best for one is tried first on those behind it.
+        let chosen = match self.chosen[column % COLUMNS] {
+            Some((form, blocks)) if blocks < BLOCKS_ALIKE => Some((form, blocks + 1)),
+            _ => None,
+        };
+        if let Some((form, blocks)) = chosen
+            && self.put_form(values, depths, form, out)?
         {
+            self.chosen[column % COLUMNS] = Some((form, blocks));
             return Ok(());
         }
-        let form = self.choose(values, width)?;
-        if !self.put_form(values, depths, form, out)? {
-            self.put_form(values, depths, Form::Bits(width), out)?;
-        }
+        let width = Width::of(values);
+        let camera = depths.filter(|_| width == Width::Wide).and_then(|z| Pinhole::of(values, z));
+        let form = match camera.map(Form::Pixels) {
+            Some(form) if self.put_form(values, depths, form, out)? => form,
+            _ => {
+                let form = self.choose(values, width)?;
+                match self.put_form(values, depths, form, out)? {
+                    true => form,
+                    false => {
+                        self.put_form(values, depths, Form::Bits(width), out)?;
+                        Form::Bits(width)
+                    }
+                }
+            }
+        };
+        self.chosen[column % COLUMNS] = Some((form, 0));
         Ok(())
     }
 
     /// The form that makes a part of the column the smallest.
     fn choose(&mut self, values: &[f64], width: Width) -> io::Result<Form> {
         let first = values.len().saturating_sub(LOOKED_AT) / 2;
-        // A sample of a short column costs as much as the column.
-        let length = (values.len() / 8).max(256).min(LOOKED_AT);
-        let part = &values[first..values.len().min(first + length)];
+        let part = &values[first..values.len().min(first + LOOKED_AT)];
         let steps = step_of(values, width).map(|step| Form::Steps(width, step));
         let differences = LAGS.map(|lag| Form::Differences(width, lag));
         let mut best = (usize::MAX, Form::Bits(width));
@@ -80,21 +103,12 @@ impl ColumnWriter {
         Ok(best.1)
     }
 
-    /// Bytes that the words take, about: what is noise is not compressed.
+    /// Bytes that the words take.
     fn size_of_sample(&mut self, form: Form) -> io::Result<usize> {
-        let mut size = 0;
-        for byte in (0..bytes_of(form, &self.words)).rev() {
-            self.sample.clear();
-            self.sample.extend(self.words.iter().map(|word| (word >> (8 * byte)) as u8));
-            let is_of_steps = matches!(form, Form::Steps(..));
-            let is_high = is_of_steps || byte + 2 >= bytes_of(form, &self.words);
-            size += if is_high {
-                self.planes.compress(&self.sample)?.min(self.sample.len())
-            } else {
-                self.sample.len()
-            };
-        }
-        Ok(size)
+        self.sample.clear();
+        let bytes = bytes_of(form, &self.words);
+        self.planes.put(&self.words, bytes, &mut self.sample)?;
+        Ok(self.sample.len())
     }
 
     /// Appends the column in a form; false if it cannot be written so.
@@ -136,6 +150,7 @@ impl ColumnWriter {
         let words = &mut self.words;
         words.clear();
         match form {
+            Form::Bits(width) | Form::Differences(width, _) if !width.has(values) => return false,
             Form::Bits(width) => words.extend(values.iter().map(|value| width.bits(*value))),
             Form::Differences(width, lag) => {
                 let ordered = |value: &f64| width.ordered(width.bits(*value));
@@ -144,6 +159,7 @@ impl ColumnWriter {
                     words[at] = width.difference(words[at], words[at - usize::from(lag)]);
                 }
             }
+            Form::Steps(width, _) if !width.has(values) => return false,
             Form::Steps(width, step) => {
                 self.apart.clear();
                 let mut before = 0;

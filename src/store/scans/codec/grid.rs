@@ -38,7 +38,7 @@ const STEPS: [f64; 30] = [
 /// Values that are looked at before all are.
 const LOOKED_AT: usize = 48;
 /// Larger multiples have no exact products any more.
-const MOST: f64 = 4_503_599_627_370_496.0;
+const MOST: f64 = 2_251_799_813_685_248.0;
 /// How far a value may be from the product, in units of its last place: readers add offsets.
 const MOST_ULPS: u64 = 100;
 
@@ -52,7 +52,7 @@ pub(super) fn step_of(values: &[f64], width: Width) -> Option<f64> {
 /// How many steps a value is, and how far it is from their product in units of the last place; `None` if that is far.
 #[inline]
 pub(super) fn multiple(value: f64, step: f64, width: Width) -> Option<(i64, i8)> {
-    let steps = (value / step).round();
+    let steps = rounded(value / step);
     if !(steps.abs() < MOST) {
         return None;
     }
@@ -62,6 +62,13 @@ pub(super) fn multiple(value: f64, step: f64, width: Width) -> Option<(i64, i8)>
     let apart = width.ordered(width.bits(value)).wrapping_sub(product) as i64;
     let most = if width == Width::Narrow { 1 } else { MOST_ULPS };
     (apart.unsigned_abs() <= most).then_some((steps, apart as i8))
+}
+
+/// A whole number next to this one, which is smaller than 2^51: what `round` does, without a call.
+#[inline]
+pub(super) fn rounded(number: f64) -> f64 {
+    const SHIFT: f64 = 6_755_399_441_055_744.0;
+    (number + SHIFT) - SHIFT
 }
 
 /// The value of so many steps.

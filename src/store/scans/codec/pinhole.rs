@@ -1,5 +1,7 @@
 //! Coordinates of depth images: `((pixel - center) / focal) * z`, for the column and for the row of each pixel.
 
+use super::grid::rounded;
+
 /// Points from which a camera is found.
 const LOOKED_AT: usize = 4096;
 /// Points that it must give to the bit before all are tried.
@@ -59,7 +61,7 @@ impl Pinhole {
     /// The pixel of a coordinate; `None` if it is not the coordinate to the bit.
     #[inline]
     pub(super) fn pixel(&self, value: f64, z: f64) -> Option<i64> {
-        let pixel = (value / z * self.focal + self.center).round();
+        let pixel = rounded(value / z * self.focal + self.center);
         let is_it = pixel.abs() < 1e6 && self.value(pixel as i64, z).to_bits() == value.to_bits();
         is_it.then_some(pixel as i64)
     }

@@ -18,7 +18,9 @@ const LEAST_GROUP: usize = 1024;
 /// What such a table takes, about, in bytes.
 const TABLE_BYTES: f64 = 80.0;
 /// Bytes that vary more than this, in bits a byte, are stored.
-const NOISE_BITS: f64 = 7.9;
+const NOISE_BITS: f64 = 7.85;
+/// Bytes by which noise is told.
+const LOOKED_AT: usize = 2048;
 
 /// Writes words as planes of bytes, the highest first.
 #[derive(Default)]
@@ -35,31 +37,43 @@ impl PlaneWriter {
     /// Appends the lowest `bytes` bytes of each word.
     pub(super) fn put(&mut self, words: &[u64], bytes: usize, out: &mut Vec<u8>) -> io::Result<()> {
         let (mut plane, mut above) = (std::mem::take(&mut self.plane), std::mem::take(&mut self.above));
-        above.clear();
         for byte in (0..bytes).rev() {
             plane.clear();
             plane.extend(words.iter().map(|word| (word >> (8 * byte)) as u8));
-            self.put_plane(&plane, &above, out)?;
+            // What is known of a byte by the one above is most in the second: mantissas by exponents.
+            let above_it = (byte + 2 == bytes).then_some(&*above);
+            self.put_plane(&plane, above_it, out)?;
             std::mem::swap(&mut plane, &mut above);
         }
         (self.plane, self.above) = (plane, above);
         Ok(())
     }
 
-    fn put_plane(&mut self, plane: &[u8], above: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
+    fn put_plane(&mut self, plane: &[u8], above: Option<&[u8]>, out: &mut Vec<u8>) -> io::Result<()> {
         let Some(&first) = plane.first() else { return Ok(()) };
+        let noise_bits = |bytes: usize| NOISE_BITS * bytes as f64;
+        if above.is_none() && plane.len() > 2 * LOOKED_AT {
+            // Noise is known by a part of it.
+            let part = &plane[..LOOKED_AT];
+            if entropy(&histogram(part), LOOKED_AT as u32) > noise_bits(LOOKED_AT) {
+                out.push(STORED);
+                out.extend_from_slice(plane);
+                return Ok(());
+            }
+        }
         let counts = histogram(plane);
         if counts[usize::from(first)] as usize == plane.len() {
             out.extend([CONSTANT, first]);
             return Ok(());
         }
-        let bits = bits_of(&counts) * plane.len() as f64;
-        let by_group = if above.is_empty() { f64::INFINITY } else { self.bits_by_group(plane, above) };
-        if by_group < bits && by_group < NOISE_BITS * plane.len() as f64 {
+        let bits = entropy(&counts, plane.len() as u32);
+        if let Some(above) = above
+            && self.bits_by_group(plane, above) < bits.min(noise_bits(plane.len()))
+        {
             out.push(GROUPED);
             return self.put_groups(plane, above, out);
         }
-        if bits < NOISE_BITS * plane.len() as f64 {
+        if bits < noise_bits(plane.len()) {
             let length = self.compress(plane)?;
             if length < plane.len() {
                 out.push(COMPRESSED);
@@ -75,22 +89,17 @@ impl PlaneWriter {
 
     /// Entropy of a plane where the bytes above are known, and what the tables of the groups take.
     fn bits_by_group(&mut self, plane: &[u8], above: &[u8]) -> f64 {
+        let groups = Groups::of(above);
+        if groups.groups == 1 {
+            return f64::INFINITY;
+        }
         self.counts.clear();
-        self.counts.resize(1 << 16, 0);
+        self.counts.resize(groups.groups << 8, 0);
         for (byte, above) in plane.iter().zip(above) {
-            self.counts[usize::from(*above) << 8 | usize::from(*byte)] += 1;
+            self.counts[usize::from(groups.of_byte[usize::from(*above)]) << 8 | usize::from(*byte)] += 1;
         }
-        let mut bits = 0.0;
-        let mut rest = [0; 256];
-        for counts in self.counts.chunks_exact(256) {
-            let bytes: u32 = counts.iter().sum();
-            if bytes as usize >= LEAST_GROUP {
-                bits += entropy(counts, bytes) + 8.0 * TABLE_BYTES;
-            } else if bytes > 0 {
-                rest.iter_mut().zip(counts).for_each(|(all, count)| *all += count);
-            }
-        }
-        bits + entropy(&rest, rest.iter().sum())
+        let of_groups = self.counts.chunks_exact(256).map(|counts| entropy(counts, counts.iter().sum()));
+        of_groups.sum::<f64>() + 8.0 * TABLE_BYTES * groups.groups as f64
     }
 
     fn put_groups(&mut self, plane: &[u8], above: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
@@ -170,12 +179,6 @@ fn histogram(plane: &[u8]) -> [u32; 256] {
     counts
 }
 
-/// Entropy in bits a byte.
-fn bits_of(counts: &[u32; 256]) -> f64 {
-    let all: u32 = counts.iter().sum();
-    entropy(counts, all) / f64::from(all.max(1))
-}
-
 /// Entropy in bits of all.
 fn entropy(counts: &[u32], all: u32) -> f64 {
     let all = f64::from(all);
@@ -202,10 +205,12 @@ impl PlaneReader {
         input: &mut BlockInput<'_>,
     ) -> Result<(), FormatError> {
         words.fill(0);
-        self.above.clear();
-        for _ in 0..bytes {
+        for byte in (0..bytes).rev() {
             self.plane.clear();
             self.plane.resize(words.len(), 0);
+            if byte + 2 != bytes {
+                self.above.clear();
+            }
             self.take_plane(input)?;
             words.iter_mut().zip(&self.plane).for_each(|(word, byte)| *word = *word << 8 | u64::from(*byte));
             std::mem::swap(&mut self.plane, &mut self.above);

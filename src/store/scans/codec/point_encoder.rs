@@ -33,15 +33,15 @@ impl PointEncoder {
             values.extend(points.iter().map(|point| point[axis]));
         };
         fill(depths, 2);
-        columns.put(depths, None, out)?;
+        columns.put(2, depths, None, out)?;
         for axis in [0, 1] {
             fill(values, axis);
-            columns.put(values, Some(depths), out)?;
+            columns.put(axis, values, Some(depths), out)?;
         }
         if let Some(intensities) = intensities {
             values.clear();
             values.extend(intensities.iter().map(|intensity| widen(intensity.to_bits())));
-            columns.put(values, None, out)?;
+            columns.put(3, values, None, out)?;
         }
         Ok(())
     }

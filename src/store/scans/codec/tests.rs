@@ -155,3 +155,47 @@ proptest! {
         prop_assert!(points.len() <= MOST_POINTS);
     }
 }
+
+/// Bytes a point and times on the real sets: `cargo test --release --lib codec -- --ignored --nocapture`.
+#[test]
+#[ignore = "a table, by hand"]
+#[cfg(feature = "clouds")]
+fn a_table_of_real_sets() {
+    use crate::io::{ReadOptions, open_any_scans};
+    use std::time::Instant;
+    let root = std::env::var_os("VOXTILE_DATA").unwrap_or_else(|| "../shared/data".into());
+    for set in [
+        "balm_os0_hall",
+        "fastlio_hku_1",
+        "mulran_riverside02_a",
+        "sevenscenes_kinect",
+        "las_large_coords/lone-star.laz",
+        "las_large_coords/lidR_Megaplot.laz",
+        "las_large_coords/autzen_trim.laz",
+    ] {
+        let mut options = ReadOptions::default();
+        options.poses = set.ends_with("laz").then(|| "identity".into());
+        let Ok(mut source) = open_any_scans(&std::path::Path::new(&root).join(set), &options) else {
+            continue;
+        };
+        let (mut encoder, mut decoder) = (PointEncoder::default(), PointDecoder::default());
+        let (mut count, mut bytes, mut encoding_s, mut decoding_s) = (0, 0, 0.0, 0.0);
+        while let Some(scan) = source.next_scan().unwrap() {
+            for (number, points) in scan.points_in_sensor.chunks(MOST_POINTS).enumerate() {
+                let first = number * MOST_POINTS;
+                let of_points = scan.intensities.as_ref().map(|all| &all[first..first + points.len()]);
+                let (mut block, began) = (Vec::new(), Instant::now());
+                encoder.encode(points, of_points, &mut block).unwrap();
+                encoding_s += began.elapsed().as_secs_f64();
+                let (mut decoded, mut of_decoded, began) = (Vec::new(), Vec::new(), Instant::now());
+                decoder.decode(&block, &mut decoded, &mut of_decoded).unwrap();
+                decoding_s += began.elapsed().as_secs_f64();
+                count += points.len();
+                bytes += block.len();
+            }
+        }
+        let [encoding, decoding] = [encoding_s, decoding_s].map(|s| 1e9 * s / count as f64);
+        let a_point = bytes as f64 / count as f64;
+        println!("{set:36} {count:9} {a_point:6.2} bytes {encoding:6.1} ns {decoding:6.1} ns");
+    }
+}

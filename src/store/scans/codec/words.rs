@@ -19,7 +19,12 @@ impl Width {
 
     /// The least width that has every bit of these numbers.
     pub(super) fn of(values: &[f64]) -> Self {
-        if values.iter().all(|value| narrow(*value).is_some()) { Self::Narrow } else { Self::Wide }
+        if Self::Narrow.has(values) { Self::Narrow } else { Self::Wide }
+    }
+
+    /// Whether it has every bit of these numbers.
+    pub(super) fn has(self, values: &[f64]) -> bool {
+        self == Self::Wide || values.iter().all(|value| narrow(*value).is_some())
     }
 
     /// The bits of a number.
