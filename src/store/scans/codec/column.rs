@@ -1,27 +1,29 @@
-use super::grid::{multiple, step_of, value_of};
+use super::grid::Grid;
 use super::pinhole::Pinhole;
 use super::planes::{BlockInput, PlaneReader, PlaneWriter};
 use super::words::{Width, unzigzag, zigzag};
 use crate::error::FormatError;
 use std::io;
+use std::sync::Arc;
 
 /// How the values of a column are turned to words.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Form {
     /// Their bits.
     Bits(Width),
     /// Differences from the value so many places before.
     Differences(Width, u8),
-    /// Differences of multiples of a step from the one before; some are a few units of the last place off.
-    Steps(Width, f64),
+    /// Differences of places on a grid from the one before; some values are a few units of the last place off.
+    Steps(Width, Grid),
     /// Differences of pixels from the one before.
-    Pixels(Pinhole),
+    Pixels(Arc<Pinhole>),
 }
 
 const BITS: u8 = 0;
 const DIFFERENCES: u8 = 1;
 const STEPS: u8 = 2;
-const PIXELS: u8 = 3;
+const PARTS: u8 = 3;
+const PIXELS: u8 = 4;
 const IS_WIDE: u8 = 0x80;
 
 /// Distances in a scan at which values are alike: neighbours, and the beams of sensors that fire in turn.
@@ -55,31 +57,23 @@ impl ColumnWriter {
         out: &mut Vec<u8>,
     ) -> io::Result<()> {
         // The blocks of a sensor are alike: what was best for one is tried first on those behind it.
-        let chosen = match self.chosen[column % COLUMNS] {
-            Some((form, blocks)) if blocks < BLOCKS_ALIKE => Some((form, blocks + 1)),
-            _ => None,
-        };
-        if let Some((form, blocks)) = chosen
-            && self.put_form(values, depths, form, out)?
+        let chosen = self.chosen[column % COLUMNS].take();
+        if let Some((form, blocks)) = chosen.filter(|(_, blocks)| *blocks < BLOCKS_ALIKE)
+            && self.put_form(values, depths, &form, out)?
         {
-            self.chosen[column % COLUMNS] = Some((form, blocks));
+            self.chosen[column % COLUMNS] = Some((form, blocks + 1));
             return Ok(());
         }
         let width = Width::of(values);
         let camera = depths.filter(|_| width == Width::Wide).and_then(|z| Pinhole::of(values, z));
-        let form = match camera.map(Form::Pixels) {
-            Some(form) if self.put_form(values, depths, form, out)? => form,
-            _ => {
-                let form = self.choose(values, width)?;
-                match self.put_form(values, depths, form, out)? {
-                    true => form,
-                    false => {
-                        self.put_form(values, depths, Form::Bits(width), out)?;
-                        Form::Bits(width)
-                    }
-                }
-            }
+        let mut form = match camera {
+            Some(camera) => Form::Pixels(Arc::new(camera)),
+            None => self.choose(values, width)?,
         };
+        if !self.put_form(values, depths, &form, out)? {
+            form = Form::Bits(width);
+            self.put_form(values, depths, &form, out)?;
+        }
         self.chosen[column % COLUMNS] = Some((form, 0));
         Ok(())
     }
@@ -88,14 +82,14 @@ impl ColumnWriter {
     fn choose(&mut self, values: &[f64], width: Width) -> io::Result<Form> {
         let first = values.len().saturating_sub(LOOKED_AT) / 2;
         let part = &values[first..values.len().min(first + LOOKED_AT)];
-        let steps = step_of(values, width).map(|step| Form::Steps(width, step));
+        let steps = Grid::of(values, width).map(|grid| Form::Steps(width, grid));
         let differences = LAGS.map(|lag| Form::Differences(width, lag));
         let mut best = (usize::MAX, Form::Bits(width));
-        for form in steps.into_iter().chain(differences).chain([Form::Bits(width)]) {
-            if !self.fill_words(part, None, form) {
+        for form in steps.chain(differences).chain([Form::Bits(width)]) {
+            if !self.fill_words(part, None, &form) {
                 continue;
             }
-            let bytes = self.size_of_sample(form)?;
+            let bytes = self.size_of_sample(&form)?;
             if bytes < best.0 {
                 best = (bytes, form);
             }
@@ -104,7 +98,7 @@ impl ColumnWriter {
     }
 
     /// Bytes that the words take.
-    fn size_of_sample(&mut self, form: Form) -> io::Result<usize> {
+    fn size_of_sample(&mut self, form: &Form) -> io::Result<usize> {
         self.sample.clear();
         let bytes = bytes_of(form, &self.words);
         self.planes.put(&self.words, bytes, &mut self.sample)?;
@@ -116,7 +110,7 @@ impl ColumnWriter {
         &mut self,
         values: &[f64],
         depths: Option<&[f64]>,
-        form: Form,
+        form: &Form,
         out: &mut Vec<u8>,
     ) -> io::Result<bool> {
         if !self.fill_words(values, depths, form) {
@@ -124,11 +118,15 @@ impl ColumnWriter {
         }
         let bytes = bytes_of(form, &self.words);
         match form {
-            Form::Bits(width) => out.push(BITS | flag_of(width)),
-            Form::Differences(width, lag) => out.extend([DIFFERENCES | flag_of(width), lag]),
-            Form::Steps(width, step) => {
-                out.push(STEPS | flag_of(width));
-                out.extend(step.to_le_bytes());
+            &Form::Bits(width) => out.push(BITS | flag_of(width)),
+            &Form::Differences(width, lag) => out.extend([DIFFERENCES | flag_of(width), lag]),
+            &Form::Steps(width, grid) => {
+                let (kind, number) = match grid {
+                    Grid::Times(step) => (STEPS, step),
+                    Grid::Over(parts) => (PARTS, parts),
+                };
+                out.push(kind | flag_of(width));
+                out.extend(number.to_le_bytes());
                 out.push(bytes as u8);
             }
             Form::Pixels(camera) => {
@@ -146,13 +144,13 @@ impl ColumnWriter {
     }
 
     /// Turns values to words; false if they have none in this form.
-    fn fill_words(&mut self, values: &[f64], depths: Option<&[f64]>, form: Form) -> bool {
+    fn fill_words(&mut self, values: &[f64], depths: Option<&[f64]>, form: &Form) -> bool {
         let words = &mut self.words;
         words.clear();
         match form {
             Form::Bits(width) | Form::Differences(width, _) if !width.has(values) => return false,
-            Form::Bits(width) => words.extend(values.iter().map(|value| width.bits(*value))),
-            Form::Differences(width, lag) => {
+            &Form::Bits(width) => words.extend(values.iter().map(|value| width.bits(*value))),
+            &Form::Differences(width, lag) => {
                 let ordered = |value: &f64| width.ordered(width.bits(*value));
                 words.extend(values.iter().map(ordered));
                 for at in (usize::from(lag)..words.len()).rev() {
@@ -160,24 +158,17 @@ impl ColumnWriter {
                 }
             }
             Form::Steps(width, _) if !width.has(values) => return false,
-            Form::Steps(width, step) => {
+            &Form::Steps(width, grid) => {
                 self.apart.clear();
                 let mut before = 0;
                 for value in values {
-                    let Some((steps, apart)) = multiple(*value, step, width) else { return false };
+                    let Some((steps, apart)) = grid.place(*value, width) else { return false };
                     words.push(zigzag(steps - before));
                     self.apart.push(u64::from(apart as u8));
                     before = steps;
                 }
             }
-            Form::Pixels(camera) => {
-                let mut before = 0;
-                for (value, z) in values.iter().zip(depths.unwrap_or_default()) {
-                    let Some(pixel) = camera.pixel(*value, *z) else { return false };
-                    words.push(zigzag(pixel - before));
-                    before = pixel;
-                }
-            }
+            Form::Pixels(camera) => return camera.words(values, depths.unwrap_or_default(), words),
         }
         true
     }
@@ -188,7 +179,7 @@ fn flag_of(width: Width) -> u8 {
 }
 
 /// Bytes that count of the words of a form.
-fn bytes_of(form: Form, words: &[u64]) -> usize {
+fn bytes_of(form: &Form, words: &[u64]) -> usize {
     match form {
         Form::Bits(width) | Form::Differences(width, _) => width.bytes(),
         Form::Steps(..) | Form::Pixels(_) => {
@@ -204,6 +195,8 @@ pub(super) struct ColumnReader {
     planes: PlaneReader,
     words: Vec<u64>,
     apart: Vec<u64>,
+    /// Of the last column of pixels.
+    camera: Option<Pinhole>,
 }
 
 impl ColumnReader {
@@ -236,8 +229,10 @@ impl ColumnReader {
                 }
                 values.extend(self.words.iter().map(|word| width.value(width.unordered(*word))));
             }
-            STEPS => {
-                let (step, bytes) = (input.double()?, word_bytes(input)?);
+            kind @ (STEPS | PARTS) => {
+                let number = input.double()?;
+                let grid = if kind == STEPS { Grid::Times(number) } else { Grid::Over(number) };
+                let bytes = word_bytes(input)?;
                 self.planes.take(&mut self.words, bytes, input)?;
                 self.apart.clear();
                 self.apart.resize(points, 0);
@@ -245,19 +240,21 @@ impl ColumnReader {
                 let mut steps = 0_i64;
                 values.extend(self.words.iter().zip(&self.apart).map(|(word, apart)| {
                     steps = steps.wrapping_add(unzigzag(*word));
-                    value_of(steps, *apart as u8 as i8, step, width)
+                    grid.value_at(steps, *apart as u8 as i8, width)
                 }));
             }
             PIXELS => {
-                let camera = Pinhole { focal: input.double()?, center: input.double()? };
+                let (focal, center) = (input.double()?, input.double()?);
+                let is_same = |camera: &Pinhole| (camera.focal, camera.center) == (focal, center);
+                let camera = match self.camera.take().filter(is_same) {
+                    Some(camera) => camera,
+                    None => Pinhole::new(focal, center),
+                };
                 let bytes = word_bytes(input)?;
                 self.planes.take(&mut self.words, bytes, input)?;
                 let depths = depths.ok_or_else(|| input.wrong("pixels without depths"))?;
-                let mut pixel = 0_i64;
-                values.extend(self.words.iter().zip(depths).map(|(word, z)| {
-                    pixel = pixel.wrapping_add(unzigzag(*word));
-                    camera.value(pixel, *z)
-                }));
+                camera.values(&self.words, depths, values);
+                self.camera = Some(camera);
             }
             _ => return Err(input.wrong("a column of no known form")),
         }

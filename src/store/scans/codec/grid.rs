@@ -42,26 +42,58 @@ const MOST: f64 = 2_251_799_813_685_248.0;
 /// How far a value may be from the product, in units of its last place: readers add offsets.
 const MOST_ULPS: u64 = 100;
 
-/// The coarsest step of which some of the values are multiples, near enough.
-pub(super) fn step_of(values: &[f64], width: Width) -> Option<f64> {
-    let every = values.len().div_ceil(LOOKED_AT).max(1);
-    let mut steps = STEPS.into_iter();
-    steps.find(|step| values.iter().step_by(every).all(|value| multiple(*value, *step, width).is_some()))
+/// A grid: multiples of a step, or parts of a unit. Readers multiply or divide, which differs in the last place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Grid {
+    /// So many times this.
+    Times(f64),
+    /// So many divided by this.
+    Over(f64),
 }
 
-/// How many steps a value is, and how far it is from their product in units of the last place; `None` if that is far.
-#[inline]
-pub(super) fn multiple(value: f64, step: f64, width: Width) -> Option<(i64, i8)> {
-    let steps = rounded(value / step);
-    if !(steps.abs() < MOST) {
-        return None;
+impl Grid {
+    /// The coarsest grids, of each kind, on which some of the values are, near enough.
+    pub(super) fn of(values: &[f64], width: Width) -> impl Iterator<Item = Self> {
+        let every = values.len().div_ceil(LOOKED_AT).max(1);
+        let is_on =
+            |grid: &Self| values.iter().step_by(every).all(|value| grid.place(*value, width).is_some());
+        let times = STEPS.into_iter().map(Self::Times).find(is_on);
+        let over = STEPS.into_iter().map(|step| Self::Over((1.0 / step).round())).find(is_on);
+        [over, times].into_iter().flatten()
     }
-    // As an integer, so that there is one zero; the other is one place below it.
-    let steps = steps as i64;
-    let product = width.ordered(width.bits(steps as f64 * step));
-    let apart = width.ordered(width.bits(value)).wrapping_sub(product) as i64;
-    let most = if width == Width::Narrow { 1 } else { MOST_ULPS };
-    (apart.unsigned_abs() <= most).then_some((steps, apart as i8))
+
+    #[inline]
+    fn value(self, steps: i64) -> f64 {
+        match self {
+            Self::Times(step) => steps as f64 * step,
+            Self::Over(parts) => steps as f64 / parts,
+        }
+    }
+
+    /// How many steps a value is, and how far it is from there in units of the last place; `None` if that is far.
+    #[inline]
+    pub(super) fn place(self, value: f64, width: Width) -> Option<(i64, i8)> {
+        let steps = rounded(match self {
+            Self::Times(step) => value / step,
+            Self::Over(parts) => value * parts,
+        });
+        if !(steps.abs() < MOST) {
+            return None;
+        }
+        // As an integer, so that there is one zero; the other is one place below it.
+        let steps = steps as i64;
+        let of_steps = width.ordered(width.bits(self.value(steps)));
+        let apart = width.ordered(width.bits(value)).wrapping_sub(of_steps) as i64;
+        let most = if width == Width::Narrow { 1 } else { MOST_ULPS };
+        (apart.unsigned_abs() <= most).then_some((steps, apart as i8))
+    }
+
+    /// The value at a place.
+    #[inline]
+    pub(super) fn value_at(self, steps: i64, apart: i8, width: Width) -> f64 {
+        let of_steps = width.ordered(width.bits(self.value(steps)));
+        width.value(width.unordered(of_steps.wrapping_add(i64::from(apart) as u64)))
+    }
 }
 
 /// A whole number next to this one, which is smaller than 2^51: what `round` does, without a call.
@@ -69,11 +101,4 @@ pub(super) fn multiple(value: f64, step: f64, width: Width) -> Option<(i64, i8)>
 pub(super) fn rounded(number: f64) -> f64 {
     const SHIFT: f64 = 6_755_399_441_055_744.0;
     (number + SHIFT) - SHIFT
-}
-
-/// The value of so many steps.
-#[inline]
-pub(super) fn value_of(steps: i64, apart: i8, step: f64, width: Width) -> f64 {
-    let product = width.ordered(width.bits(steps as f64 * step));
-    width.value(width.unordered(product.wrapping_add(i64::from(apart) as u64)))
 }

@@ -1,30 +1,40 @@
 //! Coordinates of depth images: `((pixel - center) / focal) * z`, for the column and for the row of each pixel.
 
 use super::grid::rounded;
+use super::words::{unzigzag, zigzag};
 
 /// Points from which a camera is found.
 const LOOKED_AT: usize = 4096;
 /// Points that it must give to the bit before all are tried.
 const TRIED: usize = 24;
-/// Centers of images of more pixels are not looked for.
+/// Images have fewer pixels along an edge.
 const MOST_PIXELS: usize = 4096;
 /// How many decimals the numbers of a camera may have.
 const DECIMALS: [i32; 3] = [4, 6, 8];
 /// Two ratios nearer to each other than this are one.
 const SAME: f64 = 1e-7;
 
-/// A camera along one axis, in pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A camera along one axis.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Pinhole {
+    /// Focal length and center in pixels.
     pub(super) focal: f64,
     pub(super) center: f64,
+    /// The coordinate of each pixel at a depth of one metre.
+    directions: Vec<f64>,
 }
 
 impl Pinhole {
+    pub(super) fn new(focal: f64, center: f64) -> Self {
+        let directions = (0..MOST_PIXELS).map(|pixel| (pixel as f64 - center) / focal).collect();
+        Self { focal, center, directions }
+    }
+
     /// Finds the camera that made these coordinates; its numbers have few decimals.
     pub(super) fn of(values: &[f64], depths: &[f64]) -> Option<Self> {
-        let pairs = values.iter().zip(depths);
-        let mut ratios: Vec<f64> = pairs.clone().take(LOOKED_AT).map(|(value, z)| value / z).collect();
+        let pairs: Vec<(f64, f64)> =
+            values.iter().copied().zip(depths.iter().copied()).filter(|(_, z)| *z > 0.0).collect();
+        let mut ratios: Vec<f64> = pairs.iter().take(LOOKED_AT).map(|(value, z)| value / z).collect();
         if ratios.len() < TRIED || !ratios.iter().all(|ratio| ratio.abs() < 100.0) {
             return None;
         }
@@ -33,46 +43,108 @@ impl Pinhole {
         let gap = ratios.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
         let (first, last) = (*ratios.first()?, *ratios.last()?);
         // The whole span tells the gap far more exactly than two neighbours do.
-        let mut focal = 1.0 / gap;
-        let mut reach = gap;
+        let (mut focal, mut reach) = (1.0 / gap, gap);
         for &ratio in &ratios {
             if ratio - first > 4.0 * reach || ratio == last {
                 let pixels = ((ratio - first) * focal).round();
                 if pixels >= 1.0 {
-                    focal = pixels / (ratio - first);
-                    reach = ratio - first;
+                    (focal, reach) = (pixels / (ratio - first), ratio - first);
                 }
             }
         }
         if !(10.0..1e5).contains(&focal) {
             return None;
         }
-        let mut cameras = DECIMALS.into_iter().flat_map(|decimals| {
+        let tried: Vec<_> = pairs.iter().step_by((pairs.len() / TRIED).max(1)).take(TRIED).collect();
+        let makes = |focal: f64, center: f64| {
+            tried.iter().all(|&&(value, z)| {
+                let pixel = (value / z * focal + center).round();
+                (((pixel - center) / focal) * z).to_bits() == value.to_bits()
+            })
+        };
+        for decimals in DECIMALS {
             let unit = 10_f64.powi(decimals);
             let focal = (focal * unit).round() / unit;
-            let center = (-(first * focal) * unit).round() / unit;
-            (0..MOST_PIXELS).map(move |pixels| Self { focal, center: pixels as f64 + fraction(center, unit) })
-        });
-        let every = (values.len() / TRIED).max(1);
-        let tried: Vec<_> = pairs.step_by(every).take(TRIED).collect();
-        cameras.find(|camera| tried.iter().all(|(value, z)| camera.pixel(**value, **z).is_some()))
+            let part = (-first * focal * unit).round().rem_euclid(unit) / unit;
+            // Rounding tells by how many whole pixels the center is further on.
+            // Pixels count from 0: what they are if the center were this part.
+            let least = (-(first * focal + part)).ceil().max(0.0);
+            let mut centers = (0..MOST_PIXELS).map(|pixels| least + pixels as f64 + part);
+            let center = centers.find(|center| makes(focal, *center));
+            if let Some(center) = center {
+                return Some(Self::new(focal, center));
+            }
+        }
+        None
     }
 
-    /// The pixel of a coordinate; `None` if it is not the coordinate to the bit.
     #[inline]
-    pub(super) fn pixel(&self, value: f64, z: f64) -> Option<i64> {
+    fn value(&self, pixel: i64, z: f64) -> f64 {
+        match usize::try_from(pixel).ok().and_then(|pixel| self.directions.get(pixel)) {
+            Some(direction) => direction * z,
+            None => ((pixel as f64 - self.center) / self.focal) * z,
+        }
+    }
+
+    /// The pixel of a coordinate, which is `expected` or another; `None` if it is of none, to the bit.
+    #[inline]
+    fn pixel(&self, value: f64, z: f64, expected: i64) -> Option<i64> {
+        let is_it = |pixel| self.value(pixel, z).to_bits() == value.to_bits();
+        if is_it(expected) {
+            return Some(expected);
+        }
         let pixel = rounded(value / z * self.focal + self.center);
-        let is_it = pixel.abs() < 1e6 && self.value(pixel as i64, z).to_bits() == value.to_bits();
-        is_it.then_some(pixel as i64)
+        (pixel.abs() < 1e6 && is_it(pixel as i64)).then_some(pixel as i64)
     }
 
-    #[inline]
-    pub(super) fn value(&self, pixel: i64, z: f64) -> f64 {
-        ((pixel as f64 - self.center) / self.focal) * z
+    /// Words for coordinates: how far each pixel is from the one that is expected after those before it. Where the
+    /// depth is missing, the coordinate is what stands in its place.
+    pub(super) fn words(&self, values: &[f64], depths: &[f64], words: &mut Vec<u64>) -> bool {
+        let mut row = Expected::default();
+        for (value, z) in values.iter().zip(depths) {
+            let expected = row.pixel();
+            let pixel = match *z > 0.0 {
+                true => self.pixel(*value, *z, expected),
+                false => (value.to_bits() == z.to_bits()).then_some(expected),
+            };
+            let Some(pixel) = pixel else { return false };
+            words.push(zigzag(pixel - expected));
+            row.follow(pixel);
+        }
+        true
+    }
+
+    /// The coordinates of such words.
+    pub(super) fn values(&self, words: &[u64], depths: &[f64], values: &mut Vec<f64>) {
+        let mut row = Expected::default();
+        for (word, z) in words.iter().zip(depths) {
+            let pixel = row.pixel().wrapping_add(unzigzag(*word));
+            values.push(if *z > 0.0 { self.value(pixel, *z) } else { *z });
+            row.follow(pixel);
+        }
     }
 }
 
-/// What is behind the point, from 0 to 1, in so many parts.
-fn fraction(number: f64, unit: f64) -> f64 {
-    ((number * unit).round().rem_euclid(unit)) / unit
+/// Which pixel comes next: one further, as often as that was so, or the same one.
+#[derive(Default)]
+struct Expected {
+    last: i64,
+    step: i64,
+}
+
+impl Expected {
+    #[inline]
+    fn pixel(&self) -> i64 {
+        self.last.wrapping_add(self.step)
+    }
+
+    #[inline]
+    fn follow(&mut self, pixel: i64) {
+        let step = pixel.wrapping_sub(self.last);
+        // At the end of a row it goes back; the row that begins is like the one that ended.
+        if (0..=1).contains(&step) {
+            self.step = step;
+        }
+        self.last = pixel;
+    }
 }

@@ -24,14 +24,19 @@ impl Width {
 
     /// Whether it has every bit of these numbers.
     pub(super) fn has(self, values: &[f64]) -> bool {
-        self == Self::Wide || values.iter().all(|value| narrow(*value).is_some())
+        let has_lost = |lost: u64, value: &f64| lost | (f64::from(*value as f32).to_bits() ^ value.to_bits());
+        // Without a branch first, for those that are numbers.
+        self == Self::Wide
+            || values.iter().fold(0, has_lost) == 0 && !values.iter().any(|value| value.is_nan())
+            || values.iter().all(|value| narrow(*value).is_some())
     }
 
     /// The bits of a number.
     #[inline]
     pub(super) fn bits(self, value: f64) -> u64 {
         match self {
-            Self::Narrow => u64::from(narrow(value).unwrap_or_else(|| (value as f32).to_bits())),
+            Self::Narrow if value.is_nan() => u64::from(narrow(value).unwrap_or_default()),
+            Self::Narrow => u64::from((value as f32).to_bits()),
             Self::Wide => value.to_bits(),
         }
     }
