@@ -32,17 +32,19 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let Some(file) = &args.poses else { return run_anew(args) };
     let map = whole_map(&args.map)?;
     let started = Instant::now();
+    let tolerance = args.tolerance.as_deref().map(tolerance_of).transpose()?;
     let job = Job::of(&args.rework, map)?;
     let poses = {
-        let (mut records, mut scans) = (MapReader::open(map, 1)?.kept_scans()?, Vec::new());
+        let reader = MapReader::open(map, 1)?;
+        reader.check_keeps_all()?;
+        let (mut records, mut scans) = (reader.kept_scans()?, Vec::new());
         while let Some(mut record) = records.next_record()? {
             record.tiles = Vec::new();
             scans.push(record);
         }
         poses_for(args, file, &scans)?
     };
-    let how = Remap::new(job.rework.clone())
-        .with_tolerance(args.tolerance.as_deref().map(tolerance_of).transpose()?);
+    let how = Remap::new(job.rework.clone()).with_tolerance(tolerance);
     let outcome = remap(map, &poses, &how, |done, all| job.progress.set(done, all));
     let remapped = match job.ended(outcome)? {
         Ok(remapped) => remapped,

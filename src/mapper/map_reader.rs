@@ -1,4 +1,4 @@
-use super::kept_scans::KeptScans;
+use super::kept_scans::{KeptScans, check_keeps_all, keeps_none};
 use super::statistics::IoCounts;
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::{MapConfig, MemoryLimit};
@@ -255,10 +255,20 @@ impl MapReader {
     /// A map that keeps none, with a hint; a list that cannot be read or is damaged.
     pub fn kept_scans(&self) -> Result<KeptScans> {
         if !self.keeps_scans() {
-            return Err(Error::argument(self.folder().display().to_string(), NOT_KEPT));
+            return Err(keeps_none(self.folder()));
         }
         let flush_number = self.snapshot().is_none().then(|| self.flush_number());
         Ok(KeptScans::new(self.disk.clone(), self.store.layout().clone(), self.kept_records()?, flush_number))
+    }
+
+    /// Checks that the map consists of scans that it keeps and of nothing else: only then it can be mapped again.
+    ///
+    /// # Errors
+    ///
+    /// What else there is, named; a list that cannot be read or is damaged.
+    pub fn check_keeps_all(&self) -> Result<()> {
+        let records = self.keeps_scans().then(|| self.kept_records()).transpose()?;
+        check_keeps_all(records, self.folder())
     }
 
     pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
@@ -321,10 +331,6 @@ impl MapReader {
         error
     }
 }
-
-/// What to do about a map without kept scans.
-pub(crate) const NOT_KEPT: &str =
-    "keeps no scans, so that it cannot be mapped again; build it with --keep-scans to have them";
 
 impl MapView for MapReader {
     fn config(&self) -> &MapConfig {

@@ -29,6 +29,9 @@ mod cli_pictures;
 /// Maps of a region from the command line.
 #[cfg(feature = "cli")]
 mod cli_region;
+/// Maps that follow new poses, by the command.
+#[cfg(feature = "cli")]
+mod cli_remap;
 /// Snapshots from the command line.
 #[cfg(feature = "cli")]
 mod cli_snapshots;

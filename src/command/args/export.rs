@@ -16,7 +16,7 @@ pub struct ExportArgs {
         value_name = "FILE",
         required = false,
         required_unless_present = "scans",
-        default_value_if("scans", ArgPredicate::IsPresent, "")
+        default_value_if("scans", ArgPredicate::IsPresent, "-")
     )]
     pub output: PathBuf,
     /// In place of voxels, write the scans that the map keeps into this folder: a .pcd each, and poses_tum.txt

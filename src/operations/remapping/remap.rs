@@ -75,8 +75,7 @@ pub fn remap(
     let mut remapped = Remapped::default();
     let poses = {
         let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
-        // What it says of a map without scans.
-        drop(reader.kept_scans()?);
+        reader.check_keeps_all()?;
         let poses = poses.by_number(reader.kept_records()?)?;
         let mut records = reader.kept_records()?;
         let mut moves = FxHashMap::default();

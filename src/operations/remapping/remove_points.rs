@@ -38,6 +38,7 @@ pub fn remove_points(
     let (mut changed, mut points_removed) = (FxHashSet::default(), 0);
     {
         let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
+        reader.check_keeps_all()?;
         for scan in reader.kept_scans()? {
             how.stop.check()?;
             let scan = scan?;

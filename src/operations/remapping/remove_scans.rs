@@ -52,7 +52,7 @@ pub fn remove_scans(
     let path = || MapPath::on(disk.clone(), &folder);
     let (selected, selection) = {
         let reader = MapReader::open(path(), 1)?;
-        drop(reader.kept_scans()?);
+        reader.check_keeps_all()?;
         let selection = Selection::of(scans, &reader)?;
         (numbers(&reader, &selection)?, selection)
     };

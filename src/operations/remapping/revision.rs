@@ -1,7 +1,7 @@
 use super::filtered_scan::FilteredScan;
 use crate::config::{MapConfig, MemoryLimit};
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, NOT_KEPT, Remapper, TileFinder};
+use crate::mapper::{KeptScan, Remapper, TileFinder, check_keeps_all};
 use crate::operations::snapshot::check_is_free;
 use crate::persistence::config_from;
 use crate::scan::{Pose, ScanPoints, Stop};
@@ -150,7 +150,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
     /// Finds out what the change touches; `None` for a map without scans.
     fn look(mut self, store: &TileStore) -> Result<Option<(Self, Touched)>> {
         let config = self.config_of(store)?;
-        check_keeps_all(store)?;
+        check_keeps_all(store.keeps_scans().then(|| store.kept_records()).transpose()?, store.folder())?;
         let changed_updates = self.count(store)?;
         self.counts.tiles = store.count_tiles() as u64;
         let mut touched = Touched { config, tiles: None, segments: BTreeSet::new() };
@@ -336,28 +336,6 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
         };
         Ok(record)
     }
-}
-
-/// A map that consists of more than the scans that it keeps cannot be mapped again from these.
-fn check_keeps_all(store: &TileStore) -> Result<()> {
-    let refuse = |reason: String| Err(Error::argument(store.folder().display().to_string(), reason));
-    if !store.keeps_scans() {
-        return refuse(NOT_KEPT.to_owned());
-    }
-    let mut records = store.kept_records()?;
-    while let Some(entry) = records.next_entry()? {
-        let what = match entry {
-            CatalogEntry::Kept(_) | CatalogEntry::Removed(..) => continue,
-            CatalogEntry::Listed(scan) => format!("scan {}, whose points are not kept", scan.number),
-            CatalogEntry::Unlisted(first, last) if first == last => {
-                format!("number {first}, which is no scan")
-            }
-            CatalogEntry::Unlisted(first, last) => format!("numbers {first} to {last}, which are no scans"),
-            CatalogEntry::Operation(what) => format!("a change that is no scan: {what}"),
-        };
-        return refuse(format!("cannot be mapped again from its scans, for it also consists of {what}"));
-    }
-    Ok(())
 }
 
 /// Whether a scan is one that can be moved: its points are in the frame of its sensor.

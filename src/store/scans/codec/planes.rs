@@ -31,15 +31,24 @@ pub(super) struct PlaneWriter {
     plane: Vec<u8>,
     grouped: Vec<u8>,
     counts: Vec<u32>,
+    halves: Vec<u32>,
 }
 
 impl PlaneWriter {
     /// Appends the lowest `bytes` bytes of each word.
     pub(super) fn put(&mut self, words: &[u64], bytes: usize, out: &mut Vec<u8>) -> io::Result<()> {
         let (mut plane, mut above) = (std::mem::take(&mut self.plane), std::mem::take(&mut self.above));
+        // Half as wide, they are taken apart in half the time.
+        self.halves.clear();
+        if bytes <= 4 {
+            self.halves.extend(words.iter().map(|word| *word as u32));
+        }
         for byte in (0..bytes).rev() {
             plane.clear();
-            plane.extend(words.iter().map(|word| (word >> (8 * byte)) as u8));
+            match bytes <= 4 {
+                true => plane.extend(self.halves.iter().map(|word| (word >> (8 * byte)) as u8)),
+                false => plane.extend(words.iter().map(|word| (word >> (8 * byte)) as u8)),
+            }
             // What is known of a byte by the one above is most in the second: mantissas by exponents.
             let above_it = (byte + 2 == bytes).then_some(&*above);
             self.put_plane(&plane, above_it, out)?;
@@ -67,11 +76,11 @@ impl PlaneWriter {
             return Ok(());
         }
         let bits = entropy(&counts, plane.len() as u32);
-        if let Some(above) = above
-            && self.bits_by_group(plane, above) < bits.min(noise_bits(plane.len()))
+        if let Some((above, groups)) = above.map(|above| (above, Groups::of(above)))
+            && self.bits_by_group(plane, above, &groups) < bits.min(noise_bits(plane.len()))
         {
             out.push(GROUPED);
-            return self.put_groups(plane, above, out);
+            return self.put_groups(plane, above, &groups, out);
         }
         if bits < noise_bits(plane.len()) {
             let length = self.compress(plane)?;
@@ -88,8 +97,7 @@ impl PlaneWriter {
     }
 
     /// Entropy of a plane where the bytes above are known, and what the tables of the groups take.
-    fn bits_by_group(&mut self, plane: &[u8], above: &[u8]) -> f64 {
-        let groups = Groups::of(above);
+    fn bits_by_group(&mut self, plane: &[u8], above: &[u8], groups: &Groups) -> f64 {
         if groups.groups == 1 {
             return f64::INFINITY;
         }
@@ -102,8 +110,13 @@ impl PlaneWriter {
         of_groups.sum::<f64>() + 8.0 * TABLE_BYTES * groups.groups as f64
     }
 
-    fn put_groups(&mut self, plane: &[u8], above: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
-        let groups = Groups::of(above);
+    fn put_groups(
+        &mut self,
+        plane: &[u8],
+        above: &[u8],
+        groups: &Groups,
+        out: &mut Vec<u8>,
+    ) -> io::Result<()> {
         let mut grouped = std::mem::take(&mut self.grouped);
         grouped.clear();
         grouped.resize(plane.len(), 0);
@@ -174,9 +187,16 @@ impl Groups {
 }
 
 fn histogram(plane: &[u8]) -> [u32; 256] {
-    let mut counts = [0; 256];
-    plane.iter().for_each(|byte| counts[usize::from(*byte)] += 1);
-    counts
+    // Equal bytes that follow each other do not wait for each other.
+    let mut counts = [[0_u32; 256]; 4];
+    let (chunks, rest) = plane.as_chunks::<4>();
+    for chunk in chunks {
+        for (counts, byte) in counts.iter_mut().zip(chunk) {
+            counts[usize::from(*byte)] += 1;
+        }
+    }
+    rest.iter().for_each(|byte| counts[0][usize::from(*byte)] += 1);
+    std::array::from_fn(|byte| counts.iter().map(|counts| counts[byte]).sum())
 }
 
 /// Entropy in bits of all.

@@ -196,6 +196,7 @@ fn a_table_of_real_sets() {
         }
         let [encoding, decoding] = [encoding_s, decoding_s].map(|s| 1e9 * s / count as f64);
         let a_point = bytes as f64 / count as f64;
-        println!("{set:36} {count:9} {a_point:6.2} bytes {encoding:6.1} ns {decoding:6.1} ns");
+        let line = format!("{set:36} {count:9} {a_point:6.2} bytes {encoding:6.1} ns {decoding:6.1} ns\n");
+        std::io::Write::write_all(&mut std::io::stderr(), line.as_bytes()).unwrap();
     }
 }

@@ -1,0 +1,183 @@
+use crate::cli::{failure, json, output, scans, text, voxtile};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A map of three scans that it keeps, the scans, and where both are.
+struct Kept {
+    folder: TempDir,
+    scans: PathBuf,
+    map: String,
+}
+
+const TILES: [&str; 2] = ["--tile-size", "1"];
+
+impl Kept {
+    fn new() -> Self {
+        let folder = TempDir::new().unwrap();
+        let scans = scans(&folder);
+        let kept = Self { map: text(&folder.path().join("map")).to_owned(), folder, scans };
+        output(&[&["build", text(&kept.scans), "-o", &kept.map, "--keep-scans"][..], &TILES].concat());
+        kept
+    }
+
+    fn path(&self, name: &str) -> String {
+        text(&self.folder.path().join(name)).to_owned()
+    }
+
+    /// A file with the poses of the scans, moved by so much per scan.
+    fn poses(&self, name: &str, by_m: f64) -> String {
+        let path = self.path(name);
+        let own = fs::read_to_string(self.scans.join("poses_kitti.txt")).unwrap();
+        let moved = own.lines().enumerate().map(|(number, line)| {
+            let mut numbers: Vec<f64> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
+            numbers[3] += by_m * number as f64;
+            numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ") + "\n"
+        });
+        fs::write(&path, moved.collect::<String>()).unwrap();
+        path
+    }
+
+    /// The digest of a build from nothing with other poses.
+    fn digest_with(&self, poses: &str, map: &str) -> String {
+        let map = self.path(map);
+        output(&[&["build", text(&self.scans), "-o", &map, "--poses", poses][..], &TILES].concat());
+        digest(&map)
+    }
+}
+
+/// What a command says that must end with this code.
+fn fails(arguments: &[&str], code: i32) -> String {
+    let (found, message) = failure(arguments);
+    assert_eq!(found, code, "{message}");
+    message
+}
+
+fn digest(map: &str) -> String {
+    output(&["digest", map])
+}
+
+#[test]
+fn a_map_follows_its_poses_and_is_then_as_if_built_with_them() {
+    let kept = Kept::new();
+    let before = digest(&kept.map);
+    let moved = kept.poses("moved.txt", 0.3);
+    let dry = json(&["remap", &kept.map, "--poses", &moved, "--dry-run", "--json"]);
+    assert_eq!((&dry["dry_run"], &dry["scans_changed"]), (&true.into(), &2.into()));
+    assert!(dry["estimated_s"].as_f64().unwrap() > 0.0);
+    assert_eq!(digest(&kept.map), before);
+    let done = json(&["remap", &kept.map, "--poses", &moved, "--keep-as", "before", "--json"]);
+    assert_eq!((&done["scans_changed"], &done["kept_as"]), (&2.into(), &"before".into()));
+    assert!((done["largest_move_m"].as_f64().unwrap() - 0.6).abs() < 1e-9);
+    assert_eq!(digest(&kept.map), kept.digest_with(&moved, "again"));
+    assert_eq!(digest(&format!("{}@before", kept.map)), before);
+    assert!(output(&["verify", &kept.map]).contains("whole"));
+    // A build goes on with them, and no scan comes twice.
+    let resume = ["build", text(&kept.scans), "-o", &kept.map, "--poses", &moved, "--resume", "--json"];
+    assert_eq!(json(&resume)["resumed_after"], 3);
+    // Back again, by less than the tolerance for one of them.
+    let own = kept.poses("own.txt", 0.0);
+    let told = output(&["remap", &kept.map, "--poses", &own, "--tolerance", "0.4m,1deg"]);
+    assert!(told.contains("1 scans moved, by 0.600 m") && told.contains("1 scans where they are"), "{told}");
+    output(&["remap", &kept.map, "--poses", &own]);
+    assert_eq!(digest(&kept.map), before);
+    let told = output(&["remap", &kept.map, "--poses", &own]);
+    assert!(told.contains("0 scans moved"), "{told}");
+}
+
+#[test]
+fn kept_scans_are_told_exported_and_built_again() {
+    let kept = Kept::new();
+    let told = output(&["scans", &kept.map, "--each"]);
+    assert!(told.contains(" points") && told.contains(" tiles") && told.contains("bytes a point"), "{told}");
+    let summary = json(&["scans", &kept.map, "--json"]);
+    assert_eq!((&summary["scans"], &summary["points"]), (&3.into(), &126.into()));
+    let out = kept.path("out");
+    assert!(output(&["export", &kept.map, "--scans", &out]).contains("3 scans, 126 points"));
+    let again = kept.path("again");
+    output(&[&["build", &out, "-o", &again][..], &TILES].concat());
+    assert_eq!(digest(&again), digest(&kept.map));
+    let message = fails(&["export", &kept.map, "--scans", &out], 2);
+    assert!(message.contains("choose a folder that is empty"), "{message}");
+    let third = kept.path("third");
+    output(&[&["build", &kept.map, "-o", &third][..], &TILES].concat());
+    assert_eq!(digest(&third), digest(&kept.map));
+    // Other parameters, without the files.
+    fs::remove_dir_all(&out).unwrap();
+    let (coarse, wanted) = (kept.path("coarse"), kept.path("wanted"));
+    let how = ["--resolution", "0.2", "--max-range", "2"];
+    output(&[&["remap", &kept.map, "-o", &coarse][..], &how].concat());
+    output(&[&["build", text(&kept.scans), "-o", &wanted, "--tile-size", "1"][..], &how].concat());
+    assert_eq!(digest(&coarse), digest(&wanted));
+}
+
+#[test]
+fn scans_and_points_are_removed_as_if_they_had_never_been() {
+    let kept = Kept::new();
+    output(&["snapshot", &kept.map, "all"]);
+    let told = output(&["remove-scans", &kept.map, "--scans", "2..3"]);
+    assert!(told.contains("2 scans gone") && told.contains("all still holds some of them"), "{told}");
+    let first = kept.path("first");
+    output(&[&["build", text(&kept.scans), "-o", &first, "--count", "1"][..], &TILES].concat());
+    assert_eq!(digest(&kept.map), digest(&first));
+    assert_eq!(json(&["scans", &kept.map, "--json"])["scans"], 1);
+    // They are not taken again.
+    let resumed = json(&["build", text(&kept.scans), "-o", &kept.map, "--resume", "--json"]);
+    assert_eq!((&resumed["scans"], digest(&kept.map)), (&0.into(), digest(&first)));
+    let all = ["--region", "-99", "-99", "-99", "99", "99", "99"];
+    let gone = json(&[&["remove-points", &kept.map, "--json"][..], &all].concat());
+    // One of its 42 points is nowhere.
+    assert_eq!((&gone["points_removed"], &gone["tiles"]), (&41.into(), &gone["tiles_mapped"]));
+    assert_eq!(json(&["info", &kept.map, "--json"])["voxels"], 0);
+    let message = fails(&["remove-scans", &kept.map, "--input", "nothing"], 2);
+    assert!(message.contains("the map has none of"), "{message}");
+}
+
+#[test]
+fn what_cannot_be_mapped_again_is_refused_with_what_to_do() {
+    let kept = Kept::new();
+    let refused = |arguments: &[&str]| fails(arguments, 2);
+    let three = kept.poses("poses.txt", 0.1);
+    let two = fs::read_to_string(&three).unwrap().lines().take(2).collect::<Vec<_>>().join("\n");
+    fs::write(&three, two).unwrap();
+    let message = refused(&["remap", &kept.map, "--poses", &three]);
+    assert!(message.contains("2 poses for 3 scans that the map keeps: none from scan 3 on"), "{message}");
+    let message = refused(&["remap", &kept.map, "--poses", &three, "--tolerance", "1"]);
+    assert!(message.contains("0.02m,0.1deg"), "{message}");
+    let message = refused(&["remove-scans", &kept.map, "--scans", "3..1"]);
+    assert!(message.contains("no range of numbers"), "{message}");
+    let without = kept.path("without");
+    output(&[&["build", text(&kept.scans), "-o", &without][..], &TILES].concat());
+    let message = refused(&["remap", &without, "--poses", &three]);
+    assert!(message.contains("keeps no scans") && message.contains("--keep-scans"), "{message}");
+    let message = refused(&["export", &without, "--scans", &kept.path("out")]);
+    assert!(message.contains("--keep-scans"), "{message}");
+    let message = refused(&["build", text(&kept.scans), "-o", &kept.map, "--no-rays", "--append", "--again"]);
+    assert!(message.contains("--no-rays, --keep-scans"), "{message}");
+    output(&["clear", &kept.map, "--region", "0", "0", "0", "1", "1", "1"]);
+    let poses = kept.poses("poses.txt", 0.1);
+    let message = refused(&["remap", &kept.map, "--poses", &poses]);
+    assert!(message.contains("a change that is no scan: clear"), "{message}");
+}
+
+#[test]
+fn a_damaged_segment_is_named_and_repaired_around() {
+    let kept = Kept::new();
+    let segment = Path::new(&kept.map).join("kept_scans/segment.1");
+    let mut bytes = fs::read(&segment).unwrap();
+    let last = bytes.len() - 9;
+    bytes[last] ^= 1;
+    fs::write(&segment, bytes).unwrap();
+    let before = digest(&kept.map);
+    let poses = kept.poses("poses.txt", 0.1);
+    let message = fails(&["remap", &kept.map, "--poses", &poses], 1);
+    assert!(message.contains("segment.1") && message.contains("checksum"), "{message}");
+    assert_eq!(digest(&kept.map), before);
+    let found = voxtile(&["verify", &kept.map]).assert().code(1);
+    assert!(String::from_utf8_lossy(&found.get_output().stdout).contains("(scan 3)"));
+    voxtile(&["repair", &kept.map]).assert().code(1);
+    assert!(output(&["verify", &kept.map]).contains("whole"));
+    assert_eq!(digest(&kept.map), before);
+    let message = fails(&["remap", &kept.map, "--poses", &poses], 2);
+    assert!(message.contains("scan 3, whose points are not kept"), "{message}");
+}
