@@ -32,7 +32,7 @@ mod octree {
 }
 
 mod scan {
-    pub(crate) use voxtile::scan::{PackedUpdates, ScanUpdates, TileUpdates};
+    pub(crate) use voxtile::scan::{PackedUpdates, ScanPoints, ScanUpdates, TileUpdates};
 }
 
 mod sensor {

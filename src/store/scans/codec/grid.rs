@@ -77,7 +77,9 @@ impl Grid {
             Self::Times(step) => value / step,
             Self::Over(parts) => value * parts,
         });
-        if !(steps.abs() < MOST) {
+        // Also none of what is no number.
+        let is_whole = steps.abs() < MOST;
+        if !is_whole {
             return None;
         }
         // As an integer, so that there is one zero; the other is one place below it.
