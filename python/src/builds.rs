@@ -11,8 +11,9 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use voxtile::io::{PointRoom, ReadOptions, RecordingOptions, ScanSource, SensorScan, open_any_scans};
-use voxtile::mapper::Mapper;
-use voxtile::{OutOfCoreTileMapper, ScanReport};
+use voxtile::mapper::{KeptScan, KeptScans, MapReader, Mapper};
+use voxtile::scan::ScanPoints;
+use voxtile::{Error, OutOfCoreTileMapper, Pose, Result, ScanReport};
 
 /// What a crash may take from a build.
 const BETWEEN_FLUSHES: Duration = Duration::from_secs(60);
@@ -26,7 +27,50 @@ type ReadScan<'py> =
 /// Iterates over scans: `(points, pose, intensities)`, what `Map.insert_many` takes.
 #[pyclass(frozen, module = "voxtile")]
 pub struct ScanIterator {
-    scans: Mutex<Box<dyn ScanSource + Send>>,
+    scans: Mutex<Scans>,
+}
+
+/// Where scans come from.
+enum Scans {
+    Input(Box<dyn ScanSource + Send>),
+    /// A map that keeps them, and how many are left.
+    Kept(Box<KeptScans>, usize),
+}
+
+impl Scans {
+    fn next(&mut self) -> Result<Option<SensorScan>> {
+        match self {
+            Self::Input(scans) => scans.next_scan(),
+            Self::Kept(scans, left) => {
+                *left = left.saturating_sub(1);
+                scans.next().map(|scan| in_memory(&scan?)).transpose()
+            }
+        }
+    }
+}
+
+/// A kept scan with all its points. Points in the world frame get a pose at the sensor's place.
+fn in_memory(scan: &KeptScan) -> Result<SensorScan> {
+    let origin = scan.origin();
+    let pose = scan.world_from_sensor();
+    let (mut points_in_sensor, mut intensities) = (Vec::new(), scan.has_intensities().then(Vec::new));
+    scan.for_each_own_chunk(0..scan.len(), &mut |points, of_points| {
+        match pose {
+            Some(_) => points_in_sensor.extend_from_slice(points),
+            None => points_in_sensor.extend(
+                points.iter().map(|point| std::array::from_fn::<f64, 3, _>(|k| point[k] - origin[k])),
+            ),
+        }
+        if let Some(all) = &mut intensities {
+            all.extend_from_slice(of_points.unwrap_or_default());
+        }
+        true
+    })?;
+    let world_from_sensor = match pose {
+        Some(pose) => pose,
+        None => Pose::from_quaternion(origin, [0.0, 0.0, 0.0, 1.0])?,
+    };
+    Ok(SensorScan { name: scan.number().to_string(), points_in_sensor, intensities, world_from_sensor })
 }
 
 #[pymethods]
@@ -36,7 +80,7 @@ impl ScanIterator {
     }
 
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<ReadScan<'py>>> {
-        let Some(scan) = watched(py, |_| self.scans.lock().next_scan())? else { return Ok(None) };
+        let Some(scan) = watched(py, |_| self.scans.lock().next())? else { return Ok(None) };
         let SensorScan { points_in_sensor, intensities, world_from_sensor, .. } = scan;
         let pose = rows(py, matrix_of(&world_from_sensor))?;
         Ok(Some((rows(py, points_in_sensor)?, pose, intensities.map(|intensities| column(py, intensities)))))
@@ -44,14 +88,17 @@ impl ScanIterator {
 
     /// Number of scans, if it is known before they are read.
     fn __length_hint__(&self) -> usize {
-        self.scans.lock().len_hint().unwrap_or(0)
+        match &*self.scans.lock() {
+            Scans::Input(scans) => scans.len_hint().unwrap_or(0),
+            Scans::Kept(_, left) => *left,
+        }
     }
 }
 
 /// Iterates over the scans of a file or folder of any format that the command reads: points in the sensor's frame
 /// (`float64`, N x 3), the pose (4 x 4) and intensities (`float32`, or `None`).
 ///
-/// `poses` is a file of poses, or "identity"; `topic`, `odometry` and `fixed_frame` choose from a recording; `first`,
+/// Of a map that keeps its scans, these. `poses` is a file of poses, or "identity"; `topic`, `odometry` and `fixed_frame` choose from a recording; `first`,
 /// `count` and `every` choose scans.
 #[pyfunction]
 #[pyo3(signature = (path, *, poses=None, topic=None, odometry=None, fixed_frame=None, first=0, count=None, every=1))]
@@ -69,7 +116,23 @@ pub fn scans(
 ) -> PyResult<ScanIterator> {
     let recording = RecordingOptions { topic, odometry_topic: odometry, fixed_frame };
     let options = options_of(poses, recording, (first, count, every));
-    let scans = watched(py, |_| open_any_scans(&path, &options))?;
+    let scans = watched(py, |_| {
+        if !(path.join("metadata.json").is_file() && path.join("commits.log").is_file()) {
+            return Ok(Scans::Input(open_any_scans(&path, &options)?));
+        }
+        if options.poses.is_some() || !options.selection.is_everything() {
+            return Err(Error::argument(
+                "scans",
+                "those that a map keeps are read as they are; leave the options out",
+            ));
+        }
+        let reader = MapReader::open(&path, 1)?;
+        let (mut records, mut count) = (reader.kept_scans()?, 0);
+        while records.next_record()?.is_some() {
+            count += 1;
+        }
+        Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
+    })?;
     Ok(ScanIterator { scans: Mutex::new(scans) })
 }
 
@@ -80,7 +143,8 @@ pub fn scans(
 #[pyfunction]
 #[pyo3(signature = (path, output, *, resolution=0.1, tile_size=10.0, min_range=0.0, max_range=None,
     insert_mode="per-scan", sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap",
-    memory=None, poses=None, topic=None, odometry=None, fixed_frame=None, first=0, count=None, every=1, progress=None))]
+    memory=None, poses=None, topic=None, odometry=None, fixed_frame=None, first=0, count=None, every=1, keep_scans=false,
+    progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
 pub fn build(
     py: Python<'_>,
@@ -103,6 +167,7 @@ pub fn build(
     first: u64,
     count: Option<u64>,
     every: u64,
+    keep_scans: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<InsertReport> {
     let config = config_of(
@@ -118,6 +183,7 @@ pub fn build(
             occupancy_threshold,
             storage,
             memory,
+            keep_scans,
         },
     )?;
     let recording = RecordingOptions { topic, odometry_topic: odometry, fixed_frame };

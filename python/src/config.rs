@@ -21,6 +21,7 @@ pub struct ConfigArguments<'a, 'py> {
     pub occupancy_threshold: f64,
     pub storage: &'a str,
     pub memory: Option<Bound<'py, PyAny>>,
+    pub keep_scans: bool,
 }
 
 /// The configuration of a new map.
@@ -51,7 +52,8 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
         .with_sensor_model(sensor_model)
         .with_range(arguments.min_range, arguments.max_range)
         .with_insert_mode(insert_mode)
-        .with_storage(storage_of(py, arguments.storage)?);
+        .with_storage(storage_of(py, arguments.storage)?)
+        .with_kept_scans(arguments.keep_scans);
     config.occupancy_threshold = arguments.occupancy_threshold;
     let bytes = match &arguments.memory {
         Some(memory) => bytes_of(memory)?,

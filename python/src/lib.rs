@@ -5,6 +5,7 @@
 //! questions   what arrays of points, rays and boxes are answered
 //! local_map   LocalMap: what is near the robot
 //! operations  whole maps on disk
+//! remapping   maps that follow the scans that they keep
 //! builds      files of scans: read, or made a map of
 //! command     the command `voxtile`
 //! watched     work beside the interpreter, which Ctrl-C ends
@@ -22,6 +23,7 @@ mod map;
 mod operations;
 mod pose;
 mod questions;
+mod remapping;
 mod report;
 mod scan;
 mod source;
@@ -45,6 +47,8 @@ mod _voxtile {
         clear, convert, crop, decay, delete_snapshot, diff, import_octree, merge, repair, revert, snapshots,
         verify,
     };
+    #[pymodule_export]
+    use super::remapping::{remap, remap_as, remove_points, remove_scans};
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]

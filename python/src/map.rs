@@ -91,7 +91,7 @@ impl Map {
     /// "compact". `probabilities` are hit, miss, least and most of the log-odds model.
     #[staticmethod]
     #[pyo3(signature = (path, resolution=0.1, *, tile_size=10.0, min_range=0.0, max_range=None, insert_mode="per-scan",
-        sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None))]
+        sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false))]
     #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
     fn create(
         py: Python<'_>,
@@ -106,6 +106,7 @@ impl Map {
         occupancy_threshold: f64,
         storage: &str,
         memory: Option<Bound<'_, PyAny>>,
+        keep_scans: bool,
     ) -> PyResult<Self> {
         let config = config_of(
             py,
@@ -120,6 +121,7 @@ impl Map {
                 occupancy_threshold,
                 storage,
                 memory,
+                keep_scans,
             },
         )?;
         let options = MapOptions::new().config(config).create_new(true);

@@ -27,7 +27,7 @@ pub enum MapOrSnapshot {
 }
 
 impl MapOrSnapshot {
-    fn open(&self) -> Result<MapReader> {
+    pub fn open(&self) -> Result<MapReader> {
         match self {
             Self::Map(path) => MapReader::open(path, CACHE_TILES),
             Self::Snapshot(path, name) => {
@@ -37,10 +37,10 @@ impl MapOrSnapshot {
     }
 }
 
-type Callback = Option<Py<PyAny>>;
+pub type Callback = Option<Py<PyAny>>;
 
 /// Does work and returns what it tells.
-fn told<'py, T: Serialize + Send>(
+pub fn told<'py, T: Serialize + Send>(
     py: Python<'py>,
     progress: Callback,
     work: impl FnOnce(&Stop, &Progress<'_>) -> Result<T> + Send,
@@ -48,7 +48,7 @@ fn told<'py, T: Serialize + Send>(
     object(py, &watched_with_progress(py, progress, work)?)
 }
 
-fn name_of(py: Python<'_>, name: &str) -> PyResult<SnapshotName> {
+pub fn name_of(py: Python<'_>, name: &str) -> PyResult<SnapshotName> {
     SnapshotName::new(name).map_err(|error| exception(py, &error))
 }
 

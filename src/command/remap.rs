@@ -143,7 +143,6 @@ fn config_of(args: &RemapArgs, own: &MapConfig, memory_bytes: usize) -> anyhow::
     let grid = Grid::new(resolution_m, tile_size_m)?;
     let mut config = MapConfig { grid, ..own.clone() }.with_kept_scans(args.keep_scans);
     config.memory = MemoryLimit::Bytes(memory_bytes.max(MemoryLimit::least_bytes(&grid)));
-    config.rays = rays_of(args, &own.rays);
     if let Some(storage) = args.storage {
         config.storage = storage.into();
     }

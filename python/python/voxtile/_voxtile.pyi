@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from subprocess import Popen
@@ -23,6 +23,10 @@ __all__ = [
     "diff",
     "import_octree",
     "merge",
+    "remap",
+    "remap_as",
+    "remove_points",
+    "remove_scans",
     "repair",
     "revert",
     "run_command",
@@ -114,6 +118,7 @@ class Map:
         occupancy_threshold: float = 0.5,
         storage: _Storage = "octomap",
         memory: int | str | None = None,
+        keep_scans: bool = False,
     ) -> Map: ...
     @staticmethod
     def open(
@@ -234,6 +239,7 @@ def build(
     first: int = 0,
     count: int | None = None,
     every: int = 1,
+    keep_scans: bool = False,
     progress: _Progress | None = None,
 ) -> InsertReport: ...
 def snapshots(map: _Path) -> list[dict[str, Any]]: ...
@@ -241,6 +247,51 @@ def delete_snapshot(map: _Path, name: str) -> None: ...
 def diff(first: _MapOrSnapshot, second: _MapOrSnapshot, *, progress: _Progress | None = None) -> dict[str, Any]: ...
 def revert(
     map: _Path, name: str, *, keep_as: str | None = None, progress: _Progress | None = None
+) -> dict[str, Any]: ...
+def remap(
+    map: _Path,
+    poses: Mapping[int, _Pose] | Iterable[_Pose],
+    *,
+    tolerance: tuple[float, float] | None = None,
+    keep_as: str | None = None,
+    dry_run: bool = False,
+    memory: int | str | None = None,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def remap_as(
+    map: _MapOrSnapshot,
+    output: _Path,
+    *,
+    resolution: float | None = None,
+    tile_size: float | None = None,
+    min_range: float | None = None,
+    max_range: float | None = None,
+    insert_mode: _InsertMode | None = None,
+    storage: _Storage | None = None,
+    keep_scans: bool = False,
+    memory: int | str | None = None,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def remove_scans(
+    map: _Path,
+    *,
+    scans: tuple[int, int] | None = None,
+    time: tuple[int, int] | None = None,
+    input: str | None = None,
+    from_snapshots: bool = False,
+    keep_as: str | None = None,
+    dry_run: bool = False,
+    memory: int | str | None = None,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def remove_points(
+    map: _Path,
+    region: ArrayLike,
+    *,
+    keep_as: str | None = None,
+    dry_run: bool = False,
+    memory: int | str | None = None,
+    progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def merge(
     maps: Sequence[_MapOrSnapshot],

@@ -34,6 +34,7 @@ pub fn map_anew(
     mut progress: impl FnMut(u64, u64),
 ) -> Result<MappedAnew> {
     let all = map.kept_scans()?;
+    let config = MapConfig { rays: rays(&config.rays), ..config };
     let count = map.scans()?.len() as u64;
     let mut mapper = OutOfCoreTileMapper::create(output, config)?;
     mapper.stop_with(stop.clone());

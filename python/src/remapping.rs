@@ -1,0 +1,172 @@
+//! Maps that follow the scans that they keep: new poses, other parameters, removals.
+
+use crate::config::{bytes_of, storage_of};
+use crate::errors::{exception, wrong};
+use crate::map::region_of;
+use crate::operations::{Callback, MapOrSnapshot, name_of, told};
+use crate::pose::pose_of;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::{Path, PathBuf};
+use voxtile::mapper::MapReader;
+use voxtile::operations::{self, NewPoses, Remap, Rework, ScanSelection};
+use voxtile::space::Grid;
+use voxtile::{InsertMode, MapView, MemoryLimit};
+
+/// What a change may use of memory unless something else is asked for.
+const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
+
+/// What every change of the scans can do.
+fn rework_of(
+    py: Python<'_>,
+    map: &Path,
+    keep_as: Option<&str>,
+    dry_run: bool,
+    memory: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Rework> {
+    let keep_as = keep_as.map(|name| name_of(py, name)).transpose()?;
+    let bytes = match memory {
+        Some(memory) => bytes_of(memory)?,
+        None => {
+            let config = MapReader::config_of(map).map_err(|error| exception(py, &error))?;
+            MemoryLimit::least_bytes(&config.grid).max(DEFAULT_MEMORY_BYTES)
+        }
+    };
+    Ok(Rework::default().with_memory_bytes(bytes).with_keep_as(keep_as).with_dry_run(dry_run))
+}
+
+/// Gives the scans that a map keeps new poses, and maps again what they touch: one commit, after which the map is as if
+/// it had been built with these poses.
+///
+/// `poses` is one a scan in order (N x 4 x 4, N x 7, or a list of poses as `Map.insert` takes them), or a dict of scan
+/// numbers and poses. Scans that move and turn by no more than `tolerance`, metres and degrees, stay.
+#[pyfunction]
+#[pyo3(signature = (map, poses, *, tolerance=None, keep_as=None, dry_run=false, memory=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+pub fn remap<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    poses: &Bound<'py, PyAny>,
+    tolerance: Option<(f64, f64)>,
+    keep_as: Option<&str>,
+    dry_run: bool,
+    memory: Option<Bound<'py, PyAny>>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let poses = match poses.cast::<PyDict>() {
+        Ok(numbered) => {
+            let poses = numbered.iter().map(|(number, pose)| Ok((number.extract()?, pose_of(&pose)?)));
+            NewPoses::Numbered(poses.collect::<PyResult<_>>()?)
+        }
+        Err(_) => NewPoses::InOrder(poses.try_iter()?.map(|pose| pose_of(&pose?)).collect::<PyResult<_>>()?),
+    };
+    let how = rework_of(py, &map, keep_as, dry_run, memory.as_ref())?;
+    let tolerance = tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
+    told(py, progress, |stop, progress| {
+        let how = Remap::new(how.with_stop(stop.clone())).with_tolerance(tolerance);
+        operations::remap(&map, &poses, &how, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Makes another map of the scans that a map keeps, with other parameters; what is not named stays.
+#[pyfunction]
+#[pyo3(signature = (map, output, *, resolution=None, tile_size=None, min_range=None, max_range=None, insert_mode=None,
+    storage=None, keep_scans=false, memory=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+pub fn remap_as<'py>(
+    py: Python<'py>,
+    map: MapOrSnapshot,
+    output: PathBuf,
+    resolution: Option<f64>,
+    tile_size: Option<f64>,
+    min_range: Option<f64>,
+    max_range: Option<f64>,
+    insert_mode: Option<&str>,
+    storage: Option<&str>,
+    keep_scans: bool,
+    memory: Option<Bound<'py, PyAny>>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let insert_mode = match insert_mode {
+        None => None,
+        Some("per-scan") => Some(InsertMode::PerScan),
+        Some("per-ray") => Some(InsertMode::PerRay),
+        Some(other) => {
+            return Err(wrong(py, "insert_mode", format!("{other:?} is neither 'per-scan' nor 'per-ray'")));
+        }
+    };
+    let storage = storage.map(|storage| storage_of(py, storage)).transpose()?;
+    let bytes = memory.as_ref().map(bytes_of).transpose()?;
+    told(py, progress, |stop, progress| {
+        let reader = map.open()?;
+        let own = reader.config().clone();
+        let edges =
+            (resolution.unwrap_or(own.grid.resolution_m()), tile_size.unwrap_or(own.grid.tile_size_m()));
+        let mut config = own.with_kept_scans(keep_scans);
+        config.grid = Grid::new(edges.0, edges.1)?;
+        config.storage = storage.unwrap_or(config.storage);
+        let bytes = bytes.unwrap_or(MemoryLimit::least_bytes(&config.grid).max(DEFAULT_MEMORY_BYTES));
+        let rays = |rays: &voxtile::RayConfig| {
+            let mut rays = *rays;
+            rays.min_range_m = min_range.unwrap_or(rays.min_range_m);
+            rays.max_range_m = max_range.or(rays.max_range_m);
+            rays.insert_mode = insert_mode.unwrap_or(rays.insert_mode);
+            rays
+        };
+        let config = config.with_memory_bytes(bytes);
+        operations::map_anew(&reader, &output, config, rays, stop, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Takes scans out of a map that keeps them, as if they had never been: `scans`, a first and a last number; `time`, a
+/// first and a last time stamp in nanoseconds; or `input`, the name of what they came from.
+///
+/// Snapshots that hold any of them are named in the answer, and deleted if `from_snapshots`.
+#[pyfunction]
+#[pyo3(signature = (map, *, scans=None, time=None, input=None, from_snapshots=false, keep_as=None, dry_run=false,
+    memory=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
+pub fn remove_scans<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    scans: Option<(u64, u64)>,
+    time: Option<(i64, i64)>,
+    input: Option<String>,
+    from_snapshots: bool,
+    keep_as: Option<&str>,
+    dry_run: bool,
+    memory: Option<Bound<'py, PyAny>>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let selection = match (scans, time, input) {
+        (Some((first, last)), None, None) => ScanSelection::Numbers(first, last),
+        (None, Some((first, last)), None) => ScanSelection::Time(first, last),
+        (None, None, Some(name)) => ScanSelection::Input(name),
+        _ => return Err(wrong(py, "scans", "name one of scans, time and input")),
+    };
+    let how = rework_of(py, &map, keep_as, dry_run, memory.as_ref())?;
+    told(py, progress, |stop, progress| {
+        let how = how.with_stop(stop.clone());
+        operations::remove_scans(&map, &selection, from_snapshots, &how, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Takes all points in a box out of the scans that a map keeps, and maps again what their rays touched.
+#[pyfunction]
+#[pyo3(signature = (map, region, *, keep_as=None, dry_run=false, memory=None, progress=None))]
+pub fn remove_points<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    region: &Bound<'py, PyAny>,
+    keep_as: Option<&str>,
+    dry_run: bool,
+    memory: Option<Bound<'py, PyAny>>,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let region = region_of(region)?;
+    let how = rework_of(py, &map, keep_as, dry_run, memory.as_ref())?;
+    told(py, progress, |stop, progress| {
+        let how = how.with_stop(stop.clone());
+        operations::remove_points(&map, &region, &how, |done, all| progress.tell(done, all))
+    })
+}

@@ -1,0 +1,76 @@
+"""Maps that follow the scans that they keep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import voxtile
+
+
+def scans(count: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    random = np.random.default_rng(3)
+    made = []
+    for number in range(count):
+        points = random.normal(size=(200, 3)).astype(np.float32) * 3
+        pose = np.eye(4)
+        pose[:3, 3] = [4.0 * number, 0.3, 0.1]
+        made.append((points, pose, random.uniform(0, 200, 200).astype(np.float32)))
+    return made
+
+
+def mapped(path: Path, made: list[tuple[np.ndarray, np.ndarray, np.ndarray]], **how: object) -> str:
+    with voxtile.Map.create(path, resolution=0.2, max_range=5.0, **how) as map:  # type: ignore[arg-type]
+        map.insert_many(made)
+    return voxtile.digest(path)
+
+
+def test_a_map_follows_its_poses(tmp_path: Path) -> None:
+    made = scans(6)
+    before = mapped(tmp_path / "kept", made, keep_scans=True)
+    for kept, taken in zip(voxtile.scans(tmp_path / "kept"), made, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(kept, taken, strict=True))
+    moved = [(points, pose + np.eye(4, k=3) * 0.1 * number, of) for number, (points, pose, of) in enumerate(made)]
+    wanted = mapped(tmp_path / "wanted", moved)
+    poses = np.array([pose for _, pose, _ in moved])
+    dry = voxtile.remap(tmp_path / "kept", poses, dry_run=True)
+    assert dry["scans_changed"] == 5 and dry["estimated_s"] > 0
+    assert voxtile.digest(tmp_path / "kept") == before
+    seen = []
+    voxtile.remap(tmp_path / "kept", poses, keep_as="before", progress=lambda done, all: seen.append((done, all)))
+    assert voxtile.digest(tmp_path / "kept") == wanted and seen[-1] == (6, 6)
+    assert voxtile.digest(tmp_path / "kept", snapshot="before") == before
+    told = voxtile.remap(tmp_path / "kept", {1: made[0][1], 6: made[5][1]}, tolerance=(1.0, 1.0))
+    assert (told["scans_changed"], told["scans_within_tolerance"]) == (0, 1)
+
+
+def test_scans_and_points_go(tmp_path: Path) -> None:
+    made = scans(5)
+    mapped(tmp_path / "kept", made, keep_scans=True)
+    told = voxtile.remove_scans(tmp_path / "kept", scans=(2, 3))
+    assert told["scans_removed"] == 2
+    assert voxtile.digest(tmp_path / "kept") == mapped(tmp_path / "left", [made[0], *made[3:]])
+    region = [[-9, -9, -9], [2, 9, 9]]
+    gone = voxtile.remove_points(tmp_path / "kept", region)
+    assert gone["points_removed"] > 100
+    voxtile.remap_as(tmp_path / "kept", tmp_path / "coarse", resolution=0.4, tile_size=8.0)
+    with voxtile.open(tmp_path / "coarse") as coarse:
+        assert coarse.resolution == 0.4 and len(coarse.occupied()[0]) > 0
+
+
+def test_what_cannot_be_mapped_again_is_an_exception(tmp_path: Path) -> None:
+    made = scans(2)
+    mapped(tmp_path / "without", made)
+    with pytest.raises(voxtile.VoxtileError, match="keeps no scans"):
+        voxtile.remap(tmp_path / "without", [made[0][1], made[1][1]])
+    mapped(tmp_path / "kept", made, keep_scans=True)
+    with pytest.raises(voxtile.VoxtileError, match="1 poses for 2 scans"):
+        voxtile.remap(tmp_path / "kept", [made[0][1]])
+    with pytest.raises(voxtile.VoxtileError, match="name one of"):
+        voxtile.remove_scans(tmp_path / "kept")
+    with pytest.raises((voxtile.VoxtileError, ValueError, TypeError)):
+        voxtile.remap(tmp_path / "kept", [np.full((4, 4), np.nan)] * 2)
+    with pytest.raises(voxtile.VoxtileError):
+        list(voxtile.scans(tmp_path / "without"))
