@@ -4,7 +4,7 @@ use crate::command::region_tiles::tiles_of;
 use crate::mapper::{MapReader, MapView};
 use crate::sensor::{Iwlo, SensorModel};
 use crate::space::{Grid, GridError};
-use crate::{Error, InsertMode, MapConfig, MemoryLimit, Storage};
+use crate::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig, Storage};
 
 /// Where rays are cut unless something else is asked for.
 const MAX_RANGE_M: f64 = 100.0;
@@ -18,7 +18,7 @@ pub fn config_to_create(args: &BuildArgs) -> anyhow::Result<MapConfig> {
     let config = MapConfig::new(resolution_m, tile_size_m)
         .map_err(name_the_option)?
         .with_storage(args.storage.map(Storage::from).unwrap_or_default());
-    Ok(for_this_run(args, config)?.validated()?)
+    Ok(for_this_run(args, config, None)?.validated()?)
 }
 
 /// The map's own parameters, and those that were typed, which must be the same.
@@ -30,7 +30,8 @@ pub fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
         config.grid = Grid::new(resolution_m, tile_size_m).map_err(|error| name_the_option(error.into()))?;
     }
     check_storage(args, config.storage)?;
-    Ok(for_this_run(args, config)?.validated()?)
+    let begun = args.resume.then_some(config.rays);
+    Ok(for_this_run(args, config, begun)?.validated()?)
 }
 
 /// Names the option that makes a tile fit its voxels.
@@ -57,9 +58,8 @@ fn check_storage(args: &BuildArgs, own: Storage) -> crate::Result<()> {
     }
 }
 
-fn for_this_run(args: &BuildArgs, config: MapConfig) -> anyhow::Result<MapConfig> {
-    // What was begun goes on as it was, unless something else is asked for, which is then refused.
-    let begun = args.resume.then_some(config.rays);
+/// What was begun goes on as it was, unless something else is asked for, which is then refused.
+fn for_this_run(args: &BuildArgs, config: MapConfig, begun: Option<RayConfig>) -> anyhow::Result<MapConfig> {
     let insert_mode = match args.insert {
         Some(InsertName::PerScan) => InsertMode::PerScan,
         Some(InsertName::PerRay) => InsertMode::PerRay,

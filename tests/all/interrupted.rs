@@ -299,3 +299,17 @@ fn failing_output(arguments: &[&str]) -> (i32, String) {
     let run = assert.get_output();
     (run.status.code().unwrap(), String::from_utf8(run.stdout.clone()).unwrap())
 }
+
+#[test]
+fn a_build_that_begins_with_resume_is_the_build_without() {
+    let folder = TempDir::new().unwrap();
+    let cloud = folder.path().join("far.pcd");
+    // Beyond the range at which rays are cut unless something else is asked for.
+    let far = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA \
+               ascii\n150 0 0\n";
+    fs::write(&cloud, far).unwrap();
+    let [plain, resumed] = ["plain", "resumed"].map(|name| folder.path().join(name));
+    output(&["build", text(&cloud), "-o", text(&plain)]);
+    output(&["build", text(&cloud), "-o", text(&resumed), "--resume"]);
+    assert_eq!(output(&["digest", text(&plain)]), output(&["digest", text(&resumed)]));
+}
