@@ -66,26 +66,27 @@ impl ColumnWriter {
         }
         let width = Width::of(values);
         let camera = depths.filter(|_| width == Width::Wide).and_then(|z| Pinhole::of(values, z));
-        let mut form = match camera {
+        let form = match camera {
             Some(camera) => Form::Pixels(Arc::new(camera)),
-            None => self.choose(values, width)?,
+            None => self.choose(values, width, true)?,
         };
-        if !self.put_form(values, depths, &form, out)? {
-            form = Form::Bits(width);
-            self.put_form(values, depths, &form, out)?;
+        if self.put_form(values, depths, &form, out)? {
+            self.chosen[column % COLUMNS] = Some((form, 0));
+            return Ok(());
         }
-        self.chosen[column % COLUMNS] = Some((form, 0));
-        Ok(())
+        // Some values are not on the grid of the others. The next block may be.
+        let form = self.choose(values, width, false)?;
+        self.put_form(values, depths, &form, out).map(drop)
     }
 
-    /// The form that makes a part of the column the smallest.
-    fn choose(&mut self, values: &[f64], width: Width) -> io::Result<Form> {
+    /// The form that makes a part of the column the smallest; every column has one that is no grid.
+    fn choose(&mut self, values: &[f64], width: Width, may_be_grid: bool) -> io::Result<Form> {
         let first = values.len().saturating_sub(LOOKED_AT) / 2;
         let part = &values[first..values.len().min(first + LOOKED_AT)];
-        let steps = Grid::of(values, width).map(|grid| Form::Steps(width, grid));
+        let grids = Grid::of(values, width).filter(|_| may_be_grid).map(|grid| Form::Steps(width, grid));
         let differences = LAGS.map(|lag| Form::Differences(width, lag));
         let mut best = (usize::MAX, Form::Bits(width));
-        for form in steps.chain(differences).chain([Form::Bits(width)]) {
+        for form in grids.chain(differences).chain([Form::Bits(width)]) {
             if !self.fill_words(part, None, &form) {
                 continue;
             }

@@ -89,7 +89,8 @@ impl Pinhole {
     /// The pixel of a coordinate, which is `expected` or another; `None` if it is of none, to the bit.
     #[inline]
     fn pixel(&self, value: f64, z: f64, expected: i64) -> Option<i64> {
-        let is_it = |pixel| self.value(pixel, z).to_bits() == value.to_bits();
+        // The bits of what is no number depend on the processor.
+        let is_it = |pixel| self.value(pixel, z).to_bits() == value.to_bits() && !value.is_nan();
         if is_it(expected) {
             return Some(expected);
         }

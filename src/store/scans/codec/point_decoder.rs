@@ -14,7 +14,8 @@ pub(in crate::store) struct PointDecoder {
 }
 
 impl PointDecoder {
-    /// Appends the points of a block and their intensities; returns whether it has these.
+    /// Appends the points of a block and their intensities; returns whether it has these. After an error some of the
+    /// points may be there.
     ///
     /// # Errors
     ///
