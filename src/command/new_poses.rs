@@ -18,7 +18,10 @@ pub fn poses_for(args: &RemapArgs, file: &Path, scans: &[KeptRecord]) -> Result<
     let is_plain = args.calib.is_none() && body_from_sensor.is_none();
     let tolerance_ns = (args.pose_tolerance * 1e9).round() as i64;
     let trajectory = Trajectory::read(file, args.calib.as_deref())?;
-    trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
+    // Stamps that mean nothing are all the same.
+    if trajectory.span_ns().is_none_or(|[first, last]| first < last) {
+        trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
+    }
     if trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns) {
         // As a folder of PCD takes them, to the bit.
         if is_plain

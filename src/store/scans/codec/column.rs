@@ -103,6 +103,9 @@ impl ColumnWriter {
         self.sample.clear();
         let bytes = bytes_of(form, &self.words);
         self.planes.put(&self.words, bytes, &mut self.sample)?;
+        if let Form::Steps(..) = form {
+            self.planes.put(&self.apart, 1, &mut self.sample)?;
+        }
         Ok(self.sample.len())
     }
 
