@@ -9,6 +9,7 @@ use crate::command::read_options::read_options;
 use crate::command::scan_reader::ScanReader;
 use crate::command::stop_signal;
 use crate::command::summary::Summary;
+use crate::command::watch::Watch;
 use crate::command::{INTERRUPTED, say};
 use crate::io::{PointRoom, ReadOptions, StoredScan};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
@@ -24,20 +25,34 @@ use std::time::Instant;
 const PARTS_OF_MEMORY: usize = 32;
 
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
+    let watch = Watch::at_terminal(stop_signal::catch()?);
+    let Some(summary) = build(args, &watch)? else { return Ok(stopped_early(args)) };
+    summary.print(args.json)?;
+    if summary.interrupted {
+        let all = summary.resumed_after + summary.scans;
+        say(format_args!("stopped after {all} scans; all of them are in the map; --resume goes on"));
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Makes the map, or goes on with it; `None` if it was asked to stop before the first scan. What was accepted is in the
+/// map then, whatever ended the build.
+pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>> {
     let started = Instant::now();
-    let stop = stop_signal::catch()?;
+    let stop = watch.stop();
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
     check_no_rays(args, &config)?;
     let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room(args, &config), stop.clone())?;
-    let Some((reader, input)) = opened else { return Ok(stopped_early(args)) };
+    let Some((reader, input)) = opened else { return Ok(None) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
     let mut mapper = match exists {
         true => Some(OutOfCoreTileMapper::open(&args.output, config.clone())?),
         false => None,
     };
     if !intake.read_lead()? {
-        return Ok(stopped_early(args));
+        return Ok(None);
     }
     let crs = intake.crs();
     let mapper = match &mut mapper {
@@ -56,10 +71,10 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     };
     mapper.stop_with(stop.clone());
     let Some(resumed_after) = begin(args, mapper, &mut intake, &input.name)? else {
-        return Ok(stopped_early(args));
+        return Ok(None);
     };
 
-    let progress = Progress::over_scans(input.scans);
+    let progress = watch.over_scans(input.scans);
     progress.pass(intake.content().scans);
     let mut build = Build {
         mapper,
@@ -76,7 +91,10 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
     let Build { report, scans, mut intake, progress, .. } = build;
     drop(progress);
-    intake.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", args.scans.display()));
+    let mut remarks = intake.remarks();
+    remarks.iter_mut().for_each(|remark| *remark = format!("{}: {remark}", args.scans.display()));
+    remarks.extend(all_is_cut(&report, mapper.config()));
+    remarks.iter().for_each(|remark| log::warn!("{remark}"));
     match (outcome, flushed) {
         (Err(error), Ok(())) => {
             return Err(error.context(format!("after {scans} scans, which are in the map")));
@@ -84,17 +102,10 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
         (Err(error), Err(flush_error)) => return Err(error.context(format!("{flush_error:#}; before that"))),
         (Ok(()), flushed) => flushed?,
     }
-    warn_if_all_is_cut(&report, mapper.config());
     let interrupted = stop.is_set();
     let summary = Summary::of(&args.output, scans, report, mapper, started.elapsed())?;
     let (poses, unread) = (Some(input.poses.to_string()), intake.unread);
-    Summary { interrupted, resumed_after, poses, unread, ..summary }.print(args.json)?;
-    if interrupted {
-        let all = resumed_after + scans;
-        say(format_args!("stopped after {all} scans; all of them are in the map; --resume goes on"));
-        return Ok(ExitCode::from(INTERRUPTED));
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(Some(Summary { interrupted, resumed_after, poses, unread, remarks, ..summary }))
 }
 
 struct Build<'a> {
@@ -322,17 +333,15 @@ fn check(scan: Option<&StoredScan>, config: &MapConfig) -> crate::Result<()> {
 }
 
 /// Free space alone is rarely what was wanted.
-fn warn_if_all_is_cut(report: &ScanReport, config: &MapConfig) {
+fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
     let ScanReport { points, skipped, cut_at_max_range, .. } = *report;
     let skipped: u64 = skipped.by_cause().into_iter().map(|(_, count)| count).sum();
-    if let Some(range_m) = config.rays.max_range_m
-        && cut_at_max_range > 0
-        && cut_at_max_range + skipped == points
-    {
-        log::warn!(
+    let range_m = config.rays.max_range_m?;
+    (cut_at_max_range > 0 && cut_at_max_range + skipped == points).then(|| {
+        format!(
             "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise --max-range; are the points \
              in metres? Points that are in the world frame already, far from 0 0 0, need --world-frame with poses, \
              --sensor-origin or --no-rays"
-        );
-    }
+        )
+    })
 }

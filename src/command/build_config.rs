@@ -2,7 +2,7 @@ use crate::command::args::{BuildArgs, InsertName, ModelName};
 use crate::command::octree_choice::octree_config;
 use crate::command::region_tiles::tiles_of;
 use crate::mapper::{MapReader, MapView};
-use crate::sensor::{Iwlo, SensorModel};
+use crate::sensor::{Iwlo, LogOdds, SensorModel};
 use crate::space::{Grid, GridError};
 use crate::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig, Storage};
 
@@ -15,9 +15,10 @@ const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
 /// The parameters of a new map.
 pub fn config_to_create(args: &BuildArgs) -> anyhow::Result<MapConfig> {
     let (resolution_m, tile_size_m) = (args.resolution.unwrap_or(0.1), args.tile_size.unwrap_or(10.0));
-    let config = MapConfig::new(resolution_m, tile_size_m)
+    let mut config = MapConfig::new(resolution_m, tile_size_m)
         .map_err(name_the_option)?
         .with_storage(args.storage.map(Storage::from).unwrap_or_default());
+    config.occupancy_threshold = args.occupancy_threshold.unwrap_or(config.occupancy_threshold);
     Ok(for_this_run(args, config, None)?.validated()?)
 }
 
@@ -30,6 +31,7 @@ pub fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
         config.grid = Grid::new(resolution_m, tile_size_m).map_err(|error| name_the_option(error.into()))?;
     }
     check_storage(args, config.storage)?;
+    check_threshold(args, config.occupancy_threshold)?;
     let begun = args.resume.then_some(config.rays);
     Ok(for_this_run(args, config, begun)?.validated()?)
 }
@@ -53,6 +55,15 @@ fn check_storage(args: &BuildArgs, own: Storage) -> crate::Result<()> {
         Some(wanted) if wanted != own => {
             let reason = format!("the map's tiles are stored as {own}; leave it out, or convert the map");
             Err(Error::argument("--storage", reason))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_threshold(args: &BuildArgs, own: f64) -> crate::Result<()> {
+    match args.occupancy_threshold {
+        Some(wanted) if wanted != own => {
+            Err(Error::argument("--occupancy-threshold", format!("the map's is {own}; leave it out")))
         }
         _ => Ok(()),
     }
@@ -99,6 +110,12 @@ fn sensor_model(args: &BuildArgs, own: SensorModel) -> anyhow::Result<SensorMode
         (Some(ModelName::Iwlo), SensorModel::Iwlo(own)) => SensorModel::Iwlo(own),
         (Some(ModelName::Iwlo), _) => SensorModel::Iwlo(Iwlo::default()),
     };
+    if args.probabilities.is_some() && !matches!(model, SensorModel::LogOdds(_)) {
+        return Err(Error::argument("--probabilities", "only the sensor model log-odds has these").into());
+    }
+    if let Some(&[hit, miss, least, most]) = args.probabilities.as_deref() {
+        return Ok(SensorModel::LogOdds(LogOdds::from_probabilities(hit, miss, least, most)?));
+    }
     let SensorModel::Iwlo(mut iwlo) = model else {
         if args.intensity_threshold.is_some() || args.intensity_max.is_some() {
             let reason = "only the sensor model iwlo has these; add --sensor-model iwlo";

@@ -3,17 +3,18 @@ use crate::command::export_3d_tiles;
 use crate::command::export_origin::{ExportOrigin, OriginFile};
 use crate::command::export_scans;
 use crate::command::export_voxels::{self, log_odds_of};
-use crate::command::json;
+use crate::command::exported::Exported;
 use crate::command::map_at::{point_of, read_map};
 use crate::command::memory;
 use crate::command::octree_file;
 use crate::command::output_file::{OutputFile, is_standard_output, scratch_for};
 use crate::command::part::region_of;
-use crate::command::progress::Progress;
+use crate::command::watch::Watch;
 use crate::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
-use crate::mapper::{MapReader, MapView, OctreeMap};
+use crate::mapper::{MapReader, MapView, OctreeMap, Stoppable};
 use crate::octree::{OctreeFormat, write_bt, write_ot};
 use crate::query::OctreeExport;
+use crate::scan::Stop;
 use crate::space::{Aabb, Grid, TileIndex, VoxelBox};
 use crate::{Error, MapQueries};
 use indicatif::HumanCount;
@@ -33,6 +34,7 @@ enum ExportFormat {
 /// What to write, once it is known that the arguments fit each other.
 struct Export<'a> {
     args: &'a ExportArgs,
+    watch: &'a Watch,
     format: ExportFormat,
     region: Option<Aabb>,
     /// `None` for a stream.
@@ -40,24 +42,35 @@ struct Export<'a> {
 }
 
 /// What was written.
-struct Exported {
+struct Written {
     voxels: u64,
     origin: ExportOrigin,
 }
 
 /// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
+    let exported = export(args, &Watch::at_terminal(Stop::default()))?;
+    if args.scans.is_some() || !is_standard_output(&args.output) {
+        exported.print(args.json, &mut io::stdout().lock())?;
+    } else if args.json || !is_quiet {
+        exported.print(args.json, &mut io::stderr().lock())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the file. Stopped, it is as it was.
+pub fn export(args: &ExportArgs, watch: &Watch) -> anyhow::Result<Exported> {
     if let Some(folder) = &args.scans {
-        return export_scans::run(args, folder);
+        return export_scans::export(args, folder, watch);
     }
     if args.format == Some(ExportFormatName::ThreeDTiles) {
-        return export_3d_tiles::run(args);
+        return export_3d_tiles::export(args, watch);
     }
-    let export = Export::of(args)?;
+    let export = Export::of(args, watch)?;
     if let ExportFormat::Foreign(format) = export.format {
-        return export_voxels::run(args, format, export.region.as_ref());
+        return export_voxels::export(args, format, export.region.as_ref(), watch);
     }
-    let exported = if OctreeMap::is_named_by(&args.map) {
+    let written = if OctreeMap::is_named_by(&args.map) {
         export.octree_file()?
     } else {
         read_map(&args.map, |reader| match export.format {
@@ -66,16 +79,11 @@ pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
             ExportFormat::Foreign(_) => unreachable!("written above"),
         })?
     };
-    if !is_standard_output(&args.output) {
-        export.say(&exported, &mut io::stdout().lock())?;
-    } else if args.json || !is_quiet {
-        export.say(&exported, &mut io::stderr().lock())?;
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(export.told(&written))
 }
 
 impl<'a> Export<'a> {
-    fn of(args: &'a ExportArgs) -> crate::Result<Self> {
+    fn of(args: &'a ExportArgs, watch: &'a Watch) -> crate::Result<Self> {
         let region = args.region.as_deref().map(region_of).transpose()?;
         if args.min_probability.is_some_and(|probability| !(0.0..=1.0).contains(&probability)) {
             return Err(Error::argument("--min-probability", "must be from 0 to 1"));
@@ -104,7 +112,7 @@ impl<'a> Export<'a> {
                 "standard output is a terminal; send it to a file or a pipe",
             ));
         }
-        Ok(Self { args, format, region, origin_file: OriginFile::of(&args.output)? })
+        Ok(Self { args, watch, format, region, origin_file: OriginFile::of(&args.output)? })
     }
 
     /// Writes the whole file, and beside it where it is.
@@ -114,8 +122,9 @@ impl<'a> Export<'a> {
         grid: &Grid,
         write: impl FnOnce(&mut dyn Write) -> anyhow::Result<T>,
     ) -> anyhow::Result<T> {
-        let mut file = OutputFile::create(&self.args.output)?;
+        let mut file = OutputFile::create(&self.args.output)?.stop_with(self.watch.stop().clone());
         let value = write(&mut file.out()).map_err(|error| self.with_name(error))?;
+        self.watch.stop().check()?;
         match &self.origin_file {
             // First: who has only one of the two has one too many, and no shifted file that does not say so.
             Some(beside) if origin.is_moved() => {
@@ -134,13 +143,16 @@ impl<'a> Export<'a> {
 
     /// What a disk refused while the file was written does not say by itself which file that was.
     fn with_name(&self, error: anyhow::Error) -> anyhow::Error {
+        if self.watch.stop().is_set() {
+            return Error::Stopped.into();
+        }
         match error.downcast::<io::Error>() {
             Ok(error) => Error::io(&self.args.output, "write", error).into(),
             Err(error) => error,
         }
     }
 
-    fn voxels(&self, format: VoxelFormat, reader: &MapReader) -> anyhow::Result<Exported> {
+    fn voxels(&self, format: VoxelFormat, reader: &MapReader) -> anyhow::Result<Written> {
         let grid = reader.config().grid;
         let below = self.below(reader);
         let origin =
@@ -148,11 +160,12 @@ impl<'a> Export<'a> {
         let voxels = self.count_voxels(reader)?;
         let file = VoxelFile { format, voxels, resolution_m: grid.resolution_m(), origin_m: origin.corner_m };
         self.write(&origin, &grid, |out| {
-            let progress = Progress::over_tiles(reader.tile_indices().len());
+            let progress = self.watch.over_tiles(reader.tile_indices().len());
             let mut writer = VoxelWriter::new(file, out)?;
             let mut written = Ok(());
             let mut tile = None;
-            reader.for_each_occupied(self.least_probability(), self.region.as_ref(), |voxel| {
+            let map = Stoppable::new(reader, self.watch.stop());
+            map.for_each_occupied(self.least_probability(), self.region.as_ref(), |voxel| {
                 if voxel.evidence.log_odds >= below {
                     return;
                 }
@@ -172,7 +185,7 @@ impl<'a> Export<'a> {
             })?;
             written?;
             writer.finish()?;
-            Ok(Exported { voxels, origin })
+            Ok(Written { voxels, origin })
         })
     }
 
@@ -188,8 +201,8 @@ impl<'a> Export<'a> {
             _ => {}
         }
         let mut count = 0;
-        reader
-            .for_each_occupied(least, region, |voxel| count += u64::from(voxel.evidence.log_odds < below))?;
+        let map = Stoppable::new(reader, self.watch.stop());
+        map.for_each_occupied(least, region, |voxel| count += u64::from(voxel.evidence.log_odds < below))?;
         Ok(count)
     }
 
@@ -208,19 +221,19 @@ impl<'a> Export<'a> {
     }
 
     /// Writes an octree file of any size. Its parts lie in a file without a name until all of them are known.
-    fn octree(&self, format: OctreeFormat, reader: &MapReader) -> anyhow::Result<Exported> {
+    fn octree(&self, format: OctreeFormat, reader: &MapReader) -> anyhow::Result<Written> {
         let grid = reader.config().grid;
         let origin = self.origin(None, &grid, || None)?;
         let (region, memory_bytes) = (self.region.as_ref(), self.args.memory.as_u64() as usize);
         let export = OctreeExport { format, region, origin: origin.voxel, memory_bytes };
         let mut spool = scratch_for(&self.args.output)?;
-        let voxels =
-            self.write(&origin, &grid, |mut out| reader.write_octree(&export, &mut spool, &mut out))?;
-        Ok(Exported { voxels, origin })
+        let map = Stoppable::new(reader, self.watch.stop());
+        let voxels = self.write(&origin, &grid, |mut out| map.write_octree(&export, &mut spool, &mut out))?;
+        Ok(Written { voxels, origin })
     }
 
     /// From one of OctoMap's files to another file; OctoMap's threshold is log-odds 0.
-    fn octree_file(&self) -> anyhow::Result<Exported> {
+    fn octree_file(&self) -> anyhow::Result<Written> {
         let file = octree_file::read(&self.args.map)?;
         // The tile size has no meaning here; two voxels always make a grid.
         let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m)?;
@@ -241,7 +254,7 @@ impl<'a> Export<'a> {
                     }
                     Ok(())
                 })?;
-                return Ok(Exported { voxels, origin });
+                return Ok(Written { voxels, origin });
             }
         };
         let origin = self.origin(Some(format), &grid, || None)?;
@@ -263,7 +276,7 @@ impl<'a> Export<'a> {
                 false => Ok(()),
             })?;
             writer.finish()?;
-            Ok(Exported { voxels, origin })
+            Ok(Written { voxels, origin })
         })
     }
 
@@ -283,27 +296,24 @@ impl<'a> Export<'a> {
         }
     }
 
-    fn say(&self, exported: &Exported, out: &mut impl Write) -> anyhow::Result<()> {
-        let Exported { voxels, origin } = exported;
+    fn told(&self, written: &Written) -> Exported {
+        let Written { voxels, origin } = written;
         let file = self.args.output.display().to_string();
         let beside = self.origin_file.as_ref().filter(|_| origin.is_moved()).map(OriginFile::path);
-        if self.args.json {
-            let summary = serde_json::json!({
-                "file": file,
-                "voxels": voxels,
-                "origin_m": origin.corner_m,
-                "origin_voxel": origin.voxel,
-                "origin_file": beside.map(|path| path.display().to_string()),
-                "peak_rss_bytes": memory::peak_bytes(),
-            });
-            return json::print(&summary, out);
-        }
+        let json = serde_json::json!({
+            "file": file,
+            "voxels": voxels,
+            "origin_m": origin.corner_m,
+            "origin_voxel": origin.voxel,
+            "origin_file": beside.map(|path| path.display().to_string()),
+            "peak_rss_bytes": memory::peak_bytes(),
+        });
         let file = if is_standard_output(&self.args.output) { "standard output" } else { &file };
-        writeln!(out, "{} voxels in {file}", HumanCount(*voxels))?;
+        let mut text = format!("{} voxels in {file}\n", HumanCount(*voxels));
         if origin.is_moved() || origin.asked_m.is_some() {
-            origin.print(beside, out)?;
+            text += &origin.text(beside);
         }
-        Ok(())
+        Exported { json, text }
     }
 }
 

@@ -1,20 +1,18 @@
 //! A folder of 3D Tiles: `tileset.json`, and the surface of every node as binary glTF.
 
 use crate::command::args::ExportArgs;
-use crate::command::json;
+use crate::command::exported::Exported;
 use crate::command::map_at::{AnyMap, read_any_map};
 use crate::command::memory;
 use crate::command::output_file::{StagedOutput, is_standard_output, scratch_for};
-use crate::command::progress::Progress;
+use crate::command::watch::Watch;
 use crate::mapper::MapView;
 use crate::render::levels::{Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset};
 use crate::{Error, Result};
 use indicatif::HumanCount;
 use rayon::prelude::*;
 use std::fs;
-use std::io::Write;
 use std::path::Path;
-use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile_clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
 
@@ -26,48 +24,44 @@ struct Written {
     voxels: AtomicU64,
 }
 
-pub fn run(args: &ExportArgs) -> anyhow::Result<ExitCode> {
+pub fn export(args: &ExportArgs, watch: &Watch) -> anyhow::Result<Exported> {
     check(args)?;
     let written = read_any_map(&args.map, |map| {
         let staged = StagedOutput::beside(&args.output)?;
         let folder = staged.path()?;
         let tiles = map.tile_indices();
-        let progress = Progress::over_tiles(tiles.len());
+        let progress = watch.over_tiles(tiles.len());
         let store = NodeStore::open(scratch_for(&args.output)?, &args.output)?;
-        let levels = Levels::build(map, &tiles, &store, &|_| true)?
-            .ok_or_else(|| Error::argument("--output", "the export was stopped"))?;
+        let levels =
+            Levels::build(map, &tiles, &store, &|_| !watch.stop().is_set())?.ok_or(Error::Stopped)?;
         if let Some(reason) = levels.unreadable().first() {
             // Whoever opens the folder would not know what is missing.
             return Err(anyhow::anyhow!("{reason}"));
         }
-        let export =
-            Export { map, levels: &levels, store: &store, folder: &folder, written: Written::default() };
+        let export = Export {
+            map,
+            levels: &levels,
+            store: &store,
+            folder: &folder,
+            watch,
+            written: Written::default(),
+        };
         export.write(&|| progress.step())?;
         let written = export.written;
         staged.finish()?;
         Ok(written)
     })?;
-    let mut out = std::io::stdout().lock();
     let folder = args.output.display().to_string();
     let (nodes, voxels) = (written.nodes.into_inner(), written.voxels.into_inner());
-    if args.json {
-        let summary = serde_json::json!({
-            "file": folder,
-            "format": "3dtiles",
-            "nodes": nodes,
-            "voxels": voxels,
-            "peak_rss_bytes": memory::peak_bytes(),
-        });
-        json::print(&summary, &mut out)?;
-    } else {
-        writeln!(
-            out,
-            "{} voxels in {} nodes in {folder}/tileset.json",
-            HumanCount(voxels),
-            HumanCount(nodes)
-        )?;
-    }
-    Ok(ExitCode::SUCCESS)
+    let json = serde_json::json!({
+        "file": folder,
+        "format": "3dtiles",
+        "nodes": nodes,
+        "voxels": voxels,
+        "peak_rss_bytes": memory::peak_bytes(),
+    });
+    let [voxels, nodes] = [voxels, nodes].map(HumanCount);
+    Ok(Exported { json, text: format!("{voxels} voxels in {nodes} nodes in {folder}/tileset.json\n") })
 }
 
 /// A tileset is of the whole map.
@@ -89,6 +83,7 @@ struct Export<'a> {
     levels: &'a Levels,
     store: &'a NodeStore,
     folder: &'a Path,
+    watch: &'a Watch,
     written: Written,
 }
 
@@ -107,6 +102,7 @@ impl Export<'_> {
                 next_tile();
             }
             for key in std::iter::once(key).chain(within) {
+                self.watch.stop().check()?;
                 self.write_node(key, heights_m)?;
             }
             Ok::<(), Error>(())

@@ -93,16 +93,16 @@ impl ExportOrigin {
     }
 
     /// What a person is to know of it.
-    pub fn print(&self, beside: Option<&Path>, out: &mut impl Write) -> io::Result<()> {
+    pub fn text(&self, beside: Option<&Path>) -> String {
         let [x, y, z] = self.corner_m;
-        write!(out, "origin {x} {y} {z} m: to be added to the file's coordinates")?;
+        let mut text = format!("origin {x} {y} {z} m: to be added to the file's coordinates");
         if let Some([x, y, z]) = self.asked_m {
-            write!(out, "; the voxel's corner next to {x} {y} {z}")?;
+            text += &format!("; the voxel's corner next to {x} {y} {z}");
         }
-        match beside {
-            Some(path) => writeln!(out, "; {} says so, too", path.display()),
-            None => writeln!(out),
+        if let Some(path) = beside {
+            text += &format!("; {} says so, too", path.display());
         }
+        text + "\n"
     }
 }
 

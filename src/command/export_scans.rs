@@ -1,9 +1,10 @@
 //! The scans that a map keeps, as a folder that `build` and others read: a PCD file each, and their poses.
 
 use crate::command::args::ExportArgs;
-use crate::command::json;
+use crate::command::exported::Exported;
 use crate::command::map_at::MapAt;
-use crate::command::progress::Progress;
+use crate::command::output_file::StagedOutput;
+use crate::command::watch::Watch;
 use crate::mapper::KeptScan;
 use crate::scan::ScanPoints;
 use crate::{Error, Result};
@@ -12,11 +13,10 @@ use serde::Serialize;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use std::process::ExitCode;
 
 /// What was written.
 #[derive(Debug, Default, Serialize)]
-struct Exported {
+struct ExportedScans {
     scans: u64,
     points: u64,
     /// Whether the points are in the world frame, so that reading them takes `--world-frame`.
@@ -26,29 +26,33 @@ struct Exported {
 /// The poses, in the format of TUM: seconds, position, quaternion.
 const POSES: &str = "poses_tum.txt";
 
-pub fn run(args: &ExportArgs, folder: &Path) -> anyhow::Result<ExitCode> {
+/// Writes the folder; it is there whole or not at all.
+pub fn export(args: &ExportArgs, folder: &Path, watch: &Watch) -> anyhow::Result<Exported> {
     let reader = MapAt::of(&args.map)?.open()?;
     let (mut records, mut all, mut are_stamped) = (reader.kept_scans()?, 0, true);
     while let Some(record) = records.next_record()? {
         all += 1;
         are_stamped &= record.stamp_ns.is_some();
     }
-    make_empty(folder)?;
-    let progress = Progress::over_scans(Some(all));
-    let poses = folder.join(POSES);
+    let staged = StagedOutput::beside(folder)?;
+    let unfinished = staged.path()?;
+    fs::create_dir(&unfinished).map_err(|error| Error::io(&unfinished, "create", error))?;
+    let progress = watch.over_scans(Some(all));
+    let poses = unfinished.join(POSES);
     let open = File::create_new(&poses).map_err(|error| Error::io(&poses, "create", error))?;
     let mut lines = BufWriter::new(open);
-    let mut exported = Exported::default();
+    let mut exported = ExportedScans::default();
     // Names in the order of the scans.
     let digits = all.to_string().len().max(6);
     for scan in reader.kept_scans()? {
+        watch.stop().check()?;
         let scan = scan?;
         let is_in_world = scan.world_from_sensor().is_none();
         if exported.scans > 0 && is_in_world != exported.world_frame {
             let reason = "has scans in the world frame and others in the frame of their sensor; one folder cannot hold both";
             return Err(Error::argument(args.map.display().to_string(), reason).into());
         }
-        let path = folder.join(format!("{:0digits$}.pcd", scan.number()));
+        let path = unfinished.join(format!("{:0digits$}.pcd", scan.number()));
         write_pcd(&scan, &path)?;
         write_pose(&scan, are_stamped, &mut lines).map_err(|error| Error::io(&poses, "write", error))?;
         exported.world_frame = is_in_world;
@@ -57,31 +61,16 @@ pub fn run(args: &ExportArgs, folder: &Path) -> anyhow::Result<ExitCode> {
         progress.step();
     }
     lines.flush().map_err(|error| Error::io(&poses, "write", error))?;
+    progress.say("making it durable");
+    staged.finish()?;
     drop(progress);
-    let mut out = io::stdout().lock();
-    if args.json {
-        json::print(&exported, &mut out)?;
-        return Ok(ExitCode::SUCCESS);
-    }
     let (scans, points) = (HumanCount(exported.scans), HumanCount(exported.points));
-    writeln!(out, "exported  {scans} scans, {points} points, and {POSES}, to {}", folder.display())?;
+    let mut text =
+        format!("exported  {scans} scans, {points} points, and {POSES}, to {}\n", folder.display());
     if exported.world_frame {
-        writeln!(out, "note      the points are in the world frame: build them with --world-frame")?;
+        text += "note      the points are in the world frame: build them with --world-frame\n";
     }
-    Ok(ExitCode::SUCCESS)
-}
-
-/// A folder that is not there yet or has nothing in it.
-fn make_empty(folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).map_err(|error| Error::io(folder, "create", error))?;
-    let mut names = fs::read_dir(folder).map_err(|error| Error::io(folder, "list", error))?;
-    match names.next() {
-        None => Ok(()),
-        Some(_) => {
-            let hint = "choose a folder that is empty or does not exist yet";
-            Err(Error::AlreadyExists { path: folder.to_owned(), hint })
-        }
-    }
+    Ok(Exported { json: serde_json::to_value(&exported)?, text })
 }
 
 fn write_pose(scan: &KeptScan, is_stamped: bool, out: &mut impl Write) -> io::Result<()> {

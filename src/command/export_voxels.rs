@@ -1,19 +1,17 @@
 //! Voxels in the files of other programs.
 
 use crate::command::args::{ExportArgs, WhatName};
-use crate::command::json;
+use crate::command::exported::Exported;
 use crate::command::map_at::{AnyMap, point_of, read_any_map};
 use crate::command::memory;
 use crate::command::output_file::{StagedOutput, is_standard_output};
-use crate::command::progress::Progress;
-use crate::mapper::MapView;
+use crate::command::watch::Watch;
+use crate::mapper::{MapView, Stoppable};
 use crate::maths::logit;
 use crate::space::Aabb;
 use crate::tile::Voxel;
 use crate::{Error, Result};
 use indicatif::HumanCount;
-use std::io::Write;
-use std::process::ExitCode;
 use voxtile_clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
 
 /// Which voxels are written.
@@ -24,7 +22,12 @@ struct Chosen<'a> {
 }
 
 /// Writes the file, or the folder, and what belongs beside it: all of it or nothing.
-pub fn run(args: &ExportArgs, format: VoxelFileFormat, region: Option<&Aabb>) -> anyhow::Result<ExitCode> {
+pub fn export(
+    args: &ExportArgs,
+    format: VoxelFileFormat,
+    region: Option<&Aabb>,
+    watch: &Watch,
+) -> anyhow::Result<Exported> {
     if is_standard_output(&args.output) {
         let reason = format!("{} is not written as a stream; name a file", format.name());
         return Err(Error::argument("--output", reason).into());
@@ -35,6 +38,7 @@ pub fn run(args: &ExportArgs, format: VoxelFileFormat, region: Option<&Aabb>) ->
         return Err(Error::argument("--origin", reason).into());
     }
     let (head, files) = read_any_map(&args.map, |map| {
+        let map = &Stoppable::new(map, watch.stop());
         let chosen = Chosen::of(args, format, map, region);
         let head = chosen.head(map)?;
         let staged = StagedOutput::beside(&args.output)?;
@@ -44,32 +48,28 @@ pub fn run(args: &ExportArgs, format: VoxelFileFormat, region: Option<&Aabb>) ->
         (options.z_min_m, options.z_max_m) = (args.z_min, args.z_max);
         options.cell_m = args.cell.unwrap_or(options.cell_m);
         options.origin_m = args.origin.as_deref().map_or([0.0; 3], point_of);
-        let progress = Progress::over_tiles(map.tile_indices().len());
+        let progress = watch.over_tiles(map.tile_indices().len());
         let mut sink = open_sink(format, &head, &staged.path()?, &options).map_err(Error::from)?;
         chosen.for_each(map, &mut || progress.step(), &mut |row| Ok(sink.put(row)?))?;
         sink.finish().map_err(Error::from)?;
         drop(progress);
+        watch.stop().check()?;
         Ok((head, staged.finish()?))
     })?;
-    let mut out = std::io::stdout().lock();
     let file = args.output.display().to_string();
-    if args.json {
-        let beside: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-        let [min, max] = head.bounds_m;
-        let summary = serde_json::json!({
-            "file": file,
-            "format": format.name(),
-            "voxels": head.voxels,
-            "bounds_m": (head.voxels > 0).then_some(serde_json::json!({ "min": min, "max": max })),
-            "files_beside": beside,
-            "peak_rss_bytes": memory::peak_bytes(),
-        });
-        json::print(&summary, &mut out)?;
-    } else {
-        writeln!(out, "{} voxels in {file}", HumanCount(head.voxels))?;
-        files.iter().try_for_each(|path| writeln!(out, "beside it {}", path.display()))?;
-    }
-    Ok(ExitCode::SUCCESS)
+    let beside: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let [min, max] = head.bounds_m;
+    let json = serde_json::json!({
+        "file": file,
+        "format": format.name(),
+        "voxels": head.voxels,
+        "bounds_m": (head.voxels > 0).then_some(serde_json::json!({ "min": min, "max": max })),
+        "files_beside": beside,
+        "peak_rss_bytes": memory::peak_bytes(),
+    });
+    let mut text = format!("{} voxels in {file}\n", HumanCount(head.voxels));
+    beside.iter().for_each(|path| text += &format!("beside it {path}\n"));
+    Ok(Exported { json, text })
 }
 
 /// The log-odds of the voxels that are asked for: from the first on and below the second.
@@ -84,14 +84,19 @@ pub fn log_odds_of(args: &ExportArgs, default: WhatName, threshold: f64) -> [f64
 }
 
 impl<'a> Chosen<'a> {
-    fn of(args: &ExportArgs, format: VoxelFileFormat, map: &AnyMap, region: Option<&'a Aabb>) -> Self {
+    fn of(
+        args: &ExportArgs,
+        format: VoxelFileFormat,
+        map: &Stoppable<'_, AnyMap>,
+        region: Option<&'a Aabb>,
+    ) -> Self {
         let threshold = map.config().occupied_log_odds();
         let default = if format.needs_free_voxels() { WhatName::All } else { WhatName::Occupied };
         Self { region, log_odds: log_odds_of(args, default, threshold) }
     }
 
     /// Counts the voxels, and finds a box around their centers.
-    fn head(&self, map: &AnyMap) -> Result<VoxelsHead> {
+    fn head(&self, map: &Stoppable<'_, AnyMap>) -> Result<VoxelsHead> {
         let config = map.config();
         let mut head = VoxelsHead {
             voxels: 0,
@@ -116,7 +121,7 @@ impl<'a> Chosen<'a> {
     /// Visits the voxels, tile by tile.
     fn for_each(
         &self,
-        map: &AnyMap,
+        map: &Stoppable<'_, AnyMap>,
         next_tile: &mut dyn FnMut(),
         visit: &mut dyn FnMut(&VoxelRow) -> Result<()>,
     ) -> Result<()> {

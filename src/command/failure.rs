@@ -39,7 +39,11 @@ impl JsonTo {
     /// What the command line asks for.
     pub fn of(command: &Command) -> Self {
         match command {
-            Command::Export(args) if args.json && is_standard_output(&args.output) => Self::Error,
+            Command::Export(args)
+                if args.json && args.scans.is_none() && is_standard_output(&args.output) =>
+            {
+                Self::Error
+            }
             Command::Picture(args) if args.json && args.output.as_deref().is_some_and(is_standard_output) => {
                 Self::Error
             }
@@ -102,7 +106,7 @@ impl<'a> Failure<'a> {
 }
 
 /// The error with its causes. Of files and programs, errors tell the name.
-fn message_of(error: &anyhow::Error) -> String {
+pub fn message_of(error: &anyhow::Error) -> String {
     match error.chain().next().and_then(|first| first.downcast_ref::<io::Error>()) {
         Some(error) => format!("standard output: cannot write: {error}"),
         None => format!("{error:#}"),

@@ -1,11 +1,14 @@
 //! The command `voxtile`: parse, run one command, exit code.
 //!
 //! One file a subcommand. It is part of the library so that other programs can carry the command (the Python package
-//! does); it uses the library as anybody else would, by its public items.
+//! does), or call what is more than a line of it, in `calls`; it uses the library as anybody else would, by its public
+//! items.
 
 mod args;
 mod build;
 mod build_config;
+mod call_error;
+pub mod calls;
 mod clear;
 mod completions;
 mod convert;
@@ -19,6 +22,7 @@ mod export_3d_tiles;
 mod export_origin;
 mod export_scans;
 mod export_voxels;
+mod exported;
 mod failure;
 mod flush_schedule;
 mod import;
@@ -65,7 +69,10 @@ mod threads;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod watch;
 mod written;
 
+pub use call_error::CallError;
 use run::{INTERRUPTED, say};
 pub use run::{main, run};
+pub use watch::{Listener, Watch};

@@ -1,3 +1,4 @@
+use crate::scan::Stop;
 use crate::store::check_outside_of_maps;
 use crate::{Error, Result};
 use std::fs::{self, File};
@@ -15,7 +16,14 @@ use tempfile::NamedTempFile;
 #[derive(Debug)]
 pub struct OutputFile {
     target: PathBuf,
-    out: BufWriter<Unfinished>,
+    out: Out,
+}
+
+/// Takes bytes until it is asked to stop.
+#[derive(Debug)]
+struct Out {
+    bytes: BufWriter<Unfinished>,
+    stop: Stop,
 }
 
 #[derive(Debug)]
@@ -49,7 +57,14 @@ impl OutputFile {
             Place::Stream => tempfile::tempfile().map(Unfinished::Copied),
         };
         let unfinished = unfinished.map_err(|error| Error::io(target, "create", error))?;
-        Ok(Self { target: target.to_owned(), out: BufWriter::with_capacity(1 << 18, unfinished) })
+        let out = Out { bytes: BufWriter::with_capacity(1 << 18, unfinished), stop: Stop::default() };
+        Ok(Self { target: target.to_owned(), out })
+    }
+
+    /// Once the stop is set, writing fails.
+    pub fn stop_with(mut self, stop: Stop) -> Self {
+        self.out.stop = stop;
+        self
     }
 
     /// What the bytes go to; its errors do not name the file, [`OutputFile::written`] does.
@@ -65,8 +80,9 @@ impl OutputFile {
     /// The hash of all that was written so far.
     pub fn hash(&mut self) -> Result<blake3::Hash> {
         let mut hasher = blake3::Hasher::new();
-        let hashed = self.out.flush().and_then(|()| {
-            let file = self.out.get_mut().file();
+        let bytes = &mut self.out.bytes;
+        let hashed = bytes.flush().and_then(|()| {
+            let file = bytes.get_mut().file();
             file.rewind()?;
             // To the end, where writing goes on.
             io::copy(file, &mut hasher)
@@ -84,7 +100,7 @@ impl OutputFile {
     pub fn finish(self) -> anyhow::Result<()> {
         let Self { target, out } = self;
         let refused = |error| Error::io(&target, "write", error);
-        match out.into_inner().map_err(|error| refused(error.into_error()))? {
+        match out.bytes.into_inner().map_err(|error| refused(error.into_error()))? {
             Unfinished::Named(file) => {
                 file.as_file().sync_all().map_err(refused)?;
                 // Again, for what has come to be there meanwhile.
@@ -102,6 +118,17 @@ impl OutputFile {
                 Ok(copy(file, &mut stream).map_err(refused)?)
             }
         }
+    }
+}
+
+impl Write for Out {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stop.check().map_err(io::Error::other)?;
+        self.bytes.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.bytes.flush()
     }
 }
 

@@ -1,12 +1,14 @@
 use crate::command::memory::resident_bytes;
+use crate::command::watch::Listener;
 use crate::mapper::{MapStatistics, MapView};
 use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A bar on standard error for long work; nothing where that is no terminal.
+/// A bar on standard error for long work; nothing where that is no terminal. Or another program hears of each step.
 pub struct Progress {
     bar: ProgressBar,
+    listener: Option<Listener>,
 }
 
 static ARE_HIDDEN: AtomicBool = AtomicBool::new(false);
@@ -39,7 +41,14 @@ impl Progress {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
         bar.set_style(style(template));
-        Self { bar }
+        Self { bar, listener: None }
+    }
+
+    /// Tells a program, if there is one, in place of a person.
+    pub fn told_to(mut self, listener: Option<Listener>) -> Self {
+        self.bar.set_draw_target(ProgressDrawTarget::hidden());
+        self.listener = listener;
+        self
     }
 
     /// So many were done before.
@@ -51,6 +60,9 @@ impl Progress {
     /// One more is done.
     pub fn step(&self) {
         self.bar.inc(1);
+        if let Some(listener) = &self.listener {
+            listener(self.bar.position(), self.bar.length().unwrap_or(0));
+        }
     }
 
     /// So many of all are done.

@@ -30,6 +30,8 @@ pub struct Summary {
     /// The scans that were skipped, with the reason of each.
     #[serde(rename = "unread_scans")]
     pub unread: Vec<String>,
+    /// What a person should know beside.
+    pub remarks: Vec<String>,
     #[serde(skip)]
     pub grid: Grid,
     #[serde(flatten)]
@@ -88,6 +90,7 @@ impl Summary {
             poses: None,
             region_tiles: mapper.config().rays.region,
             unread: Vec::new(),
+            remarks: Vec::new(),
             grid: mapper.config().grid,
             report,
             scan_number: reader.scan_number(),

@@ -41,6 +41,13 @@ pub struct BuildArgs {
     /// How observations become evidence [default: log-odds, or the map's own]
     #[arg(long, value_name = "MODEL")]
     pub sensor_model: Option<ModelName>,
+    /// log-odds: probabilities of a hit and a miss, and the least and most that a voxel gets
+    /// [default: 0.7 0.4 0.1192 0.971]
+    #[arg(long, value_names = ["HIT", "MISS", "MIN", "MAX"], num_args = 4)]
+    pub probabilities: Option<Vec<f64>>,
+    /// Probability from which a voxel counts as occupied, of a new map [default: 0.5]
+    #[arg(long, value_name = "P")]
+    pub occupancy_threshold: Option<f64>,
     /// iwlo: intensities up to this one are no evidence, in the sensor's unit [default: 35]
     #[arg(long, value_name = "I")]
     pub intensity_threshold: Option<f64>,

@@ -1,0 +1,79 @@
+use super::{MapStatistics, MapView, TileRef};
+use crate::config::MapConfig;
+use crate::error::Result;
+use crate::scan::Stop;
+use crate::sensor::Evidence;
+use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::store::TileVersion;
+
+/// A map that can be asked until somebody wants it to stop: from then on each tile is answered with
+/// [`Error::Stopped`](crate::Error::Stopped), which ends whatever is asked.
+#[derive(Debug)]
+pub struct Stoppable<'a, V: ?Sized> {
+    view: &'a V,
+    stop: &'a Stop,
+}
+
+impl<'a, V: MapView + ?Sized> Stoppable<'a, V> {
+    /// A map until the stop is set.
+    pub fn new(view: &'a V, stop: &'a Stop) -> Self {
+        Self { view, stop }
+    }
+}
+
+impl<V: MapView + ?Sized> MapView for Stoppable<'_, V> {
+    fn config(&self) -> &MapConfig {
+        self.view.config()
+    }
+
+    fn scan_number(&self) -> u64 {
+        self.view.scan_number()
+    }
+
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        self.view.tile_indices()
+    }
+
+    fn tile_bounds(&self) -> Option<TileBox> {
+        self.view.tile_bounds()
+    }
+
+    fn has_tile(&self, index: TileIndex) -> bool {
+        self.view.has_tile(index)
+    }
+
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        self.view.cached_tile_indices()
+    }
+
+    fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        self.stop.check()?;
+        self.view.tile(index)
+    }
+
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        self.stop.check()?;
+        self.view.tile_uncached(index)
+    }
+
+    // Asked point by point: whoever asks for many looks at the stop between them.
+    fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
+        self.view.evidence(voxel)
+    }
+
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.view.voxels_of_tile_hint(index)
+    }
+
+    fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
+        self.view.version_of_tile(index)
+    }
+
+    fn last_scan_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.view.last_scan_of_tile_hint(index)
+    }
+
+    fn statistics(&self) -> MapStatistics {
+        self.view.statistics()
+    }
+}
