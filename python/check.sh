@@ -20,7 +20,10 @@ MATURIN_PEP517_ARGS="--profile dev --locked" install .
 cp -r tests "$work/tests"
 cp -r examples "$work/examples"
 mkdir "$work/docs"
-cp ../docs/python.md "$work/docs"
+cp ../docs/python.md ../docs/python_recorded.md "$work/docs"
+# Tests run elsewhere, where a relative path leads nowhere.
+VOXTILE_DATA=$(realpath -m "${VOXTILE_DATA:-../../shared/data}")
+export VOXTILE_DATA
 mkdir "$work/python"
 mv "$work/tests" "$work/examples" "$work/python"
 cd "$work/python"

@@ -4,24 +4,56 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use voxtile::Error;
+use voxtile::command::CallError;
 
 /// The exception of an error, with path, tile and offset as attributes.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
-    let tile = error.tile().map(|tile| (tile.x, tile.y, tile.z));
+    with_details(py, Some(error), format!("{error:#}"))
+}
+
+/// The exception of a command that failed: it names keywords in place of options.
+pub fn exception_of_call(py: Python<'_>, error: &CallError) -> PyErr {
+    with_details(py, error.library_error(), with_keywords(&error.to_string()))
+}
+
+/// A text about options of the command as one about keywords: `max_range` for `--max-range`.
+pub fn with_keywords(text: &str) -> String {
+    let mut named = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find('-') {
+        let (before, option) = rest.split_at(at);
+        named += before;
+        let begins_word = named.chars().next_back().is_none_or(|last| " (`'".contains(last));
+        let end = option.find(|letter: char| !letter.is_ascii_lowercase() && letter != '-');
+        let (option, after) = option.split_at(end.unwrap_or(option.len()));
+        match option.strip_prefix("--") {
+            _ if !begins_word => named += option,
+            Some("insert") => named += "insert_mode",
+            Some(option) if !option.is_empty() => named += &option.replace('-', "_"),
+            None if option == "-o" => named += "output",
+            _ => named += option,
+        }
+        rest = after;
+    }
+    named + rest
+}
+
+fn with_details(py: Python<'_>, error: Option<&Error>, message: String) -> PyErr {
+    let tile = error.and_then(Error::tile).map(|tile| (tile.x, tile.y, tile.z));
     let (mut offset, mut line) = (None, None);
-    match error.place() {
+    match error.and_then(Error::place) {
         Some((voxtile::Place::Line, at)) => line = Some(at),
         Some((_, at)) => offset = Some(at),
         None => {}
     }
     let details = PyDict::new(py);
     let filled = details
-        .set_item("path", error.path())
+        .set_item("path", error.and_then(Error::path))
         .and_then(|()| details.set_item("tile", tile))
         .and_then(|()| details.set_item("offset", offset))
         .and_then(|()| details.set_item("line", line));
     filled
-        .and_then(|()| raised(py, error.kind(), format!("{error:#}"), &details))
+        .and_then(|()| raised(py, error.map_or("other", Error::kind), message, &details))
         .unwrap_or_else(|error| error)
 }
 

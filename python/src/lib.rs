@@ -1,20 +1,21 @@
 //! The module `voxtile._voxtile`: voxtile's library for Python, with numpy arrays.
 //!
 //! ```text
-//! map         Map: lifetime, scans in, questions
-//! questions   what arrays of points, rays and boxes are answered
-//! local_map   LocalMap: what is near the robot
-//! operations  whole maps on disk
-//! remapping   maps that follow the scans that they keep
-//! builds      files of scans: read, or made a map of
-//! command     the command `voxtile`
-//! watched     work beside the interpreter, which Ctrl-C ends
+//! map            Map: lifetime, scans in, questions
+//! questions      what arrays of points, rays and boxes are answered
+//! local_map      LocalMap: what is near the robot
+//! operations     whole maps on disk
+//! remapping      maps that follow the scans that they keep
+//! scan_iterator  files of scans
+//! calls          what the command does with files, in this process
+//! command        the command `voxtile`
+//! watched        work beside the interpreter, which Ctrl-C ends
 //! ```
 //!
 //! The package around it is `python/voxtile/`; its documentation for users is `docs/python.md`.
 
 mod arrays;
-mod builds;
+mod calls;
 mod command;
 mod config;
 mod errors;
@@ -26,8 +27,8 @@ mod questions;
 mod remapping;
 mod report;
 mod scan;
+mod scan_iterator;
 mod source;
-mod stoppable;
 mod tile_iterator;
 mod watched;
 
@@ -35,7 +36,7 @@ mod watched;
 #[pyo3::pymodule]
 mod _voxtile {
     #[pymodule_export]
-    use super::builds::{ScanIterator, build, scans};
+    use super::calls::{call_build, call_export};
     #[pymodule_export]
     use super::command::run_command;
     #[pymodule_export]
@@ -52,5 +53,9 @@ mod _voxtile {
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]
+    use super::scan_iterator::{ScanIterator, open_scans};
+    #[pymodule_export]
     use super::tile_iterator::TileIterator;
+    #[pymodule_export]
+    use super::watched::wait_for_all;
 }

@@ -1,6 +1,6 @@
 //! `voxtile.Map`: an open map.
 
-use crate::arrays::{Points, column, doubles, object, rows, singles};
+use crate::arrays::{PointSlice, Points, column, doubles, object, rows, singles};
 use crate::config::{ConfigArguments, bytes_of, config_of};
 use crate::errors::{exception, exception_of_kind, wrong};
 use crate::questions::{self, bodies_of};
@@ -8,17 +8,18 @@ use crate::report::InsertReport;
 use crate::scan::Frame;
 use crate::source::Source;
 use crate::tile_iterator::TileIterator;
-use crate::watched::{at_once, watched};
-use numpy::{PyArray1, PyArray2};
+use crate::watched::{at_once, finished, watched};
+use numpy::{Element, PyArray1, PyArray2};
 use parking_lot::RwLock;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use voxtile::mapper::{MapReader, MapView, Mapper, OctreeMap};
+use voxtile::sensor::Evidence;
 use voxtile::{
-    Aabb, MapConfig, MapOptions, MapQueries, RayQuery, Result, ScanReport, SnapshotName, Stop, TileIndex,
-    UnknownAs,
+    Aabb, MapConfig, MapOptions, MapQueries, OutOfCoreTileMapper, RayQuery, Result, ScanReport, SnapshotName,
+    Stop, TileIndex, UnknownAs,
 };
 
 /// Questions and points that take less time than anybody waits for Ctrl-C. They are worth no thread of their own.
@@ -42,13 +43,29 @@ type Nearest<'py> = (Bound<'py, PyArray2<i32>>, Bound<'py, PyArray1<f64>>, Bound
 type Occupied<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f32>>);
 
 impl Map {
-    fn of(path: PathBuf, source: Source) -> Self {
+    fn opened(
+        py: Python<'_>,
+        path: PathBuf,
+        open: impl FnOnce(&Path) -> Result<Source> + Send + 'static,
+    ) -> PyResult<Self> {
+        let at = path.clone();
+        let source = finished(py, move |_| open(&at))?;
         let config = source.config();
-        Self { source: RwLock::new(Some(Arc::new(source))), config, path }
+        Ok(Self { source: RwLock::new(Some(Arc::new(source))), config, path })
     }
 
     fn source(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
         self.source.read().clone().ok_or_else(|| closed(py, &self.path))
+    }
+
+    /// The map, if it takes scans.
+    fn writer(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
+        let source = self.source(py)?;
+        if matches!(*source, Source::Writer { .. }) {
+            return Ok(source);
+        }
+        let message = format!("{}: open for reading alone; open it with mode=\"r+\"", self.path.display());
+        Err(exception_of_kind(py, "read_only", &message))
     }
 
     /// Changes the map in a thread of its own, or at once if it is `short`.
@@ -56,17 +73,35 @@ impl Map {
         &self,
         py: Python<'_>,
         short: bool,
-        change: impl FnOnce(&mut voxtile::OutOfCoreTileMapper) -> Result<T> + Send,
+        change: impl FnOnce(&mut OutOfCoreTileMapper) -> Result<T> + Send,
     ) -> PyResult<T> {
-        let source = self.source(py)?;
-        if !matches!(*source, Source::Writer { .. }) {
-            let message =
-                format!("{}: open for reading alone; open it with mode=\"r+\"", self.path.display());
-            return Err(exception_of_kind(py, "read_only", &message));
-        }
+        let source = self.writer(py)?;
         let work = |stop: &Stop| source.change(stop, change);
         let changed = if short { at_once(py, work)? } else { watched(py, work)? };
         changed.ok_or_else(|| closed(py, &self.path))
+    }
+
+    /// Changes the map in a way that cannot be given up once it has begun.
+    fn finish<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        change: impl FnOnce(&mut OutOfCoreTileMapper) -> Result<T> + Send + 'static,
+    ) -> PyResult<T> {
+        let source = self.writer(py)?;
+        finished(py, move |stop| source.change(stop, change))?.ok_or_else(|| closed(py, &self.path))
+    }
+
+    /// Asks one thing of each point.
+    fn at_points<'py, T: Element + Send>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        ask: impl FnOnce(&Source, &Stop, PointSlice<'_>) -> Result<Vec<T>> + Send,
+    ) -> PyResult<Bound<'py, PyArray1<T>>> {
+        let py = points.py();
+        let points = Points::of("points", points)?;
+        let points = points.slice()?;
+        let answers = self.ask(py, points.len(), |source, stop| ask(source, stop, points))?;
+        Ok(column(py, answers))
     }
 
     /// Asks the map in a thread of its own, or at once if there are few questions.
@@ -125,8 +160,7 @@ impl Map {
             },
         )?;
         let options = MapOptions::new().config(config).create_new(true);
-        let source = watched(py, |_| Source::writer(options.open(&path)?))?;
-        Ok(Self::of(path, source))
+        Self::opened(py, path, move |path| Source::writer(options.open(path)?))
     }
 
     /// Opens a map: to insert scans (mode "r+"), or to be asked (mode "r"), beside a writer too.
@@ -146,17 +180,18 @@ impl Map {
         let name = snapshot.map(SnapshotName::new).transpose().map_err(|error| exception(py, &error))?;
         let is_octree = OctreeMap::is_named_by(&path);
         let reader = |reader: MapReader| Source::Reader(Box::new(RwLock::new(reader)));
-        let source = match (mode, name) {
-            ("r", Some(name)) => watched(py, |_| options.open_snapshot(&path, &name).map(reader))?,
-            ("r", None) if is_octree => watched(py, |_| Source::octree(&path))?,
-            ("r", None) => watched(py, |_| options.open_read_only(&path).map(reader))?,
-            ("r+", None) if !is_octree => watched(py, |_| Source::writer(options.open(&path)?))?,
-            ("r+", _) => {
-                return Err(wrong(py, "mode", "snapshots and files of OctoMap are read alone: mode=\"r\""));
+        match (mode, name) {
+            ("r", Some(name)) => {
+                Self::opened(py, path, move |path| options.open_snapshot(path, &name).map(reader))
             }
-            (other, _) => return Err(wrong(py, "mode", format!("{other:?} is neither 'r+' nor 'r'"))),
-        };
-        Ok(Self::of(path, source))
+            ("r", None) if is_octree => Self::opened(py, path, Source::octree),
+            ("r", None) => Self::opened(py, path, move |path| options.open_read_only(path).map(reader)),
+            ("r+", None) if !is_octree => {
+                Self::opened(py, path, move |path| Source::writer(options.open(path)?))
+            }
+            ("r+", _) => Err(wrong(py, "mode", "snapshots and files of OctoMap are read alone: mode=\"r\"")),
+            (other, _) => Err(wrong(py, "mode", format!("{other:?} is neither 'r+' nor 'r'"))),
+        }
     }
 
     /// The folder, or the file.
@@ -274,7 +309,7 @@ impl Map {
         if !matches!(*self.source(py)?, Source::Writer { .. }) {
             return Ok(());
         }
-        self.change(py, false, Mapper::flush)
+        self.finish(py, Mapper::flush)
     }
 
     /// Flushes and closes. A closed map may be closed again.
@@ -290,7 +325,7 @@ impl Map {
             self.flush(py)?;
         }
         let Some(source) = self.source.write().take() else { return Ok(()) };
-        watched(py, |stop| {
+        finished(py, move |stop| {
             // Another thread may still ask; the lock on the map's files goes now.
             if let Some(mut mapper) = source.mapper(stop)? {
                 drop(mapper.take());
@@ -328,7 +363,7 @@ impl Map {
     /// Flushes, and keeps the map as it is now under a name.
     fn snapshot(&self, py: Python<'_>, name: &str) -> PyResult<()> {
         let name = SnapshotName::new(name).map_err(|error| exception(py, &error))?;
-        self.change(py, false, |mapper| mapper.snapshot(&name))
+        self.finish(py, move |mapper| mapper.snapshot(&name))
     }
 
     /// Sizes of the map and of what is in memory, as a dict.
@@ -338,61 +373,29 @@ impl Map {
     }
 
     /// The occupancy at points: an array of `int8`, 1 occupied, 0 free, -1 unknown.
-    fn occupancy<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<i8>>> {
-        let points = Points::of("points", points)?;
-        let points = points.slice()?;
-        let answers = self.ask(py, points.len(), |source, stop| {
+    fn occupancy<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i8>>> {
+        self.at_points(points, |source, stop, points| {
             questions::occupancies(source, stop, points, questions::occupancy_code)
-        })?;
-        Ok(column(py, answers))
+        })
     }
 
     /// Probabilities of being occupied at points: `float64`, NaN for unknown.
-    fn probability<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let points = Points::of("points", points)?;
-        let points = points.slice()?;
-        let answers = self.ask(py, points.len(), |source, stop| {
+    fn probability<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        self.at_points(points, |source, stop, points| {
             questions::occupancies(source, stop, points, questions::probability_or_nan)
-        })?;
-        Ok(column(py, answers))
+        })
     }
 
     /// Exact log-odds at points: `float64`, NaN for unknown.
-    fn log_odds<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let points = Points::of("points", points)?;
-        let points = points.slice()?;
-        let answers = self.ask(py, points.len(), |source, stop| {
-            questions::evidences(source, stop, points, |evidence| evidence.map_or(f64::NAN, |of| of.log_odds))
-        })?;
-        Ok(column(py, answers))
+    fn log_odds<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let log_odds = |of: Option<Evidence>| of.map_or(f64::NAN, |of| of.log_odds);
+        self.at_points(points, |source, stop, points| questions::evidences(source, stop, points, log_odds))
     }
 
     /// Numbers of updates at points: `int32`, 0 for unknown.
-    fn counts<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<i32>>> {
-        let points = Points::of("points", points)?;
-        let points = points.slice()?;
-        let answers = self.ask(py, points.len(), |source, stop| {
-            questions::evidences(source, stop, points, |evidence| {
-                evidence.map_or(0, |of| of.observation_count)
-            })
-        })?;
-        Ok(column(py, answers))
+    fn counts<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i32>>> {
+        let count = |of: Option<Evidence>| of.map_or(0, |of| of.observation_count);
+        self.at_points(points, |source, stop, points| questions::evidences(source, stop, points, count))
     }
 
     /// The first occupied voxel on each ray: distances in metres from the origin (infinite where nothing is hit), and

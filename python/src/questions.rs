@@ -2,8 +2,7 @@
 
 use crate::arrays::{PointSlice, doubles};
 use crate::errors::wrong;
-use crate::source::Source;
-use crate::stoppable::Stoppable;
+use crate::source::{Source, View};
 use pyo3::prelude::*;
 use voxtile::mapper::MapView;
 use voxtile::space::VoxelBox;
@@ -13,9 +12,9 @@ use voxtile::{
 };
 
 /// Points that are asked before looking whether to stop.
-const POINTS_AT_A_TIME: usize = 1 << 16;
+const POINTS_AT_A_TIME: usize = 1 << 20;
 /// Rays likewise: each may cross a million voxels.
-const RAYS_AT_A_TIME: usize = 1 << 10;
+const RAYS_AT_A_TIME: usize = 1 << 14;
 /// Most voxels of a dense array.
 const MOST_DENSE_VOXELS: u64 = 1 << 31;
 
@@ -127,11 +126,7 @@ pub fn collisions(source: &Source, stop: &Stop, bodies: &[Shape], unknown: Unkno
 }
 
 /// Centers in metres and probabilities of occupied voxels, tile by tile.
-pub fn occupied(
-    map: &Stoppable<'_>,
-    region: Option<&Aabb>,
-    least: Option<f64>,
-) -> Result<(Vec<Point>, Vec<f32>)> {
+pub fn occupied(map: &View<'_>, region: Option<&Aabb>, least: Option<f64>) -> Result<(Vec<Point>, Vec<f32>)> {
     let grid = map.config().grid;
     let (mut centers, mut probabilities) = (Vec::new(), Vec::new());
     map.for_each_occupied(least, region, |voxel| {
@@ -143,7 +138,7 @@ pub fn occupied(
 
 /// The box of a region in voxels, and a value for each of them, the last axis first.
 pub fn dense<T: Clone>(
-    map: &Stoppable<'_>,
+    map: &View<'_>,
     region: &Aabb,
     unknown: T,
     of: impl Fn(Evidence) -> T,

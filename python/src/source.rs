@@ -1,13 +1,15 @@
 //! What can be asked: a map that takes scans, one that is read, a file of OctoMap.
 
-use crate::stoppable::Stoppable;
 use parking_lot::{Mutex, MutexGuard, RwLock};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::time::Duration;
-use voxtile::mapper::{LiveReader, MapReader, MapView, OctreeMap};
+use voxtile::mapper::{LiveReader, MapReader, MapView, OctreeMap, Stoppable};
 use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop, octree};
+
+/// What is asked: ends at the next tile once its stop is set.
+pub type View<'a> = Stoppable<'a, dyn MapView + 'a>;
 
 /// An open map.
 pub enum Source {
@@ -53,8 +55,8 @@ impl Source {
     }
 
     /// Asks the map as it is after its latest scan.
-    pub fn ask<T>(&self, stop: &Stop, mut question: impl FnMut(&Stoppable<'_>) -> Result<T>) -> Result<T> {
-        let mut ask = |view: &dyn MapView| question(&Stoppable { view, stop });
+    pub fn ask<T>(&self, stop: &Stop, mut question: impl FnMut(&View<'_>) -> Result<T>) -> Result<T> {
+        let mut ask = |view: &dyn MapView| question(&Stoppable::new(view, stop));
         match self {
             Self::Reader(reader) => ask(&*reader.read()),
             Self::Octree(map) => ask(&**map),

@@ -1,12 +1,12 @@
 //! Work beside the interpreter: its lock is released, and Ctrl-C ends the work.
 
 use crate::errors::exception;
-use parking_lot::Mutex;
+use parking_lot::{Condvar, Mutex};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::any::Any;
-use std::panic::resume_unwind;
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 use voxtile::{Result, Stop};
@@ -14,29 +14,31 @@ use voxtile::{Result, Stop};
 /// How often signals are looked for.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
+/// How long after Ctrl-C work may go on before it is left to itself.
+const PATIENCE: Duration = Duration::from_millis(500);
+
 /// What unwinds work that cannot return early: nothing is wrong.
 struct GivenUp;
 
 /// Does work in a thread of its own, so that this one can see to signals. The work is asked to stop by a signal handler
 /// that raises, and is waited for: nothing goes on behind the caller's back.
 pub fn watched<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<T> {
-    let stop = Stop::default();
+    watched_by(py, &Stop::default(), work)
+}
+
+fn watched_by<T: Send>(
+    py: Python<'_>,
+    stop: &Stop,
+    work: impl FnOnce(&Stop) -> Result<T> + Send,
+) -> PyResult<T> {
     let (outcome, interrupt) = py.detach(|| {
         thread::scope(|scope| {
             let (running, is_running) = channel::<()>();
             let worker = scope.spawn(|| {
                 let _running = running;
-                work(&stop)
+                work(stop)
             });
-            let mut interrupt = None;
-            while is_running.recv_timeout(BETWEEN_LOOKS) == Err(RecvTimeoutError::Timeout) {
-                if interrupt.is_none()
-                    && let Err(raised) = Python::attach(|py| py.check_signals())
-                {
-                    stop.set();
-                    interrupt = Some(raised);
-                }
-            }
+            let (_, interrupt) = answer_or_interrupt(&is_running, stop, Duration::MAX);
             (worker.join(), interrupt)
         })
     });
@@ -44,6 +46,105 @@ pub fn watched<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + 
         (Some(raised), _) => Err(raised),
         (None, Ok(done)) => done.map_err(|error| exception(py, &error)),
         (None, Err(panic)) => Err(defect(&*panic)),
+    }
+}
+
+/// Does work that owns all it needs, in a thread of its own. After Ctrl-C it is asked to stop; if that takes longer than
+/// anybody would wait, its thread finishes it and drops its answer. The interpreter waits for it before it exits.
+pub fn left_to_itself<T: Send + 'static>(
+    py: Python<'_>,
+    stop: &Stop,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let (answer, answers) = channel();
+    let counted = UnderWay::begin();
+    let run = move || {
+        let done = catch_unwind(AssertUnwindSafe(work));
+        // Whoever asked may have gone; what nobody takes is dropped before the work counts as done.
+        drop(answer.send(done));
+        drop(answer);
+        drop(counted);
+    };
+    thread::Builder::new().name("voxtile-work".to_owned()).spawn(run)?;
+    match py.detach(move || answer_or_interrupt(&answers, stop, PATIENCE)) {
+        (_, Some(raised)) => Err(raised),
+        (Some(Ok(answer)), None) => Ok(answer),
+        (Some(Err(panic)), None) => Err(defect(&*panic)),
+        (None, None) => Err(defect(&"a thread without an answer")),
+    }
+}
+
+/// [`left_to_itself`] for work of the library.
+pub fn finished<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(&Stop) -> Result<T> + Send + 'static,
+) -> PyResult<T> {
+    let stop = Stop::default();
+    let of_work = stop.clone();
+    left_to_itself(py, &stop, move || work(&of_work))?.map_err(|error| exception(py, &error))
+}
+
+/// Waits for an answer, or for the end of whoever was to send one. After a signal handler has raised, which sets the
+/// stop, at most for `patience`.
+fn answer_or_interrupt<T>(
+    answers: &Receiver<T>,
+    stop: &Stop,
+    patience: Duration,
+) -> (Option<T>, Option<PyErr>) {
+    let mut interrupt: Option<(PyErr, Instant)> = None;
+    loop {
+        let answer = match (answers.recv_timeout(BETWEEN_LOOKS), &interrupt) {
+            (Ok(answer), _) => Some(answer),
+            (Err(RecvTimeoutError::Disconnected), _) => None,
+            (Err(RecvTimeoutError::Timeout), Some((_, since))) if since.elapsed() > patience => None,
+            (Err(RecvTimeoutError::Timeout), Some(_)) => continue,
+            (Err(RecvTimeoutError::Timeout), None) => {
+                if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                    stop.set();
+                    interrupt = Some((raised, Instant::now()));
+                }
+                continue;
+            }
+        };
+        return (answer, interrupt.map(|(raised, _)| raised));
+    }
+}
+
+/// Work that may outlive the call that began it.
+struct UnderWay;
+
+static UNDER_WAY: Mutex<usize> = Mutex::new(0);
+static ENDED: Condvar = Condvar::new();
+
+impl UnderWay {
+    fn begin() -> Self {
+        *UNDER_WAY.lock() += 1;
+        Self
+    }
+}
+
+impl Drop for UnderWay {
+    fn drop(&mut self) {
+        *UNDER_WAY.lock() -= 1;
+        ENDED.notify_all();
+    }
+}
+
+/// Waits until nothing goes on that was interrupted; Ctrl-C ends the waiting.
+#[pyfunction]
+pub fn wait_for_all(py: Python<'_>) -> PyResult<()> {
+    loop {
+        let is_done = py.detach(|| {
+            let mut under_way = UNDER_WAY.lock();
+            if *under_way > 0 {
+                ENDED.wait_for(&mut under_way, BETWEEN_LOOKS);
+            }
+            *under_way == 0
+        });
+        if is_done {
+            return Ok(());
+        }
+        py.check_signals()?;
     }
 }
 
@@ -58,42 +159,65 @@ pub fn watched_with_progress<T: Send>(
     callback: Option<Py<PyAny>>,
     work: impl FnOnce(&Stop, &Progress<'_>) -> Result<T> + Send,
 ) -> PyResult<T> {
-    let raised = Mutex::new(None);
-    let done = watched(py, |stop| {
-        let progress = Progress { stop, callback: &callback, raised: &raised, told: Mutex::new(None) };
-        work(stop, &progress)
-    });
-    match raised.into_inner() {
+    let stop = Stop::default();
+    let teller = callback.map(|callback| Teller::new(stop.clone(), callback));
+    let done = watched_by(py, &stop, |stop| work(stop, &Progress { stop, teller: teller.as_ref() }));
+    match teller.and_then(|teller| teller.raised()) {
         Some(raised) => Err(raised),
         None => done,
     }
 }
 
-/// Tells a callback of Python how far the work is.
+/// How far work is that cannot return early.
 pub struct Progress<'a> {
     stop: &'a Stop,
-    callback: &'a Option<Py<PyAny>>,
-    raised: &'a Mutex<Option<PyErr>>,
-    told: Mutex<Option<Instant>>,
+    teller: Option<&'a Teller>,
 }
 
 impl Progress<'_> {
-    /// Tells of `done` out of `all`, not more often than a person can see. Leaves the work by unwinding if it is to be
-    /// given up: maps bear that anywhere, as they bear a crash.
+    /// Tells of `done` out of `all`. Leaves the work by unwinding if it is to be given up: maps bear that anywhere, as
+    /// they bear a crash.
     pub fn tell(&self, done: u64, all: u64) {
+        if let Some(teller) = self.teller {
+            teller.tell(done, all);
+        }
         if self.stop.is_set() {
             resume_unwind(Box::new(GivenUp));
         }
-        let Some(callback) = self.callback else { return };
+    }
+}
+
+/// Tells a callback of Python how far work is. A callback that raises stops the work.
+pub struct Teller {
+    stop: Stop,
+    callback: Py<PyAny>,
+    raised: Mutex<Option<PyErr>>,
+    told: Mutex<Option<Instant>>,
+}
+
+impl Teller {
+    /// Tells this callback.
+    pub fn new(stop: Stop, callback: Py<PyAny>) -> Self {
+        Self { stop, callback, raised: Mutex::new(None), told: Mutex::new(None) }
+    }
+
+    /// Tells of `done` out of `all`, not more often than a person can see, and nothing after a stop.
+    pub fn tell(&self, done: u64, all: u64) {
         let mut told = self.told.lock();
-        if done < all && told.is_some_and(|told| told.elapsed() < BETWEEN_LOOKS) {
+        let is_soon = done != all && told.is_some_and(|told| told.elapsed() < BETWEEN_LOOKS);
+        if self.stop.is_set() || is_soon {
             return;
         }
         *told = Some(Instant::now());
-        if let Err(raised) = Python::attach(|py| callback.call1(py, (done, all)).map(drop)) {
+        if let Err(raised) = Python::attach(|py| self.callback.call1(py, (done, all)).map(drop)) {
             *self.raised.lock() = Some(raised);
-            resume_unwind(Box::new(GivenUp));
+            self.stop.set();
         }
+    }
+
+    /// What the callback raised.
+    pub fn raised(&self) -> Option<PyErr> {
+        self.raised.lock().take()
     }
 }
 

@@ -56,16 +56,33 @@ def test_two_threads_two_maps_and_one(tmp_path: Path) -> None:
         assert (a.scan_number, b.scan_number) == (12, 24)
 
 
+def interrupted(script: str, *arguments: object) -> tuple[str, float]:
+    """Runs a script until it has printed a line and a moment longer, sends Ctrl-C, and returns what it prints then and
+    after how many seconds."""
+    # Shells start what runs in the background without it.
+    handled = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    process = subprocess.Popen(
+        [sys.executable, "-c", handled + textwrap.dedent(script), *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None and process.stdout.readline() == "begun\n"
+    time.sleep(0.5)
+    assert process.poll() is None
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    line = process.stdout.readline()
+    took = time.monotonic() - began
+    assert process.wait(timeout=120) == 0
+    return line.strip(), took
+
+
 def test_ctrl_c_ends_a_long_scan_and_the_map_is_whole(tmp_path: Path) -> None:
-    script = textwrap.dedent(
-        """
-        import signal
+    script = """
         import sys
         import numpy as np
         import voxtile
-        # Shells start what runs in the background without it.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        ends = np.random.default_rng(1).normal(size=(1_000_000, 3))
+        ends = np.random.default_rng(1).normal(size=(2_000_000, 3))
         ends *= 400 / np.linalg.norm(ends, axis=1)[:, None]
         with voxtile.Map.create(sys.argv[1], 0.02, tile_size=10.0, insert_mode="per-ray") as found:
             found.insert([[1.0, 2.0, 3.0]], np.eye(4))
@@ -75,20 +92,80 @@ def test_ctrl_c_ends_a_long_scan_and_the_map_is_whole(tmp_path: Path) -> None:
             except KeyboardInterrupt:
                 print("interrupted", found.scan_number, flush=True)
         """
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", script, str(tmp_path / "map")], stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None and process.stdout.readline() == "begun\n"
-    time.sleep(2)
-    assert process.poll() is None
-    began = time.monotonic()
-    process.send_signal(signal.SIGINT)
-    line = process.stdout.readline()
-    took = time.monotonic() - began
-    process.wait(timeout=60)
-    assert line == "interrupted 1\n" and took < 5
+    line, took = interrupted(script, tmp_path / "map")
+    assert line == "interrupted 1" and took < 2
     assert voxtile.verify(tmp_path / "map")["damage"] == 0
+
+
+def test_ctrl_c_in_a_flush_leaves_it_to_itself(tmp_path: Path) -> None:
+    script = """
+        import sys
+        import numpy as np
+        import voxtile
+        found = voxtile.Map.create(sys.argv[1], 0.2, tile_size=2.0, memory="1GiB")
+        found.insert(np.random.default_rng(1).uniform(-20, 20, (20_000, 3)), np.eye(4))
+        print("begun", flush=True)
+        try:
+            found.flush()
+            print("flushed before", flush=True)
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+        """
+    line, took = interrupted(script, tmp_path / "map")
+    if line == "flushed before":
+        pytest.skip("the disk is too fast")
+    assert line == "interrupted" and took < 2
+    # The interpreter waited for it.
+    with voxtile.open(tmp_path / "map") as found:
+        assert found.scan_number == 1
+
+
+BUILD = """
+    import sys
+    import voxtile
+    told = []
+    def progress(done, all):
+        if not told:
+            print("begun", flush=True)
+        told.append(done)
+    try:
+        voxtile.build(sys.argv[1], sys.argv[2], resolution=0.1, max_range=50.0, progress=progress)
+        print("built before", flush=True)
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+    """
+
+
+def test_ctrl_c_in_a_build_keeps_what_was_accepted(tmp_path: Path) -> None:
+    random = np.random.default_rng(3)
+    (tmp_path / "scans").mkdir()
+    for number in range(200):
+        points = random.normal(size=(20_000, 3)).astype(np.float32) * 20
+        header = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+        sizes = f"WIDTH {len(points)}\nHEIGHT 1\nVIEWPOINT {number} 0 0 1 0 0 0\nPOINTS {len(points)}\nDATA binary\n"
+        (tmp_path / "scans" / f"{number:03}.pcd").write_bytes((header + sizes).encode() + points.tobytes())
+    line, took = interrupted(BUILD, tmp_path / "scans", tmp_path / "map")
+    assert line == "interrupted" and took < 2
+    assert voxtile.verify(tmp_path / "map")["damage"] == 0
+    with voxtile.open(tmp_path / "map") as found:
+        begun = found.scan_number
+    assert 0 < begun < 200
+    answer = voxtile.build(tmp_path / "scans", tmp_path / "map", resume=True, count=begun + 2)
+    assert (answer["resumed_after"], answer["scan_number"]) == (begun, begun + 2)
+    voxtile.build(tmp_path / "scans", tmp_path / "whole", resolution=0.1, max_range=50.0, count=begun + 2)
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
+    script = """
+        import sys
+        import voxtile
+        print("begun", flush=True)
+        try:
+            voxtile.export(sys.argv[1], sys.argv[2], what="all")
+            print("written before", flush=True)
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+        """
+    line, took = interrupted(script, tmp_path / "whole", tmp_path / "voxels.csv")
+    assert line == "interrupted" and took < 2 and not (tmp_path / "voxels.csv").exists()
 
 
 def test_a_callback_that_raises_ends_the_work(tmp_path: Path) -> None:

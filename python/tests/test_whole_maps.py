@@ -1,6 +1,7 @@
 """Whole maps on disk, files of scans, and the command."""
 
 import json
+import operator
 import os
 import subprocess
 import sys
@@ -44,7 +45,7 @@ def test_build_makes_the_map_of_the_command(tmp_path: Path, scans: Path, room: l
     report = voxtile.build(
         scans, tmp_path / "built", resolution=0.25, max_range=4.0, progress=lambda *done: told.append(done)
     )
-    assert report.points == sum(len(points) for points, _ in room) and told[-1] == (len(room), len(room))
+    assert report["points"] == sum(len(points) for points, _ in room) and told[-1] == (len(room), len(room))
     voxtile_command("build", scans, "-o", tmp_path / "commanded", "--resolution", 0.25, "--max-range", 4.0)
     with voxtile.Map.create(tmp_path / "inserted", 0.25, max_range=4.0) as inserted:
         inserted.insert_many(voxtile.scans(scans))
@@ -58,8 +59,68 @@ def test_scans_are_what_the_files_hold(scans: Path, room: list[Scan]) -> None:
         assert intensities is None and np.array_equal(points, expected)
         np.testing.assert_allclose(pose, matrix_of(expected_pose), atol=1e-12)
     assert len(list(voxtile.scans(scans, first=1, every=2))) == 2
+    found = iter(voxtile.scans(scans))
+    assert operator.length_hint(found) == len(room)
+    next(found)
+    assert operator.length_hint(found) == len(room) - 1
+    turned = np.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]])
+    (_, pose, _), *_ = voxtile.scans(scans, count=1, extrinsic=turned)
+    np.testing.assert_allclose(pose, matrix_of(room[0][1]) @ turned, atol=1e-12)
     with pytest.raises(errors.ArgumentError, match="nothing: there is no such file"):
         voxtile.scans(scans / "nothing")
+    with pytest.raises(errors.ArgumentError, match="^pose_tolerance: "):
+        voxtile.scans(scans, pose_tolerance=-1.0)
+
+
+def test_a_build_goes_on_where_the_command_left_it(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
+    """Build and command know each other's maps and inputs."""
+    whole, ours, theirs = tmp_path / "whole", tmp_path / "ours", tmp_path / "theirs"
+    options = {"resolution": 0.25, "max_range": 4.0}
+    voxtile.build(scans, whole, resolution=0.25, max_range=4.0)
+    voxtile.build(scans, ours, count=2, resolution=0.25, max_range=4.0)
+    with pytest.raises(errors.ExistsError, match="use resume to go on"):
+        voxtile.build(scans, ours)
+    with pytest.raises(errors.ArgumentError, match="append again"):
+        voxtile.build(scans, ours, append=True)
+    answer = voxtile.build(scans, ours, resume=True)
+    assert (answer["resumed_after"], answer["scans"], answer["interrupted"]) == (2, len(room) - 2, False)
+    typed = [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
+    voxtile_command("build", scans, "-o", theirs, "--count", 3, *typed)
+    assert voxtile.build(scans, theirs, resume=True)["resumed_after"] == 3
+    assert voxtile.digest(whole) == voxtile.digest(ours) == voxtile.digest(theirs)
+    voxtile.build(scans, ours, append=True, again=True, max_range=4.0)
+    voxtile_command("build", scans, "-o", theirs, "--append", "--again", *typed)
+    assert voxtile.digest(ours) == voxtile.digest(theirs) != voxtile.digest(whole)
+
+
+def test_a_build_reads_as_the_command_does(tmp_path: Path, scans: Path) -> None:
+    """Lists, names with dashes, numbers of numpy, remarks as warnings."""
+    ours, theirs = tmp_path / "ours", tmp_path / "theirs"
+    box = np.array([[-1, -1, -1], [0.5, 1, 1]])
+    with pytest.warns(UserWarning, match="all 1200 rays were cut at 1.5 m.*raise max_range"):
+        answer = voxtile.build(
+            scans, ours, resolution=np.float64(0.25), max_range=1.5, ignore_box=box, insert_mode="per-ray", flush_every=2
+        )
+    assert len(answer["remarks"]) == 1
+    corners = [str(number) for number in box.reshape(-1)]
+    how = ["--resolution=0.25", "--max-range=1.5", "--insert=per-ray", "--ignore-box", *corners]
+    voxtile_command("build", scans, "-o", theirs, *how)
+    assert voxtile.digest(ours) == voxtile.digest(theirs)
+    with pytest.raises(errors.ArgumentError, match="unexpected argument 'resolutoin'"):
+        voxtile.build(scans, tmp_path / "none", resolutoin=0.1)  # type: ignore[call-arg]
+    assert not (tmp_path / "none").exists()
+
+
+def test_names_that_look_like_options(tmp_path: Path, scans: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scans.rename(tmp_path / "--json")
+    voxtile.build("--json", "-o", resolution=0.25, tile_size=4)
+    voxtile.export("-o", "--help.ply", region=[[-9, -9, -9], [9, 9, 9]])
+    assert (tmp_path / "--help.ply").read_bytes().startswith(b"ply") and len(list(voxtile.scans("--json"))) == 4
+    with pytest.raises(errors.MalformedError) as malformed:
+        Path("a --b--.pcd").write_bytes(b"nothing")
+        voxtile.build("a --b--.pcd", "c")
+    assert malformed.value.path == Path("a --b--.pcd")
 
 
 def test_snapshots(city: Path, tmp_path: Path) -> None:
@@ -105,7 +166,10 @@ def test_decay_verify_repair(city: Path) -> None:
 
 def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
     voxtile.export(city, tmp_path / "city.ot")
-    voxtile.export(city, tmp_path / "city.ply")
+    told: list[tuple[int, int]] = []
+    answer = voxtile.export(city, tmp_path / "city.ply", what="all", progress=lambda *done: told.append(done))
+    with voxtile.open(city) as ours:
+        assert answer["voxels"] == len(ours.occupied(min_probability=0.0)[0]) and told
     assert (tmp_path / "city.ply").read_bytes().startswith(b"ply\n")
     with voxtile.open(city) as ours, voxtile.open(tmp_path / "city.ot") as theirs:
         at = np.random.default_rng(5).uniform(-6, 6, (4000, 3))
@@ -114,6 +178,15 @@ def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
     voxtile.import_octree(tmp_path / "city.ot", tmp_path / "imported", storage="compact")
     with voxtile.open(tmp_path / "imported") as imported, voxtile.open(city) as ours:
         assert len(imported.occupied()[0]) == len(ours.occupied()[0])
+    with pytest.raises(errors.ArgumentError, match="^output: .*its extension is of no known format"):
+        voxtile.export(city, tmp_path / "city.what")
+
+    def raising(done: int, all: int) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="^enough$"):
+        voxtile.export(city, tmp_path / "given_up.csv", progress=raising)
+    assert not (tmp_path / "given_up.csv").exists()
     with pytest.raises(errors.NoMapError) as missing:
         voxtile.export(tmp_path / "none", tmp_path / "none.ply")
     assert missing.value.path == tmp_path / "none"

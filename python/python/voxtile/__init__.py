@@ -8,6 +8,8 @@ Where processes are forked with maps open, threads are missing in the child: sta
 maps there.
 """
 
+import atexit
+
 from . import errors
 from ._voxtile import (
     InsertReport,
@@ -15,7 +17,6 @@ from ._voxtile import (
     Map,
     ScanIterator,
     TileIterator,
-    build,
     clear,
     convert,
     crop,
@@ -30,12 +31,17 @@ from ._voxtile import (
     remove_scans,
     repair,
     revert,
-    scans,
     snapshots,
     verify,
+    wait_for_all,
 )
 from .errors import VoxtileError
-from .whole_maps import digest, export, open, snapshot
+from .files import build, export, export_scans, scans
+from .whole_maps import digest, open, snapshot
+
+# What was interrupted while it could not be given up is finished before the interpreter exits.
+atexit.register(wait_for_all)
+del wait_for_all
 
 __all__ = [
     "InsertReport",
@@ -54,6 +60,7 @@ __all__ = [
     "digest",
     "errors",
     "export",
+    "export_scans",
     "import_octree",
     "merge",
     "open",

@@ -14,7 +14,8 @@ __all__ = [
     "Map",
     "ScanIterator",
     "TileIterator",
-    "build",
+    "call_build",
+    "call_export",
     "clear",
     "convert",
     "crop",
@@ -23,6 +24,7 @@ __all__ = [
     "diff",
     "import_octree",
     "merge",
+    "open_scans",
     "remap",
     "remap_as",
     "remove_points",
@@ -30,9 +32,9 @@ __all__ = [
     "repair",
     "revert",
     "run_command",
-    "scans",
     "snapshots",
     "verify",
+    "wait_for_all",
 ]
 
 _Path: TypeAlias = str | PathLike[str]
@@ -207,41 +209,9 @@ class ScanIterator:
     def __next__(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32] | None]: ...
     def __length_hint__(self) -> int: ...
 
-def scans(
-    path: _Path,
-    *,
-    poses: _Path | None = None,
-    topic: str | None = None,
-    odometry: str | None = None,
-    fixed_frame: str | None = None,
-    first: int = 0,
-    count: int | None = None,
-    every: int = 1,
-) -> ScanIterator: ...
-def build(
-    path: _Path,
-    output: _Path,
-    *,
-    resolution: float = 0.1,
-    tile_size: float = 10.0,
-    min_range: float = 0.0,
-    max_range: float | None = None,
-    insert_mode: _InsertMode = "per-scan",
-    sensor_model: _SensorModel = "log-odds",
-    probabilities: _Probabilities | None = None,
-    occupancy_threshold: float = 0.5,
-    storage: _Storage = "octomap",
-    memory: int | str | None = None,
-    poses: _Path | None = None,
-    topic: str | None = None,
-    odometry: str | None = None,
-    fixed_frame: str | None = None,
-    first: int = 0,
-    count: int | None = None,
-    every: int = 1,
-    keep_scans: bool = False,
-    progress: _Progress | None = None,
-) -> InsertReport: ...
+def open_scans(path: _Path, arguments: Sequence[str]) -> ScanIterator: ...
+def call_build(arguments: Sequence[str], progress: _Progress | None = None) -> dict[str, Any]: ...
+def call_export(arguments: Sequence[str], progress: _Progress | None = None) -> dict[str, Any]: ...
 def snapshots(map: _Path) -> list[dict[str, Any]]: ...
 def delete_snapshot(map: _Path, name: str) -> None: ...
 def diff(first: _MapOrSnapshot, second: _MapOrSnapshot, *, progress: _Progress | None = None) -> dict[str, Any]: ...
@@ -328,3 +298,4 @@ def decay(
 def verify(map: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
 def repair(map: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
 def run_command(arguments: Sequence[str]) -> None: ...
+def wait_for_all() -> None: ...
