@@ -374,16 +374,15 @@ impl Map {
 
     /// The occupancy at points: an array of `int8`, 1 occupied, 0 free, -1 unknown.
     fn occupancy<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i8>>> {
-        self.at_points(points, |source, stop, points| {
-            questions::occupancies(source, stop, points, questions::occupancy_code)
-        })
+        let least = self.config.occupied_log_odds();
+        let code = |of: Option<Evidence>| of.map_or(-1, |of| i8::from(of.log_odds >= least));
+        self.at_points(points, |source, stop, points| questions::evidences(source, stop, points, code))
     }
 
     /// Probabilities of being occupied at points: `float64`, NaN for unknown.
     fn probability<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        self.at_points(points, |source, stop, points| {
-            questions::occupancies(source, stop, points, questions::probability_or_nan)
-        })
+        let probability = |of: Option<Evidence>| of.map_or(f64::NAN, |of| of.probability());
+        self.at_points(points, |source, stop, points| questions::evidences(source, stop, points, probability))
     }
 
     /// Exact log-odds at points: `float64`, NaN for unknown.

@@ -7,8 +7,7 @@ use pyo3::prelude::*;
 use voxtile::mapper::MapView;
 use voxtile::space::VoxelBox;
 use voxtile::{
-    Aabb, Error, Evidence, Hit, MapQueries, Occupancy, Point, Queries, RayQuery, Result, Shape, Stop,
-    UnknownAs,
+    Aabb, Error, Evidence, Hit, MapQueries, Point, Queries, RayQuery, Result, Shape, Stop, UnknownAs,
 };
 
 /// Points that are asked before looking whether to stop.
@@ -30,38 +29,6 @@ pub fn bodies_of(boxes: &Bound<'_, PyAny>) -> PyResult<Vec<Shape>> {
     Ok(corners.as_chunks().0.iter().map(body).collect())
 }
 
-/// What the occupancy is called in arrays.
-pub fn occupancy_code(occupancy: Occupancy) -> i8 {
-    match occupancy {
-        Occupancy::Unknown => -1,
-        Occupancy::Free(_) => 0,
-        Occupancy::Occupied(_) => 1,
-    }
-}
-
-/// The probability in arrays: NaN where nothing is known.
-pub fn probability_or_nan(occupancy: Occupancy) -> f64 {
-    occupancy.probability().unwrap_or(f64::NAN)
-}
-
-/// The occupancy at each point, as `of` writes it.
-pub fn occupancies<T>(
-    source: &Source,
-    stop: &Stop,
-    points: PointSlice<'_>,
-    of: impl Fn(Occupancy) -> T,
-) -> Result<Vec<T>> {
-    source.ask(stop, |map| {
-        let mut answers = Vec::with_capacity(points.len());
-        points.in_chunks(POINTS_AT_A_TIME, |chunk| {
-            stop.check()?;
-            answers.extend(map.occupancy_at_points(chunk)?.into_iter().map(&of));
-            Ok::<(), Error>(())
-        })?;
-        Ok(answers)
-    })
-}
-
 /// The exact evidence at each point, as `of` writes it.
 pub fn evidences<T>(
     source: &Source,
@@ -70,14 +37,10 @@ pub fn evidences<T>(
     of: impl Fn(Option<Evidence>) -> T,
 ) -> Result<Vec<T>> {
     source.ask(stop, |map| {
-        let grid = map.config().grid;
         let mut answers = Vec::with_capacity(points.len());
         points.in_chunks(POINTS_AT_A_TIME, |chunk| {
             stop.check()?;
-            for &point in chunk {
-                let evidence = grid.voxel_of(point).map_or(Ok(None), |voxel| map.evidence(voxel))?;
-                answers.push(of(evidence));
-            }
+            answers.extend(map.evidence_at_points(chunk)?.into_iter().map(&of));
             Ok::<(), Error>(())
         })?;
         Ok(answers)

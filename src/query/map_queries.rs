@@ -2,6 +2,7 @@ use super::{Occupancy, OctreeExport, coarse, digest, merged, octree_blocks, poin
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::octree::Octree;
+use crate::sensor::Evidence;
 use crate::space::{Aabb, Point};
 use crate::tile::Voxel;
 use std::io::{self, Read, Seek, Write};
@@ -18,6 +19,15 @@ pub trait MapQueries: MapView + Sized {
     #[inline]
     fn voxel_at(&self, point: Point) -> Result<Option<Voxel>> {
         point::voxel_at(self, point)
+    }
+
+    /// The exact evidence at many points, in their order, on all cores: each tile is looked at once or a few times.
+    ///
+    /// # Errors
+    ///
+    /// As for [`MapQueries::voxel_at`].
+    fn evidence_at_points(&self, points: &[Point]) -> Result<Vec<Option<Evidence>>> {
+        point::evidence_at_points(self, points)
     }
 
     /// The occupancy of the octree node at `depth` that holds a point: the largest log-odds under the node as `f32`,

@@ -33,6 +33,7 @@ mod octree_shift;
 mod of_live_reader;
 mod of_map;
 mod point;
+mod points_by_tile;
 mod queries;
 mod ray;
 mod region;

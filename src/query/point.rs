@@ -1,9 +1,10 @@
 use super::Occupancy;
+use super::points_by_tile::PointsByTile;
 use super::queries::on_all_cores;
-use super::tile_cursor::TileCursor;
 use crate::error::Result;
 use crate::mapper::MapView;
-use crate::space::{Point, VoxelIndex};
+use crate::sensor::Evidence;
+use crate::space::{Point, TileIndex};
 use crate::tile::Voxel;
 
 #[inline]
@@ -16,25 +17,40 @@ pub(super) fn voxel_at<V: MapView + ?Sized>(view: &V, point: Point) -> Result<Op
 /// Points that are answered by one core at a time.
 const POINTS_AT_A_TIME: usize = 4096;
 
-/// Each tile is loaded once, or once for so many of its points.
-pub(super) fn occupancy_at_points<V: MapView>(view: &V, points: &[Point]) -> Result<Vec<Occupancy>> {
-    let config = view.config();
-    let voxels =
-        points.iter().enumerate().filter_map(|(number, &point)| Some((config.grid.voxel_of(point)?, number)));
-    let mut by_tile: Vec<(VoxelIndex, usize)> = voxels.collect();
-    by_tile.sort_unstable_by_key(|&(voxel, number)| (config.grid.tile_of_voxel(voxel), number));
-    let chunks: Vec<&[(VoxelIndex, usize)]> = by_tile.chunks(POINTS_AT_A_TIME).collect();
-    let answered = on_all_cores(&chunks, |chunk| {
-        let mut tiles = TileCursor::new(view);
-        let answer = |&(voxel, number): &(VoxelIndex, usize)| {
-            let evidence = tiles.tile_of(voxel)?.and_then(|tile| tile.evidence(voxel));
-            Ok((number, Occupancy::of(config, evidence)))
-        };
-        chunk.iter().map(answer).collect::<Result<Vec<_>>>()
-    })?;
-    let mut answers = vec![Occupancy::Unknown; points.len()];
-    for (number, occupancy) in answered.into_iter().flatten() {
-        answers[number] = occupancy;
+/// What each of many points is answered, from the evidence of its voxel. Each tile is loaded once for so many of its
+/// points.
+fn at_points<V: MapView, A: Copy + Send>(
+    view: &V,
+    points: &[Point],
+    unknown: A,
+    answer: impl Fn(Evidence) -> A + Sync,
+) -> Result<Vec<A>> {
+    let grid = view.config().grid;
+    let mut answers = vec![unknown; points.len()];
+    for (points, answers) in
+        points.chunks(PointsByTile::MOST_POINTS).zip(answers.chunks_mut(PointsByTile::MOST_POINTS))
+    {
+        let by_tile = PointsByTile::of(&grid, points);
+        let chunks: Vec<(TileIndex, &[u32])> = by_tile.chunks(POINTS_AT_A_TIME).collect();
+        let answered = on_all_cores(&chunks, |&(tile, numbers)| {
+            let Some(tile) = view.tile(tile)? else { return Ok(Vec::new()) };
+            let evidence = |number: u32| tile.evidence(grid.voxel_of(points[number as usize])?);
+            Ok(numbers.iter().map(|&number| evidence(number).map(&answer)).collect::<Vec<_>>())
+        })?;
+        for (&(_, numbers), answered) in chunks.iter().zip(answered) {
+            for (&number, answer) in numbers.iter().zip(answered) {
+                answers[number as usize] = answer.unwrap_or(unknown);
+            }
+        }
     }
     Ok(answers)
+}
+
+pub(super) fn occupancy_at_points<V: MapView>(view: &V, points: &[Point]) -> Result<Vec<Occupancy>> {
+    let config = view.config();
+    at_points(view, points, Occupancy::Unknown, |evidence| Occupancy::of(config, Some(evidence)))
+}
+
+pub(super) fn evidence_at_points<V: MapView>(view: &V, points: &[Point]) -> Result<Vec<Option<Evidence>>> {
+    at_points(view, points, None, Some)
 }

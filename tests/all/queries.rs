@@ -245,8 +245,10 @@ fn many_points_are_answered_in_their_order() {
     let folder = TempDir::new().unwrap();
     let (map, out_of_core) = maps(&folder);
     let mut random = Random(70);
-    let mut points: Vec<_> = (0..500).map(|_| random.point([0.0; 3], 4.0)).collect();
+    // More of a tile than are answered at a time.
+    let mut points: Vec<_> = (0..20_000).map(|_| random.point([0.0; 3], 4.0)).collect();
     points[7] = [f64::NAN; 3];
+    points[8] = [1e300, 0.0, 0.0];
     let occupied = map.all_occupied_voxels(None).unwrap();
     points.extend(occupied.iter().map(|voxel| map.config().grid.center_m(voxel.index)));
     let answers = out_of_core.occupancy_at_points(&points).unwrap();
@@ -254,6 +256,12 @@ fn many_points_are_answered_in_their_order() {
         assert_eq!(map.occupancy_at(*point).unwrap(), *answer);
     }
     assert!(answers.iter().any(Occupancy::is_occupied) && answers.contains(&Occupancy::Unknown));
+    let evidence = out_of_core.evidence_at_points(&points).unwrap();
+    for (point, evidence) in points.iter().zip(&evidence) {
+        assert_eq!(map.voxel_at(*point).unwrap().map(|voxel| voxel.evidence), *evidence);
+    }
+    assert!(out_of_core.evidence_at_points(&[]).unwrap().is_empty());
+    assert_eq!(out_of_core.evidence_at_points(&[[f64::NAN; 3]; 2]).unwrap(), [None, None]);
 }
 
 #[test]
