@@ -162,6 +162,34 @@ impl OutOfCoreTileMapper {
         self.pager().create_snapshot(name)
     }
 
+    /// Begins a flush of all that was accepted until now, beside the mapper: a thread of its own writes and commits it,
+    /// and scans go on meanwhile. [`OutOfCoreTileMapper::flushed_scan_number`] tells when it is durable, and
+    /// [`OutOfCoreTileMapper::end_flush`] waits for it. One that is under way ends first.
+    ///
+    /// Tiles that a scan changes before they are written are in memory twice; both count in the limit. Where memory is so
+    /// short that a tile with later changes has to go, the mapper waits for the flush.
+    ///
+    /// # Errors
+    ///
+    /// Why an earlier one has failed; and as for [`Mapper::flush`], for what comes before it goes on beside the mapper.
+    pub fn begin_flush(&mut self) -> Result<()> {
+        self.tiles.begin_flush()
+    }
+
+    /// Whether a flush goes on beside the mapper.
+    pub fn is_flushing(&self) -> bool {
+        self.pager().is_flushing()
+    }
+
+    /// Waits for a flush beside the mapper, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// Why it has failed: the map on disk is as of an earlier flush, and nothing in memory is lost.
+    pub fn end_flush(&mut self) -> Result<()> {
+        self.tiles.end_flush()
+    }
+
     /// A handle for other threads: it answers queries while this mapper inserts scans and flushes. See [`LiveReader`].
     ///
     /// # Errors

@@ -26,3 +26,4 @@ pub(crate) use packer::Packer;
 pub(crate) use parameters::{config_from, new_metadata};
 pub(crate) use tile_saver::TileSaver;
 pub(crate) use upgrade::upgrade;
+pub(crate) use worker::Worker;

@@ -32,6 +32,7 @@ pub use crate::scratch::Scratch;
 pub use commit::commit_log::CommitLog;
 pub use commit::commit_record::Flush;
 pub use commit::commits::Commits;
+pub use commit::flush::{BegunCommit, Step, Synced, Unsynced};
 pub(crate) use commit::input_record::MOST_INPUTS;
 pub use commit::input_record::{InputContent, InputRecord};
 pub use commit::metadata::{Bounds, Extension, MapParameters, Metadata};

@@ -98,7 +98,7 @@ fn kept_scans_are_told_exported_and_built_again() {
     output(&[&["build", &out, "-o", &again][..], &TILES].concat());
     assert_eq!(digest(&again), digest(&kept.map));
     let message = fails(&["export", &kept.map, "--scans", &out], 2);
-    assert!(message.contains("choose a folder that is empty"), "{message}");
+    assert!(message.contains("is a folder with content; name another"), "{message}");
     let third = kept.path("third");
     output(&[&["build", &kept.map, "-o", &third][..], &TILES].concat());
     assert_eq!(digest(&third), digest(&kept.map));

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 29] = [
+const SOURCES: [&str; 31] = [
     "tile/octocache/octree_statistics.rs",
     "tile/octocache/octree_worker.rs",
     "tile/octocache/shared_tree.rs",
@@ -14,7 +14,9 @@ const SOURCES: [&str; 29] = [
     "mapper/paging/compact_tiles.rs",
     "mapper/paging/contents.rs",
     "mapper/paging/eviction.rs",
+    "mapper/paging/flight.rs",
     "mapper/paging/flush.rs",
+    "mapper/paging/flusher.rs",
     "mapper/paging/paged_tiles.rs",
     "mapper/paging/prefetch.rs",
     "mapper/paging/resident_tiles.rs",

@@ -1,3 +1,5 @@
+use super::flight::Flight;
+use super::flusher::FlushedTile;
 use super::memory_plan::MemoryPlan;
 use super::tile_cache::{Cached, TileCache};
 use super::tile_state::{Base, StoredTileState, TileState};
@@ -5,7 +7,9 @@ use super::views::{ViewId, Views};
 use super::write_buffer::WriteBuffer;
 use crate::error::{Error, Result};
 use crate::space::{TileBox, TileIndex};
-use crate::store::InputRecord;
+use crate::store::{InputRecord, TileVersion};
+use crate::tile::Tile;
+use std::sync::Arc;
 
 /// What a map holds after some scan: its tiles in memory and what is buffered for the others.
 #[derive(Debug)]
@@ -21,6 +25,10 @@ pub(in crate::mapper) struct TileContents {
     /// What the map was built from and, last, is being built from; kept with it at the next flush.
     pub(super) inputs: Vec<InputRecord>,
     pub(super) views: Views,
+    /// What a flush beside the mapper holds, while there is one.
+    pub(super) flight: Option<Flight>,
+    /// Why the last such flush failed, until somebody is told.
+    pub(super) flush_error: Option<Error>,
 }
 
 impl TileContents {
@@ -68,6 +76,58 @@ impl TileContents {
             }
         }
         self.views.content_changes();
+    }
+
+    // A flush beside the mapper.
+
+    /// Notes that the cache has another version of these tiles, or none, from now on.
+    pub(super) fn leave_to_flush(&mut self, tiles: impl Iterator<Item = TileIndex>) {
+        if let Some(flight) = &mut self.flight {
+            tiles.for_each(|index| flight.is_left_alone_with(index));
+        }
+    }
+
+    /// Bytes of memory that changing these tiles takes on top.
+    pub(super) fn bytes_to_copy(&self, tiles: impl Iterator<Item = TileIndex>) -> usize {
+        self.flight.as_ref().map_or(0, |flight| flight.bytes_to_copy(tiles))
+    }
+
+    /// Notes that a tile was written as of the flush's scan.
+    pub(super) fn note_flushed(&mut self, tile: FlushedTile, version: TileVersion) {
+        let index = tile.index();
+        self.views.note_on_disk(index, version);
+        if let Some(flight) = &mut self.flight {
+            flight.note_written(index);
+        }
+        match tile {
+            FlushedTile::Resident(tile) => {
+                let is_same = self.cache.peek(index).is_some_and(|own| Arc::ptr_eq(own, &tile));
+                // Let go first: changing a tile that somebody else holds would copy it.
+                drop(tile);
+                if is_same {
+                    self.cache.change(index, Tile::mark_clean);
+                }
+            }
+            FlushedTile::Compact(index, tile) => drop(self.cache.save_ended(index, &tile, true)),
+        }
+    }
+
+    /// Notes that a tile will not be written: it is as dirty as before.
+    pub(super) fn note_not_flushed(&mut self, tile: FlushedTile) {
+        if let FlushedTile::Compact(index, tile) = tile {
+            self.cache.save_ended(index, &tile, false);
+        }
+    }
+
+    /// Notes that the flush has ended.
+    pub(super) fn end_flight(&mut self, flushed: Result<()>) {
+        self.flight = None;
+        self.flush_error = flushed.err();
+    }
+
+    /// Why a flush beside the mapper has failed, told once.
+    pub(super) fn take_flush_error(&mut self) -> Option<Error> {
+        self.flush_error.take()
     }
 
     /// Begins to look at the map as it is now.

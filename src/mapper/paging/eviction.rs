@@ -1,5 +1,6 @@
 //! How room is made: resident tiles go into the compact form, and these to disk, beside the mapper.
 
+use super::flight::Flight;
 use super::tile_cache::Eviction;
 use super::tile_pager::TilePager;
 use crate::error::{Error, Result};
@@ -48,8 +49,13 @@ impl TilePager<'_> {
 
     /// Bytes of memory that grow outside of the cache.
     fn outside_bytes(&self) -> usize {
-        let disk = self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes();
+        let disk = self.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes();
         self.contents.buffer.bytes() + self.contents.views.bytes() + disk
+    }
+
+    /// Bytes of memory of what is on its way to disk or from there.
+    pub(super) fn in_flight_bytes(&self) -> usize {
+        self.disk.in_flight_bytes() + self.contents.flight.as_ref().map_or(0, Flight::bytes)
     }
 
     /// Whether so many more tiles fit, and so many bytes with them.
@@ -83,6 +89,7 @@ impl TilePager<'_> {
     pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
         log::debug!("tile {index}: evicted");
         if self.contents.cache.has_compact_tier() {
+            self.contents.leave_to_flush(std::iter::once(index));
             return self.contents.cache.make_compact(index);
         }
         if self.contents.cache.is_dirty(index) {
@@ -95,8 +102,11 @@ impl TilePager<'_> {
     /// Drops a tile in the compact form, once it is on disk.
     fn evict_compact(&mut self, index: TileIndex) -> Result<()> {
         while self.contents.cache.is_dirty(index) {
+            self.end_flight();
             self.begin_save(index)?;
-            self.wait_for_save()?;
+            if self.contents.cache.is_dirty(index) {
+                self.wait_for_save()?;
+            }
         }
         self.contents.cache.drop_compact(index);
         Ok(())
@@ -104,7 +114,9 @@ impl TilePager<'_> {
 
     /// Saves tiles before they have to go, as many as may be in flight.
     fn save_ahead(&mut self) -> Result<()> {
-        if !self.contents.cache.has_compact_tier() || self.disk.has_save_error() {
+        // While a flush goes on beside the mapper, nothing is saved that need not be.
+        let is_flushing = self.contents.flight.is_some();
+        if is_flushing || !self.contents.cache.has_compact_tier() || self.disk.has_save_error() {
             return Ok(());
         }
         while self.disk.can_save()
@@ -120,6 +132,7 @@ impl TilePager<'_> {
         if !self.contents.cache.needs_save(index) {
             return Ok(());
         }
+        self.end_flight();
         self.upgrade()?;
         while !self.disk.can_save() {
             self.wait_for_save()?;

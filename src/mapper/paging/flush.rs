@@ -1,11 +1,16 @@
 //! How a map becomes durable: buffered updates are applied, dirty tiles written, and all of it committed at once.
 
+use super::flight::Flight;
+use super::flusher::{BegunFlush, FlushedTile};
+use super::shared_contents::unlocked;
+use super::shared_disk;
 use super::tile_pager::TilePager;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use crate::store::{InputRecord, MOST_INPUTS};
 use crate::tile::Tile;
 use std::sync::Arc;
+use std::time::Instant;
 
 impl TilePager<'_> {
     /// Records a new input and flushes, so that the record is durable. It replaces an input without scans; the earliest
@@ -27,19 +32,11 @@ impl TilePager<'_> {
 
     /// Applies buffered updates, writes every dirty tile and commits.
     pub(in crate::mapper) fn flush(&mut self) -> Result<()> {
-        self.end_io()?;
-        for index in self.store().suspects() {
-            // Its file may not be on the medium; what can be read of it is checked as always.
-            if !self.contents.cache.is_resident(index) {
-                self.load(index)?;
-            }
-            self.write(index)?;
+        self.end_flight();
+        if let Some(error) = self.contents.take_flush_error() {
+            log::debug!("an earlier flush failed, and its tiles are written again: {error:#}");
         }
-        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
-        buffered.sort_unstable();
-        for index in buffered {
-            self.flush_buffered(index)?;
-        }
+        self.settle()?;
         // Files are made from tables alone. Syncing keeps octree statistics up to date and puts bricks in order, which
         // speeds up writing.
         self.contents.cache.sync_octrees();
@@ -67,6 +64,63 @@ impl TilePager<'_> {
         self.wait(|disk| disk.commit(&inputs, scan_number))
     }
 
+    /// Begins a flush of the map as it is now: what dirty tiles hold, which goes on to be shared with the cache, and the
+    /// scans that were noted. One that is under way ends first.
+    pub(super) fn begin_flush(&mut self) -> Result<BegunFlush> {
+        self.end_flight();
+        self.contents.take_flush_error().map_or(Ok(()), Err)?;
+        self.settle()?;
+        self.make_room_for(0, self.contents.cache.plan().tiles)?;
+        // What that has begun to save.
+        self.end_saves()?;
+        self.upgrade()?;
+        let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
+        let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
+        let mut tiles = Vec::new();
+        for index in self.contents.cache.dirty_compact() {
+            tiles.extend(self.contents.cache.begin_save(index).map(|tile| FlushedTile::Compact(index, tile)));
+        }
+        for index in self.contents.cache.resident_indices() {
+            let tile = self.contents.cache.peek(index).filter(|tile| tile.is_dirty());
+            tiles.extend(tile.cloned().map(FlushedTile::Resident));
+        }
+        let flight = Flight::of(tiles.iter().map(|tile| (tile.index(), tile.bytes())));
+        self.contents.flight = Some(flight);
+        Ok(BegunFlush { scan_number, tiles, writer, commit })
+    }
+
+    /// Waits for a flush beside the mapper. If it failed, the next one says why, or makes up for it.
+    pub(super) fn end_flight(&mut self) {
+        if self.contents.flight.is_none() {
+            return;
+        }
+        let since = Instant::now();
+        let Self { contents, disk, flusher, .. } = self;
+        unlocked(contents, || shared_disk::unlocked(disk, || while flusher.wait() {}));
+        self.disk.note_stall(since.elapsed());
+        if self.contents.flight.is_some() {
+            let lost = std::io::Error::other("the thread that flushed has ended early");
+            let error = Error::io(self.store().folder(), "flush", lost);
+            self.contents.end_flight(Err(error));
+            self.contents.cache.no_save_in_flight();
+        }
+    }
+
+    /// Leaves nothing on its way to disk or from there, and no buffered updates.
+    fn settle(&mut self) -> Result<()> {
+        self.end_io()?;
+        for index in self.store().suspects() {
+            // Its file may not be on the medium; what can be read of it is checked as always.
+            if !self.contents.cache.is_resident(index) {
+                self.load(index)?;
+            }
+            self.write(index)?;
+        }
+        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
+        buffered.sort_unstable();
+        buffered.into_iter().try_for_each(|index| self.flush_buffered(index))
+    }
+
     /// Applies a tile's buffered updates. Where there is no room for the tile it is written at once and not kept.
     fn flush_buffered(&mut self, index: TileIndex) -> Result<()> {
         if !self.contents.cache.has_compact_tier() {
@@ -91,6 +145,7 @@ impl TilePager<'_> {
 
     /// Writes a resident tile; after an error it is dirty.
     pub(super) fn write(&mut self, index: TileIndex) -> Result<()> {
+        self.end_flight();
         self.upgrade()?;
         self.end_saves_of(index);
         // Dirty until it is written: a failed attempt may cut short what is on disk of it.

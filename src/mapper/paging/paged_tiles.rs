@@ -1,21 +1,26 @@
 use super::contents::TileContents;
+use super::flusher::{FlushJob, Flusher};
 use super::shared_contents::SharedContents;
+use super::shared_disk::SharedDisk;
 use super::tile_cache::TileCache;
 use super::tile_disk::TileDisk;
 use super::tile_pager::TilePager;
 use super::views::Views;
 use super::write_buffer::WriteBuffer;
 use crate::config::MapConfig;
+use crate::error::Result;
 use crate::space::TileBox;
 use crate::store::TileStore;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
-/// The tiles of an out-of-core map: what it holds, which readers share, and the disk, which belongs to the mapper.
+/// The tiles of an out-of-core map: what it holds, which readers share, and the disk, which belongs to the mapper and to
+/// the thread that flushes beside it.
 #[derive(Debug)]
 pub(in crate::mapper) struct PagedTiles {
     config: MapConfig,
     contents: Arc<SharedContents>,
-    disk: Mutex<TileDisk>,
+    disk: Arc<SharedDisk>,
+    flusher: Flusher,
 }
 
 impl PagedTiles {
@@ -28,20 +33,53 @@ impl PagedTiles {
             bounds: TileBox::of(store.tiles().chain(store.orphans())),
             inputs: store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone()),
             views: Views::default(),
+            flight: None,
+            flush_error: None,
         };
-        let disk = Mutex::new(TileDisk::new(&config, store));
-        Self { config, contents: Arc::new(SharedContents::new(contents)), disk }
+        let disk = Arc::new(SharedDisk::new(TileDisk::new(&config, store)));
+        let flusher = Flusher::new(&config);
+        Self { config, contents: Arc::new(SharedContents::new(contents)), disk, flusher }
     }
 
     /// The pager, for one call of the mapper. A second one waits until the first is dropped.
     pub(in crate::mapper) fn pager(&self) -> TilePager<'_> {
-        // A panic in a query leaves no update half applied.
-        let disk = self.disk.lock().unwrap_or_else(PoisonError::into_inner);
-        TilePager { config: &self.config, shared: &self.contents, contents: self.contents.lock(), disk }
+        let disk = self.disk.lock();
+        let Self { config, contents: shared, flusher, .. } = self;
+        TilePager { config, shared, flusher, contents: shared.lock(), disk }
+    }
+
+    /// Begins a flush of all that was accepted until now, beside the mapper. One that is under way ends first.
+    ///
+    /// # Errors
+    ///
+    /// Why an earlier one has failed; tiles that cannot be read, a disk that refuses.
+    pub(in crate::mapper) fn begin_flush(&self) -> Result<()> {
+        let begun = self.pager().begin_flush()?;
+        let (contents, disk) = (self.contents.clone(), self.disk.clone());
+        self.flusher.give(FlushJob { contents, disk, begun });
+        Ok(())
+    }
+
+    /// Waits for a flush beside the mapper, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// Why it has failed.
+    pub(in crate::mapper) fn end_flush(&self) -> Result<()> {
+        while self.flusher.wait() {}
+        let mut contents = self.contents.lock();
+        contents.take_flush_error().map_or(Ok(()), Err)
     }
 
     /// What readers share with the mapper.
     pub(in crate::mapper) fn contents(&self) -> &Arc<SharedContents> {
         &self.contents
+    }
+}
+
+impl Drop for PagedTiles {
+    /// What was begun is committed, and the map is free for another writer.
+    fn drop(&mut self) {
+        while self.flusher.wait() {}
     }
 }

@@ -6,11 +6,11 @@ use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load,
 use crate::scan::{PackedUpdates, ScanPoints, TileUpdates};
 use crate::space::{TileIndex, TileTable};
 use crate::store::{
-    CatalogEntry, InputRecord, Metadata, SegmentPlace, SnapshotName, SpillFile, TileStore, TileVersion,
-    TileWriter,
+    BegunCommit, CatalogEntry, InputRecord, Metadata, SegmentPlace, SnapshotName, SpillFile, TileStore,
+    TileVersion, TileWriter,
 };
 use crate::tile::{Table, Tile};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The disk as the pager sees it: the map's store, the threads that save and load beside the mapper, and the counts of
 /// both.
@@ -67,6 +67,11 @@ impl TileDisk {
         let answer = wait(self);
         self.stalls.note(since.elapsed());
         answer
+    }
+
+    /// Counts how long the mapper waited.
+    pub(super) fn note_stall(&mut self, time: Duration) {
+        self.stalls.note(time);
     }
 
     // Reading.
@@ -144,6 +149,12 @@ impl TileDisk {
         let version = self.saver.save(&mut self.store, tile, scan_number)?;
         self.note_written(tile.index(), version);
         Ok(version)
+    }
+
+    /// Notes that a flush beside the mapper has written a tile.
+    pub(super) fn note_flushed(&mut self, index: TileIndex, version: TileVersion) {
+        self.store.note_next(index, version);
+        self.note_written(index, version);
     }
 
     fn note_written(&mut self, index: TileIndex, version: TileVersion) {
@@ -321,6 +332,21 @@ impl TileDisk {
     pub(super) fn commit(&mut self, inputs: &[InputRecord], scan_number: u64) -> Result<()> {
         let metadata = self.metadata(inputs);
         self.store.commit(metadata, scan_number)
+    }
+
+    /// Begins a commit that another thread completes, and returns what writes its tiles.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses to finish what the last commit left to do.
+    pub(super) fn begin_commit(
+        &mut self,
+        inputs: &[InputRecord],
+        scan_number: u64,
+    ) -> Result<(BegunCommit, TileWriter)> {
+        let metadata = self.metadata(inputs);
+        let begun = self.store.begin_commit(metadata, scan_number)?;
+        Ok((begun, self.store.writer()?))
     }
 
     fn metadata(&self, inputs: &[InputRecord]) -> Metadata {

@@ -1,4 +1,6 @@
+use super::flusher::Flusher;
 use super::shared_contents::{ContentsGuard, SharedContents, unlocked};
+use super::shared_disk::DiskGuard;
 use super::tile_cache::Cached;
 use super::tile_disk::TileDisk;
 use super::write_buffer::WriteBuffer;
@@ -13,7 +15,7 @@ use crate::store::{
 };
 use crate::tile::{Table, Tile};
 use rustc_hash::FxHashMap;
-use std::sync::{Arc, MutexGuard};
+use std::sync::Arc;
 
 /// The tiles of an out-of-core map: which are in memory, and what is buffered for the others.
 ///
@@ -26,7 +28,8 @@ pub(in crate::mapper) struct TilePager<'a> {
     pub(super) config: &'a MapConfig,
     pub(super) shared: &'a SharedContents,
     pub(super) contents: ContentsGuard<'a>,
-    pub(super) disk: MutexGuard<'a, TileDisk>,
+    pub(super) disk: DiskGuard<'a>,
+    pub(super) flusher: &'a Flusher,
 }
 
 /// Expected growth of a tile or of the write buffer per update, in bytes.
@@ -91,8 +94,9 @@ impl TilePager<'_> {
             }
         }
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
+        let copied = self.contents.bytes_to_copy(updates.tiles.iter().map(|(tile, _)| *tile));
         // A tile that is made new by the updates is one tile more than there are.
-        self.make_room_for(BYTES_OF_UPDATE * all, self.contents.cache.plan().tiles)
+        self.make_room_for(BYTES_OF_UPDATE * all + copied, self.contents.cache.plan().tiles)
     }
 
     /// Accepts the updates, staged parts first: resident tiles take theirs at once, those of other tiles are buffered.
@@ -105,6 +109,7 @@ impl TilePager<'_> {
         touched.dedup();
         self.shared.wait_for_views(&mut self.contents);
         self.contents.keep_for_views(touched.iter().copied());
+        self.contents.leave_to_flush(touched.iter().copied());
         let bounds = TileBox::of(touched.iter().copied())
             .into_iter()
             .chain(self.contents.bounds)
@@ -347,6 +352,7 @@ impl TilePager<'_> {
     /// room.
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
         self.contents.buffer.forget(tile.index(), &self.disk);
+        self.contents.leave_to_flush(std::iter::once(tile.index()));
         self.contents.cache.put(tile);
     }
 
@@ -427,6 +433,11 @@ impl TilePager<'_> {
         self.contents.cache.resident_indices()
     }
 
+    /// Whether a flush goes on beside the mapper.
+    pub(in crate::mapper) fn is_flushing(&self) -> bool {
+        self.contents.flight.is_some()
+    }
+
     /// Whether a tile has updates that are not on disk.
     pub(in crate::mapper) fn is_dirty(&self, index: TileIndex) -> bool {
         self.contents.buffer.contains(index) || self.contents.cache.is_dirty(index)
@@ -441,6 +452,7 @@ impl TilePager<'_> {
         if self.is_dirty(index) && !discard_changes {
             return Err(Error::UnsavedChanges { tile: index });
         }
+        self.end_flight();
         self.end_io()?;
         // All that may fail comes before anything is let go.
         let table = self.wait(|disk| disk.read(index))?;
@@ -489,6 +501,7 @@ impl TilePager<'_> {
     ///
     /// A name that is taken, and a disk that refuses.
     pub(in crate::mapper) fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
+        self.end_flight();
         self.wait(|disk| disk.create_snapshot(name))
     }
 
@@ -506,7 +519,7 @@ impl TilePager<'_> {
     pub(super) fn memory(&self) -> MemoryCounts {
         MemoryCounts {
             write_buffer: self.contents.buffer.bytes() as u64,
-            in_flight: self.disk.in_flight_bytes() as u64,
+            in_flight: self.in_flight_bytes() as u64,
             index: (self.disk.index_bytes() + self.disk.commit_bytes()) as u64,
             readers: self.contents.views.bytes() as u64,
             ..self.contents.cache.memory()

@@ -70,23 +70,36 @@ impl Checkpoint {
         versions: &mut TileVersions,
         kept: &mut KeptTables,
     ) -> Result<()> {
-        self.keep_replaced(files, versions.commits().flush_number.saturating_sub(1), kept)?;
+        let tiles: Vec<_> = self.unrenamed.tiles().chain(self.unremoved.iter().copied()).collect();
+        let pinned = self.keep_replaced(files, &tiles, versions.commits().flush_number, kept)?;
+        sync_folders(files, &pinned, |tile| kept.is_durable(tile))?;
         self.finish_renames(files)?;
         self.finish_removals(files, versions)?;
         self.finish_snapshots(files)
     }
 
-    /// Keeps the tables in place that the last commit replaces or removes, where a reader or a snapshot sees them.
-    /// Those of snapshots have their new names durably before other tables can take the old ones.
-    fn keep_replaced(&self, files: &MapFiles, flush_number: u64, kept: &mut KeptTables) -> Result<()> {
-        let layout = files.layout();
-        let tiles: Vec<_> = self.unrenamed.tiles().chain(self.unremoved.iter().copied()).collect();
+    /// Some tiles whose committed versions still have their `*.next` names.
+    pub(in crate::store) fn some_unrenamed(&self, most: usize) -> Vec<TileIndex> {
+        self.unrenamed.tiles().take(most).collect()
+    }
+
+    /// Keeps the tables in place of some tiles that the last commit replaces or removes, where a reader or a snapshot
+    /// sees them. Returns the tiles of which those of snapshots must have their new names durably before other tables
+    /// take the old ones.
+    pub(in crate::store) fn keep_replaced(
+        &self,
+        files: &MapFiles,
+        tiles: &[TileIndex],
+        flush_number: u64,
+        kept: &mut KeptTables,
+    ) -> Result<Vec<TileIndex>> {
+        let (layout, flush_number) = (files.layout(), flush_number.saturating_sub(1));
         // Asked after the commit: who begins to read later sees it.
         if !tiles.is_empty() {
             kept.refresh_readers();
         }
         let mut pinned = Vec::new();
-        for tile in tiles {
+        for &tile in tiles {
             if kept.needs(tile, flush_number) && self.is_replaced_in_place(files, tile)? {
                 files.rename(&layout.current(tile, TileFile::Table), &layout.kept(tile, flush_number))?;
                 kept.keep(tile, flush_number);
@@ -96,13 +109,7 @@ impl Checkpoint {
                 pinned.push(tile);
             }
         }
-        let folders: Vec<_> = pinned.iter().map(|&tile| layout.tile_folder(tile)).collect();
-        let [_, synced] = files.disk().sync_all(&[], &folders);
-        for ((tile, folder), result) in pinned.iter().zip(&folders).zip(synced) {
-            result.map_err(|error| Error::io(folder, "sync", error))?;
-            kept.is_durable(*tile);
-        }
-        Ok(())
+        Ok(pinned)
     }
 
     /// Whether the table in place is the version before the last commit. An earlier attempt may have kept it already;
@@ -117,27 +124,38 @@ impl Checkpoint {
     }
 
     fn finish_renames(&mut self, files: &MapFiles) -> Result<()> {
-        let layout = files.layout();
         while !self.unrenamed.is_empty() {
-            let group: Vec<_> = self.unrenamed.tiles().take(TILES_SYNCED_AT_ONCE).collect();
-            for tile in group {
-                for &file in layout.files() {
-                    put_in_place(files, &layout.next(tile, file), &layout.current(tile, file))?;
-                }
-                self.unrenamed.remove(tile);
-                self.renamed.insert(tile, ());
-            }
+            self.rename(files, &self.some_unrenamed(TILES_SYNCED_AT_ONCE))?;
         }
         while !self.renamed.is_empty() {
             let group: Vec<_> = self.renamed.tiles().take(TILES_SYNCED_AT_ONCE).collect();
-            let folders: Vec<_> = group.iter().map(|&tile| layout.tile_folder(tile)).collect();
-            let [_, synced] = files.disk().sync_all(&[], &folders);
-            for ((&tile, folder), result) in group.iter().zip(&folders).zip(synced) {
-                result.map_err(|error| Error::io(folder, "sync", error))?;
-                self.renamed.remove(tile);
-            }
+            sync_folders(files, &group, |tile| self.renames_are_durable(&[tile]))?;
         }
         Ok(())
+    }
+
+    /// Gives the versions of some tiles their names, which are not durable yet.
+    pub(in crate::store) fn rename(&mut self, files: &MapFiles, tiles: &[TileIndex]) -> Result<()> {
+        let layout = files.layout();
+        for &tile in tiles {
+            // Another may have done it meanwhile.
+            if !self.unrenamed.contains(tile) {
+                continue;
+            }
+            for &file in layout.files() {
+                put_in_place(files, &layout.next(tile, file), &layout.current(tile, file))?;
+            }
+            self.unrenamed.remove(tile);
+            self.renamed.insert(tile, ());
+        }
+        Ok(())
+    }
+
+    /// Notes that the names of some tiles' versions are durable.
+    pub(in crate::store) fn renames_are_durable(&mut self, tiles: &[TileIndex]) {
+        for &tile in tiles {
+            self.renamed.remove(tile);
+        }
     }
 
     /// Removes the files of removed tiles, and their folders where nothing else is in them. The log names these tiles
@@ -171,6 +189,21 @@ impl Checkpoint {
         (self.unnamed_snapshot, self.deleted_snapshot) = (None, None);
         Ok(())
     }
+}
+
+/// Makes the names in the folders of some tiles durable, and tells of each that is.
+pub(in crate::store) fn sync_folders(
+    files: &MapFiles,
+    tiles: &[TileIndex],
+    mut is_durable: impl FnMut(TileIndex),
+) -> Result<()> {
+    let folders: Vec<_> = tiles.iter().map(|&tile| files.layout().tile_folder(tile)).collect();
+    let [_, synced] = files.disk().sync_all(&[], &folders);
+    for ((&tile, folder), result) in tiles.iter().zip(&folders).zip(synced) {
+        result.map_err(|error| Error::io(folder, "sync", error))?;
+        is_durable(tile);
+    }
+    Ok(())
 }
 
 /// Gives a committed file its name. A folder or link that has it, which no map contains, is moved to quarantine.

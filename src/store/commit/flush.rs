@@ -1,6 +1,6 @@
 //! The writing half of [`TileStore`]: versions beside the committed ones, and the commit that puts them in place.
 
-use super::checkpoint::TILES_SYNCED_AT_ONCE;
+use super::checkpoint::{TILES_SYNCED_AT_ONCE, sync_folders};
 use super::commit_record::Flush;
 use super::metadata::Metadata;
 use crate::error::{Error, Result};
@@ -11,7 +11,6 @@ use crate::store::scans::{CatalogEntry, ScanRecord};
 use crate::store::tile_store::TileStore;
 use crate::store::tiles::file_checksum::FileChecksum;
 use crate::store::tiles::tile_version::TileVersion;
-use crate::store::tiles::tile_versions::TileVersions;
 use crate::store::tiles::tile_writer::TileWriter;
 use std::io::{self, Write};
 
@@ -75,8 +74,9 @@ impl TileStore {
     ///
     /// An I/O error.
     pub fn settle_scans(&mut self) -> Result<()> {
-        let scans = self.scans.write(&self.files, self.versions.commits().flush_number)?;
-        self.scans.commit(scans);
+        let count = self.scans.pending();
+        let scans = self.scans.write(&self.files, self.versions.commits().flush_number, count)?;
+        self.scans.commit(scans, count);
         self.committer.set_scan_records(scans.records);
         self.write_metadata()
     }
@@ -117,6 +117,25 @@ impl TileStore {
     ///
     /// An I/O error, [`Error::LockLost`], or a map of the original format.
     pub fn commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<()> {
+        let begun = self.begin_commit(metadata, scan_number)?;
+        if self.has_news(&begun) {
+            let synced = self.unsynced().sync();
+            self.commit_synced(&begun, synced)?;
+        }
+        self.tidy_up();
+        Ok(())
+    }
+
+    /// Begins a commit that others complete while the map goes on: it takes along the scans that were noted until now.
+    ///
+    /// Then the versions are written that the commit is to name, and no others; [`TileStore::unsynced`] makes them
+    /// durable, beside the map; [`TileStore::commit_synced`] commits; and what is left to do is done in steps
+    /// ([`TileStore::begin_step`]).
+    ///
+    /// # Errors
+    ///
+    /// As for [`TileStore::commit`].
+    pub fn begin_commit(&mut self, metadata: Metadata, scan_number: u64) -> Result<BegunCommit> {
         self.finish_earlier_work()?;
         self.keep_for_late_readers();
         self.committer.logged_map_id()?;
@@ -124,51 +143,118 @@ impl TileStore {
             let folder = self.layout().tile_folder(tile);
             return Err(Error::io(&folder, "trust", io::Error::other("an earlier sync failed")));
         }
-        let number = self.commits().flush_number + 1;
+        self.keeper.begin_commit();
+        Ok(BegunCommit { metadata, scan_number, listed_scans: self.scans.pending() })
+    }
+
+    /// Whether there is something to commit.
+    pub fn has_news(&self, begun: &BegunCommit) -> bool {
+        let has_changed = !self.versions.next().is_empty() || !self.versions.removed().is_empty();
+        has_changed
+            || self.committer.is_new(&self.metadata_of(begun))
+            || self.keeper.has_news()
+            || begun.scan_number != self.commits().scan_number
+    }
+
+    /// What a commit is to make durable before it can name it.
+    pub fn unsynced(&self) -> Unsynced {
+        let tiles = self.versions.next().tiles().collect();
+        Unsynced { files: self.files.clone(), tiles, segments: self.keeper.unsynced() }
+    }
+
+    fn metadata_of(&self, begun: &BegunCommit) -> Metadata {
+        let numbers = [self.commits().flush_number + 1, begun.scan_number];
         let mut metadata =
-            self.committer.fill_in(metadata, &self.files, &self.versions, [number, scan_number]);
+            self.committer.fill_in(begun.metadata.clone(), &self.files, &self.versions, numbers);
         if let Some(ext) = &mut metadata.ext {
             ext.keeps_scans = self.keeper.is_on();
         }
+        metadata
+    }
+
+    /// Commits what [`Unsynced::sync`] has made durable.
+    ///
+    /// # Errors
+    ///
+    /// Why that failed; as for [`TileStore::commit`].
+    pub fn commit_synced(&mut self, begun: &BegunCommit, synced: Synced) -> Result<()> {
+        synced.suspects.into_iter().for_each(|tile| self.versions.suspect(tile));
+        synced.result?;
+        let number = self.commits().flush_number + 1;
+        let mut metadata = self.metadata_of(begun);
         let is_new = self.committer.is_new(&metadata);
         let removed = self.versions.removed();
-        let has_changed = !self.versions.next().is_empty() || !removed.is_empty();
-        if has_changed || is_new || self.keeper.has_news() || scan_number != self.commits().scan_number {
-            sync_next(&self.files, &mut self.versions)?;
-            let scans = self.scans.write(&self.files, number - 1)?;
-            let kept = self.write_kept()?;
-            if let Some(ext) = &mut metadata.ext {
-                ext.scan_records = Some(scans.records);
-            }
-            // As late as can be: what another writer commits must not be cut off.
-            self.committer.check_lock()?;
-            let text = metadata.to_text();
-            let metadata_text = is_new.then_some(&*text);
-            let changed = self.versions.next();
-            let flush = Flush { number, scan_number, changed, removed: &removed, metadata_text };
-            if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
-                // At once if it goes: another process may come next, and would see a record that is not on the medium.
-                let _ = self.finish_earlier_work();
-                self.keeper.not_committed();
-                return Err(error);
-            }
-            // Committed.
-            self.note_added(number);
-            self.scans.commit(scans);
-            self.keeper.commit(kept);
-            let changed = self.versions.committed(number, scan_number);
-            log::info!(
-                "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",
-                self.files.folder().display(),
-                changed.len(),
-                removed.len()
-            );
-            self.checkpoint.add(changed.tiles(), &removed);
+        let scans = self.scans.write(&self.files, number - 1, begun.listed_scans)?;
+        let kept = self.write_kept()?;
+        if let Some(ext) = &mut metadata.ext {
+            ext.scan_records = Some(scans.records);
         }
+        // As late as can be: what another writer commits must not be cut off.
+        self.committer.check_lock()?;
+        let text = metadata.to_text();
+        let metadata_text = is_new.then_some(&*text);
+        let (changed, scan_number) = (self.versions.next(), begun.scan_number);
+        let flush = Flush { number, scan_number, changed, removed: &removed, metadata_text };
+        if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
+            // At once if it goes: another process may come next, and would see a record that is not on the medium.
+            let _ = self.finish_earlier_work();
+            self.keeper.not_committed();
+            return Err(error);
+        }
+        // Committed.
+        self.note_added(number);
+        self.scans.commit(scans, begun.listed_scans);
+        self.keeper.commit(kept);
+        let changed = self.versions.committed(number, scan_number);
+        log::info!(
+            "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",
+            self.files.folder().display(),
+            changed.len(),
+            removed.len()
+        );
+        self.checkpoint.add(changed.tiles(), &removed);
+        Ok(())
+    }
+
+    /// Does what a commit leaves to do. What the disk refuses is done later.
+    pub fn tidy_up(&mut self) {
         if let Err(error) = self.finish_commit() {
             log::warn!("flushed, but not tidied up: {error:#}");
         }
-        Ok(())
+    }
+
+    /// Begins to put some of the committed versions in place; `None` if all are, or as far as they could be.
+    /// [`TileStore::put_in_place`] comes next.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
+    pub fn begin_step(&mut self) -> Result<Option<Step>> {
+        let flush_number = self.commits().flush_number;
+        if self.committer.written_flush() != Some(flush_number) {
+            self.write_metadata()?;
+        }
+        let tiles = self.checkpoint.some_unrenamed(TILES_OF_STEP);
+        if tiles.is_empty() {
+            return Ok(None);
+        }
+        let pinned = self.checkpoint.keep_replaced(&self.files, &tiles, flush_number, &mut self.kept)?;
+        Ok(Some(Step { files: self.files.clone(), tiles, pinned }))
+    }
+
+    /// Puts the versions of a step in place, once [`Step::sync_kept`] has succeeded.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
+    pub fn put_in_place(&mut self, step: &Step) -> Result<()> {
+        step.pinned.iter().for_each(|&tile| self.kept.is_durable(tile));
+        self.checkpoint.rename(&self.files, &step.tiles)
+    }
+
+    /// Ends a step, once [`Step::sync_names`] has succeeded.
+    pub fn end_step(&mut self, step: &Step) {
+        self.checkpoint.renames_are_durable(&step.tiles);
     }
 
     /// Records the tiles that a commit adds. A reader of an earlier flush does not see them, so their tables need not
@@ -271,21 +357,85 @@ impl TileStore {
     }
 }
 
-/// Syncs all versions that the next commit names.
-fn sync_next(files: &MapFiles, versions: &mut TileVersions) -> Result<()> {
-    let mut suspects = Vec::new();
-    let mut changed = versions.next().tiles().peekable();
-    let synced = loop {
-        let group: Vec<_> = changed.by_ref().take(TILES_SYNCED_AT_ONCE).collect();
-        let is_last = changed.peek().is_none();
-        let synced = sync_group(files, &group, is_last, &mut suspects);
-        if is_last || synced.is_err() {
-            break synced;
+/// Tiles that are put in place at a time beside the map.
+const TILES_OF_STEP: usize = 64;
+
+/// A commit that has begun.
+#[derive(Debug)]
+pub struct BegunCommit {
+    metadata: Metadata,
+    scan_number: u64,
+    /// How many of the scans that were noted belong to it.
+    listed_scans: usize,
+}
+
+/// What a commit is to make durable.
+#[derive(Debug)]
+pub struct Unsynced {
+    files: MapFiles,
+    tiles: Vec<TileIndex>,
+    segments: Vec<u64>,
+}
+
+/// What came of that.
+#[derive(Debug)]
+pub struct Synced {
+    suspects: Vec<TileIndex>,
+    result: Result<()>,
+}
+
+/// Some committed versions that are put in place.
+#[derive(Debug)]
+pub struct Step {
+    files: MapFiles,
+    tiles: Vec<TileIndex>,
+    /// Those of which a snapshot sees what was in place before.
+    pinned: Vec<TileIndex>,
+}
+
+impl Unsynced {
+    /// Syncs all versions that the commit names. The store needs not wait for it.
+    pub fn sync(&self) -> Synced {
+        let mut suspects = Vec::new();
+        let mut changed = self.tiles.chunks(TILES_SYNCED_AT_ONCE).peekable();
+        let result = loop {
+            let group = changed.next().unwrap_or_default();
+            let is_last = changed.peek().is_none();
+            let synced = sync_group(&self.files, group, is_last, &mut suspects);
+            if is_last || synced.is_err() {
+                break synced;
+            }
+        };
+        Synced { suspects, result }
+    }
+
+    /// Brings kept scans to the medium ahead of the commit, which then has little of them left to sync. What fails here
+    /// fails there, too.
+    pub fn sync_kept_scans_ahead(&self) {
+        for &segment in &self.segments {
+            let _ = self.files.disk().sync_file(&self.files.layout().segment(segment));
         }
-    };
-    drop(changed);
-    suspects.into_iter().for_each(|tile| versions.suspect(tile));
-    synced
+    }
+}
+
+impl Step {
+    /// Makes durable what snapshots see from now on.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
+    pub fn sync_kept(&self) -> Result<()> {
+        sync_folders(&self.files, &self.pinned, |_| {})
+    }
+
+    /// Makes durable that the versions have their names.
+    ///
+    /// # Errors
+    ///
+    /// An I/O error.
+    pub fn sync_names(&self) -> Result<()> {
+        sync_folders(&self.files, &self.tiles, |_| {})
+    }
 }
 
 /// Syncs the versions of some tiles, and adds the tiles of which that failed to `suspects`. With the last of them goes

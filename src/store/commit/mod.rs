@@ -5,6 +5,6 @@ pub(super) mod commit_log;
 pub(super) mod commit_record;
 pub(super) mod commits;
 pub(super) mod committer;
-mod flush;
+pub(super) mod flush;
 pub(super) mod input_record;
 pub(super) mod metadata;

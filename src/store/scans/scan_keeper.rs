@@ -20,6 +20,8 @@ pub(in crate::store) struct ScanKeeper {
     committed: Option<Option<Catalog>>,
     /// Entries of the next commit, behind the committed ones or, if there is one, the replacement.
     pending: Vec<CatalogEntry>,
+    /// How many of these belong to a commit that has begun.
+    begun_entries: usize,
     /// The catalog that takes the place of the committed one.
     replacement: Option<Replacement>,
     segment: Option<SegmentWriter>,
@@ -166,8 +168,10 @@ impl ScanKeeper {
 
     /// Records an entry of the next commit.
     pub(in crate::store) fn note(&mut self, entry: CatalogEntry) {
+        // What a commit has begun to take along stays as it is.
+        let own = self.pending.get_mut(self.begun_entries..).unwrap_or_default();
         if let (Some(CatalogEntry::Unlisted(_, last)), CatalogEntry::Unlisted(first, new_last)) =
-            (self.pending.last_mut(), &entry)
+            (own.last_mut(), &entry)
             && *last + 1 == *first
         {
             *last = *new_last;
@@ -201,6 +205,16 @@ impl ScanKeeper {
     }
 
     // Commits.
+
+    /// Begins a commit: it takes along the entries that there are now.
+    pub(in crate::store) fn begin_commit(&mut self) {
+        self.begun_entries = self.pending.len();
+    }
+
+    /// The segments with scans that are not durable.
+    pub(in crate::store) fn unsynced(&self) -> Vec<u64> {
+        self.unsynced.iter().copied().collect()
+    }
 
     /// Writes what belongs to a commit, synced; `committed_flush` is the flush before it. `before` are the entries of
     /// what the map had before its scans were kept, for the first catalog. Returns what [`ScanKeeper::commit`] is to be
@@ -255,11 +269,11 @@ impl ScanKeeper {
             }
             None => committed,
         };
-        if in_place.is_some_and(|catalog| !catalog.has_excess) && self.pending.is_empty() {
+        if in_place.is_some_and(|catalog| !catalog.has_excess) && self.begun_entries == 0 {
             return Ok(in_place);
         }
         let earlier = if in_place.is_none() { before()? } else { Vec::new() };
-        if in_place.is_none() && earlier.is_empty() && self.pending.is_empty() {
+        if in_place.is_none() && earlier.is_empty() && self.begun_entries == 0 {
             return Ok(None);
         }
         self.make_folder(files)?;
@@ -275,7 +289,8 @@ impl ScanKeeper {
                 Some(catalog) => CatalogWriter::append(disk, layout, generation, catalog.bytes)?,
                 None => CatalogWriter::create(disk, layout, generation)?,
             };
-            earlier.iter().chain(&self.pending).try_for_each(|entry| out.put(entry, flush_number))?;
+            let begun = self.pending.get(..self.begun_entries).unwrap_or(&self.pending);
+            earlier.iter().chain(begun).try_for_each(|entry| out.put(entry, flush_number))?;
             out.finish()
         };
         let bytes = write().map_err(|error| Error::io(&layout.catalog(generation), "write", error));
@@ -290,7 +305,8 @@ impl ScanKeeper {
         if self.is_on {
             self.committed = Some(written);
         }
-        (self.pending, self.replacement, self.begun) = (Vec::new(), None, None);
+        self.pending = self.pending.split_off(self.begun_entries.min(self.pending.len()));
+        (self.begun_entries, self.replacement, self.begun) = (0, None, None);
     }
 
     /// Notes that what was written is not committed: its records may be in the file.

@@ -48,13 +48,24 @@ impl ScanList {
         self.pending.capacity() * size_of::<Entry>()
     }
 
-    /// Writes what belongs to a commit, synced; `committed` is the flush before it. Returns what [`ScanList::commit`] is
-    /// to be told.
+    /// How many entries there are for the next commit.
+    pub(in crate::store) fn pending(&self) -> usize {
+        self.pending.len()
+    }
+
+    /// Writes what belongs to a commit, the first `count` entries, synced; `committed` is the flush before it. Returns
+    /// what [`ScanList::commit`] is to be told.
     ///
     /// # Errors
     ///
     /// A disk that refuses: the next call writes it again.
-    pub(in crate::store) fn write(&mut self, files: &MapFiles, committed: u64) -> Result<Extent> {
+    pub(in crate::store) fn write(
+        &mut self,
+        files: &MapFiles,
+        committed: u64,
+        count: usize,
+    ) -> Result<Extent> {
+        let pending = self.pending.get(..count).unwrap_or(&self.pending);
         let path = files.layout().scans();
         let before = match self.committed {
             Some(before) => before,
@@ -64,10 +75,10 @@ impl ScanList {
                 *self.committed.insert(found)
             }
         };
-        if self.pending.is_empty() && !self.has_excess {
+        if pending.is_empty() && !self.has_excess {
             return Ok(before);
         }
-        if self.pending.is_empty() && before.records == 0 {
+        if pending.is_empty() && before.records == 0 {
             files.remove_file(&path)?;
             self.has_excess = false;
             return Ok(before);
@@ -83,7 +94,7 @@ impl ScanList {
                 }
                 bytes => files.disk().append(&path, bytes)?,
             };
-            for records in self.pending.chunks(1024) {
+            for records in pending.chunks(1024) {
                 let bytes: Vec<u8> = records.iter().flat_map(|entry| entry.to_bytes(committed + 1)).collect();
                 out.write_all(&bytes)?;
             }
@@ -93,13 +104,13 @@ impl ScanList {
         if before.records == 0 {
             files.sync_map_folder()?;
         }
-        Ok(Extent { records: before.records + self.pending.len() as u64 })
+        Ok(Extent { records: before.records + pending.len() as u64 })
     }
 
     /// Notes that what was written is committed.
-    pub(in crate::store) fn commit(&mut self, written: Extent) {
+    pub(in crate::store) fn commit(&mut self, written: Extent, count: usize) {
         (self.committed, self.has_excess) = (Some(written), false);
-        self.pending = Vec::new();
+        self.pending = self.pending.split_off(count.min(self.pending.len()));
     }
 }
 

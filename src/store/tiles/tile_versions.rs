@@ -21,8 +21,8 @@ pub(in crate::store) struct TileVersions {
 }
 
 /// Bytes that a commit takes for each tile that it changes, beside the index: its place among those that the last
-/// record names and among those that wait for their names.
-const COMMIT_BYTES_OF_TILE: usize = 30;
+/// record names, among those that are synced and among those that wait for their names.
+const COMMIT_BYTES_OF_TILE: usize = 42;
 
 impl TileVersions {
     pub(in crate::store) fn new(commits: Commits) -> Self {

@@ -116,6 +116,7 @@ mod persistence {
     pub(crate) use parameters::{config_from, new_metadata};
     pub(crate) use tile_saver::TileSaver;
     pub(crate) use upgrade::upgrade;
+    pub(crate) use worker::Worker;
 }
 
 mod mapper {
@@ -135,14 +136,21 @@ mod mapper {
         mod eviction {
             source!("eviction.rs");
         }
+        mod flight {
+            source!("flight.rs");
+        }
         mod flush {
             source!("flush.rs");
+        }
+        mod flusher {
+            source!("flusher.rs");
         }
         mod memory_plan;
         mod paged_tiles {
             source!("paged_tiles.rs");
         }
         mod shared_contents;
+        mod shared_disk;
         mod tile_state {
             source!("tile_state.rs");
         }

@@ -27,6 +27,12 @@ struct Life {
     expected: BTreeMap<TileIndex, Tile>,
     /// The same as of the last flush.
     flushed: BTreeMap<TileIndex, Tile>,
+    /// The same as of flushes that were begun beside the mapper, by the number of batches.
+    begun: BTreeMap<u64, BTreeMap<TileIndex, Tile>>,
+    /// That of the one that goes on.
+    flying: Option<u64>,
+    /// Whether flushes go on beside the mapper.
+    is_beside: bool,
     /// How often each tile was to be changed or was asked for.
     touched: BTreeMap<TileIndex, u64>,
     errors: u64,
@@ -41,13 +47,13 @@ fn voxels(tile: &Tile) -> Vec<Voxel> {
 }
 
 impl Life {
-    fn new(storage: Storage) -> Self {
+    fn new(storage: Storage, is_beside: bool) -> Self {
         let (disk, config, map_id) = (MemoryDisk::new(), config(storage), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
         let store = TileStore::create(Arc::new(disk.clone()), Path::new("/map"), metadata, map_id).unwrap();
         let tiles = PagedTiles::new(config.clone(), store);
-        let (expected, flushed, touched) = Default::default();
-        Self { tiles, disk, config, expected, flushed, touched, errors: 0 }
+        let (expected, flushed, begun, touched) = Default::default();
+        Self { tiles, disk, config, expected, flushed, begun, flying: None, is_beside, touched, errors: 0 }
     }
 
     /// A batch of points in some tiles: taken whole, or refused and nothing of it taken.
@@ -95,8 +101,13 @@ impl Life {
     }
 
     fn flush(&mut self, refuses: bool) {
+        // Whatever came of one beside the mapper, this one tells it.
+        self.flying = None;
         match self.tiles.pager().flush() {
-            Ok(()) => self.flushed = self.expected.clone(),
+            Ok(()) => {
+                self.flushed = self.expected.clone();
+                self.begun.clear();
+            }
             Err(error) => {
                 // What could not be saved before is saved now, and no older trouble is told of.
                 assert!(refuses, "{error:#}");
@@ -105,13 +116,47 @@ impl Life {
         }
     }
 
+    /// Begins a flush that goes on beside what comes next.
+    fn begin_flush(&mut self) {
+        let number = self.tiles.pager().scan_number();
+        match self.tiles.begin_flush() {
+            Ok(()) => {
+                self.begun.insert(number, self.expected.clone());
+                self.flying = Some(number);
+            }
+            Err(_) => {
+                (self.errors, self.flying) = (self.errors + 1, None);
+            }
+        }
+    }
+
+    fn end_flush(&mut self) {
+        let flying = self.flying.take();
+        match (self.tiles.end_flush(), flying) {
+            (Ok(()), Some(number)) => {
+                assert_eq!(self.tiles.pager().store().commits().scan_number, number);
+                self.flushed = self.begun.remove(&number).expect("it was begun");
+                self.begun.clear();
+            }
+            (Ok(()), None) => {}
+            (Err(_), _) => self.errors += 1,
+        }
+    }
+
     /// Goes away in the middle of everything, and begins again with what was flushed.
     fn begin_again(self) -> Self {
-        let Self { tiles, disk, config, flushed, touched, errors, .. } = self;
+        let Self { tiles, disk, config, mut flushed, begun, flying, is_beside, touched, errors, .. } = self;
         drop(tiles);
         let store = TileStore::open(Arc::new(disk.clone()), Path::new("/map")).unwrap();
+        let committed = store.commits().scan_number;
+        // What goes on when the mapper goes is finished, unless the disk refuses.
+        assert!(flying.is_none_or(|number| number == committed || disk.refused() > 0), "{committed}");
+        if let Some(begun) = begun.get(&committed) {
+            flushed = begun.clone();
+        }
         let tiles = PagedTiles::new(config.clone(), store);
-        Self { tiles, disk, config, expected: flushed.clone(), flushed, touched, errors }
+        let (expected, begun) = (flushed.clone(), BTreeMap::new());
+        Self { tiles, disk, config, expected, flushed, begun, flying: None, is_beside, touched, errors }
     }
 
     fn run(&mut self, steps: usize) {
@@ -119,7 +164,10 @@ impl Life {
         self.disk.refuse(refuses);
         for _ in 0..steps {
             match thread_rng().gen_range(0..16) {
-                0..9 => self.insert(),
+                0..8 => self.insert(),
+                8 if self.is_beside => self.begin_flush(),
+                8 => self.insert(),
+                9 if self.is_beside && thread_rng().gen_bool(0.3) => self.end_flush(),
                 9..13 => self.ask(),
                 13 => self.flush(refuses),
                 _ => {
@@ -150,12 +198,14 @@ impl Life {
     }
 }
 
-fn live(storage: Storage) {
-    let mut life = Life::new(storage);
+fn live(storage: Storage, is_beside: bool) {
+    let mut life = Life::new(storage, is_beside);
     for _ in 0..2 {
         life.run(24);
         life.check_tiles();
-        life.check_saves();
+        if !life.is_beside {
+            life.check_saves();
+        }
         life = life.begin_again();
         life.check_tiles();
     }
@@ -169,11 +219,23 @@ fn live(storage: Storage) {
 /// version of a tile comes after a newer, and nobody waits for ever.
 #[test]
 fn tiles_on_their_way_to_disk_and_back_are_what_they_must_be() {
-    in_many_orders(|| live(Storage::Compact));
+    in_many_orders(|| live(Storage::Compact, false));
 }
 
 /// The same where the saving thread unpacks tiles.
 #[test]
 fn tiles_that_are_unpacked_on_their_way_are_too() {
-    in_many_orders(|| live(Storage::OctoMap));
+    in_many_orders(|| live(Storage::OctoMap, false));
+}
+
+/// The same with flushes that go on beside scans, questions and whatever ends the mapper: what is on disk afterwards is
+/// the map as of one of them.
+#[test]
+fn flushes_beside_the_mapper_are_of_one_scan() {
+    in_many_orders(|| live(Storage::Compact, true));
+}
+
+#[test]
+fn flushes_beside_the_mapper_that_unpack_tiles_are_too() {
+    in_many_orders(|| live(Storage::OctoMap, true));
 }

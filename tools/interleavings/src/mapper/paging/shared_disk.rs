@@ -1,0 +1,44 @@
+use super::tile_disk::TileDisk;
+use shuttle::sync::{Mutex, MutexGuard};
+use std::ops::{Deref, DerefMut};
+
+/// The disk behind the scheduler's lock, which knows no way to let go of a guard for a while.
+#[derive(Debug)]
+pub(super) struct SharedDisk(Mutex<TileDisk>);
+
+#[derive(Debug)]
+pub(super) struct DiskGuard<'a> {
+    disk: &'a Mutex<TileDisk>,
+    guard: Option<MutexGuard<'a, TileDisk>>,
+}
+
+impl SharedDisk {
+    pub(super) fn new(disk: TileDisk) -> Self {
+        Self(Mutex::new(disk))
+    }
+
+    pub(super) fn lock(&self) -> DiskGuard<'_> {
+        DiskGuard { disk: &self.0, guard: Some(self.0.lock().unwrap()) }
+    }
+}
+
+impl Deref for DiskGuard<'_> {
+    type Target = TileDisk;
+
+    fn deref(&self) -> &TileDisk {
+        self.guard.as_ref().expect("nobody looks while it is unlocked")
+    }
+}
+
+impl DerefMut for DiskGuard<'_> {
+    fn deref_mut(&mut self) -> &mut TileDisk {
+        self.guard.as_mut().expect("nobody looks while it is unlocked")
+    }
+}
+
+pub(super) fn unlocked<T>(disk: &mut DiskGuard<'_>, wait: impl FnOnce() -> T) -> T {
+    disk.guard = None;
+    let answer = wait();
+    disk.guard = Some(disk.disk.lock().unwrap());
+    answer
+}
