@@ -197,10 +197,19 @@ fn flush_if(
     mapper: &mut OutOfCoreTileMapper,
     schedule: &mut FlushSchedule,
 ) -> crate::Result<()> {
-    if is_due {
-        mapper.flush()?;
-        schedule.flushed();
+    if !is_due {
+        return Ok(());
     }
+    if !schedule.is_by_time() {
+        mapper.flush()?;
+    } else if mapper.is_flushing() {
+        // The disk is slower than the clock: the next flush begins once this one has ended.
+        return Ok(());
+    } else {
+        // Scans go on meanwhile.
+        mapper.begin_flush()?;
+    }
+    schedule.flushed();
     Ok(())
 }
 

@@ -59,6 +59,11 @@ impl FlushSchedule {
         }
     }
 
+    /// Whether time decides, so that a flush may go on beside scans. After so many scans is after these and no others.
+    pub fn is_by_time(&self) -> bool {
+        matches!(self.every, FlushEvery::Time(_))
+    }
+
     /// The map was flushed.
     pub fn flushed(&mut self) {
         (self.scans, self.since) = (0, Instant::now());

@@ -20,6 +20,8 @@ fn live(seed: u64, config: &MapConfig) {
         _ => usize::MAX,
     };
     let (mut scans, mut flushed): (u64, (Voxels, u64)) = (0, (Voxels::new(), 0));
+    // As of the flush that goes on beside what comes next.
+    let mut begun: Option<(Voxels, u64)> = None;
     for _ in 0..60 {
         match random.below(10) {
             0..5 => {
@@ -36,13 +38,19 @@ fn live(seed: u64, config: &MapConfig) {
                 let found = found.map(|evidence| (evidence.log_odds.to_bits(), evidence.observation_count));
                 assert_eq!(found, reference.voxels.get(&voxel).copied(), "seed {seed}");
             }
+            7 if random.below(2) == 0 => {
+                mapper.begin_flush().unwrap();
+                begun = Some((reference.voxels.clone(), scans));
+            }
             7 => {
                 mapper.flush().unwrap();
-                flushed = (reference.voxels.clone(), scans);
+                (flushed, begun) = ((reference.voxels.clone(), scans), None);
             }
             8 => {
                 // Whatever was evicted since the last flush is on disk, and must not count.
                 drop(mapper);
+                // What was begun is finished.
+                flushed = begun.take().unwrap_or(flushed);
                 mapper =
                     OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &path), config.clone())
                         .unwrap();

@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::space::{TileBox, TileIndex};
 use crate::store::{InputRecord, TileVersion};
 use crate::tile::Tile;
-use std::sync::Arc;
 
 /// What a map holds after some scan: its tiles in memory and what is buffered for the others.
 #[derive(Debug)]
@@ -20,6 +19,8 @@ pub(in crate::mapper) struct TileContents {
     pub(super) scan_number: u64,
     /// The tiles that the last scan touched.
     pub(super) last_scan: Option<TileBox>,
+    /// How many.
+    pub(super) last_touched: usize,
     /// Around all tiles of the map, and perhaps some that it had.
     pub(super) bounds: Option<TileBox>,
     /// What the map was built from and, last, is being built from; kept with it at the next flush.
@@ -27,6 +28,10 @@ pub(in crate::mapper) struct TileContents {
     pub(super) views: Views,
     /// What a flush beside the mapper holds, while there is one.
     pub(super) flight: Option<Flight>,
+    /// Bytes of memory that are kept free for what such flushes hold alone, once there was one: a little more than the
+    /// largest so far took, and than the tiles that a scan changes. Otherwise the scan after the beginning of a flush
+    /// would have to make room for all of it.
+    pub(super) flush_reserve: usize,
     /// Why the last such flush failed, until somebody is told.
     pub(super) flush_error: Option<Error>,
 }
@@ -80,28 +85,54 @@ impl TileContents {
 
     // A flush beside the mapper.
 
+    /// Bytes of memory that a flush holds alone.
+    pub(super) fn flight_bytes(&self) -> usize {
+        self.flight.as_ref().map_or(0, Flight::bytes)
+    }
+
     /// Notes that the cache has another version of these tiles, or none, from now on.
     pub(super) fn leave_to_flush(&mut self, tiles: impl Iterator<Item = TileIndex>) {
         if let Some(flight) = &mut self.flight {
-            tiles.for_each(|index| flight.is_left_alone_with(index));
+            tiles.for_each(|index| flight.note_changed(index));
+            let bytes = flight.bytes();
+            self.reserve_for_flush(bytes);
         }
     }
 
-    /// Bytes of memory that changing these tiles takes on top.
+    /// Keeps memory free for flushes that hold so much alone.
+    fn reserve_for_flush(&mut self, bytes: usize) {
+        self.flush_reserve = self.flush_reserve.max(bytes + bytes / 4);
+    }
+
+    /// Keeps memory free for flushes, if there are any, that begin after a scan has changed these tiles.
+    pub(super) fn note_touched(&mut self, tiles: &[TileIndex]) {
+        self.last_touched = tiles.len();
+        if self.flush_reserve > 0 {
+            let resident = tiles.iter().filter_map(|&index| self.cache.peek(index));
+            let bytes = resident.map(|tile| tile.bytes()).sum();
+            self.reserve_for_flush(bytes);
+        }
+    }
+
+    /// Bytes of memory that changing these tiles takes beyond what is kept free for it.
     pub(super) fn bytes_to_copy(&self, tiles: impl Iterator<Item = TileIndex>) -> usize {
-        self.flight.as_ref().map_or(0, |flight| flight.bytes_to_copy(tiles))
+        let Some(flight) = &self.flight else { return 0 };
+        let with_them = flight.bytes() + flight.bytes_to_copy(tiles);
+        with_them.saturating_sub(self.flush_bytes())
+    }
+
+    /// Bytes of memory that a flush holds alone, or that are kept free for that.
+    pub(super) fn flush_bytes(&self) -> usize {
+        self.flight_bytes().max(self.flush_reserve)
     }
 
     /// Notes that a tile was written as of the flush's scan.
     pub(super) fn note_flushed(&mut self, tile: FlushedTile, version: TileVersion) {
         let index = tile.index();
         self.views.note_on_disk(index, version);
-        if let Some(flight) = &mut self.flight {
-            flight.note_written(index);
-        }
+        let is_same = self.flight.as_mut().is_some_and(|flight| flight.note_written(index));
         match tile {
             FlushedTile::Resident(tile) => {
-                let is_same = self.cache.peek(index).is_some_and(|own| Arc::ptr_eq(own, &tile));
                 // Let go first: changing a tile that somebody else holds would copy it.
                 drop(tile);
                 if is_same {
@@ -109,6 +140,18 @@ impl TileContents {
                 }
             }
             FlushedTile::Compact(index, tile) => drop(self.cache.save_ended(index, &tile, true)),
+        }
+    }
+
+    /// Which of these tiles the flush shares with the cache.
+    pub(super) fn is_shared_with_flush(&self, index: TileIndex) -> bool {
+        self.flight.as_ref().is_some_and(|flight| flight.is_shared(index))
+    }
+
+    /// Notes that the flush has copied a tile.
+    pub(super) fn note_copied(&mut self, index: TileIndex) {
+        if let Some(flight) = &mut self.flight {
+            flight.note_own(index);
         }
     }
 

@@ -1,6 +1,5 @@
 //! How room is made: resident tiles go into the compact form, and these to disk, beside the mapper.
 
-use super::flight::Flight;
 use super::tile_cache::Eviction;
 use super::tile_pager::TilePager;
 use crate::error::{Error, Result};
@@ -49,13 +48,14 @@ impl TilePager<'_> {
 
     /// Bytes of memory that grow outside of the cache.
     fn outside_bytes(&self) -> usize {
-        let disk = self.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes();
-        self.contents.buffer.bytes() + self.contents.views.bytes() + disk
+        let disk = self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes();
+        let contents = self.contents.buffer.bytes() + self.contents.views.bytes();
+        disk + contents + self.contents.flush_bytes()
     }
 
     /// Bytes of memory of what is on its way to disk or from there.
     pub(super) fn in_flight_bytes(&self) -> usize {
-        self.disk.in_flight_bytes() + self.contents.flight.as_ref().map_or(0, Flight::bytes)
+        self.disk.in_flight_bytes() + self.contents.flight_bytes()
     }
 
     /// Whether so many more tiles fit, and so many bytes with them.
@@ -76,10 +76,18 @@ impl TilePager<'_> {
     /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles in use are not evicted; if all are
     /// in use, the limit is exceeded.
     pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize) -> Result<()> {
-        while let Some(eviction) = self.contents.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
-            match eviction {
-                Eviction::Resident(index) => self.evict(index)?,
-                Eviction::Compact(index) => self.evict_compact(index)?,
+        loop {
+            match self.contents.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
+                Some(Eviction::Resident(index)) => self.evict(index)?,
+                Some(Eviction::Compact(index)) => self.evict_compact(index)?,
+                None if self.contents.cache.is_over(bytes, tiles, self.outside_bytes()) => {
+                    // All that is left is held, and where a flush beside the mapper holds it, it lets go.
+                    if self.contents.flight.is_none() {
+                        break;
+                    }
+                    self.end_flight();
+                }
+                None => break,
             }
         }
         self.save_ahead()

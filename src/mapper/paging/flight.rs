@@ -4,7 +4,8 @@ use rustc_hash::FxHashMap;
 /// What a flush beside the mapper holds of the tiles as of its scan, until they are written.
 ///
 /// It shares resident tiles with the cache. A scan that changes one leaves the flush with what was there (copy on
-/// write), which then counts on top.
+/// write), which then counts on top. So that the next scan needs not wait for that, the flush itself copies the tiles
+/// that it will change.
 #[derive(Debug, Default)]
 pub(super) struct Flight {
     tiles: FxHashMap<TileIndex, FlightTile>,
@@ -17,12 +18,14 @@ pub(super) struct Flight {
 struct FlightTile {
     bytes: usize,
     is_shared: bool,
+    /// Whether the cache may hold something else by now.
+    has_changed: bool,
 }
 
 impl Flight {
     /// A flush of some tiles, each with its bytes of memory.
     pub(super) fn of(tiles: impl Iterator<Item = (TileIndex, usize)>) -> Self {
-        let tile = |(index, bytes)| (index, FlightTile { bytes, is_shared: true });
+        let tile = |(index, bytes)| (index, FlightTile { bytes, is_shared: true, has_changed: false });
         Self { tiles: tiles.map(tile).collect(), own_bytes: 0 }
     }
 
@@ -32,8 +35,13 @@ impl Flight {
         shared.map(|tile| tile.bytes).sum()
     }
 
-    /// Notes that the cache has another version of a tile, or none, from now on.
-    pub(super) fn is_left_alone_with(&mut self, index: TileIndex) {
+    /// Whether a tile is shared with the cache.
+    pub(super) fn is_shared(&self, index: TileIndex) -> bool {
+        self.tiles.get(&index).is_some_and(|tile| tile.is_shared)
+    }
+
+    /// Notes that the flush has a tile of its own from now on, be it a copy.
+    pub(super) fn note_own(&mut self, index: TileIndex) {
         if let Some(tile) = self.tiles.get_mut(&index)
             && tile.is_shared
         {
@@ -42,13 +50,19 @@ impl Flight {
         }
     }
 
-    /// Notes that a tile was written, and let go of.
-    pub(super) fn note_written(&mut self, index: TileIndex) {
-        if let Some(tile) = self.tiles.remove(&index)
-            && !tile.is_shared
-        {
-            self.own_bytes -= tile.bytes;
+    /// Notes that the cache has another version of a tile, or none, from now on.
+    pub(super) fn note_changed(&mut self, index: TileIndex) {
+        self.note_own(index);
+        if let Some(tile) = self.tiles.get_mut(&index) {
+            tile.has_changed = true;
         }
+    }
+
+    /// Notes that a tile was written, and let go of. Tells whether it is what the cache holds.
+    pub(super) fn note_written(&mut self, index: TileIndex) -> bool {
+        let Some(tile) = self.tiles.remove(&index) else { return false };
+        self.own_bytes -= if tile.is_shared { 0 } else { tile.bytes };
+        !tile.has_changed
     }
 
     /// Bytes of memory.

@@ -80,13 +80,15 @@ impl TilePager<'_> {
         for index in self.contents.cache.dirty_compact() {
             tiles.extend(self.contents.cache.begin_save(index).map(|tile| FlushedTile::Compact(index, tile)));
         }
-        for index in self.contents.cache.resident_indices() {
-            let tile = self.contents.cache.peek(index).filter(|tile| tile.is_dirty());
-            tiles.extend(tile.cloned().map(FlushedTile::Resident));
-        }
+        let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
+        let first = tiles.len();
+        tiles.extend(dirty.cloned().map(FlushedTile::Resident));
+        // The next scan changes about the tiles that the last one has changed.
+        let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
         let flight = Flight::of(tiles.iter().map(|tile| (tile.index(), tile.bytes())));
         self.contents.flight = Some(flight);
-        Ok(BegunFlush { scan_number, tiles, writer, commit })
+        self.contents.flush_reserve = self.contents.flush_reserve.max(1);
+        Ok(BegunFlush { scan_number, tiles, soon_changed, writer, commit })
     }
 
     /// Waits for a flush beside the mapper. If it failed, the next one says why, or makes up for it.

@@ -11,6 +11,7 @@ use crate::persistence::{CompactTile, TileSaver, Worker};
 use crate::space::{Grid, TileIndex};
 use crate::store::{BegunCommit, TileVersion, TileWriter};
 use crate::tile::Tile;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The thread that flushes beside the mapper.
@@ -31,6 +32,8 @@ pub(super) struct BegunFlush {
     pub(super) scan_number: u64,
     /// The dirty tiles.
     pub(super) tiles: Vec<FlushedTile>,
+    /// Those of them that the next scan will change.
+    pub(super) soon_changed: Range<usize>,
     pub(super) writer: TileWriter,
     pub(super) commit: BegunCommit,
 }
@@ -64,12 +67,26 @@ impl Flusher {
 
 impl FlushJob {
     fn run(mut self, config: &MapConfig) {
+        self.copy_soon_changed();
         let flushed = self.write_tiles(config).and_then(|()| self.commit());
         let mut contents = self.contents.lock();
         for tile in self.begun.tiles {
             contents.note_not_flushed(tile);
         }
         contents.end_flight(flushed);
+    }
+
+    /// Copies the tiles that the next scan will change, so that it needs not.
+    fn copy_soon_changed(&mut self) {
+        let tiles = self.begun.tiles.get_mut(self.begun.soon_changed.clone()).unwrap_or_default();
+        for tile in tiles {
+            let FlushedTile::Resident(shared) = tile else { continue };
+            // A scan may have been first.
+            if self.contents.lock().is_shared_with_flush(shared.index()) {
+                *shared = Arc::new(Tile::clone(shared));
+                self.contents.lock().note_copied(shared.index());
+            }
+        }
     }
 
     fn write_tiles(&mut self, config: &MapConfig) -> Result<()> {
@@ -128,7 +145,9 @@ impl FlushJob {
         loop {
             let Some(step) = self.disk.lock().store_mut().begin_step()? else { break };
             step.sync_kept()?;
-            self.disk.lock().store_mut().put_in_place(&step)?;
+            for part in 0..step.parts() {
+                self.disk.lock().store_mut().put_in_place(&step, part)?;
+            }
             step.sync_names()?;
             self.disk.lock().store_mut().end_step(&step);
         }

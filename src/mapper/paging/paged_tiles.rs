@@ -30,10 +30,12 @@ impl PagedTiles {
             buffer: WriteBuffer::default(),
             scan_number: store.commits().scan_number,
             last_scan: None,
+            last_touched: 0,
             bounds: TileBox::of(store.tiles().chain(store.orphans())),
             inputs: store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone()),
             views: Views::default(),
             flight: None,
+            flush_reserve: 0,
             flush_error: None,
         };
         let disk = Arc::new(SharedDisk::new(TileDisk::new(&config, store)));

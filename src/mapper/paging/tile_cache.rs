@@ -97,6 +97,11 @@ impl TileCache {
         indices
     }
 
+    /// The resident tiles, the one used last first.
+    pub(super) fn used_last_first(&self) -> impl Iterator<Item = &Arc<Tile>> {
+        self.resident.iter()
+    }
+
     /// Makes a tile from a table, without putting it into the cache.
     pub(super) fn make_tile(&self, index: TileIndex, table: Table) -> Tile {
         Tile::from_table(&self.grid, &self.octrees, index, table)
@@ -243,11 +248,20 @@ impl TileCache {
             && self.limited_bytes(outside).saturating_add(bytes) <= self.plan.bytes
     }
 
+    /// Whether there are more than `tiles` resident tiles, or fewer than `bytes` free bytes.
+    pub(super) fn is_over(&self, bytes: usize, tiles: usize, outside: usize) -> bool {
+        self.resident.len() > tiles || self.is_short(bytes, outside)
+    }
+
+    fn is_short(&self, bytes: usize, outside: usize) -> bool {
+        self.limited_bytes(outside).saturating_add(bytes) > self.plan.bytes
+    }
+
     /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes. Tiles that somebody holds stay;
     /// if all are held, nothing goes.
     pub(super) fn next_eviction(&self, bytes: usize, tiles: usize, outside: usize) -> Option<Eviction> {
-        let is_short = self.limited_bytes(outside).saturating_add(bytes) > self.plan.bytes;
-        if self.resident.len() <= tiles && !is_short {
+        let is_short = self.is_short(bytes, outside);
+        if !self.is_over(bytes, tiles, outside) {
             return None;
         }
         match (self.resident.least_recently_used(), self.compact.oldest()) {

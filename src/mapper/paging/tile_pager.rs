@@ -143,6 +143,7 @@ impl TilePager<'_> {
         }
         self.make_tiles(new);
         self.contents.scan_number += 1;
+        self.contents.note_touched(&touched);
         touched
     }
 

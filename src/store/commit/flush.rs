@@ -242,14 +242,17 @@ impl TileStore {
         Ok(Some(Step { files: self.files.clone(), tiles, pinned }))
     }
 
-    /// Puts the versions of a step in place, once [`Step::sync_kept`] has succeeded.
+    /// Puts the versions of a part of a step in place, once [`Step::sync_kept`] has succeeded.
     ///
     /// # Errors
     ///
     /// An I/O error.
-    pub fn put_in_place(&mut self, step: &Step) -> Result<()> {
-        step.pinned.iter().for_each(|&tile| self.kept.is_durable(tile));
-        self.checkpoint.rename(&self.files, &step.tiles)
+    pub fn put_in_place(&mut self, step: &Step, part: usize) -> Result<()> {
+        let tiles = step.tiles.chunks(TILES_OF_PART).nth(part).unwrap_or_default();
+        for &tile in step.pinned.iter().filter(|tile| tiles.contains(tile)) {
+            self.kept.is_durable(tile);
+        }
+        self.checkpoint.rename(&self.files, tiles)
     }
 
     /// Ends a step, once [`Step::sync_names`] has succeeded.
@@ -357,8 +360,10 @@ impl TileStore {
     }
 }
 
-/// Tiles that are put in place at a time beside the map.
+/// Tiles whose new names are made durable at once beside the map.
 const TILES_OF_STEP: usize = 64;
+/// Tiles that get their names while the map waits: a rename may take a millisecond.
+const TILES_OF_PART: usize = 8;
 
 /// A commit that has begun.
 #[derive(Debug)]
@@ -426,6 +431,11 @@ impl Step {
     /// An I/O error.
     pub fn sync_kept(&self) -> Result<()> {
         sync_folders(&self.files, &self.pinned, |_| {})
+    }
+
+    /// How many parts [`TileStore::put_in_place`] has.
+    pub fn parts(&self) -> usize {
+        self.tiles.len().div_ceil(TILES_OF_PART)
     }
 
     /// Makes durable that the versions have their names.

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
 use voxtile::mapper::IoCounts;
 use voxtile::{InMemoryMapper, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
@@ -30,6 +32,19 @@ pub struct Build {
     pub is_kept: bool,
     /// Whether the digest is wanted.
     pub has_digest: bool,
+    /// Flushes on the way, beside the one at the end.
+    pub flushes: Option<Flushes>,
+}
+
+/// Flushes while scans come.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Flushes {
+    /// How many scans come between two; the next begins once the last has ended.
+    pub every_scans: usize,
+    /// How much later each scan comes than the one before, in seconds; 0 as soon as it can be taken.
+    pub period_s: f64,
+    /// Whether scans go on meanwhile.
+    pub is_beside: bool,
 }
 
 /// A map that was built.
@@ -76,6 +91,8 @@ pub struct ScanCost {
     pub resident_bytes: u64,
     /// Bytes written to the disk since the map was opened.
     pub bytes_written: u64,
+    /// Wall time of the call that flushed after it; 0 if none did.
+    pub flush_ms: f64,
 }
 
 impl Build {
@@ -90,7 +107,7 @@ impl Build {
         let meter = disk.meter();
         if self.limit == Limit::InMemory {
             let mut mapper = InMemoryMapper::new(config)?;
-            let mut built = self.insert_all(&mut mapper, &meter)?;
+            let mut built = self.insert_all(&mut mapper, &meter, |_, _| Ok(false))?;
             if self.has_digest {
                 built.digest = mapper.digest()?.to_string();
             }
@@ -98,7 +115,7 @@ impl Build {
         }
         replace_folder(&self.folder)?;
         let mut mapper = OutOfCoreTileMapper::create(MapPath::on(Arc::new(disk), &self.folder), config)?;
-        let mut built = self.insert_all(&mut mapper, &meter)?;
+        let mut built = self.insert_all(&mut mapper, &meter, flush)?;
         built.map_file_bytes = file_bytes(&self.folder)?;
         drop(mapper);
         if self.has_digest {
@@ -111,28 +128,50 @@ impl Build {
         Ok(built)
     }
 
-    fn insert_all(&self, mapper: &mut impl Mapper, meter: &Meter) -> Result<Built> {
+    /// `flush` flushes in one of two ways, and tells whether it did.
+    fn insert_all<M: Mapper>(
+        &self,
+        mapper: &mut M,
+        meter: &Meter,
+        flush: impl Fn(&mut M, Flushes) -> Result<bool>,
+    ) -> Result<Built> {
         let mut built = Built { start_resident_bytes: process_memory::resident_bytes()?, ..Built::default() };
         let mut scans = self.case.scans()?;
         let mut way = Way::default();
         let mut since_last = Stopwatch::start()?;
+        let (begun, mut unflushed) = (Instant::now(), 0);
         loop {
             let some: Vec<Scan> = scans.by_ref().take(self.scans_at_a_time).collect::<Result<_>>()?;
             if some.is_empty() {
                 break;
             }
             for scan in &some {
+                let period_s = self.flushes.map_or(0.0, |flushes| flushes.period_s);
+                let at = Duration::from_secs_f64(period_s * built.scans.len() as f64);
+                thread::sleep(at.saturating_sub(begun.elapsed()));
                 let others_s = since_last.stop()?.others_s;
                 let stopwatch = Stopwatch::start()?;
                 mapper.insert_scan(scan)?;
                 let took = stopwatch.stop()?;
                 since_last = Stopwatch::start()?;
+                unflushed += 1;
+                let mut flush_ms = 0.0;
+                let mut flush_cpu_s = 0.0;
+                if let Some(flushes) = self.flushes.filter(|flushes| unflushed >= flushes.every_scans) {
+                    let stopwatch = Stopwatch::start()?;
+                    if flush(mapper, flushes)? {
+                        let took = stopwatch.stop()?;
+                        (flush_ms, flush_cpu_s, unflushed) = (1e3 * took.wall_s, took.cpu_s(), 0);
+                        since_last = Stopwatch::start()?;
+                    }
+                }
                 built.scans.push(ScanCost {
                     distance_m: way.to(scan),
                     wall_ms: 1e3 * took.wall_s,
-                    cpu_ms: 1e3 * (took.cpu_s() + others_s),
+                    cpu_ms: 1e3 * (took.cpu_s() + others_s + flush_cpu_s),
                     resident_bytes: process_memory::resident_bytes()?,
                     bytes_written: meter.bytes_written(),
+                    flush_ms,
                 });
             }
         }
@@ -164,6 +203,18 @@ impl Built {
     pub fn written_by_map(&self) -> f64 {
         self.bytes_written as f64 / self.map_file_bytes as f64
     }
+}
+
+/// Flushes, unless an earlier flush goes on beside.
+fn flush(mapper: &mut OutOfCoreTileMapper, flushes: Flushes) -> Result<bool> {
+    if !flushes.is_beside {
+        mapper.flush()?;
+    } else if mapper.is_flushing() {
+        return Ok(false);
+    } else {
+        mapper.begin_flush()?;
+    }
+    Ok(true)
 }
 
 /// How far a sensor has come.
@@ -232,6 +283,7 @@ mod tests {
             folder,
             is_kept: false,
             has_digest: true,
+            flushes: None,
         };
         build.run().unwrap()
     }

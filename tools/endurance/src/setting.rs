@@ -44,6 +44,7 @@ impl Setting {
             folder: self.work.join("map"),
             is_kept: false,
             has_digest: true,
+            flushes: None,
         }
     }
 }

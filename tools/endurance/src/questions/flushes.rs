@@ -1,0 +1,120 @@
+//! How long does a scan wait where the map is flushed every ten seconds?
+
+use crate::build::{Build, Built, Flushes};
+use crate::case::Limit;
+use crate::findings::Findings;
+use crate::metered_disk::DiskSpeed;
+use crate::promise::{Promise, Wanted};
+use crate::setting::{RAYS, Setting, made_up, mib};
+use crate::task::Apart;
+use anyhow::Result;
+use report::{Cell, Table};
+use workload::SurveyName;
+
+/// Worst of a thousand calls by their median.
+const MOST_BY_MEDIAN: f64 = 4.0;
+/// Worst of all calls, those that flush among them, in milliseconds.
+const MOST_MS: f64 = 100.0;
+/// CPU time by that of flushes that stop the mapper.
+const MOST_CPU: f64 = 1.1;
+/// What the slow disk moves in a second, reads and writes together.
+const SLOW_BYTES_PER_S: f64 = 40e6;
+/// As the command has it.
+const LIMIT: Limit = Limit::Bytes(512 << 20);
+
+/// A drive on a disk with one kind of flush.
+struct Driven {
+    disk: &'static str,
+    is_beside: bool,
+    built: Built,
+}
+
+pub fn answer(setting: &Setting) -> Result<Findings> {
+    let scans = setting.size(5_000, 60);
+    let case = made_up("drive", (SurveyName::Drive, RAYS, scans), [0.1, 10.0, 60.0]);
+    let disks: &[(&str, DiskSpeed)] = setting.size(
+        &[("own speed", DiskSpeed::Own), ("40 MB/s", DiskSpeed::BytesPerSecond(SLOW_BYTES_PER_S))],
+        &[("not synced", DiskSpeed::Unsynced)],
+    );
+    let mut findings = Findings::default();
+    let mut driven = Vec::new();
+    for &(disk, speed) in disks {
+        for is_beside in [false, true] {
+            let (every_scans, period_s) = setting.size((100, 0.1), (10, 0.0));
+            let flushes = Some(Flushes { every_scans, period_s, is_beside });
+            let build = Build { disk: speed, flushes, ..setting.build(&case, LIMIT) };
+            let built = build.clone().apart()?;
+            findings.keep_build(&build, &built)?;
+            driven.push(Driven { disk, is_beside, built });
+        }
+    }
+    for pair in driven.chunks(2) {
+        let [stopped, beside] = pair else { continue };
+        let disk = beside.disk;
+        let by_median = beside.insert_ms(0.999) / beside.insert_ms(0.5);
+        let cpu = beside.built.cpu_s() / stopped.built.cpu_s();
+        let promise = |what: &str, found, wanted, unit| {
+            Promise::about_time(format!("{disk}: {what}"), found, Wanted::AtMost(wanted), unit)
+        };
+        findings.promises.extend([
+            promise("p99.9 of a scan by the median", by_median, MOST_BY_MEDIAN, ""),
+            promise("longest call", beside.insert_ms(1.0).max(beside.flush_ms()), MOST_MS, "ms"),
+            promise("CPU time by that of flushes that stop", cpu, MOST_CPU, ""),
+        ]);
+        let differ = f64::from(u8::from(stopped.built.digest != beside.built.digest));
+        let what = format!("{disk}: digests that differ from that of flushes that stop");
+        findings.promises.push(Promise::new(what, differ, Wanted::AtMost(0.0), ""));
+    }
+    findings.answer.tables = vec![table(&case.description(), &driven)];
+    Ok(findings)
+}
+
+impl Driven {
+    /// Wall time of the call that inserts a scan, at a quantile.
+    fn insert_ms(&self, quantile: f64) -> f64 {
+        let mut times: Vec<f64> = self.built.scans.iter().map(|scan| scan.wall_ms).collect();
+        times.sort_unstable_by(f64::total_cmp);
+        let at = (quantile * times.len() as f64).ceil() as usize;
+        times.get(at.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Longest call that flushed.
+    fn flush_ms(&self) -> f64 {
+        self.built.scans.iter().map(|scan| scan.flush_ms).fold(0.0, f64::max)
+    }
+}
+
+fn table(case: &str, driven: &[Driven]) -> Table {
+    let caption = format!(
+        "Wall time of calls at ten scans a second with a flush every ten seconds, limit 512 MiB, storage `octomap`; {case}. \
+         A flush beside the mapper returns once it has begun."
+    );
+    let columns = [
+        "disk",
+        "flush",
+        "scan: median ms",
+        "p99",
+        "p99.9",
+        "worst",
+        "flush: worst ms",
+        "CPU s",
+        "peak MiB",
+        "tiles",
+    ];
+    let mut table = Table::new("flushes", caption, columns);
+    for of in driven {
+        table.push([
+            of.disk.into(),
+            if of.is_beside { "beside" } else { "stops" }.into(),
+            Cell::Number(of.insert_ms(0.5), 1),
+            Cell::Number(of.insert_ms(0.99), 1),
+            Cell::Number(of.insert_ms(0.999), 1),
+            Cell::Number(of.insert_ms(1.0), 1),
+            Cell::Number(of.flush_ms(), 1),
+            Cell::Number(of.built.cpu_s(), 1),
+            Cell::Number(mib(of.built.peak_resident_bytes as f64), 0),
+            Cell::Count(of.built.tiles),
+        ]);
+    }
+    table
+}
