@@ -305,11 +305,24 @@ impl Map {
     }
 
     /// Makes everything so far durable, as a whole. Nothing to do for a map that is read.
-    fn flush(&self, py: Python<'_>) -> PyResult<()> {
+    ///
+    /// With `wait=False` it returns at once, and what it makes durable is the map as of now, while scans go on;
+    /// `flushed_scan_number` tells when that is done. If it fails, the next flush says why.
+    #[pyo3(signature = (*, wait=true))]
+    fn flush(&self, py: Python<'_>, wait: bool) -> PyResult<()> {
         if !matches!(*self.source(py)?, Source::Writer { .. }) {
             return Ok(());
         }
-        self.finish(py, Mapper::flush)
+        self.finish(py, if wait { Mapper::flush } else { OutOfCoreTileMapper::begin_flush })
+    }
+
+    /// Number of the last scan that a crash cannot take away.
+    #[getter]
+    fn flushed_scan_number(&self, py: Python<'_>) -> PyResult<u64> {
+        match *self.source(py)? {
+            Source::Writer { .. } => self.change(py, false, |mapper| Ok(mapper.flushed_scan_number())),
+            Source::Reader(_) | Source::Octree(_) => self.scan_number(py),
+        }
     }
 
     /// Flushes and closes. A closed map may be closed again.
@@ -322,7 +335,7 @@ impl Map {
             return Ok(());
         }
         if flush {
-            self.flush(py)?;
+            self.flush(py, true)?;
         }
         let Some(source) = self.source.write().take() else { return Ok(()) };
         finished(py, move |stop| {

@@ -1,5 +1,6 @@
 """An open map: scans in, answers out."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,22 @@ def made(folder: Path, scans: list[Scan], **options: object) -> voxtile.Map:
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_a_flush_beside_scans_is_of_its_call(tmp_path: Path) -> None:
+    scans = scans_of(6, count=12, points=2000)
+    with voxtile.Map.create(tmp_path / "map", 0.1) as found:
+        found.insert_many(scans[:6])
+        found.flush(wait=False)
+        found.insert_many(scans[6:])
+        while found.flushed_scan_number != 6:
+            time.sleep(0.01)
+        with voxtile.open(tmp_path / "map") as seen, voxtile.Map.create(tmp_path / "half", 0.1) as half:
+            half.insert_many(scans[:6])
+            assert (seen.scan_number, seen.flushed_scan_number) == (6, 6) and seen.digest() == half.digest()
+    with voxtile.Map.create(tmp_path / "whole", 0.1) as whole:
+        whole.insert_many(scans)
+        assert whole.digest() == voxtile.digest(tmp_path / "map")
+
+
 def test_equals_the_naive_map(tmp_path: Path, seed: int) -> None:
     scans, naive = scans_of(seed), NaiveMap(0.25)
     with voxtile.Map.create(tmp_path / "map", 0.25, tile_size=4.0) as found:

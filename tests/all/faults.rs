@@ -226,6 +226,11 @@ fn check_scans(reader: &MapReader, what: &str) {
     let scans = reader.scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
     let numbers: Vec<u64> = scans.iter().map(|scan| scan.number).collect();
     assert_eq!(numbers, (1..=reader.scan_number()).collect::<Vec<_>>(), "{what}");
+    if reader.keeps_scans() && reader.scan_number() > 0 {
+        let kept = reader.kept_scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
+        let kept = kept.map(|scan| scan.unwrap_or_else(|error| panic!("{what}: {error:#}")).number());
+        assert_eq!(kept.collect::<Vec<_>>(), numbers, "{what}");
+    }
 }
 
 /// The disk after an undisturbed life.
@@ -259,6 +264,7 @@ fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
         fail_once_at_every_operation(&Oracle::of(config.clone()));
         fail_once_at_every_operation(&Oracle::of(config).beside());
     }
+    fail_once_at_every_operation(&Oracle::of(config().with_kept_scans(true)).beside());
 }
 
 fn fail_once_at_every_operation(oracle: &Oracle) {
@@ -306,6 +312,7 @@ fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
         crash_at_every_operation(&Oracle::of(config.clone()));
         crash_at_every_operation(&Oracle::of(config).beside());
     }
+    crash_at_every_operation(&Oracle::of(config().with_kept_scans(true)).beside());
 }
 
 fn crash_at_every_operation(oracle: &Oracle) {

@@ -85,8 +85,8 @@ pub struct BuildArgs {
     /// Go past scans that cannot be read, and say which, in place of ending with an error
     #[arg(long)]
     pub skip_bad: bool,
-    /// Make durable what was mapped every N scans, or with s every so many seconds (25, 60s), or only at the end (end):
-    /// what a crash can lose
+    /// Make durable what was mapped every so many seconds while mapping goes on (60s), or stop every N scans for it (25), or
+    /// only at the end (end): what a crash can lose
     #[arg(long, value_name = "N", default_value = "60s")]
     pub flush_every: FlushEvery,
     /// Print the summary as JSON

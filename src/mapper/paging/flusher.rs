@@ -130,8 +130,7 @@ impl FlushJob {
             (disk.store().has_news(&self.begun.commit), disk.store().unsynced())
         };
         if has_news {
-            unsynced.sync_kept_scans_ahead();
-            let synced = unsynced.sync();
+            let synced = unsynced.sync_with_scans();
             self.disk.lock().store_mut().commit_synced(&self.begun.commit, synced)?;
         }
         // It is committed: what the disk refuses from here on is done later.

@@ -179,6 +179,9 @@ impl TileStore {
     /// Why that failed; as for [`TileStore::commit`].
     pub fn commit_synced(&mut self, begun: &BegunCommit, synced: Synced) -> Result<()> {
         synced.suspects.into_iter().for_each(|tile| self.versions.suspect(tile));
+        if synced.has_lost_scans {
+            self.keeper.suspect_unsynced();
+        }
         synced.result?;
         let number = self.commits().flush_number + 1;
         let mut metadata = self.metadata_of(begun);
@@ -386,6 +389,8 @@ pub struct Unsynced {
 #[derive(Debug)]
 pub struct Synced {
     suspects: Vec<TileIndex>,
+    /// Whether kept scans could not be synced.
+    has_lost_scans: bool,
     result: Result<()>,
 }
 
@@ -411,15 +416,20 @@ impl Unsynced {
                 break synced;
             }
         };
-        Synced { suspects, result }
+        Synced { suspects, has_lost_scans: false, result }
     }
 
-    /// Brings kept scans to the medium ahead of the commit, which then has little of them left to sync. What fails here
-    /// fails there, too.
-    pub fn sync_kept_scans_ahead(&self) {
+    /// The same, and brings kept scans to the medium ahead of the commit, which then has little of them left to sync.
+    pub fn sync_with_scans(&self) -> Synced {
         for &segment in &self.segments {
-            let _ = self.files.disk().sync_file(&self.files.layout().segment(segment));
+            let path = self.files.layout().segment(segment);
+            if let Err(error) = self.files.disk().sync_file(&path) {
+                // A disk tells this once: what it says of the file from now on proves nothing.
+                let result = Err(Error::io(&path, "sync", error));
+                return Synced { suspects: Vec::new(), has_lost_scans: true, result };
+            }
         }
+        self.sync()
     }
 }
 

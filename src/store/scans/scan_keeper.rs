@@ -334,12 +334,17 @@ impl ScanKeeper {
         Ok(found)
     }
 
+    /// Notes that a sync has failed: what is not durable is copied before a commit names it.
+    pub(in crate::store) fn suspect_unsynced(&mut self) {
+        self.suspects.append(&mut self.unsynced);
+        self.segment = None;
+    }
+
     fn sync_segments(&mut self, files: &MapFiles) -> Result<()> {
         for &segment in &self.unsynced {
             let path = files.layout().segment(segment);
             if let Err(error) = files.disk().sync_file(&path) {
-                self.suspects = std::mem::take(&mut self.unsynced);
-                self.segment = None;
+                self.suspect_unsynced();
                 return Err(Error::io(&path, "sync", error));
             }
         }

@@ -153,6 +153,7 @@ mod tests {
             wall_ms: if k >= 100 && k % 20 == 0 { 50.0 } else { 10.0 },
             cpu_ms: 5.0 + (k / 100) as f64,
             resident_bytes: 0,
+            flush_ms: 0.0,
             bytes_written: 700 + k.saturating_sub(99) as u64,
         });
         Built { scans: scans.collect(), ..Built::default() }
