@@ -100,6 +100,25 @@ impl Transforms {
         self.frames.remove(bare(child));
     }
 
+    /// Forgets samples that are older than this before the last one of the same frames, and returns how many samples
+    /// are left: a buffer of tf keeps its last seconds.
+    pub fn forget_older_than(&mut self, span_ns: i64) -> usize {
+        let mut left = 0;
+        for link in self.frames.values_mut().flat_map(|frame| frame.links.values_mut()) {
+            let Link::Moving(samples) = link else { continue };
+            if let Some((&last_ns, _)) = samples.last_key_value() {
+                *samples = samples.split_off(&last_ns.saturating_sub(span_ns));
+            }
+            left += samples.len();
+        }
+        left
+    }
+
+    /// Number of frames that have a parent.
+    pub fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
     /// Whether a transform names a frame.
     pub fn knows(&self, frame: &str) -> bool {
         let frame = bare(frame);
@@ -238,6 +257,20 @@ mod tests {
         assert_eq!(tf.lookup("odom", "camera", 9), Err(WhyNot::UnknownFrame("camera".into())));
         tf.insert("rig", "camera", 9, at(1.0), true);
         assert!(matches!(tf.lookup("odom", "camera", 9), Err(WhyNot::NotConnected(..))));
+    }
+
+    #[test]
+    fn each_link_keeps_its_own_last_seconds() {
+        let mut tf = Transforms::default();
+        for stamp_ns in 0..10 {
+            tf.insert("odom", "base", stamp_ns, at(0.3), false);
+        }
+        tf.insert("map", "odom", 2, at(0.7), false);
+        tf.insert("base", "lidar", 0, RigidPose::IDENTITY, true);
+        assert_eq!((tf.forget_older_than(3), tf.frames()), (5, 3));
+        assert_eq!(tf.lookup("odom", "lidar", 5), Err(WhyNot::Before("base".into())));
+        assert_eq!(tf.lookup("odom", "lidar", 6), Ok(at(0.3)));
+        assert_eq!(tf.lookup("map", "odom", 2), Ok(at(0.7)));
     }
 
     #[test]
