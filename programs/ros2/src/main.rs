@@ -1,0 +1,53 @@
+//! The node `voxtile_ros2`: clouds and transforms from ROS 2 over DDS, into a map of voxtile. No ROS installation.
+//!
+//! ```text
+//! DDS -> RawMessage -> CloudQueue, TransformBuffer   node: a thread a topic
+//! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
+//! ```
+
+mod args;
+mod cloud;
+mod cloud_queue;
+mod counters;
+mod inbox;
+mod mapping;
+mod node;
+mod raw_message;
+mod transform_buffer;
+mod when_behind;
+
+use args::Args;
+use clap::Parser;
+use inbox::Inbox;
+use mapping::Mapping;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("info,rustdds=error")).init();
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("voxtile-ros2: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // A second one ends the process at once.
+        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.clone())?;
+        signal_hook::flag::register(signal, stop.clone())?;
+    }
+    let inbox = Arc::new(Inbox::new(args));
+    // A map that cannot be opened is told before anybody sees a node.
+    let mut mapping = Mapping::open(args, inbox.clone())?;
+    let node = node::start(args, &inbox)?;
+    let outcome = mapping.run(&stop);
+    inbox.close();
+    drop(node);
+    outcome
+}

@@ -1,0 +1,141 @@
+use crate::args::Args;
+use crate::inbox::Inbox;
+use crate::raw_message::{RawAdapter, RawMessage};
+use anyhow::{Context as _, anyhow};
+use futures::StreamExt;
+use futures::executor::block_on;
+use ros2_client::{Context, Node, NodeName, NodeOptions};
+use rustdds::policy::{Durability, History, Reliability};
+use rustdds::{DomainParticipantBuilder, QosPolicies, QosPolicyBuilder, Subscriber, TopicKind};
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::Arc;
+use voxtile_clouds::ros::messages::MessageKind;
+
+/// What keeps the node in the graph.
+pub struct RunningNode {
+    _node: Node,
+    _context: Context,
+}
+
+/// Below 2 MiB most fragments of a cloud are lost.
+const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
+
+/// Joins the domain and reads each topic in a thread of its own.
+///
+/// # Errors
+///
+/// No sockets; names of topics that ROS 2 does not know.
+pub fn start(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<RunningNode> {
+    let mut builder =
+        DomainParticipantBuilder::new(args.domain_id).socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
+    if !args.network {
+        builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
+    }
+    let domain = format!("--domain-id {}", args.domain_id);
+    let participant = builder.build().map_err(|error| anyhow!("{error:?}")).context(domain)?;
+    let context =
+        Context::from_domain_participant(participant.clone()).map_err(|error| anyhow!("{error:?}"))?;
+    let name = NodeName::new("/", "voxtile_ros2").map_err(|error| anyhow!("{error:?}"))?;
+    let mut node = context.new_node(name, NodeOptions::new()).map_err(|error| anyhow!("{error:?}"))?;
+    let spinner = node.spinner().map_err(|error| anyhow!("{error:?}"))?;
+    spawn("spinner", move || drop(block_on(spinner.spin())))?;
+
+    let volatile = qos(Reliability::BestEffort, Durability::Volatile, 5);
+    let subscriber = participant.create_subscriber(&volatile).map_err(|error| anyhow!("{error:?}"))?;
+    let read = |topic: &str, type_name: &str, qos: &QosPolicies, put: Box<dyn Fn(Vec<u8>) + Send>| {
+        let name = dds_name(topic)?;
+        let topic = participant
+            .create_topic(name.clone(), type_name.to_owned(), qos, TopicKind::NoKey)
+            .map_err(|error| anyhow!("{name}: {error:?}"))?;
+        read_topic(&subscriber, &topic, qos, inbox.clone(), put)
+    };
+    for (number, topic) in args.cloud.iter().enumerate() {
+        let to = inbox.clone();
+        let put = Box::new(move |cdr| to.put_cloud(number, cdr));
+        read(topic, "sensor_msgs::msg::dds_::PointCloud2_", &volatile, put)?;
+    }
+    let poses = |kind, is_static| {
+        let to = inbox.clone();
+        Box::new(move |cdr: Vec<u8>| to.put_poses(kind, &cdr, is_static))
+    };
+    let reliable = Reliability::Reliable { max_blocking_time: rustdds::Duration::from_millis(100) };
+    let latched = qos(reliable, Durability::TransientLocal, 100);
+    let tf = "tf2_msgs::msg::dds_::TFMessage_";
+    read("/tf_static", tf, &latched, poses(MessageKind::Tf, true))?;
+    match &args.odometry {
+        Some(topic) => {
+            let odometry = "nav_msgs::msg::dds_::Odometry_";
+            read(topic, odometry, &volatile, poses(MessageKind::Odometry, false))?;
+        }
+        None => {
+            let tf_qos = qos(reliable, Durability::Volatile, 100);
+            read("/tf", tf, &tf_qos, poses(MessageKind::Tf, false))?;
+        }
+    }
+    log::info!("listening to {} in domain {}", args.cloud.join(", "), args.domain_id);
+    Ok(RunningNode { _node: node, _context: context })
+}
+
+fn read_topic(
+    subscriber: &Subscriber,
+    topic: &rustdds::Topic,
+    qos: &QosPolicies,
+    inbox: Arc<Inbox>,
+    put: Box<dyn Fn(Vec<u8>) + Send>,
+) -> anyhow::Result<()> {
+    let reader = subscriber
+        .create_simple_datareader_no_key::<RawMessage, RawAdapter>(topic, Some(qos.clone()))
+        .map_err(|error| anyhow!("{error:?}"))?;
+    spawn("reader", move || {
+        block_on(reader.as_async_stream().for_each(|sample| {
+            match sample {
+                Ok(sample) => put(sample.into_value().cdr),
+                Err(error) => {
+                    log::debug!("a sample is lost: {error:?}");
+                    inbox.count(|counters| counters.transport_errors += 1);
+                }
+            }
+            futures::future::ready(())
+        }));
+    })
+}
+
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> anyhow::Result<()> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(work).context("a thread cannot be started")?;
+    Ok(())
+}
+
+fn qos(reliability: Reliability, durability: Durability, depth: i32) -> QosPolicies {
+    QosPolicyBuilder::new()
+        .reliability(reliability)
+        .durability(durability)
+        .history(History::KeepLast { depth })
+        .build()
+}
+
+/// As ROS 2 names topics in DDS.
+fn dds_name(topic: &str) -> anyhow::Result<String> {
+    let bare = topic.trim_start_matches('/');
+    let is_name = |part: &str| {
+        part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    if !bare.split('/').all(is_name) {
+        return Err(anyhow!("{topic:?} is no name of a topic; it looks like /lidar/points"));
+    }
+    Ok(format!("rt/{bare}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_topics() {
+        assert_eq!(dds_name("/lidar/points").unwrap(), "rt/lidar/points");
+        assert_eq!(dds_name("cloud_in").unwrap(), "rt/cloud_in");
+        for wrong in ["", "/", "a//b", "9a", "a b", "/a/"] {
+            assert!(dds_name(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,131 @@
+use crate::args::Args;
+use crate::cloud::Cloud;
+use crate::cloud_queue::Verdict;
+use crate::counters::Counters;
+use std::time::{Duration, Instant};
+use voxtile_clouds::RigidPose;
+use voxtile_clouds::ros::messages::StampedPose;
+use voxtile_clouds::ros::{Transforms, WhyNot};
+
+/// The last seconds of tf, and how long clouds wait for more of it.
+#[derive(Debug)]
+pub struct TransformBuffer {
+    transforms: Transforms,
+    fixed_frame: String,
+    most_wait: Duration,
+    /// Samples since the last time that old ones were forgotten, and those left then.
+    samples: (usize, usize),
+}
+
+/// As long as the buffers of tf2 are.
+const SPAN_NS: i64 = 10_000_000_000;
+/// Old samples are forgotten after so many new ones.
+const FORGET_EVERY: usize = 1000;
+/// Bounds of what a flood can fill.
+const MOST_SAMPLES: usize = 200_000;
+const MOST_FRAMES: usize = 2000;
+const MOST_NAME_BYTES: usize = 256;
+
+impl TransformBuffer {
+    pub fn new(args: &Args) -> Self {
+        let mut transforms = Transforms::default();
+        transforms.set_most_gap_ns(Some((args.pose_tolerance.max(0.0) * 1e9) as i64));
+        let most_wait = Duration::try_from_secs_f64(args.transform_wait).unwrap_or_default();
+        let fixed_frame = args.frame_id.trim_start_matches('/').to_owned();
+        Self { transforms, fixed_frame, most_wait, samples: (0, 0) }
+    }
+
+    pub fn insert(&mut self, pose: &StampedPose, is_static: bool, counters: &mut Counters) {
+        let (new, kept) = self.samples;
+        if new >= FORGET_EVERY {
+            self.samples = (0, self.transforms.forget_older_than(SPAN_NS));
+        }
+        let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
+        let is_full = new + kept >= MOST_SAMPLES || self.transforms.frames() >= MOST_FRAMES;
+        let is_refused = parent.len().max(child.len()) > MOST_NAME_BYTES
+            || is_full
+            || !self.transforms.insert(
+                parent,
+                child,
+                pose.header.stamp_ns,
+                pose.parent_from_child,
+                is_static,
+            );
+        counters.transforms_refused += u64::from(is_refused);
+        self.samples.0 += 1;
+    }
+
+    /// Whether a cloud has its pose, may still get it, or never will.
+    pub fn verdict(&self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
+        match self.transforms.lookup(&self.fixed_frame, &cloud.frame, cloud.stamp_ns) {
+            Ok(pose) => Verdict::Ready(pose),
+            // Transforms may come late and out of order.
+            Err(why) if now.saturating_duration_since(cloud.arrived) < self.most_wait => {
+                log::trace!("a cloud of {} waits: {why}", cloud.frame);
+                Verdict::Waits
+            }
+            Err(why) => {
+                self.tell(&why);
+                Verdict::Hopeless
+            }
+        }
+    }
+
+    fn tell(&self, why: &WhyNot) {
+        log::debug!("a cloud is dropped, it has no pose in {}: {why}", self.fixed_frame);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use voxtile_clouds::ros::messages::Header;
+
+    fn buffer() -> TransformBuffer {
+        TransformBuffer::new(&Args::parse_from(["voxtile-ros2", "-o", "map"]))
+    }
+
+    fn pose(parent: &str, child: &str, stamp_ns: i64, x: f64) -> StampedPose {
+        StampedPose {
+            header: Header { stamp_ns, frame_id: parent.to_owned() },
+            child_frame: child.to_owned(),
+            parent_from_child: RigidPose { position_m: [x, 0.0, 0.0], ..RigidPose::IDENTITY },
+        }
+    }
+
+    fn cloud(stamp_ns: i64) -> Cloud {
+        Cloud { topic: 0, stamp_ns, frame: "lidar".to_owned(), cdr: Vec::new(), arrived: Instant::now() }
+    }
+
+    #[test]
+    fn a_cloud_waits_for_the_transform_behind_its_stamp_and_then_is_dropped() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        let cloud = cloud(150_000_000);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, &mut counters);
+        buffer.insert(&pose("map", "base", 100_000_000, 0.0), false, &mut counters);
+        assert_eq!(buffer.verdict(&cloud, cloud.arrived), Verdict::Waits);
+        assert_eq!(buffer.verdict(&cloud, cloud.arrived + Duration::from_secs(2)), Verdict::Hopeless);
+        buffer.insert(&pose("map", "base", 200_000_000, 2.0), false, &mut counters);
+        let Verdict::Ready(found) = buffer.verdict(&cloud, cloud.arrived) else { panic!("no pose") };
+        assert_eq!(found.position_m, [2.0, 0.0, 0.0]);
+        assert_eq!(counters, Counters::default());
+    }
+
+    #[test]
+    fn a_flood_of_frames_or_samples_fills_the_buffer_and_no_more() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        for frame in 0..MOST_FRAMES + 7 {
+            buffer.insert(&pose("map", &format!("f{frame}"), 0, 0.0), false, &mut counters);
+        }
+        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (MOST_FRAMES, 7));
+        let (mut buffer, mut counters) = (self::buffer(), Counters::default());
+        for stamp_ns in 0..MOST_SAMPLES as i64 + 3000 {
+            buffer.insert(&pose("map", "base", stamp_ns, 0.0), false, &mut counters);
+        }
+        assert!(counters.transforms_refused > 0);
+        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
+        buffer.insert(&pose("map", &"x".repeat(1 << 20), 0, 0.0), true, &mut counters);
+        assert_eq!(buffer.transforms.frames(), 1);
+    }
+}

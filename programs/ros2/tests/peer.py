@@ -1,0 +1,180 @@
+"""An independent ROS 2 peer (Cyclone DDS): writes a bag of clouds and tf, and publishes the same messages.
+
+peer.py DOMAIN BAG CLOUDS [hostile]
+"""
+
+import os
+import sys
+import time
+
+os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General><Interfaces>
+<NetworkInterface address="127.0.0.1" multicast="false"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import float64, int32, sequence, uint8, uint32
+from cyclonedds.pub import DataWriter
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32
+    nanosec: uint32
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+class PointField(IdlStruct, typename="sensor_msgs::msg::dds_::PointField_"):
+    name: str
+    offset: uint32
+    datatype: uint8
+    count: uint32
+
+
+@dataclass
+class PointCloud2(IdlStruct, typename="sensor_msgs::msg::dds_::PointCloud2_"):
+    header: Header
+    height: uint32
+    width: uint32
+    fields: sequence[PointField]
+    is_bigendian: bool
+    point_step: uint32
+    row_step: uint32
+    data: sequence[uint8]
+    is_dense: bool
+
+
+@dataclass
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: float64
+    y: float64
+    z: float64
+
+
+@dataclass
+class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
+    x: float64
+    y: float64
+    z: float64
+    w: float64
+
+
+@dataclass
+class Transform(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
+    translation: Vector3
+    rotation: Quaternion
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
+    transforms: sequence[TransformStamped]
+
+
+START_S = 1_700_000_000
+BEST, RELIABLE = Policy.Reliability.BestEffort, Policy.Reliability.Reliable(duration(seconds=1))
+VOLATILE, LATCHED = Policy.Durability.Volatile, Policy.Durability.TransientLocal
+
+
+def header(stamp_ns, frame):
+    return Header(Time(START_S + stamp_ns // 10**9, stamp_ns % 10**9), frame)
+
+
+def transform(stamp_ns, parent, child, x, yaw):
+    turn = Quaternion(0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
+    return TransformStamped(header(stamp_ns, parent), child, Transform(Vector3(x, 0.5, 0.0), turn))
+
+
+def cloud(stamp_ns, seed):
+    """A room of 8 m x 6 m x 3 m as a turning sensor sees it; every 50th ray comes back with nothing."""
+    random = np.random.default_rng(seed)
+    rays = random.normal(size=(2000, 3))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    reach = np.min(np.array([4.0, 3.0, 1.5]) / np.maximum(np.abs(rays), 1e-9), axis=1)
+    points = np.zeros((2000, 4), np.float32)
+    points[:, :3] = rays * reach[:, None]
+    points[::50, :3] = np.nan
+    points[:, 3] = random.uniform(0, 100, 2000)
+    fields = [PointField(name, 4 * k, 7, 1) for k, name in enumerate(["x", "y", "z", "intensity"])]
+    data = points.tobytes()
+    return PointCloud2(header(stamp_ns, "lidar"), 1, 2000, fields, False, 16, len(data), data, False)
+
+
+def messages(clouds):
+    """Topic and message, in the order in which a robot sends them: transforms at 50 Hz, clouds at 10 Hz between."""
+    yield "/tf_static", TFMessage([transform(0, "base", "lidar", 0.2, 0.1)])
+    for tick in range(5 * clouds + 2):
+        stamp_ns = tick * 20_000_000
+        moving = [transform(stamp_ns, "map", "odom", 1.0, 0.0), transform(stamp_ns, "odom", "base", tick * 0.01, tick * 0.02)]
+        yield "/tf", TFMessage(moving)
+        if tick % 5 == 0 and tick // 5 < clouds:
+            yield "/cloud_in", cloud(stamp_ns + 7_000_000, tick)
+
+
+TYPES = {"/tf_static": "tf2_msgs/msg/TFMessage", "/tf": "tf2_msgs/msg/TFMessage", "/cloud_in": "sensor_msgs/msg/PointCloud2"}
+
+
+def write_bag(path, clouds):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        topics = {name: bag.add_connection(name, kind, typestore=store) for name, kind in TYPES.items()}
+        for number, (name, message) in enumerate(messages(clouds)):
+            bag.write(topics[name], START_S * 10**9 + number, bytes(message.serialize()))
+
+
+def main():
+    domain, bag, clouds = int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    is_hostile = sys.argv[4:] == ["hostile"]
+    write_bag(bag, clouds)
+    participant = DomainParticipant(domain)
+
+    def writer(name, kind, *policies):
+        return DataWriter(participant, Topic(participant, "rt" + name, kind), qos=Qos(*policies))
+
+    writers = {
+        "/tf_static": writer("/tf_static", TFMessage, RELIABLE, LATCHED, Policy.History.KeepLast(1)),
+        "/tf": writer("/tf", TFMessage, RELIABLE, VOLATILE, Policy.History.KeepLast(100)),
+        "/cloud_in": writer("/cloud_in", PointCloud2, BEST, VOLATILE, Policy.History.KeepLast(5)),
+    }
+    until = time.time() + 20
+    while not all(one.get_matched_subscriptions() for one in writers.values()):
+        if time.time() > until:
+            sys.exit("no node answers")
+        time.sleep(0.02)
+    time.sleep(0.5)
+    for name, message in messages(clouds):
+        if is_hostile and name == "/cloud_in":
+            liar = cloud(0, 1)
+            liar.header.stamp = message.header.stamp
+            liar.height = liar.width = liar.row_step = 2**32 - 1
+            writers[name].write(liar)
+            liar.fields = []
+            writers[name].write(liar)
+        writers[name].write(message)
+        time.sleep(0.02)
+    time.sleep(1.5)
+
+
+main()
