@@ -42,5 +42,14 @@ for kind in friendly hostile; do
         cat "$work/$kind.log"
         exit 1
     fi
+    # The map is there to go on with, and nothing that did not come changes it.
+    target/debug/voxtile-ros2 -o "$map" --domain-id $domain >"$work/$kind.log" 2>&1 &
+    node=$!
+    sleep 2
+    kill -TERM "$node"
+    wait "$node" || { cat "$work/$kind.log"; exit 1; }
+    node=
+    grep -q 'the map is at scan 30' "$work/$kind.log" || { cat "$work/$kind.log"; exit 1; }
+    [ "$("$voxtile" digest "$map")" = "$of_node" ] || { echo "$kind: starting again changes the map"; exit 1; }
     echo "$kind: $of_node"
 done
