@@ -54,15 +54,16 @@ impl Mapping {
     ///
     /// # Errors
     ///
-    /// The map cannot be written.
+    /// The map cannot be written; a flush beside the mapping that failed is told by the next.
     pub fn run(&mut self, stop: &AtomicBool) -> anyhow::Result<()> {
         while !stop.load(Ordering::Relaxed) {
             if let Some((cloud, pose)) = self.inbox.take(WAIT) {
                 self.insert(&cloud, &pose)?;
             }
-            if self.flushed_at.elapsed() >= self.flush_every {
+            // One that takes longer than the timer is waited for by the next, not by clouds.
+            if self.flushed_at.elapsed() >= self.flush_every && !self.mapper.is_flushing() {
                 if self.mapper.is_dirty() {
-                    self.mapper.flush()?;
+                    self.mapper.begin_flush()?;
                 }
                 self.flushed_at = Instant::now();
             }

@@ -17,8 +17,9 @@ pub struct RunningNode {
     _context: Context,
 }
 
-/// Below 2 MiB most fragments of a cloud are lost.
 const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
+/// Below this most fragments of a large cloud are lost.
+const LEAST_RECEIVE_BUFFER_BYTES: usize = 2 << 20;
 
 /// Joins the domain and reads each topic in a thread of its own.
 ///
@@ -31,6 +32,7 @@ pub fn start(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<RunningNode> {
     if !args.network {
         builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
     }
+    check_receive_buffer();
     let domain = format!("--domain-id {}", args.domain_id);
     let participant = builder.build().map_err(|error| anyhow!("{error:?}")).context(domain)?;
     let context =
@@ -98,6 +100,18 @@ fn read_topic(
             futures::future::ready(())
         }));
     })
+}
+
+/// Says what to do where the system gives sockets too little room: it cuts what is asked for without a word.
+fn check_receive_buffer() {
+    let most = std::fs::read_to_string("/proc/sys/net/core/rmem_max");
+    let Some(most) = most.ok().and_then(|text| text.trim().parse::<usize>().ok()) else { return };
+    if most < LEAST_RECEIVE_BUFFER_BYTES {
+        log::warn!(
+            "the system gives sockets {most} bytes, too few for large clouds, most of which will be lost: \
+             sysctl net.core.rmem_max={RECEIVE_BUFFER_BYTES}"
+        );
+    }
 }
 
 fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> anyhow::Result<()> {

@@ -41,7 +41,9 @@ impl TransformBuffer {
             self.samples = (0, self.transforms.forget_older_than(SPAN_NS));
         }
         let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
-        let is_full = new + kept >= MOST_SAMPLES || self.transforms.frames() >= MOST_FRAMES;
+        // Frames that are known stay in use, whoever floods the rest.
+        let is_new = !self.transforms.knows(child);
+        let is_full = new + kept >= MOST_SAMPLES || (is_new && self.transforms.frames() >= MOST_FRAMES);
         let is_refused = parent.len().max(child.len()) > MOST_NAME_BYTES
             || is_full
             || !self.transforms.insert(
@@ -119,6 +121,8 @@ mod tests {
             buffer.insert(&pose("map", &format!("f{frame}"), 0, 0.0), false, &mut counters);
         }
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (MOST_FRAMES, 7));
+        buffer.insert(&pose("map", "f3", 1, 0.0), false, &mut counters);
+        assert_eq!(counters.transforms_refused, 7);
         let (mut buffer, mut counters) = (self::buffer(), Counters::default());
         for stamp_ns in 0..MOST_SAMPLES as i64 + 3000 {
             buffer.insert(&pose("map", "base", stamp_ns, 0.0), false, &mut counters);
