@@ -99,7 +99,13 @@ def test_a_build_reads_as_the_command_does(tmp_path: Path, scans: Path) -> None:
     box = np.array([[-1, -1, -1], [0.5, 1, 1]])
     with pytest.warns(UserWarning, match="all 1200 rays were cut at 1.5 m.*raise max_range"):
         answer = voxtile.build(
-            scans, ours, resolution=np.float64(0.25), max_range=1.5, ignore_box=box, insert_mode="per-ray", flush_every=2
+            scans,
+            ours,
+            resolution=np.float64(0.25),
+            max_range=1.5,
+            ignore_box=box,
+            insert_mode="per-ray",
+            flush_every=2,
         )
     assert len(answer["remarks"]) == 1
     corners = [str(number) for number in box.reshape(-1)]

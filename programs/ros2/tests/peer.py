@@ -127,13 +127,18 @@ def messages(clouds):
     yield "/tf_static", TFMessage([transform(0, "base", "lidar", 0.2, 0.1)])
     for tick in range(5 * clouds + 2):
         stamp_ns = tick * 20_000_000
-        moving = [transform(stamp_ns, "map", "odom", 1.0, 0.0), transform(stamp_ns, "odom", "base", tick * 0.01, tick * 0.02)]
+        odometry = transform(stamp_ns, "odom", "base", tick * 0.01, tick * 0.02)
+        moving = [transform(stamp_ns, "map", "odom", 1.0, 0.0), odometry]
         yield "/tf", TFMessage(moving)
         if tick % 5 == 0 and tick // 5 < clouds:
             yield "/cloud_in", cloud(stamp_ns + 7_000_000, tick)
 
 
-TYPES = {"/tf_static": "tf2_msgs/msg/TFMessage", "/tf": "tf2_msgs/msg/TFMessage", "/cloud_in": "sensor_msgs/msg/PointCloud2"}
+TYPES = {
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/cloud_in": "sensor_msgs/msg/PointCloud2",
+}
 
 
 def write_bag(path, clouds):
