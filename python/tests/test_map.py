@@ -17,7 +17,6 @@ def made(folder: Path, scans: list[Scan], **options: object) -> voxtile.Map:
     return made
 
 
-@pytest.mark.parametrize("seed", range(3))
 def test_a_flush_beside_scans_is_of_its_call(tmp_path: Path) -> None:
     scans = scans_of(6, count=12, points=2000)
     with voxtile.Map.create(tmp_path / "map", 0.1) as found:
@@ -34,6 +33,7 @@ def test_a_flush_beside_scans_is_of_its_call(tmp_path: Path) -> None:
         assert whole.digest() == voxtile.digest(tmp_path / "map")
 
 
+@pytest.mark.parametrize("seed", range(3))
 def test_equals_the_naive_map(tmp_path: Path, seed: int) -> None:
     scans, naive = scans_of(seed), NaiveMap(0.25)
     with voxtile.Map.create(tmp_path / "map", 0.25, tile_size=4.0) as found:
