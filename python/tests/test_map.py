@@ -23,7 +23,9 @@ def test_a_flush_beside_scans_is_of_its_call(tmp_path: Path) -> None:
         found.insert_many(scans[:6])
         found.flush(wait=False)
         found.insert_many(scans[6:])
+        until = time.monotonic() + 60
         while found.flushed_scan_number != 6:
+            assert time.monotonic() < until
             time.sleep(0.01)
         with voxtile.open(tmp_path / "map") as seen, voxtile.Map.create(tmp_path / "half", 0.1) as half:
             half.insert_many(scans[:6])
