@@ -146,6 +146,11 @@ impl Layout {
         self.tile_folder(tile).join(SPILL)
     }
 
+    /// A file that is to take the place of a tile's next version, until it is whole.
+    pub(super) fn replacement(&self, tile: TileIndex) -> PathBuf {
+        self.tile_folder(tile).join(REPLACEMENT)
+    }
+
     /// The folder of snapshots.
     pub fn snapshots(&self) -> PathBuf {
         self.folder.join(SNAPSHOTS)
@@ -174,6 +179,9 @@ impl Layout {
 
 /// The name of the file of updates that wait for a tile. Like all that no commit names, it ends with `.next`.
 pub(super) const SPILL: &str = "updates.next";
+
+/// The name of a file that is to take the place of a next version, until it is whole.
+pub(super) const REPLACEMENT: &str = "replacement.next";
 
 /// The name of the folder for what repair takes out of the map.
 pub const QUARANTINE: &str = "quarantine";

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 31] = [
+const SOURCES: [&str; 32] = [
     "tile/octocache/octree_statistics.rs",
     "tile/octocache/octree_worker.rs",
     "tile/octocache/shared_tree.rs",
@@ -25,6 +25,7 @@ const SOURCES: [&str; 31] = [
     "mapper/paging/tile_disk.rs",
     "mapper/paging/tile_pager.rs",
     "mapper/paging/tile_state.rs",
+    "mapper/paging/unapplied_tile.rs",
     "mapper/paging/views.rs",
     "mapper/paging/write_buffer.rs",
     "persistence/compact_tile.rs",

@@ -4,7 +4,6 @@ use crate::error::{Error, FormatError, Result};
 use crate::mapper::paging::{Base, StoredTileState, TileState, ViewId};
 use crate::mapper::{MapStatistics, MapView, TileRef};
 use crate::persistence::load::read_stored_table;
-use crate::scan::PackedUpdates;
 use crate::space::{TileBox, TileIndex};
 use crate::store::TileVersion;
 use crate::tile::{Table, Tile};
@@ -69,7 +68,7 @@ impl Shared {
         if is_base_alone && let Some(tile) = self.read_tiles.lock().get(index, base) {
             return Ok(tile);
         }
-        let (grid, model) = (&self.config.grid, &self.config.sensor_model);
+        let grid = &self.config.grid;
         let table = match base {
             Base::Nothing => Table::default(),
             Base::Compact(tile) => tile.decode(grid, index)?,
@@ -80,12 +79,7 @@ impl Shared {
             }
         };
         let mut tile = Tile::uncached(grid, index, table);
-        if spilled.bytes > 0 {
-            let input = self.files.open_spill(index, *spilled)?;
-            PackedUpdates::unpack(input, |updates| tile.apply(model, &updates))
-                .map_err(|error| Error::io(self.files.folder(), "read buffered updates in", error))?;
-        }
-        updates.iter().flat_map(|updates| updates.iter()).for_each(|updates| tile.apply(model, &updates));
+        stored.apply_updates(&mut tile, &self.files, &self.config.sensor_model)?;
         let tile = Arc::new(tile);
         if is_base_alone {
             self.read_tiles.lock().put(base.clone(), tile.clone());

@@ -10,12 +10,20 @@ use std::sync::Arc;
 /// was short, the others in memory.
 #[derive(Debug, Default)]
 pub(super) struct BufferedUpdates {
-    in_memory: FxHashMap<TileIndex, Arc<PackedUpdates>>,
+    in_memory: FxHashMap<TileIndex, InMemory>,
     /// Bytes of memory of these.
     bytes: usize,
     spilled: TileTable<Spilled>,
     /// The sum of these.
     all_spilled: Spilled,
+}
+
+/// Updates of one tile in memory.
+#[derive(Debug, Default)]
+struct InMemory {
+    updates: Arc<PackedUpdates>,
+    /// How many scans they are of.
+    scans: u32,
 }
 
 /// Updates of one tile in its spill file.
@@ -27,19 +35,20 @@ pub(super) struct Spilled {
 
 impl BufferedUpdates {
     /// What a tile takes in memory beside its updates: its place in the table, which may be half empty.
-    const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, usize)>() + size_of::<PackedUpdates>() + 16;
+    const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, InMemory)>() + size_of::<PackedUpdates>() + 16;
     /// Bytes of memory that a tile with a spill file takes, about.
     pub(super) const BYTES_OF_FILE: usize = 24;
 
     pub(super) fn push(&mut self, tile: TileIndex, updates: &TileUpdates) {
-        let updates_so_far = match self.in_memory.entry(tile) {
+        let so_far = match self.in_memory.entry(tile) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(place) => {
                 self.bytes += Self::SLOT_BYTES;
-                place.insert(Arc::default())
+                place.insert(InMemory::default())
             }
         };
-        let updates_so_far = Arc::make_mut(updates_so_far);
+        so_far.scans += 1;
+        let updates_so_far = Arc::make_mut(&mut so_far.updates);
         self.bytes -= updates_so_far.bytes();
         updates_so_far.push(updates);
         self.bytes += updates_so_far.bytes();
@@ -66,7 +75,12 @@ impl BufferedUpdates {
 
     /// A tile's updates in memory.
     pub(super) fn in_memory(&self, tile: TileIndex) -> Option<&Arc<PackedUpdates>> {
-        self.in_memory.get(&tile)
+        self.in_memory.get(&tile).map(|in_memory| &in_memory.updates)
+    }
+
+    /// How many scans a tile's updates in memory are of.
+    pub(super) fn scans(&self, tile: TileIndex) -> u32 {
+        self.in_memory.get(&tile).map_or(0, |in_memory| in_memory.scans)
     }
 
     /// Forgets a tile's updates. Returns what was in its spill file.
@@ -75,9 +89,24 @@ impl BufferedUpdates {
         self.forget_spilled(tile)
     }
 
+    /// Forgets the first of a tile's updates: those in its spill file, and so many bytes of those in memory, which hold
+    /// so many updates.
+    pub(super) fn remove_first(&mut self, tile: TileIndex, bytes: usize, updates: usize) {
+        self.forget_spilled(tile);
+        let Some(in_memory) = self.in_memory.get_mut(&tile) else { return };
+        if in_memory.updates.as_bytes().len() <= bytes {
+            return self.forget_in_memory(tile);
+        }
+        self.bytes -= in_memory.updates.bytes();
+        let later = Arc::make_mut(&mut in_memory.updates);
+        later.drop_first(bytes, updates);
+        later.shrink();
+        self.bytes += later.bytes();
+    }
+
     fn forget_in_memory(&mut self, tile: TileIndex) {
         if let Some(removed) = self.in_memory.remove(&tile) {
-            self.bytes -= Self::SLOT_BYTES + removed.bytes();
+            self.bytes -= Self::SLOT_BYTES + removed.updates.bytes();
         }
     }
 
@@ -116,7 +145,7 @@ impl BufferedUpdates {
 
     /// Number of updates.
     pub(super) fn updates(&self) -> u64 {
-        let in_memory: usize = self.in_memory.values().map(|updates| updates.len()).sum();
+        let in_memory: usize = self.in_memory.values().map(|in_memory| in_memory.updates.len()).sum();
         self.all_spilled.updates + in_memory as u64
     }
 
@@ -136,7 +165,7 @@ impl BufferedUpdates {
     /// equals, the lowest tile.
     pub(super) fn heaviest(&self, bytes: usize) -> Vec<TileIndex> {
         let mut heaviest: Vec<_> =
-            self.in_memory.iter().map(|(tile, updates)| (Reverse(updates.bytes()), *tile)).collect();
+            self.in_memory.iter().map(|(tile, of)| (Reverse(of.updates.bytes()), *tile)).collect();
         heaviest.sort_unstable();
         let mut sum = 0;
         let is_wanted = |&(Reverse(own_bytes), _): &(Reverse<usize>, TileIndex)| {

@@ -14,6 +14,8 @@ pub(super) struct CompactTiles {
     /// Dirty tiles that are not being saved, by number. Looking for one from the oldest tile on would pass all clean
     /// ones, again and again.
     to_save: BTreeMap<u64, TileIndex>,
+    /// Clean tiles, by number.
+    clean: BTreeMap<u64, TileIndex>,
     dirty: usize,
     /// How many tiles were ever put in.
     puts: u64,
@@ -33,8 +35,8 @@ const SLOT_BYTES: usize = size_of::<(TileIndex, Entry)>() + 128;
 
 impl Default for CompactTiles {
     fn default() -> Self {
-        let (tiles, to_save) = (LruCache::unbounded(), BTreeMap::new());
-        Self { tiles, packer: Packer::default(), bytes: 0, to_save, dirty: 0, puts: 0 }
+        let (tiles, packer) = (LruCache::unbounded(), Packer::default());
+        Self { tiles, packer, bytes: 0, to_save: BTreeMap::new(), clean: BTreeMap::new(), dirty: 0, puts: 0 }
     }
 }
 
@@ -89,6 +91,8 @@ impl CompactTiles {
         if is_dirty {
             self.dirty += 1;
             self.to_save.insert(entry.number, index);
+        } else {
+            self.clean.insert(entry.number, index);
         }
         self.tiles.put(index, entry);
     }
@@ -99,6 +103,7 @@ impl CompactTiles {
         self.bytes -= removed.bytes();
         self.dirty -= usize::from(removed.is_dirty);
         self.to_save.remove(&removed.number);
+        self.clean.remove(&removed.number);
         true
     }
 
@@ -112,6 +117,11 @@ impl CompactTiles {
 
     pub(super) fn oldest(&self) -> Option<TileIndex> {
         self.indices().next_back()
+    }
+
+    /// The oldest clean tile.
+    pub(super) fn oldest_clean(&self) -> Option<TileIndex> {
+        self.clean.first_key_value().map(|(_, index)| *index)
     }
 
     /// The oldest dirty tile that is not being saved.
@@ -140,6 +150,7 @@ impl CompactTiles {
         if entry.is_dirty && is_on_disk {
             entry.is_dirty = false;
             self.dirty -= 1;
+            self.clean.insert(entry.number, index);
         } else if entry.is_dirty {
             self.to_save.insert(entry.number, index);
         }

@@ -2,6 +2,7 @@ use super::flight::Flight;
 use super::flusher::FlushedTile;
 use super::memory_plan::MemoryPlan;
 use super::tile_cache::{Cached, TileCache};
+use super::tile_disk::TileDisk;
 use super::tile_state::{Base, StoredTileState, TileState};
 use super::views::{ViewId, Views};
 use super::write_buffer::WriteBuffer;
@@ -127,7 +128,7 @@ impl TileContents {
     }
 
     /// Notes that a tile was written as of the flush's scan.
-    pub(super) fn note_flushed(&mut self, tile: FlushedTile, version: TileVersion) {
+    pub(super) fn note_flushed(&mut self, tile: FlushedTile, version: TileVersion, disk: &TileDisk) {
         let index = tile.index();
         self.views.note_on_disk(index, version);
         let is_same = self.flight.as_mut().is_some_and(|flight| flight.note_written(index));
@@ -140,6 +141,12 @@ impl TileContents {
                 }
             }
             FlushedTile::Compact(index, tile) => drop(self.cache.save_ended(index, &tile, true)),
+            FlushedTile::Unapplied(_) => {
+                if self.buffer.thaw(index, true, disk) {
+                    // What is on disk is newer.
+                    self.cache.drop_compact(index);
+                }
+            }
         }
     }
 
@@ -156,9 +163,11 @@ impl TileContents {
     }
 
     /// Notes that a tile will not be written: it is as dirty as before.
-    pub(super) fn note_not_flushed(&mut self, tile: FlushedTile) {
-        if let FlushedTile::Compact(index, tile) = tile {
-            self.cache.save_ended(index, &tile, false);
+    pub(super) fn note_not_flushed(&mut self, tile: FlushedTile, disk: &TileDisk) {
+        match tile {
+            FlushedTile::Resident(_) => {}
+            FlushedTile::Compact(index, tile) => drop(self.cache.save_ended(index, &tile, false)),
+            FlushedTile::Unapplied(tile) => drop(self.buffer.thaw(tile.index, false, disk)),
         }
     }
 

@@ -76,21 +76,31 @@ impl TilePager<'_> {
     /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles in use are not evicted; if all are
     /// in use, the limit is exceeded.
     pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize) -> Result<()> {
+        self.evict_until(bytes, tiles)?;
+        self.save_ahead()
+    }
+
+    /// [`TilePager::make_room_for`], which saves no tile that need not go.
+    pub(super) fn evict_until(&mut self, bytes: usize, tiles: usize) -> Result<()> {
         loop {
-            match self.contents.cache.next_eviction(bytes, tiles, self.outside_bytes()) {
+            let (outside, is_flushing) = (self.outside_bytes(), self.contents.flight.is_some());
+            match self.contents.cache.next_eviction(bytes, tiles, outside, is_flushing) {
                 Some(Eviction::Resident(index)) => self.evict(index)?,
+                // It is being written, or cannot be before the flush has ended.
+                Some(Eviction::Compact(index)) if is_flushing && self.contents.cache.is_dirty(index) => {
+                    self.wait_for_flight();
+                }
                 Some(Eviction::Compact(index)) => self.evict_compact(index)?,
                 None if self.contents.cache.is_over(bytes, tiles, self.outside_bytes()) => {
                     // All that is left is held, and where a flush beside the mapper holds it, it lets go.
-                    if self.contents.flight.is_none() {
-                        break;
+                    if !is_flushing {
+                        return Ok(());
                     }
-                    self.end_flight();
+                    self.wait_for_flight();
                 }
-                None => break,
+                None => return Ok(()),
             }
         }
-        self.save_ahead()
     }
 
     /// Evicts a resident tile: into the compact form, or to disk where there is no such tier.
@@ -116,6 +126,7 @@ impl TilePager<'_> {
                 self.wait_for_save()?;
             }
         }
+        self.contents.leave_to_flush(std::iter::once(index));
         self.contents.cache.drop_compact(index);
         Ok(())
     }

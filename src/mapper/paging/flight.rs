@@ -11,6 +11,8 @@ pub(super) struct Flight {
     tiles: FxHashMap<TileIndex, FlightTile>,
     /// Bytes of memory of tiles that the flush alone holds.
     own_bytes: usize,
+    /// Bytes of memory for one tile that it makes.
+    bytes_to_make: usize,
 }
 
 /// A tile on its way to disk.
@@ -23,10 +25,10 @@ struct FlightTile {
 }
 
 impl Flight {
-    /// A flush of some tiles, each with its bytes of memory.
-    pub(super) fn of(tiles: impl Iterator<Item = (TileIndex, usize)>) -> Self {
+    /// A flush of some tiles, each with its bytes of memory, which takes so many bytes to make one.
+    pub(super) fn of(tiles: impl Iterator<Item = (TileIndex, usize)>, bytes_to_make: usize) -> Self {
         let tile = |(index, bytes)| (index, FlightTile { bytes, is_shared: true, has_changed: false });
-        Self { tiles: tiles.map(tile).collect(), own_bytes: 0 }
+        Self { tiles: tiles.map(tile).collect(), own_bytes: 0, bytes_to_make }
     }
 
     /// Bytes of memory that changing these tiles takes on top.
@@ -67,6 +69,6 @@ impl Flight {
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.own_bytes + hash_table_bytes::<(TileIndex, FlightTile)>(self.tiles.capacity())
+        self.own_bytes + self.bytes_to_make + hash_table_bytes::<(TileIndex, FlightTile)>(self.tiles.capacity())
     }
 }

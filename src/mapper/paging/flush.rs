@@ -4,7 +4,11 @@ use super::flight::Flight;
 use super::flusher::{BegunFlush, FlushedTile};
 use super::shared_contents::unlocked;
 use super::shared_disk;
+use super::tile_cache::Cached;
+use super::tile_disk::BYTES_OF_VOXEL;
 use super::tile_pager::TilePager;
+use super::tile_state::{Base, StoredTileState};
+use super::unapplied_tile::UnappliedTile;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use crate::store::{InputRecord, MOST_INPUTS};
@@ -64,31 +68,68 @@ impl TilePager<'_> {
         self.wait(|disk| disk.commit(&inputs, scan_number))
     }
 
-    /// Begins a flush of the map as it is now: what dirty tiles hold, which goes on to be shared with the cache, and the
-    /// scans that were noted. One that is under way ends first.
+    /// Begins a flush of the map as it is now: what dirty tiles hold, which goes on to be shared with the cache; what is
+    /// buffered for others; and the scans that were noted. One that is under way ends first.
     pub(super) fn begin_flush(&mut self) -> Result<BegunFlush> {
         self.end_flight();
         self.contents.take_flush_error().map_or(Ok(()), Err)?;
-        self.settle()?;
-        self.make_room_for(0, self.contents.cache.plan().tiles)?;
-        // What that has begun to save.
-        self.end_saves()?;
+        self.write_suspects()?;
         self.upgrade()?;
+        // A tile that could not be saved stays dirty, and the flush saves it again; so this error is dropped.
+        let _ = self.end_saves();
+        let bytes_to_make = self.bytes_to_make();
+        self.evict_until(bytes_to_make, self.contents.cache.plan().tiles)?;
+        // Those of tiles that had to go.
+        let _ = self.end_saves();
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
+        let files = self.store().reader()?;
         let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
-        let mut tiles = Vec::new();
+        // The last ones are written first.
+        let mut tiles: Vec<_> = self.freeze_buffer().into_iter().map(FlushedTile::Unapplied).collect();
         for index in self.contents.cache.dirty_compact() {
-            tiles.extend(self.contents.cache.begin_save(index).map(|tile| FlushedTile::Compact(index, tile)));
+            if !self.contents.buffer.is_frozen(index) {
+                let tile = self.contents.cache.begin_save(index);
+                tiles.extend(tile.map(|tile| FlushedTile::Compact(index, tile)));
+            }
         }
         let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
         let first = tiles.len();
         tiles.extend(dirty.cloned().map(FlushedTile::Resident));
         // The next scan changes about the tiles that the last one has changed.
         let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
-        let flight = Flight::of(tiles.iter().map(|tile| (tile.index(), tile.bytes())));
-        self.contents.flight = Some(flight);
+        let bytes_of_tiles = tiles.iter().map(|tile| (tile.index(), tile.bytes()));
+        self.contents.flight = Some(Flight::of(bytes_of_tiles, bytes_to_make));
         self.contents.flush_reserve = self.contents.flush_reserve.max(1);
-        Ok(BegunFlush { scan_number, tiles, soon_changed, writer, commit })
+        Ok(BegunFlush { scan_number, tiles, soon_changed, writer, files, commit })
+    }
+
+    /// What is buffered, left to a flush beside the mapper.
+    fn freeze_buffer(&mut self) -> Vec<UnappliedTile> {
+        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
+        buffered.sort_unstable();
+        let unapplied = buffered.into_iter().map(|index| {
+            let (spilled, updates) = self.contents.buffer.freeze(index);
+            let version = self.disk.store().version(index);
+            let (base, location) = match (self.contents.cache.find(index), version) {
+                (Some(Cached::Compact(tile)), _) => (Base::Compact(tile.clone()), None),
+                (_, Some(version)) => (Base::OnDisk(version), self.disk.store().location(index)),
+                _ if self.disk.store().contains(index) => (Base::Orphan, None),
+                _ => (Base::Nothing, None),
+            };
+            UnappliedTile { index, state: StoredTileState { base, spilled, updates }, location }
+        });
+        unapplied.collect()
+    }
+
+    /// Bytes of memory, about, of the largest tile that a flush would have to make of what is buffered for it.
+    fn bytes_to_make(&self) -> usize {
+        let most_voxels = (self.config.grid.voxels_per_tile_edge() as u64).saturating_pow(3);
+        let voxels = self.contents.buffer.tiles().map(|index| {
+            let updates = self.contents.buffer.updates_of(index);
+            let before = self.voxels_of_tile_hint(index).unwrap_or_default();
+            before.saturating_add(updates).min(most_voxels)
+        });
+        voxels.max().map_or(0, |voxels| BYTES_OF_VOXEL.saturating_mul(voxels as usize))
     }
 
     /// Waits for a flush beside the mapper. If it failed, the next one says why, or makes up for it.
@@ -108,9 +149,28 @@ impl TilePager<'_> {
         }
     }
 
+    /// Waits until a flush beside the mapper has let go of some tiles, or has ended.
+    pub(super) fn wait_for_flight(&mut self) {
+        let since = Instant::now();
+        let Self { contents, disk, flusher, .. } = self;
+        let goes_on = unlocked(contents, || shared_disk::unlocked(disk, || flusher.wait_for_some()));
+        self.disk.note_stall(since.elapsed());
+        if !goes_on {
+            self.end_flight();
+        }
+    }
+
     /// Leaves nothing on its way to disk or from there, and no buffered updates.
     fn settle(&mut self) -> Result<()> {
         self.end_io()?;
+        self.write_suspects()?;
+        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
+        buffered.sort_unstable();
+        buffered.into_iter().try_for_each(|index| self.flush_buffered(index))
+    }
+
+    /// Writes tiles anew that the disk has failed to sync.
+    fn write_suspects(&mut self) -> Result<()> {
         for index in self.store().suspects() {
             // Its file may not be on the medium; what can be read of it is checked as always.
             if !self.contents.cache.is_resident(index) {
@@ -118,9 +178,7 @@ impl TilePager<'_> {
             }
             self.write(index)?;
         }
-        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
-        buffered.sort_unstable();
-        buffered.into_iter().try_for_each(|index| self.flush_buffered(index))
+        Ok(())
     }
 
     /// Applies a tile's buffered updates. Where there is no room for the tile it is written at once and not kept.

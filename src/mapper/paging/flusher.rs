@@ -5,19 +5,23 @@
 
 use super::shared_contents::SharedContents;
 use super::shared_disk::SharedDisk;
+use super::unapplied_tile::UnappliedTile;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::persistence::{CompactTile, TileSaver, Worker};
-use crate::space::{Grid, TileIndex};
-use crate::store::{BegunCommit, TileVersion, TileWriter};
+use crate::space::TileIndex;
+use crate::store::{BegunCommit, TileReader, TileVersion, TileWriter};
 use crate::tile::Tile;
 use std::ops::Range;
+use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The thread that flushes beside the mapper.
 #[derive(Debug)]
 pub(super) struct Flusher {
     worker: Mutex<Worker<FlushJob, ()>>,
+    /// Something comes whenever the flush that goes on has let go of tiles.
+    progress: Mutex<Option<Receiver<()>>>,
 }
 
 /// All that a flush takes.
@@ -25,6 +29,7 @@ pub(super) struct FlushJob {
     pub(super) contents: Arc<SharedContents>,
     pub(super) disk: Arc<SharedDisk>,
     pub(super) begun: BegunFlush,
+    pub(super) progress: Sender<()>,
 }
 
 /// The map as of a scan, as far as it is to be written.
@@ -35,6 +40,8 @@ pub(super) struct BegunFlush {
     /// Those of them that the next scan will change.
     pub(super) soon_changed: Range<usize>,
     pub(super) writer: TileWriter,
+    /// What finds the earlier versions of tiles.
+    pub(super) files: TileReader,
     pub(super) commit: BegunCommit,
 }
 
@@ -42,6 +49,8 @@ pub(super) struct BegunFlush {
 pub(super) enum FlushedTile {
     Resident(Arc<Tile>),
     Compact(TileIndex, CompactTile),
+    /// It is made first, and only to be written.
+    Unapplied(UnappliedTile),
 }
 
 /// Tiles that are written before the locks are taken to note them.
@@ -51,12 +60,19 @@ impl Flusher {
     pub(super) fn new(config: &MapConfig) -> Self {
         let config = config.clone();
         let worker = Worker::new("voxtile-flush", move |job: FlushJob| job.run(&config));
-        Self { worker: Mutex::new(worker) }
+        Self { worker: Mutex::new(worker), progress: Mutex::new(None) }
     }
 
     /// Begins a flush. The caller holds no lock: where the system refuses a thread, it is done here.
-    pub(super) fn give(&self, job: FlushJob) {
+    pub(super) fn give(&self, job: FlushJob, progress: Receiver<()>) {
+        *self.progress.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
         self.worker.lock().unwrap_or_else(PoisonError::into_inner).give(job);
+    }
+
+    /// Waits until the flush that goes on has let go of tiles; `false` if it has ended. The caller holds no lock.
+    pub(super) fn wait_for_some(&self) -> bool {
+        let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        progress.as_ref().is_some_and(|progress| progress.recv().is_ok())
     }
 
     /// Waits for a flush to end; tells whether there was one. The caller holds no lock.
@@ -69,9 +85,11 @@ impl FlushJob {
     fn run(mut self, config: &MapConfig) {
         self.copy_soon_changed();
         let flushed = self.write_tiles(config).and_then(|()| self.commit());
+        // In the order in which the mapper takes them.
+        let disk = self.disk.lock();
         let mut contents = self.contents.lock();
         for tile in self.begun.tiles {
-            contents.note_not_flushed(tile);
+            contents.note_not_flushed(tile, &disk);
         }
         contents.end_flight(flushed);
     }
@@ -90,7 +108,7 @@ impl FlushJob {
     }
 
     fn write_tiles(&mut self, config: &MapConfig) -> Result<()> {
-        let Self { contents, disk, begun } = self;
+        let Self { contents, disk, begun, progress } = self;
         let mut saver = TileSaver::new(config);
         loop {
             let mut written = Vec::new();
@@ -98,7 +116,7 @@ impl FlushJob {
             while written.len() < NOTED_AT_ONCE
                 && let Some(tile) = begun.tiles.pop()
             {
-                match tile.write(&mut saver, &begun.writer, &config.grid, begun.scan_number) {
+                match begun.write(&tile, &mut saver, config) {
                     Ok(version) => written.push((tile, version)),
                     Err(error) => {
                         begun.tiles.push(tile);
@@ -108,13 +126,17 @@ impl FlushJob {
                 }
             }
             let is_all = written.is_empty();
-            // In the order in which the mapper takes them.
             let mut disk = disk.lock();
             let mut contents = contents.lock();
             for (tile, version) in written {
+                if let FlushedTile::Unapplied(tile) = &tile {
+                    tile.bytes_on_disk().into_iter().for_each(|bytes| disk.note_read_to_flush(bytes));
+                }
                 disk.note_flushed(tile.index(), version);
-                contents.note_flushed(tile, version);
+                contents.note_flushed(tile, version, &disk);
             }
+            // Nobody may wait for it.
+            let _ = progress.send(());
             outcome?;
             if is_all {
                 return Ok(());
@@ -155,11 +177,30 @@ impl FlushJob {
     }
 }
 
+impl BegunFlush {
+    fn write(&self, tile: &FlushedTile, saver: &mut TileSaver, config: &MapConfig) -> Result<TileVersion> {
+        let (writer, scan_number) = (&self.writer, self.scan_number);
+        match tile {
+            FlushedTile::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
+            FlushedTile::Compact(index, tile) => {
+                saver.write_compact(writer, &config.grid, *index, tile, scan_number)
+            }
+            FlushedTile::Unapplied(tile) => {
+                let made = tile.make(&self.files, config)?;
+                // It may have been made of an earlier next version, which the mapper may read meanwhile.
+                let writer = writer.clone().keeping_earlier();
+                saver.write(&writer, tile.index, made.table(), scan_number)
+            }
+        }
+    }
+}
+
 impl FlushedTile {
     pub(super) fn index(&self) -> TileIndex {
         match self {
             Self::Resident(tile) => tile.index(),
             Self::Compact(index, _) => *index,
+            Self::Unapplied(tile) => tile.index,
         }
     }
 
@@ -168,19 +209,7 @@ impl FlushedTile {
         match self {
             Self::Resident(tile) => tile.bytes(),
             Self::Compact(_, tile) => tile.bytes().len(),
-        }
-    }
-
-    fn write(
-        &self,
-        saver: &mut TileSaver,
-        writer: &TileWriter,
-        grid: &Grid,
-        scan_number: u64,
-    ) -> Result<TileVersion> {
-        match self {
-            Self::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
-            Self::Compact(index, tile) => saver.write_compact(writer, grid, *index, tile, scan_number),
+            Self::Unapplied(tile) => tile.bytes(),
         }
     }
 }

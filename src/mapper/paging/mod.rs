@@ -29,6 +29,7 @@ mod tile_cache;
 mod tile_disk;
 mod tile_pager;
 mod tile_state;
+mod unapplied_tile;
 mod views;
 mod write_buffer;
 

@@ -12,6 +12,7 @@ use crate::error::Result;
 use crate::space::TileBox;
 use crate::store::TileStore;
 use std::sync::Arc;
+use std::sync::mpsc::channel;
 
 /// The tiles of an out-of-core map: what it holds, which readers share, and the disk, which belongs to the mapper and to
 /// the thread that flushes beside it.
@@ -58,7 +59,8 @@ impl PagedTiles {
     pub(in crate::mapper) fn begin_flush(&self) -> Result<()> {
         let begun = self.pager().begin_flush()?;
         let (contents, disk) = (self.contents.clone(), self.disk.clone());
-        self.flusher.give(FlushJob { contents, disk, begun });
+        let (progress, on_progress) = channel();
+        self.flusher.give(FlushJob { contents, disk, begun, progress }, on_progress);
         Ok(())
     }
 

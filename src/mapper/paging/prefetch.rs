@@ -1,12 +1,19 @@
 //! Tiles are fetched before they are needed: those with the most buffered updates, and those in the direction of
 //! travel.
 
+use super::tile_cache::Cached;
 use super::tile_pager::TilePager;
 use crate::error::Result;
-use crate::scan::TileUpdates;
+use crate::scan::{ScanUpdates, TileUpdates};
 use crate::space::{TileBox, TileIndex};
 use crate::tile::Table;
 use std::sync::Arc;
+
+/// A tile for which updates of so many scans wait is changed often.
+const SCANS_OF_OFTEN: u32 = 8;
+
+/// So many tiles in the compact form are brought in with one scan: unpacking takes milliseconds.
+const MOST_PACKED_AT_ONCE: usize = 2;
 
 impl TilePager<'_> {
     /// Prefetches tiles that will be needed, as far as there is room for them. `updates` are those of the scan that is
@@ -25,6 +32,11 @@ impl TilePager<'_> {
                 }
             }
         }
+        for (tile, _) in updates {
+            if self.is_often_changed(*tile) && self.may_replace_oldest() {
+                self.begin_prefetch(*tile);
+            }
+        }
         let now = TileBox::of(updates.iter().map(|(tile, _)| *tile));
         let before = std::mem::replace(&mut self.contents.last_scan, now);
         if let (Some(before), Some(now)) = (before, now) {
@@ -34,6 +46,33 @@ impl TilePager<'_> {
                 }
             }
         }
+    }
+
+    /// Brings in tiles in the compact form that scan after scan has changed.
+    pub(super) fn bring_in_packed(&mut self, updates: &ScanUpdates) -> Result<()> {
+        let mut brought_in = 0;
+        for &(tile, _) in &updates.tiles {
+            let is_wanted = self.is_often_changed(tile)
+                && matches!(self.contents.cache.find(tile), Some(Cached::Compact(_)))
+                && !self.contents.buffer.is_staged(tile);
+            if is_wanted && brought_in < MOST_PACKED_AT_ONCE && self.may_replace_oldest() {
+                self.load(tile)?;
+                brought_in += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether updates of many scans wait for a tile.
+    fn is_often_changed(&self, tile: TileIndex) -> bool {
+        self.contents.buffer.scans_of(tile) >= SCANS_OF_OFTEN
+    }
+
+    /// Whether a tile that scan after scan changes may take the place of the one that was not used for longest. Where
+    /// all are used about as often, it would have to go again at once, and its updates had better wait.
+    fn may_replace_oldest(&self) -> bool {
+        let since = self.contents.cache.scans_since_oldest();
+        since.is_some_and(|scans| scans > u64::from(2 * SCANS_OF_OFTEN))
     }
 
     fn begin_prefetch(&mut self, index: TileIndex) {

@@ -10,6 +10,8 @@ use std::sync::Arc;
 pub(super) struct ResidentTiles {
     tiles: LruCache<TileIndex, Resident>,
     bytes: usize,
+    /// Number of scans so far.
+    scans: u64,
 }
 
 #[derive(Debug)]
@@ -17,6 +19,8 @@ struct Resident {
     tile: Arc<Tile>,
     /// As they were counted: a tree that another thread writes grows meanwhile.
     bytes: usize,
+    /// Number of scans when it was used last.
+    used: u64,
 }
 
 /// What a tile takes beside itself: its place in the table and in the order.
@@ -24,7 +28,7 @@ const SLOT_BYTES: usize = size_of::<(TileIndex, Resident)>() + 64;
 
 impl Default for ResidentTiles {
     fn default() -> Self {
-        Self { tiles: LruCache::unbounded(), bytes: 0 }
+        Self { tiles: LruCache::unbounded(), bytes: 0, scans: 0 }
     }
 }
 
@@ -44,7 +48,14 @@ impl ResidentTiles {
 
     /// A tile, which becomes the one used last.
     pub(super) fn get(&mut self, index: TileIndex) -> Option<&Arc<Tile>> {
-        self.tiles.get(&index).map(|resident| &resident.tile)
+        let resident = self.tiles.get_mut(&index)?;
+        resident.used = self.scans;
+        Some(&resident.tile)
+    }
+
+    /// Notes that a scan was inserted.
+    pub(super) fn note_scan(&mut self) {
+        self.scans += 1;
     }
 
     /// A tile, which keeps its place in the order.
@@ -61,7 +72,7 @@ impl ResidentTiles {
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
         let (index, bytes) = (tile.index(), bytes_of(&tile));
         self.bytes += bytes;
-        if let Some(replaced) = self.tiles.put(index, Resident { tile, bytes }) {
+        if let Some(replaced) = self.tiles.put(index, Resident { tile, bytes, used: self.scans }) {
             self.bytes -= replaced.bytes;
         }
     }
@@ -74,7 +85,17 @@ impl ResidentTiles {
 
     /// The tile whose last use is the longest ago, of those that nobody holds.
     pub(super) fn least_recently_used(&self) -> Option<TileIndex> {
-        self.iter().rev().find(|tile| Arc::strong_count(tile) == 1).map(|tile| tile.index())
+        self.oldest().map(|resident| resident.tile.index())
+    }
+
+    /// For how many scans that tile has not been used.
+    pub(super) fn scans_since_oldest(&self) -> Option<u64> {
+        self.oldest().map(|resident| self.scans - resident.used)
+    }
+
+    fn oldest(&self) -> Option<&Resident> {
+        let mut oldest_first = self.tiles.iter().rev().map(|(_, resident)| resident);
+        oldest_first.find(|resident| Arc::strong_count(&resident.tile) == 1)
     }
 
     /// Changes a tile, which keeps its place in the order.

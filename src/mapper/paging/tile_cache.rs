@@ -86,6 +86,16 @@ impl TileCache {
         self.resident.peek(index)
     }
 
+    /// Notes that a scan was inserted.
+    pub(super) fn note_scan(&mut self) {
+        self.resident.note_scan();
+    }
+
+    /// For how many scans the resident tile that has to go next has not been used; `None` if none can go.
+    pub(super) fn scans_since_oldest(&self) -> Option<u64> {
+        self.resident.scans_since_oldest()
+    }
+
     pub(super) fn is_resident(&self, index: TileIndex) -> bool {
         self.resident.contains(index)
     }
@@ -258,13 +268,20 @@ impl TileCache {
     }
 
     /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes. Tiles that somebody holds stay;
-    /// if all are held, nothing goes.
-    pub(super) fn next_eviction(&self, bytes: usize, tiles: usize, outside: usize) -> Option<Eviction> {
+    /// if all are held, nothing goes. While a flush goes on, tiles in the compact form that need no saving go first.
+    pub(super) fn next_eviction(
+        &self,
+        bytes: usize,
+        tiles: usize,
+        outside: usize,
+        is_flushing: bool,
+    ) -> Option<Eviction> {
         let is_short = self.is_short(bytes, outside);
         if !self.is_over(bytes, tiles, outside) {
             return None;
         }
-        match (self.resident.least_recently_used(), self.compact.oldest()) {
+        let clean = if is_flushing { self.compact.oldest_clean() } else { None };
+        match (self.resident.least_recently_used(), clean.or_else(|| self.compact.oldest())) {
             (_, Some(index)) if is_short && self.compact.bytes() > self.plan.compact_bytes => {
                 Some(Eviction::Compact(index))
             }

@@ -33,7 +33,7 @@ pub(super) struct TileDisk {
 }
 
 /// Bytes of memory that a voxel of a tile on disk takes, about.
-const BYTES_OF_VOXEL: usize = 6;
+pub(super) const BYTES_OF_VOXEL: usize = 6;
 
 impl TileDisk {
     pub(super) fn new(config: &MapConfig, store: TileStore) -> Self {
@@ -132,6 +132,9 @@ impl TileDisk {
     fn note_prefetched(&mut self, loaded: Loaded) -> (TileIndex, Option<Table>) {
         let Loaded { index, result } = loaded;
         let Ok(read) = result else { return (index, None) };
+        if self.store.version(index).is_some_and(|version| version.table != read.file) {
+            return (index, None); // A flush beside the mapper has written a newer one meanwhile.
+        }
         self.note_read(index, read.file.bytes);
         self.counts.prefetches += 1;
         (index, Some(read.table))
@@ -155,6 +158,12 @@ impl TileDisk {
     pub(super) fn note_flushed(&mut self, index: TileIndex, version: TileVersion) {
         self.store.note_next(index, version);
         self.note_written(index, version);
+    }
+
+    /// Notes that such a flush has read a tile of so many bytes to write it.
+    pub(super) fn note_read_to_flush(&mut self, bytes: u64) {
+        self.counts.loads += 1;
+        self.counts.bytes_read += bytes;
     }
 
     fn note_written(&mut self, index: TileIndex, version: TileVersion) {

@@ -93,6 +93,7 @@ impl TilePager<'_> {
                 self.load(*tile)?;
             }
         }
+        self.bring_in_packed(updates)?;
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         let copied = self.contents.bytes_to_copy(updates.tiles.iter().map(|(tile, _)| *tile));
         // A tile that is made new by the updates is one tile more than there are.
@@ -143,6 +144,7 @@ impl TilePager<'_> {
         }
         self.make_tiles(new);
         self.contents.scan_number += 1;
+        self.contents.cache.note_scan();
         self.contents.note_touched(&touched);
         touched
     }
@@ -230,7 +232,8 @@ impl TilePager<'_> {
         let excess = self.contents.buffer.bytes().saturating_sub(most_bytes);
         let heaviest = if excess > 0 { self.contents.buffer.heaviest(excess) } else { Vec::new() };
         for tile in heaviest {
-            if self.contents.buffer.is_staged(tile) {
+            // A flush beside the mapper is about to apply what is frozen.
+            if self.contents.buffer.is_staged(tile) || self.contents.buffer.is_frozen(tile) {
                 continue;
             }
             if self.is_spilling_cheaper(tile) {
@@ -256,6 +259,9 @@ impl TilePager<'_> {
     ///
     /// A disk that refuses; the updates stay in memory.
     fn spill(&mut self, index: TileIndex) -> Result<()> {
+        if self.contents.buffer.is_frozen(index) {
+            self.end_flight();
+        }
         let (before, updates) = self.contents.buffer.of(index);
         if let Some(updates) = updates.filter(|updates| !updates.is_empty()) {
             let spilled = self.wait(|disk| disk.spill(index, before, &updates))?;
@@ -395,7 +401,13 @@ impl TilePager<'_> {
         if let Some(Cached::Compact(tile)) = self.contents.cache.find(index) {
             return Ok((tile.decode(&self.config.grid, index)?, self.contents.cache.is_dirty(index)));
         }
-        Ok((self.wait(|disk| disk.read(index))?.unwrap_or_default(), false))
+        let mut read = self.wait(|disk| disk.read(index));
+        if read.is_err() && self.contents.buffer.is_frozen(index) {
+            // A flush beside the mapper may have written it anew, and not said so yet.
+            self.end_flight();
+            read = self.wait(|disk| disk.read(index));
+        }
+        Ok((read?.unwrap_or_default(), false))
     }
 
     /// Number of voxels of a tile in memory, or of its latest version on disk; buffered updates are left out.

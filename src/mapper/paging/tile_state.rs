@@ -1,6 +1,8 @@
+use crate::error::{Error, Result};
 use crate::persistence::CompactTile;
 use crate::scan::PackedUpdates;
-use crate::store::{SpillFile, TileVersion};
+use crate::sensor::SensorModel;
+use crate::store::{SpillFile, TileReader, TileVersion};
 use crate::tile::Tile;
 use std::sync::Arc;
 
@@ -50,6 +52,28 @@ impl TileState {
                     compact + updates.as_ref().map_or(0, |updates| updates.bytes())
                 }
             }
+    }
+}
+
+impl StoredTileState {
+    /// Applies the updates to a tile that was made of the base.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; a spill file that is not what was written, or was removed.
+    pub(in crate::mapper) fn apply_updates(
+        &self,
+        tile: &mut Tile,
+        files: &TileReader,
+        model: &SensorModel,
+    ) -> Result<()> {
+        if self.spilled.bytes > 0 {
+            let input = files.open_spill(tile.index(), self.spilled)?;
+            PackedUpdates::unpack(input, |updates| tile.apply(model, &updates))
+                .map_err(|error| Error::io(files.folder(), "read buffered updates in", error))?;
+        }
+        self.updates.iter().flat_map(|updates| updates.iter()).for_each(|updates| tile.apply(model, &updates));
+        Ok(())
     }
 }
 

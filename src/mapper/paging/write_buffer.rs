@@ -2,8 +2,9 @@ use super::buffered_updates::{BufferedUpdates, Spilled};
 use super::tile_disk::TileDisk;
 use crate::mapper::statistics::MapStatistics;
 use crate::scan::{PackedUpdates, TileUpdates};
-use crate::space::{TileIndex, TileTable};
+use crate::space::{TileIndex, TileTable, hash_table_bytes};
 use crate::store::SpillFile;
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// Updates of tiles that are not resident, until these come in: in memory, spilled to files where memory is short, and
@@ -13,7 +14,23 @@ pub(super) struct WriteBuffer {
     buffered: BufferedUpdates,
     /// The spill files with the parts of the scan that is being inserted. They count once it is accepted.
     staged: TileTable<Spilled>,
+    /// The tiles that a flush beside the mapper makes of their updates as of its scan. These stay here until that is
+    /// done; later ones follow them.
+    frozen: FxHashMap<TileIndex, Frozen>,
 }
+
+/// How many of a tile's updates a flush applies: all that are in its spill file, and the first of those in memory.
+#[derive(Clone, Copy, Debug)]
+struct Frozen {
+    has_file: bool,
+    bytes: usize,
+    updates: usize,
+    /// Whether they are here no more: the mapper has brought the tile in with them.
+    is_forgotten: bool,
+}
+
+/// A tile's updates, in order: those in its spill file, then those in memory.
+pub(super) type UpdatesOfTile = (SpillFile, Option<Arc<PackedUpdates>>);
 
 impl WriteBuffer {
     /// Bytes of memory that a tile with a spill file takes, about.
@@ -36,7 +53,7 @@ impl WriteBuffer {
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.buffered.bytes()
+        self.buffered.bytes() + hash_table_bytes::<(TileIndex, Frozen)>(self.frozen.capacity())
     }
 
     /// Number of tiles with a spill file.
@@ -50,6 +67,17 @@ impl WriteBuffer {
         self.buffered.spilled(tile).file.bytes + in_memory as u64
     }
 
+    /// Number of a tile's updates, in memory and in its spill file.
+    pub(super) fn updates_of(&self, tile: TileIndex) -> u64 {
+        let in_memory = self.buffered.in_memory(tile).map_or(0, |updates| updates.len());
+        self.buffered.spilled(tile).updates + in_memory as u64
+    }
+
+    /// See [`BufferedUpdates::scans`].
+    pub(super) fn scans_of(&self, tile: TileIndex) -> u32 {
+        self.buffered.scans(tile)
+    }
+
     /// See [`BufferedUpdates::heaviest`].
     pub(super) fn heaviest(&self, bytes: usize) -> Vec<TileIndex> {
         self.buffered.heaviest(bytes)
@@ -61,15 +89,55 @@ impl WriteBuffer {
     }
 
     /// A tile's updates, in order: those in its spill file, then those in memory.
-    pub(super) fn of(&self, tile: TileIndex) -> (SpillFile, Option<Arc<PackedUpdates>>) {
+    pub(super) fn of(&self, tile: TileIndex) -> UpdatesOfTile {
         (self.buffered.spilled(tile).file, self.buffered.in_memory(tile).cloned())
     }
 
     /// Forgets a tile's updates: they were applied, or nobody wants them any more.
     pub(super) fn forget(&mut self, index: TileIndex, disk: &TileDisk) {
-        if self.buffered.remove(index).file.bytes > 0 {
+        let spilled = self.buffered.remove(index);
+        match self.frozen.get_mut(&index) {
+            // The flush has yet to read the file.
+            Some(frozen) => frozen.is_forgotten = true,
+            None if spilled.file.bytes > 0 => disk.remove_spill(index),
+            None => {}
+        }
+    }
+
+    // A flush beside the mapper.
+
+    /// Leaves a tile's updates of now to a flush, and returns them. Until it is done with them nothing may be spilled
+    /// for the tile.
+    pub(super) fn freeze(&mut self, index: TileIndex) -> UpdatesOfTile {
+        let (file, in_memory) = self.of(index);
+        let (bytes, updates) =
+            in_memory.as_ref().map_or((0, 0), |updates| (updates.as_bytes().len(), updates.len()));
+        let frozen = Frozen { has_file: file.bytes > 0, bytes, updates, is_forgotten: false };
+        self.frozen.insert(index, frozen);
+        (file, in_memory)
+    }
+
+    /// Whether a flush is to apply updates of a tile.
+    pub(super) fn is_frozen(&self, index: TileIndex) -> bool {
+        self.frozen.contains_key(&index)
+    }
+
+    /// Notes that a flush is done with a tile, and forgets the updates that are on disk now. Tells whether the tile is
+    /// what is on disk with the updates that are left here; otherwise the mapper has brought it in meanwhile.
+    pub(super) fn thaw(&mut self, index: TileIndex, is_on_disk: bool, disk: &TileDisk) -> bool {
+        let Some(frozen) = self.frozen.remove(&index) else { return false };
+        let is_wanted = !frozen.is_forgotten && !is_on_disk;
+        if frozen.has_file && !is_wanted {
             disk.remove_spill(index);
         }
+        let is_here = !frozen.is_forgotten && is_on_disk;
+        if is_here {
+            self.buffered.remove_first(index, frozen.bytes, frozen.updates);
+        }
+        if self.frozen.is_empty() {
+            self.frozen = FxHashMap::default();
+        }
+        is_here
     }
 
     /// Notes that a tile's updates in memory are in its spill file now.

@@ -76,8 +76,14 @@ impl PackedUpdates {
         self.updates += others.updates;
     }
 
+    /// Takes away the first so many bytes, which hold so many updates: they are the earlier part of what was appended.
+    pub fn drop_first(&mut self, bytes: usize, updates: usize) {
+        self.bytes.drain(..bytes.min(self.bytes.len()));
+        self.updates = self.updates.saturating_sub(updates);
+    }
+
     /// Releases unused memory.
-    pub(crate) fn shrink(&mut self) {
+    pub fn shrink(&mut self) {
         self.bytes.shrink_to_fit();
     }
 

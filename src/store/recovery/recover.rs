@@ -2,7 +2,7 @@ use crate::error::{Error, Result, is_of_medium};
 use crate::space::{TileIndex, TileTable};
 use crate::store::commit::commits::Commits;
 use crate::store::disk::{Disk, EntryKind};
-use crate::store::layout::{Layout, SPILL, tile_of_folder};
+use crate::store::layout::{Layout, REPLACEMENT, SPILL, tile_of_folder};
 use crate::store::snapshots::seen_tables::{KeptFlushes, SeenTables};
 use crate::store::snapshots::snapshot_file::Snapshot;
 use crate::store::snapshots::snapshot_list::SnapshotList;
@@ -217,7 +217,7 @@ fn look_at_tile(
         remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
-    for name in names.extract_if(.., |name| name == SPILL) {
+    for name in names.extract_if(.., |name| name == SPILL || name == REPLACEMENT) {
         remove(disk, &folder.join(name), removed)?;
     }
     let is_kept = |name: &mut String| layout.flush_of_kept(name).is_some();

@@ -16,11 +16,18 @@ use std::path::Path;
 pub struct TileWriter {
     files: MapFiles,
     map_id: [u8; 16],
+    keeps_earlier: bool,
 }
 
 impl TileWriter {
     pub(in crate::store) fn new(files: MapFiles, map_id: [u8; 16]) -> Self {
-        Self { files, map_id }
+        Self { files, map_id, keeps_earlier: false }
+    }
+
+    /// Leaves an earlier next version as it is until the new one is whole: it can be read meanwhile, and an error loses
+    /// nothing.
+    pub fn keeping_earlier(self) -> Self {
+        Self { keeps_earlier: true, ..self }
     }
 
     /// The map's id.
@@ -37,7 +44,8 @@ impl TileWriter {
     ///
     /// # Errors
     ///
-    /// A disk that refuses; what there was of an earlier next version is lost then.
+    /// A disk that refuses; what there was of an earlier next version is lost then, unless it is kept
+    /// ([`TileWriter::keeping_earlier`]).
     pub fn write_next(
         &self,
         tile: TileIndex,
@@ -45,7 +53,8 @@ impl TileWriter {
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<FileChecksum> {
         make_folder(&**self.files.disk(), &self.files.layout().tile_folder(tile))?;
-        let path = self.files.layout().next(tile, file);
+        let next = self.files.layout().next(tile, file);
+        let path = if self.keeps_earlier { self.files.layout().replacement(tile) } else { next.clone() };
         let write_file = || {
             let mut out =
                 Checksumming::new(BufWriter::with_capacity(1 << 16, self.files.disk().create(&path)?));
@@ -53,7 +62,12 @@ impl TileWriter {
             out.flush()?;
             Ok(out.finish().0)
         };
-        write_file().map_err(|error| Error::io(&path, "write", error))
+        let written = write_file().map_err(|error| Error::io(&path, "write", error))?;
+        if self.keeps_earlier {
+            let renamed = self.files.disk().rename(&path, &next);
+            renamed.map_err(|error| Error::io(&path, "rename", error))?;
+        }
+        Ok(written)
     }
 }
 

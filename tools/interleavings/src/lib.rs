@@ -154,6 +154,9 @@ mod mapper {
         mod tile_state {
             source!("tile_state.rs");
         }
+        mod unapplied_tile {
+            source!("unapplied_tile.rs");
+        }
         mod views {
             source!("views.rs");
         }

@@ -1,0 +1,53 @@
+use super::tile_state::{Base, StoredTileState};
+use crate::config::MapConfig;
+use crate::error::{FormatError, Result};
+use crate::persistence::load::read_stored_table;
+use crate::space::TileIndex;
+use crate::store::{TileLocation, TileReader};
+use crate::tile::{Table, Tile};
+
+/// A tile that is not in use, as of a flush beside the mapper, which makes it of its stored form and the updates that
+/// were buffered for it.
+pub(super) struct UnappliedTile {
+    pub(super) index: TileIndex,
+    pub(super) state: StoredTileState,
+    /// Where the version on disk is, if that is the base.
+    pub(super) location: Option<TileLocation>,
+}
+
+impl UnappliedTile {
+    /// Makes the tile.
+    ///
+    /// # Errors
+    ///
+    /// Damage, and a disk that refuses.
+    pub(super) fn make(&self, files: &TileReader, config: &MapConfig) -> Result<Tile> {
+        let (grid, index) = (&config.grid, self.index);
+        let table = match (&self.state.base, &self.location) {
+            (Base::Compact(tile), _) => tile.decode(grid, index)?,
+            (_, Some(location)) => read_stored_table(grid, index, location.clone().open()?)?.table,
+            (Base::Orphan, _) => {
+                let reason = "commits.log does not name this tile";
+                return Err(FormatError::at_offset(0, reason).in_map(files.folder(), Some(index)));
+            }
+            (_, None) => Table::default(),
+        };
+        let mut tile = Tile::uncached(grid, index, table);
+        self.state.apply_updates(&mut tile, files, &config.sensor_model)?;
+        Ok(tile)
+    }
+
+    /// Bytes of memory that others may let go of meanwhile.
+    pub(super) fn bytes(&self) -> usize {
+        let base = if let Base::Compact(tile) = &self.state.base { tile.bytes().len() } else { 0 };
+        base + self.state.updates.as_ref().map_or(0, |updates| updates.bytes())
+    }
+
+    /// Length of the file that is read, if one is.
+    pub(super) fn bytes_on_disk(&self) -> Option<u64> {
+        match (&self.state.base, &self.location) {
+            (Base::OnDisk(version), Some(_)) => Some(version.table.bytes),
+            _ => None,
+        }
+    }
+}
