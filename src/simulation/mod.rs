@@ -1,7 +1,7 @@
 //! A made-up world to map: seeded, endless, and the same to the last bit on every platform.
 //!
 //! ```text
-//! City, Building  (World)  what there is: boxes and a ground plane   block, solid, scene
+//! City, Building, Warehouse  (World)  what there is: boxes and a ground plane   block, solid, scene
 //! Drive, Teleport, Walk  (Route)  where the sensor is at step k      leg, plan
 //! Lidar                    what it sees from there: a Scan in the world frame
 //! Survey                   the three together: scan k, or one scan after another
@@ -32,6 +32,7 @@ mod solid;
 mod survey;
 mod teleport;
 mod walk;
+mod warehouse;
 mod world;
 
 pub use building::Building;
@@ -45,4 +46,5 @@ pub use solid::Solid;
 pub use survey::Survey;
 pub use teleport::Teleport;
 pub use walk::Walk;
+pub use warehouse::Warehouse;
 pub use world::World;

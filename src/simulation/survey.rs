@@ -1,4 +1,4 @@
-use super::{Building, City, Drive, Lidar, Route, Teleport, Walk, World};
+use super::{Building, City, Drive, Lidar, Route, Teleport, Walk, Warehouse, World};
 use crate::scan::Scan;
 
 /// A world, a way through it and a lidar: the scans of a whole drive, made one at a time.
@@ -76,6 +76,14 @@ impl Survey<Building, Walk> {
     pub fn indoor(seed: u64) -> Self {
         let building = Building::new(seed);
         Self::new(building, Walk::new(building, 0.5), Lidar::indoor(), seed)
+    }
+}
+
+/// Scans of about `rays` rays.
+impl Survey<Warehouse, Walk> {
+    /// A scan every ten centimetres of rounds through a warehouse, without end: a metre a second, ten scans a second.
+    pub fn warehouse(seed: u64, rays: u32) -> Self {
+        Self::new(Warehouse::new(seed), Walk::in_warehouse(0.1), Lidar::of_rays(rays), seed)
     }
 }
 

@@ -1,10 +1,12 @@
 use super::building::{Building, Room};
+use super::warehouse::Warehouse;
 use super::route::{Route, level_pose, sound_spacing};
 use crate::maths;
 use crate::scan::Pose;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// An endless walk through a [`Building`]: along the corridor, through every door, around every pillar, and again.
+/// An endless walk through a [`Building`]: along the corridor, through every door, around every pillar, and again. Or
+/// through a [`Warehouse`]: along every aisle.
 ///
 /// As an iterator it yields the sensor's poses (`world_from_sensor`) and never ends.
 #[derive(Clone, Debug)]
@@ -37,6 +39,21 @@ impl Walk {
         }
         corners.push([Building::SIZE_M[0] - 0.9, middle]);
         corners.push([0.9, middle]);
+        Self::along(corners, spacing_m)
+    }
+
+    /// A round through a warehouse with a pose every `spacing_m` metres (1 m if that is not a positive length).
+    pub fn in_warehouse(spacing_m: f64) -> Self {
+        let [west, east] = Warehouse::AISLE_ENDS_M;
+        let ways = [[west, east], [east, west]].into_iter().cycle();
+        let mut corners: Vec<_> =
+            Warehouse::aisles_m().zip(ways).flat_map(|(y, ends)| ends.map(|x| [x, y])).collect();
+        // The number of aisles is even: the last one ends where the first begins, across.
+        corners.extend(corners.first().copied());
+        Self::along(corners, spacing_m)
+    }
+
+    fn along(corners: Vec<[f64; 2]>, spacing_m: f64) -> Self {
         let round_m = corners.windows(2).map(|pair| length_m(pair[0], pair[1])).sum();
         Self { spacing_m: sound_spacing(spacing_m), next: 0, corners, round_m }
     }
@@ -109,6 +126,23 @@ mod tests {
                 for z in [0.1, 0.7, 1.4] {
                     assert!(!scene.is_solid([at.x + dx, at.y + dy, z]), "at {at}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_round_through_a_warehouse_is_closed_and_touches_nothing() {
+        let scene = Warehouse::new(6).scene([100.0, 50.0, 1.0], 300.0);
+        let walk = Walk::in_warehouse(0.5);
+        assert_eq!(walk.corners.first(), walk.corners.last());
+        for pair in walk.corners.windows(2) {
+            assert!(pair[0][0] == pair[1][0] || pair[0][1] == pair[1][1], "{pair:?}");
+        }
+        let round = (walk.round_m / 0.5) as usize + 2;
+        for pose in walk.take(round) {
+            let at = pose.isometry().translation;
+            for (dx, dy) in [(0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6)] {
+                assert!(!scene.is_solid([at.x + dx, at.y + dy, at.z]), "at {at}");
             }
         }
     }

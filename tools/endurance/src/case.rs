@@ -32,6 +32,17 @@ pub enum Input {
         /// How many scans.
         scans: usize,
     },
+    /// From a made-up survey, one scan in so many of it.
+    EveryNth {
+        /// Which one.
+        survey: SurveyName,
+        /// Rays of a scan, more or less.
+        rays: u32,
+        /// How many scans.
+        scans: usize,
+        /// How many scans of the survey one is taken of.
+        every: usize,
+    },
     /// From a folder of recorded scans and poses.
     Recorded {
         /// Which one.
@@ -82,7 +93,7 @@ impl Case {
     /// Whether the scans follow each other along a way, so that its length says how far the map has come.
     pub fn is_way(&self) -> bool {
         match &self.input {
-            Input::MadeUp { survey, .. } => survey.spacing_m().is_some(),
+            Input::MadeUp { survey, .. } | Input::EveryNth { survey, .. } => survey.spacing_m().is_some(),
             Input::Recorded { .. } => true,
         }
     }
@@ -97,6 +108,12 @@ impl Case {
             Input::MadeUp { survey, rays, scans } => Ok(Box::new(
                 survey.scans(SEED, 0, *rays).take(*scans).map(|scan| Ok(without_intensities(scan))),
             )),
+            Input::EveryNth { survey, rays, scans, every } => {
+                let (survey, rays, every) = (*survey, *rays, *every);
+                // Each by its number: those between are not made.
+                let scan = move |k: usize| survey.scans(SEED, every.saturating_mul(k), rays).next();
+                Ok(Box::new((0..*scans).filter_map(scan).map(|scan| Ok(without_intensities(scan)))))
+            }
             Input::Recorded { folder } => {
                 let cannot = format!("{}: cannot read the scans", folder.display());
                 let mut source = open_scans(folder, None).with_context(|| cannot.clone())?;
@@ -117,6 +134,10 @@ impl Case {
                 }
                 None => format!("`{}`, {rays} rays, {scans} scans", survey.name()),
             },
+            Input::EveryNth { survey, rays, scans, every } => {
+                let every = if *every > 1 { format!(", one in {every}") } else { String::new() };
+                format!("`{}`, {rays} rays, {scans} scans{every}", survey.name())
+            }
             Input::Recorded { .. } => "recorded".to_owned(),
         };
         let Self { resolution_m, tile_size_m, max_range_m, .. } = self;

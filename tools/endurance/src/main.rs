@@ -3,6 +3,7 @@
 mod bucket;
 mod build;
 mod case;
+mod day;
 mod export;
 mod findings;
 mod hard_scan;

@@ -1,4 +1,5 @@
 use crate::build::{Build, Built};
+use crate::day::{Day, DayFound};
 use crate::export::{Export, Exported};
 use crate::idle::{Idle, Idled};
 use crate::working_set::{WorkingSet, WorkingSetFound};
@@ -19,6 +20,8 @@ pub enum Task {
     Export(Export),
     /// Do nothing.
     Idle(Idle),
+    /// Map the same place all day.
+    Day(Day),
 }
 
 /// What tells the program to do a task that comes from standard input.
@@ -74,6 +77,14 @@ impl Apart for Idle {
     }
 }
 
+impl Apart for Day {
+    type Found = DayFound;
+
+    fn into_task(self) -> Task {
+        Task::Day(self)
+    }
+}
+
 /// Does the task that comes from standard input, and says to standard output what came of it.
 ///
 /// # Errors
@@ -86,6 +97,7 @@ pub fn do_task() -> Result<()> {
         Task::WorkingSet(working_set) => serde_json::to_value(working_set.run()?),
         Task::Export(export) => serde_json::to_value(export.run()?),
         Task::Idle(idle) => serde_json::to_value(idle.run()?),
+        Task::Day(day) => serde_json::to_value(day.run()?),
     };
     serde_json::to_writer(io::stdout().lock(), &outcome?)?;
     Ok(())

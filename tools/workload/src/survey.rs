@@ -14,6 +14,8 @@ pub enum SurveyName {
     Drive,
     /// Every metre of the same round of 4 km through the city, again and again
     Laps,
+    /// Every ten centimetres of a round of 2.4 km through a warehouse, again and again: ten scans a second
+    Warehouse,
     /// Every scan from another street within 5 km
     Teleport,
     /// Every scan from another mast of 50 m within 5 km, with rays of up to 400 m
@@ -37,6 +39,7 @@ impl SurveyName {
             Self::Indoor => Box::new(Survey::indoor(seed).skip(first)),
             Self::Drive => Box::new(Survey::tour(seed, rays).skip(first)),
             Self::Laps => Box::new(Survey::laps(seed, LAP_BLOCKS, rays).skip(first)),
+            Self::Warehouse => Box::new(Survey::warehouse(seed, rays).skip(first)),
             Self::Teleport => Box::new(Survey::teleports(seed, REACH_M, rays).skip(first)),
             Self::Mast => Box::new(Survey::masts(seed, REACH_M, rays).skip(first)),
         }
@@ -47,6 +50,7 @@ impl SurveyName {
         match self {
             Self::Street | Self::Drive | Self::Laps => Some(1.0),
             Self::Indoor => Some(0.5),
+            Self::Warehouse => Some(0.1),
             Self::Teleport | Self::Mast => None,
         }
     }
@@ -58,6 +62,7 @@ impl SurveyName {
             Self::Indoor => "indoor",
             Self::Drive => "drive",
             Self::Laps => "laps",
+            Self::Warehouse => "warehouse",
             Self::Teleport => "teleport",
             Self::Mast => "mast",
         }
@@ -87,7 +92,7 @@ mod tests {
             }
         }
         // Two surveys have their own number of rays.
-        assert_eq!(labels.len(), 6 * 4 - 2);
+        assert_eq!(labels.len(), 7 * 4 - 2);
     }
 
     #[test]

@@ -1,0 +1,193 @@
+use crate::build::remove_folder;
+use crate::case::{Case, Limit};
+use crate::process_memory;
+use anyhow::{Context, Result};
+use report::{Samples, Stopwatch};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+use voxtile::{MapReader, MapView, Mapper, OutOfCoreTileMapper, Storage};
+
+/// A robot that goes the same rounds all day: scan after scan of a small map, with flushes beside them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Day {
+    /// The scans.
+    pub case: Case,
+    /// Bytes for all that grows.
+    pub memory_bytes: usize,
+    /// How the tiles are stored.
+    pub storage: Storage,
+    /// How many scans come between two flushes.
+    pub flush_every_scans: usize,
+    /// How many scans make one part of the day.
+    pub scans_per_part: usize,
+    /// Folder of the map, which must not exist and is removed again.
+    pub folder: PathBuf,
+}
+
+/// What a part of the day took, and what there was at its end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    pub scans: u64,
+    pub flushes: u64,
+    /// Mean CPU time of a scan, all threads and the flushes among it.
+    pub cpu_ms: f64,
+    /// Wall time of the calls that insert a scan.
+    pub median_ms: f64,
+    pub p999_ms: f64,
+    pub worst_ms: f64,
+    /// Longest call that began a flush.
+    pub begin_flush_ms: f64,
+    /// Largest resident memory of the process after a scan, in bytes.
+    pub resident_bytes: u64,
+    /// Most files and folders in the map's folder, right after a flush had begun.
+    pub files: u64,
+    /// Most bytes of all of them.
+    pub map_bytes: u64,
+    /// Most bytes of the log of commits.
+    pub log_bytes: u64,
+    pub tiles: u64,
+}
+
+/// What came of the day.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct DayFound {
+    pub parts: Vec<Part>,
+    /// Largest resident memory of the process, in bytes.
+    pub peak_resident_bytes: u64,
+    /// Number of the last scan in the map that was left on disk.
+    pub scan_number: u64,
+}
+
+/// A part under way.
+#[derive(Default)]
+struct Under {
+    part: Part,
+    wall_ms: Samples,
+    cpu_s: f64,
+}
+
+impl Day {
+    /// Lives it in this process.
+    ///
+    /// # Errors
+    ///
+    /// A map that cannot be made.
+    pub fn run(self) -> Result<DayFound> {
+        let config = self.case.config(Limit::Bytes(self.memory_bytes))?.with_storage(self.storage);
+        let mut mapper = OutOfCoreTileMapper::create(&self.folder, config)?;
+        let mut parts = Vec::new();
+        let mut under = Under::default();
+        let mut unflushed = 0;
+        let mut since_last = Stopwatch::start()?;
+        for scan in self.case.scans()? {
+            let scan = scan?;
+            // Making the scan is no part of it; what other threads did meanwhile is.
+            under.cpu_s += since_last.stop()?.others_s;
+            let stopwatch = Stopwatch::start()?;
+            mapper.insert_scan(&scan)?;
+            let took = stopwatch.stop()?;
+            under.wall_ms.push(1e3 * took.wall_s);
+            under.cpu_s += took.cpu_s();
+            unflushed += 1;
+            if unflushed >= self.flush_every_scans && !mapper.is_flushing() {
+                let stopwatch = Stopwatch::start()?;
+                mapper.begin_flush()?;
+                let took = stopwatch.stop()?;
+                under.cpu_s += took.cpu_s();
+                under.part.begin_flush_ms = under.part.begin_flush_ms.max(1e3 * took.wall_s);
+                under.part.flushes += 1;
+                unflushed = 0;
+                under.look_at(&self.folder)?;
+            }
+            under.part.resident_bytes = under.part.resident_bytes.max(process_memory::resident_bytes()?);
+            under.part.scans += 1;
+            if under.part.scans as usize == self.scans_per_part {
+                let part = std::mem::take(&mut under).end(&mapper);
+                eprintln!("  {} scans: {:.2} ms CPU a scan, {} files", part.scans, part.cpu_ms, part.files);
+                parts.push(part);
+            }
+            since_last = Stopwatch::start()?;
+        }
+        mapper.flush()?;
+        drop(mapper);
+        let scan_number = MapReader::open(&self.folder, 1)?.scan_number();
+        remove_folder(&self.folder)?;
+        Ok(DayFound { parts, peak_resident_bytes: process_memory::peak_bytes()?, scan_number })
+    }
+}
+
+impl Under {
+    fn look_at(&mut self, folder: &Path) -> Result<()> {
+        let (files, bytes) = count(folder)?;
+        self.part.files = self.part.files.max(files);
+        self.part.map_bytes = self.part.map_bytes.max(bytes);
+        let log = folder.join("commits.log");
+        let log_bytes = fs::metadata(&log).with_context(|| format!("{}: cannot look at", log.display()))?.len();
+        self.part.log_bytes = self.part.log_bytes.max(log_bytes);
+        Ok(())
+    }
+
+    fn end(self, mapper: &OutOfCoreTileMapper) -> Part {
+        let quantile = |share| self.wall_ms.quantile(share);
+        Part {
+            cpu_ms: 1e3 * self.cpu_s / self.part.scans as f64,
+            median_ms: quantile(0.5),
+            p999_ms: quantile(0.999),
+            worst_ms: quantile(1.0),
+            tiles: mapper.statistics().tiles,
+            ..self.part
+        }
+    }
+}
+
+/// Files and folders in a folder, at any depth, and bytes of all of them. A flush goes on meanwhile: what is gone again
+/// does not count.
+fn count(folder: &Path) -> Result<(u64, u64)> {
+    let (mut files, mut bytes) = (0, 0);
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        let entries = fs::read_dir(&folder).with_context(|| format!("{}: cannot read", folder.display()))?;
+        for entry in entries {
+            let Ok(metadata) = entry.as_ref().map_err(|_| ()).and_then(|entry| entry.metadata().map_err(|_| ()))
+            else {
+                continue;
+            };
+            files += 1;
+            match entry {
+                Ok(entry) if metadata.is_dir() => folders.push(entry.path()),
+                _ => bytes += metadata.len(),
+            }
+        }
+    }
+    Ok((files, bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Input;
+    use workload::SurveyName;
+
+    #[test]
+    fn a_day_is_cut_into_parts_that_have_all_scans() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = Input::EveryNth { survey: SurveyName::Warehouse, rays: 300, scans: 12, every: 20 };
+        let case =
+            Case { name: "warehouse".into(), input, resolution_m: 0.4, tile_size_m: 8.0, max_range_m: 20.0 };
+        let day = Day {
+            case,
+            memory_bytes: 64 << 20,
+            storage: Storage::Compact,
+            flush_every_scans: 3,
+            scans_per_part: 6,
+            folder: folder.path().join("map"),
+        };
+        let found = day.run().unwrap();
+        assert_eq!((found.parts.len(), found.scan_number), (2, 12));
+        assert!(found.parts.iter().all(|part| part.scans == 6 && part.flushes > 0 && part.log_bytes > 0));
+        let [first, second] = found.parts[..] else { panic!("two parts") };
+        assert!(second.tiles > first.tiles && second.files > first.files && second.worst_ms >= second.median_ms);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,180 @@
+//! Does anything grow where a robot goes the same rounds all day?
+
+use crate::case::{Case, Input};
+use crate::day::{Day, DayFound, Part};
+use crate::findings::Findings;
+use crate::promise::{Promise, Wanted};
+use crate::setting::{Setting, mib};
+use crate::task::Apart;
+use anyhow::{Context, Result};
+use report::plot::{Content, Line, Panel, Plot, Scale};
+use report::{Cell, Table};
+use voxtile::Storage;
+use workload::SurveyName;
+
+const RAYS: u32 = 4_000;
+const SCANS_PER_S: usize = 10;
+const HOURS: usize = 12;
+const FLUSH_EVERY_S: usize = 10;
+/// Scans of a round, a metre a second.
+const SCANS_PER_ROUND: usize = 24_000;
+/// The last part by the second, in which everything has been seen.
+const MOST_GROWTH: f64 = 1.05;
+/// The same of times.
+const MOST_SLOWER: f64 = 1.15;
+
+pub fn answer(setting: &Setting) -> Result<Findings> {
+    // The short day has as many rounds as fit: its robot is 24 times as fast.
+    let (scans, every, scans_per_part) =
+        setting.size((HOURS * 3_600 * SCANS_PER_S, 1, 3_600 * SCANS_PER_S), (3_000, 24, SCANS_PER_ROUND / 24));
+    let input = Input::EveryNth { survey: SurveyName::Warehouse, rays: RAYS, scans, every };
+    let case = Case {
+        name: "warehouse".into(),
+        input,
+        resolution_m: setting.size(0.1, 0.2),
+        tile_size_m: 10.0,
+        max_range_m: 30.0,
+    };
+    let mut findings = Findings::default();
+    let mut lived = Vec::new();
+    for storage in [Storage::Compact, Storage::OctoMap] {
+        let day = Day {
+            case: case.clone(),
+            memory_bytes: setting.size(64, 24) << 20,
+            storage,
+            flush_every_scans: FLUSH_EVERY_S * SCANS_PER_S,
+            scans_per_part,
+            folder: setting.work.join("day"),
+        };
+        let found = day.clone().apart()?;
+        findings.keep(&day, &found)?;
+        findings.promises.extend(promises(&day, &found, scans)?);
+        lived.push((day, found));
+        if setting.is_short {
+            break;
+        }
+    }
+    let what = case.description();
+    findings.answer.tables = lived.iter().map(|(day, found)| table(day, found, &what)).collect();
+    findings.answer.plots = lived.first().map(|(_, found)| plot(found)).into_iter().collect();
+    Ok(findings)
+}
+
+fn promises(day: &Day, found: &DayFound, scans: usize) -> Result<Vec<Promise>> {
+    let storage = day.storage;
+    let (second, last) = found.parts.get(1).zip(found.parts.last()).context("a day has two parts or more")?;
+    let growth = |what: &str, of: fn(&Part) -> f64| {
+        let what = format!("`{storage}`: {what}, last part of the day by the second");
+        Promise::new(what, of(last) / of(second), Wanted::AtMost(MOST_GROWTH), "")
+    };
+    let slower = format!("`{storage}`: CPU time of a scan, last part of the day by the second");
+    let missing = scans as f64 - found.scan_number as f64;
+    Ok(vec![
+        growth("resident memory", |part| part.resident_bytes as f64),
+        growth("files", |part| part.files as f64),
+        growth("bytes on disk", |part| part.map_bytes as f64),
+        growth("bytes of the log of commits", |part| part.log_bytes as f64),
+        Promise::new(format!("`{storage}`: scans that are not in the map"), missing, Wanted::AtMost(0.0), ""),
+        Promise::about_time(slower, last.cpu_ms / second.cpu_ms, Wanted::AtMost(MOST_SLOWER), ""),
+    ])
+}
+
+fn table(day: &Day, found: &DayFound, what: &str) -> Table {
+    let caption = format!(
+        "A day by parts: {what}; limit {} MiB, storage `{}`, a flush beside the mapper every {} scans. Memory, files and \
+         bytes are the most of each part.",
+        day.memory_bytes >> 20,
+        day.storage,
+        day.flush_every_scans,
+    );
+    let columns = [
+        "scans",
+        "flushes",
+        "CPU ms a scan",
+        "median ms",
+        "p99.9",
+        "worst",
+        "begin flush: worst ms",
+        "resident MiB",
+        "files",
+        "map MiB",
+        "log KiB",
+        "tiles",
+    ];
+    let file = if day.storage == Storage::Compact { "day_compact" } else { "day_octomap" };
+    let mut table = Table::new(file, caption, columns);
+    let mut scans = 0;
+    for part in &found.parts {
+        scans += part.scans;
+        table.push([
+            Cell::Count(scans),
+            Cell::Count(part.flushes),
+            Cell::Number(part.cpu_ms, 2),
+            Cell::Number(part.median_ms, 2),
+            Cell::Number(part.p999_ms, 1),
+            Cell::Number(part.worst_ms, 1),
+            Cell::Number(part.begin_flush_ms, 1),
+            Cell::Number(mib(part.resident_bytes as f64), 1),
+            Cell::Count(part.files),
+            Cell::Number(mib(part.map_bytes as f64), 1),
+            Cell::Number(part.log_bytes as f64 / 1024.0, 0),
+            Cell::Count(part.tiles),
+        ]);
+    }
+    table
+}
+
+fn plot(found: &DayFound) -> Plot {
+    let panel = |title: &str, y_label: &str, of: fn(&Part) -> f64| {
+        let points = found.parts.iter().enumerate().map(|(number, part)| [(number + 1) as f64, of(part)]);
+        let lines = vec![Line { name: title.to_owned(), points: points.collect() }];
+        Panel {
+            title: title.to_owned(),
+            x_label: "part of the day".to_owned(),
+            y_label: y_label.to_owned(),
+            content: Content::Lines { x_scale: Scale::Linear, y_scale: Scale::Linear, lines },
+        }
+    };
+    let caption = "Memory, disk and cost of a scan over a day of the same rounds".to_owned();
+    let panels = vec![
+        panel("resident memory", "MiB", |part| mib(part.resident_bytes as f64)),
+        panel("map on disk", "MiB", |part| mib(part.map_bytes as f64)),
+        panel("CPU", "ms a scan", |part| part.cpu_ms),
+    ];
+    Plot { file: "day", caption, panels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    #[test]
+    fn growth_after_the_second_part_is_found() {
+        let part = |grown: f64| Part {
+            scans: 10,
+            cpu_ms: 2.0 * grown,
+            resident_bytes: (1e6 * grown) as u64,
+            files: 100,
+            map_bytes: 1_000,
+            log_bytes: (1_000.0 * grown) as u64,
+            ..Part::default()
+        };
+        let input = Input::EveryNth { survey: SurveyName::Warehouse, rays: 1, scans: 30, every: 1 };
+        let case =
+            Case { name: "warehouse".into(), input, resolution_m: 0.1, tile_size_m: 10.0, max_range_m: 30.0 };
+        let day = Day {
+            case,
+            memory_bytes: 1,
+            storage: Storage::Compact,
+            flush_every_scans: 1,
+            scans_per_part: 10,
+            folder: PathBuf::new(),
+        };
+        let parts = vec![part(0.1), part(1.0), part(1.2)];
+        let found = DayFound { parts, peak_resident_bytes: 0, scan_number: 30 };
+        let kept: Vec<bool> = promises(&day, &found, 30).unwrap().iter().map(Promise::is_kept).collect();
+        assert_eq!(kept, [false, true, true, false, true, false]);
+        assert!(promises(&day, &DayFound { parts: vec![], ..found }, 30).is_err());
+    }
+}
