@@ -6,6 +6,7 @@ use crate::command::intake::{Intake, Next};
 use crate::command::map_at::whole_map;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
+use crate::command::scan_queue::{ScanQueue, WhenBehind};
 use crate::command::scan_reader::ScanReader;
 use crate::command::stop_signal;
 use crate::command::summary::Summary;
@@ -44,6 +45,7 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     let exists = exists(args)?;
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
     check_no_rays(args, &config)?;
+    check_when_behind(args)?;
     let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room(args, &config), stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
@@ -74,6 +76,9 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
         return Ok(None);
     };
 
+    if args.when_behind != WhenBehind::Wait {
+        intake.read_ahead(ScanQueue::new(args.when_behind));
+    }
     let progress = watch.over_scans(input.scans);
     progress.pass(intake.content().scans);
     let mut build = Build {
@@ -104,8 +109,8 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     }
     let interrupted = stop.is_set();
     let summary = Summary::of(&args.output, scans, report, mapper, started.elapsed())?;
-    let (poses, unread) = (Some(input.poses.to_string()), intake.unread);
-    Ok(Some(Summary { interrupted, resumed_after, poses, unread, remarks, ..summary }))
+    let (poses, unread, left_out) = (Some(input.poses.to_string()), intake.unread, intake.left_out);
+    Ok(Some(Summary { interrupted, resumed_after, poses, unread, left_out, remarks, ..summary }))
 }
 
 struct Build<'a> {
@@ -167,6 +172,17 @@ fn check_no_rays(args: &BuildArgs, config: &MapConfig) -> crate::Result<()> {
     }
     let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build another map";
     Err(Error::argument("--no-rays, --keep-scans", reason))
+}
+
+/// Only scans that come by themselves can come too fast.
+fn check_when_behind(args: &BuildArgs) -> crate::Result<()> {
+    let is_file = args.scans.is_file() || args.scans.is_dir();
+    if args.when_behind == WhenBehind::Wait || !is_file {
+        return Ok(());
+    }
+    let reason =
+        "files wait until they are read: leave it out, or give the scans as they come, as - or a pipe";
+    Err(Error::argument("--when-behind", reason))
 }
 
 /// Takes the points of a scan as hits alone, as one batch; those outside the map's region are left out.
@@ -331,9 +347,14 @@ fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
         _ => Path::new("."),
     };
     match config.memory {
-        MemoryLimit::Bytes(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY, folder),
+        MemoryLimit::Bytes(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(args), folder),
         _ => PointRoom::default(),
     }
+}
+
+/// How many scans there may be at a time.
+fn scans_in_memory(args: &BuildArgs) -> usize {
+    if args.when_behind == WhenBehind::Wait { 1 } else { ScanQueue::MOST_SCANS + 1 }
 }
 
 fn check(scan: Option<&StoredScan>, config: &MapConfig) -> crate::Result<()> {

@@ -1,4 +1,5 @@
 use crate::Error;
+use crate::command::scan_queue::ScanQueue;
 use crate::command::scan_reader::{Read, ReadScan, ScanReader};
 use crate::io::{ScanChain, StoredScan};
 use crate::store::InputContent;
@@ -22,6 +23,8 @@ pub struct Intake {
     skips_bad: bool,
     /// Why scans were skipped by this process.
     pub unread: Vec<String>,
+    /// How many scans were left out because they came faster than they could be mapped.
+    pub left_out: u64,
 }
 
 /// What came of asking for a scan to map.
@@ -34,7 +37,13 @@ pub enum Next {
 impl Intake {
     pub fn new(reader: ScanReader, scans: PathBuf, skips_bad: bool) -> Self {
         let (lead, chain) = (VecDeque::new(), ScanChain::default());
-        Self { reader, scans, lead, chain, begins_with: None, skipped: vec![], skips_bad, unread: vec![] }
+        let (skipped, unread, left_out) = Default::default();
+        Self { reader, scans, lead, chain, begins_with: None, skipped, skips_bad, unread, left_out }
+    }
+
+    /// See [`ScanReader::read_ahead`].
+    pub fn read_ahead(&mut self, queue: ScanQueue) {
+        self.reader.read_ahead(queue);
     }
 
     /// Reads what tells which input this is; `false` if it was asked to stop before that had come.
@@ -148,6 +157,7 @@ impl Intake {
                     self.chain.add_unread();
                 }
                 Read::Unread(_) if was_skipped => self.chain.add_unread(),
+                Read::LeftOut(mark) => self.chain.add(&mark),
                 Read::Scan(ReadScan { mark, .. }) => self.chain.add(&mark),
                 Read::Unread(error) => {
                     let context = format!("scan {number}, which the map has taken, cannot be read any more");
@@ -167,6 +177,10 @@ impl Intake {
                 Read::Scan(ReadScan { scan, mark }) => {
                     self.chain.add(&mark);
                     return Ok(Next::Scan(scan));
+                }
+                Read::LeftOut(mark) => {
+                    self.chain.add(&mark);
+                    self.left_out += 1;
                 }
                 Read::Unread(error) => self.skip(error)?,
             }

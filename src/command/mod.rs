@@ -57,6 +57,7 @@ mod revert;
 mod rework;
 mod run;
 mod scan_input;
+mod scan_queue;
 mod scan_reader;
 mod scans;
 mod share;

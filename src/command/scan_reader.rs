@@ -1,9 +1,11 @@
 use crate::Error;
 use crate::command::scan_input;
+use crate::command::scan_queue::{ScanQueue, is_last};
 use crate::io::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
 use crate::scan::Stop;
 use anyhow::bail;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
@@ -16,6 +18,8 @@ const PATIENCE: Duration = Duration::from_millis(100);
 pub struct ScanReader {
     place: Place,
     stop: Stop,
+    /// Where scans come from once they are read before anybody asks.
+    ahead: Option<Arc<ScanQueue>>,
 }
 
 /// What is known of an input once it is open.
@@ -36,6 +40,8 @@ pub enum Read {
     Scan(ReadScan),
     /// One that cannot be read; the next call gives the one behind it.
     Unread(Error),
+    /// One that came while too many waited.
+    LeftOut(ScanMark),
     End,
     /// It was asked to stop before there was a scan.
     Stopped,
@@ -51,6 +57,8 @@ enum Request {
     Fingerprint,
     Remarks,
     Crs,
+    /// Read on into a queue until the input has come to its end.
+    Ahead(Arc<ScanQueue>),
 }
 
 enum Answer {
@@ -80,12 +88,15 @@ impl ScanReader {
             let opened = Opened::of(&path, &*source);
             let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
             while is_wanted && let Ok(request) = requests_in.recv() {
-                is_wanted = answers_out.send(answer(&mut *source, &request, &room)).is_ok();
+                is_wanted = match request {
+                    Request::Ahead(queue) => read_ahead(&mut *source, &room, &queue),
+                    request => answers_out.send(answer(&mut *source, &request, &room)).is_ok(),
+                };
             }
         };
         match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
             Ok(_) => {
-                let mut reader = Self { place: Place::Thread { requests, answers }, stop };
+                let mut reader = Self { place: Place::Thread { requests, answers }, stop, ahead: None };
                 match reader.wait(&mut || Ok(()))? {
                     Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
                     _ => Ok(None),
@@ -95,13 +106,27 @@ impl ScanReader {
                 log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
                 let source = scan_input::open(&scans, &options)?;
                 let opened = Opened::of(&scans, &*source);
-                Ok(Some((Self { place: Place::Here(source, here), stop }, opened)))
+                Ok(Some((Self { place: Place::Here(source, here), stop, ahead: None }, opened)))
             }
+        }
+    }
+
+    /// From here on scans are read as they come, and those that find no room are left out. Where there is no thread to
+    /// read, the input waits.
+    pub fn read_ahead(&mut self, queue: ScanQueue) {
+        if let Place::Thread { requests, .. } = &self.place {
+            let queue = Arc::new(queue);
+            // A thread that is gone is noticed by waiting for it.
+            drop(requests.send(Request::Ahead(queue.clone())));
+            self.ahead = Some(queue);
         }
     }
 
     /// The next scan. While it does not come, `idle` is called ten times a second.
     pub fn next(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Read> {
+        if let Some(queue) = &self.ahead {
+            return take(queue, &self.stop, idle);
+        }
         match self.ask(Request::Scan, idle)? {
             Some(Answer::Read(read)) => Ok(read?),
             _ => Ok(Read::Stopped),
@@ -161,10 +186,38 @@ impl ScanReader {
     }
 }
 
+impl Drop for ScanReader {
+    fn drop(&mut self) {
+        self.ahead.iter().for_each(|queue| queue.close());
+    }
+}
+
 impl Opened {
     fn of(scans: &std::path::Path, source: &dyn ScanSource) -> Self {
         let name = scan_input::name_of(scans, source);
         Self { name, scans: source.len_hint(), poses: source.pose_source() }
+    }
+}
+
+fn take(queue: &ScanQueue, stop: &Stop, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Read> {
+    while !stop.is_set() {
+        match queue.take(PATIENCE) {
+            Some(read) => return Ok(read?),
+            None => idle()?,
+        }
+    }
+    Ok(Read::Stopped)
+}
+
+/// Reads an input to its end; tells whether anybody wants more of it.
+fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, queue: &ScanQueue) -> bool {
+    loop {
+        let read = read(source, room);
+        let is_last = is_last(&read);
+        let is_wanted = queue.push(read);
+        if is_last || !is_wanted {
+            return is_wanted;
+        }
     }
 }
 
@@ -173,7 +226,7 @@ fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom) -> A
         Request::Scan => Answer::Read(read(source, room)),
         Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
         Request::Remarks => Answer::Remarks(source.remarks()),
-        Request::Crs => Answer::Crs(source.crs()),
+        Request::Crs | Request::Ahead(_) => Answer::Crs(source.crs()),
     }
 }
 

@@ -30,6 +30,9 @@ pub struct Summary {
     /// The scans that were skipped, with the reason of each.
     #[serde(rename = "unread_scans")]
     pub unread: Vec<String>,
+    /// How many scans were left out because they came faster than they could be mapped.
+    #[serde(rename = "left_out_scans")]
+    pub left_out: u64,
     /// What a person should know beside.
     pub remarks: Vec<String>,
     #[serde(skip)]
@@ -90,6 +93,7 @@ impl Summary {
             poses: None,
             region_tiles: mapper.config().rays.region,
             unread: Vec::new(),
+            left_out: 0,
             remarks: Vec::new(),
             grid: mapper.config().grid,
             report,
@@ -133,6 +137,10 @@ impl Summary {
         if !self.unread.is_empty() {
             writeln!(out, "unread    {} scans, skipped", HumanCount(self.unread.len() as u64))?;
             self.unread.iter().try_for_each(|scan| writeln!(out, "          {scan}"))?;
+        }
+        if self.left_out > 0 {
+            let left_out = HumanCount(self.left_out);
+            writeln!(out, "left out  {left_out} scans, which came faster than they could be mapped")?;
         }
         writeln!(
             out,

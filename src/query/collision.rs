@@ -31,6 +31,7 @@ pub(super) fn collision<V: MapView + ?Sized>(
         }
         let Some(tile) = view.tile(index)? else { continue };
         let mut touched = bricks_in(&tile, &around)
+            .filter(|brick| brick.may_hold(&tile, occupied_from))
             .filter(|brick| body.touches_voxels(grid, &brick.voxels))
             .flat_map(|brick| brick.voxels_from(&tile, occupied_from))
             .filter(|voxel| body.touches_voxel(grid, voxel.index));

@@ -1,12 +1,12 @@
-use super::region::{bricks_in, tiles_in, voxels_around};
+use super::region::{BrickPart, tiles_in, voxels_around};
 use super::{Hit, Occupancy};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::space::{Aabb, BRICK_EDGE, Grid, Point, TileIndex, VoxelBox};
+use crate::tile::Tile;
 
-/// Radii of the balls that are searched before the whole one, in edges of a brick and of a tile.
-const NEAR_BRICKS: [f64; 2] = [0.5, 2.0];
-const NEAR_TILES: [f64; 2] = [1.0, 4.0];
+/// Radius of the first ball that is searched, in edges of a brick. Each other one is twice as large as the one before.
+const FIRST_BRICKS: f64 = 1.0;
 
 pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     view: &V,
@@ -17,11 +17,9 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     // Small balls first: what is near is found without a look at the rest of the map.
     let grid = &view.config().grid;
     let brick_m = f64::from(BRICK_EDGE) * grid.resolution_m();
-    let radii_m = NEAR_BRICKS.map(|bricks| bricks * brick_m).into_iter();
-    for radius_m in radii_m.chain(NEAR_TILES.map(|tiles| tiles * grid.tile_size_m())) {
-        if radius_m < max_distance_m
-            && let Some(nearest) = nearest_in_ball(view, point, radius_m)?
-        {
+    let radii_m = std::iter::successors(Some(FIRST_BRICKS * brick_m), |radius_m| Some(2.0 * radius_m));
+    for radius_m in radii_m.take_while(|radius_m| *radius_m < max_distance_m) {
+        if let Some(nearest) = nearest_in_ball(view, point, radius_m)? {
             return Ok(Some(nearest));
         }
     }
@@ -54,10 +52,23 @@ fn nearest_in_ball<V: MapView + ?Sized>(view: &V, point: Point, max_distance_m: 
             break;
         }
         let Some(tile) = view.tile(index)? else { continue };
-        for brick in bricks_in(&tile, &voxels_around(&grid, &ball(limit_m))) {
+        let around = voxels_around(&grid, &ball(limit_m)).intersection(&tile.voxel_box());
+        let mut nearest_first: Vec<(f64, BrickPart)> = Vec::new();
+        let mut note = |brick: BrickPart| {
+            let distance_m = distance_to_voxels_m(&grid, &brick.voxels, point);
+            if distance_m <= limit_m && brick.may_hold(&tile, threshold) {
+                nearest_first.push((distance_m, brick));
+            }
+        };
+        // Most bricks are of free space, and are passed over without a look at their voxels.
+        if !tile.table().visit_marked(&around, threshold, |lowest| note(BrickPart::whole(lowest))) {
+            bricks_around(&tile, &around).for_each(note);
+        }
+        nearest_first.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (distance_m, brick) in nearest_first {
             let limit_m = best.map_or(max_distance_m, |best| best.distance_m);
-            if distance_to_voxels_m(&grid, &brick.voxels, point) > limit_m {
-                continue;
+            if distance_m > limit_m {
+                break;
             }
             for voxel in brick.voxels_from(&tile, threshold) {
                 let hit = Hit::from(&grid, point, voxel.index, None);
@@ -70,6 +81,21 @@ fn nearest_in_ball<V: MapView + ?Sized>(view: &V, point: Point, max_distance_m: 
         }
     }
     Ok(best)
+}
+
+/// Bricks of a tile that may have voxels in a box, as wholes, in no particular order.
+fn bricks_around(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = BrickPart> {
+    let low = voxels.min.map(|k| k & !(BRICK_EDGE - 1));
+    let along = move |k: usize| (low[k]..voxels.end[k]).step_by(BRICK_EDGE as usize);
+    let edges: [usize; 3] = std::array::from_fn(|k| if voxels.is_empty() { 0 } else { along(k).count() });
+    // A large ball may have more places for bricks than the tile has bricks.
+    let is_large = edges.iter().product::<usize>() > tile.table().brick_count();
+    let listed =
+        is_large.then(|| tile.table().bricks().filter_map(|brick| tile.voxels_of_brick(brick).next()));
+    let listed = listed.into_iter().flatten().map(|voxel| BrickPart::whole(voxel.index));
+    let places = (!is_large && !voxels.is_empty())
+        .then(|| along(0).flat_map(move |x| along(1).flat_map(move |y| along(2).map(move |z| [x, y, z]))));
+    listed.chain(places.into_iter().flatten().map(BrickPart::whole))
 }
 
 /// A distance from which on there may be voxels of a box.

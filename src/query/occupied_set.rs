@@ -1,7 +1,7 @@
 //! Queries of sets of voxels that are occupied, of which all others are unknown: local maps and layers.
 
 use super::collision::first_not_free;
-use super::ray::{Met, walk_ray, walk_segment};
+use super::ray::{Met, voxel_by_voxel, walk_ray, walk_segment};
 use super::region::voxels_around;
 use super::{Hit, Occupancy, RayQuery, Shape, UnknownAs, VoxelOccupancy};
 use crate::error::{Error, Result};
@@ -53,7 +53,7 @@ fn meet(set: &impl OccupiedSet, unknown: UnknownAs) -> impl FnMut(VoxelIndex) ->
 }
 
 pub(crate) fn cast_ray(set: &impl OccupiedSet, query: &RayQuery) -> Result<Option<Hit>> {
-    walk_ray(&set.grid_of_set(), query, set.hull(), meet(set, query.unknown))
+    walk_ray(&set.grid_of_set(), query, set.hull(), voxel_by_voxel(meet(set, query.unknown)))
 }
 
 pub(crate) fn cast_segment(
@@ -61,7 +61,7 @@ pub(crate) fn cast_segment(
     ends: [Point; 2],
     unknown: UnknownAs,
 ) -> Result<Option<Hit>> {
-    walk_segment(&set.grid_of_set(), ends, meet(set, unknown))
+    walk_segment(&set.grid_of_set(), ends, voxel_by_voxel(meet(set, unknown)))
 }
 
 pub(crate) fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>> {

@@ -1,9 +1,9 @@
-use super::tile_cursor::{Found, TileCursor};
+use super::tile_cursor::{Around, TileCursor};
 use super::{Hit, Occupancy, UnknownAs};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::scan::{MAX_RAY_STEPS, RayWalk};
-use crate::space::{BRICK_EDGE, Grid, Point, VoxelBox, VoxelIndex};
+use crate::scan::{Advanced, MAX_RAY_STEPS, RayWalk};
+use crate::space::{BRICK_EDGE, Grid, Point, VoxelBox, VoxelIndex, place_of_voxel};
 
 /// A ray to be cast through the map.
 ///
@@ -39,12 +39,24 @@ pub(crate) enum Met {
     Free,
     /// Nothing that stops it in this box around the voxel.
     Empty(VoxelBox),
+    /// Nothing so far: it has gone on, to a voxel that is still to be met.
+    Passed,
+    /// Nothing up to the last voxel.
+    End,
+}
+
+/// Meets a ray in one voxel after another.
+pub(crate) fn voxel_by_voxel(
+    mut meet: impl FnMut(VoxelIndex) -> Result<Met>,
+) -> impl FnMut(&mut RayWalk, f64) -> Result<Met> {
+    move |walk, _| meet(walk.voxel())
 }
 
 /// All voxels.
 pub(crate) const EVERYWHERE: VoxelBox = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
 
-/// Walks a ray until it is stopped. Outside the hull everything is unknown; there is no hull around nothing.
+/// Walks a ray until it is stopped. Outside the hull everything is unknown; there is no hull around nothing. `meet` is
+/// given the walk and the time until which it matters, and may walk on itself.
 ///
 /// # Errors
 ///
@@ -53,7 +65,7 @@ pub(crate) fn walk_ray(
     grid: &Grid,
     query: &RayQuery,
     hull: Option<VoxelBox>,
-    mut meet: impl FnMut(VoxelIndex) -> Result<Met>,
+    mut meet: impl FnMut(&mut RayWalk, f64) -> Result<Met>,
 ) -> Result<Option<Hit>> {
     let (origin, direction) = (query.origin, of_usable_size(query.direction));
     let start = grid
@@ -83,17 +95,19 @@ pub(crate) fn walk_ray(
     };
     let range_m = query.max_range_m.unwrap_or(f64::INFINITY);
     while walk.entry_time() <= range_m {
-        let voxel = walk.voxel();
-        match meet(voxel)? {
+        let before = walk.voxel();
+        match meet(&mut walk, range_m)? {
             Met::Obstacle(probability) => {
-                let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time());
-                return Ok(Some(Hit { voxel, center_m, distance_m, probability }));
+                let (voxel, distance_m) = (walk.voxel(), walk.entry_time());
+                return Ok(Some(Hit { voxel, center_m: grid.center_m(voxel), distance_m, probability }));
             }
             Met::Free => walk.advance(),
             Met::Empty(empty) => walk.leave(&empty),
+            Met::Passed => {}
+            Met::End => return Ok(None),
         }
         let is_over = query.unknown == UnknownAs::Free && !hull.contains(walk.voxel());
-        if is_over || walk.voxel() == voxel {
+        if is_over || walk.voxel() == before {
             // Beyond the map, or at the end of all voxels.
             return Ok(None);
         }
@@ -109,7 +123,7 @@ pub(crate) fn walk_ray(
 pub(crate) fn walk_segment(
     grid: &Grid,
     [from, to]: [Point; 2],
-    mut meet: impl FnMut(VoxelIndex) -> Result<Met>,
+    mut meet: impl FnMut(&mut RayWalk, f64) -> Result<Met>,
 ) -> Result<Option<Hit>> {
     let (Some(start), Some(last)) = (grid.voxel_of(from), grid.voxel_of(to)) else {
         let reason = format!("{from:?} to {to:?} m is not finite or too far away for voxel indices");
@@ -122,12 +136,13 @@ pub(crate) fn walk_segment(
     }
     let length_m = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
     loop {
-        let voxel = walk.voxel();
-        match meet(voxel)? {
+        match meet(&mut walk, f64::INFINITY)? {
             Met::Obstacle(probability) => {
-                let (center_m, distance_m) = (grid.center_m(voxel), walk.entry_time() * length_m);
-                return Ok(Some(Hit { voxel, center_m, distance_m, probability }));
+                let (voxel, distance_m) = (walk.voxel(), walk.entry_time() * length_m);
+                return Ok(Some(Hit { voxel, center_m: grid.center_m(voxel), distance_m, probability }));
             }
+            Met::Passed => {}
+            Met::End => return Ok(None),
             _ if walk.is_at_end() => return Ok(None),
             Met::Free => walk.advance(),
             Met::Empty(empty) => walk.leave(&empty),
@@ -147,27 +162,49 @@ pub(super) fn cast_segment<V: MapView + ?Sized>(
     walk_segment(&view.config().grid, ends, meet_map(view, unknown))
 }
 
-/// What a ray meets in the voxels of a map.
-fn meet_map<V: MapView + ?Sized>(view: &V, unknown: UnknownAs) -> impl FnMut(VoxelIndex) -> Result<Met> {
+/// What a ray meets in the voxels of a map: brick by brick.
+fn meet_map<V: MapView + ?Sized>(
+    view: &V,
+    unknown: UnknownAs,
+) -> impl FnMut(&mut RayWalk, f64) -> Result<Met> {
     let config = view.config();
     let occupied_from = config.occupied_log_odds();
+    let stops_at_unknown = unknown == UnknownAs::Obstacle;
     let mut tiles = TileCursor::new(view);
-    move |voxel| {
-        let (log_odds, empty) = match tiles.find(voxel)? {
-            Found::NothingIn(empty) => (None, Some(empty)),
-            Found::InBrick(evidence) => (evidence.map(|evidence| evidence.log_odds), None),
+    move |walk, until| {
+        if !stops_at_unknown && let Some(below) = tiles.below_around(walk.voxel(), occupied_from)? {
+            return Ok(match below.end[0] - below.min[0] > BRICK_EDGE {
+                true => Met::Empty(below),
+                // The few steps through a brick cost less than a jump.
+                false => met_nothing(walk.advance_in(&below, until, |_| true)),
+            });
+        }
+        let (brick, voxels) = match tiles.around(walk.voxel())? {
+            Around::Nothing(_) if stops_at_unknown => return Ok(Met::Obstacle(None)),
+            Around::Nothing(empty) => return Ok(Met::Empty(empty)),
+            Around::Brick(brick, voxels) => (brick, voxels),
         };
-        let stops = match log_odds {
-            None => unknown == UnknownAs::Obstacle,
-            Some(log_odds) => log_odds >= occupied_from,
+        let mut met = None;
+        let advanced = match (brick.is_below(occupied_from), stops_at_unknown) {
+            (true, false) => walk.advance_in(&voxels, until, |_| true),
+            (true, true) => walk.advance_in(&voxels, until, |voxel| brick.is_observed(place_of_voxel(voxel))),
+            (false, _) => walk.advance_in(&voxels, until, |voxel| {
+                let log_odds = brick.get(place_of_voxel(voxel)).map(|evidence| evidence.log_odds);
+                let stops = log_odds.map_or(stops_at_unknown, |log_odds| log_odds >= occupied_from);
+                // The probability is computed for the answer alone.
+                met = log_odds;
+                !stops
+            }),
         };
-        Ok(match empty {
-            // The probability is computed for the answer alone.
-            _ if stops => Met::Obstacle(Occupancy::of_log_odds(config, log_odds).probability()),
-            Some(empty) => Met::Empty(empty),
-            None => Met::Free,
+        Ok(match advanced {
+            Advanced::Stopped => Met::Obstacle(Occupancy::of_log_odds(config, met).probability()),
+            advanced => met_nothing(advanced),
         })
     }
+}
+
+fn met_nothing(advanced: Advanced) -> Met {
+    if advanced == Advanced::AtEnd { Met::End } else { Met::Passed }
 }
 
 /// The same direction, scaled if its squares would overflow or underflow.

@@ -6,7 +6,7 @@ use crate::maths::logit;
 use crate::space::{
     Aabb, BRICK_EDGE, BrickCode, BrickMask, Grid, TileBox, TileIndex, VoxelBox, VoxelIndex, mask_of_box,
 };
-use crate::tile::{Tile, Voxel};
+use crate::tile::{BrickLook, Tile, Voxel};
 
 pub(super) fn evidence_in<'a, V: MapView + ?Sized>(
     view: &'a V,
@@ -45,15 +45,20 @@ pub(super) fn for_each_occupied(
     mut visit: impl FnMut(Voxel),
 ) -> Result<()> {
     let threshold = min_log_odds(view.config(), min_probability);
-    let mut visit_occupied = |voxel: Voxel| {
-        if voxel.evidence.log_odds >= threshold {
-            visit(voxel);
-        }
-    };
     match region {
-        Some(region) => for_each_voxel_in(view, region, visit_occupied),
+        Some(region) => {
+            let grid = view.config().grid;
+            let around = voxels_around(&grid, region);
+            tiles_in(view, &around).into_iter().try_for_each(|index| {
+                let Some(tile) = view.tile_uncached(index)? else { return Ok(()) };
+                let bricks = bricks_in(&tile, &around).filter(|brick| brick.may_hold(&tile, threshold));
+                let voxels = bricks.flat_map(|brick| brick.voxels_from(&tile, threshold));
+                voxels.filter(|voxel| region.contains(grid.center_m(voxel.index))).for_each(&mut visit);
+                Ok(())
+            })
+        }
         None => view.tiles().try_for_each(|tile| {
-            tile?.voxels().for_each(&mut visit_occupied);
+            tile?.voxels_from(threshold).for_each(&mut visit);
             Ok(())
         }),
     }
@@ -67,7 +72,7 @@ pub(super) fn cached_occupied_voxels(
     let mut voxels = Vec::new();
     for index in view.cached_tile_indices() {
         if let Some(tile) = view.tile_uncached(index)? {
-            voxels.extend(tile.voxels().filter(|voxel| voxel.evidence.log_odds >= threshold));
+            voxels.extend(tile.voxels_from(threshold));
         }
     }
     Ok(voxels)
@@ -122,6 +127,11 @@ pub(super) struct BrickPart {
 }
 
 impl BrickPart {
+    /// A whole brick, by its lowest voxel.
+    pub(super) fn whole(lowest: VoxelIndex) -> Self {
+        Self { code: BrickCode::of_voxel(lowest), voxels: brick_of(lowest), mask: [u64::MAX; 8] }
+    }
+
     fn of(voxel: VoxelIndex, within: &VoxelBox) -> Self {
         let voxels = brick_of(voxel);
         let local = |corner: VoxelIndex| {
@@ -131,12 +141,27 @@ impl BrickPart {
         Self { code: BrickCode::of_voxel(voxel), voxels, mask }
     }
 
+    /// Whether there may be voxels whose log-odds are at least a threshold.
+    pub(super) fn may_hold(&self, tile: &Tile, threshold: f64) -> bool {
+        self.look(tile).is_some_and(|brick| !brick.is_below(threshold))
+    }
+
     /// The observed voxels whose log-odds are at least a threshold, in Morton order.
     pub(super) fn voxels_from(self, tile: &Tile, threshold: f64) -> impl Iterator<Item = Voxel> {
-        let found = tile.table().voxels_of_mask(self.code, self.mask);
-        found
-            .filter(move |(_, evidence)| evidence.log_odds >= threshold)
-            .map(|(code, evidence)| Voxel { index: tile.index_of(code), evidence })
+        let mut mask = self.mask;
+        if threshold > f64::NEG_INFINITY
+            && let Some(brick) = self.look(tile)
+        {
+            let from_threshold = brick.mask_from(threshold);
+            mask.iter_mut().zip(from_threshold).for_each(|(word, wanted)| *word &= wanted);
+        }
+        let found = tile.table().voxels_of_mask(self.code, mask);
+        found.map(|(code, evidence)| Voxel { index: tile.index_of(code), evidence })
+    }
+
+    fn look<'a>(&self, tile: &'a Tile) -> Option<BrickLook<'a>> {
+        let table = tile.table();
+        table.number_of_brick(self.code).and_then(|number| table.numbered(number))
     }
 }
 

@@ -1,76 +1,74 @@
 use super::ray::brick_of;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
-use crate::sensor::Evidence;
-use crate::space::{BrickCode, TileIndex, VoxelBox, VoxelIndex, place_of_voxel};
-use crate::tile::Tile;
+use crate::space::{BrickCode, VoxelBox, VoxelIndex};
+use crate::tile::{BrickLook, Tile};
 
-/// Keeps the last tile, so that neighbouring voxels load it once, and finds its last brick once.
+/// Keeps the last tile, so that neighbouring voxels load it once.
 pub(super) struct TileCursor<'a, V: ?Sized> {
     view: &'a V,
-    tile: Option<(TileIndex, Option<TileRef<'a>>)>,
-    brick: Option<NearBrick>,
+    tile: Option<CurrentTile<'a>>,
 }
 
-/// The brick that was found last.
-#[derive(Clone, Copy)]
-struct NearBrick {
-    /// Its voxels in the tile.
+struct CurrentTile<'a> {
     voxels: VoxelBox,
-    /// Its number in the tile's table.
-    number: u32,
+    /// `None` if nothing was observed in it.
+    tile: Option<TileRef<'a>>,
 }
 
-/// What is found at a voxel.
-pub(super) enum Found {
+/// What there is around a voxel.
+pub(super) enum Around<'a> {
     /// Nothing was observed in this box around it.
-    NothingIn(VoxelBox),
-    /// Something was observed in its brick; this is its own evidence.
-    InBrick(Option<Evidence>),
+    Nothing(VoxelBox),
+    /// Something was observed in its brick, of which these voxels are of its tile.
+    Brick(BrickLook<'a>, VoxelBox),
 }
 
 impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
     pub(super) fn new(view: &'a V) -> Self {
-        Self { view, tile: None, brick: None }
+        Self { view, tile: None }
     }
 
     /// The tile that holds a voxel; `None` if nothing was observed in it.
     pub(super) fn tile_of(&mut self, voxel: VoxelIndex) -> Result<Option<&Tile>> {
-        let index = self.view.config().grid.tile_of_voxel(voxel);
-        if self.tile.as_ref().is_none_or(|(current, _)| *current != index) {
-            // Release the previous tile first, so that it can be evicted.
-            (self.tile, self.brick) = (None, None);
-            self.tile = Some((index, self.view.tile(index)?));
-        }
-        Ok(self.tile())
+        Ok(self.current(voxel)?.tile.as_deref())
     }
 
-    /// What is known of a voxel and around it.
+    /// A box around a voxel in which all log-odds, if there are any, are less than a threshold; `None` if nobody knows.
     #[inline]
-    pub(super) fn find(&mut self, voxel: VoxelIndex) -> Result<Found> {
-        if let (Some(near), Some(tile)) = (self.brick, self.tile())
-            && near.voxels.contains(voxel)
-        {
-            return Ok(Found::InBrick(tile.table().get_in(near.number, place_of_voxel(voxel))));
-        }
-        self.find_brick(voxel)
+    pub(super) fn below_around(&mut self, voxel: VoxelIndex, threshold: f64) -> Result<Option<VoxelBox>> {
+        let CurrentTile { voxels, tile } = self.current(voxel)?;
+        Ok(match tile {
+            Some(tile) => tile.table().below_around(voxel, threshold).map(|below| below.intersection(voxels)),
+            None => Some(*voxels),
+        })
     }
 
-    fn find_brick(&mut self, voxel: VoxelIndex) -> Result<Found> {
-        let grid = self.view.config().grid;
-        let Some(tile) = self.tile_of(voxel)? else {
-            return Ok(Found::NothingIn(grid.voxels_of_tile(grid.tile_of_voxel(voxel))));
-        };
-        let voxels = brick_of(voxel).intersection(&tile.voxel_box());
-        let Some(number) = tile.table().number_of_brick(BrickCode::of_voxel(voxel)) else {
-            return Ok(Found::NothingIn(voxels));
-        };
-        let evidence = tile.table().get_in(number, place_of_voxel(voxel));
-        self.brick = Some(NearBrick { voxels, number });
-        Ok(Found::InBrick(evidence))
+    /// What is known around a voxel.
+    #[inline]
+    pub(super) fn around(&mut self, voxel: VoxelIndex) -> Result<Around<'_>> {
+        let CurrentTile { voxels, tile } = self.current(voxel)?;
+        let Some(tile) = tile else { return Ok(Around::Nothing(*voxels)) };
+        let of_brick = brick_of(voxel).intersection(voxels);
+        let table = tile.table();
+        let number = table.number_of_brick(BrickCode::of_voxel(voxel));
+        Ok(match number.and_then(|number| table.numbered(number)) {
+            Some(brick) => Around::Brick(brick, of_brick),
+            None => Around::Nothing(of_brick),
+        })
     }
 
-    fn tile(&self) -> Option<&Tile> {
-        self.tile.as_ref().and_then(|(_, tile)| tile.as_deref())
+    #[inline]
+    fn current(&mut self, voxel: VoxelIndex) -> Result<&CurrentTile<'a>> {
+        // Release the previous tile first, so that it can be evicted.
+        let current = match self.tile.take().filter(|current| current.voxels.contains(voxel)) {
+            Some(current) => current,
+            None => {
+                let grid = self.view.config().grid;
+                let index = grid.tile_of_voxel(voxel);
+                CurrentTile { voxels: grid.voxels_of_tile(index), tile: self.view.tile(index)? }
+            }
+        };
+        Ok(self.tile.insert(current))
     }
 }

@@ -1,6 +1,6 @@
 use super::collision::first_not_free;
 use super::occupied_set::check_resolutions;
-use super::ray::{EVERYWHERE, Met, walk_ray, walk_segment};
+use super::ray::{EVERYWHERE, Met, voxel_by_voxel, walk_ray, walk_segment};
 use super::{Hit, Occupancy, Queries, RayQuery, Shape, UnknownAs, VoxelOccupancy, Voxels};
 use crate::error::{Error, Result};
 use crate::space::{Aabb, Grid, Point, VoxelIndex};
@@ -128,14 +128,14 @@ impl Queries for United<'_> {
     fn cast_ray(&self, ray: &RayQuery) -> Result<Option<Hit>> {
         match ray.unknown {
             UnknownAs::Free => self.best(|map| map.cast_ray(ray), is_before),
-            UnknownAs::Obstacle => walk_ray(&self.grid, ray, Some(EVERYWHERE), self.meet()),
+            UnknownAs::Obstacle => walk_ray(&self.grid, ray, Some(EVERYWHERE), voxel_by_voxel(self.meet())),
         }
     }
 
     fn cast_segment(&self, from: Point, to: Point, unknown: UnknownAs) -> Result<Option<Hit>> {
         match unknown {
             UnknownAs::Free => self.best(|map| map.cast_segment(from, to, unknown), is_before),
-            UnknownAs::Obstacle => walk_segment(&self.grid, [from, to], self.meet()),
+            UnknownAs::Obstacle => walk_segment(&self.grid, [from, to], voxel_by_voxel(self.meet())),
         }
     }
 

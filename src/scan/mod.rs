@@ -29,6 +29,7 @@ mod world_scan;
 pub use coordinate::Coordinate;
 pub use point_batch::PointBatch;
 pub use pose::Pose;
+pub(crate) use ray::Advanced;
 pub use ray::{MAX_RAY_STEPS, RayWalk, no_return};
 pub use report::{ScanReport, SkippedPoints};
 pub use scan_points::{ScanPoints, TakePoints};

@@ -87,6 +87,15 @@ impl SensorModel {
         }
     }
 
+    /// No miss leads to larger log-odds, unless they were larger before: a first one, or the clamp.
+    pub(crate) fn most_after_miss(&self) -> f64 {
+        let min = match self {
+            Self::LogOdds(model) => model.min,
+            Self::Iwlo(model) => model.min,
+        };
+        self.update(None, Observation::Miss).log_odds.max(min)
+    }
+
     /// The evidence after so many misses in a row, bit-identical to single updates.
     pub fn update_misses(&self, before: Evidence, misses: u16) -> Evidence {
         let min = match self {

@@ -1,6 +1,6 @@
 use super::building::{Building, Room};
-use super::warehouse::Warehouse;
 use super::route::{Route, level_pose, sound_spacing};
+use super::warehouse::Warehouse;
 use crate::maths;
 use crate::scan::Pose;
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -91,7 +91,8 @@ fn build_bay(random: &mut Random, x_m: f64, row_m: f64, solids: &mut Vec<Solid>)
             if random.below(4) > 0 {
                 let (begin, end) = (random.between(0.2, 0.6), random.between(3.2, 3.9));
                 let height_m = random.between(0.6, 1.6);
-                let (min, max) = ([x_m + begin, side + 0.1, board_m], [x_m + end, side + 1.0, board_m + height_m]);
+                let (min, max) =
+                    ([x_m + begin, side + 0.1, board_m], [x_m + end, side + 1.0, board_m + height_m]);
                 solids.push(Solid::new(min, max, GOODS));
             }
         }

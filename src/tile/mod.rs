@@ -16,6 +16,7 @@ mod tile_body;
 
 pub use octocache::{OctreeQueueCounts, OctreeStatistics, OctreeTimes, VoxelCache, VoxelCacheCounts};
 pub use octree::OctreeFactory;
+pub(crate) use table::BrickLook;
 pub use table::Table;
 pub use tile_body::{Tile, TileCounts, Voxel};
 

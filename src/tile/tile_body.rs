@@ -124,6 +124,13 @@ impl Tile {
         self.table.iter().map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
     }
 
+    /// The observed voxels whose log-odds are at least a threshold, in Morton order: without a look at those of bricks
+    /// of free space.
+    pub fn voxels_from(&self, log_odds: f64) -> impl Iterator<Item = Voxel> {
+        let found = self.table.iter_from(log_odds);
+        found.map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
+    }
+
     /// The observed voxels of one brick in Morton order.
     pub fn voxels_of_brick(&self, brick: BrickCode) -> impl Iterator<Item = Voxel> {
         self.table

@@ -6,10 +6,11 @@ use testkit::reference_map::voxels_of;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::query::{RayQuery, Shape, UnknownAs};
 use voxtile::scan::{PointBatch, RayWalk};
+use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
 use voxtile::{
-    InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, Occupancy,
-    OutOfCoreTileMapper, Queries,
+    InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, Occupancy,
+    OutOfCoreTileMapper, Queries, Storage,
 };
 
 fn config() -> MapConfig {
@@ -237,6 +238,105 @@ fn regions_collisions_and_nearest_are_those_of_a_search_of_every_voxel() {
             .min_by(|a, b| a.partial_cmp(b).unwrap());
         let answer = out_of_core.nearest_occupied(center, max_distance_m).unwrap();
         assert_eq!(answer.map(|nearest| (nearest.distance_m, nearest.voxel)), nearest);
+    }
+}
+
+/// Sensor models under which one miss leads far down, hardly down, and up.
+fn models() -> [SensorModel; 4] {
+    let plain = LogOdds::default();
+    [
+        SensorModel::LogOdds(plain),
+        SensorModel::LogOdds(LogOdds { miss: -0.02, ..plain }),
+        SensorModel::LogOdds(LogOdds { min: 0.3, ..plain }),
+        SensorModel::Iwlo(Iwlo { adaptive: true, ..Iwlo::default() }),
+    ]
+}
+
+/// Asks a map about rays, nearest and occupied voxels, and looks at every voxel for the answers.
+fn check_by_every_voxel(map: &impl MapView, random: &mut Random) {
+    let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
+    let log_odds = |(bits, _): (u64, i32)| f64::from_bits(bits);
+    let all: HashMap<VoxelIndex, f64> =
+        voxels_of(map).into_iter().map(|(voxel, evidence)| (voxel, log_odds(evidence))).collect();
+    let mut occupied: Vec<VoxelIndex> =
+        all.iter().filter(|(_, log_odds)| **log_odds >= occupied_from).map(|(voxel, _)| *voxel).collect();
+    let mut listed: Vec<VoxelIndex> =
+        map.all_occupied_voxels(None).unwrap().iter().map(|voxel| voxel.index).collect();
+    let mut in_region = Vec::new();
+    let region = Aabb { min: [-100.0; 3], max: [100.0; 3] };
+    map.for_each_occupied(None, Some(&region), |voxel| in_region.push(voxel.index)).unwrap();
+    [&mut occupied, &mut listed, &mut in_region].into_iter().for_each(|voxels| voxels.sort_unstable());
+    assert_eq!((&listed, &in_region), (&occupied, &occupied));
+    for number in 0..60 {
+        let origin = random.point([0.0; 3], 4.0);
+        let direction = random.point([0.0; 3], 1.0);
+        let unknown = if number % 4 == 0 { UnknownAs::Obstacle } else { UnknownAs::Free };
+        let query = RayQuery { origin, direction, max_range_m: Some(9.0), unknown };
+        let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
+        let unit = grid.to_voxel_units(direction.map(|d| d / length));
+        let mut walk = RayWalk::along(grid.to_voxel_units(origin), grid.voxel_of(origin).unwrap(), unit);
+        let stopped = loop {
+            if walk.entry_time() > 9.0 {
+                break None;
+            }
+            let log_odds = all.get(&walk.voxel());
+            if log_odds.map_or(unknown == UnknownAs::Obstacle, |log_odds| *log_odds >= occupied_from) {
+                break Some((walk.voxel(), walk.entry_time()));
+            }
+            walk.advance();
+        };
+        let answer = map.cast_ray(&query).unwrap();
+        assert_eq!(answer.map(|hit| (hit.voxel, hit.distance_m)), stopped, "{query:?}");
+        let end = std::array::from_fn(|k| origin[k] + 2.0 * direction[k]);
+        let [from, to] =
+            [origin, end].map(|point| (grid.to_voxel_units(point), grid.voxel_of(point).unwrap()));
+        let mut walk = RayWalk::between(from.0, from.1, to.0, to.1);
+        let stopped = loop {
+            let log_odds = all.get(&walk.voxel());
+            if log_odds.map_or(unknown == UnknownAs::Obstacle, |log_odds| *log_odds >= occupied_from) {
+                break Some(walk.voxel());
+            }
+            if walk.is_at_end() {
+                break None;
+            }
+            walk.advance();
+        };
+        let answer = map.cast_segment(origin, end, unknown).unwrap();
+        assert_eq!(answer.map(|hit| hit.voxel), stopped, "{origin:?} to {end:?}");
+        let distance =
+            |v: &VoxelIndex| (0..3).map(|k| (grid.center_m(*v)[k] - origin[k]).powi(2)).sum::<f64>().sqrt();
+        let nearest = occupied.iter().map(|v| (distance(v), *v)).filter(|(distance, _)| *distance <= 2.0);
+        let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap());
+        let answer = map.nearest_occupied(origin, 2.0).unwrap();
+        assert_eq!(answer.map(|hit| (hit.distance_m, hit.voxel)), nearest);
+    }
+}
+
+#[test]
+fn free_space_is_passed_over_only_where_it_is_free() {
+    let mut random = Random(70);
+    for (number, model) in models().into_iter().enumerate() {
+        for threshold in [0.2, 0.4, 0.485, 0.4878, 0.5, 0.7, 0.95] {
+            let folder = TempDir::new().unwrap();
+            // Tiles of three blocks of bricks along each side, and a part of one.
+            let mut config = MapConfig::new(0.1, 10.0).unwrap();
+            (config.sensor_model, config.occupancy_threshold) = (model, threshold);
+            config.rays.insert_mode = if number % 2 == 0 { InsertMode::PerScan } else { InsertMode::PerRay };
+            let storage = if threshold < 0.49 { Storage::Compact } else { Storage::OctoMap };
+            let path = folder.path().join("map");
+            let disk = MapPath::on(UnsyncedDisk::shared(), &path);
+            let mut mapper = OutOfCoreTileMapper::create(disk, config.with_storage(storage)).unwrap();
+            for seed in 0..3 {
+                let from = random.point([0.0; 3], 2.0);
+                mapper.insert_scan(&random_scan(&mut Random(seed), from, 60)).unwrap();
+            }
+            // As it was made; with summaries of every brick; as it comes from disk.
+            check_by_every_voxel(&mapper, &mut random);
+            mapper.flush().unwrap();
+            check_by_every_voxel(&mapper, &mut random);
+            drop(mapper);
+            check_by_every_voxel(&MapReader::open(&path, 64).unwrap(), &mut random);
+        }
     }
 }
 

@@ -167,6 +167,39 @@ mod command {
     }
 
     #[test]
+    fn scans_that_come_too_fast_are_left_out_if_asked_counted_and_not_taken_later() {
+        const SCANS: usize = 60;
+        let folder = TempDir::new().unwrap();
+        let (map, again, file) =
+            (folder.path().join("map"), folder.path().join("again"), folder.path().join("drive.scans"));
+        for how in ["drop-oldest", "thin"] {
+            let _ = std::fs::remove_dir_all(&map);
+            let _ = std::fs::remove_dir_all(&again);
+            let arguments = ["build", "-", "-o", text(&map), "--resolution", "0.5", "--keep-scans", "--json"];
+            let arguments = [&arguments[..], &["--when-behind", how]].concat();
+            // All at once.
+            let built = voxtile(&arguments).write_stdin(drive("", SCANS)).assert().success();
+            let summary: serde_json::Value = serde_json::from_slice(&built.get_output().stdout).unwrap();
+            let [scans, left_out] = ["scans", "left_out_scans"].map(|key| summary[key].as_u64().unwrap());
+            assert_eq!(scans + left_out, SCANS as u64);
+            assert!(scans > 0 && left_out > 0, "{summary}");
+            // The map is that of the scans which it keeps.
+            json(&["build", text(&map), "-o", text(&again), "--resolution", "0.5", "--json"]);
+            assert_eq!(digest(&map), digest(&again));
+            assert_eq!(json(&["info", text(&map), "--json"])["scan_number"], scans);
+            // The same input goes on behind what came: nothing that was left out is taken.
+            let arguments = ["build", "-", "-o", text(&map), "--resolution", "0.5", "--resume", "--json"];
+            let resumed = voxtile(&arguments).write_stdin(drive("", SCANS + 2)).assert().success();
+            let summary: serde_json::Value = serde_json::from_slice(&resumed.get_output().stdout).unwrap();
+            assert_eq!((summary["scans"].as_u64(), summary["left_out_scans"].as_u64()), (Some(2), Some(0)));
+        }
+        std::fs::write(&file, drive("", 2)).unwrap();
+        let arguments = ["build", text(&file), "-o", text(&again), "--when-behind", "thin"];
+        let refused = voxtile(&arguments).assert().code(2);
+        assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("--when-behind"));
+    }
+
+    #[test]
     fn a_local_map_takes_scans_from_standard_input_once() {
         let folder = TempDir::new().unwrap();
         let (file, picture) = (folder.path().join("drive.scans"), folder.path().join("local.png"));

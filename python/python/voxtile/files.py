@@ -74,6 +74,7 @@ class BuildOptions(ReadOptions, total=False):
     again: bool
     skip_bad: bool
     flush_every: int | str
+    when_behind: Literal["wait", "drop-oldest", "thin"]
 
 
 class ExportOptions(TypedDict, total=False):

@@ -1,6 +1,7 @@
 use super::ReadArgs;
 use crate::Storage;
 use crate::command::flush_schedule::FlushEvery;
+use crate::command::scan_queue::WhenBehind;
 use bytesize::ByteSize;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -89,6 +90,10 @@ pub struct BuildArgs {
     /// only at the end (end): what a crash can lose
     #[arg(long, value_name = "N", default_value = "60s")]
     pub flush_every: FlushEvery,
+    /// What becomes of scans from standard input or a pipe that come faster than they can be mapped; those left out are
+    /// counted
+    #[arg(long, value_name = "HOW", default_value = "wait")]
+    pub when_behind: WhenBehind,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,

@@ -69,6 +69,8 @@ impl Flight {
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.own_bytes + self.bytes_to_make + hash_table_bytes::<(TileIndex, FlightTile)>(self.tiles.capacity())
+        self.own_bytes
+            + self.bytes_to_make
+            + hash_table_bytes::<(TileIndex, FlightTile)>(self.tiles.capacity())
     }
 }

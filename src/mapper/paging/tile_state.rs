@@ -72,7 +72,10 @@ impl StoredTileState {
             PackedUpdates::unpack(input, |updates| tile.apply(model, &updates))
                 .map_err(|error| Error::io(files.folder(), "read buffered updates in", error))?;
         }
-        self.updates.iter().flat_map(|updates| updates.iter()).for_each(|updates| tile.apply(model, &updates));
+        self.updates
+            .iter()
+            .flat_map(|updates| updates.iter())
+            .for_each(|updates| tile.apply(model, &updates));
         Ok(())
     }
 }

@@ -129,7 +129,7 @@ impl Cells {
         let mut nodes: BTreeMap<_, _> =
             keys.map(|key| (key, Self { cells: Vec::new(), last_scan })).collect();
         let (threshold, scale) = (config.occupied_log_odds(), Scale::of(config, Kind::Occupied));
-        for voxel in tile.voxels().filter(|voxel| voxel.evidence.log_odds >= threshold) {
+        for voxel in tile.voxels_from(threshold) {
             let value = scale.value(voxel.evidence.log_odds);
             let count = count_of(voxel.evidence.observation_count);
             for level in 0..=scheme.tile_level() {

@@ -18,6 +18,7 @@ pub(crate) use range::{NO_RETURN_M, RangeRule, Ranged};
 pub(crate) use ray_cut::RayCut;
 pub(crate) use ray_end::RayEnd;
 pub(crate) use ray_origin::RayOrigin;
+pub(crate) use ray_walk::Advanced;
 pub use ray_walk::{MAX_RAY_STEPS, RayWalk};
 pub(crate) use slab_path::Stretch;
 pub(crate) use slab_ray::{SlabRay, voxel};

@@ -23,6 +23,17 @@ pub struct RayWalk {
     entry: f64,
 }
 
+/// What came of [`RayWalk::advance_in`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Advanced {
+    /// The present voxel did not pass.
+    Stopped,
+    /// The present voxel is outside, or was entered too late; it was not looked at.
+    Left,
+    /// The present voxel passed, and is the last.
+    AtEnd,
+}
+
 impl RayWalk {
     /// The walk from `origin` to `end`, both in units of voxels and inside `start` and `last`, their voxels.
     ///
@@ -127,6 +138,63 @@ impl RayWalk {
                 tz = if z == lz { f64::INFINITY } else { (f64::from(z) + bz - oz) * iz };
             }
         }
+    }
+
+    /// Steps on from the present voxel, which is inside `region`, as long as voxels pass, to the first one outside or
+    /// entered after `until`.
+    ///
+    /// The same steps as [`RayWalk::advance`], with everything in registers.
+    #[inline]
+    pub(crate) fn advance_in(
+        &mut self,
+        region: &VoxelBox,
+        until: f64,
+        mut passes: impl FnMut(VoxelIndex) -> bool,
+    ) -> Advanced {
+        let [ox, oy, oz] = self.origin;
+        let [ix, iy, iz] = self.inv_direction;
+        let [lx, ly, lz] = self.last;
+        let [sx, sy, sz] = self.step;
+        let [bx, by, bz] = self.step.map(|step| f64::from(step > 0));
+        let [mut x, mut y, mut z] = self.voxel;
+        let [mut tx, mut ty, mut tz] = self.next;
+        let mut entry = self.entry;
+        // The first coordinates outside; what the walk never leaves along is never equal to it.
+        let [ex, ey, ez]: VoxelIndex = std::array::from_fn(|k| match self.step[k] {
+            1 => region.end[k],
+            -1 => region.min[k].wrapping_sub(1),
+            _ => i32::MIN,
+        });
+        let advanced = loop {
+            if !passes([x, y, z]) {
+                break Advanced::Stopped;
+            }
+            let is_outside;
+            if tx <= ty && tx <= tz {
+                if tx == f64::INFINITY {
+                    break Advanced::AtEnd;
+                }
+                entry = tx;
+                x += sx;
+                tx = if x == lx { f64::INFINITY } else { (f64::from(x) + bx - ox) * ix };
+                is_outside = x == ex;
+            } else if ty <= tz {
+                entry = ty;
+                y += sy;
+                ty = if y == ly { f64::INFINITY } else { (f64::from(y) + by - oy) * iy };
+                is_outside = y == ey;
+            } else {
+                entry = tz;
+                z += sz;
+                tz = if z == lz { f64::INFINITY } else { (f64::from(z) + bz - oz) * iz };
+                is_outside = z == ez;
+            }
+            if is_outside || entry > until {
+                break Advanced::Left;
+            }
+        };
+        (self.voxel, self.next, self.entry) = ([x, y, z], [tx, ty, tz], entry);
+        advanced
     }
 
     /// Whether the present voxel is the last.

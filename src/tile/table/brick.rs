@@ -30,7 +30,8 @@ impl Brick {
 
     /// A brick without observed voxels.
     pub(crate) const fn new(code: BrickCode) -> Self {
-        Self::with(code, [0; 8], Storage::Interned(Cells::empty()))
+        let evidence = Storage::Interned(Cells::empty());
+        Self { code, observed: [0; 8], evidence, summary: Summary::EMPTY }
     }
 
     /// A brick with voxels.
@@ -78,6 +79,23 @@ impl Brick {
                 cells.for_each(self.observed, |place, evidence| visit(place, evidence.into()))
             }
         }
+    }
+
+    /// The observed voxels whose log-odds are at least a threshold.
+    pub(crate) fn mask_from(&self, threshold: f64, palette: &Palette) -> BrickMask {
+        let mut mask = [0; 8];
+        for (word, bits) in mask.iter_mut().enumerate() {
+            let from_threshold = match &self.evidence {
+                Storage::Interned(cells) => {
+                    cells.cell(word).map(|cell| bits_of(cell, |state| palette.evidence(state), threshold))
+                }
+                Storage::Plain(cells) => {
+                    cells.cell(word).map(|cell| bits_of(cell, Evidence::from, threshold))
+                }
+            };
+            *bits = from_threshold.unwrap_or(0) & self.observed[word];
+        }
+        mask
     }
 
     /// Makes the brick hold its evidence itself, without the palette.
@@ -129,6 +147,18 @@ impl Brick {
         }
     }
 
+    /// No voxel has larger log-odds, but for rounding.
+    #[inline]
+    pub(crate) fn bound(&self) -> f32 {
+        self.summary.max
+    }
+
+    /// Whether no voxel is known to have log-odds of a threshold or more.
+    #[inline]
+    pub(crate) fn is_below(&self, threshold: f64) -> bool {
+        self.summary.is_below(threshold)
+    }
+
     /// The summary of the brick, as of the last [`Brick::sum_up`].
     pub(crate) fn summary(&self) -> Summary {
         self.summary
@@ -155,6 +185,14 @@ impl Brick {
         }
     }
 
+    /// Notes what the largest log-odds are of a brick that was made as a whole.
+    pub(crate) fn note_max(&mut self, palette: &Palette) {
+        if let Storage::Interned(cells) = &self.evidence {
+            let of_cells = cells.all().iter().flat_map(|cell| palette.values(cell));
+            self.summary.max = of_cells.fold(f32::NEG_INFINITY, larger);
+        }
+    }
+
     /// Marks the states that the brick's voxels are in.
     pub(crate) fn mark_states(&self, in_use: &mut [bool]) {
         if let Storage::Interned(cells) = &self.evidence {
@@ -168,4 +206,11 @@ impl Brick {
             cells.all_mut().iter_mut().flatten().for_each(|state| *state = numbers[usize::from(*state)]);
         }
     }
+}
+
+/// Which values of a cell have log-odds of at least a threshold: without a branch, for they are hard to predict.
+#[inline]
+fn bits_of<T: Copy>(cell: &[T; CELL_VOXELS], evidence: impl Fn(T) -> Evidence, threshold: f64) -> u64 {
+    let bit = |(bit, &value): (usize, &T)| u64::from(evidence(value).log_odds >= threshold) << bit;
+    cell.iter().enumerate().map(bit).fold(0, |bits, bit| bits | bit)
 }

@@ -7,13 +7,18 @@ pub(crate) struct BrickDirectory {
     /// The number of each brick of a block, in Morton order, counted from 1; 0 if it is absent. The first block stands
     /// for all absent blocks.
     numbers: Vec<[u32; BLOCK_BRICKS]>,
+    /// The bricks of each block that may hold occupied voxels, in Morton order, a bit each.
+    marks: Vec<u64>,
 }
 
 const BLOCK_BRICKS: usize = 64;
 
+/// Voxels along each side of a block.
+pub(crate) const BLOCK_EDGE: i32 = 32;
+
 impl Default for BrickDirectory {
     fn default() -> Self {
-        Self { blocks: Torus::default(), numbers: vec![[0; BLOCK_BRICKS]] }
+        Self { blocks: Torus::default(), numbers: vec![[0; BLOCK_BRICKS]], marks: vec![0] }
     }
 }
 
@@ -21,7 +26,8 @@ impl Default for BrickDirectory {
 #[derive(Clone, Copy)]
 pub(crate) struct Address {
     block: [i32; 3],
-    brick: usize,
+    /// The place of the brick in its block.
+    pub(crate) brick: usize,
     pub(crate) place: usize,
 }
 
@@ -61,7 +67,9 @@ const fn spread() -> [u16; 32] {
 impl BrickDirectory {
     /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        self.blocks.bytes() + self.numbers.capacity() * size_of::<[u32; BLOCK_BRICKS]>()
+        self.blocks.bytes()
+            + self.numbers.capacity() * size_of::<[u32; BLOCK_BRICKS]>()
+            + self.marks.capacity() * size_of::<u64>()
     }
 
     /// The number of the brick at an address, or 0.
@@ -71,6 +79,20 @@ impl BrickDirectory {
         self.numbers[self.blocks.get(at.block) as usize][at.brick]
     }
 
+    /// The marks of the bricks of the block at an address, in Morton order, a bit each.
+    #[inline]
+    pub(crate) fn marks(&self, at: Address) -> u64 {
+        self.marks[self.blocks.get(at.block) as usize]
+    }
+
+    /// Marks a brick that is there.
+    pub(crate) fn mark(&mut self, at: Address) {
+        let block = self.blocks.get(at.block);
+        if block != Torus::NONE {
+            self.marks[block as usize] |= 1 << at.brick;
+        }
+    }
+
     /// The entry for the brick at an address.
     pub(crate) fn entry(&mut self, at: Address) -> &mut u32 {
         let mut block = self.blocks.get(at.block);
@@ -78,6 +100,7 @@ impl BrickDirectory {
             block = self.numbers.len() as u32;
             self.blocks.insert(at.block, block);
             self.numbers.push([0; BLOCK_BRICKS]);
+            self.marks.push(0);
         }
         &mut self.numbers[block as usize][at.brick]
     }

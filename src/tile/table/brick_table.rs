@@ -1,10 +1,11 @@
 use super::brick::Brick;
-use super::brick_directory::{Address, BrickDirectory};
+use super::brick_directory::{Address, BLOCK_EDGE, BrickDirectory};
+use super::brick_look::BrickLook;
 use super::palette::Palette;
 use super::summary::{Summary, larger};
 use crate::octree::write_bt_of_bricks;
 use crate::sensor::Evidence;
-use crate::space::{BrickCode, BrickMask, MortonCode, VoxelKey, places};
+use crate::space::{BRICK_EDGE, BrickCode, BrickMask, MortonCode, VoxelBox, VoxelIndex, VoxelKey, places};
 use std::io::{self, Write};
 use std::ops::Range;
 
@@ -76,10 +77,73 @@ impl Table {
         self.directory.get(Address::of_brick(brick)).checked_sub(1)
     }
 
-    /// The evidence of the voxel at a place of the brick with a number.
+    /// The brick with a number, to look at many of its voxels.
     #[inline]
-    pub(crate) fn get_in(&self, number: u32, place: usize) -> Option<Evidence> {
-        self.bricks.get(number as usize)?.get(place, &self.palette)
+    pub(crate) fn numbered(&self, number: u32) -> Option<BrickLook<'_>> {
+        Some(BrickLook { brick: self.bricks.get(number as usize)?, palette: &self.palette })
+    }
+
+    /// A cube of 8, 16 or 32 voxels around a voxel without any whose log-odds are at least a threshold; `None` if there
+    /// may be one in the voxel's brick. It may extend beyond the tile.
+    #[inline]
+    pub(crate) fn below_around(&self, voxel: VoxelIndex, threshold: f64) -> Option<VoxelBox> {
+        if !Summary::are_marks_for(threshold) {
+            return None;
+        }
+        let at = Address::of_key(VoxelKey::from_index(voxel));
+        let marks = self.directory.marks(at);
+        // Eight bricks in a row of the Morton order are a cube.
+        let octant = marks >> (at.brick & !7) & 0xff;
+        let edge = match (marks, octant, octant >> (at.brick & 7) & 1) {
+            (0, ..) => BLOCK_EDGE,
+            (_, 0, _) => BLOCK_EDGE / 2,
+            (.., 0) => BRICK_EDGE,
+            _ => return None,
+        };
+        let min = voxel.map(|k| k & !(edge - 1));
+        Some(VoxelBox { min, end: min.map(|k| k.saturating_add(edge)) })
+    }
+
+    /// Visits the lowest voxels of bricks that meet a box and may hold log-odds of at least a threshold. Says `false`,
+    /// and visits none, if nobody knows which these are.
+    pub(crate) fn visit_marked(
+        &self,
+        voxels: &VoxelBox,
+        threshold: f64,
+        mut visit: impl FnMut(VoxelIndex),
+    ) -> bool {
+        if !Summary::are_marks_for(threshold) {
+            return false;
+        }
+        let low = voxels.min.map(|k| k & !(BLOCK_EDGE - 1));
+        let along = |k: usize| (low[k]..voxels.end[k]).step_by(BLOCK_EDGE as usize);
+        for x in along(0) {
+            for y in along(1) {
+                for z in along(2) {
+                    let block = [x, y, z];
+                    let mut marks = self.directory.marks(Address::of_key(VoxelKey::from_index(block)));
+                    while marks != 0 {
+                        let place = marks.trailing_zeros();
+                        marks &= marks - 1;
+                        visit(std::array::from_fn(|k| {
+                            // Two bits a coordinate, interleaved.
+                            let steps = (place >> k & 1) | (place >> (k + 3) & 1) << 1;
+                            block[k].saturating_add(BRICK_EDGE * steps as i32)
+                        }));
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// Notes which of the bricks may hold occupied voxels since a change; `before` is the bound of its log-odds before.
+    #[inline]
+    pub(crate) fn note_raised(&mut self, number: usize, before: f32) {
+        let brick = &self.bricks[number];
+        if before <= Summary::MARKED_ABOVE && brick.bound() > Summary::MARKED_ABOVE {
+            self.directory.mark(Address::of_brick(brick.code()));
+        }
     }
 
     /// The bricks that hold an observed voxel, in Morton order.
@@ -114,6 +178,15 @@ impl Table {
     /// The observed voxels in Morton order.
     pub fn iter(&self) -> impl Iterator<Item = (MortonCode, Evidence)> {
         self.bricks_in_order().flat_map(|brick| self.voxels_in(brick))
+    }
+
+    /// The observed voxels whose log-odds are at least a threshold, in Morton order. Bricks of free space are passed
+    /// over as wholes.
+    pub fn iter_from(&self, threshold: f64) -> impl Iterator<Item = (MortonCode, Evidence)> {
+        self.bricks_in_order().filter(move |brick| !brick.is_below(threshold)).flat_map(move |brick| {
+            let found = places(brick.mask_from(threshold, &self.palette));
+            found.filter_map(move |place| Some((brick.code().voxel(place), brick.get(place, &self.palette)?)))
+        })
     }
 
     /// Number of observed voxels whose log-odds are at least a threshold.

@@ -42,7 +42,8 @@ impl Brick {
     /// Applies an update. Returns how many voxels are observed for the first time. If the palette is full, the
     /// remainder stays in `rest`; the caller makes room, or makes the brick plain, and tries again.
     pub(crate) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
-        self.summary.is_stale = true;
+        let has_hits = rest.hits != [0; 8];
+        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
         match &mut self.evidence {
             Storage::Interned(cells) => update_interned(cells, &mut self.observed, rest, palette),
             Storage::Plain(cells) => (update_plain(cells, &mut self.observed, rest, palette.model()), Ok(())),
@@ -58,7 +59,11 @@ impl Brick {
         observation: Observation,
         palette: &mut Palette,
     ) -> Option<bool> {
-        self.step(place, |before| match observation {
+        let bound = match observation {
+            Observation::Miss => palette.most_after_miss(),
+            Observation::Hit(_) => f32::INFINITY,
+        };
+        self.step(place, bound, |before| match observation {
             Observation::Miss => palette.after_miss(before),
             Observation::Hit(intensity) => palette.after_hit(before, intensity),
         })
@@ -72,7 +77,8 @@ impl Brick {
         palette: &mut Palette,
         known: &mut MissRuns,
     ) -> (usize, usize) {
-        self.summary.is_stale = true;
+        let has_hits = runs.iter().any(|run| run.hit.is_some());
+        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
         let Storage::Interned(cells) = &mut self.evidence else { return (0, 0) };
         cells.make(runs.iter().fold(0, |words, run| words | 1 << (run.place / 64)), UNKNOWN);
         let mut new = 0;
@@ -96,13 +102,18 @@ impl Brick {
     }
 
     #[inline]
-    fn step(&mut self, place: usize, after: impl FnOnce(StateId) -> Result<StateId, Full>) -> Option<bool> {
+    fn step(
+        &mut self,
+        place: usize,
+        bound: f32,
+        after: impl FnOnce(StateId) -> Result<StateId, Full>,
+    ) -> Option<bool> {
         let (word, bit) = (place / 64, place % 64);
         let Storage::Interned(cells) = &mut self.evidence else { return None };
         let state = &mut cells.cell_mut(word)?[bit];
         let before = *state;
         *state = after(before).ok()?;
-        self.summary.is_stale = true;
+        self.summary.note_change(bound);
         let is_new = before == UNKNOWN;
         if is_new {
             self.observed[word] |= 1 << bit;
@@ -113,7 +124,9 @@ impl Brick {
     /// Inserts voxels that were not observed yet, in Morton order. Returns how many were inserted before the palette
     /// was full.
     pub(crate) fn insert(&mut self, voxels: &[(usize, Evidence)], palette: &mut Palette) -> usize {
-        self.summary.is_stale = true;
+        for (_, evidence) in voxels {
+            self.summary.note_change((evidence.log_odds as f32).next_up());
+        }
         let words = voxels.iter().fold(0, |words, (place, _)| words | 1 << (place / 64));
         match &mut self.evidence {
             Storage::Interned(cells) => cells.make(words, UNKNOWN),

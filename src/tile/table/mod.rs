@@ -9,6 +9,7 @@
 
 mod brick;
 mod brick_directory;
+mod brick_look;
 mod brick_table;
 mod brick_update;
 mod cells;
@@ -19,6 +20,7 @@ mod table_update;
 mod unpadded_evidence;
 
 pub(crate) use brick::{Brick, Storage};
+pub(crate) use brick_look::BrickLook;
 pub use brick_table::Table;
 pub(crate) use cells::{CELL_VOXELS, Cells};
 pub(crate) use palette::{Full, Palette, StateId, UNKNOWN};

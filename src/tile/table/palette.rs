@@ -20,6 +20,8 @@ pub(crate) const UNKNOWN: StateId = 0;
 #[derive(Clone, Debug)]
 pub(crate) struct Palette {
     model: SensorModel,
+    /// No miss leads to larger log-odds, unless they were larger before.
+    most_after_miss: f32,
     evidence: Vec<Evidence>,
     next: Vec<Next>,
     /// The log-odds as `f32`, as the octree has them; negative infinity for unknown voxels.
@@ -46,6 +48,10 @@ pub(crate) struct Full;
 const FIRST_LIMIT: usize = 1 << 10;
 const MOST_STATES: usize = 1 << 16;
 
+fn most_after_miss(model: &SensorModel) -> f32 {
+    (model.most_after_miss() as f32).next_up()
+}
+
 impl Default for Palette {
     fn default() -> Self {
         Self::limited(FIRST_LIMIT, MOST_STATES)
@@ -55,8 +61,10 @@ impl Default for Palette {
 impl Palette {
     /// A palette of `limit` states at first and at most `most`; both powers of two.
     pub(crate) fn limited(limit: usize, most: usize) -> Self {
+        let model = SensorModel::default();
         Self {
-            model: SensorModel::default(),
+            model,
+            most_after_miss: most_after_miss(&model),
             evidence: vec![Evidence::PRIOR],
             next: vec![Next::default()],
             values: vec![f32::NEG_INFINITY],
@@ -86,8 +94,15 @@ impl Palette {
     pub(crate) fn use_model(&mut self, model: &SensorModel) {
         if self.model != *model {
             self.model = *model;
+            self.most_after_miss = most_after_miss(model);
             self.next.fill(Next::default());
         }
+    }
+
+    /// No miss leads to larger log-odds, unless they were larger before.
+    #[inline]
+    pub(crate) fn most_after_miss(&self) -> f32 {
+        self.most_after_miss
     }
 
     /// Number of states, including the unknown state.

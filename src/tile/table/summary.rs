@@ -3,7 +3,7 @@ use crate::octree::BrickNodes;
 /// What an octree needs of a brick, in eight bytes; computed anew after the brick has changed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Summary {
-    /// Largest log-odds.
+    /// Largest log-odds; once the brick has changed, no less than that.
     pub(crate) max: f32,
     /// Nodes of OctoMap's tree, including the brick's own at depth 13.
     pub(crate) nodes: u16,
@@ -14,7 +14,36 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    pub(crate) const STALE: Self = Self { max: f32::NEG_INFINITY, nodes: 0, is_leaf: false, is_stale: true };
+    /// Of a brick without voxels.
+    pub(crate) const EMPTY: Self = Self { max: f32::NEG_INFINITY, nodes: 0, is_leaf: false, is_stale: true };
+    /// Of a brick of which nobody knows.
+    pub(crate) const STALE: Self = Self { max: f32::INFINITY, ..Self::EMPTY };
+}
+
+impl Summary {
+    /// Notes that the brick has changed, to log-odds of at most `bound` where it did.
+    #[inline]
+    pub(crate) fn note_change(&mut self, bound: f32) {
+        self.is_stale = true;
+        self.max = larger(self.max, bound);
+    }
+
+    /// Log-odds above which a brick is marked in the directory: more than a miss leads to, less than what most maps take
+    /// for occupied.
+    pub(crate) const MARKED_ABOVE: f32 = -0.05;
+
+    /// Whether bricks that are not marked hold nothing from this threshold on.
+    #[inline]
+    pub(crate) fn are_marks_for(threshold: f64) -> bool {
+        threshold > f64::from(Self::MARKED_ABOVE.next_up())
+    }
+
+    /// Whether all log-odds are known to be less than a threshold.
+    #[inline]
+    pub(crate) fn is_below(&self, threshold: f64) -> bool {
+        // The next number: the largest log-odds may have been rounded down.
+        f64::from(self.max.next_up()) <= threshold
+    }
 }
 
 impl From<(BrickNodes, f32)> for Summary {

@@ -39,10 +39,11 @@ impl Table {
             let mut left = &runs[..];
             while !left.is_empty() {
                 let brick = &mut self.bricks[number];
-                let bytes = brick.heap_bytes();
+                let (bytes, bound) = (brick.heap_bytes(), brick.bound());
                 let (new, done) = brick.update_runs(left, &mut self.palette, &mut known);
                 self.len += new;
                 self.cell_bytes += brick.heap_bytes() - bytes;
+                self.note_raised(number, bound);
                 left = &left[done..];
                 if let Some((run, later)) = left.split_first() {
                     let renumberings = self.palette.renumberings();
@@ -121,8 +122,12 @@ impl Table {
     /// Applies one update of a voxel of a brick.
     #[inline]
     fn step(&mut self, number: usize, place: usize, observation: Observation) {
+        let bound = self.bricks[number].bound();
         match self.bricks[number].update_one(place, observation, &mut self.palette) {
-            Some(is_new) => self.len += usize::from(is_new),
+            Some(is_new) => {
+                self.len += usize::from(is_new);
+                self.note_raised(number, bound);
+            }
             None => self.update_rest(number, &mut Rest::of_voxel(place, &observation)),
         }
     }
@@ -135,10 +140,11 @@ impl Table {
         let number = self.number_of(brick);
         loop {
             let brick = &mut self.bricks[number];
-            let bytes = brick.heap_bytes();
+            let (bytes, bound) = (brick.heap_bytes(), brick.bound());
             let done = brick.insert(voxels, &mut self.palette);
             self.len += done;
             self.cell_bytes += brick.heap_bytes() - bytes;
+            self.note_raised(number, bound);
             voxels = &voxels[done..];
             if voxels.is_empty() {
                 return;
@@ -148,11 +154,13 @@ impl Table {
     }
 
     /// Adds a brick that is absent so far, with the palette's state numbers.
-    pub(crate) fn add_brick(&mut self, brick: Brick) {
+    pub(crate) fn add_brick(&mut self, mut brick: Brick) {
+        brick.note_max(&self.palette);
         let number = self.number_of(brick.code());
         self.len += brick.observed.iter().map(|word| word.count_ones() as usize).sum::<usize>();
         self.cell_bytes += brick.heap_bytes();
         self.bricks[number] = brick;
+        self.note_raised(number, f32::NEG_INFINITY);
     }
 
     /// The number of a brick, made if it is absent.
@@ -172,10 +180,11 @@ impl Table {
     fn update_rest(&mut self, number: usize, rest: &mut Rest<'_>) {
         loop {
             let brick = &mut self.bricks[number];
-            let bytes = brick.heap_bytes();
+            let (bytes, bound) = (brick.heap_bytes(), brick.bound());
             let (new, done) = brick.update(rest, &mut self.palette);
             self.len += new;
             self.cell_bytes += brick.heap_bytes() - bytes;
+            self.note_raised(number, bound);
             match done {
                 Ok(()) => return,
                 Err(_) => self.make_room_for(number),

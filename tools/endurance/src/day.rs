@@ -123,7 +123,8 @@ impl Under {
         self.part.files = self.part.files.max(files);
         self.part.map_bytes = self.part.map_bytes.max(bytes);
         let log = folder.join("commits.log");
-        let log_bytes = fs::metadata(&log).with_context(|| format!("{}: cannot look at", log.display()))?.len();
+        let log_bytes =
+            fs::metadata(&log).with_context(|| format!("{}: cannot look at", log.display()))?.len();
         self.part.log_bytes = self.part.log_bytes.max(log_bytes);
         Ok(())
     }
@@ -149,7 +150,8 @@ fn count(folder: &Path) -> Result<(u64, u64)> {
     while let Some(folder) = folders.pop() {
         let entries = fs::read_dir(&folder).with_context(|| format!("{}: cannot read", folder.display()))?;
         for entry in entries {
-            let Ok(metadata) = entry.as_ref().map_err(|_| ()).and_then(|entry| entry.metadata().map_err(|_| ()))
+            let Ok(metadata) =
+                entry.as_ref().map_err(|_| ()).and_then(|entry| entry.metadata().map_err(|_| ()))
             else {
                 continue;
             };
@@ -187,7 +189,9 @@ mod tests {
         assert_eq!((found.parts.len(), found.scan_number), (2, 12));
         assert!(found.parts.iter().all(|part| part.scans == 6 && part.flushes > 0 && part.log_bytes > 0));
         let [first, second] = found.parts[..] else { panic!("two parts") };
-        assert!(second.tiles > first.tiles && second.files > first.files && second.worst_ms >= second.median_ms);
+        assert!(
+            second.tiles > first.tiles && second.files > first.files && second.worst_ms >= second.median_ms
+        );
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

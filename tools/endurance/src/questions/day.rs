@@ -25,8 +25,8 @@ const MOST_SLOWER: f64 = 1.15;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
     // The short day has as many rounds as fit: its robot is 24 times as fast.
-    let (scans, every, scans_per_part) =
-        setting.size((HOURS * 3_600 * SCANS_PER_S, 1, 3_600 * SCANS_PER_S), (3_000, 24, SCANS_PER_ROUND / 24));
+    let (scans, every, scans_per_part) = setting
+        .size((HOURS * 3_600 * SCANS_PER_S, 1, 3_600 * SCANS_PER_S), (3_000, 24, SCANS_PER_ROUND / 24));
     let input = Input::EveryNth { survey: SurveyName::Warehouse, rays: RAYS, scans, every };
     let case = Case {
         name: "warehouse".into(),

@@ -1,0 +1,165 @@
+use crate::Error;
+use crate::command::scan_reader::{Read, ReadScan};
+use clap::ValueEnum;
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// What becomes of scans that come faster than they can be mapped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum WhenBehind {
+    /// The input waits
+    #[default]
+    Wait,
+    /// The oldest scan that waits makes room
+    DropOldest,
+    /// While more than half of the room is taken, every second scan is left out; then as drop-oldest
+    Thin,
+}
+
+/// Scans that were read and wait to be mapped, oldest first: at most a few, so that what is mapped is what came last.
+///
+/// Of a scan that is left out its mark stays: what the map remembers of the input counts all scans.
+pub struct ScanQueue {
+    waiting: Mutex<Waiting>,
+    came: Condvar,
+    when_behind: WhenBehind,
+}
+
+#[derive(Default)]
+struct Waiting {
+    reads: VecDeque<crate::Result<Read>>,
+    scans: usize,
+    was_thinned: bool,
+    /// Nobody takes any more.
+    is_closed: bool,
+}
+
+impl ScanQueue {
+    /// Most scans that wait.
+    pub const MOST_SCANS: usize = 8;
+
+    pub fn new(when_behind: WhenBehind) -> Self {
+        Self { waiting: Mutex::default(), came: Condvar::new(), when_behind }
+    }
+
+    /// Puts in what was read; tells whether anybody will take it.
+    pub fn push(&self, read: crate::Result<Read>) -> bool {
+        let mut waiting = self.lock();
+        match read {
+            Ok(Read::Scan(scan)) => waiting.push_scan(scan, self.when_behind),
+            other => waiting.reads.push_back(other),
+        }
+        self.came.notify_all();
+        !waiting.is_closed
+    }
+
+    /// The oldest, waited for so long; `None` if nothing has come.
+    pub fn take(&self, patience: Duration) -> Option<crate::Result<Read>> {
+        let waiting = self.lock();
+        let waited = self.came.wait_timeout_while(waiting, patience, |waiting| waiting.reads.is_empty());
+        let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let read = waiting.reads.pop_front()?;
+        waiting.scans -= usize::from(matches!(read, Ok(Read::Scan(_))));
+        Some(read)
+    }
+
+    /// Says that nobody takes any more.
+    pub fn close(&self) {
+        self.lock().is_closed = true;
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Waiting {
+    fn push_scan(&mut self, scan: ReadScan, when_behind: WhenBehind) {
+        if when_behind == WhenBehind::Thin {
+            self.was_thinned = !self.was_thinned && 2 * self.scans > ScanQueue::MOST_SCANS;
+            if self.was_thinned {
+                return self.reads.push_back(Ok(Read::LeftOut(scan.mark)));
+            }
+        }
+        if self.scans >= ScanQueue::MOST_SCANS
+            && let Some(oldest) = self.reads.iter_mut().find(|read| matches!(read, Ok(Read::Scan(_))))
+            && let Ok(Read::Scan(ReadScan { mark, .. })) = oldest
+        {
+            *oldest = Ok(Read::LeftOut(*mark));
+            self.scans -= 1;
+        }
+        self.scans += 1;
+        self.reads.push_back(Ok(Read::Scan(scan)));
+    }
+}
+
+/// Whether nothing comes after this.
+pub fn is_last(read: &Result<Read, Error>) -> bool {
+    matches!(read, Ok(Read::End | Read::Stopped) | Err(_))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::{PointStore, ScanMark, StoredScan};
+    use nalgebra::Isometry3;
+
+    fn scan(number: usize) -> ReadScan {
+        let mut points_in_sensor = PointStore::default();
+        points_in_sensor.begin(false);
+        points_in_sensor.push([number as f64, 0.0, 0.0], 0.0).unwrap();
+        let world_from_sensor = Isometry3::identity().into();
+        let scan =
+            StoredScan { name: number.to_string(), stamp_ns: None, points_in_sensor, world_from_sensor };
+        let mark = ScanMark::of(&scan).unwrap();
+        ReadScan { scan, mark }
+    }
+
+    /// What comes out after so many scans: the numbers of those that are to be mapped, and how many were left out.
+    fn after(scans: usize, when_behind: WhenBehind) -> (Vec<usize>, usize) {
+        let queue = ScanQueue::new(when_behind);
+        let marks: Vec<String> = (0..scans).map(|number| scan(number).mark.scan_text()).collect();
+        assert!((0..scans).all(|number| queue.push(Ok(Read::Scan(scan(number))))));
+        assert!(queue.push(Ok(Read::End)));
+        let (mut mapped, mut left_out, mut seen) = (Vec::new(), 0, Vec::new());
+        loop {
+            match queue.take(Duration::ZERO) {
+                Some(Ok(Read::Scan(scan))) => {
+                    mapped.push(seen.len());
+                    seen.push(scan.mark.scan_text());
+                }
+                Some(Ok(Read::LeftOut(mark))) => {
+                    left_out += 1;
+                    seen.push(mark.scan_text());
+                }
+                Some(Ok(Read::End)) => break,
+                _ => panic!("nothing else was put in"),
+            }
+        }
+        assert_eq!(seen, marks, "every scan is known of, in order");
+        assert!(queue.take(Duration::ZERO).is_none());
+        (mapped, left_out)
+    }
+
+    #[test]
+    fn the_oldest_scans_make_room_and_leave_their_marks() {
+        assert_eq!(after(8, WhenBehind::DropOldest), ((0..8).collect(), 0));
+        assert_eq!(after(20, WhenBehind::DropOldest), ((12..20).collect(), 12));
+    }
+
+    #[test]
+    fn every_second_scan_is_left_out_while_more_than_half_of_the_room_is_taken() {
+        assert_eq!(after(5, WhenBehind::Thin), ((0..5).collect(), 0));
+        assert_eq!(after(11, WhenBehind::Thin), (vec![0, 1, 2, 3, 4, 6, 8, 10], 3));
+        let (mapped, left_out) = after(100, WhenBehind::Thin);
+        assert_eq!((mapped.len(), left_out), (8, 92));
+    }
+
+    #[test]
+    fn a_queue_that_nobody_takes_from_says_so() {
+        let queue = ScanQueue::new(WhenBehind::DropOldest);
+        queue.close();
+        assert!(!queue.push(Ok(Read::Scan(scan(0)))));
+    }
+}

@@ -1,0 +1,36 @@
+use super::brick::Brick;
+use super::palette::Palette;
+use crate::sensor::Evidence;
+use crate::space::BrickMask;
+
+/// A brick of a table, to look at many of its voxels.
+#[derive(Clone, Copy)]
+pub(crate) struct BrickLook<'a> {
+    pub(super) brick: &'a Brick,
+    pub(super) palette: &'a Palette,
+}
+
+impl BrickLook<'_> {
+    /// The evidence of the voxel at a place; `None` if it was never observed.
+    #[inline]
+    pub(crate) fn get(&self, place: usize) -> Option<Evidence> {
+        self.brick.get(place, self.palette)
+    }
+
+    /// Whether the voxel at a place was observed.
+    #[inline]
+    pub(crate) fn is_observed(&self, place: usize) -> bool {
+        self.brick.observed[place / 64] >> (place % 64) & 1 == 1
+    }
+
+    /// The observed voxels whose log-odds are at least a threshold.
+    pub(crate) fn mask_from(&self, log_odds: f64) -> BrickMask {
+        self.brick.mask_from(log_odds, self.palette)
+    }
+
+    /// Whether no voxel is known to have log-odds of a threshold or more.
+    #[inline]
+    pub(crate) fn is_below(&self, log_odds: f64) -> bool {
+        self.brick.is_below(log_odds)
+    }
+}
