@@ -85,7 +85,7 @@ impl TilePager<'_> {
         let files = self.store().reader()?;
         let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
         // The last ones are written first.
-        let mut tiles: Vec<_> = self.freeze_buffer().into_iter().map(FlushedTile::Unapplied).collect();
+        let mut tiles = self.freeze_buffer();
         for index in self.contents.cache.dirty_compact() {
             if !self.contents.buffer.is_frozen(index) {
                 let tile = self.contents.cache.begin_save(index);
@@ -104,7 +104,7 @@ impl TilePager<'_> {
     }
 
     /// What is buffered, left to a flush beside the mapper.
-    fn freeze_buffer(&mut self) -> Vec<UnappliedTile> {
+    fn freeze_buffer(&mut self) -> Vec<FlushedTile> {
         let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
         buffered.sort_unstable();
         let unapplied = buffered.into_iter().map(|index| {
@@ -116,7 +116,8 @@ impl TilePager<'_> {
                 _ if self.disk.store().contains(index) => (Base::Orphan, None),
                 _ => (Base::Nothing, None),
             };
-            UnappliedTile { index, state: StoredTileState { base, spilled, updates }, location }
+            let state = StoredTileState { base, spilled, updates };
+            FlushedTile::Unapplied(Box::new(UnappliedTile { index, state, location }))
         });
         unapplied.collect()
     }

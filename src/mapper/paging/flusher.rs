@@ -50,7 +50,7 @@ pub(super) enum FlushedTile {
     Resident(Arc<Tile>),
     Compact(TileIndex, CompactTile),
     /// It is made first, and only to be written.
-    Unapplied(UnappliedTile),
+    Unapplied(Box<UnappliedTile>),
 }
 
 /// Tiles that are written before the locks are taken to note them.
