@@ -194,7 +194,8 @@ mod command {
             assert_eq!((summary["scans"].as_u64(), summary["left_out_scans"].as_u64()), (Some(2), Some(0)));
         }
         std::fs::write(&file, drive("", 2)).unwrap();
-        let arguments = ["build", text(&file), "-o", text(&again), "--when-behind", "thin"];
+        let new = folder.path().join("new");
+        let arguments = ["build", text(&file), "-o", text(&new), "--when-behind", "thin"];
         let refused = voxtile(&arguments).assert().code(2);
         assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("--when-behind"));
     }
