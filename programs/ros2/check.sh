@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # The node beside an independent peer (Cyclone DDS from PyPI), over loopback: the map of the node and the map that
-# `voxtile build` makes of the same messages have one digest, with a hostile peer too. Without Python or PyPI it says
-# so and passes. VOXTILE_ROS2_PYTHON names a Python that has the packages.
+# `voxtile build` makes of the same messages have one digest, with a hostile peer too; what the node publishes is what
+# `voxtile export` writes. Without Python or PyPI it says so and passes. VOXTILE_ROS2_PYTHON names a Python that has the
+# packages, VOXTILE and VOXTILE_ROS2 name programs that are built.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 built=${CARGO_TARGET_DIR:-target}/debug
 work=$(mktemp -d)
-node=
-trap '[ -z "$node" ] || kill "$node" 2>/dev/null || true; rm -rf "$work"' EXIT
+node= listener=
+trap 'for one in $node $listener; do kill "$one" 2>/dev/null || true; done; rm -rf "$work"' EXIT
 
 python=${VOXTILE_ROS2_PYTHON:-}
 if [ -z "$python" ]; then
@@ -24,13 +25,28 @@ if [ -z "$voxtile" ]; then
     cargo build -q --locked
     voxtile=$built/voxtile
 fi
-cargo build -q --locked -p voxtile-ros2
+program=${VOXTILE_ROS2:-}
+if [ -z "$program" ]; then
+    cargo build -q --locked -p voxtile-ros2
+    program=$built/voxtile-ros2
+fi
+radius=2.5 max_z=1.0
+outputs="--publish-every 0.2 --publish-radius $radius --projected-radius 30 --occupancy-max-z $max_z"
+
+# Writes down for so many seconds what the node publishes.
+listen() {
+    "$python" programs/ros2/tests/outputs.py listen $domain "$work/$kind.outputs" "$1" &
+    listener=$!
+}
 
 # Plays the messages to the node, into the map and the log of this name.
 play() {
-    "$built/voxtile-ros2" -o "$map" --domain-id $domain --resolution 0.1 >"$work/$kind.log" 2>&1 &
+    "$program" -o "$map" --domain-id $domain --resolution 0.1 $outputs >"$work/$kind.log" 2>&1 &
     node=$!
+    listen 12
     "$python" programs/ros2/tests/peer.py $domain "$work/$kind.bag" 30 $([ $kind = hostile ] && echo hostile)
+    wait "$listener"
+    listener=
     kill -INT "$node"
     wait "$node" || { cat "$work/$kind.log"; exit 1; }
     node=
@@ -63,10 +79,23 @@ for kind in friendly hostile; do
         cat "$work/$kind.log"
         exit 1
     fi
-    # The map is there to go on with, and nothing that did not come changes it.
-    "$built/voxtile-ros2" -o "$map" --domain-id $domain >"$work/$kind.log" 2>&1 &
+    "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
+    "$voxtile" export "$map" -o "$map.pgm" --z-max $max_z >/dev/null
+    compare() {
+        "$python" programs/ros2/tests/outputs.py compare "$work/$kind.outputs" "$map.csv" "$map.pgm" 30 $radius $max_z
+    }
+    compare
+    # The map is there to go on with, and nothing that did not come changes it. Who listens gets it, once.
+    "$program" -o "$map" --domain-id $domain $outputs >"$work/$kind.log" 2>&1 &
     node=$!
-    sleep 2
+    listen 4
+    wait "$listener"
+    listener=
+    compare
+    if grep -q '"count": [^1]' "$work/$kind.outputs"; then
+        echo "$kind: what did not change was published again"
+        exit 1
+    fi
     kill -TERM "$node"
     wait "$node" || { cat "$work/$kind.log"; exit 1; }
     node=

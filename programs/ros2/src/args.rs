@@ -1,7 +1,10 @@
+use crate::publishers::Extent;
 use crate::when_behind::WhenBehind;
+use anyhow::ensure;
 use bytesize::ByteSize;
 use clap::Parser;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Map what the sensors of a robot see, from ROS 2 over DDS, into a map of voxtile. Lengths are metres, times seconds.
 #[derive(Clone, Debug, Parser)]
@@ -48,6 +51,22 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = WhenBehind::DropOldest)]
     pub when_behind: WhenBehind,
 
+    /// Publish what changed so often, to those who listen
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    pub publish_every: f64,
+    /// Publish the box around the sensor that reaches so far
+    #[arg(long, value_name = "M", default_value_t = 20.0)]
+    pub publish_radius: f64,
+    /// The same for projected_map [default: that of --publish-radius]
+    #[arg(long, value_name = "M")]
+    pub projected_radius: Option<f64>,
+    /// Voxels below this height are left out of clouds, cubes and projected_map
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub occupancy_min_z: Option<f64>,
+    /// Voxels above this height are left out of clouds, cubes and projected_map
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub occupancy_max_z: Option<f64>,
+
     /// DDS domain
     #[arg(long, value_name = "ID", env = "ROS_DOMAIN_ID", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=232))]
@@ -66,6 +85,43 @@ impl Args {
     /// Bytes of the mapper.
     pub fn map_bytes(&self) -> usize {
         self.memory_bytes() - self.queue_bytes()
+    }
+
+    /// How much is published.
+    ///
+    /// # Errors
+    ///
+    /// Lengths that are none.
+    pub fn extent(&self) -> anyhow::Result<Extent> {
+        let radius_m = self.publish_radius;
+        ensure!(radius_m > 0.0, "--publish-radius: {radius_m} is no radius; give metres above 0");
+        let heights_m = [
+            self.occupancy_min_z.unwrap_or(f64::NEG_INFINITY),
+            self.occupancy_max_z.unwrap_or(f64::INFINITY),
+        ];
+        let [least, most] = heights_m;
+        ensure!(least < most, "--occupancy-min-z: {least} is not below --occupancy-max-z, {most}");
+        Ok(Extent { radius_m, heights_m })
+    }
+
+    /// How much is published of the flat map.
+    ///
+    /// # Errors
+    ///
+    /// Lengths that are none.
+    pub fn projected_extent(&self) -> anyhow::Result<Extent> {
+        let extent = self.extent()?;
+        let radius_m = self.projected_radius.unwrap_or(extent.radius_m);
+        ensure!(radius_m > 0.0, "--projected-radius: {radius_m} is no radius; give metres above 0");
+        Ok(Extent { radius_m, ..extent })
+    }
+
+    /// # Errors
+    ///
+    /// A time that is none.
+    pub fn publish_every(&self) -> anyhow::Result<Duration> {
+        Duration::try_from_secs_f64(self.publish_every)
+            .map_err(|_| anyhow::anyhow!("--publish-every: {} is no time; give seconds", self.publish_every))
     }
 
     fn memory_bytes(&self) -> usize {

@@ -3,6 +3,7 @@
 //! ```text
 //! DDS -> RawMessage -> CloudQueue, TransformBuffer   node: a thread a topic
 //! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
+//! LiveMap -> messages -> DDS                         publishers: one thread
 //! ```
 
 mod args;
@@ -10,8 +11,11 @@ mod cloud;
 mod cloud_queue;
 mod counters;
 mod inbox;
+mod live_map;
 mod mapping;
+mod messages;
 mod node;
+mod publishers;
 mod raw_message;
 mod transform_buffer;
 mod when_behind;
@@ -45,9 +49,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let inbox = Arc::new(Inbox::new(args));
     // A map that cannot be opened is told before anybody sees a node.
     let mut mapping = Mapping::open(args, inbox.clone())?;
-    let node = node::start(args, &inbox)?;
+    let node = node::start(args, &inbox, mapping.live())?;
     let outcome = mapping.run(&stop);
     inbox.close();
-    drop(node);
+    node.end();
     outcome
 }

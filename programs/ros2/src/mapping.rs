@@ -1,10 +1,12 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::inbox::Inbox;
+use crate::live_map::LiveMap;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Pose, ScanRef};
+use voxtile::{Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Point, Pose, ScanRef};
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::ros::Wire;
 use voxtile_clouds::ros::messages::PointCloud2;
@@ -13,6 +15,7 @@ use voxtile_clouds::ros::messages::PointCloud2;
 pub struct Mapping {
     inbox: Arc<Inbox>,
     mapper: OutOfCoreTileMapper,
+    live: Arc<LiveMap>,
     flush_every: Duration,
     flushed_at: Instant,
     told_at: Instant,
@@ -46,8 +49,16 @@ impl Mapping {
             }
             Err(error) => return Err(error.into()),
         };
+        let (sensor_m, stamp_ns) = last_place(&args.output);
+        let frame = args.frame_id.trim_start_matches('/').to_owned();
+        let live = Arc::new(LiveMap::new(frame, mapper.reader()?, sensor_m, stamp_ns));
         let now = Instant::now();
-        Ok(Self { inbox, mapper, flush_every, flushed_at: now, told_at: now })
+        Ok(Self { inbox, mapper, live, flush_every, flushed_at: now, told_at: now })
+    }
+
+    /// The map for those who look at it meanwhile.
+    pub fn live(&self) -> Arc<LiveMap> {
+        self.live.clone()
     }
 
     /// Maps until it is told to stop; what was mapped is flushed then.
@@ -92,7 +103,11 @@ impl Mapping {
         }
         let intensities = message.has_intensities().then_some(&*intensities);
         match insert_points(&mut self.mapper, world_from_sensor, &points, intensities) {
-            Ok(()) => self.inbox.count(|counters| counters.mapped += 1),
+            Ok(()) => {
+                let (scan_number, sensor_m) = (self.mapper.scan_number(), world_from_sensor.position_m);
+                self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);
+                self.inbox.count(|counters| counters.mapped += 1);
+            }
             // A pose that is none or beyond all tiles: the next cloud may do.
             Err(error @ (Error::InvalidArgument { .. } | Error::Grid(_))) => {
                 log::warn!("a cloud is left out: {error}");
@@ -107,6 +122,13 @@ impl Mapping {
         let (counters, waiting) = self.inbox.counters();
         log::info!("{counters}; {waiting} wait; the map is at scan {}", self.mapper.scan_number());
     }
+}
+
+/// Where the sensor of a map was last, and when; the origin where the map does not tell.
+fn last_place(folder: &Path) -> (Point, i64) {
+    let scans = MapReader::open(folder, 1).and_then(|reader| reader.scans());
+    let last = scans.ok().and_then(|scans| scans.last().copied());
+    last.map_or(([0.0; 3], 0), |scan| (scan.origin_m, scan.stamp_ns.unwrap_or(0)))
 }
 
 fn insert_points(
