@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The node beside an independent peer (Cyclone DDS from PyPI), over loopback: the map of the node and the map that
 # `voxtile build` makes of the same messages have one digest, with a hostile peer too; what the node publishes is what
-# `voxtile export` writes. Without Python or PyPI it says so and passes. VOXTILE_ROS2_PYTHON names a Python that has the
-# packages, VOXTILE and VOXTILE_ROS2 name programs that are built.
+# `voxtile export` writes, and its services do what they say. Without Python or PyPI it says so and passes.
+# VOXTILE_ROS2_PYTHON names a Python that has the packages, VOXTILE and VOXTILE_ROS2 name programs that are built.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -86,7 +86,7 @@ for kind in friendly hostile; do
     }
     compare
     # The map is there to go on with, and nothing that did not come changes it. Who listens gets it, once.
-    "$program" -o "$map" --domain-id $domain $outputs >"$work/$kind.log" 2>&1 &
+    "$program" -o "$map" --domain-id $domain --rmw cyclonedds $outputs >"$work/$kind.log" 2>&1 &
     node=$!
     listen 4
     wait "$listener"
@@ -96,6 +96,7 @@ for kind in friendly hostile; do
         echo "$kind: what did not change was published again"
         exit 1
     fi
+    "$python" programs/ros2/tests/services.py $domain || { cat "$work/$kind.log"; exit 1; }
     kill -TERM "$node"
     wait "$node" || { cat "$work/$kind.log"; exit 1; }
     node=

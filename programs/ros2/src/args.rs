@@ -1,4 +1,5 @@
 use crate::publishers::Extent;
+use crate::services::Rmw;
 use crate::when_behind::WhenBehind;
 use anyhow::ensure;
 use bytesize::ByteSize;
@@ -67,6 +68,12 @@ pub struct Args {
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub occupancy_max_z: Option<f64>,
 
+    /// Name of the node, of which some services are named after
+    #[arg(long, value_name = "NAME", default_value = "voxtile_ros2")]
+    pub node_name: String,
+    /// Middleware of those who call services
+    #[arg(long, value_enum, default_value_t = Rmw::Fastrtps)]
+    pub rmw: Rmw,
     /// DDS domain
     #[arg(long, value_name = "ID", env = "ROS_DOMAIN_ID", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=232))]

@@ -1,3 +1,4 @@
+use crate::health::Health;
 use crate::messages::{Header, Time};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use voxtile::{LiveReader, LiveView, MapView, Point};
@@ -13,6 +14,7 @@ pub struct LiveMap {
 struct State {
     reader: LiveReader,
     moment: Moment,
+    health: Health,
 }
 
 /// What was known after a scan.
@@ -36,7 +38,8 @@ pub struct MapVersion {
 impl LiveMap {
     pub fn new(frame: String, reader: LiveReader, sensor_m: Point, stamp_ns: i64) -> Self {
         let version = MapVersion { opening: 0, scan_number: reader.view().scan_number() };
-        let state = Mutex::new(State { reader, moment: Moment { version, sensor_m, stamp_ns } });
+        let moment = Moment { version, sensor_m, stamp_ns };
+        let state = Mutex::new(State { reader, moment, health: Health::default() });
         Self { frame, state }
     }
 
@@ -47,14 +50,35 @@ impl LiveMap {
         *moment = Moment { version, sensor_m, stamp_ns };
     }
 
+    /// The map was changed as a whole, and opened anew.
+    pub fn note_opening(&self, reader: LiveReader) {
+        let scan_number = reader.view().scan_number();
+        let mut state = self.lock();
+        let opening = state.moment.version.opening + 1;
+        state.moment.version = MapVersion { opening, scan_number };
+        state.reader = reader;
+    }
+
+    pub fn note_health(&self, health: Health) {
+        self.lock().health = health;
+    }
+
+    pub fn health(&self) -> Health {
+        self.lock().health.clone()
+    }
+
     pub fn moment(&self) -> Moment {
         self.lock().moment
     }
 
     /// The map after its last scan. Of a map that is being opened anew, what it was.
     pub fn view(&self) -> LiveView {
-        let reader = self.lock().reader.clone();
-        reader.view()
+        self.reader().view()
+    }
+
+    /// What answers questions about the map.
+    pub fn reader(&self) -> LiveReader {
+        self.lock().reader.clone()
     }
 
     /// For messages about a moment.

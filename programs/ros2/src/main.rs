@@ -4,12 +4,14 @@
 //! DDS -> RawMessage -> CloudQueue, TransformBuffer   node: a thread a topic
 //! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
 //! LiveMap -> messages -> DDS                         publishers: one thread
+//! DDS -> orders -> Mapping, questions -> LiveMap     services: a thread a service
 //! ```
 
 mod args;
 mod cloud;
 mod cloud_queue;
 mod counters;
+mod health;
 mod inbox;
 mod live_map;
 mod mapping;
@@ -17,6 +19,7 @@ mod messages;
 mod node;
 mod publishers;
 mod raw_message;
+mod services;
 mod transform_buffer;
 mod when_behind;
 
@@ -29,7 +32,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("info,rustdds=error")).init();
+    // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks.
+    let filter = "info,rustdds=error,ros2_client=off";
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     match run(&Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -48,8 +53,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     let inbox = Arc::new(Inbox::new(args));
     // A map that cannot be opened is told before anybody sees a node.
-    let mut mapping = Mapping::open(args, inbox.clone())?;
-    let node = node::start(args, &inbox, mapping.live())?;
+    let (orders, placed_orders) = services::orders();
+    let mapping = Mapping::open(args, inbox.clone(), placed_orders)?;
+    let node = node::start(args, &inbox, mapping.live(), &orders)?;
     let outcome = mapping.run(&stop);
     inbox.close();
     node.end();

@@ -3,6 +3,7 @@ use crate::inbox::Inbox;
 use crate::live_map::LiveMap;
 use crate::publishers::Publishing;
 use crate::raw_message::{RawAdapter, RawMessage};
+use crate::services::{self, Orders};
 use anyhow::{Context as _, anyhow};
 use futures::StreamExt;
 use futures::executor::block_on;
@@ -41,7 +42,12 @@ const LEAST_RECEIVE_BUFFER_BYTES: usize = 2 << 20;
 /// # Errors
 ///
 /// No sockets; names of topics that ROS 2 does not know.
-pub fn start(args: &Args, inbox: &Arc<Inbox>, map: Arc<LiveMap>) -> anyhow::Result<RunningNode> {
+pub fn start(
+    args: &Args,
+    inbox: &Arc<Inbox>,
+    map: Arc<LiveMap>,
+    orders: &Orders,
+) -> anyhow::Result<RunningNode> {
     let mut builder =
         DomainParticipantBuilder::new(args.domain_id).socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
     if !args.network {
@@ -52,7 +58,8 @@ pub fn start(args: &Args, inbox: &Arc<Inbox>, map: Arc<LiveMap>) -> anyhow::Resu
     let participant = builder.build().map_err(|error| anyhow!("{error:?}")).context(domain)?;
     let context =
         Context::from_domain_participant(participant.clone()).map_err(|error| anyhow!("{error:?}"))?;
-    let name = NodeName::new("/", "voxtile_ros2").map_err(|error| anyhow!("{error:?}"))?;
+    let name = NodeName::new("/", &args.node_name)
+        .map_err(|error| anyhow!("--node-name {}: {error:?}", args.node_name))?;
     let mut node = context.new_node(name, NodeOptions::new()).map_err(|error| anyhow!("{error:?}"))?;
     let spinner = node.spinner().map_err(|error| anyhow!("{error:?}"))?;
     spawn("spinner", move || drop(block_on(spinner.spin())))?;
@@ -90,7 +97,8 @@ pub fn start(args: &Args, inbox: &Arc<Inbox>, map: Arc<LiveMap>) -> anyhow::Resu
         }
     }
     log::info!("listening to {} in domain {}", args.cloud.join(", "), args.domain_id);
-    let mut publishing = Publishing::new(args, node, map)?;
+    services::start(args, &participant, &mut node, &map, orders)?;
+    let mut publishing = Publishing::new(args, node, inbox.clone(), map)?;
     let stop = Arc::new(AtomicBool::new(false));
     let its_stop = stop.clone();
     let publishing = spawn("publisher", move || publishing.run(&its_stop))?;

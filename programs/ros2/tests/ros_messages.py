@@ -7,11 +7,11 @@ os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General><Interfaces>
 <Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
 <Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 
 from cyclonedds.core import Policy
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float32, float64, int8, int32, sequence, uint8, uint32
+from cyclonedds.idl.types import float32, float64, int8, int32, int64, sequence, uint8, uint32, uint64
 from cyclonedds.util import duration
 
 BEST, RELIABLE = Policy.Reliability.BestEffort, Policy.Reliability.Reliable(duration(seconds=1))
@@ -175,3 +175,63 @@ class Marker(IdlStruct, typename="visualization_msgs::msg::dds_::Marker_"):
 @dataclass
 class MarkerArray(IdlStruct, typename="visualization_msgs::msg::dds_::MarkerArray_"):
     markers: sequence[Marker]
+
+
+@dataclass
+class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str
+    value: str
+
+
+@dataclass
+class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: uint8
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
+
+
+@dataclass
+class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: Header
+    status: sequence[DiagnosticStatus]
+
+
+def service(package, name, request, response):
+    """Request and response as Cyclone DDS sends them: who asks and the number of the question come first."""
+    kinds = []
+    for kind, fields in [("Request", request), ("Response", response)]:
+        fields = fields or {"structure_needs_at_least_one_member": uint8}
+        head = {"guid": uint64, "number": int64}
+        namespace = {"__module__": __name__, "__idl_typename__": f"{package}::srv::dds_::{name}_{kind}_"}
+        fields = list({**head, **fields}.items())
+        kinds.append(make_dataclass(f"{name}_{kind}", fields, bases=(IdlStruct,), namespace=namespace))
+    return kinds
+
+
+OUTCOME = {"success": bool, "message": str}
+BOX = {"min": Point, "max": Point}
+HIT = {**OUTCOME, "hit": bool, "center": Point, "distance": float64, "probability": float64}
+SERVICES = {
+    "save": service("std_srvs", "Trigger", {}, OUTCOME),
+    "reset": service("std_srvs", "Empty", {}, {}),
+    "clear_bbox": service("octomap_msgs", "BoundingBoxQuery", BOX, {}),
+    "octomap_binary": service("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
+    "octomap_full": service("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
+    "octomap_in_box": service("voxtile_msgs", "GetOctomapInBox", {**BOX, "binary": bool}, {**OUTCOME, "map": Octomap}),
+    "snapshot": service("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
+    "revert": service("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
+    "cast_ray": service(
+        "voxtile_msgs",
+        "CastRay",
+        {"origin": Point, "direction": Vector3, "max_range": float64, "unknown_is_obstacle": bool},
+        HIT,
+    ),
+    "check_collision": service(
+        "voxtile_msgs",
+        "CheckCollision",
+        {"from_": Point, "to": Point, "radius": float64, "unknown_is_obstacle": bool},
+        HIT,
+    ),
+}

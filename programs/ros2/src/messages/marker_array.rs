@@ -1,4 +1,4 @@
-use super::sequence::bytes;
+use super::sequence;
 use super::{Header, Pose, Time};
 use serde::Serialize;
 
@@ -42,7 +42,7 @@ pub struct Marker {
 struct CompressedImage {
     header: Header,
     format: String,
-    #[serde(serialize_with = "bytes")]
+    #[serde(with = "sequence")]
     data: Vec<u8>,
 }
 
@@ -50,7 +50,7 @@ struct CompressedImage {
 #[derive(Clone, Debug, Default, Serialize)]
 struct MeshFile {
     filename: String,
-    #[serde(serialize_with = "bytes")]
+    #[serde(with = "sequence")]
     data: Vec<u8>,
 }
 

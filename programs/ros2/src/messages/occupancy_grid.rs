@@ -1,4 +1,4 @@
-use super::sequence::bytes;
+use super::sequence;
 use super::{Header, Pose, Time};
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub struct OccupancyGrid {
     pub header: Header,
     pub info: MapMetaData,
     /// Row by row from the smallest y up: -1 unknown, 0 free, 100 occupied, as signed octets.
-    #[serde(serialize_with = "bytes")]
+    #[serde(with = "sequence")]
     pub data: Vec<u8>,
 }
 

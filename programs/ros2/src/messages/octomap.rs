@@ -1,9 +1,9 @@
 use super::Header;
-use super::sequence::bytes;
-use serde::Serialize;
+use super::sequence;
+use serde::{Deserialize, Serialize};
 
 /// `octomap_msgs/Octomap`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Octomap {
     pub header: Header,
     /// Whether nodes are free or occupied (`.bt`) or have log-odds (`.ot`).
@@ -13,6 +13,6 @@ pub struct Octomap {
     /// Metres.
     pub resolution: f64,
     /// The nodes alone, without the header of a file.
-    #[serde(serialize_with = "bytes")]
+    #[serde(with = "sequence")]
     pub data: Vec<u8>,
 }

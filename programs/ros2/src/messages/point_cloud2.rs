@@ -1,5 +1,5 @@
 use super::Header;
-use super::sequence::bytes;
+use super::sequence;
 use serde::Serialize;
 
 /// `sensor_msgs/PointField`.
@@ -21,7 +21,7 @@ pub struct PointCloud2 {
     pub is_bigendian: bool,
     pub point_step: u32,
     pub row_step: u32,
-    #[serde(serialize_with = "bytes")]
+    #[serde(with = "sequence")]
     pub data: Vec<u8>,
     pub is_dense: bool,
 }

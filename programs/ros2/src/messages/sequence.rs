@@ -1,6 +1,11 @@
-use serde::Serializer;
+//! For sequences of octets: written as one block, not number by number.
 
-/// For sequences of octets: as one block, not number by number.
-pub fn bytes<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+use serde::{Deserialize, Deserializer, Serializer};
+
+pub fn serialize<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_bytes(bytes)
+}
+
+pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error> {
+    Vec::deserialize(deserializer)
 }

@@ -2,9 +2,13 @@
 //!
 //! ```text
 //! LiveMap -> LiveView -> octomap, occupied_voxels, projected_map -> messages
+//! Health, Counters -> diagnostics
 //! Publishing: one thread beside the mapper; Outlet: a topic, and what was sent last
 //! ```
 
+mod bounded_file;
+mod diagnosing;
+mod diagnostics;
 mod extent;
 mod occupied_voxels;
 mod octomap;
@@ -13,4 +17,5 @@ mod projected_map;
 mod publishing;
 
 pub use extent::Extent;
+pub use octomap::octomap;
 pub use publishing::Publishing;

@@ -1,6 +1,6 @@
+use super::bounded_file::BoundedFile;
 use crate::messages::{Header, Octomap};
 use anyhow::anyhow;
-use std::io::Cursor;
 use voxtile::octree::OctreeFormat;
 use voxtile::query::OctreeExport;
 use voxtile::{Aabb, MapQueries, MapView};
@@ -14,7 +14,7 @@ const LAST_HEADER_LINE: &[u8] = b"\ndata\n";
 ///
 /// # Errors
 ///
-/// Voxels beyond OctoMap's keys; a tile that cannot be read.
+/// Voxels beyond OctoMap's keys; more than a message may have; a tile that cannot be read.
 pub fn octomap(
     map: &impl MapView,
     region: &Aabb,
@@ -23,8 +23,9 @@ pub fn octomap(
 ) -> anyhow::Result<Octomap> {
     let resolution = map.config().grid.resolution_m();
     let export = OctreeExport { format, region: Some(region), origin: [0; 3], memory_bytes: MEMORY_BYTES };
-    let (mut spool, mut file) = (Cursor::new(Vec::new()), Vec::new());
+    let (mut spool, mut file) = (BoundedFile::default(), BoundedFile::default());
     map.write_octree::<anyhow::Error>(&export, &mut spool, &mut file)?;
+    let mut file = file.into_bytes();
     let end = file.windows(LAST_HEADER_LINE.len()).position(|line| line == LAST_HEADER_LINE);
     let end = end.ok_or_else(|| anyhow!("the octree has no header"))? + LAST_HEADER_LINE.len();
     file.drain(..end);

@@ -1,9 +1,11 @@
 use super::Extent;
+use super::diagnosing::Diagnosing;
 use super::occupied_voxels::{cloud, markers};
 use super::octomap::octomap;
 use super::outlet::Outlet;
 use super::projected_map::projected_map;
 use crate::args::Args;
+use crate::inbox::Inbox;
 use crate::live_map::LiveMap;
 use crate::messages::{MarkerArray, OccupancyGrid, Octomap, PointCloud2};
 use ros2_client::Node;
@@ -15,6 +17,7 @@ use voxtile::octree::OctreeFormat;
 /// The thread that publishes the map, beside the mapper: it reads views, for which no mapper waits.
 pub struct Publishing {
     node: Node,
+    inbox: Arc<Inbox>,
     map: Arc<LiveMap>,
     every: Duration,
     extent: Extent,
@@ -24,6 +27,7 @@ pub struct Publishing {
     centers: Outlet<PointCloud2>,
     markers: Outlet<MarkerArray>,
     projected_map: Outlet<OccupancyGrid>,
+    diagnosing: Diagnosing,
 }
 
 /// How long it sleeps before it looks whether it is to end.
@@ -33,7 +37,7 @@ impl Publishing {
     /// # Errors
     ///
     /// Rates and lengths that are none; DDS refuses.
-    pub fn new(args: &Args, mut node: Node, map: Arc<LiveMap>) -> anyhow::Result<Self> {
+    pub fn new(args: &Args, mut node: Node, inbox: Arc<Inbox>, map: Arc<LiveMap>) -> anyhow::Result<Self> {
         let octomap = ["octomap_msgs", "Octomap"];
         let cloud = ["sensor_msgs", "PointCloud2"];
         Ok(Self {
@@ -49,7 +53,9 @@ impl Publishing {
                 ["visualization_msgs", "MarkerArray"],
             )?,
             projected_map: Outlet::new(&mut node, "projected_map", ["nav_msgs", "OccupancyGrid"])?,
+            diagnosing: Diagnosing::new(&mut node, &args.node_name)?,
             node,
+            inbox,
             map,
         })
     }
@@ -62,6 +68,7 @@ impl Publishing {
                 begun = Instant::now();
                 self.refresh();
             }
+            self.diagnosing.refresh(&self.node, &self.inbox, &self.map);
             std::thread::sleep(NAP);
         }
     }
