@@ -6,14 +6,19 @@ use bytesize::ByteSize;
 use clap::Parser;
 use std::path::PathBuf;
 use std::time::Duration;
+use voxtile::SensorModel;
+use voxtile::sensor::LogOdds;
 
 /// Map what the sensors of a robot see, from ROS 2 over DDS, into a map of voxtile. Lengths are metres, times seconds.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "voxtile-ros2", version, max_term_width = 80)]
+#[command(name = "voxtile-ros2", version, max_term_width = 80, args_override_self = true)]
 pub struct Args {
     /// Folder of the map; made if it is not there, gone on with if it is
     #[arg(short = 'o', long = "output", value_name = "MAP")]
     pub output: PathBuf,
+    /// Options from a parameter file of ROS 2; those on the command line win, and a later file over an earlier one
+    #[arg(long, value_name = "FILE")]
+    pub params_file: Vec<PathBuf>,
     /// Topic of clouds (sensor_msgs/PointCloud2); give it again for each sensor
     #[arg(long, value_name = "TOPIC", default_value = "/cloud_in")]
     pub cloud: Vec<String>,
@@ -42,6 +47,18 @@ pub struct Args {
     /// Rays are cut at this length
     #[arg(long, value_name = "M")]
     pub max_range: Option<f64>,
+    /// Probability of being occupied that a hit stands for, of a new map [default: 0.7]
+    #[arg(long, value_name = "P")]
+    pub hit: Option<f64>,
+    /// The same of a miss [default: 0.4]
+    #[arg(long, value_name = "P")]
+    pub miss: Option<f64>,
+    /// Least probability that a voxel gets, of a new map [default: 0.1192]
+    #[arg(long, value_name = "P")]
+    pub clamp_min: Option<f64>,
+    /// Most probability that a voxel gets, of a new map [default: 0.971]
+    #[arg(long, value_name = "P")]
+    pub clamp_max: Option<f64>,
     /// Memory for the map and for clouds that wait; the clouds get an eighth
     #[arg(long, value_name = "SIZE", default_value = "1GiB")]
     pub memory: ByteSize,
@@ -92,6 +109,29 @@ impl Args {
     /// Bytes of the mapper.
     pub fn map_bytes(&self) -> usize {
         self.memory_bytes() - self.queue_bytes()
+    }
+
+    /// How hits and misses become evidence, in a new map.
+    ///
+    /// # Errors
+    ///
+    /// Probabilities that make no model.
+    pub fn sensor_model(&self) -> voxtile::Result<SensorModel> {
+        let octomap = LogOdds::default();
+        let given = LogOdds::from_probabilities(
+            self.hit.unwrap_or(0.7),
+            self.miss.unwrap_or(0.4),
+            self.clamp_min.unwrap_or(0.1192),
+            self.clamp_max.unwrap_or(0.971),
+        )?;
+        // OctoMap's defaults are not quite these probabilities.
+        let model = LogOdds {
+            hit: self.hit.map_or(octomap.hit, |_| given.hit),
+            miss: self.miss.map_or(octomap.miss, |_| given.miss),
+            min: self.clamp_min.map_or(octomap.min, |_| given.min),
+            max: self.clamp_max.map_or(octomap.max, |_| given.max),
+        };
+        Ok(SensorModel::LogOdds(model))
     }
 
     /// How much is published.

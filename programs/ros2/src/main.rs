@@ -17,6 +17,7 @@ mod live_map;
 mod mapping;
 mod messages;
 mod node;
+mod parameters;
 mod publishers;
 mod raw_message;
 mod services;
@@ -24,7 +25,6 @@ mod transform_buffer;
 mod when_behind;
 
 use args::Args;
-use clap::Parser;
 use inbox::Inbox;
 use mapping::Mapping;
 use std::process::ExitCode;
@@ -35,7 +35,9 @@ fn main() -> ExitCode {
     // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks.
     let filter = "info,rustdds=error,ros2_client=off";
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
-    match run(&Args::parse()) {
+    let arguments: Vec<_> = std::env::args_os().collect();
+    let args = parameters::parse(&arguments).unwrap_or_else(|error| error.exit());
+    match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("voxtile-ros2: {error:#}");

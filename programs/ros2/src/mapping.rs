@@ -61,6 +61,7 @@ impl Mapping {
             }
             Err(Error::NoMap { .. }) => {
                 let config = MapConfig::new(args.resolution, args.tile_size)?;
+                let config = config.with_sensor_model(args.sensor_model()?);
                 OutOfCoreTileMapper::create(&args.output, own(config))?
             }
             Err(error) => return Err(error.into()),
