@@ -21,6 +21,7 @@ mod parameters;
 mod publishers;
 mod raw_message;
 mod services;
+mod stamp_check;
 mod transform_buffer;
 mod when_behind;
 
