@@ -1,3 +1,4 @@
+use crate::latencies::Latencies;
 use std::time::Duration;
 use voxtile::mapper::MapStatistics;
 
@@ -10,4 +11,5 @@ pub struct Health {
     /// Since the map on disk was last what is in memory, or made newer.
     pub flush_age: Duration,
     pub is_flushing: bool,
+    pub latencies: Latencies,
 }

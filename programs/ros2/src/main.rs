@@ -13,6 +13,7 @@ mod cloud_queue;
 mod counters;
 mod health;
 mod inbox;
+mod latencies;
 mod live_map;
 mod mapping;
 mod messages;

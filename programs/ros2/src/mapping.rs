@@ -2,6 +2,7 @@ use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::health::Health;
 use crate::inbox::Inbox;
+use crate::latencies::Latencies;
 use crate::live_map::LiveMap;
 use crate::services::{Order, PlacedOrder};
 use std::path::{Path, PathBuf};
@@ -22,6 +23,7 @@ pub struct Mapping {
     inbox: Arc<Inbox>,
     mapper: OutOfCoreTileMapper,
     live: Arc<LiveMap>,
+    latencies: Latencies,
     orders: Receiver<PlacedOrder>,
     /// Orders to save, with the scan that has to be durable.
     saves: Vec<(u64, PlacedOrder)>,
@@ -75,6 +77,7 @@ impl Mapping {
             inbox,
             mapper,
             live,
+            latencies: Latencies::default(),
             orders,
             saves: Vec::new(),
             folder: args.output.clone(),
@@ -192,6 +195,7 @@ impl Mapping {
             unflushed_scans: scan_number.saturating_sub(flushed),
             flush_age: self.durable.0.elapsed(),
             is_flushing: self.mapper.is_flushing(),
+            latencies: self.latencies.clone(),
         });
     }
 
@@ -213,6 +217,7 @@ impl Mapping {
             Ok(()) => {
                 let (scan_number, sensor_m) = (self.mapper.scan_number(), world_from_sensor.position_m);
                 self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);
+                self.latencies.note(cloud.arrived.elapsed());
                 self.inbox.count(|counters| counters.mapped += 1);
             }
             // A pose that is none or beyond all tiles: the next cloud may do.
@@ -227,7 +232,11 @@ impl Mapping {
 
     fn tell(&self) {
         let (counters, waiting) = self.inbox.counters();
-        log::info!("{counters}; {waiting} wait; the map is at scan {}", self.mapper.scan_number());
+        let [p50, p99] = [50, 99].map(|percent| self.latencies.percentile(percent).unwrap_or_default());
+        log::info!(
+            "{counters}; {waiting} wait; the map is at scan {}; {p50:.1?} from cloud to map, p99 {p99:.1?}",
+            self.mapper.scan_number()
+        );
     }
 }
 

@@ -1,6 +1,9 @@
 """An independent ROS 2 peer (Cyclone DDS): writes a bag of clouds and tf, and publishes the same messages.
 
-peer.py DOMAIN BAG CLOUDS [hostile]
+peer.py DOMAIN BAG CLOUDS [hostile | variants | real FOLDER]
+
+variants: the same points as organised clouds, big-endian, in double precision with fields in another order.
+real: the PCD files of a folder, at its poses (poses_tum.txt).
 """
 
 import sys
@@ -30,7 +33,6 @@ from ros_messages import (
     Vector3,
 )
 
-
 START_S = 1_700_000_000
 
 
@@ -58,8 +60,47 @@ def cloud(stamp_ns, seed):
     return PointCloud2(header(stamp_ns, "lidar"), 1, 2000, fields, False, 16, len(data), data, False)
 
 
-def messages(clouds):
+def variant(plain, number):
+    """The same points in another layout."""
+    points = np.frombuffer(plain.data, "<f4").reshape(-1, 4)
+    if number % 3 == 0:
+        # Organised, with room behind each row.
+        rows = points.reshape(4, -1).view(np.uint8).reshape(4, -1)
+        data = np.pad(rows, ((0, 0), (0, 24)), constant_values=255).tobytes()
+        return PointCloud2(plain.header, 4, 500, plain.fields, False, 16, len(data) // 4, data, False)
+    if number % 3 == 1:
+        data = points.astype(">f4").tobytes()
+        return PointCloud2(plain.header, 1, 2000, plain.fields, True, 16, len(data), data, False)
+    layout = {"names": ["intensity", "z", "y", "x"], "formats": ["<f4", "<f8", "<f8", "<f8"]}
+    rows = np.zeros(2000, {**layout, "offsets": [0, 8, 16, 24], "itemsize": 40})
+    for k, name in enumerate(["x", "y", "z", "intensity"]):
+        rows[name] = points[:, k]
+    fields = [PointField(name, 8 * k, 7 if k == 0 else 8, 1) for k, name in enumerate(layout["names"])]
+    data = rows.tobytes()
+    return PointCloud2(plain.header, 1, 2000, fields, False, 40, len(data), data, False)
+
+
+def real_messages(clouds, folder):
+    """A recording: each cloud comes with the pose at its stamp."""
+    poses = [line.split() for line in open(folder / "poses_tum.txt") if not line.startswith("#")]
+    files = sorted((folder / "scans").glob("*.pcd"))
+    for tick, (file, pose) in enumerate(list(zip(files, poses))[:clouds]):
+        head, points = file.read_bytes().split(b"DATA binary\n", 1)
+        assert b"FIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\n" in head
+        stamp = header(tick * 100_000_000, "map")
+        place, turn = [float(at) for at in pose[1:4]], [float(at) for at in pose[4:8]]
+        yield "/tf", TFMessage([TransformStamped(stamp, "lidar", Transform(Vector3(*place), Quaternion(*turn)))])
+        fields = [PointField(name, 4 * k, 7, 1) for k, name in enumerate(["x", "y", "z", "intensity"])]
+        count = len(points) // 16
+        lidar = header(tick * 100_000_000, "lidar")
+        yield "/cloud_in", PointCloud2(lidar, 1, count, fields, False, 16, len(points), points, False)
+
+
+def messages(clouds, kind, folder):
     """Topic and message, in the order in which a robot sends them: transforms at 50 Hz, clouds at 10 Hz between."""
+    if kind == "real":
+        yield from real_messages(clouds, Path(folder))
+        return
     yield "/tf_static", TFMessage([transform(0, "base", "lidar", 0.2, 0.1)])
     for tick in range(5 * clouds + 2):
         stamp_ns = tick * 20_000_000
@@ -67,7 +108,8 @@ def messages(clouds):
         moving = [transform(stamp_ns, "map", "odom", 1.0, 0.0), odometry]
         yield "/tf", TFMessage(moving)
         if tick % 5 == 0 and tick // 5 < clouds:
-            yield "/cloud_in", cloud(stamp_ns + 7_000_000, tick)
+            plain = cloud(stamp_ns + 7_000_000, tick)
+            yield "/cloud_in", variant(plain, tick // 5) if kind == "variants" else plain
 
 
 TYPES = {
@@ -77,18 +119,18 @@ TYPES = {
 }
 
 
-def write_bag(path, clouds):
+def write_bag(path, clouds, kind, folder):
     store = get_typestore(Stores.ROS2_JAZZY)
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         topics = {name: bag.add_connection(name, kind, typestore=store) for name, kind in TYPES.items()}
-        for number, (name, message) in enumerate(messages(clouds)):
+        for number, (name, message) in enumerate(messages(clouds, kind, folder)):
             bag.write(topics[name], START_S * 10**9 + number, bytes(message.serialize()))
 
 
 def main():
     domain, bag, clouds = int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
-    is_hostile = sys.argv[4:] == ["hostile"]
-    write_bag(bag, clouds)
+    kind, folder = (*sys.argv[4:], "", "")[:2]
+    write_bag(bag, clouds, kind, folder)
     participant = DomainParticipant(domain)
 
     def writer(name, kind, *policies):
@@ -105,8 +147,8 @@ def main():
             sys.exit("no node answers")
         time.sleep(0.02)
     time.sleep(0.5)
-    for name, message in messages(clouds):
-        if is_hostile and name == "/cloud_in":
+    for name, message in messages(clouds, kind, folder):
+        if kind == "hostile" and name == "/cloud_in":
             liar = cloud(0, 1)
             liar.header.stamp = message.header.stamp
             liar.height = liar.width = liar.row_step = 2**32 - 1
@@ -114,7 +156,7 @@ def main():
             liar.fields = []
             writers[name].write(liar)
         writers[name].write(message)
-        time.sleep(0.02)
+        time.sleep(0.05 if kind == "real" else 0.02)
     time.sleep(1.5)
 
 

@@ -33,7 +33,9 @@ pub fn diagnostics(
         ("clouds_waiting", waiting.to_string()),
     ];
     values.extend(dropped.map(|(why, now, _)| (why, now.to_string())));
-    let Health { statistics, unflushed_scans, flush_age, is_flushing } = health;
+    let Health { statistics, unflushed_scans, flush_age, is_flushing, latencies } = health;
+    let ms =
+        |percent| format!("{:.1}", latencies.percentile(percent).unwrap_or_default().as_secs_f64() * 1e3);
     let memory = &statistics.memory;
     values.extend([
         ("scan_number", statistics.scan_number.to_string()),
@@ -51,6 +53,8 @@ pub fn diagnostics(
         ("flush_age_s", format!("{:.1}", flush_age.as_secs_f64())),
         ("flushing", is_flushing.to_string()),
         ("unflushed_scans", unflushed_scans.to_string()),
+        ("latency_p50_ms", ms(50)),
+        ("latency_p99_ms", ms(99)),
         ("stalls", statistics.stalls.count.to_string()),
         ("worst_stall_ms", (statistics.stalls.worst_us / 1000).to_string()),
     ]);
