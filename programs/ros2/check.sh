@@ -47,7 +47,7 @@ play() {
     "$program" -o "$map" --domain-id $domain --resolution $resolution $outputs >"$work/$kind.log" 2>&1 &
     node=$!
     listen $seconds
-    "$python" programs/ros2/tests/peer.py $domain "$work/$kind.bag" $count $kind $street
+    "$python" programs/ros2/tests/peer.py $domain "$work/$kind.bag" $count $kind "$street"
     wait "$listener"
     listener=
     kill -INT "$node"
@@ -91,7 +91,8 @@ for kind in ${*:-friendly hostile variants real}; do
     "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
     "$voxtile" export "$map" -o "$map.pgm" --z-max $max_z >/dev/null
     compare() {
-        [ $kind = real ] || "$python" programs/ros2/tests/outputs.py compare "$work/$kind.outputs" "$map.csv" "$map.pgm" 30 $radius $max_z
+        [ $kind = real ] || "$python" programs/ros2/tests/outputs.py compare \
+            "$work/$kind.outputs" "$map.csv" "$map.pgm" $count $radius $max_z
     }
     compare
     # The map is there to go on with, and nothing that did not come changes it. Who listens gets it, once.
