@@ -1,71 +1,63 @@
-use super::column_grid::{ColumnGrid, nothing_to_draw};
+use super::flat_map::{Column, FlatMap};
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use crate::error::Result;
 use std::path::{Path, PathBuf};
 
-/// Grey of a column without a voxel: `p = (255 - 205) / 255 = 0.196`.
-const UNKNOWN: u8 = 205;
-const FREE: u8 = 254;
-const OCCUPIED: u8 = 0;
-
 /// A flat map as nav2's map server loads it: a picture, and a `.yaml` beside it that names it.
 pub(super) struct Nav2Sink {
     out: OutFile,
-    head: VoxelsHead,
-    heights_m: [f64; 2],
+    resolution_m: f64,
     yaml: PathBuf,
     image: String,
-    grid: Option<ColumnGrid<u8>>,
+    map: FlatMap,
 }
 
 impl Nav2Sink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
-        let heights_m = options.heights_m()?;
+        let map = FlatMap::new(head, options.heights_m()?);
         let (yaml, image) = (options.companion("yaml")?, options.final_name()?.to_owned());
-        Ok(Self { out: OutFile::create(path)?, head: head.clone(), heights_m, yaml, image, grid: None })
+        Ok(Self { out: OutFile::create(path)?, resolution_m: head.resolution_m, yaml, image, map })
     }
 }
 
 impl VoxelSink for Nav2Sink {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
-        let grid = match &mut self.grid {
-            Some(grid) => grid,
-            none => none.insert(ColumnGrid::new(&self.head, voxel, UNKNOWN)?),
-        };
-        let (column, _) = grid.column(voxel)?;
-        let [least, most] = self.heights_m;
-        let (z, half) = (voxel.center_m[2], 0.5 * self.head.resolution_m);
-        if z + half <= least || z - half >= most {
-            return Ok(());
-        }
-        if voxel.probability >= self.head.occupied_from {
-            *column = OCCUPIED;
-        } else if *column == UNKNOWN {
-            *column = FREE;
-        }
-        Ok(())
+        self.map.put(voxel)
     }
 
     fn finish(mut self: Box<Self>) -> Result<()> {
-        let grid = self.grid.take().ok_or_else(nothing_to_draw)?;
-        let [width, height] = grid.size();
+        let [width, height] = self.map.size()?;
         self.out.write(format!("P5\n{width} {height}\n255\n").as_bytes())?;
-        self.out.write(grid.cells())?;
-        let [x, y, _] = grid.corner_m();
+        let mut greys = Vec::new();
+        for row in self.map.columns()?.chunks(width.max(1)) {
+            greys.clear();
+            greys.extend(row.iter().copied().map(grey_of));
+            self.out.write(&greys)?;
+        }
+        let [x, y, _] = self.map.corner_m()?;
         // nav2 compares with `<` and `>`: 0.196 is below the 0.19608 of an unknown cell, which its own saver's 0.25 makes
         // free.
         let yaml = format!(
             "image: {}\nmode: trinary\nresolution: {}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n\
              free_thresh: 0.196\n",
             quoted(&self.image),
-            self.head.resolution_m
+            self.resolution_m
         );
         let mut companion = OutFile::create(&self.yaml)?;
         companion.write(yaml.as_bytes())?;
         companion.finish()?;
         self.out.finish()
+    }
+}
+
+fn grey_of(column: Column) -> u8 {
+    match column {
+        // `p = (255 - 205) / 255 = 0.196`.
+        Column::Unknown => 205,
+        Column::Free => 254,
+        Column::Occupied => 0,
     }
 }
 
@@ -76,6 +68,7 @@ pub(super) fn quoted(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::column_grid::ColumnGrid;
     use super::super::testing::{head_of, row};
     use super::*;
 

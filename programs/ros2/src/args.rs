@@ -1,15 +1,24 @@
+use crate::publishers::Extent;
+use crate::services::Rmw;
 use crate::when_behind::WhenBehind;
+use anyhow::ensure;
 use bytesize::ByteSize;
 use clap::Parser;
 use std::path::PathBuf;
+use std::time::Duration;
+use voxtile::SensorModel;
+use voxtile::sensor::LogOdds;
 
 /// Map what the sensors of a robot see, from ROS 2 over DDS, into a map of voxtile. Lengths are metres, times seconds.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "voxtile-ros2", version, max_term_width = 80)]
+#[command(name = "voxtile-ros2", version, max_term_width = 80, args_override_self = true)]
 pub struct Args {
     /// Folder of the map; made if it is not there, gone on with if it is
     #[arg(short = 'o', long = "output", value_name = "MAP")]
     pub output: PathBuf,
+    /// Options from a parameter file of ROS 2; those on the command line win, and a later file over an earlier one
+    #[arg(long, value_name = "FILE")]
+    pub params_file: Vec<PathBuf>,
     /// Topic of clouds (sensor_msgs/PointCloud2); give it again for each sensor
     #[arg(long, value_name = "TOPIC", default_value = "/cloud_in")]
     pub cloud: Vec<String>,
@@ -38,6 +47,18 @@ pub struct Args {
     /// Rays are cut at this length
     #[arg(long, value_name = "M")]
     pub max_range: Option<f64>,
+    /// Probability of being occupied that a hit stands for, of a new map [default: 0.7]
+    #[arg(long, value_name = "P")]
+    pub hit: Option<f64>,
+    /// The same of a miss [default: 0.4]
+    #[arg(long, value_name = "P")]
+    pub miss: Option<f64>,
+    /// Least probability that a voxel gets, of a new map [default: 0.1192]
+    #[arg(long, value_name = "P")]
+    pub clamp_min: Option<f64>,
+    /// Most probability that a voxel gets, of a new map [default: 0.971]
+    #[arg(long, value_name = "P")]
+    pub clamp_max: Option<f64>,
     /// Memory for the map and for clouds that wait; the clouds get an eighth
     #[arg(long, value_name = "SIZE", default_value = "1GiB")]
     pub memory: ByteSize,
@@ -48,6 +69,28 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = WhenBehind::DropOldest)]
     pub when_behind: WhenBehind,
 
+    /// Publish what changed so often, to those who listen
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    pub publish_every: f64,
+    /// Publish the box around the sensor that reaches so far
+    #[arg(long, value_name = "M", default_value_t = 20.0)]
+    pub publish_radius: f64,
+    /// The same for projected_map [default: that of --publish-radius]
+    #[arg(long, value_name = "M")]
+    pub projected_radius: Option<f64>,
+    /// Voxels below this height are left out of clouds, cubes and projected_map
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub occupancy_min_z: Option<f64>,
+    /// Voxels above this height are left out of clouds, cubes and projected_map
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub occupancy_max_z: Option<f64>,
+
+    /// Name of the node, of which some services are named after
+    #[arg(long, value_name = "NAME", default_value = "voxtile_ros2")]
+    pub node_name: String,
+    /// Middleware of those who call services
+    #[arg(long, value_enum, default_value_t = Rmw::Fastrtps)]
+    pub rmw: Rmw,
     /// DDS domain
     #[arg(long, value_name = "ID", env = "ROS_DOMAIN_ID", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=232))]
@@ -66,6 +109,66 @@ impl Args {
     /// Bytes of the mapper.
     pub fn map_bytes(&self) -> usize {
         self.memory_bytes() - self.queue_bytes()
+    }
+
+    /// How hits and misses become evidence, in a new map.
+    ///
+    /// # Errors
+    ///
+    /// Probabilities that make no model.
+    pub fn sensor_model(&self) -> voxtile::Result<SensorModel> {
+        let octomap = LogOdds::default();
+        let given = LogOdds::from_probabilities(
+            self.hit.unwrap_or(0.7),
+            self.miss.unwrap_or(0.4),
+            self.clamp_min.unwrap_or(0.1192),
+            self.clamp_max.unwrap_or(0.971),
+        )?;
+        // OctoMap's defaults are not quite these probabilities.
+        let model = LogOdds {
+            hit: self.hit.map_or(octomap.hit, |_| given.hit),
+            miss: self.miss.map_or(octomap.miss, |_| given.miss),
+            min: self.clamp_min.map_or(octomap.min, |_| given.min),
+            max: self.clamp_max.map_or(octomap.max, |_| given.max),
+        };
+        Ok(SensorModel::LogOdds(model))
+    }
+
+    /// How much is published.
+    ///
+    /// # Errors
+    ///
+    /// Lengths that are none.
+    pub fn extent(&self) -> anyhow::Result<Extent> {
+        let radius_m = self.publish_radius;
+        ensure!(radius_m > 0.0, "--publish-radius: {radius_m} is no radius; give metres above 0");
+        let heights_m = [
+            self.occupancy_min_z.unwrap_or(f64::NEG_INFINITY),
+            self.occupancy_max_z.unwrap_or(f64::INFINITY),
+        ];
+        let [least, most] = heights_m;
+        ensure!(least < most, "--occupancy-min-z: {least} is not below --occupancy-max-z, {most}");
+        Ok(Extent { radius_m, heights_m })
+    }
+
+    /// How much is published of the flat map.
+    ///
+    /// # Errors
+    ///
+    /// Lengths that are none.
+    pub fn projected_extent(&self) -> anyhow::Result<Extent> {
+        let extent = self.extent()?;
+        let radius_m = self.projected_radius.unwrap_or(extent.radius_m);
+        ensure!(radius_m > 0.0, "--projected-radius: {radius_m} is no radius; give metres above 0");
+        Ok(Extent { radius_m, ..extent })
+    }
+
+    /// # Errors
+    ///
+    /// A time that is none.
+    pub fn publish_every(&self) -> anyhow::Result<Duration> {
+        Duration::try_from_secs_f64(self.publish_every)
+            .map_err(|_| anyhow::anyhow!("--publish-every: {} is no time; give seconds", self.publish_every))
     }
 
     fn memory_bytes(&self) -> usize {

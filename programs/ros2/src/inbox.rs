@@ -59,7 +59,10 @@ impl Inbox {
         let mut state = self.lock();
         let State { transforms, counters, .. } = &mut *state;
         match poses {
-            Ok(poses) => poses.iter().for_each(|pose| transforms.insert(pose, is_static, counters)),
+            Ok(poses) => {
+                let now = Instant::now();
+                poses.iter().for_each(|pose| transforms.insert(pose, is_static, now, counters));
+            }
             Err(error) => {
                 log::debug!("transforms cannot be decoded: {error}");
                 counters.malformed += 1;

@@ -3,21 +3,30 @@
 //! ```text
 //! DDS -> RawMessage -> CloudQueue, TransformBuffer   node: a thread a topic
 //! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
+//! LiveMap -> messages -> DDS                         publishers: one thread
+//! DDS -> orders -> Mapping, questions -> LiveMap     services: a thread a service
 //! ```
 
 mod args;
 mod cloud;
 mod cloud_queue;
 mod counters;
+mod health;
 mod inbox;
+mod latencies;
+mod live_map;
 mod mapping;
+mod messages;
 mod node;
+mod parameters;
+mod publishers;
 mod raw_message;
+mod services;
+mod stamp_check;
 mod transform_buffer;
 mod when_behind;
 
 use args::Args;
-use clap::Parser;
 use inbox::Inbox;
 use mapping::Mapping;
 use std::process::ExitCode;
@@ -25,8 +34,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("info,rustdds=error")).init();
-    match run(&Args::parse()) {
+    // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks.
+    let filter = "info,rustdds=error,ros2_client=off";
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
+    let arguments: Vec<_> = std::env::args_os().collect();
+    let args = parameters::parse(&arguments).unwrap_or_else(|error| error.exit());
+    match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("voxtile-ros2: {error:#}");
@@ -44,10 +57,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     let inbox = Arc::new(Inbox::new(args));
     // A map that cannot be opened is told before anybody sees a node.
-    let mut mapping = Mapping::open(args, inbox.clone())?;
-    let node = node::start(args, &inbox)?;
+    let (orders, placed_orders) = services::orders();
+    let mapping = Mapping::open(args, inbox.clone(), placed_orders)?;
+    let node = node::start(args, &inbox, mapping.live(), &orders)?;
     let outcome = mapping.run(&stop);
     inbox.close();
-    drop(node);
+    node.end();
     outcome
 }

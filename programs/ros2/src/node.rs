@@ -1,20 +1,36 @@
 use crate::args::Args;
 use crate::inbox::Inbox;
+use crate::live_map::LiveMap;
+use crate::publishers::Publishing;
 use crate::raw_message::{RawAdapter, RawMessage};
+use crate::services::{self, Orders};
 use anyhow::{Context as _, anyhow};
 use futures::StreamExt;
 use futures::executor::block_on;
-use ros2_client::{Context, Node, NodeName, NodeOptions};
+use ros2_client::{Context, NodeName, NodeOptions};
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::{DomainParticipantBuilder, QosPolicies, QosPolicyBuilder, Subscriber, TopicKind};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use voxtile_clouds::ros::messages::MessageKind;
 
 /// What keeps the node in the graph.
 pub struct RunningNode {
-    _node: Node,
+    publishing: JoinHandle<()>,
+    stop: Arc<AtomicBool>,
     _context: Context,
+}
+
+impl RunningNode {
+    /// Leaves the graph.
+    pub fn end(self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if self.publishing.join().is_err() {
+            log::error!("the thread that publishes has died");
+        }
+    }
 }
 
 const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
@@ -26,7 +42,12 @@ const LEAST_RECEIVE_BUFFER_BYTES: usize = 2 << 20;
 /// # Errors
 ///
 /// No sockets; names of topics that ROS 2 does not know.
-pub fn start(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<RunningNode> {
+pub fn start(
+    args: &Args,
+    inbox: &Arc<Inbox>,
+    map: Arc<LiveMap>,
+    orders: &Orders,
+) -> anyhow::Result<RunningNode> {
     let mut builder =
         DomainParticipantBuilder::new(args.domain_id).socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
     if !args.network {
@@ -37,7 +58,8 @@ pub fn start(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<RunningNode> {
     let participant = builder.build().map_err(|error| anyhow!("{error:?}")).context(domain)?;
     let context =
         Context::from_domain_participant(participant.clone()).map_err(|error| anyhow!("{error:?}"))?;
-    let name = NodeName::new("/", "voxtile_ros2").map_err(|error| anyhow!("{error:?}"))?;
+    let name = NodeName::new("/", &args.node_name)
+        .map_err(|error| anyhow!("--node-name {}: {error:?}", args.node_name))?;
     let mut node = context.new_node(name, NodeOptions::new()).map_err(|error| anyhow!("{error:?}"))?;
     let spinner = node.spinner().map_err(|error| anyhow!("{error:?}"))?;
     spawn("spinner", move || drop(block_on(spinner.spin())))?;
@@ -75,7 +97,12 @@ pub fn start(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<RunningNode> {
         }
     }
     log::info!("listening to {} in domain {}", args.cloud.join(", "), args.domain_id);
-    Ok(RunningNode { _node: node, _context: context })
+    services::start(args, &participant, &mut node, &map, orders)?;
+    let mut publishing = Publishing::new(args, node, inbox.clone(), map)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let its_stop = stop.clone();
+    let publishing = spawn("publisher", move || publishing.run(&its_stop))?;
+    Ok(RunningNode { publishing, stop, _context: context })
 }
 
 fn read_topic(
@@ -99,7 +126,8 @@ fn read_topic(
             }
             futures::future::ready(())
         }));
-    })
+    })?;
+    Ok(())
 }
 
 /// Says what to do where the system gives sockets too little room: it cuts what is asked for without a word.
@@ -114,9 +142,8 @@ fn check_receive_buffer() {
     }
 }
 
-fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> anyhow::Result<()> {
-    std::thread::Builder::new().name(name.to_owned()).spawn(work).context("a thread cannot be started")?;
-    Ok(())
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> anyhow::Result<JoinHandle<()>> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(work).context("a thread cannot be started")
 }
 
 fn qos(reliability: Reliability, durability: Durability, depth: i32) -> QosPolicies {

@@ -2,6 +2,7 @@ use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::cloud_queue::Verdict;
 use crate::counters::Counters;
+use crate::stamp_check::{StampCheck, StampVerdict};
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::ros::messages::StampedPose;
@@ -11,6 +12,7 @@ use voxtile_clouds::ros::{Transforms, WhyNot};
 #[derive(Debug)]
 pub struct TransformBuffer {
     transforms: Transforms,
+    stamps: StampCheck,
     fixed_frame: String,
     most_wait: Duration,
     /// Samples since the last time that old ones were forgotten, and those left then.
@@ -32,10 +34,10 @@ impl TransformBuffer {
         transforms.set_most_gap_ns(Some((args.pose_tolerance.max(0.0) * 1e9) as i64));
         let most_wait = Duration::try_from_secs_f64(args.transform_wait).unwrap_or_default();
         let fixed_frame = args.frame_id.trim_start_matches('/').to_owned();
-        Self { transforms, fixed_frame, most_wait, samples: (0, 0) }
+        Self { transforms, stamps: StampCheck::default(), fixed_frame, most_wait, samples: (0, 0) }
     }
 
-    pub fn insert(&mut self, pose: &StampedPose, is_static: bool, counters: &mut Counters) {
+    pub fn insert(&mut self, pose: &StampedPose, is_static: bool, now: Instant, counters: &mut Counters) {
         let (new, kept) = self.samples;
         if new >= FORGET_EVERY {
             self.samples = (0, self.transforms.forget_older_than(SPAN_NS));
@@ -46,6 +48,7 @@ impl TransformBuffer {
         let is_full = new + kept >= MOST_SAMPLES || (is_new && self.transforms.frames() >= MOST_FRAMES);
         let is_refused = parent.len().max(child.len()) > MOST_NAME_BYTES
             || is_full
+            || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now))
             || !self.transforms.insert(
                 parent,
                 child,
@@ -55,6 +58,23 @@ impl TransformBuffer {
             );
         counters.transforms_refused += u64::from(is_refused);
         self.samples.0 += 1;
+    }
+
+    /// Whether a stamp is one of the robot's clock. If that has jumped, what was before it is forgotten.
+    fn is_of_now(&mut self, child: &str, stamp_ns: i64, now: Instant) -> bool {
+        match self.stamps.verdict(child, stamp_ns, now) {
+            StampVerdict::Take => true,
+            StampVerdict::Refuse => false,
+            StampVerdict::Jump(children) => {
+                log::warn!("the clock of the transforms has jumped: those before are forgotten");
+                for child in children {
+                    if self.transforms.is_moving(&child) {
+                        self.transforms.detach(&child);
+                    }
+                }
+                true
+            }
+        }
     }
 
     /// Whether a cloud has its pose, may still get it, or never will.
@@ -104,32 +124,61 @@ mod tests {
     fn a_cloud_waits_for_the_transform_behind_its_stamp_and_then_is_dropped() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         let cloud = cloud(150_000_000);
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, &mut counters);
-        buffer.insert(&pose("map", "base", 100_000_000, 0.0), false, &mut counters);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, Instant::now(), &mut counters);
+        buffer.insert(&pose("map", "base", 100_000_000, 0.0), false, Instant::now(), &mut counters);
         assert_eq!(buffer.verdict(&cloud, cloud.arrived), Verdict::Waits);
         assert_eq!(buffer.verdict(&cloud, cloud.arrived + Duration::from_secs(2)), Verdict::Hopeless);
-        buffer.insert(&pose("map", "base", 200_000_000, 2.0), false, &mut counters);
+        buffer.insert(&pose("map", "base", 200_000_000, 2.0), false, Instant::now(), &mut counters);
         let Verdict::Ready(found) = buffer.verdict(&cloud, cloud.arrived) else { panic!("no pose") };
         assert_eq!(found.position_m, [2.0, 0.0, 0.0]);
         assert_eq!(counters, Counters::default());
     }
 
     #[test]
+    fn a_stamp_in_the_future_costs_no_history_and_a_restart_forgets_it() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut counters);
+        let mut tick = |buffer: &mut TransformBuffer, number: i64, stamp_ns: i64, x: f64| {
+            let now = start + Duration::from_millis(20) * number as u32;
+            buffer.insert(&pose("map", "base", stamp_ns, x), false, now, &mut counters);
+        };
+        for number in 0..3000 {
+            tick(&mut buffer, number, 5 * S + number * S / 50, 3.0);
+            if number % 10 == 0 {
+                tick(&mut buffer, number, 900_000 * S, 9.0);
+            }
+        }
+        let found = |buffer: &TransformBuffer, stamp_ns: i64| match buffer.verdict(&cloud(stamp_ns), start) {
+            Verdict::Ready(pose) => Some(pose.position_m[0]),
+            _ => None,
+        };
+        assert_eq!(found(&buffer, 60 * S), Some(4.0));
+        // The simulation begins anew, and passes the same stamps.
+        for number in 3000..6000 {
+            tick(&mut buffer, number, 5 * S + (number - 3000) * S / 50 + 7, 5.0);
+        }
+        assert_eq!(found(&buffer, 60 * S), Some(6.0));
+        assert_eq!(found(&buffer, 5 * S + S / 10), None);
+        assert!((300..330).contains(&counters.transforms_refused), "{counters}");
+    }
+
+    #[test]
     fn a_flood_of_frames_or_samples_fills_the_buffer_and_no_more() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         for frame in 0..MOST_FRAMES + 7 {
-            buffer.insert(&pose("map", &format!("f{frame}"), 0, 0.0), false, &mut counters);
+            buffer.insert(&pose("map", &format!("f{frame}"), 0, 0.0), false, Instant::now(), &mut counters);
         }
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (MOST_FRAMES, 7));
-        buffer.insert(&pose("map", "f3", 1, 0.0), false, &mut counters);
+        buffer.insert(&pose("map", "f3", 1, 0.0), false, Instant::now(), &mut counters);
         assert_eq!(counters.transforms_refused, 7);
         let (mut buffer, mut counters) = (self::buffer(), Counters::default());
         for stamp_ns in 0..MOST_SAMPLES as i64 + 3000 {
-            buffer.insert(&pose("map", "base", stamp_ns, 0.0), false, &mut counters);
+            buffer.insert(&pose("map", "base", stamp_ns, 0.0), false, Instant::now(), &mut counters);
         }
         assert!(counters.transforms_refused > 0);
         assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
-        buffer.insert(&pose("map", &"x".repeat(1 << 20), 0, 0.0), true, &mut counters);
+        buffer.insert(&pose("map", &"x".repeat(1 << 20), 0, 0.0), true, Instant::now(), &mut counters);
         assert_eq!(buffer.transforms.frames(), 1);
     }
 }

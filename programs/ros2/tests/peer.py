@@ -1,101 +1,39 @@
 """An independent ROS 2 peer (Cyclone DDS): writes a bag of clouds and tf, and publishes the same messages.
 
-peer.py DOMAIN BAG CLOUDS [hostile]
+peer.py DOMAIN BAG CLOUDS [hostile | variants | real FOLDER]
+
+variants: the same points as organised clouds, big-endian, in double precision with fields in another order.
+real: the PCD files of a folder, at its poses (poses_tum.txt).
 """
 
-import os
 import sys
 import time
-
-os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General><Interfaces>
-<NetworkInterface address="127.0.0.1" multicast="false"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
-<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
-<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
-
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
-from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float64, int32, sequence, uint8, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.topic import Topic
-from cyclonedds.util import duration
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
-
-
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    sec: int32
-    nanosec: uint32
-
-
-@dataclass
-class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    stamp: Time
-    frame_id: str
-
-
-@dataclass
-class PointField(IdlStruct, typename="sensor_msgs::msg::dds_::PointField_"):
-    name: str
-    offset: uint32
-    datatype: uint8
-    count: uint32
-
-
-@dataclass
-class PointCloud2(IdlStruct, typename="sensor_msgs::msg::dds_::PointCloud2_"):
-    header: Header
-    height: uint32
-    width: uint32
-    fields: sequence[PointField]
-    is_bigendian: bool
-    point_step: uint32
-    row_step: uint32
-    data: sequence[uint8]
-    is_dense: bool
-
-
-@dataclass
-class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
-    x: float64
-    y: float64
-    z: float64
-
-
-@dataclass
-class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
-    x: float64
-    y: float64
-    z: float64
-    w: float64
-
-
-@dataclass
-class Transform(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
-    translation: Vector3
-    rotation: Quaternion
-
-
-@dataclass
-class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
-    header: Header
-    child_frame_id: str
-    transform: Transform
-
-
-@dataclass
-class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
-    transforms: sequence[TransformStamped]
-
+from ros_messages import (
+    BEST,
+    LATCHED,
+    RELIABLE,
+    VOLATILE,
+    Header,
+    PointCloud2,
+    PointField,
+    Quaternion,
+    TFMessage,
+    Time,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
 
 START_S = 1_700_000_000
-BEST, RELIABLE = Policy.Reliability.BestEffort, Policy.Reliability.Reliable(duration(seconds=1))
-VOLATILE, LATCHED = Policy.Durability.Volatile, Policy.Durability.TransientLocal
 
 
 def header(stamp_ns, frame):
@@ -122,8 +60,47 @@ def cloud(stamp_ns, seed):
     return PointCloud2(header(stamp_ns, "lidar"), 1, 2000, fields, False, 16, len(data), data, False)
 
 
-def messages(clouds):
+def variant(plain, number):
+    """The same points in another layout."""
+    points = np.frombuffer(plain.data, "<f4").reshape(-1, 4)
+    if number % 3 == 0:
+        # Organised, with room behind each row.
+        rows = points.reshape(4, -1).view(np.uint8).reshape(4, -1)
+        data = np.pad(rows, ((0, 0), (0, 24)), constant_values=255).tobytes()
+        return PointCloud2(plain.header, 4, 500, plain.fields, False, 16, len(data) // 4, data, False)
+    if number % 3 == 1:
+        data = points.astype(">f4").tobytes()
+        return PointCloud2(plain.header, 1, 2000, plain.fields, True, 16, len(data), data, False)
+    layout = {"names": ["intensity", "z", "y", "x"], "formats": ["<f4", "<f8", "<f8", "<f8"]}
+    rows = np.zeros(2000, {**layout, "offsets": [0, 8, 16, 24], "itemsize": 40})
+    for k, name in enumerate(["x", "y", "z", "intensity"]):
+        rows[name] = points[:, k]
+    fields = [PointField(name, 8 * k, 7 if k == 0 else 8, 1) for k, name in enumerate(layout["names"])]
+    data = rows.tobytes()
+    return PointCloud2(plain.header, 1, 2000, fields, False, 40, len(data), data, False)
+
+
+def real_messages(clouds, folder):
+    """A recording: each cloud comes with the pose at its stamp."""
+    poses = [line.split() for line in open(folder / "poses_tum.txt") if not line.startswith("#")]
+    files = sorted((folder / "scans").glob("*.pcd"))
+    for tick, (file, pose) in enumerate(list(zip(files, poses))[:clouds]):
+        head, points = file.read_bytes().split(b"DATA binary\n", 1)
+        assert b"FIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\n" in head
+        stamp = header(tick * 100_000_000, "map")
+        place, turn = [float(at) for at in pose[1:4]], [float(at) for at in pose[4:8]]
+        yield "/tf", TFMessage([TransformStamped(stamp, "lidar", Transform(Vector3(*place), Quaternion(*turn)))])
+        fields = [PointField(name, 4 * k, 7, 1) for k, name in enumerate(["x", "y", "z", "intensity"])]
+        count = len(points) // 16
+        lidar = header(tick * 100_000_000, "lidar")
+        yield "/cloud_in", PointCloud2(lidar, 1, count, fields, False, 16, len(points), points, False)
+
+
+def messages(clouds, kind, folder):
     """Topic and message, in the order in which a robot sends them: transforms at 50 Hz, clouds at 10 Hz between."""
+    if kind == "real":
+        yield from real_messages(clouds, Path(folder))
+        return
     yield "/tf_static", TFMessage([transform(0, "base", "lidar", 0.2, 0.1)])
     for tick in range(5 * clouds + 2):
         stamp_ns = tick * 20_000_000
@@ -131,7 +108,8 @@ def messages(clouds):
         moving = [transform(stamp_ns, "map", "odom", 1.0, 0.0), odometry]
         yield "/tf", TFMessage(moving)
         if tick % 5 == 0 and tick // 5 < clouds:
-            yield "/cloud_in", cloud(stamp_ns + 7_000_000, tick)
+            plain = cloud(stamp_ns + 7_000_000, tick)
+            yield "/cloud_in", variant(plain, tick // 5) if kind == "variants" else plain
 
 
 TYPES = {
@@ -141,18 +119,18 @@ TYPES = {
 }
 
 
-def write_bag(path, clouds):
+def write_bag(path, clouds, kind, folder):
     store = get_typestore(Stores.ROS2_JAZZY)
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         topics = {name: bag.add_connection(name, kind, typestore=store) for name, kind in TYPES.items()}
-        for number, (name, message) in enumerate(messages(clouds)):
+        for number, (name, message) in enumerate(messages(clouds, kind, folder)):
             bag.write(topics[name], START_S * 10**9 + number, bytes(message.serialize()))
 
 
 def main():
     domain, bag, clouds = int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
-    is_hostile = sys.argv[4:] == ["hostile"]
-    write_bag(bag, clouds)
+    kind, folder = (*sys.argv[4:], "", "")[:2]
+    write_bag(bag, clouds, kind, folder)
     participant = DomainParticipant(domain)
 
     def writer(name, kind, *policies):
@@ -169,8 +147,8 @@ def main():
             sys.exit("no node answers")
         time.sleep(0.02)
     time.sleep(0.5)
-    for name, message in messages(clouds):
-        if is_hostile and name == "/cloud_in":
+    for name, message in messages(clouds, kind, folder):
+        if kind == "hostile" and name == "/cloud_in":
             liar = cloud(0, 1)
             liar.header.stamp = message.header.stamp
             liar.height = liar.width = liar.row_step = 2**32 - 1
@@ -178,7 +156,7 @@ def main():
             liar.fields = []
             writers[name].write(liar)
         writers[name].write(message)
-        time.sleep(0.02)
+        time.sleep(0.05 if kind == "real" else 0.02)
     time.sleep(1.5)
 
 

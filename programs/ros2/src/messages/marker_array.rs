@@ -1,0 +1,92 @@
+use super::sequence;
+use super::{Header, Pose, Time};
+use serde::Serialize;
+
+/// `std_msgs/ColorRGBA`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Color {
+    pub r: f32,
+    pub g: f32,
+    pub b: f32,
+    pub a: f32,
+}
+
+/// `visualization_msgs/Marker`, as it is since Humble.
+#[derive(Clone, Debug, Serialize)]
+pub struct Marker {
+    pub header: Header,
+    pub ns: String,
+    pub id: i32,
+    kind: i32,
+    action: i32,
+    pose: Pose,
+    /// Metres.
+    pub scale: [f64; 3],
+    pub color: Color,
+    lifetime: Time,
+    frame_locked: bool,
+    /// Metres.
+    pub points: Vec<[f64; 3]>,
+    colors: Vec<Color>,
+    texture_resource: String,
+    texture: CompressedImage,
+    uv_coordinates: Vec<[f32; 2]>,
+    text: String,
+    mesh_resource: String,
+    mesh_file: MeshFile,
+    mesh_use_embedded_materials: bool,
+}
+
+/// `sensor_msgs/CompressedImage`.
+#[derive(Clone, Debug, Default, Serialize)]
+struct CompressedImage {
+    header: Header,
+    format: String,
+    #[serde(with = "sequence")]
+    data: Vec<u8>,
+}
+
+/// `visualization_msgs/MeshFile`.
+#[derive(Clone, Debug, Default, Serialize)]
+struct MeshFile {
+    filename: String,
+    #[serde(with = "sequence")]
+    data: Vec<u8>,
+}
+
+/// `visualization_msgs/MarkerArray`.
+#[derive(Clone, Debug, Serialize)]
+pub struct MarkerArray {
+    pub markers: Vec<Marker>,
+}
+
+const CUBE_LIST: i32 = 6;
+const ADD: i32 = 0;
+const DELETE: i32 = 2;
+
+impl Marker {
+    /// Cubes of one size and color; without any, what was shown is taken away.
+    pub fn of_cubes(header: Header, edge_m: f64, color: Color, centers_m: Vec<[f64; 3]>) -> Self {
+        Self {
+            header,
+            ns: "map".to_owned(),
+            id: 0,
+            kind: CUBE_LIST,
+            action: if centers_m.is_empty() { DELETE } else { ADD },
+            pose: Pose::at([0.0; 3]),
+            scale: [edge_m; 3],
+            color,
+            lifetime: Time::default(),
+            frame_locked: false,
+            points: centers_m,
+            colors: Vec::new(),
+            texture_resource: String::new(),
+            texture: CompressedImage::default(),
+            uv_coordinates: Vec::new(),
+            text: String::new(),
+            mesh_resource: String::new(),
+            mesh_file: MeshFile::default(),
+            mesh_use_embedded_materials: false,
+        }
+    }
+}

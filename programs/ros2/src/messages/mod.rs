@@ -1,0 +1,31 @@
+//! Messages that the node sends and requests that it takes, as ROS 2 defines them; `serde` makes CDR of them, in the order
+//! of their fields. The definitions of our own (`voxtile_msgs`) are in `docs/ros2.md`.
+
+mod box_request;
+mod diagnostic_array;
+mod empty;
+mod get_octomap;
+mod header;
+mod marker_array;
+mod occupancy_grid;
+mod octomap;
+mod outcome;
+mod point_cloud2;
+mod pose;
+mod queries;
+mod sequence;
+mod snapshot_request;
+
+pub use box_request::BoxRequest;
+pub use diagnostic_array::{DiagnosticArray, DiagnosticStatus, KeyValue};
+pub use empty::Empty;
+pub use get_octomap::{OctomapInBoxRequest, OctomapInBoxResponse, OctomapResponse};
+pub use header::{Header, Time};
+pub use marker_array::{Color, Marker, MarkerArray};
+pub use occupancy_grid::{MapMetaData, OccupancyGrid};
+pub use octomap::Octomap;
+pub use outcome::Outcome;
+pub use point_cloud2::PointCloud2;
+pub use pose::Pose;
+pub use queries::{CollisionRequest, HitResponse, RayRequest};
+pub use snapshot_request::SnapshotRequest;

@@ -1,0 +1,18 @@
+use super::Header;
+use super::sequence;
+use serde::{Deserialize, Serialize};
+
+/// `octomap_msgs/Octomap`.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Octomap {
+    pub header: Header,
+    /// Whether nodes are free or occupied (`.bt`) or have log-odds (`.ot`).
+    pub binary: bool,
+    /// OctoMap's name of the tree's class.
+    pub id: String,
+    /// Metres.
+    pub resolution: f64,
+    /// The nodes alone, without the header of a file.
+    #[serde(with = "sequence")]
+    pub data: Vec<u8>,
+}

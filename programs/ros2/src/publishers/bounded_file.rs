@@ -1,0 +1,55 @@
+use std::io::{self, Cursor, Error, ErrorKind, Read, Seek, SeekFrom, Write};
+
+/// A file in memory that refuses to grow beyond what a message may have.
+#[derive(Debug, Default)]
+pub struct BoundedFile(Cursor<Vec<u8>>);
+
+/// Nobody gets a larger one over DDS.
+const MOST_BYTES: usize = 64 << 20;
+
+impl BoundedFile {
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.0.into_inner()
+    }
+}
+
+impl Write for BoundedFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let end = self.0.position().saturating_add(bytes.len() as u64);
+        if end > MOST_BYTES as u64 {
+            let reason = format!("the octree has more than {MOST_BYTES} bytes: ask for a smaller box");
+            return Err(Error::new(ErrorKind::FileTooLarge, reason));
+        }
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Read for BoundedFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.read(buffer)
+    }
+}
+
+impl Seek for BoundedFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_refuses_what_is_too_much_and_keeps_what_it_has() {
+        let mut file = BoundedFile::default();
+        file.write_all(&[7; 3]).unwrap();
+        file.seek(SeekFrom::Start(MOST_BYTES as u64 - 1)).unwrap();
+        assert_eq!(file.write(&[1; 2]).unwrap_err().kind(), ErrorKind::FileTooLarge);
+        assert_eq!(file.into_bytes(), [7; 3]);
+    }
+}

@@ -1,0 +1,51 @@
+use super::Extent;
+use crate::messages::{Color, Header, Marker, MarkerArray, PointCloud2};
+use anyhow::bail;
+use voxtile::{Aabb, MapQueries, MapView};
+
+/// Most voxels of a message: nobody gets a larger one over DDS.
+const MOST_VOXELS: usize = 4 << 20;
+const COLOR: Color = Color { r: 0.0, g: 0.0, b: 1.0, a: 1.0 };
+
+/// The centers of the occupied voxels of a region that reach between the heights.
+fn centers_m(map: &impl MapView, region: &Aabb, extent: &Extent) -> anyhow::Result<Vec<[f64; 3]>> {
+    let grid = map.config().grid;
+    let (mut centers_m, mut count) = (Vec::new(), 0);
+    map.for_each_occupied(None, Some(region), |voxel| {
+        let center_m = grid.center_m(voxel.index);
+        if extent.reaches(center_m[2], grid.resolution_m()) {
+            count += 1;
+            if count <= MOST_VOXELS {
+                centers_m.push(center_m);
+            }
+        }
+    })?;
+    if count > MOST_VOXELS {
+        bail!(
+            "{count} occupied voxels, and a message has at most {MOST_VOXELS}: take a smaller --publish-radius"
+        );
+    }
+    Ok(centers_m)
+}
+
+/// They as a cloud.
+pub fn cloud(
+    map: &impl MapView,
+    region: &Aabb,
+    extent: &Extent,
+    header: Header,
+) -> anyhow::Result<PointCloud2> {
+    Ok(PointCloud2::of_points(header, centers_m(map, region, extent)?))
+}
+
+/// They as cubes.
+pub fn markers(
+    map: &impl MapView,
+    region: &Aabb,
+    extent: &Extent,
+    header: Header,
+) -> anyhow::Result<MarkerArray> {
+    let edge_m = map.config().grid.resolution_m();
+    let centers_m = centers_m(map, region, extent)?;
+    Ok(MarkerArray { markers: vec![Marker::of_cubes(header, edge_m, COLOR, centers_m)] })
+}

@@ -1,0 +1,34 @@
+use super::bounded_file::BoundedFile;
+use crate::messages::{Header, Octomap};
+use anyhow::anyhow;
+use voxtile::octree::OctreeFormat;
+use voxtile::query::OctreeExport;
+use voxtile::{Aabb, MapQueries, MapView};
+
+/// Memory for the part of the tree that is built at a time.
+const MEMORY_BYTES: usize = 32 << 20;
+/// The line that ends the header of a file.
+const LAST_HEADER_LINE: &[u8] = b"\ndata\n";
+
+/// The voxels of a region as OctoMap's tree, as `octomap_msgs::msgToMap` reads it.
+///
+/// # Errors
+///
+/// Voxels beyond OctoMap's keys; more than a message may have; a tile that cannot be read.
+pub fn octomap(
+    map: &impl MapView,
+    region: &Aabb,
+    format: OctreeFormat,
+    header: Header,
+) -> anyhow::Result<Octomap> {
+    let resolution = map.config().grid.resolution_m();
+    let export = OctreeExport { format, region: Some(region), origin: [0; 3], memory_bytes: MEMORY_BYTES };
+    let (mut spool, mut file) = (BoundedFile::default(), BoundedFile::default());
+    map.write_octree::<anyhow::Error>(&export, &mut spool, &mut file)?;
+    let mut file = file.into_bytes();
+    let end = file.windows(LAST_HEADER_LINE.len()).position(|line| line == LAST_HEADER_LINE);
+    let end = end.ok_or_else(|| anyhow!("the octree has no header"))? + LAST_HEADER_LINE.len();
+    file.drain(..end);
+    let binary = format == OctreeFormat::Bt;
+    Ok(Octomap { header, binary, id: "OcTree".to_owned(), resolution, data: file })
+}

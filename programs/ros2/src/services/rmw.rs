@@ -1,0 +1,8 @@
+/// The middleware of the clients: they mark requests in different ways.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Rmw {
+    /// Fast DDS (`rmw_fastrtps`), the default of ROS 2.
+    Fastrtps,
+    /// Cyclone DDS (`rmw_cyclonedds`).
+    Cyclonedds,
+}

@@ -1,0 +1,137 @@
+use super::Rmw;
+use super::marked::Marked;
+use anyhow::{Context as _, anyhow};
+use futures::StreamExt;
+use futures::executor::block_on;
+use ros2_client::qos::{History, QosProfile};
+use ros2_client::{Message, Name, Node, ServiceMapping, ServiceTypeName};
+use rustdds::{DomainParticipant, QosPolicies, Topic, TopicKind};
+
+/// Makes services of a node, each with a thread of its own.
+pub struct Servers<'a> {
+    pub participant: &'a DomainParticipant,
+    pub node: &'a mut Node,
+    pub node_name: &'a str,
+    pub rmw: Rmw,
+}
+
+/// Requests that DDS keeps for a service that is busy.
+const DEPTH: usize = 10;
+
+impl Servers<'_> {
+    /// Answers a service, one request after the other. A name that begins with `~` is one of the node's own.
+    ///
+    /// # Errors
+    ///
+    /// DDS refuses, or the system a thread.
+    pub fn serve<Q, A>(
+        &mut self,
+        name: &str,
+        [package, type_name]: [&str; 2],
+        answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> anyhow::Result<()>
+    where
+        Q: Message + Clone + Send + 'static,
+        A: Message + Send + 'static,
+    {
+        let path = match name.strip_prefix("~/") {
+            Some(own) => format!("{}/{own}", self.node_name),
+            None => name.to_owned(),
+        };
+        match self.rmw {
+            Rmw::Fastrtps => self.serve_enhanced(&path, [package, type_name], answer),
+            Rmw::Cyclonedds => self.serve_marked(&path, [package, type_name], answer),
+        }
+    }
+
+    /// For clients of which requests are known by what DDS says about them.
+    fn serve_enhanced<Q, A>(
+        &mut self,
+        path: &str,
+        [package, type_name]: [&str; 2],
+        answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> anyhow::Result<()>
+    where
+        Q: Message + Clone + Send + 'static,
+        A: Message + Send + 'static,
+    {
+        let failed = |error: &dyn std::fmt::Debug| anyhow!("{path}: {error:?}");
+        let (namespace, own) = path.rsplit_once('/').unwrap_or(("", path));
+        let full_name = Name::new(&format!("/{namespace}"), own).map_err(|error| failed(&error))?;
+        let type_name = ServiceTypeName::new(package, type_name);
+        let server = self
+            .node
+            .create_server::<Q, A>(ServiceMapping::Enhanced, &full_name, &type_name, qos(), qos())
+            .map_err(|error| failed(&error))?;
+        let label = path.to_owned();
+        spawn(move || {
+            block_on(server.receive_request_stream().for_each(|request| {
+                match request {
+                    Ok((id, request)) => {
+                        if let Err(error) = server.send_response(id, answer(request)) {
+                            log::warn!("{label}: not answered: {error:?}");
+                        }
+                    }
+                    Err(error) => log::debug!("{label}: a request cannot be read: {error:?}"),
+                }
+                futures::future::ready(())
+            }));
+        })
+    }
+
+    /// For clients that mark the messages themselves. Not by `create_server`: it marks them in both ways, and then
+    /// responses of more than 64 KB arrive as garbage.
+    fn serve_marked<Q, A>(
+        &mut self,
+        path: &str,
+        [package, type_name]: [&str; 2],
+        answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> anyhow::Result<()>
+    where
+        Q: Message + Clone + Send + 'static,
+        A: Message + Send + 'static,
+    {
+        let failed = |error: &dyn std::fmt::Debug| anyhow!("{path}: {error:?}");
+        let type_name = format!("{package}::srv::dds_::{type_name}");
+        let requests = self.topic(format!("rq/{path}Request"), format!("{type_name}_Request_"))?;
+        let responses = self.topic(format!("rr/{path}Reply"), format!("{type_name}_Response_"))?;
+        let reader = self.node.create_subscription::<Marked<Q>>(&requests, Some(qos()));
+        let reader = reader.map_err(|error| failed(&error))?;
+        let writer = self.node.create_publisher::<Marked<A>>(&responses, Some(qos()));
+        let writer = writer.map_err(|error| failed(&error))?;
+        let label = path.to_owned();
+        spawn(move || {
+            block_on(reader.async_stream().for_each(|request| {
+                match request {
+                    Ok((Marked { guid, number, body }, _)) => {
+                        let response = Marked { guid, number, body: answer(body) };
+                        if let Err(error) = writer.publish(response) {
+                            log::warn!("{label}: not answered: {error}");
+                        }
+                    }
+                    Err(error) => log::debug!("{label}: a request cannot be read: {error:?}"),
+                }
+                futures::future::ready(())
+            }));
+        })
+    }
+
+    fn topic(&self, name: String, type_name: String) -> anyhow::Result<Topic> {
+        let topic = self.participant.create_topic(name.clone(), type_name, &policies(), TopicKind::NoKey);
+        topic.map_err(|error| anyhow!("{name}: {error:?}"))
+    }
+}
+
+fn qos() -> QosProfile {
+    QosProfile::publisher_default().history(History::KeepLast { depth: DEPTH })
+}
+
+fn policies() -> QosPolicies {
+    (&qos()).into()
+}
+
+fn spawn(work: impl FnOnce() + Send + 'static) -> anyhow::Result<()> {
+    let thread = std::thread::Builder::new().name("service".to_owned());
+    thread.spawn(work).context("a thread cannot be started")?;
+    Ok(())
+}

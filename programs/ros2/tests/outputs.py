@@ -1,0 +1,145 @@
+"""What the node publishes, as an independent peer (Cyclone DDS) gets and reads it.
+
+outputs.py listen DOMAIN FILE SECONDS [TOPIC ...]   writes the last message of each topic, and how many there were
+outputs.py compare FILE ALL.csv MAP.pgm CLOUDS RADIUS MAX_Z   compares them with what `voxtile export` writes
+"""
+
+import csv
+import json
+import sys
+import time
+
+import numpy as np
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from octrees import binary_leaves, full_leaves, octets, voxels_of
+from ros_messages import LATCHED, RELIABLE, MarkerArray, OccupancyGrid, Octomap, PointCloud2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+TYPES = {
+    "octomap_binary": (Octomap, "octomap_msgs/msg/Octomap"),
+    "octomap_full": (Octomap, "octomap_msgs/msg/Octomap"),
+    "octomap_point_cloud_centers": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
+    "occupied_cells_vis_array": (MarkerArray, "visualization_msgs/msg/MarkerArray"),
+    "projected_map": (OccupancyGrid, "nav_msgs/msg/OccupancyGrid"),
+}
+
+
+def typestore():
+    """ROS's own definitions."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    octomap = "std_msgs/Header header\nbool binary\nstring id\nfloat64 resolution\nint8[] data\n"
+    store.register(get_types_from_msg(octomap, "octomap_msgs/msg/Octomap"))
+    return store
+
+
+def plain(name, message):
+    """A message as numbers and texts."""
+    if name == "occupied_cells_vis_array":
+        [marker] = message.markers
+        points = [[point.x, point.y, point.z] for point in marker.points]
+        scale = [marker.scale.x, marker.scale.y, marker.scale.z]
+        frame = marker.header.frame_id
+        return {"frame": frame, "type": marker.type, "action": marker.action, "scale": scale, "points": points}
+    if name == "octomap_point_cloud_centers":
+        assert [field.name for field in message.fields] == ["x", "y", "z"]
+        points = np.frombuffer(octets(message.data), "<f4").reshape(-1, 3)
+        assert len(points) == message.width * message.height
+        return {"frame": message.header.frame_id, "points": points.astype(float).tolist()}
+    if name == "projected_map":
+        info = message.info
+        origin = info.origin.position
+        size = [info.width, info.height]
+        cells = [int(cell) for cell in message.data]
+        place = {"origin": [origin.x, origin.y, origin.z], "turn": info.origin.orientation.w}
+        return {"frame": message.header.frame_id, "size": size, "cells": cells, **place}
+    head = {"frame": message.header.frame_id, "binary": message.binary, "id": message.id}
+    return {**head, "resolution": message.resolution, "data": octets(message.data).hex()}
+
+
+def listen(domain, file, seconds, topics):
+    participant = DomainParticipant(domain)
+    store, got, readers = typestore(), {}, {}
+    for name in topics or TYPES:
+        qos = Qos(RELIABLE, LATCHED, Policy.History.KeepLast(1))
+        readers[name] = DataReader(participant, Topic(participant, "rt/" + name, TYPES[name][0]), qos=qos)
+    until = time.time() + seconds
+    while time.time() < until:
+        for name, reader in readers.items():
+            for message in reader.take(10):
+                if not hasattr(message, "serialize"):
+                    continue
+                # The classes here are those of ROS.
+                store.deserialize_cdr(bytes(message.serialize()), TYPES[name][1])
+                count = got.get(name, {"count": 0})["count"] + 1
+                got[name] = {"count": count, "message": plain(name, message)}
+        time.sleep(0.02)
+    with open(file, "w") as out:
+        json.dump(got, out)
+
+
+def pgm_cells(path):
+    """nav2's picture as cells of a message: row by row from below."""
+    data = open(path, "rb").read()
+    magic, size, most, pixels = data.split(b"\n", 3)
+    assert (magic, most) == (b"P5", b"255")
+    width, height = map(int, size.split())
+    rows = np.frombuffer(pixels, np.uint8).reshape(height, width)[::-1]
+    states = {0: 100, 254: 0, 205: -1}
+    return [width, height], [states[int(pixel)] for pixel in rows.flatten()]
+
+
+def last_place(clouds):
+    """Where peer.py has the sensor at its last cloud."""
+    ticks = 5 * (clouds - 1) + 0.35
+    yaw = 0.02 * ticks
+    x, y = 0.2 * np.cos(yaw) - 0.5 * np.sin(yaw), 0.2 * np.sin(yaw) + 0.5 * np.cos(yaw)
+    return [1.0 + 0.01 * ticks + x, 0.5 + 0.5 + y, 0.0]
+
+
+def compare(file, all_csv, pgm, origin, radius, max_z):
+    got = {name: one["message"] for name, one in json.load(open(file)).items()}
+    assert set(got) == set(TYPES), f"only {sorted(got)} came"
+    assert all(one["frame"] == "map" for one in got.values())
+    resolution = got["octomap_full"]["resolution"]
+    log_odds, centers = {}, {}
+    for row in csv.DictReader(open(all_csv)):
+        center = [float(row[axis]) for axis in "xyz"]
+        if not all(origin[k] - radius <= center[k] < origin[k] + radius for k in range(3)):
+            continue
+        index = tuple(round(at / resolution - 0.5) for at in center)
+        log_odds[index], centers[index] = float(row["log_odds"]), center
+    occupied = {index for index, value in log_odds.items() if value >= 0}
+    assert len(occupied) > 100 and len(log_odds) > len(occupied)
+
+    binary, full = got["octomap_binary"], got["octomap_full"]
+    assert (binary["binary"], full["binary"], binary["id"], full["id"]) == (True, False, "OcTree", "OcTree")
+    found = voxels_of(binary_leaves(bytes.fromhex(binary["data"])))
+    assert found == {index: index in occupied for index in log_odds}, "octomap_binary is another map"
+    found = voxels_of(full_leaves(bytes.fromhex(full["data"])))
+    assert found == {index: float(np.float32(value)) for index, value in log_odds.items()}, "octomap_full differs"
+
+    low = sorted(index for index in occupied if centers[index][2] - resolution / 2 < max_z)
+    assert 0 < len(low) < len(occupied)
+    for name in ["octomap_point_cloud_centers", "occupied_cells_vis_array"]:
+        points = [tuple(round(at / resolution - 0.5) for at in point) for point in got[name]["points"]]
+        assert sorted(points) == low, f"{name} has {len(points)} voxels, the map {len(low)}"
+    markers = got["occupied_cells_vis_array"]
+    assert (markers["type"], markers["action"], markers["scale"]) == (6, 0, [resolution] * 3)
+
+    grid = got["projected_map"]
+    size, cells = pgm_cells(pgm)
+    assert (grid["size"], grid["turn"]) == (size, 1.0), f"{grid['size']} cells, and the picture has {size}"
+    assert grid["cells"] == cells, "projected_map is another map"
+    corner = [float(at) for at in open(pgm.replace(".pgm", ".yaml")).read().split("origin: [")[1].split(",")[:2]]
+    assert grid["origin"] == [*corner, 0.0], f"{grid['origin']} and {corner}"
+    print(f"outputs: {len(log_odds)} voxels, {len(low)} of {len(occupied)} occupied ones below, {size} cells")
+
+
+if sys.argv[1] == "listen":
+    listen(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]), sys.argv[5:])
+else:
+    radius, max_z = map(float, sys.argv[6:8])
+    compare(*sys.argv[2:5], last_place(int(sys.argv[5])), radius, max_z)

@@ -1,0 +1,237 @@
+"""Messages of ROS 2 for Cyclone DDS, written after their definitions and not after the node's; and how to reach it."""
+
+import os
+
+os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General><Interfaces>
+<NetworkInterface address="127.0.0.1" multicast="false"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+
+from dataclasses import dataclass, make_dataclass
+
+from cyclonedds.core import Policy
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import float32, float64, int8, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.util import duration
+
+BEST, RELIABLE = Policy.Reliability.BestEffort, Policy.Reliability.Reliable(duration(seconds=1))
+VOLATILE, LATCHED = Policy.Durability.Volatile, Policy.Durability.TransientLocal
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32
+    nanosec: uint32
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+class PointField(IdlStruct, typename="sensor_msgs::msg::dds_::PointField_"):
+    name: str
+    offset: uint32
+    datatype: uint8
+    count: uint32
+
+
+@dataclass
+class PointCloud2(IdlStruct, typename="sensor_msgs::msg::dds_::PointCloud2_"):
+    header: Header
+    height: uint32
+    width: uint32
+    fields: sequence[PointField]
+    is_bigendian: bool
+    point_step: uint32
+    row_step: uint32
+    data: sequence[uint8]
+    is_dense: bool
+
+
+@dataclass
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: float64
+    y: float64
+    z: float64
+
+
+@dataclass
+class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
+    x: float64
+    y: float64
+    z: float64
+    w: float64
+
+
+@dataclass
+class Transform(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
+    translation: Vector3
+    rotation: Quaternion
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
+    transforms: sequence[TransformStamped]
+
+
+@dataclass
+class Octomap(IdlStruct, typename="octomap_msgs::msg::dds_::Octomap_"):
+    header: Header
+    binary: bool
+    id: str
+    resolution: float64
+    data: sequence[int8]
+
+
+@dataclass
+class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
+    x: float64
+    y: float64
+    z: float64
+
+
+@dataclass
+class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
+    position: Point
+    orientation: Quaternion
+
+
+@dataclass
+class MapMetaData(IdlStruct, typename="nav_msgs::msg::dds_::MapMetaData_"):
+    map_load_time: Time
+    resolution: float32
+    width: uint32
+    height: uint32
+    origin: Pose
+
+
+@dataclass
+class OccupancyGrid(IdlStruct, typename="nav_msgs::msg::dds_::OccupancyGrid_"):
+    header: Header
+    info: MapMetaData
+    data: sequence[int8]
+
+
+@dataclass
+class ColorRGBA(IdlStruct, typename="std_msgs::msg::dds_::ColorRGBA_"):
+    r: float32
+    g: float32
+    b: float32
+    a: float32
+
+
+@dataclass
+class CompressedImage(IdlStruct, typename="sensor_msgs::msg::dds_::CompressedImage_"):
+    header: Header
+    format: str
+    data: sequence[uint8]
+
+
+@dataclass
+class UVCoordinate(IdlStruct, typename="visualization_msgs::msg::dds_::UVCoordinate_"):
+    u: float32
+    v: float32
+
+
+@dataclass
+class MeshFile(IdlStruct, typename="visualization_msgs::msg::dds_::MeshFile_"):
+    filename: str
+    data: sequence[uint8]
+
+
+@dataclass
+class Marker(IdlStruct, typename="visualization_msgs::msg::dds_::Marker_"):
+    header: Header
+    ns: str
+    id: int32
+    type: int32
+    action: int32
+    pose: Pose
+    scale: Vector3
+    color: ColorRGBA
+    lifetime: Time
+    frame_locked: bool
+    points: sequence[Point]
+    colors: sequence[ColorRGBA]
+    texture_resource: str
+    texture: CompressedImage
+    uv_coordinates: sequence[UVCoordinate]
+    text: str
+    mesh_resource: str
+    mesh_file: MeshFile
+    mesh_use_embedded_materials: bool
+
+
+@dataclass
+class MarkerArray(IdlStruct, typename="visualization_msgs::msg::dds_::MarkerArray_"):
+    markers: sequence[Marker]
+
+
+@dataclass
+class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str
+    value: str
+
+
+@dataclass
+class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: uint8
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
+
+
+@dataclass
+class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: Header
+    status: sequence[DiagnosticStatus]
+
+
+def service(package, name, request, response):
+    """Request and response as Cyclone DDS sends them: who asks and the number of the question come first."""
+    kinds = []
+    for kind, fields in [("Request", request), ("Response", response)]:
+        fields = fields or {"structure_needs_at_least_one_member": uint8}
+        head = {"guid": uint64, "number": int64}
+        namespace = {"__module__": __name__, "__idl_typename__": f"{package}::srv::dds_::{name}_{kind}_"}
+        fields = list({**head, **fields}.items())
+        kinds.append(make_dataclass(f"{name}_{kind}", fields, bases=(IdlStruct,), namespace=namespace))
+    return kinds
+
+
+OUTCOME = {"success": bool, "message": str}
+BOX = {"min": Point, "max": Point}
+HIT = {**OUTCOME, "hit": bool, "center": Point, "distance": float64, "probability": float64}
+SERVICES = {
+    "save": service("std_srvs", "Trigger", {}, OUTCOME),
+    "reset": service("std_srvs", "Empty", {}, {}),
+    "clear_bbox": service("octomap_msgs", "BoundingBoxQuery", BOX, {}),
+    "octomap_binary": service("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
+    "octomap_full": service("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
+    "octomap_in_box": service("voxtile_msgs", "GetOctomapInBox", {**BOX, "binary": bool}, {**OUTCOME, "map": Octomap}),
+    "snapshot": service("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
+    "revert": service("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
+    "cast_ray": service(
+        "voxtile_msgs",
+        "CastRay",
+        {"origin": Point, "direction": Vector3, "max_range": float64, "unknown_is_obstacle": bool},
+        HIT,
+    ),
+    "check_collision": service(
+        "voxtile_msgs",
+        "CheckCollision",
+        {"from_": Point, "to": Point, "radius": float64, "unknown_is_obstacle": bool},
+        HIT,
+    ),
+}
