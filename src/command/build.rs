@@ -308,7 +308,9 @@ fn begin(
             return Ok(intake.pass(done)?.then_some(done));
         }
     }
-    if args.resume && !args.append && mapper.scan_number() > 0 {
+    // A map that was merged of others has tiles, and knows of no scans.
+    let is_empty = mapper.scan_number() == 0 && mapper.tile_bounds().is_none();
+    if args.resume && !args.append && !is_empty {
         let found = inputs.last().map_or("that it does not know".to_owned(), |last| last.name.clone());
         let (path, what, wanted) = (args.output.clone(), "been built from input", name.to_owned());
         return Err(Error::Mismatch { path, what, found, wanted }.into());
