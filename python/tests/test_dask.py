@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -89,3 +92,15 @@ def test_what_a_build_in_parts_does_not_take_is_named(client: object, drive: Pat
     (tmp_path / "map").mkdir()
     with pytest.raises(errors.ArgumentError, match="it exists"):
         voxtile_dask.build(drive, tmp_path / "map", client=client, **OPTIONS)
+
+
+def test_the_command_makes_the_map_and_tells_of_it(drive: Path, whole: str, tmp_path: Path) -> None:
+    options = [f"--{name.replace('_', '-')}={value}" for name, value in OPTIONS.items()]
+    command = [sys.executable, "-m", "voxtile.dask", str(drive), "-o", str(tmp_path / "map"), "--local=2", *options]
+    done = subprocess.run([*command, "--region-size=5", "--json"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert voxtile.digest(tmp_path / "map") == whole
+    assert told["regions"] > 1 and told["overlap"] >= 1 and told["slowest"][0]["seconds"] > 0
+    again = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert again.returncode == 2 and "it exists" in again.stderr

@@ -1,4 +1,4 @@
-"""One map by many workers of a dask cluster: ``pip install voxtile[dask]``.
+"""A build in parts.
 
 Space is divided into columns. A task maps the scans that reach a column into that column's tiles only, so tasks have
 no order and share nothing, and a lost one is run again. Disjoint columns merge to the map of the whole.
@@ -14,19 +14,24 @@ import operator
 import os
 import shutil
 import tempfile
+import time
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from distributed import Client, as_completed, get_worker
 
-from . import files
-from ._voxtile import merge
-from .errors import ArgumentError
-from .files import ReadOptions
+from .. import files
+from .._voxtile import merge
+from ..errors import ArgumentError
+from ..files import ReadOptions
+
+try:
+    import distributed
+except ImportError:
+    raise ImportError("voxtile.dask needs distributed: pip install voxtile[dask]") from None
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -34,6 +39,9 @@ if TYPE_CHECKING:
 _Path = str | os.PathLike[str]
 _Box = tuple[float, float, float, float]
 _Column = tuple[int, int]
+
+# Its types are not complete.
+_dask: Any = distributed
 
 # Regions of fewer tiles read most scans many times.
 _DEFAULT_REGION_TILES = 20
@@ -64,26 +72,28 @@ def build(
     *,
     resolution: float,
     region_size: float | None = None,
-    client: Client | None = None,
+    client: distributed.Client | None = None,
+    progress: Callable[[int, int], object] | None = None,
     **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
     """Makes a map of a file or folder of scans with the workers of ``client``, or of the current one.
 
     The map has the digest of ``voxtile.build``, for any ``region_size`` (metres, along x and y) and any workers. All
     workers and this process need to see ``scans`` and the folder of ``out``. What is done lies in ``out + ".parts"``
-    until the end; the same call after a failure goes on with it. Returns numbers about the build.
+    until the end; the same call after a failure goes on with it. ``progress`` is called with the regions done and
+    their number. Returns numbers about the build.
     """
     output = Path(os.path.abspath(out))
     source = os.path.abspath(scans)
     tile_size = options.get("tile_size", 10.0)
     size = tile_size * _DEFAULT_REGION_TILES if region_size is None else region_size
     _check(output, size, tile_size, options)
-    found = Client.current() if client is None else client
+    found: Any = _dask.Client.current() if client is None else client
     settings: dict[str, Any] = {"resolution": resolution, **options}
     parts = output.with_name(output.name + ".parts")
     with _locked(parts):
         for attempt in parts.glob("attempt-*"):
-            shutil.rmtree(attempt)
+            shutil.rmtree(attempt, ignore_errors=True)
         boxes = _plan(found, source, dict(options))
         columns = _columns(boxes, size, tile_size)
         if not columns:
@@ -97,20 +107,28 @@ def build(
             for part, (column, span) in open_parts.items()
         ]
         try:
-            for future in as_completed(futures):
-                future.result()
+            tasks = []
+            for future in _dask.as_completed(futures):
+                tasks.append(future.result())
+                if progress is not None:
+                    progress(len(columns) - len(open_parts) + len(tasks), len(columns))
         finally:
             found.cancel(futures)
         merged = merge([str(part) for part in sorted(wanted)], str(output))
         read = sum(last - first for first, last in columns.values())
         shutil.rmtree(parts)
+    seconds = sorted((task["seconds"] for task in tasks), reverse=True)
     return {
+        "output": str(output),
         "regions": len(columns),
         "regions_done_before": len(columns) - len(open_parts),
         "scans": len(boxes),
         "scans_read": read,
         "overlap": read / max(len(boxes), 1),
         "tiles": merged.get("tiles"),
+        "cpu_seconds": sum(task["cpu_seconds"] for task in tasks),
+        "skew": seconds[0] * len(seconds) / sum(seconds) if seconds else None,
+        "slowest": sorted(tasks, key=lambda task: -task["seconds"])[:5],
     }
 
 
@@ -138,10 +156,15 @@ def _locked(parts: Path) -> Iterator[None]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise ArgumentError(f"{parts}: another process makes this map; wait for it") from None
-        yield
+        try:
+            yield
+        finally:
+            # What was made stays for the next run; a folder without anything does not.
+            if parts.exists() and os.listdir(parts) == ["lock"]:
+                shutil.rmtree(parts)
 
 
-def _plan(client: Client, source: str, options: dict[str, Any]) -> list[_Box | None]:
+def _plan(client: Any, source: str, options: dict[str, Any]) -> list[_Box | None]:
     """Where each scan may leave something: west, south, east, north. ``None`` is nowhere."""
     reading = {name: value for name, value in options.items() if name in ReadOptions.__annotations__}
     reach = (options.get("max_range"), options.get("clear_no_return"))
@@ -150,10 +173,8 @@ def _plan(client: Client, source: str, options: dict[str, Any]) -> list[_Box | N
     step = max(math.ceil(scans / (4 * workers)), 1)
     firsts = list(range(0, scans, step)) or [0]
     # The last one takes what an estimate left out.
-    tasks = [
-        client.submit(_boxes, source, first, None if first == firsts[-1] else step, reading, reach, pure=False, retries=2)
-        for first in firsts
-    ]
+    spans = [(first, None if first == firsts[-1] else step) for first in firsts]
+    tasks = [client.submit(_boxes, source, *span, reading, reach, pure=False, retries=2) for span in spans]
     return [box for part in client.gather(tasks) for box in part]
 
 
@@ -200,13 +221,12 @@ def _columns(boxes: Sequence[_Box | None], size: float, tile_size: float) -> dic
 
 def _map_column(
     source: str, part: str, column: _Column, size: float, span: tuple[int, int], settings: dict[str, Any]
-) -> None:
+) -> dict[str, Any]:
     """Maps a column on the worker's disk, and puts it beside the others whole."""
-    if os.path.exists(part):
-        return
+    began, cpu_began = time.perf_counter(), time.process_time()
     x, y = column
     region = [x * size, y * size, -math.inf, (x + 1) * size, (y + 1) * size, math.inf]
-    with tempfile.TemporaryDirectory(prefix="voxtile-", dir=get_worker().local_directory) as local:
+    with tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory) as local:
         made = os.path.join(local, "map")
         first, last = span
         files.build(source, made, **{**settings, "first": first, "count": last - first, "region": region})
@@ -221,3 +241,9 @@ def _map_column(
                 raise
         finally:
             shutil.rmtree(attempt, ignore_errors=True)
+    return {
+        "column": list(column),
+        "scans": last - first,
+        "seconds": time.perf_counter() - began,
+        "cpu_seconds": time.process_time() - cpu_began,
+    }
