@@ -206,8 +206,8 @@ def _boxes(
 def _columns(boxes: Sequence[_Box | None], size: float, tile_size: float) -> dict[_Column, tuple[int, int]]:
     """The columns that scans may reach, and of each the first scan and the one after the last."""
     columns: dict[_Column, tuple[int, int]] = {}
-    # A tile whose center is in a column reaches beyond it, and a tile may be larger than was asked for.
-    margin = 2 * tile_size
+    # A tile whose center is in a column reaches half of its edge beyond; the other half is slack for rounding.
+    margin = tile_size
     for number, box in enumerate(boxes):
         if box is None:
             continue
