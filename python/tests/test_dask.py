@@ -104,3 +104,29 @@ def test_the_command_makes_the_map_and_tells_of_it(drive: Path, whole: str, tmp_
     assert told["regions"] > 1 and told["overlap"] >= 1 and told["slowest"][0]["seconds"] > 0
     again = subprocess.run(command, capture_output=True, text=True, check=False)
     assert again.returncode == 2 and "it exists" in again.stderr
+
+
+def test_a_second_run_goes_on(
+    client: object, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise errors.DiskError("the disk is full")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("voxtile.dask.building.merge", fail)
+        with pytest.raises(errors.DiskError, match="full"):
+            voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    report = voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    assert report["regions_done_before"] == report["regions"] > 1 and not report["slowest"]
+    assert voxtile.digest(tmp_path / "map") == whole
+
+
+@pytest.mark.parametrize("name", ["mulran_riverside02_a", "balm_os0_hall"])
+def test_recorded_scans(client: object, name: str, tmp_path: Path) -> None:
+    data = Path(os.environ.get("VOXTILE_DATA", "")) / name
+    if "VOXTILE_DATA" not in os.environ or not data.is_dir():
+        pytest.skip(f"{name} is not there; VOXTILE_DATA names the folder of recorded sets")
+    options = {"resolution": 0.5, "max_range": 40.0, "storage": "compact"}
+    voxtile.build(data, tmp_path / "whole", **options)
+    voxtile_dask.build(data, tmp_path / "map", region_size=70.0, client=client, **options)
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
