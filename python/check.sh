@@ -13,7 +13,7 @@ trap 'rm -rf "$work"' EXIT
 python3 -m venv "$work/venv"
 python=$work/venv/bin/python
 install() { "$python" -m pip install --quiet --disable-pip-version-check "$@"; }
-install ipykernel matplotlib mypy nbclient pyright pytest
+install dask distributed ipykernel matplotlib mypy nbclient pyright pytest
 install --only-binary :all: pyoctomap || echo "skipped: pyoctomap, which has no wheel for this Python"
 MATURIN_PEP517_ARGS="--profile dev --locked" install .
 # Beside the sources, Python would find the package without its module.
