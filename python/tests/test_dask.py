@@ -121,6 +121,29 @@ def test_a_second_run_goes_on(
     assert voxtile.digest(tmp_path / "map") == whole
 
 
+def test_a_second_run_takes_no_parts_of_other_points(
+    drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise errors.DiskError("the disk is full")
+
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None)
+    with cluster, distributed.Client(cluster) as client:
+        with monkeypatch.context() as broken:
+            broken.setattr("voxtile.dask.building.merge", fail)
+            with pytest.raises(errors.DiskError, match="full"):
+                voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+        # The first point changes sides along z: the box around the scan is the same.
+        scan = drive / "003.pcd"
+        content = bytearray(scan.read_bytes())
+        content[content.index(b"DATA binary\n") + len(b"DATA binary\n") + 11] ^= 0x80
+        scan.write_bytes(content)
+        report = voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    voxtile.build(drive, tmp_path / "whole", **OPTIONS)
+    assert report["regions_done_before"] == 0
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
+
+
 @pytest.mark.parametrize("name", ["mulran_riverside02_a", "balm_os0_hall"])
 def test_recorded_scans(client: object, name: str, tmp_path: Path) -> None:
     data = Path(os.environ.get("VOXTILE_DATA", "")) / name

@@ -18,6 +18,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 _Path = str | os.PathLike[str]
 _Box = tuple[float, float, float, float]
 _Column = tuple[int, int]
+# What tells a scan from others, and where it may leave something.
+_Seen = tuple[str, _Box | None]
 
 # Its types are not complete.
 _dask: Any = distributed
@@ -94,11 +97,12 @@ def build(
     with _locked(parts):
         for attempt in parts.glob("attempt-*"):
             shutil.rmtree(attempt, ignore_errors=True)
-        boxes = _plan(found, source, dict(options))
+        seen = _plan(found, source, dict(options))
+        boxes = [box for _, box in seen]
         columns = _columns(boxes, size, tile_size)
         if not columns:
             raise ArgumentError(f"{source}: no scan has a point, so there is nothing to map")
-        identity = json.dumps([source, size, settings, boxes], sort_keys=True, default=str)
+        identity = json.dumps([version("voxtile"), source, size, settings, seen], sort_keys=True, default=str)
         mark = hashlib.sha256(identity.encode()).hexdigest()[:16]
         wanted = {parts / f"{mark}-{x}-{y}": ((x, y), span) for (x, y), span in columns.items()}
         open_parts = {part: what for part, what in wanted.items() if not part.exists()}
@@ -164,8 +168,8 @@ def _locked(parts: Path) -> Iterator[None]:
                 shutil.rmtree(parts)
 
 
-def _plan(client: Any, source: str, options: dict[str, Any]) -> list[_Box | None]:
-    """Where each scan may leave something: west, south, east, north. ``None`` is nowhere."""
+def _plan(client: Any, source: str, options: dict[str, Any]) -> list[_Seen]:
+    """What each scan is, and where it may leave something: west, south, east, north. ``None`` is nowhere."""
     reading = {name: value for name, value in options.items() if name in ReadOptions.__annotations__}
     reach = (options.get("max_range"), options.get("clear_no_return"))
     scans = operator.length_hint(files.scans(source, **reading))
@@ -175,7 +179,7 @@ def _plan(client: Any, source: str, options: dict[str, Any]) -> list[_Box | None
     # The last one takes what an estimate left out.
     spans = [(first, None if first == firsts[-1] else step) for first in firsts]
     tasks = [client.submit(_boxes, source, *span, reading, reach, pure=False, retries=2) for span in spans]
-    return [box for part in client.gather(tasks) for box in part]
+    return [scan for part in client.gather(tasks) for scan in part]
 
 
 def _boxes(
@@ -184,10 +188,12 @@ def _boxes(
     count: int | None,
     reading: dict[str, Any],
     reach: tuple[float | None, float | None],
-) -> list[_Box | None]:
+) -> list[_Seen]:
     max_range, clear_no_return = reach
-    boxes: list[_Box | None] = []
-    for points, pose, _ in files.scans(source, **{**reading, "first": first, "count": count}):
+    seen: list[_Seen] = []
+    for points, pose, intensities in files.scans(source, **{**reading, "first": first, "count": count}):
+        content = hashlib.blake2b(points.tobytes() + pose.tobytes(), digest_size=16)
+        content.update(b"" if intensities is None else intensities.tobytes())
         origin = pose[:2, 3]
         ends = (points @ pose[:3, :3].T + pose[:3, 3])[:, :2]
         ends = ends[np.isfinite(ends).all(axis=1)]
@@ -196,11 +202,12 @@ def _boxes(
         if clear_no_return is not None:
             ends = np.concatenate([ends, [origin - clear_no_return, origin + clear_no_return]])
         if len(ends) == 0:
-            boxes.append(None)
+            seen.append((content.hexdigest(), None))
             continue
         low, high = np.minimum(ends.min(axis=0), origin), np.maximum(ends.max(axis=0), origin)
-        boxes.append((float(low[0]), float(low[1]), float(high[0]), float(high[1])))
-    return boxes
+        box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+        seen.append((content.hexdigest(), box))
+    return seen
 
 
 def _columns(boxes: Sequence[_Box | None], size: float, tile_size: float) -> dict[_Column, tuple[int, int]]:
