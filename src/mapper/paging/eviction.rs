@@ -217,8 +217,10 @@ impl TilePager<'_> {
 
     /// Waits until nothing is in flight, to disk or from there.
     pub(super) fn end_io(&mut self) -> Result<()> {
+        // A tile that could not be saved stays dirty, and the flush saves it again; so this error is dropped: before
+        // others are brought in, too, for whose room a save is waited for.
+        let _ = self.end_saves();
         self.end_prefetches()?;
-        // A tile that could not be saved stays dirty, and the flush saves it again; so this error is dropped.
         let _ = self.end_saves();
         Ok(())
     }

@@ -20,6 +20,8 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) is_enforced: bool,
     /// Bytes that stay free of tiles that need not come in yet.
     pub(super) spare_bytes: usize,
+    /// A tile for which updates of so many scans wait is changed often.
+    pub(super) often_scans: u32,
     /// Most bytes of tiles in the compact form while others have to go.
     pub(super) compact_bytes: usize,
     /// Most bytes of tiles that readers in other threads make, once there are any.
@@ -27,6 +29,8 @@ pub(in crate::mapper) struct MemoryPlan {
     /// Most bytes of what views hold that has changed since.
     pub(super) view_bytes: usize,
 }
+
+const OFTEN_SCANS: u32 = 8;
 
 impl MemoryPlan {
     pub(in crate::mapper) fn new(limit: MemoryLimit) -> Self {
@@ -40,6 +44,7 @@ impl MemoryPlan {
                 least_scan_bytes: 0,
                 is_enforced: true,
                 spare_bytes: 0,
+                often_scans: OFTEN_SCANS,
                 compact_bytes: 0,
                 reader_bytes: 64 << 20,
                 view_bytes: usize::MAX,
@@ -63,6 +68,7 @@ impl MemoryPlan {
             least_scan_bytes: bytes / 8,
             is_enforced: true,
             spare_bytes: bytes / 4,
+            often_scans: OFTEN_SCANS,
             compact_bytes: bytes / 8 * 3,
             reader_bytes: bytes / 16,
             view_bytes: bytes / 8,

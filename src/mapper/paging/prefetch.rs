@@ -9,9 +9,6 @@ use crate::space::{TileBox, TileIndex};
 use crate::tile::Table;
 use std::sync::Arc;
 
-/// A tile for which updates of so many scans wait is changed often.
-const SCANS_OF_OFTEN: u32 = 8;
-
 /// So many tiles in the compact form are brought in with one scan: unpacking takes milliseconds.
 const MOST_PACKED_AT_ONCE: usize = 2;
 
@@ -65,14 +62,14 @@ impl TilePager<'_> {
 
     /// Whether updates of many scans wait for a tile.
     fn is_often_changed(&self, tile: TileIndex) -> bool {
-        self.contents.buffer.scans_of(tile) >= SCANS_OF_OFTEN
+        self.contents.buffer.scans_of(tile) >= self.contents.plan().often_scans
     }
 
     /// Whether a tile that scan after scan changes may take the place of the one that was not used for longest. Where
     /// all are used about as often, it would have to go again at once, and its updates had better wait.
     fn may_replace_oldest(&self) -> bool {
-        let since = self.contents.cache.scans_since_oldest();
-        since.is_some_and(|scans| scans > u64::from(2 * SCANS_OF_OFTEN))
+        let often_scans = u64::from(self.contents.plan().often_scans);
+        self.contents.cache.scans_since_oldest().is_some_and(|scans| scans > 2 * often_scans)
     }
 
     fn begin_prefetch(&mut self, index: TileIndex) {

@@ -10,6 +10,7 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) least_scan_bytes: usize,
     pub(super) is_enforced: bool,
     pub(super) spare_bytes: usize,
+    pub(super) often_scans: u32,
     pub(super) compact_bytes: usize,
     pub(super) view_bytes: usize,
 }
@@ -23,6 +24,7 @@ impl MemoryPlan {
             least_scan_bytes: 0,
             is_enforced: false,
             spare_bytes: 2 << 10,
+            often_scans: 1,
             compact_bytes: 1 << 10,
             view_bytes: 2 << 10,
         }
