@@ -191,7 +191,8 @@ def _boxes(
 ) -> list[_Seen]:
     max_range, clear_no_return = reach
     seen: list[_Seen] = []
-    for points, pose, intensities in files.scans(source, **{**reading, "first": first, "count": count}):
+    options: dict[str, Any] = {**reading, "first": first, "count": count}
+    for points, pose, intensities in files.scans(source, **options):
         content = hashlib.blake2b(points.tobytes() + pose.tobytes(), digest_size=16)
         content.update(b"" if intensities is None else intensities.tobytes())
         origin = pose[:2, 3]
@@ -236,7 +237,8 @@ def _map_column(
     with tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory) as local:
         made = os.path.join(local, "map")
         first, last = span
-        files.build(source, made, **{**settings, "first": first, "count": last - first, "region": region})
+        options: dict[str, Any] = {**settings, "first": first, "count": last - first, "region": region}
+        files.build(source, made, **options)
         attempt = os.path.join(os.path.dirname(part), f"attempt-{uuid.uuid4().hex}")
         try:
             shutil.copytree(made, attempt)
