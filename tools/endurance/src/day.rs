@@ -143,8 +143,8 @@ impl Under {
     }
 }
 
-/// Files and folders in a folder, at any depth, and bytes of all of them. A flush goes on meanwhile: what is gone again
-/// does not count.
+/// Files and folders in a folder, at any depth, and bytes of all of them. A flush goes on meanwhile: what it has not
+/// committed, and what is gone again, does not count.
 fn count(folder: &Path) -> Result<(u64, u64)> {
     let (mut files, mut bytes) = (0, 0);
     let mut folders = vec![folder.to_owned()];
@@ -156,6 +156,9 @@ fn count(folder: &Path) -> Result<(u64, u64)> {
             else {
                 continue;
             };
+            if entry.as_ref().is_ok_and(|entry| entry.file_name().to_string_lossy().ends_with(".next")) {
+                continue;
+            }
             files += 1;
             match entry {
                 Ok(entry) if metadata.is_dir() => folders.push(entry.path()),

@@ -20,8 +20,8 @@ const FLUSH_EVERY_S: usize = 10;
 const SCANS_PER_ROUND: usize = 24_000;
 /// The last part by the middle one, in which everything has been seen often.
 const MOST_GROWTH: f64 = 1.05;
-/// The same of a short day, where what a flush has under way is a good part of what there is.
-const MOST_GROWTH_SHORT: f64 = 1.3;
+/// The same of a short day, whose voxels have not been seen often enough to stay as they are.
+const MOST_GROWTH_SHORT: f64 = 1.5;
 /// The same of times.
 const MOST_SLOWER: f64 = 1.15;
 
