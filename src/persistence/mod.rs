@@ -5,6 +5,7 @@
 //! tile_saver    Tile or CompactTile -> table and octree files -> store
 //! compact_tile  a tile in the compact form, in memory; packer makes it
 //! io_threads    one saving and one loading thread, each a `Worker`
+//! priority      threads that give way to the mapper's
 //! upgrade       a map of the original format -> the same map with id, log and checksums
 //! parameters    MapConfig <-> metadata.json; map_id makes ids
 //! ```
@@ -15,6 +16,7 @@ pub(crate) mod load;
 mod map_id;
 mod packer;
 mod parameters;
+mod priority;
 mod tile_saver;
 mod upgrade;
 mod worker;

@@ -1,3 +1,4 @@
+use super::priority::give_way;
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::Arc;
@@ -15,6 +16,7 @@ pub(crate) struct Worker<Job, Done> {
     work: Arc<dyn Fn(Job) -> Done + Send + Sync>,
     thread: Option<Thread<Job, Done>>,
     has_no_thread: bool,
+    gives_way: bool,
     done_here: VecDeque<Done>,
     in_flight: usize,
 }
@@ -29,7 +31,12 @@ struct Thread<Job, Done> {
 impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
     pub(crate) fn new(name: &'static str, work: impl Fn(Job) -> Done + Send + Sync + 'static) -> Self {
         let (work, done_here) = (Arc::new(work), VecDeque::new());
-        Self { name, work, thread: None, has_no_thread: false, done_here, in_flight: 0 }
+        Self { name, work, thread: None, has_no_thread: false, gives_way: false, done_here, in_flight: 0 }
+    }
+
+    /// The same for work that nobody waits for as long as there is other work.
+    pub(crate) fn giving_way(self) -> Self {
+        Self { gives_way: true, ..self }
     }
 
     /// How many jobs were given of which the result was not taken.
@@ -85,8 +92,11 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
         let (jobs, jobs_in) = channel::<Job>();
         let (done_out, done) = channel();
         let is_over = Arc::new(AtomicBool::new(false));
-        let (work, is_over_there) = (self.work.clone(), is_over.clone());
+        let (work, is_over_there, gives_way) = (self.work.clone(), is_over.clone(), self.gives_way);
         let handle = thread::Builder::new().name(self.name.to_owned()).spawn(move || {
+            if gives_way {
+                give_way();
+            }
             for job in jobs_in {
                 if is_over_there.load(Ordering::Relaxed) || done_out.send(work(job)).is_err() {
                     return;

@@ -59,7 +59,7 @@ const NOTED_AT_ONCE: usize = 8;
 impl Flusher {
     pub(super) fn new(config: &MapConfig) -> Self {
         let config = config.clone();
-        let worker = Worker::new("voxtile-flush", move |job: FlushJob| job.run(&config));
+        let worker = Worker::new("voxtile-flush", move |job: FlushJob| job.run(&config)).giving_way();
         Self { worker: Mutex::new(worker), progress: Mutex::new(None) }
     }
 

@@ -97,6 +97,10 @@ mod persistence {
     mod parameters {
         source!("parameters.rs");
     }
+    /// The scheduler has threads of its own, and no order among them is to be left out.
+    mod priority {
+        pub(super) fn give_way() {}
+    }
     mod tile_saver {
         source!("tile_saver.rs");
     }
