@@ -1,3 +1,5 @@
+#[cfg(feature = "bucket")]
+mod bucket;
 mod build;
 mod edit;
 mod export;
@@ -9,6 +11,8 @@ mod snapshot;
 #[cfg(feature = "view")]
 mod view;
 
+#[cfg(feature = "bucket")]
+pub use bucket::{PullArgs, PushArgs};
 pub use build::{BuildArgs, InsertName, ModelName, OctreeArgs, OctreeName, StorageName, VoxelCacheName};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -104,6 +108,12 @@ pub enum Command {
     /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit, and
     /// snapshots are not taken along
     Convert(ConvertArgs),
+    /// Copy a map into a bucket of an object store; only what has changed since the last push is sent
+    #[cfg(feature = "bucket")]
+    Push(PushArgs),
+    /// Make a map in a folder of one in a bucket
+    #[cfg(feature = "bucket")]
+    Pull(PullArgs),
     /// Check every file of a map for damage; exit code 1 if there is any
     Verify(VerifyArgs),
     /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted; exit code 1 if
@@ -151,6 +161,10 @@ impl Command {
             Self::Remap(args) => args.rework.json,
             Self::RemoveScans(args) => args.rework.json,
             Self::RemovePoints(args) => args.rework.json,
+            #[cfg(feature = "bucket")]
+            Self::Push(args) => args.json,
+            #[cfg(feature = "bucket")]
+            Self::Pull(args) => args.json,
             Self::Verify(args) => args.json,
             Self::Repair(args) => args.json,
             #[cfg(feature = "view")]

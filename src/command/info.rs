@@ -8,7 +8,7 @@ use crate::mapper::{MapReader, MapView, OctreeMap};
 use crate::operations::{KeptBytes, kept_bytes};
 use crate::sensor::SensorModel;
 use crate::space::{Aabb, Grid, TileBox};
-use crate::store::{Bounds, InputRecord};
+use crate::store::{Bounds, InputRecord, MapPath};
 use crate::{MapQueries, Result, Storage};
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -121,7 +121,11 @@ impl Info {
             occupied,
             table_bytes,
             octree_bytes,
-            kept: reader.snapshot().is_none().then(|| kept_bytes(reader.folder())).transpose()?,
+            kept: reader
+                .snapshot()
+                .is_none()
+                .then(|| kept_bytes(MapPath::on(reader.disk(), reader.folder())))
+                .transpose()?,
         })
     }
 

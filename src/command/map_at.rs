@@ -1,4 +1,5 @@
 use crate::command::octree_file;
+use crate::command::place::{check_is_folder, place_of};
 use crate::mapper::{MapReader, MapStatistics, MapView, OctreeMap, TileRef};
 use crate::space::{TileBox, TileIndex};
 use crate::store::{SnapshotName, TileVersion};
@@ -34,8 +35,8 @@ impl MapAt {
             return Err(Error::argument(self.map.display().to_string(), reason));
         }
         match &self.snapshot {
-            Some(name) => MapReader::open_snapshot(&self.map, name, CACHE_TILES),
-            None => MapReader::open(&self.map, CACHE_TILES),
+            Some(name) => MapReader::open_snapshot(place_of(&self.map)?, name, CACHE_TILES),
+            None => MapReader::open(place_of(&self.map)?, CACHE_TILES),
         }
     }
 }
@@ -108,8 +109,9 @@ impl MapView for AnyMap {
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` where there is a map at `MAP`.
+/// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` where there is a map at `MAP`, and for a URL.
 pub fn whole_map(path: &Path) -> Result<&Path> {
+    check_is_folder(path)?;
     let MapAt { map, snapshot } = MapAt::of(path)?;
     if snapshot.is_some() && map.join("metadata.json").exists() {
         let reason = format!(

@@ -43,7 +43,12 @@ mod one_heap;
 mod output_file;
 mod part;
 mod picture;
+mod place;
 mod progress;
+#[cfg(feature = "bucket")]
+mod pull;
+#[cfg(feature = "bucket")]
+mod push;
 mod query;
 mod raycast;
 mod read_options;

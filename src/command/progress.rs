@@ -36,6 +36,12 @@ impl Progress {
         Self::styled(ProgressBar::new(tiles as u64), "{bar:30} {pos}/{len} tiles  {eta} left")
     }
 
+    /// A bar over bytes.
+    #[cfg(feature = "bucket")]
+    pub fn over_bytes() -> Self {
+        Self::styled(ProgressBar::new(0), "{bar:30} {bytes}/{total_bytes}  {bytes_per_sec}  {eta} left")
+    }
+
     fn styled(bar: ProgressBar, template: &str) -> Self {
         if ARE_HIDDEN.load(Ordering::Relaxed) {
             bar.set_draw_target(ProgressDrawTarget::hidden());

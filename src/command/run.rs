@@ -9,6 +9,8 @@ use super::{
     merge, one_heap, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report,
     revert, scans, share, snapshot, snapshots, threads, verify,
 };
+#[cfg(feature = "bucket")]
+use super::{pull, push};
 use clap::Parser;
 use std::ffi::OsString;
 use std::io::Write;
@@ -69,6 +71,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Remap(args) => remap::run(&args),
         Command::RemoveScans(args) => remove_scans::run(&args),
         Command::RemovePoints(args) => remove_points::run(&args),
+        #[cfg(feature = "bucket")]
+        Command::Push(args) => push::run(&args),
+        #[cfg(feature = "bucket")]
+        Command::Pull(args) => pull::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
         #[cfg(feature = "view")]

@@ -1,12 +1,13 @@
 use crate::command::args::SnapshotsArgs;
 use crate::command::json;
+use crate::command::place::place_of;
 use crate::operations::{SnapshotInfo, snapshots};
 use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
 use std::process::ExitCode;
 
 pub fn run(args: &SnapshotsArgs) -> anyhow::Result<ExitCode> {
-    let infos = snapshots(&args.map)?;
+    let infos = snapshots(place_of(&args.map)?)?;
     let mut out = std::io::stdout().lock();
     if args.json {
         let answer = serde_json::json!({ "map": args.map.display().to_string(), "snapshots": infos });

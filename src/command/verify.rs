@@ -2,6 +2,7 @@ use crate::command::args::VerifyArgs;
 use crate::command::json;
 use crate::command::map_at::whole_map;
 use crate::command::memory;
+use crate::command::place::{place_of, url_of};
 use crate::command::progress::Progress;
 use crate::integrity::{Finding, Verification, verify};
 use indicatif::{HumanBytes, HumanCount};
@@ -24,10 +25,14 @@ struct Report<'a> {
 }
 
 pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
+    let map = match url_of(&args.map) {
+        Some(_) => place_of(&args.map)?,
+        None => whole_map(&args.map)?.into(),
+    };
     let progress = Progress::over_tiles(0);
     let mut findings = Vec::new();
     let verification = verify(
-        whole_map(&args.map)?,
+        map,
         |finding| {
             if !args.json {
                 progress.print(&finding.to_string());

@@ -7,13 +7,13 @@ use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
 use crate::space::{TileBox, TileIndex};
 use crate::store::{
-    CatalogEntry, Disk, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileStore, TileVersion,
-    read_scans,
+    CatalogEntry, Disk, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileFile, TileStore,
+    TileVersion, read_scans,
 };
 use crate::tile::{OctreeFactory, Tile};
 use lru::LruCache;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// A map on disk, opened to be asked: it takes no lock, beside a writer too, and never writes.
 ///
@@ -28,6 +28,8 @@ pub struct MapReader {
     /// Around all tiles that this reader sees.
     bounds: Option<TileBox>,
     disk: Arc<dyn Disk>,
+    /// The tiles in order, once a disk wants to know which come next.
+    order: OnceLock<Vec<TileIndex>>,
     cache: Mutex<ReaderCache>,
 }
 
@@ -124,7 +126,7 @@ impl MapReader {
         let config = config_of_store(&store, memory)?;
         let octrees = OctreeFactory::default();
         let bounds = TileBox::of(store.tiles());
-        Ok(Self { config, octrees, store, bounds, disk, cache: Mutex::default() })
+        Ok(Self { config, octrees, store, bounds, disk, order: OnceLock::new(), cache: Mutex::default() })
     }
 
     /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not
@@ -142,7 +144,9 @@ impl MapReader {
             return Ok(false);
         }
         let folder = self.store.folder().to_owned();
-        let store = TileStore::open_read_only(self.disk.clone(), &folder)?;
+        let newer = self.disk.newer().map_err(|error| Error::io(&folder, "read", error))?;
+        let disk = newer.unwrap_or_else(|| self.disk.clone());
+        let store = TileStore::open_read_only(disk.clone(), &folder)?;
         let id = |store: &TileStore| store.metadata().ext.as_ref().map(|ext| ext.map_id.clone());
         let (seen, found) = (id(&self.store), id(&store));
         if seen.is_some() && seen != found {
@@ -159,7 +163,7 @@ impl MapReader {
             }
         }
         self.bounds = TileBox::of(store.tiles());
-        (self.store, self.config) = (store, config);
+        (self.store, self.config, self.disk, self.order) = (store, config, disk, OnceLock::new());
         Ok(is_newer)
     }
 
@@ -301,7 +305,21 @@ impl MapReader {
 
     /// The table of a tile as it stands in its file, which is not kept in memory; `None` if the map has no such tile.
     pub(crate) fn read_table(&self, index: TileIndex) -> Result<Option<ReadTable>> {
+        self.read_ahead(index);
         load::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
+    }
+
+    /// Names the tiles behind this one to a disk that wants to know them: who looks at a tile once walks over all.
+    fn read_ahead(&self, index: TileIndex) {
+        let files = self.disk.files_ahead();
+        if files == 0 {
+            return;
+        }
+        let order = self.order.get_or_init(|| self.tile_indices());
+        let behind = order.partition_point(|tile| *tile <= index);
+        for tile in order.iter().skip(behind).take(files) {
+            self.disk.read_ahead(&self.store.layout().current(*tile, TileFile::Table));
+        }
     }
 
     fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {
@@ -385,6 +403,7 @@ impl MapView for MapReader {
         if let Some((tile, _)) = self.found(|cache| cache.tiles.peek(&index).cloned()) {
             return Ok(Some(TileRef::shared(tile)));
         }
+        self.read_ahead(index);
         let loaded = load::load_uncached(&self.store, &self.config.grid, index);
         let loaded = loaded.map_err(|error| self.explain(error))?;
         Ok(loaded.map(|(tile, _)| TileRef::shared(Arc::new(tile))))

@@ -3,6 +3,7 @@ use crate::scratch::Scratch;
 use std::fmt::Debug;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
@@ -42,6 +43,10 @@ pub trait Disk: Debug + Send + Sync {
     }
     /// Renames a file, replacing what had the new name, or a folder to a name that nothing has.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Gives each of two folders the name of the other, at once. An error where that cannot be done at once.
+    fn exchange(&self, _: &Path, _: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
     /// Gives a file another name, which nothing has; the two are one file. An error where files have one name only.
     fn link(&self, _: &Path, _: &Path) -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
@@ -65,6 +70,17 @@ pub trait Disk: Debug + Send + Sync {
     /// Locks a file, made if missing, until the returned value is dropped; `None` if another holds it. Only who may
     /// write the file can lock it.
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>>;
+    /// The present state of what this disk shows as of a moment; `None` if it has not changed, or if this disk shows
+    /// what is there at any moment, as most do.
+    fn newer(&self) -> io::Result<Option<Arc<dyn Disk>>> {
+        Ok(None)
+    }
+    /// How many files are worth naming by [`Disk::read_ahead`]: none where reading takes no longer than asking.
+    fn files_ahead(&self) -> usize {
+        0
+    }
+    /// Says that a file will be opened soon. What goes wrong is told when it is.
+    fn read_ahead(&self, _: &Path) {}
     /// Waits a moment for another process.
     fn pause(&self) {
         thread::sleep(Duration::from_millis(2));

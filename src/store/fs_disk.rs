@@ -88,6 +88,12 @@ impl Disk for FsDisk {
         fs::rename(from, to)
     }
 
+    #[cfg(target_os = "linux")]
+    fn exchange(&self, first: &Path, second: &Path) -> io::Result<()> {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        Ok(renameat_with(CWD, first, CWD, second, RenameFlags::EXCHANGE)?)
+    }
+
     fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
         // Elsewhere it cannot be told that a file has other names.
         if cfg!(unix) {

@@ -8,12 +8,14 @@
 //! | `scans` | number, time and origin of each scan |
 //! | `snapshots` | snapshots, and replaced tables kept for them and for readers |
 //! | `recovery` | crash recovery, damaged logs, quarantine, unfinished maps |
+//! | `committed_files` | which files a copy of the map consists of |
 //! | `layout`, `map_files` | file names; operations on them |
 //! | `disk`, `fs_disk` | [`Disk`], through which every file operation goes, and the file system |
 //!
 //! Tests replace [`Disk`] to simulate failures and power cuts. `docs/durability.md` describes the protocol.
 
 mod commit;
+mod committed_files;
 mod disk;
 mod fs_disk;
 mod layout;
@@ -36,6 +38,7 @@ pub use commit::flush::{BegunCommit, Step, Synced, Unsynced};
 pub(crate) use commit::input_record::MOST_INPUTS;
 pub use commit::input_record::{InputContent, InputRecord};
 pub use commit::metadata::{Bounds, Extension, MapParameters, Metadata};
+pub use committed_files::{CommittedContent, CommittedFile, FileVersion};
 pub use disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
 pub use fs_disk::FsDisk;
 pub use layout::{

@@ -16,6 +16,11 @@ pub fn check_outside_of_maps(path: &Path) -> Result<()> {
 }
 
 pub(super) fn check_place(disk: &dyn Disk, path: &Path) -> Result<()> {
+    if path.to_str().is_some_and(|path| path.contains("://")) {
+        let reason =
+            format!("{} is a URL; maps are made in folders, and `voxtile push` copies one", path.display());
+        return Err(Error::argument("output", reason));
+    }
     let resolved = disk.resolve(path).map_err(|error| Error::io(path, "look for", error))?;
     for outer in resolved.ancestors().skip(1) {
         if is_map(disk, outer)? {

@@ -28,7 +28,7 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
 }
 
 /// Every folder and file of the library, and what of ours it may name. Above them is `command/`, which may name all.
-const LAYERS: [(&str, &[&str]); 24] = [
+const LAYERS: [(&str, &[&str]); 25] = [
     ("maths.rs", &[]),
     ("path_text.rs", &[]),
     ("scratch.rs", &[]),
@@ -56,6 +56,8 @@ const LAYERS: [(&str, &[&str]); 24] = [
         "operations",
         &["config", "error", "mapper", "maths", "persistence", "scan", "sensor", "space", "store", "tile"],
     ),
+    // Maps in a bucket: their files, and no tile's content.
+    ("bucket", &["error", "scratch", "space", "store"]),
     ("integrity", &["config", "error", "path_text", "persistence", "space", "store", "tile"]),
     // Maps to look at, by the interface of mappers: no web, no screen, no file.
     (

@@ -11,13 +11,14 @@ use crate::command::map_at::{AnyMap, MapAt, read_any_map};
 use crate::command::memory;
 use crate::command::output_file::{OutputFile, is_standard_output};
 use crate::command::picture::{name_of, path_of};
+use crate::command::place::place_of;
 use crate::command::progress::Progress;
 use crate::integrity::{Finding, Verification, verify};
 use crate::mapper::{MapReader, MapView};
 use crate::operations::{SnapshotInfo, snapshots};
 use crate::render::{Drawn, Picture, SideAxis, Survey, View};
 use crate::store::ScanRecord;
-use crate::{Error, Result, TileIndex};
+use crate::{Error, TileIndex};
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
@@ -103,7 +104,7 @@ impl Report {
             Some(_) => Damage::OfSnapshot,
             None => Damage::of(&map),
         };
-        let snapshots = snapshots(&map).map_err(|error| format!("{error:#}"));
+        let snapshots = place_of(&map).and_then(snapshots).map_err(|error| format!("{error:#}"));
         Ok(Self { name: name_of(&args.map), unreadable, content, snapshots, damage })
     }
 
@@ -179,7 +180,7 @@ impl Damage {
                 findings.push(finding.clone());
             }
         };
-        let verified: Result<Verification> = verify(map, found, |done, all| progress.set(done, all));
+        let verified = place_of(map).and_then(|map| verify(map, found, |done, all| progress.set(done, all)));
         match verified {
             Ok(verification) => Self::Checked { verification, findings },
             Err(error) => Self::Failed(format!("{error:#}")),

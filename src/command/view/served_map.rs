@@ -2,6 +2,7 @@ use super::map_state::{MapState, Shown};
 use super::node_cache;
 use super::route::{At, MapId};
 use crate::command::map_at::{AnyMap, MapAt, open_any_map};
+use crate::command::place::place_of;
 use crate::command::progress::Progress;
 use crate::mapper::MapView;
 use crate::operations::snapshots;
@@ -88,7 +89,8 @@ impl ServedMap {
     /// The snapshots that can be shown; none of a map that is shown as one.
     pub fn snapshots(&self) -> Vec<(String, u64)> {
         let is_map = self.at.snapshot.is_none() && matches!(self.now().map, AnyMap::Map(_));
-        let found = if is_map { snapshots(&self.at.map).unwrap_or_default() } else { Vec::new() };
+        let found =
+            if is_map { place_of(&self.at.map).and_then(snapshots).unwrap_or_default() } else { Vec::new() };
         found.into_iter().filter(|info| info.damage.is_none()).map(|info| (info.name, info.tiles)).collect()
     }
 

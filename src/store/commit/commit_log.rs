@@ -50,17 +50,21 @@ impl CommitLog {
         commits: &Commits,
         metadata_text: &str,
     ) -> io::Result<Self> {
-        let whole = Flush {
-            number: commits.flush_number,
-            scan_number: commits.scan_number,
-            changed: &commits.tiles,
-            removed: &commits.last_removed,
-            metadata_text: Some(metadata_text),
-        };
         let mut out = disk.create(path)?;
-        let record_bytes = whole.write(true, &header(map_id), &mut out)?;
+        let record_bytes = Flush::of_all(commits, metadata_text).write(true, &header(map_id), &mut out)?;
         out.sync()?;
         Ok(Self { map_id, bytes: HEADER_BYTES as u64 + record_bytes })
+    }
+
+    /// The same log in memory.
+    pub(in crate::store) fn to_bytes(
+        map_id: [u8; 16],
+        commits: &Commits,
+        metadata_text: &str,
+    ) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        Flush::of_all(commits, metadata_text).write(true, &header(map_id), &mut bytes)?;
+        Ok(bytes)
     }
 
     /// Appends a record of changed and removed tiles and syncs it: when this returns, the flush is committed. After an

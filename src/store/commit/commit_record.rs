@@ -1,3 +1,4 @@
+use super::commits::Commits;
 use super::metadata::Metadata;
 use crate::error::{DecodeError, FormatError};
 use crate::space::{TileIndex, TileTable};
@@ -58,7 +59,18 @@ pub(in crate::store) fn whole_map_bytes(tiles: usize) -> u64 {
     (tiles * TILE_BYTES) as u64
 }
 
-impl Flush<'_> {
+impl<'a> Flush<'a> {
+    /// The whole map as of its last flush.
+    pub(in crate::store) fn of_all(commits: &'a Commits, metadata_text: &'a str) -> Self {
+        Self {
+            number: commits.flush_number,
+            scan_number: commits.scan_number,
+            changed: &commits.tiles,
+            removed: &commits.last_removed,
+            metadata_text: Some(metadata_text),
+        }
+    }
+
     /// Writes `front`, then the record. Returns the length of the record in bytes.
     pub(in crate::store) fn write(
         &self,

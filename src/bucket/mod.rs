@@ -1,0 +1,37 @@
+//! Maps that lie in a bucket of an object store: `s3://`, `gs://`, `az://`, and `https://` for reading.
+//!
+//! ```text
+//! push  map folder -> files as of a flush -> parts, named by content -> pages -> manifest, put last
+//! read  manifest -> BucketDisk, a `Disk` that reads only -> MapReader and all that takes one
+//! pull  manifest -> MAP.unfinished, files whose content is there are kept -> MAP
+//! ```
+//!
+//! | module | content |
+//! |---|---|
+//! | `bucket` | [`Bucket`]: gets and puts objects, with retries; every error names its object |
+//! | `object_name` | objects are named by the BLAKE3 of their content |
+//! | `manifest` | the one object that changes: which files the map has, by pages of tiles |
+//! | `file_list` | the list of files, with the pages that were asked for |
+//! | `bucket_disk`, `part_reader` | a map in a bucket as files that can be read |
+//! | `push`, `sender`, `prune`, `pull` | maps to buckets and back |
+//!
+//! `docs/format.md` describes the objects.
+
+#[expect(clippy::module_inception, reason = "the noun that the rest is about")]
+mod bucket;
+mod bucket_disk;
+mod file_list;
+mod manifest;
+mod object_name;
+mod part_reader;
+mod prune;
+mod pull;
+mod push;
+mod sender;
+
+/// The crate of [`Bucket::on`], in the version that voxtile uses.
+pub use ::object_store;
+pub use bucket::{Bucket, is_url};
+pub use bucket_disk::BucketDisk;
+pub use pull::{Pulled, pull};
+pub use push::{PushOptions, Pushed, push};

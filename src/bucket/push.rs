@@ -1,0 +1,277 @@
+use super::bucket::Bucket;
+use super::file_list::FileList;
+use super::manifest::{Files, Manifest, StoredFile, page_from_bytes};
+use super::object_name::ObjectName;
+use super::prune::prune;
+use super::sender::Sender;
+use crate::error::{Error, FormatError, Result};
+use crate::space::TileIndex;
+use crate::store::{
+    Checksumming, CommittedContent, CommittedFile, FileVersion, MapPath, Snapshot, TileStore, hex,
+};
+use object_store::UpdateVersion;
+use rustc_hash::FxHashMap;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::path::Path;
+
+/// How to [`push`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PushOptions {
+    /// Remove the objects that no manifest names any more. Whoever reads an earlier state of the map has to open it anew.
+    pub prunes: bool,
+}
+
+/// What a push did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Pushed {
+    /// Number of the flush that was pushed.
+    pub flush_number: u64,
+    /// Tiles of the map.
+    pub tiles: u64,
+    /// Tiles of which something was sent.
+    pub tiles_sent: u64,
+    /// Objects that were sent, the manifest left out.
+    pub objects_sent: u64,
+    /// Their bytes.
+    pub bytes_sent: u64,
+    /// Bytes of all files of the map.
+    pub bytes: u64,
+    /// Objects that were removed.
+    pub objects_pruned: u64,
+}
+
+/// How often a push begins again because a writer flushed the map meanwhile. What was sent stays sent.
+const ATTEMPTS: usize = 20;
+
+/// Copies the last flush of a map into a bucket, beside a writer too. Only tiles that changed since the last push are
+/// sent, several at a time, and the manifest last: readers of the bucket see one push whole, or the one before.
+/// `progress` hears of tiles done and of all tiles.
+///
+/// # Errors
+///
+/// [`Error::Mismatch`] if another map is there or a later state of this one; a map that cannot be read or is damaged; a
+/// store that refuses; another push that came first, whose state then stays.
+pub fn push(
+    map: impl Into<MapPath>,
+    bucket: &Bucket,
+    options: PushOptions,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Pushed> {
+    bucket.check_can_write()?;
+    let map = map.into();
+    let mut push = Push::begin(bucket)?;
+    let mut manifest = push.send_map(&map, &mut progress);
+    for _ in 1..ATTEMPTS {
+        if !matches!(manifest, Err(Error::Changed { .. })) {
+            break;
+        }
+        manifest = push.send_map(&map, &mut progress);
+    }
+    let manifest = manifest.map_err(|error| push.overtaken().unwrap_or(error))?;
+    if push.before.as_ref() != Some(&manifest) {
+        bucket.replace_manifest(&manifest, push.version)?;
+    }
+    let mut pushed = Pushed {
+        flush_number: manifest.flush_number,
+        tiles: manifest.tiles,
+        tiles_sent: push.tiles_sent,
+        objects_sent: push.sender.objects,
+        bytes_sent: push.sender.bytes,
+        bytes: manifest.bytes,
+        objects_pruned: 0,
+    };
+    if options.prunes {
+        pushed.objects_pruned = prune(bucket, manifest)?;
+    }
+    Ok(pushed)
+}
+
+/// A push that goes on.
+struct Push<'a> {
+    bucket: &'a Bucket,
+    /// The manifest that was there, and what tells it from its successor.
+    before: Option<Manifest>,
+    version: Option<UpdateVersion>,
+    /// Its files.
+    list: Option<FileList>,
+    sender: Sender<'a>,
+    /// Files of tiles that an earlier attempt has sent.
+    sent: FxHashMap<String, StoredFile>,
+    tiles_sent: u64,
+}
+
+impl<'a> Push<'a> {
+    fn begin(bucket: &'a Bucket) -> Result<Self> {
+        let found = bucket.manifest()?;
+        let (before, version) = found.map(|found| (found.manifest, found.version)).unzip();
+        let list = before.clone().map(|before| FileList::new(bucket.clone(), before));
+        let mut sender = Sender::new(bucket);
+        sender.note(list.iter().flat_map(|list| list.own_files().values()));
+        let sent = FxHashMap::default();
+        Ok(Self { bucket, before, version, list, sender, sent, tiles_sent: 0 })
+    }
+
+    /// Sends what the bucket lacks of the map's last flush; the manifest that names all of it.
+    fn send_map(&mut self, map: &MapPath, progress: &mut impl FnMut(u64, u64)) -> Result<Manifest> {
+        let (disk, folder) = map.clone().into_parts();
+        let store = TileStore::open_read_only(disk, &folder)?;
+        let commits = store.commits();
+        let map_id = store.map_id().map(|id| hex(&id));
+        let mut manifest = Manifest::new(map_id, commits.flush_number, commits.scan_number);
+        manifest.tiles = store.count_tiles() as u64;
+        self.check_is_later(&manifest, &folder)?;
+        let snapshots = store.read_snapshots()?;
+        let pages = pages_of(&store, &snapshots);
+        let all = pages.values().map(|tiles| tiles.len() as u64).sum();
+        let mut done = 0;
+        for (name, tiles) in pages {
+            let before = self.page_before(&name)?;
+            let mut page = Files::new();
+            for tile in &tiles {
+                self.send_tile(&store, &snapshots, *tile, &before, &mut page)?;
+                done += 1;
+                progress(done, all);
+            }
+            manifest.bytes += page.values().map(|file| file.bytes).sum::<u64>();
+            let object = self.send_page(&name, &page)?;
+            manifest.pages.insert(name, object);
+        }
+        for file in store.committed_files(&snapshots)? {
+            let path = file.path.clone();
+            let stored = self.send_file(&store, file, None)?;
+            manifest.bytes += stored.bytes;
+            manifest.files.insert(path, stored);
+        }
+        self.sender.finish()?;
+        Ok(manifest)
+    }
+
+    /// Why a push may have failed: another one came first, and removed what this one builds on.
+    fn overtaken(&self) -> Option<Error> {
+        let now = self.bucket.manifest().ok()?.map(|found| found.version);
+        (now != self.version).then(|| self.bucket.overtaken())
+    }
+
+    /// Neither another map nor a later state of this one is replaced.
+    fn check_is_later(&self, manifest: &Manifest, folder: &Path) -> Result<()> {
+        let Some(before) = &self.before else { return Ok(()) };
+        let path = self.bucket.path().to_owned();
+        if before.map_id != manifest.map_id {
+            let [found, wanted] =
+                [&before.map_id, &manifest.map_id].map(|id| id.clone().unwrap_or_else(|| "none".to_owned()));
+            let wanted = format!("{wanted} of {}", folder.display());
+            return Err(Error::Mismatch { path, what: "the id", found, wanted });
+        }
+        if before.flush_number > manifest.flush_number {
+            let found = before.flush_number.to_string();
+            let wanted = format!("at most {} as {}", manifest.flush_number, folder.display());
+            return Err(Error::Mismatch { path, what: "flush", found, wanted });
+        }
+        Ok(())
+    }
+
+    /// The files that a page lists by now.
+    fn page_before(&mut self, name: &str) -> Result<Files> {
+        let Some(list) = &self.list else { return Ok(Files::new()) };
+        let page = list.page(name).map_err(|error| Error::io(self.bucket.path(), "read", error))?;
+        self.sender.note(page.iter().flat_map(|page| page.values()));
+        Ok(page.map_or_else(Files::new, |page| (*page).clone()))
+    }
+
+    /// Sends what is new of a tile, and adds its files to the page.
+    fn send_tile(
+        &mut self,
+        store: &TileStore,
+        snapshots: &[Snapshot],
+        tile: TileIndex,
+        before: &Files,
+        page: &mut Files,
+    ) -> Result<()> {
+        let objects = self.sender.objects;
+        for file in store.committed_files_of(tile, snapshots)? {
+            let path = file.path.clone();
+            let known = match &file.content {
+                CommittedContent::Stored { version: Some(version), .. } => {
+                    let known = [before.get(&path), self.sent.get(&path)].into_iter().flatten();
+                    known.into_iter().find(|known| known.is_version(*version)).cloned()
+                }
+                _ => None,
+            };
+            let stored = match known {
+                Some(known) => known,
+                None => self.send_file(store, file, Some(tile))?,
+            };
+            page.insert(path, stored);
+        }
+        self.tiles_sent += u64::from(self.sender.objects > objects);
+        Ok(())
+    }
+
+    /// Sends a page.
+    fn send_page(&mut self, name: &str, page: &Files) -> Result<ObjectName> {
+        let failed = |error| Error::io(self.bucket.path(), "write", error);
+        let content = serde_json::to_vec(page).map_err(|error| failed(error.into()))?;
+        // What no reader would take is not sent.
+        page_from_bytes(name, &content).map_err(|reason| failed(io::Error::other(reason)))?;
+        let object = ObjectName::of(&content);
+        match &self.before {
+            Some(before) if before.pages.get(name) == Some(&object) => Ok(object),
+            _ => self.sender.send(content.into()),
+        }
+    }
+
+    /// Sends the parts of a file that the bucket lacks.
+    fn send_file(
+        &mut self,
+        store: &TileStore,
+        file: CommittedFile,
+        tile: Option<TileIndex>,
+    ) -> Result<StoredFile> {
+        let CommittedFile { path, content } = file;
+        let (places, version) = match content {
+            CommittedContent::Bytes(bytes) => {
+                return self.sender.send_file(&store.folder().join(path), &mut &bytes[..]);
+            }
+            CommittedContent::Stored { places, version } => (places, version),
+        };
+        for place in places {
+            let input = match store.disk().open(&place) {
+                Ok(input) => input,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(error) => return Err(Error::io(&place, "open", error)),
+            };
+            let mut input = Checksumming::new(input);
+            let mut stored = self.sender.send_file(&place, &mut input)?;
+            let Some(FileVersion { checksum, scan_number }) = version else { return Ok(stored) };
+            if input.finish().0 == checksum {
+                (stored.crc32, stored.scan_number) = (Some(checksum.crc), Some(scan_number));
+                self.sent.insert(path, stored.clone());
+                return Ok(stored);
+            }
+        }
+        Err(not_found(store, &path, tile))
+    }
+}
+
+/// Why a file that the log names is not there, or is another one: a flush came in between, or it is damaged.
+fn not_found(store: &TileStore, path: &str, tile: Option<TileIndex>) -> Error {
+    let folder = store.folder();
+    let now = TileStore::open_read_only(store.disk().clone(), folder);
+    if now.is_ok_and(|now| now.commits().flush_number == store.commits().flush_number) {
+        let reason = "the file is missing or not the one that commits.log names; `voxtile verify` says more";
+        return FormatError::at_offset(0, reason).in_map(&folder.join(path), tile);
+    }
+    Error::Changed { path: folder.to_owned() }
+}
+
+/// The tiles that the map or a snapshot of it sees, by the pages that list their files.
+fn pages_of(store: &TileStore, snapshots: &[Snapshot]) -> BTreeMap<String, BTreeSet<TileIndex>> {
+    let mut pages: BTreeMap<String, BTreeSet<TileIndex>> = BTreeMap::new();
+    let of_snapshots = snapshots.iter().flat_map(|snapshot| snapshot.commits.tiles.tiles());
+    for tile in store.tiles().chain(of_snapshots) {
+        pages.entry(Manifest::page_of(tile)).or_default().insert(tile);
+    }
+    pages
+}

@@ -1,0 +1,33 @@
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub struct PushArgs {
+    /// Folder of the map; a writer may be at work on it, and its last flush is pushed
+    pub map: PathBuf,
+    /// Where the map goes: s3://BUCKET/MAP, gs://BUCKET/MAP or az://CONTAINER/MAP; keys, region and endpoint come from
+    /// the environment (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL and so on)
+    #[arg(value_name = "URL")]
+    pub url: String,
+    /// Remove the objects there that the map does not need any more; who reads an earlier push has to open it anew
+    #[arg(long)]
+    pub prune: bool,
+    /// Print JSON; sizes in bytes
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct PullArgs {
+    /// Where the map is: as for push, or https://HOST/MAP
+    #[arg(value_name = "URL")]
+    pub url: String,
+    /// Folder of the map; it does not exist yet, or --replace is given
+    pub map: PathBuf,
+    /// Replace the state of the same map that is in the folder; what it has and the bucket lacks is lost
+    #[arg(long)]
+    pub replace: bool,
+    /// Print JSON; sizes in bytes
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,49 @@
+use crate::store::MapPath;
+use crate::{Error, Result};
+use std::path::Path;
+
+/// How the URLs of maps in buckets begin.
+const SCHEMES: [&str; 7] = ["s3", "gs", "az", "abfs", "abfss", "http", "https"];
+
+/// Where a map is that is to be read: a folder, or the URL of a bucket.
+///
+/// # Errors
+///
+/// As for [`Bucket::open`](crate::bucket::Bucket::open); a URL, where the command was built without buckets.
+pub fn place_of(map: &Path) -> Result<MapPath> {
+    match url_of(map) {
+        Some(url) => in_bucket(url),
+        None => Ok(map.into()),
+    }
+}
+
+/// The URL that is given in place of a folder.
+pub fn url_of(map: &Path) -> Option<&str> {
+    let text = map.to_str()?;
+    let (scheme, _) = text.split_once("://")?;
+    SCHEMES.contains(&scheme).then_some(text)
+}
+
+/// A map that is to be changed cannot be in a bucket.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] for a URL.
+pub fn check_is_folder(map: &Path) -> Result<()> {
+    let Some(url) = url_of(map) else { return Ok(()) };
+    let reason =
+        "a map in a bucket can be read and not changed; `voxtile pull` it, change it, `voxtile push` it";
+    Err(Error::argument(url, reason))
+}
+
+#[cfg(feature = "bucket")]
+fn in_bucket(url: &str) -> Result<MapPath> {
+    use crate::bucket::{Bucket, BucketDisk};
+    Ok(BucketDisk::open(Bucket::open(url)?)?.into_map_path())
+}
+
+#[cfg(not(feature = "bucket"))]
+fn in_bucket(url: &str) -> Result<MapPath> {
+    let reason = "this voxtile was built without buckets; `cargo install voxtile --features bucket` makes one with them";
+    Err(Error::argument(url, reason))
+}

@@ -1,0 +1,51 @@
+use crate::bucket::{Bucket, PushOptions, Pushed, push};
+use crate::command::args::PushArgs;
+use crate::command::json;
+use crate::command::map_at::whole_map;
+use crate::command::memory;
+use crate::command::progress::Progress;
+use indicatif::{HumanBytes, HumanCount};
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "crate::path_text::serialize")]
+    map: &'a Path,
+    url: &'a str,
+    #[serde(flatten)]
+    pushed: Pushed,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &PushArgs) -> anyhow::Result<ExitCode> {
+    let bucket = Bucket::open(&args.url)?;
+    let progress = Progress::over_tiles(0);
+    let options = PushOptions { prunes: args.prune };
+    let pushed = push(whole_map(&args.map)?, &bucket, options, |done, all| progress.set(done, all))?;
+    drop(progress);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let peak_rss_bytes = memory::peak_bytes();
+        let summary = Summary { map: &args.map, url: bucket.url(), pushed, peak_rss_bytes };
+        json::print(&summary, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let Pushed { flush_number, tiles, tiles_sent, objects_sent, bytes_sent, bytes, objects_pruned } = pushed;
+    writeln!(out, "pushed    flush {flush_number} to {}", bucket.url())?;
+    writeln!(
+        out,
+        "sent      {} of {} tiles: {} objects, {} of {}",
+        HumanCount(tiles_sent),
+        HumanCount(tiles),
+        HumanCount(objects_sent),
+        HumanBytes(bytes_sent),
+        HumanBytes(bytes)
+    )?;
+    if args.prune {
+        writeln!(out, "pruned    {} objects", HumanCount(objects_pruned))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,161 @@
+//! The files of a map as of a flush, to be copied to another place: a folder of these and no others is the map.
+
+use super::commit::commit_log::CommitLog;
+use super::disk::EntryKind;
+use super::layout::{Layout, TileFile};
+use super::snapshots::seen_tables::seen_by;
+use super::snapshots::snapshot_file::Snapshot;
+use super::tile_store::TileStore;
+use super::tiles::file_checksum::FileChecksum;
+use crate::error::{Error, Result};
+use crate::space::TileIndex;
+use std::path::{Path, PathBuf};
+
+/// A file of a map as of a flush.
+#[derive(Clone, Debug)]
+pub struct CommittedFile {
+    /// Its path in the folder of the map, with `/` between names.
+    pub path: String,
+    /// What is in it.
+    pub content: CommittedContent,
+}
+
+/// Where the content of a [`CommittedFile`] is.
+#[derive(Clone, Debug)]
+pub enum CommittedContent {
+    /// Here: the file says what the map's own file says as of the flush.
+    Bytes(Vec<u8>),
+    /// In the first of these files that has this checksum. Beside a writer it may be none of them any more.
+    Stored {
+        /// Where to look.
+        places: Vec<PathBuf>,
+        /// Tells whether it is the one; `None` where no log says it.
+        version: Option<FileVersion>,
+    },
+}
+
+/// What tells the versions of a tile's file apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FileVersion {
+    /// Length and checksum.
+    pub checksum: FileChecksum,
+    /// Number of the last scan that the map had taken when it was written.
+    pub scan_number: u64,
+}
+
+impl TileStore {
+    /// All snapshots of the map.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Snapshot::read`].
+    pub fn read_snapshots(&self) -> Result<Vec<Snapshot>> {
+        if self.map_id().is_none() {
+            return Ok(Vec::new());
+        }
+        self.snapshot_names()?.iter().map(|name| self.snapshot(name)).collect()
+    }
+
+    /// The files of the map that belong to no tile, `metadata.json` last: whoever finds it finds the others.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub fn committed_files(&self, snapshots: &[Snapshot]) -> Result<Vec<CommittedFile>> {
+        let mut files = Vec::new();
+        for snapshot in snapshots {
+            files.push(self.stored(self.layout().snapshot(&snapshot.name), None));
+        }
+        let kept = self.layout().kept_scans();
+        if self.keeps_scans() && self.disk().kind_at(&kept)? == Some(EntryKind::Folder) {
+            let mut names = self.disk().list(&kept).map_err(|error| Error::io(&kept, "list", error))?;
+            names.retain(|name| Layout::generation_of(name).is_some() || Layout::segment_of(name).is_some());
+            names.sort_unstable();
+            files.extend(names.into_iter().map(|name| self.stored(kept.join(name), None)));
+        }
+        let scans = self.layout().scans();
+        if let Some(EntryKind::File(_)) = self.disk().kind_at(&scans)? {
+            files.push(self.stored(scans, None));
+        }
+        let text = self.metadata().to_text();
+        if let Some(map_id) = self.map_id() {
+            let log = CommitLog::to_bytes(map_id, self.commits(), &text)
+                .map_err(|error| Error::io(&self.layout().commit_log(), "copy", error))?;
+            files.push(self.made(&self.layout().commit_log(), log));
+        }
+        files.push(self.made(&self.layout().metadata(), text.into_bytes()));
+        Ok(files)
+    }
+
+    /// The files of a tile that the map or one of its snapshots sees.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Changed`] if a writer was faster; a folder that cannot be listed.
+    pub fn committed_files_of(&self, tile: TileIndex, snapshots: &[Snapshot]) -> Result<Vec<CommittedFile>> {
+        let mut files = Vec::new();
+        let version = self.version(tile);
+        match version {
+            Some(version) => {
+                let table = self.layout().current(tile, TileFile::Table);
+                let table = self.stored(table, Some((version.table, version.scan_number)));
+                files.push(self.at_places(table, self.other_places(tile)?));
+                if self.layout().files().contains(&TileFile::Octree) {
+                    let octree = self.layout().current(tile, TileFile::Octree);
+                    let octree = self.stored(octree, Some((version.octree, version.scan_number)));
+                    files.push(self.at_places(octree, vec![self.layout().next(tile, TileFile::Octree)]));
+                }
+            }
+            // Of a map without a log.
+            None if self.contains(tile) => {
+                for file in self.layout().files() {
+                    let path = self.layout().current(tile, *file);
+                    if let Some(EntryKind::File(_)) = self.disk().kind_at(&path)? {
+                        files.push(self.stored(path, None));
+                    }
+                }
+            }
+            None => {}
+        }
+        let mut kept_before = None;
+        for snapshot in snapshots {
+            let Some(seen) = snapshot.commits.tiles.get(tile) else { continue };
+            if Some(seen) == version {
+                continue;
+            }
+            let kept = self.kept_tables(tile)?;
+            let Some(flush_number) = seen_by(Some(&kept), snapshot.commits.flush_number) else {
+                // It was in place a moment ago.
+                return Err(Error::Changed { path: self.folder().to_owned() });
+            };
+            if kept_before.replace(flush_number) != Some(flush_number) {
+                let path = self.layout().kept(tile, flush_number);
+                files.push(self.stored(path, Some((seen.table, seen.scan_number))));
+            }
+        }
+        files.dedup_by(|file, before| file.path == before.path);
+        Ok(files)
+    }
+
+    fn stored(&self, path: PathBuf, version: Option<(FileChecksum, u64)>) -> CommittedFile {
+        let version = version.map(|(checksum, scan_number)| FileVersion { checksum, scan_number });
+        let name = self.path_in_map(&path);
+        CommittedFile { path: name, content: CommittedContent::Stored { places: vec![path], version } }
+    }
+
+    fn at_places(&self, mut file: CommittedFile, others: Vec<PathBuf>) -> CommittedFile {
+        if let CommittedContent::Stored { places, .. } = &mut file.content {
+            places.extend(others);
+        }
+        file
+    }
+
+    fn made(&self, path: &Path, bytes: Vec<u8>) -> CommittedFile {
+        CommittedFile { path: self.path_in_map(path), content: CommittedContent::Bytes(bytes) }
+    }
+
+    fn path_in_map(&self, path: &Path) -> String {
+        let names = path.strip_prefix(self.folder()).unwrap_or(path).iter();
+        names.map(|name| name.to_string_lossy()).collect::<Vec<_>>().join("/")
+    }
+}

@@ -1,0 +1,185 @@
+"""Pushes, reads and pulls a map with servers that are slow, fail and cut off: `check.py VOXTILE MAP FOLDER`."""
+
+import http.client
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from urllib.request import Request, urlopen
+
+VOXTILE, MAP, WORK = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
+
+
+class Proxy(BaseHTTPRequestHandler):
+    """Hands requests on to the server behind it, but for what `fault` does to some."""
+
+    protocol_version = "HTTP/1.1"
+    behind = ("127.0.0.1", 0)
+    fault = None
+    requests = 0
+    lock = threading.Lock()
+
+    def handle_one(self):
+        with Proxy.lock:
+            Proxy.requests += 1
+            number = Proxy.requests
+        length = int(self.headers.get("Content-Length") or 0)
+        body = self.rfile.read(length)
+        fault = Proxy.fault if number % 3 == 0 else None
+        if fault == "slow":
+            time.sleep(0.2)
+        if fault == "500":
+            self.send_response(500)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+            return
+        connection = http.client.HTTPConnection(*Proxy.behind, timeout=30)
+        connection.request(self.command, self.path, body, dict(self.headers))
+        answer = connection.getresponse()
+        content = answer.read()
+        self.send_response(answer.status)
+        for name, value in answer.getheaders():
+            if name.lower() not in ("connection", "transfer-encoding", "content-length"):
+                self.send_header(name, value)
+        is_head = self.command == "HEAD"
+        self.send_header("Content-Length", answer.getheader("Content-Length") if is_head else str(len(content)))
+        self.end_headers()
+        if fault == "cut off" and self.command == "GET" and len(content) > 1:
+            self.wfile.write(content[: len(content) // 2])
+            self.wfile.flush()
+            self.connection.close()
+            self.close_connection = True
+        elif not is_head:
+            self.wfile.write(content)
+
+    do_GET = do_PUT = do_POST = do_HEAD = do_DELETE = handle_one
+
+    def log_message(self, *arguments):
+        pass
+
+
+def environment(port):
+    return {
+        **os.environ,
+        "AWS_ACCESS_KEY_ID": "key",
+        "AWS_SECRET_ACCESS_KEY": "secret",
+        "AWS_REGION": "us-east-1",
+        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",
+    }
+
+
+def voxtile(*arguments, port, fails=False):
+    done = subprocess.run(
+        [VOXTILE, *map(str, arguments)], env=environment(port), capture_output=True, text=True, timeout=300
+    )
+    if fails:
+        assert done.returncode != 0, f"{arguments} should have failed: {done.stdout}"
+        return done.stderr + done.stdout
+    assert done.returncode == 0, f"{arguments}: {done.stderr}"
+    return done.stdout
+
+
+def main():
+    moto = subprocess.Popen(
+        [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        port = next(int(line.rsplit(":", 1)[1]) for line in moto.stdout if "Running on http" in line)
+        threading.Thread(target=lambda: [None for _ in moto.stdout], daemon=True).start()
+        check(port)
+    finally:
+        moto.terminate()
+        moto.wait()
+
+
+def check(port):
+    urlopen(Request(f"http://127.0.0.1:{port}/robots", method="PUT")).read()
+    url = "s3://robots/maps/city"
+    digest = voxtile("digest", MAP, port=port)
+    first = json.loads(voxtile("push", MAP, url, "--json", port=port))
+    assert first["tiles_sent"] == first["tiles"] > 0, first
+    assert json.loads(voxtile("push", MAP, url, "--json", port=port))["objects_sent"] == 0
+
+    # Each command that reads says there what it says in the folder.
+    for command in (
+        ["digest", "{}"],
+        ["query", "{}", 10, 0.5, 0.1],
+        ["raycast", "{}", "--origin", 10, 0, 1.5, "--direction", 1, 0.3, 0],
+        ["verify", "{}", "--json"],
+    ):
+        here, there = ([str(word).format(map) for word in command] for map in (MAP, url))
+        answers = [voxtile(*words, port=port) for words in (here, there)]
+        if "--json" in command:
+            answers = [{**json.loads(answer), "map": "", "peak_rss_bytes": 0} for answer in answers]
+        assert answers[0] == answers[1], (command, answers)
+    for name, map in (("here.ply", MAP), ("there.ply", url)):
+        voxtile("export", map, "-o", WORK / name, port=port)
+    assert (WORK / "here.ply").read_bytes() == (WORK / "there.ply").read_bytes()
+    assert json.loads(voxtile("info", url, "--json", "--no-picture", port=port))["tiles"] == first["tiles"]
+    print("read there: digest, query, raycast, verify, export, info")
+
+    # What is not there, and what would write.
+    assert "no map here" in voxtile("info", "s3://robots/maps/none", port=port, fails=True)
+    assert "read and not changed" in voxtile("clear", url, "--region", 0, 0, 0, 1, 1, 1, port=port, fails=True)
+    assert "maps are made in folders" in voxtile("crop", MAP, "-o", url, "--region", 0, 0, 0, 9, 9, 9, port=port, fails=True)
+
+    voxtile("pull", url, WORK / "pulled", port=port)
+    assert voxtile("digest", WORK / "pulled", port=port) == digest
+    voxtile("verify", WORK / "pulled", port=port)
+
+    # Another robot adds to its copy and pushes; the first one's copy is behind then.
+    voxtile("clear", WORK / "pulled", "--region", 0, -3, -3, 8, 3, 3, port=port)
+    second = json.loads(voxtile("push", WORK / "pulled", url, "--json", "--prune", port=port))
+    assert 0 < second["tiles_sent"] < second["tiles"] and second["objects_pruned"] > 0, second
+    assert "flush" in voxtile("push", MAP, url, port=port, fails=True)
+    shutil.copytree(MAP, WORK / "behind")
+    replaced = json.loads(voxtile("pull", url, WORK / "behind", "--replace", "--json", port=port))
+    assert replaced["files_fetched"] < replaced["files"] / 2, replaced
+    digest = voxtile("digest", WORK / "behind", port=port)
+    assert digest == voxtile("digest", url, port=port) == voxtile("digest", WORK / "pulled", port=port)
+    print("pushed and pulled what changed:", replaced["files_fetched"], "of", replaced["files"], "files")
+
+    # A network that is slow, fails and cuts off.
+    Proxy.behind = ("127.0.0.1", port)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Proxy)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    bad = server.server_port
+    for fault in ("slow", "500", "cut off"):
+        Proxy.fault = fault
+        began = time.monotonic()
+        assert voxtile("digest", url, port=bad) == digest, fault
+        voxtile("push", WORK / "behind", f"{url}-{fault.replace(' ', '-')}", port=bad)
+        Proxy.fault = None
+        assert voxtile("digest", f"{url}-{fault.replace(' ', '-')}", port=port) == digest, fault
+        print(f"{fault}: {time.monotonic() - began:.1f} s")
+    # A web server serves what moto has, for reading.
+    Proxy.fault = None
+    web = f"http://127.0.0.1:{bad}/robots/maps/city"
+    assert voxtile("digest", web, port=port) == digest
+    assert "can be read and not written to" in voxtile("push", MAP, web, port=port, fails=True)
+
+    # An object that is changed, cut or missing is named.
+    names = [part for part in listed(port) if "/objects/" in part and part.startswith("maps/city/")]
+    for name, content in ((names[0], b"other"), (names[0], b""), (names[0], None)):
+        method = "DELETE" if content is None else "PUT"
+        urlopen(Request(f"http://127.0.0.1:{port}/robots/{name}", data=content, method=method)).read()
+        said = voxtile("pull", url, WORK / "broken", port=port, fails=True)
+        assert name in said, said
+        shutil.rmtree(WORK / "broken.unfinished", ignore_errors=True)
+    print("objects that were changed, cut and missing are named")
+
+
+def listed(port):
+    text = urlopen(f"http://127.0.0.1:{port}/robots?list-type=2&prefix=maps/city/").read().decode()
+    return [part.split("</Key>")[0] for part in text.split("<Key>")[1:]]
+
+
+main()
