@@ -3,7 +3,7 @@
 # `voxtile build` makes of the same messages have one digest, with a hostile peer too; what the node publishes is what
 # `voxtile export` writes, and its services do what they say. Without Python or PyPI it says so and passes.
 #
-# check.sh [friendly] [hostile] [variants] [real]
+# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood]
 #
 # VOXTILE_ROS2_PYTHON names a Python that has the packages, VOXTILE and VOXTILE_ROS2 name programs that are built.
 set -euo pipefail
@@ -33,90 +33,187 @@ if [ -z "$program" ]; then
     cargo build -q --locked -p voxtile-ros2
     program=$built/voxtile-ros2
 fi
-radius=2.5 max_z=1.0
+radius=2.5 max_z=1.0 inflation_range=2.2
 outputs="--max-range 60 --publish-every 0.2 --publish-radius $radius --projected-radius 30 --occupancy-max-z $max_z"
+outputs="$outputs --inflation-range $inflation_range"
 
-# Writes down for so many seconds what the node publishes.
+# What the kind is about, with all that the node has to tell about it.
+fail() {
+    echo "$kind: $*"
+    cat "$work/$kind.log"
+    exit 1
+}
+
+# Starts the node with these options.
+start() {
+    "$program" -o "$map" --domain-id $domain "$@" >"$work/$kind.log" 2>&1 &
+    node=$!
+}
+
+# Ends it with a signal.
+end() {
+    kill "-$1" "$node"
+    wait "$node" || fail "the node has failed"
+    node=
+}
+
+# Writes down for so many seconds what the node publishes under these names.
 listen() {
-    "$python" programs/ros2/tests/outputs.py listen $domain "$work/$kind.outputs" "$1" &
+    "$python" programs/ros2/tests/outputs.py listen $domain "$work/$kind.outputs" "$@" &
     listener=$!
 }
 
 # Plays the messages to the node, into the map and the log of this name.
 play() {
-    "$program" -o "$map" --domain-id $domain --resolution $resolution $outputs >"$work/$kind.log" 2>&1 &
-    node=$!
-    listen $seconds
+    case $kind in
+    odometry) start --resolution $resolution $outputs --odometry /odom --frame-id odom ;;
+    path) start --resolution $resolution --max-range 60 --publish-every 0.2 --path /slam_path --flush-every 2 ;;
+    sensors) start --resolution $resolution $outputs --cloud /cloud_in --cloud /rear ;;
+    launch)
+        # As `ros2 launch` starts a node with a namespace, a name, parameters and remappings.
+        printf '/robot/mapper:\n  ros__parameters: {max_range: 60.0, resolution: 0.7}\n' >"$work/launch.yaml"
+        start --publish-every 0.2 --ros-args -r __node:=mapper -r __ns:=/robot --params-file "$work/launch.yaml" \
+            -p resolution:=$resolution -r cloud_in:=/cloud_in -r octomap_binary:=/hall/octomap_binary
+        ;;
+    *) start --resolution $resolution $outputs ;;
+    esac
+    if [ $kind = path ]; then
+        listen 20 octomap_full
+    elif [ $kind = launch ]; then
+        listen $seconds octomap_binary robot/octomap_full hall/octomap_binary
+    else
+        listen $seconds
+    fi
     "$python" programs/ros2/tests/peer.py $domain "$work/$kind.bag" $count $kind "$street"
     wait "$listener"
     listener=
-    kill -INT "$node"
-    wait "$node" || { cat "$work/$kind.log"; exit 1; }
-    node=
+    end INT
     grep 'clouds:' "$work/$kind.log" | tail -1 | tee "$work/$kind.counters"
+}
+
+# The node and the command make one map of the clouds of a topic.
+built_of() {
+    "$voxtile" build "$work/$kind.bag" "$@" --resolution $resolution --tile-size 10 --max-range 60 >/dev/null
+}
+
+# More clouds than the queue takes are counted, take no more memory than they may, and the node maps on.
+flood() {
+    local clouds=1500 grown received dropped waiting mapped_before mapped without
+    start --memory 128MiB --transform-wait 100 --resolution 0.1
+    "$python" programs/ros2/tests/flood.py $domain $clouds $node >"$work/flood.counts" || fail "the peer has failed"
+    end INT
+    read -r grown received dropped waiting mapped_before mapped without <"$work/flood.counts"
+    echo "flood: $received received, $dropped dropped, $waiting waited, $mapped mapped; $((grown >> 20)) MiB more"
+    [ "$mapped_before" = 0 ] || fail "clouds without transforms are mapped"
+    [ "$received" -gt 600 ] || { echo "skipped: this machine has lost most of the flood on the way"; return; }
+    [ "$dropped" -gt 0 ] || fail "16 MiB hold all of it"
+    [ $((dropped + waiting)) = "$received" ] || fail "some were not counted"
+    # The queue's 16 MiB, the 8 MiB of the socket, and what rustdds holds.
+    [ "$grown" -lt $((64 << 20)) ] || fail "$grown bytes more"
+    [ $((mapped + without)) = "$waiting" ] && [ "$mapped" -gt 0 ] || fail "those that waited are not mapped"
 }
 
 # A street of real clouds where they are at hand.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
-for kind in ${*:-friendly hostile variants real}; do
+for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
-    if [ $kind = real ]; then
-        count=75 resolution=0.2 seconds=20
-        [ -d "$street/scans" ] || continue
+    if [ $kind = flood ]; then
+        domain=$((RANDOM % 100 + 100))
+        flood
+        continue
     fi
+    sent=$count
+    case $kind in
+    real)
+        count=75 sent=75 resolution=0.2 seconds=20
+        [ -d "$street/scans" ] || continue
+        ;;
+    hostile) sent=90 ;;
+    sensors) sent=60 ;;
+    esac
     # Clouds are best effort: a machine that is busy enough loses some on the way, which is no fault of the node.
+    mapped=$([ $kind = hostile ] && echo $count || echo $sent)
     for attempt in 1 2 3; do
         domain=$((RANDOM % 100 + 100))
         rm -rf "$map" "$work/$kind.bag"
         play
-        if grep -q " $count mapped" "$work/$kind.counters"; then break; fi
-        sent=$([ $kind = hostile ] && echo 90 || echo $count)
+        if grep -q " $mapped mapped" "$work/$kind.counters"; then break; fi
         if grep -q "clouds: $sent received" "$work/$kind.counters"; then
-            echo "$kind: all clouds came, and not all were mapped"
-            cat "$work/$kind.log"
-            exit 1
+            fail "all clouds came, and not all were mapped"
         fi
         if [ $attempt = 3 ]; then
             echo "skipped: this machine has lost clouds on the way, three times"
             exit 0
         fi
     done
-    "$voxtile" build "$work/$kind.bag" -o "$map.built" --resolution $resolution --tile-size 10 --max-range 60 >/dev/null
+    case $kind in
+    sensors)
+        # Of two sensors far apart the order does not matter: voxel by voxel there is the map of each.
+        for topic in cloud_in rear; do
+            built_of -o "$map.$topic" --topic /$topic
+            "$voxtile" export "$map.$topic" -o "$map.$topic.csv" --what all >/dev/null
+        done
+        "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
+        cmp <(sort "$map.csv") <(sort -u "$map.cloud_in.csv" "$map.rear.csv") || fail "the map is another one"
+        echo "sensors: $(wc -l <"$map.cloud_in.csv") and $(wc -l <"$map.rear.csv") rows in one map"
+        continue
+        ;;
+    odometry) built_of -o "$map.built" --odometry /odom ;;
+    path)
+        built_of -o "$map.built" --keep-scans
+        before=$("$voxtile" digest "$map.built")
+        "$voxtile" remap "$map.built" --poses "$work/$kind.bag.tum" >/dev/null
+        [ "$("$voxtile" digest "$map.built")" != "$before" ] || fail "the path moves nothing"
+        ;;
+    *) built_of -o "$map.built" ;;
+    esac
     of_node=$("$voxtile" digest "$map") of_bag=$("$voxtile" digest "$map.built")
-    if [ "$of_node" != "$of_bag" ]; then
-        echo "$kind: the map of the node is another one: $of_node, not $of_bag"
-        cat "$work/$kind.log"
-        exit 1
+    [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"
+    if [ $kind = path ]; then
+        # What moved was published, and no scan was mapped twice.
+        grep -q 'remapped: 30 of 30 scans moved' "$work/$kind.log" || fail "nothing was remapped"
+        "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
+        "$python" programs/ros2/tests/outputs.py whole "$work/$kind.outputs" "$map.csv"
+        echo "$kind: $of_node"
+        continue
+    fi
+    if [ $kind = launch ]; then
+        for name in robot/octomap_full hall/octomap_binary; do
+            grep -q "\"$name\"" "$work/$kind.outputs" || fail "nothing is published as /$name"
+        done
+        grep -q '"octomap_binary":' "$work/$kind.outputs" && fail "names are not mapped"
+        echo "$kind: $of_node"
+        continue
+    fi
+    if [ $kind = odometry ]; then
+        echo "$kind: $of_node"
+        continue
     fi
     "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
     "$voxtile" export "$map" -o "$map.pgm" --z-max $max_z >/dev/null
     compare() {
         [ $kind = real ] || "$python" programs/ros2/tests/outputs.py compare \
-            "$work/$kind.outputs" "$map.csv" "$map.pgm" $count $radius $max_z
+            "$work/$kind.outputs" "$map.csv" "$map.pgm" $count $radius $max_z $1 $inflation_range
     }
-    compare
+    compare live
     # The map is there to go on with, and nothing that did not come changes it. Who listens gets it, once.
-    "$program" -o "$map" --domain-id $domain --rmw cyclonedds $outputs >"$work/$kind.log" 2>&1 &
-    node=$!
+    start --rmw cyclonedds $outputs
     listen 4
     wait "$listener"
     listener=
-    compare
+    compare rest
     if grep -q '"count": [^1]' "$work/$kind.outputs"; then
         echo "$kind: what did not change was published again"
         exit 1
     fi
-    [ $kind = real ] || "$python" programs/ros2/tests/services.py $domain || { cat "$work/$kind.log"; exit 1; }
-    kill -TERM "$node"
-    wait "$node" || { cat "$work/$kind.log"; exit 1; }
-    node=
-    grep -q "the map is at scan $count" "$work/$kind.log" || { cat "$work/$kind.log"; exit 1; }
-    [ "$("$voxtile" digest "$map")" = "$of_node" ] || { echo "$kind: starting again changes the map"; exit 1; }
+    [ $kind = real ] || "$python" programs/ros2/tests/services.py $domain || fail "services"
+    end TERM
+    grep -q "the map is at scan $count" "$work/$kind.log" || fail "scans are missing"
+    [ "$("$voxtile" digest "$map")" = "$of_node" ] || fail "starting again changes the map"
     # However points are laid out, and whoever else talks, it is one map.
     [ $kind = friendly ] && of_friend=$of_node
     if [ $kind != real ] && [ "$of_node" != "${of_friend:-$of_node}" ]; then
-        echo "$kind: another map than without: $of_node, not $of_friend"
-        exit 1
+        fail "another map than without: $of_node, not $of_friend"
     fi
     echo "$kind: $of_node"
 done

@@ -33,8 +33,7 @@ mod trace;
 mod traits;
 
 pub use in_memory::InMemoryMapper;
-pub use kept_scan::KeptScan;
-pub(crate) use kept_scan::pose_of_numbers;
+pub use kept_scan::{KeptScan, pose_of_numbers};
 pub use kept_scans::KeptScans;
 pub(crate) use kept_scans::check_keeps_all;
 pub use live::{LiveReader, LiveView};

@@ -38,6 +38,7 @@ pub struct ScanRef<'a> {
     points: PointSlice<'a>,
     /// One a point.
     intensities: Option<&'a [f32]>,
+    stamp_ns: Option<i64>,
 }
 
 /// The frame of the points.
@@ -55,13 +56,14 @@ const POINTS_AT_A_TIME: usize = 1 << 18;
 impl<'a> ScanRef<'a> {
     /// Points in the world frame, seen from `origin`. A point equal to the origin means "no return" and is skipped.
     pub fn in_world<C: Coordinate>(origin: Point, points: &'a [[C; 3]]) -> Self {
-        Self { frame: Frame::World(origin), points: C::slice(points), intensities: None }
+        Self { frame: Frame::World(origin), points: C::slice(points), intensities: None, stamp_ns: None }
     }
 
     /// Points in the sensor's frame, and the pose of the sensor. The exact point (0, 0, 0) means "no return" and is
     /// skipped.
     pub fn in_sensor<C: Coordinate>(world_from_sensor: impl Into<Pose>, points: &'a [[C; 3]]) -> Self {
-        Self { frame: Frame::Sensor(world_from_sensor.into()), points: C::slice(points), intensities: None }
+        let frame = Frame::Sensor(world_from_sensor.into());
+        Self { frame, points: C::slice(points), intensities: None, stamp_ns: None }
     }
 
     /// The same with an intensity per point.
@@ -73,6 +75,12 @@ impl<'a> ScanRef<'a> {
         check_count(self.len(), intensities)?;
         Ok(Self { intensities: Some(intensities), ..self })
     }
+
+    /// The same with the time at which it was taken, in nanoseconds since the epoch of its source.
+    #[must_use]
+    pub fn with_stamp_ns(self, stamp_ns: i64) -> Self {
+        Self { stamp_ns: Some(stamp_ns), ..self }
+    }
 }
 
 impl ScanPoints for ScanRef<'_> {
@@ -81,6 +89,10 @@ impl ScanPoints for ScanRef<'_> {
             Frame::World(origin) => *origin,
             Frame::Sensor(pose) => pose.position_m(),
         }
+    }
+
+    fn stamp_ns(&self) -> Option<i64> {
+        self.stamp_ns
     }
 
     fn len(&self) -> usize {

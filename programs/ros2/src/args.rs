@@ -1,3 +1,4 @@
+use crate::names::Names;
 use crate::publishers::Extent;
 use crate::services::Rmw;
 use crate::when_behind::WhenBehind;
@@ -6,8 +7,11 @@ use bytesize::ByteSize;
 use clap::Parser;
 use std::path::PathBuf;
 use std::time::Duration;
-use voxtile::SensorModel;
+use voxtile::local::LocalParameters;
 use voxtile::sensor::LogOdds;
+use voxtile::{MapConfig, SensorModel};
+
+const DEFAULT_INFLATION_M: f64 = 0.2;
 
 /// Map what the sensors of a robot see, from ROS 2 over DDS, into a map of voxtile. Lengths are metres, times seconds.
 #[derive(Clone, Debug, Parser)]
@@ -20,7 +24,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub params_file: Vec<PathBuf>,
     /// Topic of clouds (sensor_msgs/PointCloud2); give it again for each sensor
-    #[arg(long, value_name = "TOPIC", default_value = "/cloud_in")]
+    #[arg(long, value_name = "TOPIC", default_value = "cloud_in")]
     pub cloud: Vec<String>,
     /// Frame of the map
     #[arg(long, value_name = "FRAME", default_value = "map")]
@@ -28,6 +32,13 @@ pub struct Args {
     /// Poses from a topic of nav_msgs/Odometry instead of /tf; mounts still come from /tf_static
     #[arg(long, value_name = "TOPIC")]
     pub odometry: Option<String>,
+    /// Corrected poses of the sensor at the stamps of its clouds, from a topic of nav_msgs/Path: what moved clouds
+    /// touch is mapped again. Keeps the scans, and takes one topic of clouds
+    #[arg(long, value_name = "TOPIC")]
+    pub path: Option<String>,
+    /// A path by which no scan moves farther than this, or turns by half a degree, changes nothing
+    #[arg(long, value_name = "M", default_value_t = 0.05)]
+    pub path_tolerance: f64,
     /// How long a cloud waits for the transforms around its stamp before it is dropped
     #[arg(long, value_name = "S", default_value_t = 1.0)]
     pub transform_wait: f64,
@@ -59,6 +70,9 @@ pub struct Args {
     /// Most probability that a voxel gets, of a new map [default: 0.971]
     #[arg(long, value_name = "P")]
     pub clamp_max: Option<f64>,
+    /// Keep the scans in a new map, so that it can follow its trajectory
+    #[arg(long)]
+    pub keep_scans: bool,
     /// Memory for the map and for clouds that wait; the clouds get an eighth
     #[arg(long, value_name = "SIZE", default_value = "1GiB")]
     pub memory: ByteSize,
@@ -85,9 +99,28 @@ pub struct Args {
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub occupancy_max_z: Option<f64>,
 
+    /// Points farther from the sensor than this do not enter the local map
+    #[arg(long, value_name = "M", default_value_t = 40.0)]
+    pub local_range: f64,
+    /// Most voxels of the local map; those seen longest ago are forgotten
+    #[arg(long, value_name = "N", default_value_t = 50_000)]
+    pub local_max_voxels: usize,
+    /// Voxels so near to an occupied one are inflated [default: 0.2, or 20 voxels where these are less]
+    #[arg(long, value_name = "M")]
+    pub inflation_radius: Option<f64>,
+    /// Occupied voxels so near to the sensor inflate others
+    #[arg(long, value_name = "M", default_value_t = 8.0)]
+    pub inflation_range: f64,
+
     /// Name of the node, of which some services are named after
     #[arg(long, value_name = "NAME", default_value = "voxtile_ros2")]
     pub node_name: String,
+    /// Namespace of the node, in which names without a slash in front are
+    #[arg(long, value_name = "NS", default_value = "/")]
+    pub namespace: String,
+    /// Gives a topic or a service another name; give it again for each
+    #[arg(long, value_name = "FROM:=TO")]
+    pub remap: Vec<String>,
     /// Middleware of those who call services
     #[arg(long, value_enum, default_value_t = Rmw::Fastrtps)]
     pub rmw: Rmw,
@@ -111,6 +144,15 @@ impl Args {
         self.memory_bytes() - self.queue_bytes()
     }
 
+    /// Names of the node, of topics and of services.
+    ///
+    /// # Errors
+    ///
+    /// Rules that are none.
+    pub fn names(&self) -> anyhow::Result<Names> {
+        Names::new(&self.namespace, &self.node_name, &self.remap)
+    }
+
     /// How hits and misses become evidence, in a new map.
     ///
     /// # Errors
@@ -132,6 +174,22 @@ impl Args {
             max: self.clamp_max.map_or(octomap.max, |_| given.max),
         };
         Ok(SensorModel::LogOdds(model))
+    }
+
+    /// How the local map is made beside a map.
+    ///
+    /// # Errors
+    ///
+    /// Lengths that are none; a radius of more voxels than the local map inflates by.
+    pub fn local_parameters(&self, map: &MapConfig) -> voxtile::Result<LocalParameters> {
+        let resolution_m = map.grid.resolution_m();
+        let radius_m = self.inflation_radius.unwrap_or(DEFAULT_INFLATION_M.min(20.0 * resolution_m));
+        let mut parameters = LocalParameters::local_mapping()
+            .with_max_voxels(self.local_max_voxels)
+            .with_ranges(self.local_range, self.inflation_range)
+            .with_inflation_radius(radius_m);
+        parameters.min_input_range_m = self.min_range;
+        parameters.validated(resolution_m)
     }
 
     /// How much is published.
@@ -173,5 +231,26 @@ impl Args {
 
     fn memory_bytes(&self) -> usize {
         usize::try_from(self.memory.as_u64()).unwrap_or(usize::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_local_map_fits_the_voxels() {
+        let parameters = |options: &[&str], resolution_m: f64| {
+            let args = Args::parse_from(["voxtile-ros2", "-o", "map"].iter().chain(options));
+            args.local_parameters(&MapConfig::new(resolution_m, 64.0 * resolution_m).unwrap())
+        };
+        assert_eq!(parameters(&[], 0.1).unwrap(), LocalParameters::local_mapping());
+        assert_eq!(parameters(&[], 0.005).unwrap().inflation_radius_m, 0.1);
+        let given = parameters(&["--min-range", "0.5", "--inflation-radius", "0.3"], 0.1).unwrap();
+        assert_eq!((given.min_input_range_m, given.inflation_radius_m), (0.5, 0.3));
+        for wrong in [["--inflation-radius", "3"], ["--local-max-voxels", "0"], ["--inflation-range", "NaN"]]
+        {
+            assert!(parameters(&wrong, 0.1).is_err(), "{wrong:?}");
+        }
     }
 }

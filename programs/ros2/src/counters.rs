@@ -15,6 +15,8 @@ pub struct Counters {
     pub too_large: u64,
     /// Transforms that are not valid, or more than the buffer takes.
     pub transforms_refused: u64,
+    /// How often the map followed a corrected path.
+    pub remapped: u64,
     /// Samples that the transport could not deliver.
     pub transport_errors: u64,
 }

@@ -11,5 +11,7 @@ pub struct Health {
     /// Since the map on disk was last what is in memory, or made newer.
     pub flush_age: Duration,
     pub is_flushing: bool,
+    /// Of the local map, beside the statistics.
+    pub local_map_bytes: usize,
     pub latencies: Latencies,
 }

@@ -7,7 +7,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::ros::Wire;
-use voxtile_clouds::ros::messages::{MessageKind, PointCloud2, decode_poses};
+use voxtile_clouds::ros::messages::{MessageKind, PointCloud2, StampedPose, decode_poses};
 
 /// What readers have for the mapping thread.
 #[derive(Debug)]
@@ -21,6 +21,9 @@ struct State {
     queue: CloudQueue,
     transforms: TransformBuffer,
     counters: Counters,
+    /// The last one that came and was not taken.
+    path: Option<Vec<StampedPose>>,
+    fixed_frame: String,
     is_closed: bool,
 }
 
@@ -28,7 +31,9 @@ impl Inbox {
     pub fn new(args: &Args) -> Self {
         let queue = CloudQueue::new(args.queue_bytes(), args.cloud.len(), args.when_behind);
         let (transforms, counters) = (TransformBuffer::new(args), Counters::default());
-        let state = Mutex::new(State { queue, transforms, counters, is_closed: false });
+        let fixed_frame = args.frame_id.trim_start_matches('/').to_owned();
+        let state = State { queue, transforms, counters, path: None, fixed_frame, is_closed: false };
+        let state = Mutex::new(state);
         Self { state, changed: Condvar::new() }
     }
 
@@ -69,6 +74,29 @@ impl Inbox {
             }
         }
         self.changed.notify_all();
+    }
+
+    /// A corrected path; it takes the place of one that nobody has taken.
+    pub fn put_path(&self, cdr: &[u8]) {
+        let poses = decode_poses(MessageKind::Path, Wire::Cdr, cdr);
+        let mut state = self.lock();
+        match poses {
+            Ok(poses) if poses.iter().all(|pose| pose.header.frame_id == state.fixed_frame) => {
+                state.path = Some(poses);
+            }
+            Ok(_) => {
+                log::warn!("a path is left out: not all of it is in the frame {}", state.fixed_frame);
+                state.counters.malformed += 1;
+            }
+            Err(error) => {
+                log::debug!("a path cannot be decoded: {error}");
+                state.counters.malformed += 1;
+            }
+        }
+    }
+
+    pub fn take_path(&self) -> Option<Vec<StampedPose>> {
+        self.lock().path.take()
     }
 
     /// The next cloud that has its pose, waiting for it at most so long.

@@ -1,13 +1,17 @@
 use crate::health::Health;
+use crate::local_share::LocalShare;
 use crate::messages::{Header, Time};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use voxtile::{LiveReader, LiveView, MapView, Point};
+use voxtile::{Grid, LiveReader, LiveView, MapView, Point};
 
 /// The map as others than its mapper see it, and where the robot is in it.
 #[derive(Debug)]
 pub struct LiveMap {
     frame: String,
+    /// The same however often the map is opened anew.
+    grid: Grid,
     state: Mutex<State>,
+    local: LocalShare,
 }
 
 #[derive(Debug)]
@@ -37,10 +41,13 @@ pub struct MapVersion {
 
 impl LiveMap {
     pub fn new(frame: String, reader: LiveReader, sensor_m: Point, stamp_ns: i64) -> Self {
-        let version = MapVersion { opening: 0, scan_number: reader.view().scan_number() };
+        let view = reader.view();
+        let (grid, version) =
+            (view.config().grid, MapVersion { opening: 0, scan_number: view.scan_number() });
+        drop(view);
         let moment = Moment { version, sensor_m, stamp_ns };
         let state = Mutex::new(State { reader, moment, health: Health::default() });
-        Self { frame, state }
+        Self { frame, grid, state, local: LocalShare::default() }
     }
 
     /// A scan was mapped.
@@ -50,12 +57,13 @@ impl LiveMap {
         *moment = Moment { version, sensor_m, stamp_ns };
     }
 
-    /// The map was changed as a whole, and opened anew.
-    pub fn note_opening(&self, reader: LiveReader) {
+    /// The map was changed as a whole, and opened anew; the sensor's last place, where it is another one now.
+    pub fn note_opening(&self, reader: LiveReader, sensor_m: Option<Point>) {
         let scan_number = reader.view().scan_number();
         let mut state = self.lock();
         let opening = state.moment.version.opening + 1;
         state.moment.version = MapVersion { opening, scan_number };
+        state.moment.sensor_m = sensor_m.unwrap_or(state.moment.sensor_m);
         state.reader = reader;
     }
 
@@ -65,6 +73,15 @@ impl LiveMap {
 
     pub fn health(&self) -> Health {
         self.lock().health.clone()
+    }
+
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The local map beside it.
+    pub fn local(&self) -> &LocalShare {
+        &self.local
     }
 
     pub fn moment(&self) -> Moment {

@@ -3,6 +3,7 @@
 //! ```text
 //! DDS -> RawMessage -> CloudQueue, TransformBuffer   node: a thread a topic
 //! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
+//! DDS -> corrected path -> Mapping -> map of moved scans
 //! LiveMap -> messages -> DDS                         publishers: one thread
 //! DDS -> orders -> Mapping, questions -> LiveMap     services: a thread a service
 //! ```
@@ -10,13 +11,17 @@
 mod args;
 mod cloud;
 mod cloud_queue;
+mod corrections;
 mod counters;
 mod health;
 mod inbox;
 mod latencies;
 mod live_map;
+mod local_mapping;
+mod local_share;
 mod mapping;
 mod messages;
+mod names;
 mod node;
 mod parameters;
 mod publishers;
@@ -31,7 +36,7 @@ use inbox::Inbox;
 use mapping::Mapping;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use voxtile::Stop;
 
 fn main() -> ExitCode {
     // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks.
@@ -49,11 +54,11 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    let stop = Arc::new(AtomicBool::new(false));
+    let stop = Stop::default();
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // A second one ends the process at once.
-        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.clone())?;
-        signal_hook::flag::register(signal, stop.clone())?;
+        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.flag())?;
+        signal_hook::flag::register(signal, stop.flag())?;
     }
     let inbox = Arc::new(Inbox::new(args));
     // A map that cannot be opened is told before anybody sees a node.

@@ -1,33 +1,42 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
+use crate::corrections::Corrections;
 use crate::health::Health;
 use crate::inbox::Inbox;
 use crate::latencies::Latencies;
 use crate::live_map::LiveMap;
+use crate::local_mapping::LocalMapping;
 use crate::services::{Order, PlacedOrder};
+use anyhow::ensure;
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
-use voxtile::operations::{self, Part};
+use voxtile::operations::{self, NewPoses, Part, Remap, Remapped, Rework, remap};
 use voxtile::{
-    Aabb, Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Point, Pose, ScanRef,
+    Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Pose,
+    ScanRef, Stop,
 };
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::ros::Wire;
-use voxtile_clouds::ros::messages::PointCloud2;
+use voxtile_clouds::ros::messages::{PointCloud2, StampedPose};
 
 /// The thread that maps: clouds from the inbox into the map, flushed by a timer.
 pub struct Mapping {
     inbox: Arc<Inbox>,
     mapper: OutOfCoreTileMapper,
     live: Arc<LiveMap>,
+    local: LocalMapping,
     latencies: Latencies,
     orders: Receiver<PlacedOrder>,
     /// Orders to save, with the scan that has to be durable.
     saves: Vec<(u64, PlacedOrder)>,
+    /// A corrected path, with the scan that has to be durable before it is followed.
+    path: Option<(u64, Vec<StampedPose>)>,
     folder: PathBuf,
+    /// What moves scans no farther, in metres, is no correction.
+    path_tolerance_m: f64,
     flush_every: Duration,
     flushed_at: Instant,
     told_at: Instant,
@@ -40,6 +49,8 @@ pub struct Mapping {
 const WAIT: Duration = Duration::from_millis(50);
 const TELL_EVERY: Duration = Duration::from_secs(10);
 const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// By which angle scans turn that are no correction: half a degree.
+const PATH_TOLERANCE: f64 = PI / 360.0;
 /// Beyond the last voxel that has an index.
 const EVERYWHERE: Aabb = Aabb { min: [-1e12; 3], max: [1e12; 3] };
 
@@ -55,15 +66,27 @@ impl Mapping {
         let own = |config: MapConfig| {
             config.with_memory_bytes(args.map_bytes()).with_range(args.min_range, args.max_range)
         };
+        let is_followed = args.path.is_some();
+        ensure!(
+            !is_followed || args.cloud.len() == 1,
+            "--path: its poses are of one sensor, and there are {} topics of clouds; name one with --cloud",
+            args.cloud.len()
+        );
         let mapper = match MapReader::config_of(&args.output) {
             Ok(config) => {
                 // Resolution and tiles are the map's own.
                 log::info!("going on with the map {}", args.output.display());
+                ensure!(
+                    config.keeps_scans || !is_followed,
+                    "--path: the map {} keeps no scans, so that it cannot follow; begin another one",
+                    args.output.display()
+                );
                 OutOfCoreTileMapper::open(&args.output, own(config))?
             }
             Err(Error::NoMap { .. }) => {
                 let config = MapConfig::new(args.resolution, args.tile_size)?;
                 let config = config.with_sensor_model(args.sensor_model()?);
+                let config = config.with_kept_scans(args.keep_scans || is_followed);
                 OutOfCoreTileMapper::create(&args.output, own(config))?
             }
             Err(error) => return Err(error.into()),
@@ -71,16 +94,21 @@ impl Mapping {
         let (sensor_m, stamp_ns) = last_place(&args.output);
         let frame = args.frame_id.trim_start_matches('/').to_owned();
         let live = Arc::new(LiveMap::new(frame, mapper.reader()?, sensor_m, stamp_ns));
+        let parameters = args.local_parameters(mapper.config())?;
+        let local = LocalMapping::new(parameters, args.extent()?.radius_m, live.clone());
         let now = Instant::now();
         let durable = (now, mapper.flushed_scan_number());
         Ok(Self {
             inbox,
             mapper,
             live,
+            local,
             latencies: Latencies::default(),
             orders,
             saves: Vec::new(),
+            path: None,
             folder: args.output.clone(),
+            path_tolerance_m: args.path_tolerance,
             flush_every,
             flushed_at: now,
             told_at: now,
@@ -99,16 +127,30 @@ impl Mapping {
     /// # Errors
     ///
     /// The map cannot be written; a flush beside the mapping that failed is told by the next.
-    pub fn run(mut self, stop: &AtomicBool) -> anyhow::Result<()> {
-        while !stop.load(Ordering::Relaxed) {
+    pub fn run(mut self, stop: &Stop) -> anyhow::Result<()> {
+        while !stop.is_set() {
             if let Some((cloud, pose)) = self.inbox.take(WAIT) {
                 self.insert(&cloud, &pose)?;
             }
             if let Ok(order) = self.orders.try_recv() {
                 self = self.obey(order)?;
             }
+            if let Some(path) = self.inbox.take_path() {
+                // A later one takes its place, and waits no longer for that.
+                let scan = self.path.take().map_or(self.mapper.scan_number(), |(scan, _)| scan);
+                self.path = Some((scan, path));
+            }
+            if let Some((scan, path)) = self.path.take() {
+                if scan <= self.mapper.flushed_scan_number() {
+                    self = self.follow(&path, stop)?;
+                } else {
+                    self.path = Some((scan, path));
+                }
+            }
+            self.local.refresh(&self.mapper);
             // One that takes longer than the timer is waited for by the next, not by clouds.
-            let is_time = self.flushed_at.elapsed() >= self.flush_every || !self.saves.is_empty();
+            let is_wanted = !self.saves.is_empty() || self.path.is_some();
+            let is_time = self.flushed_at.elapsed() >= self.flush_every || is_wanted;
             if is_time && !self.mapper.is_flushing() {
                 if self.mapper.is_dirty() {
                     self.mapper.begin_flush()?;
@@ -153,23 +195,75 @@ impl Mapping {
         Ok(self)
     }
 
-    /// Changes the map as a whole: it is flushed and closed for that, and clouds wait.
+    /// Maps again what the scans touch that a corrected path moves.
+    fn follow(self, path: &[StampedPose], stop: &Stop) -> anyhow::Result<Self> {
+        let found = match corrections(&self.folder, path) {
+            Ok(found) => found,
+            Err(error) => {
+                log::warn!("a path is left out: {error}");
+                return Ok(self);
+            }
+        };
+        if found.most_moved_m <= self.path_tolerance_m && found.most_turned <= PATH_TOLERANCE {
+            log::debug!("a path of {} poses changes nothing: it names {} scans", path.len(), found.named);
+            return Ok(self);
+        }
+        let begun = Instant::now();
+        let rework = Rework::default().with_stop(stop.clone());
+        let rework = match self.mapper.config().memory {
+            MemoryLimit::Bytes(bytes) => rework.with_memory_bytes(bytes),
+            _ => rework,
+        };
+        let (mut moved, outcome) = self.change(&|folder| {
+            let poses = corrections(folder, path)?.poses;
+            remap(folder, &NewPoses::Numbered(poses), &Remap::new(rework.clone()), |_, _| ())
+        })?;
+        match outcome {
+            Ok(Remapped { mapped, largest_move_m, .. }) => {
+                let (sensor_m, _) = last_place(&moved.folder);
+                moved.live.note_opening(moved.mapper.reader()?, Some(sensor_m));
+                moved.inbox.count(|counters| counters.remapped += 1);
+                log::info!(
+                    "remapped: {} of {} scans moved, by {largest_move_m:.2} m at most, {} of {} tiles, in {:.1?}",
+                    mapped.scans_changed,
+                    mapped.scans,
+                    mapped.tiles_mapped,
+                    mapped.tiles,
+                    begun.elapsed()
+                );
+            }
+            Err(error) => log::warn!("a path is left out: {error}"),
+        }
+        moved.flushed_at = Instant::now();
+        Ok(moved)
+    }
+
     fn edit(
-        mut self,
+        self,
         placed: PlacedOrder,
         change: &dyn Fn(&Path) -> voxtile::Result<String>,
     ) -> anyhow::Result<Self> {
+        let (changed, outcome) = self.change(change)?;
+        placed.answer(outcome.map_err(|error| error.to_string()));
+        Ok(changed)
+    }
+
+    /// Changes the map as a whole: it is flushed and closed for that, and clouds wait.
+    fn change<T>(
+        mut self,
+        change: &dyn Fn(&Path) -> voxtile::Result<T>,
+    ) -> anyhow::Result<(Self, voxtile::Result<T>)> {
         self.mapper.flush()?;
         self.answer_saves();
+        self.local.forget();
         let config = self.mapper.config().clone();
         drop(self.mapper);
         let outcome = change(&self.folder);
         // A map that is not as it was is none to go on with.
         let mapper = OutOfCoreTileMapper::open(&self.folder, config)?;
-        self.live.note_opening(mapper.reader()?);
-        placed.answer(outcome.map_err(|error| error.to_string()));
+        self.live.note_opening(mapper.reader()?, None);
         let durable = (Instant::now(), mapper.flushed_scan_number());
-        Ok(Self { mapper, durable, ..self })
+        Ok((Self { mapper, durable, ..self }, outcome))
     }
 
     fn answer_saves(&mut self) {
@@ -195,6 +289,7 @@ impl Mapping {
             unflushed_scans: scan_number.saturating_sub(flushed),
             flush_age: self.durable.0.elapsed(),
             is_flushing: self.mapper.is_flushing(),
+            local_map_bytes: self.local.bytes(),
             latencies: self.latencies.clone(),
         });
     }
@@ -213,8 +308,11 @@ impl Mapping {
             intensities.push(point.intensity);
         }
         let intensities = message.has_intensities().then_some(&*intensities);
-        match insert_points(&mut self.mapper, world_from_sensor, &points, intensities) {
-            Ok(()) => {
+        let scan = scan_of(world_from_sensor, cloud.stamp_ns, &points, intensities);
+        match scan.and_then(|scan| self.mapper.insert_points(&scan).map(|_| scan)) {
+            Ok(scan) => {
+                // Before others hear of the scan: they publish once what they see then.
+                self.local.follow(&scan);
                 let (scan_number, sensor_m) = (self.mapper.scan_number(), world_from_sensor.position_m);
                 self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);
                 self.latencies.note(cloud.arrived.elapsed());
@@ -246,6 +344,19 @@ fn cleared(folder: &Path, region: Aabb) -> voxtile::Result<String> {
     Ok(format!("{} voxels are unknown now", cleared.voxels_cleared))
 }
 
+/// What a path means for the scans that the map on disk has.
+fn corrections(folder: &Path, path: &[StampedPose]) -> voxtile::Result<Corrections> {
+    let reader = MapReader::open(folder, 1)?;
+    // Before the map is closed for a path that it cannot follow.
+    reader.check_keeps_all()?;
+    let mut scans = reader.kept_scans()?;
+    let mut records = Vec::new();
+    while let Some(record) = scans.next_record()? {
+        records.push(record);
+    }
+    Corrections::of(&records, path)
+}
+
 /// Where the sensor of a map was last, and when; the origin where the map does not tell.
 fn last_place(folder: &Path) -> (Point, i64) {
     let scans = MapReader::open(folder, 1).and_then(|reader| reader.scans());
@@ -253,17 +364,16 @@ fn last_place(folder: &Path) -> (Point, i64) {
     last.map_or(([0.0; 3], 0), |scan| (scan.origin_m, scan.stamp_ns.unwrap_or(0)))
 }
 
-fn insert_points(
-    mapper: &mut OutOfCoreTileMapper,
+fn scan_of<'a>(
     world_from_sensor: &RigidPose,
-    points: &[[f64; 3]],
-    intensities: Option<&[f32]>,
-) -> voxtile::Result<()> {
+    stamp_ns: i64,
+    points: &'a [[f64; 3]],
+    intensities: Option<&'a [f32]>,
+) -> voxtile::Result<ScanRef<'a>> {
     let pose = Pose::from_quaternion(world_from_sensor.position_m, world_from_sensor.quaternion)?;
-    let scan = ScanRef::in_sensor(pose, points);
-    let scan = match intensities {
-        Some(intensities) => scan.with_intensities(intensities)?,
-        None => scan,
-    };
-    mapper.insert_points(&scan).map(drop)
+    let scan = ScanRef::in_sensor(pose, points).with_stamp_ns(stamp_ns);
+    match intensities {
+        Some(intensities) => scan.with_intensities(intensities),
+        None => Ok(scan),
+    }
 }

@@ -7,7 +7,7 @@ use crate::services::{self, Orders};
 use anyhow::{Context as _, anyhow};
 use futures::StreamExt;
 use futures::executor::block_on;
-use ros2_client::{Context, NodeName, NodeOptions};
+use ros2_client::{Context, NodeOptions};
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::{DomainParticipantBuilder, QosPolicies, QosPolicyBuilder, Subscriber, TopicKind};
 use std::net::{IpAddr, Ipv4Addr};
@@ -54,20 +54,21 @@ pub fn start(
         builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
     }
     check_receive_buffer();
+    let names = args.names()?;
     let domain = format!("--domain-id {}", args.domain_id);
     let participant = builder.build().map_err(|error| anyhow!("{error:?}")).context(domain)?;
     let context =
         Context::from_domain_participant(participant.clone()).map_err(|error| anyhow!("{error:?}"))?;
-    let name = NodeName::new("/", &args.node_name)
-        .map_err(|error| anyhow!("--node-name {}: {error:?}", args.node_name))?;
-    let mut node = context.new_node(name, NodeOptions::new()).map_err(|error| anyhow!("{error:?}"))?;
+    let mut node =
+        context.new_node(names.of_node()?, NodeOptions::new()).map_err(|error| anyhow!("{error:?}"))?;
     let spinner = node.spinner().map_err(|error| anyhow!("{error:?}"))?;
     spawn("spinner", move || drop(block_on(spinner.spin())))?;
 
     let volatile = qos(Reliability::BestEffort, Durability::Volatile, 5);
     let subscriber = participant.create_subscriber(&volatile).map_err(|error| anyhow!("{error:?}"))?;
     let read = |topic: &str, type_name: &str, qos: &QosPolicies, put: Box<dyn Fn(Vec<u8>) + Send>| {
-        let name = dds_name(topic)?;
+        // As ROS 2 names topics in DDS.
+        let name = names.of(topic).map(|_| format!("rt{}", names.full(topic)))?;
         let topic = participant
             .create_topic(name.clone(), type_name.to_owned(), qos, TopicKind::NoKey)
             .map_err(|error| anyhow!("{name}: {error:?}"))?;
@@ -96,7 +97,13 @@ pub fn start(
             read("/tf", tf, &tf_qos, poses(MessageKind::Tf, false))?;
         }
     }
-    log::info!("listening to {} in domain {}", args.cloud.join(", "), args.domain_id);
+    if let Some(topic) = &args.path {
+        let to = inbox.clone();
+        let last = qos(reliable, Durability::Volatile, 1);
+        read(topic, "nav_msgs::msg::dds_::Path_", &last, Box::new(move |cdr| to.put_path(&cdr)))?;
+    }
+    let clouds: Vec<String> = args.cloud.iter().map(|topic| names.full(topic)).collect();
+    log::info!("listening to {} in domain {}", clouds.join(", "), args.domain_id);
     services::start(args, &participant, &mut node, &map, orders)?;
     let mut publishing = Publishing::new(args, node, inbox.clone(), map)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -152,31 +159,4 @@ fn qos(reliability: Reliability, durability: Durability, depth: i32) -> QosPolic
         .durability(durability)
         .history(History::KeepLast { depth })
         .build()
-}
-
-/// As ROS 2 names topics in DDS.
-fn dds_name(topic: &str) -> anyhow::Result<String> {
-    let bare = topic.trim_start_matches('/');
-    let is_name = |part: &str| {
-        part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
-            && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-    };
-    if !bare.split('/').all(is_name) {
-        return Err(anyhow!("{topic:?} is no name of a topic; it looks like /lidar/points"));
-    }
-    Ok(format!("rt/{bare}"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_topics() {
-        assert_eq!(dds_name("/lidar/points").unwrap(), "rt/lidar/points");
-        assert_eq!(dds_name("cloud_in").unwrap(), "rt/cloud_in");
-        for wrong in ["", "/", "a//b", "9a", "a b", "/a/"] {
-            assert!(dds_name(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -1,7 +1,10 @@
 """What the node publishes, as an independent peer (Cyclone DDS) gets and reads it.
 
-outputs.py listen DOMAIN FILE SECONDS [TOPIC ...]   writes the last message of each topic, and how many there were
-outputs.py compare FILE ALL.csv MAP.pgm CLOUDS RADIUS MAX_Z   compares them with what `voxtile export` writes
+outputs.py listen DOMAIN FILE SECONDS [TOPIC ...]   writes the last message of each topic, and how many there were; of
+                                                    changes what they come to
+outputs.py compare FILE ALL.csv MAP.pgm CLOUDS RADIUS MAX_Z live|rest RANGE
+                                                    compares them with what `voxtile export` writes
+outputs.py whole FILE ALL.csv   compares octomap_full, of a box around the whole map, likewise
 """
 
 import csv
@@ -24,7 +27,13 @@ TYPES = {
     "octomap_point_cloud_centers": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
     "occupied_cells_vis_array": (MarkerArray, "visualization_msgs/msg/MarkerArray"),
     "projected_map": (OccupancyGrid, "nav_msgs/msg/OccupancyGrid"),
+    "octomap_point_cloud_changes": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
+    "local_occupied": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
+    "local_inflated": (PointCloud2, "sensor_msgs/msg/PointCloud2"),
 }
+
+
+CHANGES = "octomap_point_cloud_changes"
 
 
 def typestore():
@@ -35,6 +44,27 @@ def typestore():
     return store
 
 
+class Viewer:
+    """Puts changes together."""
+
+    def __init__(self):
+        self.occupied, self.points = set(), []
+
+    def take(self, message):
+        assert [field.name for field in message.fields] == ["x", "y", "z", "state"]
+        layout = {"names": ["at", "state"], "formats": ["3<f4", "u1"], "offsets": [0, 12], "itemsize": 16}
+        rows = np.frombuffer(octets(message.data), layout)
+        assert len(rows) == message.width * message.height
+        assert {int(state) for state in rows["state"]} <= {0, 1, 2}
+        for at, state in zip(rows["at"].tolist(), rows["state"].tolist()):
+            if state == 1:
+                self.occupied.add(tuple(at))
+            else:
+                self.occupied.discard(tuple(at))
+        self.points.append(len(rows))
+        return {"frame": message.header.frame_id, "points": sorted(self.occupied), "changes": self.points}
+
+
 def plain(name, message):
     """A message as numbers and texts."""
     if name == "occupied_cells_vis_array":
@@ -43,7 +73,7 @@ def plain(name, message):
         scale = [marker.scale.x, marker.scale.y, marker.scale.z]
         frame = marker.header.frame_id
         return {"frame": frame, "type": marker.type, "action": marker.action, "scale": scale, "points": points}
-    if name == "octomap_point_cloud_centers":
+    if TYPES[name][0] is PointCloud2:
         assert [field.name for field in message.fields] == ["x", "y", "z"]
         points = np.frombuffer(octets(message.data), "<f4").reshape(-1, 3)
         assert len(points) == message.width * message.height
@@ -61,10 +91,11 @@ def plain(name, message):
 
 def listen(domain, file, seconds, topics):
     participant = DomainParticipant(domain)
-    store, got, readers = typestore(), {}, {}
+    store, got, readers, viewer = typestore(), {}, {}, Viewer()
     for name in topics or TYPES:
-        qos = Qos(RELIABLE, LATCHED, Policy.History.KeepLast(1))
-        readers[name] = DataReader(participant, Topic(participant, "rt/" + name, TYPES[name][0]), qos=qos)
+        qos = Qos(RELIABLE, LATCHED, Policy.History.KeepLast(100 if name == CHANGES else 1))
+        kind = TYPES[name.split("/")[-1]][0]
+        readers[name] = DataReader(participant, Topic(participant, "rt/" + name, kind), qos=qos)
     until = time.time() + seconds
     while time.time() < until:
         for name, reader in readers.items():
@@ -72,9 +103,10 @@ def listen(domain, file, seconds, topics):
                 if not hasattr(message, "serialize"):
                     continue
                 # The classes here are those of ROS.
-                store.deserialize_cdr(bytes(message.serialize()), TYPES[name][1])
+                own = name.split("/")[-1]
+                store.deserialize_cdr(bytes(message.serialize()), TYPES[own][1])
                 count = got.get(name, {"count": 0})["count"] + 1
-                got[name] = {"count": count, "message": plain(name, message)}
+                got[name] = {"count": count, "message": viewer.take(message) if own == CHANGES else plain(own, message)}
         time.sleep(0.02)
     with open(file, "w") as out:
         json.dump(got, out)
@@ -99,7 +131,40 @@ def last_place(clouds):
     return [1.0 + 0.01 * ticks + x, 0.5 + 0.5 + y, 0.0]
 
 
-def compare(file, all_csv, pgm, origin, radius, max_z):
+INFLATION_M = 0.2
+
+
+def compare_local(got, occupied, centers, origin, radius, moment, inflation_range, resolution):
+    """What is inflated is what a ball around the occupied voxels near to the sensor reaches; after a start the local
+    map begins with what the map knows."""
+    local, inflated = (
+        {tuple(round(at / resolution - 0.5) for at in point) for point in got[name]["points"]}
+        for name in ["local_occupied", "local_inflated"]
+    )
+    if moment == "rest":
+        near = {index for index in occupied if np.linalg.norm(np.subtract(centers[index], origin)) <= radius}
+        assert local == near, f"{len(local)} voxels in the local map, and {len(near)} near in the map"
+    else:
+        assert len(local) > 100 and len(local & occupied) > 0.8 * len(local), "the local map is another one"
+    reach = int(INFLATION_M / resolution + 1)
+    cube = [np.array([x, y, z]) for x, y, z in np.ndindex(*[2 * reach + 1] * 3)]
+    ball = [at - reach for at in cube if np.linalg.norm(at - reach) * resolution <= INFLATION_M * (1 + 1e-9)]
+    center = {index: (np.array(index) + 0.5) * resolution for index in local}
+    sources = [index for index in local if np.linalg.norm(center[index] - origin) <= inflation_range]
+    assert 0 < len(sources) < len(local)
+    wanted = {tuple(int(at) for at in np.add(index, offset)) for index in sources for offset in ball} | local
+    # What inflates into the box from outside is not known here.
+    inner = [np.ceil((origin[k] - radius + INFLATION_M) / resolution) for k in range(3)]
+    outer = [np.floor((origin[k] + radius - INFLATION_M) / resolution) - 1 for k in range(3)]
+    wanted, found = (
+        {index for index in indices if all(inner[k] <= index[k] <= outer[k] for k in range(3))}
+        for indices in [wanted, inflated]
+    )
+    assert found == wanted, f"{len(found)} inflated voxels, and {len(wanted)} are near to occupied ones"
+    return f"{len(local)} voxels in the local map and {len(inflated)} inflated"
+
+
+def compare(file, all_csv, pgm, origin, radius, max_z, moment, inflation_range):
     got = {name: one["message"] for name, one in json.load(open(file)).items()}
     assert set(got) == set(TYPES), f"only {sorted(got)} came"
     assert all(one["frame"] == "map" for one in got.values())
@@ -123,9 +188,11 @@ def compare(file, all_csv, pgm, origin, radius, max_z):
 
     low = sorted(index for index in occupied if centers[index][2] - resolution / 2 < max_z)
     assert 0 < len(low) < len(occupied)
-    for name in ["octomap_point_cloud_centers", "occupied_cells_vis_array"]:
+    for name in ["octomap_point_cloud_centers", "occupied_cells_vis_array", CHANGES]:
         points = [tuple(round(at / resolution - 0.5) for at in point) for point in got[name]["points"]]
         assert sorted(points) == low, f"{name} has {len(points)} voxels, the map {len(low)}"
+    changes = got[CHANGES]["changes"]
+    assert moment == "rest" or max(changes[5:], default=len(low)) < len(low) / 2, f"{changes}: more than changed"
     markers = got["occupied_cells_vis_array"]
     assert (markers["type"], markers["action"], markers["scale"]) == (6, 0, [resolution] * 3)
 
@@ -135,11 +202,25 @@ def compare(file, all_csv, pgm, origin, radius, max_z):
     assert grid["cells"] == cells, "projected_map is another map"
     corner = [float(at) for at in open(pgm.replace(".pgm", ".yaml")).read().split("origin: [")[1].split(",")[:2]]
     assert grid["origin"] == [*corner, 0.0], f"{grid['origin']} and {corner}"
-    print(f"outputs: {len(log_odds)} voxels, {len(low)} of {len(occupied)} occupied ones below, {size} cells")
+    local = compare_local(got, occupied, centers, origin, radius, moment, inflation_range, resolution)
+    print(f"outputs: {len(log_odds)} voxels, {local}, {len(low)} of {len(occupied)} occupied ones below, {size} cells")
 
 
-if sys.argv[1] == "listen":
+def compare_whole(file, all_csv):
+    got = json.load(open(file))["octomap_full"]["message"]
+    resolution, log_odds = got["resolution"], {}
+    for row in csv.DictReader(open(all_csv)):
+        index = tuple(round(float(row[axis]) / resolution - 0.5) for axis in "xyz")
+        log_odds[index] = float(np.float32(float(row["log_odds"])))
+    assert voxels_of(full_leaves(bytes.fromhex(got["data"]))) == log_odds, "octomap_full is another map"
+    print(f"outputs: {len(log_odds)} voxels in octomap_full")
+
+
+if sys.argv[1] == "whole":
+    compare_whole(*sys.argv[2:4])
+elif sys.argv[1] == "listen":
     listen(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]), sys.argv[5:])
 else:
     radius, max_z = map(float, sys.argv[6:8])
-    compare(*sys.argv[2:5], last_place(int(sys.argv[5])), radius, max_z)
+    moment, inflation_range = sys.argv[8], float(sys.argv[9])
+    compare(*sys.argv[2:5], last_place(int(sys.argv[5])), radius, max_z, moment, inflation_range)

@@ -1,19 +1,25 @@
 """An independent ROS 2 peer (Cyclone DDS): writes a bag of clouds and tf, and publishes the same messages.
 
-peer.py DOMAIN BAG CLOUDS [hostile | variants | real FOLDER]
+peer.py DOMAIN BAG CLOUDS [hostile | types | variants | odometry | sensors | path | real FOLDER]
 
 variants: the same points as organised clouds, big-endian, in double precision with fields in another order.
+hostile: clouds that lie, before each one.
+types: others offer and want the same topics with other types.
+odometry: poses come as nav_msgs/Odometry, and only the mount of the sensor by tf.
+sensors: two sensors with their mounts, so far apart that their clouds do not overlap.
+path: at last a corrected path comes, which BAG.tum gets too.
 real: the PCD files of a folder, at its poses (poses_tum.txt).
 """
 
+import pathlib
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -23,13 +29,22 @@ from ros_messages import (
     RELIABLE,
     VOLATILE,
     Header,
+    Odometry,
+    Path,
+    Point,
     PointCloud2,
     PointField,
+    Pose,
+    PoseStamped,
+    PoseWithCovariance,
     Quaternion,
+    String,
     TFMessage,
     Time,
     Transform,
     TransformStamped,
+    Twist,
+    TwistWithCovariance,
     Vector3,
 )
 
@@ -99,14 +114,27 @@ def real_messages(clouds, folder):
 def messages(clouds, kind, folder):
     """Topic and message, in the order in which a robot sends them: transforms at 50 Hz, clouds at 10 Hz between."""
     if kind == "real":
-        yield from real_messages(clouds, Path(folder))
+        yield from real_messages(clouds, pathlib.Path(folder))
         return
-    yield "/tf_static", TFMessage([transform(0, "base", "lidar", 0.2, 0.1)])
+    mounts = [transform(0, "base", "lidar", 0.2, 0.1)]
+    if kind == "sensors":
+        mounts.append(transform(0, "base", "rear", -50.0, 2.0))
+    yield "/tf_static", TFMessage(mounts)
     for tick in range(5 * clouds + 2):
         stamp_ns = tick * 20_000_000
         odometry = transform(stamp_ns, "odom", "base", tick * 0.01, tick * 0.02)
         moving = [transform(stamp_ns, "map", "odom", 1.0, 0.0), odometry]
-        yield "/tf", TFMessage(moving)
+        if kind == "odometry":
+            at, turn = odometry.transform.translation, odometry.transform.rotation
+            pose = PoseWithCovariance(Pose(Point(at.x, at.y, at.z), turn), [0.0] * 36)
+            still = TwistWithCovariance(Twist(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)), [0.0] * 36)
+            yield "/odom", Odometry(odometry.header, "base", pose, still)
+        else:
+            yield "/tf", TFMessage(moving)
+        if kind == "sensors" and tick % 5 == 2 and tick // 5 < clouds:
+            rear = cloud(stamp_ns + 7_000_000, 1000 + tick)
+            rear.header.frame_id = "rear"
+            yield "/rear", rear
         if tick % 5 == 0 and tick // 5 < clouds:
             plain = cloud(stamp_ns + 7_000_000, tick)
             yield "/cloud_in", variant(plain, tick // 5) if kind == "variants" else plain
@@ -116,19 +144,68 @@ TYPES = {
     "/tf_static": "tf2_msgs/msg/TFMessage",
     "/tf": "tf2_msgs/msg/TFMessage",
     "/cloud_in": "sensor_msgs/msg/PointCloud2",
+    "/rear": "sensor_msgs/msg/PointCloud2",
+    "/odom": "nav_msgs/msg/Odometry",
 }
+
+
+def corrected_path(clouds):
+    """Poses of the sensor at its clouds, further and further from where tf had it; in between some that are of none."""
+    poses = []
+    for number in range(clouds):
+        drift, yaw = 0.01 * number, 0.1 + 0.03 * number
+        turn = Quaternion(0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
+        stamp = header(number * 100_000_000 + 7_000_000, "map")
+        poses.append(PoseStamped(stamp, Pose(Point(1.2 + 0.07 * number, 1.0 - drift, 0.3 * drift), turn)))
+    lost = PoseStamped(header(50_000_000, "map"), poses[0].pose)
+    return poses, Path(header(0, "map"), poses[:1] + [lost] + poses[1:])
+
+
+def write_tum(file, poses):
+    with open(file, "w") as out:
+        for one in poses:
+            stamp, at, turn = one.header.stamp, one.pose.position, one.pose.orientation
+            numbers = [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w]
+            print(f"{stamp.sec}.{stamp.nanosec:09}", *map(repr, numbers), file=out)
+
+
+def topics_of(kind):
+    """The topics of a robot."""
+    poses = "/odom" if kind == "odometry" else "/tf"
+    return ["/tf_static", poses, "/cloud_in"] + (["/rear"] if kind == "sensors" else [])
+
+
+def strangers(domain):
+    """Others that use the node's topics with other types: they send some, and want what is published."""
+    participant = DomainParticipant(domain)
+    made = []
+    for name, kind in [("cloud_in", String), ("tf", PointCloud2), ("tf_static", String)]:
+        made.append((DataWriter(participant, Topic(participant, "rt/" + name, kind), qos=Qos(RELIABLE)), kind))
+    latched = Qos(RELIABLE, LATCHED, Policy.History.KeepLast(1))
+    wanted = [DataReader(participant, Topic(participant, "rt/" + name, String), qos=latched) for name in PUBLISHED]
+    return participant, made, wanted
+
+
+PUBLISHED = ["octomap_binary", "projected_map", "local_inflated"]
+
+
+def speak(made, message):
+    """What they send."""
+    for writer, kind in made:
+        writer.write(String("x" * 1000) if kind is String else message)
 
 
 def write_bag(path, clouds, kind, folder):
     store = get_typestore(Stores.ROS2_JAZZY)
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        topics = {name: bag.add_connection(name, kind, typestore=store) for name, kind in TYPES.items()}
+        names = topics_of(kind)
+        topics = {name: bag.add_connection(name, TYPES[name], typestore=store) for name in names}
         for number, (name, message) in enumerate(messages(clouds, kind, folder)):
             bag.write(topics[name], START_S * 10**9 + number, bytes(message.serialize()))
 
 
 def main():
-    domain, bag, clouds = int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    domain, bag, clouds = int(sys.argv[1]), pathlib.Path(sys.argv[2]), int(sys.argv[3])
     kind, folder = (*sys.argv[4:], "", "")[:2]
     write_bag(bag, clouds, kind, folder)
     participant = DomainParticipant(domain)
@@ -138,9 +215,17 @@ def main():
 
     writers = {
         "/tf_static": writer("/tf_static", TFMessage, RELIABLE, LATCHED, Policy.History.KeepLast(1)),
-        "/tf": writer("/tf", TFMessage, RELIABLE, VOLATILE, Policy.History.KeepLast(100)),
         "/cloud_in": writer("/cloud_in", PointCloud2, BEST, VOLATILE, Policy.History.KeepLast(5)),
     }
+    if kind == "odometry":
+        writers["/odom"] = writer("/odom", Odometry, RELIABLE, VOLATILE, Policy.History.KeepLast(100))
+    else:
+        writers["/tf"] = writer("/tf", TFMessage, RELIABLE, VOLATILE, Policy.History.KeepLast(100))
+    if kind == "sensors":
+        writers["/rear"] = writer("/rear", PointCloud2, BEST, VOLATILE, Policy.History.KeepLast(5))
+    if kind == "path":
+        writers["/slam_path"] = writer("/slam_path", Path, RELIABLE, VOLATILE, Policy.History.KeepLast(1))
+    others = strangers(domain) if kind == "types" else None
     until = time.time() + 20
     while not all(one.get_matched_subscriptions() for one in writers.values()):
         if time.time() > until:
@@ -155,9 +240,17 @@ def main():
             writers[name].write(liar)
             liar.fields = []
             writers[name].write(liar)
+        if others and name == "/cloud_in":
+            speak(others[1], message)
         writers[name].write(message)
         time.sleep(0.05 if kind == "real" else 0.02)
     time.sleep(1.5)
+    if kind == "path":
+        poses, path = corrected_path(clouds)
+        write_tum(f"{bag}.tum", poses)
+        writers["/slam_path"].write(path)
+        time.sleep(2.0)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -27,30 +27,52 @@ pub struct PointCloud2 {
 }
 
 const FLOAT32: u8 = 7;
+const UINT8: u8 = 2;
 const STEP: u32 = 12;
+/// With a state behind, and aligned.
+const STEP_WITH_STATE: u32 = 16;
 
 impl PointCloud2 {
     /// A cloud in single precision, as all that reads clouds of ROS takes it.
     pub fn of_points(header: Header, points_m: impl IntoIterator<Item = [f64; 3]>) -> Self {
-        let fields = [("x", 0), ("y", 4), ("z", 8)].map(|(name, offset)| PointField {
-            name: name.to_owned(),
-            offset,
-            datatype: FLOAT32,
-            count: 1,
-        });
         let places = points_m.into_iter().flatten();
-        let data: Vec<u8> = places.flat_map(|place| (place as f32).to_le_bytes()).collect();
+        let data = places.flat_map(|place| (place as f32).to_le_bytes()).collect();
+        Self::of_data(header, places_fields().to_vec(), STEP, data)
+    }
+
+    /// The same with a field `state`.
+    pub fn of_states(header: Header, points: impl IntoIterator<Item = ([f64; 3], u8)>) -> Self {
+        let mut data = Vec::new();
+        for (point_m, state) in points {
+            data.extend(point_m.into_iter().flat_map(|place| (place as f32).to_le_bytes()));
+            data.extend([state, 0, 0, 0]);
+        }
+        let mut fields = places_fields().to_vec();
+        fields.push(PointField { name: "state".to_owned(), offset: STEP, datatype: UINT8, count: 1 });
+        Self::of_data(header, fields, STEP_WITH_STATE, data)
+    }
+
+    fn of_data(header: Header, fields: Vec<PointField>, point_step: u32, data: Vec<u8>) -> Self {
         let row_step = u32::try_from(data.len()).unwrap_or(u32::MAX);
         Self {
             header,
             height: 1,
-            width: row_step / STEP,
-            fields: fields.to_vec(),
+            width: row_step / point_step,
+            fields,
             is_bigendian: false,
-            point_step: STEP,
+            point_step,
             row_step,
             data,
             is_dense: true,
         }
     }
+}
+
+fn places_fields() -> [PointField; 3] {
+    [("x", 0), ("y", 4), ("z", 8)].map(|(name, offset)| PointField {
+        name: name.to_owned(),
+        offset,
+        datatype: FLOAT32,
+        count: 1,
+    })
 }

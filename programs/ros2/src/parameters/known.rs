@@ -36,7 +36,7 @@ const WITHOUT_EFFECT: [&str; 8] = [
 ];
 
 /// Options that are for a command line alone.
-const NOT_IN_FILES: [&str; 4] = ["params-file", "node-name", "help", "version"];
+const NOT_IN_FILES: [&str; 6] = ["params-file", "node-name", "namespace", "remap", "help", "version"];
 
 impl Known {
     pub fn of(name: &str) -> Self {

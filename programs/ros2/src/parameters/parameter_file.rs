@@ -9,39 +9,76 @@ use std::path::Path;
 const PARAMETERS: &str = "ros__parameters";
 const MOST_BYTES: u64 = 1 << 20;
 
-/// The parameters that a file has for a node, by their full names; of two for one name the later section counts, in the
-/// order of their wildcards: `/**`, then `/*`, then the node by name.
+/// The parameters that a file has for a node, by their full names. Of two for one name the section counts that says
+/// more precisely which node it means: `/**`, then `/*`, then its name.
 ///
 /// # Errors
 ///
 /// A file that cannot be read, or is no parameter file.
-pub fn read(path: &Path, node_name: &str) -> anyhow::Result<BTreeMap<String, Value>> {
+pub fn read(path: &Path, node: &str) -> anyhow::Result<BTreeMap<String, Value>> {
     let mut text = String::new();
     let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
     let bytes = file.take(MOST_BYTES + 1).read_to_string(&mut text);
     let bytes = bytes.with_context(|| format!("cannot read {}", path.display()))?;
     ensure!(bytes as u64 <= MOST_BYTES, "{}: more than {MOST_BYTES} bytes are no parameters", path.display());
-    of_text(&text, node_name).with_context(|| path.display().to_string())
+    of_text(&text, node).with_context(|| path.display().to_string())
 }
 
-fn of_text(text: &str, node_name: &str) -> anyhow::Result<BTreeMap<String, Value>> {
-    let sections: BTreeMap<String, Value> = serde_saphyr::from_str(text)?;
+fn of_text(text: &str, node: &str) -> anyhow::Result<BTreeMap<String, Value>> {
+    let groups: BTreeMap<String, Value> = serde_saphyr::from_str(text)?;
+    let mut sections = Vec::new();
+    collect("", &groups, &mut sections)?;
+    let node: Vec<&str> = parts(node).collect();
     let mut parameters = BTreeMap::new();
-    let absolute = format!("/{node_name}");
-    for wanted in [&["/**", "**"][..], &["/*", "*"], &[node_name, &absolute]] {
-        for (name, section) in sections.iter().filter(|(name, _)| wanted.contains(&name.as_str())) {
-            let Value::Group(section) = section else { bail!("{name} is no group with {PARAMETERS}") };
-            match section.get(PARAMETERS) {
-                Some(Value::Group(group)) => flatten("", group, &mut parameters),
-                Some(Value::Nothing(())) => {}
-                _ => bail!("{name} has no {PARAMETERS}"),
+    for wildcard in [Some("**"), Some("*"), None] {
+        for (name, section) in &sections {
+            let name: Vec<&str> = parts(name).collect();
+            let widest = ["**", "*"].into_iter().find(|wildcard| name.contains(wildcard));
+            if widest == wildcard && is_for(&name, &node) {
+                flatten("", section, &mut parameters);
             }
         }
     }
     if parameters.is_empty() {
-        log::warn!("no parameters for /{node_name}; sections are {:?}", sections.keys());
+        let names = sections.iter().map(|(name, _)| name);
+        log::warn!("no parameters for /{}; sections are {:?}", node.join("/"), names.collect::<Vec<_>>());
     }
     Ok(parameters)
+}
+
+fn parts(name: &str) -> impl Iterator<Item = &str> {
+    name.split('/').filter(|part| !part.is_empty())
+}
+
+/// Whether a section's name, with its wildcards, means a node: `*` is one part of a name, `**` are any.
+fn is_for(section: &[&str], node: &[&str]) -> bool {
+    match (section, node) {
+        ([], []) => true,
+        (["**", rest @ ..], _) => {
+            (0..=node.len()).any(|at| node.get(at..).is_some_and(|node| is_for(rest, node)))
+        }
+        ([first, rest @ ..], [own, node @ ..]) => (*first == "*" || first == own) && is_for(rest, node),
+        _ => false,
+    }
+}
+
+/// The groups of parameters with the names of their nodes; namespaces may be groups themselves.
+fn collect<'a>(
+    prefix: &str,
+    groups: &'a BTreeMap<String, Value>,
+    into: &mut Vec<(String, &'a BTreeMap<String, Value>)>,
+) -> anyhow::Result<()> {
+    for (name, group) in groups {
+        let name = format!("{prefix}/{}", name.trim_matches('/'));
+        let Value::Group(group) = group else { bail!("{name} is no group with {PARAMETERS}") };
+        match group.get(PARAMETERS) {
+            Some(Value::Group(parameters)) => into.push((name, parameters)),
+            Some(Value::Nothing(())) => {}
+            None if !group.is_empty() => collect(&name, group, into)?,
+            _ => bail!("{name} has no {PARAMETERS}"),
+        }
+    }
+    Ok(())
 }
 
 /// Groups are parts of names. How deep they can be the reader of YAML limits.
@@ -82,6 +119,24 @@ voxtile_ros2:
         assert_eq!(found.get("sensor_model.max_range"), Some(&Value::Whole(20)));
         assert_eq!(found.get("frame_id"), Some(&Value::Text("1".to_owned())));
         assert_eq!(of_text(text, "third").unwrap().get("resolution"), Some(&Value::Number(0.2)));
+    }
+
+    #[test]
+    fn sections_name_nodes_of_a_namespace() {
+        let names =
+            |text: &str, node: &str| -> Vec<String> { of_text(text, node).unwrap().into_keys().collect() };
+        let text = "\
+robot: {front: {ros__parameters: {a: 1}}, rear: {ros__parameters: {b: 1}}}
+/robot/*: {ros__parameters: {c: 1}}
+/**/front: {ros__parameters: {d: 1}}
+front: {ros__parameters: {e: 1}}
+/*: {ros__parameters: {f: 1}}
+/nothing: {ros__parameters: }
+";
+        assert_eq!(names(text, "/robot/front"), ["a", "c", "d"]);
+        assert_eq!(names(text, "/robot/rear"), ["b", "c"]);
+        assert_eq!(names(text, "/front"), ["d", "e", "f"]);
+        assert_eq!(names(text, "/a/robot/front"), ["d"]);
     }
 
     #[test]

@@ -1,32 +1,47 @@
 use super::known::Known;
 use super::parameter_file;
+use super::ros_args::RosArgs;
 use super::value::Value;
 use crate::args::Args;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory as _, Error, Parser as _};
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// The options of a command line, and of the files that it names; what stands on the command line wins.
+/// The options of a command line, of the parameters on it, and of the files that it names; options win over parameters,
+/// and these over files.
 ///
 /// # Errors
 ///
 /// Wrong options; files that cannot be read; parameters that are not known, or have a wrong value.
 pub fn parse(arguments: &[OsString]) -> Result<Args, Error> {
+    let RosArgs { arguments, parameters } = RosArgs::of(arguments).map_err(wrong)?;
+    let arguments = arguments.as_slice();
     // Only what is there is looked at: what a file may give can still be missing.
     let given = Args::command().ignore_errors(true).try_get_matches_from(arguments);
     let Ok(given) = given else { return Args::try_parse_from(arguments) };
     let files = given.try_get_many::<PathBuf>("params_file").ok().flatten();
     let files: Vec<PathBuf> = files.into_iter().flatten().cloned().collect();
-    let node_name = given.try_get_one::<String>("node_name").ok().flatten().cloned().unwrap_or_default();
+    let text = |id| given.try_get_one::<String>(id).ok().flatten().cloned().unwrap_or_default();
+    let node = format!("{}/{}", text("namespace"), text("node_name"));
     let mut from_files: Vec<(String, Vec<OsString>)> = Vec::new();
-    for file in &files {
-        for (long, options) in options_of(file, &node_name, &given)? {
-            // A later file wins.
+    // A later one wins.
+    let mut put = |found: Vec<(String, Vec<OsString>)>| {
+        for (long, options) in found {
             from_files.retain(|(earlier, _)| *earlier != long);
             from_files.push((long, options));
         }
+    };
+    for file in &files {
+        let parameters = parameter_file::read(file, &node);
+        let parameters = parameters.map_err(|error| wrong(format!("--params-file: {error:#}")))?;
+        put(options_of(&file.display().to_string(), parameters, &given)?);
+    }
+    for [name, text] in parameters {
+        let value = serde_saphyr::from_str::<Value>(&text);
+        let value = value.map_err(|error| wrong(format!("--param {name}: {text} is no YAML: {error}")))?;
+        put(options_of("--param", [(name, value)], &given)?);
     }
     let mut all: Vec<OsString> = arguments.iter().take(1).cloned().collect();
     all.extend(from_files.into_iter().flat_map(|(_, options)| options));
@@ -34,18 +49,19 @@ pub fn parse(arguments: &[OsString]) -> Result<Args, Error> {
     Args::try_parse_from(all)
 }
 
-/// The options of a file, but for those that are given anyhow.
+fn wrong(what: String) -> Error {
+    Args::command().error(ErrorKind::ValueValidation, what)
+}
+
+/// The options that parameters mean, but for those that are given anyhow.
 fn options_of(
-    file: &Path,
-    node_name: &str,
+    source: &str,
+    parameters: impl IntoIterator<Item = (String, Value)>,
     given: &ArgMatches,
 ) -> Result<Vec<(String, Vec<OsString>)>, Error> {
-    let wrong = |what: String| Args::command().error(ErrorKind::ValueValidation, what);
-    let parameters =
-        parameter_file::read(file, node_name).map_err(|error| wrong(format!("--params-file: {error:#}")))?;
     let mut found = Vec::new();
     for (name, value) in parameters {
-        let place = format!("{}: parameter {name}", file.display());
+        let place = format!("{source}: parameter {name}");
         let no_value = || wrong(format!("{place} has no value that it can have: {value:?}"));
         let (long, options) = match Known::of(&name) {
             Known::WithoutEffect => {
@@ -132,6 +148,23 @@ mod tests {
         let args = parsed(FILE, &["--resolution", "0.4", "--cloud", "/c", "-o", "/maps/b"]).unwrap();
         assert_eq!((args.resolution, args.cloud), (0.4, vec!["/c".to_owned()]));
         assert_eq!(args.output, PathBuf::from("/maps/b"));
+    }
+
+    #[test]
+    fn parameters_of_launch_files_win_over_files_and_options_over_them() {
+        let launch = ["--ros-args", "-p", "resolution:=0.3", "-p", "hit:=0.9", "-p", "cloud:=[/c, d]"];
+        let args = parsed(FILE, &launch).unwrap();
+        assert_eq!((args.resolution, args.hit, args.miss), (0.3, Some(0.9), None));
+        assert_eq!(args.cloud, ["/c", "d"]);
+        let args = parsed(FILE, &[&["--resolution", "0.4"], &launch[..]].concat()).unwrap();
+        assert_eq!((args.resolution, args.hit), (0.4, Some(0.9)));
+        let named = "/robot/mapper: {ros__parameters: {output: m, resolution: 0.7}}";
+        let args = parsed(named, &["--ros-args", "-r", "__ns:=/robot", "-r", "__node:=mapper"]).unwrap();
+        assert_eq!((args.resolution, &*args.namespace, &*args.node_name), (0.7, "/robot", "mapper"));
+        for wrong in ["resolutoin:=1", "resolution:=fine", "resolution:={", "network:=7"] {
+            let told = parsed(FILE, &["--ros-args", "-p", wrong]).unwrap_err();
+            assert!(told.contains("--param") && told.contains(wrong.split(':').next().unwrap()), "{told}");
+        }
     }
 
     #[test]

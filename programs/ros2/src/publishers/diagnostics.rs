@@ -33,11 +33,12 @@ pub fn diagnostics(
         ("clouds_waiting", waiting.to_string()),
     ];
     values.extend(dropped.map(|(why, now, _)| (why, now.to_string())));
-    let Health { statistics, unflushed_scans, flush_age, is_flushing, latencies } = health;
+    let Health { statistics, unflushed_scans, flush_age, is_flushing, local_map_bytes, latencies } = health;
     let ms =
         |percent| format!("{:.1}", latencies.percentile(percent).unwrap_or_default().as_secs_f64() * 1e3);
     let memory = &statistics.memory;
     values.extend([
+        ("remapped", now.remapped.to_string()),
         ("scan_number", statistics.scan_number.to_string()),
         ("tiles", statistics.tiles.to_string()),
         ("dirty_tiles", statistics.dirty_tiles.to_string()),
@@ -49,6 +50,7 @@ pub fn diagnostics(
         ("memory_in_flight_bytes", memory.in_flight.to_string()),
         ("memory_index_bytes", memory.index.to_string()),
         ("memory_readers_bytes", memory.readers.to_string()),
+        ("memory_local_map_bytes", local_map_bytes.to_string()),
         ("disk_bytes", statistics.disk_bytes.to_string()),
         ("flush_age_s", format!("{:.1}", flush_age.as_secs_f64())),
         ("flushing", is_flushing.to_string()),

@@ -1,22 +1,29 @@
 use super::Extent;
 use crate::messages::{Color, Header, Marker, MarkerArray, PointCloud2};
 use anyhow::bail;
-use voxtile::{Aabb, MapQueries, MapView};
+use voxtile::{Aabb, MapQueries, MapView, VoxelIndex};
 
 /// Most voxels of a message: nobody gets a larger one over DDS.
-const MOST_VOXELS: usize = 4 << 20;
+pub(super) const MOST_VOXELS: usize = 4 << 20;
 const COLOR: Color = Color { r: 0.0, g: 0.0, b: 1.0, a: 1.0 };
 
-/// The centers of the occupied voxels of a region that reach between the heights.
-fn centers_m(map: &impl MapView, region: &Aabb, extent: &Extent) -> anyhow::Result<Vec<[f64; 3]>> {
+/// The occupied voxels of a region that reach between the heights.
+///
+/// # Errors
+///
+/// More of them than a message may have; a tile that cannot be read.
+pub fn occupied_voxels(
+    map: &impl MapView,
+    region: &Aabb,
+    extent: &Extent,
+) -> anyhow::Result<Vec<VoxelIndex>> {
     let grid = map.config().grid;
-    let (mut centers_m, mut count) = (Vec::new(), 0);
+    let (mut voxels, mut count) = (Vec::new(), 0);
     map.for_each_occupied(None, Some(region), |voxel| {
-        let center_m = grid.center_m(voxel.index);
-        if extent.reaches(center_m[2], grid.resolution_m()) {
+        if extent.reaches(grid.center_m(voxel.index)[2], grid.resolution_m()) {
             count += 1;
             if count <= MOST_VOXELS {
-                centers_m.push(center_m);
+                voxels.push(voxel.index);
             }
         }
     })?;
@@ -25,7 +32,12 @@ fn centers_m(map: &impl MapView, region: &Aabb, extent: &Extent) -> anyhow::Resu
             "{count} occupied voxels, and a message has at most {MOST_VOXELS}: take a smaller --publish-radius"
         );
     }
-    Ok(centers_m)
+    Ok(voxels)
+}
+
+fn centers_m(map: &impl MapView, region: &Aabb, extent: &Extent) -> anyhow::Result<Vec<[f64; 3]>> {
+    let grid = map.config().grid;
+    Ok(occupied_voxels(map, region, extent)?.into_iter().map(|voxel| grid.center_m(voxel)).collect())
 }
 
 /// They as a cloud.

@@ -1,12 +1,13 @@
 use crate::live_map::MapVersion;
+use crate::names::Names;
 use anyhow::anyhow;
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
-use ros2_client::{MessageTypeName, Name, Node, Publisher};
+use ros2_client::{MessageTypeName, Node, Publisher};
 use serde::Serialize;
 
 /// A topic that tells the state of the map to who comes late, too; and which state was sent last.
 pub struct Outlet<M: Serialize> {
-    topic: &'static str,
+    topic: String,
     publisher: Publisher<M>,
     sent: Option<MapVersion>,
 }
@@ -17,7 +18,8 @@ impl<M: Serialize> Outlet<M> {
     /// DDS refuses.
     pub fn new(
         node: &mut Node,
-        topic: &'static str,
+        names: &Names,
+        topic: &str,
         [package, type_name]: [&str; 2],
     ) -> anyhow::Result<Self> {
         let qos = QosProfile::publisher_default()
@@ -25,16 +27,21 @@ impl<M: Serialize> Outlet<M> {
             .durability(Durability::TransientLocal)
             .history(History::KeepLast { depth: 1 });
         let failed = |error: &dyn std::fmt::Debug| anyhow!("{topic}: {error:?}");
-        let name = Name::new("/", topic).map_err(|error| failed(&error))?;
+        let name = names.of(topic)?;
         let type_name = MessageTypeName::new(package, type_name);
         let dds_topic = node.create_topic(&name, type_name, &qos).map_err(|error| failed(&error))?;
         let publisher = node.create_publisher(&dds_topic, Some(qos)).map_err(|error| failed(&error))?;
-        Ok(Self { topic, publisher, sent: None })
+        Ok(Self { topic: names.full(topic), publisher, sent: None })
+    }
+
+    /// Whether somebody listens.
+    pub fn is_wanted(&self, node: &Node) -> bool {
+        self.publisher.get_subscription_count(node) > 0
     }
 
     /// Sends the message about a state of the map, if it is another one than was sent and somebody listens.
     pub fn refresh(&mut self, node: &Node, version: MapVersion, make: impl FnOnce() -> anyhow::Result<M>) {
-        if self.sent == Some(version) || self.publisher.get_subscription_count(node) == 0 {
+        if self.sent == Some(version) || !self.is_wanted(node) {
             return;
         }
         match make() {

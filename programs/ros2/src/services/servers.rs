@@ -1,5 +1,6 @@
 use super::Rmw;
 use super::marked::Marked;
+use crate::names::Names;
 use anyhow::{Context as _, anyhow};
 use futures::StreamExt;
 use futures::executor::block_on;
@@ -11,7 +12,7 @@ use rustdds::{DomainParticipant, QosPolicies, Topic, TopicKind};
 pub struct Servers<'a> {
     pub participant: &'a DomainParticipant,
     pub node: &'a mut Node,
-    pub node_name: &'a str,
+    pub names: &'a Names,
     pub rmw: Rmw,
 }
 
@@ -34,12 +35,9 @@ impl Servers<'_> {
         Q: Message + Clone + Send + 'static,
         A: Message + Send + 'static,
     {
-        let path = match name.strip_prefix("~/") {
-            Some(own) => format!("{}/{own}", self.node_name),
-            None => name.to_owned(),
-        };
+        let (path, full_name) = (self.names.full(name), self.names.of(name)?);
         match self.rmw {
-            Rmw::Fastrtps => self.serve_enhanced(&path, [package, type_name], answer),
+            Rmw::Fastrtps => self.serve_enhanced(&full_name, [package, type_name], answer),
             Rmw::Cyclonedds => self.serve_marked(&path, [package, type_name], answer),
         }
     }
@@ -47,7 +45,7 @@ impl Servers<'_> {
     /// For clients of which requests are known by what DDS says about them.
     fn serve_enhanced<Q, A>(
         &mut self,
-        path: &str,
+        path: &Name,
         [package, type_name]: [&str; 2],
         answer: impl Fn(Q) -> A + Send + 'static,
     ) -> anyhow::Result<()>
@@ -56,14 +54,12 @@ impl Servers<'_> {
         A: Message + Send + 'static,
     {
         let failed = |error: &dyn std::fmt::Debug| anyhow!("{path}: {error:?}");
-        let (namespace, own) = path.rsplit_once('/').unwrap_or(("", path));
-        let full_name = Name::new(&format!("/{namespace}"), own).map_err(|error| failed(&error))?;
         let type_name = ServiceTypeName::new(package, type_name);
         let server = self
             .node
-            .create_server::<Q, A>(ServiceMapping::Enhanced, &full_name, &type_name, qos(), qos())
+            .create_server::<Q, A>(ServiceMapping::Enhanced, path, &type_name, qos(), qos())
             .map_err(|error| failed(&error))?;
-        let label = path.to_owned();
+        let label = path.clone();
         spawn(move || {
             block_on(server.receive_request_stream().for_each(|request| {
                 match request {
@@ -93,8 +89,8 @@ impl Servers<'_> {
     {
         let failed = |error: &dyn std::fmt::Debug| anyhow!("{path}: {error:?}");
         let type_name = format!("{package}::srv::dds_::{type_name}");
-        let requests = self.topic(format!("rq/{path}Request"), format!("{type_name}_Request_"))?;
-        let responses = self.topic(format!("rr/{path}Reply"), format!("{type_name}_Response_"))?;
+        let requests = self.topic(format!("rq{path}Request"), format!("{type_name}_Request_"))?;
+        let responses = self.topic(format!("rr{path}Reply"), format!("{type_name}_Response_"))?;
         let reader = self.node.create_subscription::<Marked<Q>>(&requests, Some(qos()));
         let reader = reader.map_err(|error| failed(&error))?;
         let writer = self.node.create_publisher::<Marked<A>>(&responses, Some(qos()));

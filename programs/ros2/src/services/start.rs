@@ -21,7 +21,8 @@ pub fn start(
     map: &Arc<LiveMap>,
     orders: &Orders,
 ) -> anyhow::Result<()> {
-    let servers = &mut Servers { participant, node, node_name: &args.node_name, rmw: args.rmw };
+    let names = args.names()?;
+    let servers = &mut Servers { participant, node, names: &names, rmw: args.rmw };
     change_the_map(servers, orders)?;
     let extent = args.extent()?;
     for (name, format) in [("octomap_binary", OctreeFormat::Bt), ("octomap_full", OctreeFormat::Ot)] {
