@@ -16,7 +16,7 @@ use std::io;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 
 /// A place for one map in an object store.
@@ -43,6 +43,9 @@ pub(super) struct FoundManifest {
 
 /// How often content is fetched that is not what its name says: a proxy may have cut it off.
 const FETCHES: usize = 3;
+
+/// What took longer to fail is not tried again.
+const LATEST_RETRY: Duration = Duration::from_secs(10);
 
 /// The longest manifest or page that is read.
 const MOST_LIST_BYTES: u64 = 1 << 28;
@@ -290,7 +293,19 @@ fn pending<T: Send + 'static>(request: impl Future<Output = io::Result<T>> + Sen
     Pending(answer)
 }
 
+/// Gets an object. An answer that is cut off is asked for again; the store itself does that only before it begins.
 async fn get(store: &dyn ObjectStore, key: &Key, most_bytes: u64) -> io::Result<(Bytes, UpdateVersion)> {
+    let began = Instant::now();
+    for _ in 1..FETCHES {
+        match get_once(store, key, most_bytes).await {
+            Err(error) if error.kind() == io::ErrorKind::Other && began.elapsed() < LATEST_RETRY => {}
+            outcome => return outcome,
+        }
+    }
+    get_once(store, key, most_bytes).await
+}
+
+async fn get_once(store: &dyn ObjectStore, key: &Key, most_bytes: u64) -> io::Result<(Bytes, UpdateVersion)> {
     let found = store.get(key).await.map_err(|error| refused(key, &error))?;
     let bytes = found.meta.size;
     if bytes > most_bytes {
