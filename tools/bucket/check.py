@@ -8,9 +8,11 @@ import subprocess
 import sys
 import threading
 import time
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from functools import partial
+from http.server import BaseHTTPRequestHandler, SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from urllib.request import Request, urlopen
+
+import boto3
 
 VOXTILE, MAP, WORK = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
 
@@ -63,6 +65,11 @@ class Proxy(BaseHTTPRequestHandler):
         pass
 
 
+class Files(SimpleHTTPRequestHandler):
+    def log_message(self, *arguments):
+        pass
+
+
 def environment(port):
     return {
         **os.environ,
@@ -101,7 +108,14 @@ def main():
 
 
 def check(port):
-    urlopen(Request(f"http://127.0.0.1:{port}/robots", method="PUT")).read()
+    s3 = boto3.client(
+        "s3",
+        endpoint_url=f"http://127.0.0.1:{port}",
+        region_name="us-east-1",
+        aws_access_key_id="key",
+        aws_secret_access_key="secret",
+    )
+    s3.create_bucket(Bucket="robots")
     url = "s3://robots/maps/city"
     digest = voxtile("digest", MAP, port=port)
     first = json.loads(voxtile("push", MAP, url, "--json", port=port))
@@ -160,26 +174,29 @@ def check(port):
         Proxy.fault = None
         assert voxtile("digest", f"{url}-{fault.replace(' ', '-')}", port=port) == digest, fault
         print(f"{fault}: {time.monotonic() - began:.1f} s")
-    # A web server serves what moto has, for reading.
-    Proxy.fault = None
-    web = f"http://127.0.0.1:{bad}/robots/maps/city"
+    # A plain web server has a copy of the objects, for reading.
+    pages = s3.get_paginator("list_objects_v2").paginate(Bucket="robots", Prefix="maps/city/")
+    keys = [found["Key"] for page in pages for found in page["Contents"]]
+    for key in keys:
+        (WORK / "web" / key).parent.mkdir(parents=True, exist_ok=True)
+        s3.download_file("robots", key, str(WORK / "web" / key))
+    files = ThreadingHTTPServer(("127.0.0.1", 0), partial(Files, directory=WORK / "web"))
+    threading.Thread(target=files.serve_forever, daemon=True).start()
+    web = f"http://127.0.0.1:{files.server_port}/maps/city"
     assert voxtile("digest", web, port=port) == digest
     assert "can be read and not written to" in voxtile("push", MAP, web, port=port, fails=True)
 
     # An object that is changed, cut or missing is named.
-    names = [part for part in listed(port) if "/objects/" in part and part.startswith("maps/city/")]
-    for name, content in ((names[0], b"other"), (names[0], b""), (names[0], None)):
-        method = "DELETE" if content is None else "PUT"
-        urlopen(Request(f"http://127.0.0.1:{port}/robots/{name}", data=content, method=method)).read()
+    name = next(key for key in keys if "/objects/" in key)
+    for content in (b"other", b"", None):
+        if content is None:
+            s3.delete_object(Bucket="robots", Key=name)
+        else:
+            s3.put_object(Bucket="robots", Key=name, Body=content)
         said = voxtile("pull", url, WORK / "broken", port=port, fails=True)
         assert name in said, said
         shutil.rmtree(WORK / "broken.unfinished", ignore_errors=True)
     print("objects that were changed, cut and missing are named")
-
-
-def listed(port):
-    text = urlopen(f"http://127.0.0.1:{port}/robots?list-type=2&prefix=maps/city/").read().decode()
-    return [part.split("</Key>")[0] for part in text.split("<Key>")[1:]]
 
 
 main()
