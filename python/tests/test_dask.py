@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -83,6 +84,129 @@ def test_workers_that_are_killed_change_nothing(drive: Path, whole: str, tmp_pat
         voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
         killer.join(10)
     assert killed and voxtile.digest(tmp_path / "map") == whole
+
+
+def _occupied(tile: object) -> tuple[int, float]:
+    centers, probabilities = tile.occupied()
+    dense, corner = tile.dense("log_odds")
+    region = tile.region
+    assert dense.shape == (8, 8, 8) and np.allclose(corner, region[:3])
+    assert np.all(centers > region[:3]) and np.all(centers < region[3:])
+    return len(centers), float(np.nansum(dense))
+
+
+def test_a_function_of_the_tiles_sees_every_voxel_once(client: object, drive: Path, tmp_path: Path) -> None:
+    voxtile.build(drive, tmp_path / "map", **OPTIONS)
+    with voxtile.Map.open(tmp_path / "map", "r") as opened:
+        occupied = len(opened.occupied()[0])
+        tiles = opened.tiles
+        dense, _ = opened.to_dense(opened.bounds.reshape(-1), "log_odds")
+    found = voxtile_dask.map_tiles(tmp_path / "map", _occupied).compute()
+    assert len(found) == len(tiles) > 20
+    assert sum(count for count, _ in found) == occupied > 0
+    assert np.isclose(sum(total for _, total in found), np.nansum(dense))
+    # In the order that was asked for, and of a snapshot.
+    some = [tuple(int(number) for number in tile) for tile in tiles[:3]]
+    back = voxtile_dask.map_tiles(tmp_path / "map", _occupied, tiles=some[::-1]).compute()
+    assert back == found[:3][::-1]
+    with voxtile.Map.open(tmp_path / "map") as opened:
+        opened.snapshot("before")
+    voxtile.clear(tmp_path / "map", [-100, -100, -100, 100, 100, 100])
+    assert voxtile_dask.map_tiles(tmp_path / "map", _occupied).compute() == []
+    assert voxtile_dask.map_tiles(tmp_path / "map", _occupied, snapshot="before").compute() == found
+
+
+def test_the_worker_that_fails_is_named(
+    drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # No file of a worker may grow beyond a kilobyte: its disk is full.
+    def fill(dask_worker: object) -> None:
+        import resource
+        import signal
+
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1024, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+
+    cluster = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, local_directory=tmp_path / "local"
+    )
+    with cluster, distributed.Client(cluster) as client:
+        client.run(fill)
+        with pytest.raises(errors.VoxtileError, match=r"worker tcp://127\.0\.0\.1:\d+, whose disk is .*local"):
+            voxtile_dask.build(drive, tmp_path / "map", client=client, **OPTIONS)
+
+
+def test_workers_killed_again_and_again_leave_a_map_or_an_error_and_the_next_run_goes_on(
+    drive: Path, whole: str, tmp_path: Path
+) -> None:
+    # VOXTILE_DASK_KILLS=20 takes a minute.
+    kills = int(os.environ.get("VOXTILE_DASK_KILLS", "4"))
+    random, killed = np.random.default_rng(5), 0
+    cluster = distributed.LocalCluster(n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None)
+    is_over = threading.Event()
+
+    def kill() -> None:
+        nonlocal killed
+        while killed < kills and not is_over.wait(random.uniform(0.02, 0.4)):
+            workers = [nanny.process for nanny in cluster.workers.values()]
+            pids = [worker.pid for worker in workers if worker is not None and worker.pid is not None]
+            if pids:
+                os.kill(random.choice(pids), 9)
+                killed += 1
+
+    failures = 0
+    with cluster, distributed.Client(cluster) as client:
+        killer = threading.Thread(target=kill, daemon=True)
+        killer.start()
+        while True:
+            try:
+                voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+            except errors.VoxtileError as error:
+                failures += 1
+                assert "call again to go on" in str(error) and failures <= kills
+                continue
+            if killed >= kills:
+                break
+            # It was too fast for them.
+            assert voxtile.digest(tmp_path / "map") == whole
+            shutil.rmtree(tmp_path / "map")
+        is_over.set()
+        killer.join(10)
+    assert killed == kills and voxtile.digest(tmp_path / "map") == whole
+
+
+def test_a_scheduler_that_is_killed_is_an_error_and_the_next_run_goes_on(
+    drive: Path, whole: str, tmp_path: Path
+) -> None:
+    start = "import sys; from dask.__main__ import main; sys.exit(main())"
+    told = tmp_path / "scheduler.json"
+    dask = [sys.executable, "-c", start]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    common = [f"--scheduler-file={told}", "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, "scheduler", "--port=0", *common], **quiet)
+    worker = subprocess.Popen(
+        [*dask, "worker", "--nthreads=1", f"--local-directory={tmp_path}", *common], **quiet
+    )
+    try:
+        client = distributed.Client(scheduler_file=str(told), timeout="60s")
+
+        def kill(done: int, regions: int) -> None:
+            if done == 2:
+                scheduler.kill()
+
+        with pytest.raises(errors.VoxtileError, match="call again to go on"):
+            voxtile_dask.build(
+                drive, tmp_path / "map", region_size=4.0, client=client, progress=kill, **OPTIONS
+            )
+        client.close(timeout=1)
+    finally:
+        worker.kill()
+        scheduler.kill()
+        worker.wait()
+        scheduler.wait()
+    with distributed.Client(n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
+        report = voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    assert report["regions_done_before"] >= 2 and voxtile.digest(tmp_path / "map") == whole
 
 
 def test_what_a_build_in_parts_does_not_take_is_named(client: object, drive: Path, tmp_path: Path) -> None:

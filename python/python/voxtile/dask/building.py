@@ -17,6 +17,7 @@ import tempfile
 import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -26,7 +27,7 @@ import numpy as np
 
 from .. import files
 from .._voxtile import merge
-from ..errors import ArgumentError
+from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
 
 try:
@@ -113,7 +114,7 @@ def build(
         try:
             tasks = []
             for future in _dask.as_completed(futures):
-                tasks.append(future.result())
+                tasks.append(_result(future))
                 if progress is not None:
                     progress(len(columns) - len(open_parts) + len(tasks), len(columns))
         finally:
@@ -134,6 +135,22 @@ def build(
         "skew": seconds[0] * len(seconds) / sum(seconds) if seconds else None,
         "slowest": sorted(tasks, key=lambda task: -task["seconds"])[:5],
     }
+
+
+def _result(future: Any) -> dict[str, Any]:
+    """What a task answers; an error says which worker to look at."""
+    try:
+        done: dict[str, Any] = future.result()
+    except _dask.KilledWorker as error:
+        raise VoxtileError(
+            f"{error.last_worker.address}: this worker and others have ended while they made a region; perhaps memory"
+            " was short: take a smaller region_size or memory, or workers with more, and call again to go on"
+        ) from error
+    except CancelledError as error:
+        raise VoxtileError(
+            f"{error}; the regions that are done are kept: call again to go on, with a client of a scheduler that runs"
+        ) from error
+    return done
 
 
 def _check(output: Path, region_size: float, tile_size: float, options: Any) -> None:
@@ -238,7 +255,13 @@ def _map_column(
         made = os.path.join(local, "map")
         first, last = span
         options: dict[str, Any] = {**settings, "first": first, "count": last - first, "region": region}
-        files.build(source, made, **options)
+        try:
+            files.build(source, made, **options)
+        except VoxtileError as error:
+            # Of the classes of errors, callers look at the class and the message.
+            worker = _dask.get_worker()
+            error.args = (f"{error} (worker {worker.address}, whose disk is {worker.local_directory})",)
+            raise
         attempt = os.path.join(os.path.dirname(part), f"attempt-{uuid.uuid4().hex}")
         try:
             shutil.copytree(made, attempt)
