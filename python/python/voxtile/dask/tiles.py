@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
@@ -29,6 +28,10 @@ _bag: Any = dask.bag
 
 # Tiles of a task: opening a map takes as long as reading a few.
 _TILES_AT_ONCE = 16
+
+
+# The map of the task at hand, by process, path and snapshot.
+_opened: dict[tuple[int, str, str | None], Map] = {}
 
 
 @dataclass(frozen=True)
@@ -56,14 +59,13 @@ class Tile:
         return self._reader().to_dense(self.region, values)
 
     def _reader(self) -> Map:
-        return _reader(self.map, self.snapshot, os.getpid())
-
-
-@lru_cache(maxsize=1)
-def _reader(path: str, snapshot: str | None, process: int) -> Map:
-    """The map of the task at hand. A process that was forked opens its own."""
-    del process
-    return Map.open(path, "r", snapshot=snapshot)
+        # A process that was forked opens its own.
+        key = (os.getpid(), self.map, self.snapshot)
+        reader = _opened.get(key)
+        if reader is None:
+            _opened.clear()
+            reader = _opened[key] = Map.open(self.map, "r", snapshot=self.snapshot)
+        return reader
 
 
 def map_tiles(
@@ -91,5 +93,5 @@ def map_tiles(
 
 def _apply(tiles: Sequence[Tile], function: Callable[[Tile], _T]) -> list[_T]:
     # What an earlier task has opened may be an earlier flush.
-    _reader.cache_clear()
+    _opened.clear()
     return [function(tile) for tile in tiles]
