@@ -50,14 +50,6 @@ const LATEST_RETRY: Duration = Duration::from_secs(10);
 /// The longest manifest or page that is read.
 const MOST_LIST_BYTES: u64 = 1 << 28;
 
-/// Whether a text is the URL of a map in a bucket rather than the path of a folder.
-pub fn is_url(text: &str) -> bool {
-    let scheme = text.split_once("://").map(|(scheme, _)| scheme);
-    scheme.is_some_and(|scheme| SCHEMES.contains(&scheme))
-}
-
-const SCHEMES: [&str; 7] = ["s3", "gs", "az", "abfs", "abfss", "http", "https"];
-
 impl Bucket {
     /// The bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`, and for reading
     /// `https://HOST/MAP`. Keys, region and endpoint come from the environment, by the names that each store's own
@@ -69,10 +61,9 @@ impl Bucket {
     /// [`Error::InvalidArgument`] for another URL, or if the environment lacks something.
     pub fn open(url: &str) -> Result<Self> {
         let wrong = |reason: String| Error::argument(url, reason);
-        let Some((scheme, rest)) = url.split_once("://").filter(|_| is_url(url)) else {
-            let reason = format!("is no URL of a bucket; these begin with {}://", SCHEMES.join("://, "));
-            return Err(wrong(reason));
-        };
+        let no_bucket =
+            || wrong("is no URL of a bucket; these begin with s3://, gs://, az:// or https://".to_owned());
+        let (scheme, rest) = url.split_once("://").ok_or_else(no_bucket)?;
         let (host, prefix) = rest.split_once('/').unwrap_or((rest, ""));
         if host.is_empty() {
             return Err(wrong(format!("names no bucket; write {scheme}://BUCKET/MAP")));
@@ -113,10 +104,11 @@ impl Bucket {
                 let builder = HttpBuilder::new().with_url(&root).with_retry(retry);
                 Arc::new(builder.with_client_options(options).build().map_err(refused)?)
             }
-            _ => {
+            "az" | "abfs" | "abfss" => {
                 let builder = MicrosoftAzureBuilder::from_env().with_url(&root).with_retry(retry);
                 Arc::new(builder.build().map_err(refused)?)
             }
+            _ => return Err(no_bucket()),
         };
         let prefix = Key::parse(prefix.trim_end_matches('/')).map_err(|error| wrong(error.to_string()))?;
         let can_write = !scheme.starts_with("http");

@@ -31,7 +31,7 @@ mod sender;
 
 /// The crate of [`Bucket::on`], in the version that voxtile uses.
 pub use ::object_store;
-pub use bucket::{Bucket, is_url};
+pub use bucket::Bucket;
 pub use bucket_disk::BucketDisk;
 pub use pull::{Pulled, pull};
 pub use push::{PushOptions, Pushed, push};

@@ -44,6 +44,6 @@ fn in_bucket(url: &str) -> Result<MapPath> {
 
 #[cfg(not(feature = "bucket"))]
 fn in_bucket(url: &str) -> Result<MapPath> {
-    let reason = "this voxtile was built without buckets; `cargo install voxtile --features bucket` makes one with them";
+    let reason = "this voxtile was built without buckets; `cargo install --locked --path . --features bucket` makes one with them";
     Err(Error::argument(url, reason))
 }

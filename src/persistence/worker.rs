@@ -159,6 +159,19 @@ mod tests {
         assert_eq!((worker.take(), worker.wait(), worker.in_flight()), (Some(0), Some(2), 3));
     }
 
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_worker_that_gives_way_has_less_priority_than_its_owner_and_no_other_has() {
+        let niceness = || rustix::process::getpriority_process(None).unwrap();
+        let own = niceness();
+        let mut equal = Worker::new("equal", move |()| niceness());
+        let mut behind = Worker::new("behind", move |()| niceness()).giving_way();
+        equal.give(());
+        behind.give(());
+        assert_eq!((equal.wait(), niceness()), (Some(own), own));
+        assert_eq!(behind.wait(), Some((own + 10).min(19)));
+    }
+
     #[test]
     fn dropping_does_not_wait_for_what_was_not_begun() {
         let count = Arc::new(AtomicUsize::new(0));

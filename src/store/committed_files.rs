@@ -9,6 +9,7 @@ use super::tile_store::TileStore;
 use super::tiles::file_checksum::FileChecksum;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A file of a map as of a flush.
@@ -117,7 +118,7 @@ impl TileStore {
             }
             None => {}
         }
-        let mut kept_before = None;
+        let mut seen_kept = BTreeSet::new();
         for snapshot in snapshots {
             let Some(seen) = snapshot.commits.tiles.get(tile) else { continue };
             if Some(seen) == version {
@@ -128,12 +129,11 @@ impl TileStore {
                 // It was in place a moment ago.
                 return Err(Error::Changed { path: self.folder().to_owned() });
             };
-            if kept_before.replace(flush_number) != Some(flush_number) {
+            if seen_kept.insert(flush_number) {
                 let path = self.layout().kept(tile, flush_number);
                 files.push(self.stored(path, Some((seen.table, seen.scan_number))));
             }
         }
-        files.dedup_by(|file, before| file.path == before.path);
         Ok(files)
     }
 
