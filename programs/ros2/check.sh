@@ -130,6 +130,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         ;;
     hostile) sent=90 ;;
     sensors) sent=60 ;;
+    path) sent=50 ;;
     esac
     # Clouds are best effort: a machine that is busy enough loses some on the way, which is no fault of the node.
     mapped=$([ $kind = hostile ] && echo $count || echo $sent)
@@ -160,10 +161,12 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         ;;
     odometry) built_of -o "$map.built" --odometry /odom ;;
     path)
-        built_of -o "$map.built" --keep-scans
+        # The path is about the first clouds alone; those behind it keep their poses.
+        built_of -o "$map.built" --keep-scans --count $count
         before=$("$voxtile" digest "$map.built")
         "$voxtile" remap "$map.built" --poses "$work/$kind.bag.tum" >/dev/null
         [ "$("$voxtile" digest "$map.built")" != "$before" ] || fail "the path moves nothing"
+        "$voxtile" build "$work/$kind.bag" -o "$map.built" --resume --max-range 60 >/dev/null
         ;;
     *) built_of -o "$map.built" ;;
     esac
@@ -171,7 +174,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
     [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"
     if [ $kind = path ]; then
         # What moved was published, and no scan was mapped twice.
-        grep -q 'remapped: 30 of 30 scans moved' "$work/$kind.log" || fail "nothing was remapped"
+        grep -q 'remapped: 30 of' "$work/$kind.log" || fail "nothing was remapped"
         "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
         "$python" programs/ros2/tests/outputs.py whole "$work/$kind.outputs" "$map.csv"
         echo "$kind: $of_node"

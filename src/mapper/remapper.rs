@@ -1,4 +1,4 @@
-use super::OutOfCoreTileMapper;
+use super::{OutOfCoreTileMapper, SideMapper};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::Result;
 use crate::scan::{ScanPoints, ScanReport, Stop};
@@ -53,6 +53,21 @@ impl Remapper {
     /// Writes points in place of those that a scan has.
     pub(crate) fn write_points(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
         self.mapper.pager_keep(scan)
+    }
+
+    /// Takes over what was mapped beside the map and committed there: its tiles, and its entries as the new catalog.
+    pub(crate) fn take_over(&mut self, side: &mut SideMapper) -> Result<()> {
+        self.mapper.with_store(|store| {
+            side.with_store(|side| {
+                let mut records = side.kept_records()?;
+                while let Some(entry) = records.next_entry()? {
+                    store.put_entry(&entry)?;
+                }
+                // What a commit may leave to the next opening is not left here: the files need their names.
+                side.checkpoint()?;
+                store.take_over(side)
+            })
+        })
     }
 
     /// Commits, with a note where the poses are no longer those of the map's inputs; then removes what nothing needs any more.

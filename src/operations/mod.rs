@@ -45,8 +45,8 @@ pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::Part;
 pub use remapping::{
-    MappedAgain, MappedAnew, NewPoses, PointsRemoved, Remap, Remapped, Rework, ScanSelection, ScansRemoved,
-    map_anew, remap, remove_points, remove_scans,
+    MappedAgain, MappedAnew, NewPoses, PointsRemoved, Remap, RemapBeside, Remapped, Rework, ScanSelection,
+    ScansRemoved, map_anew, remap, remove_points, remove_scans,
 };
 pub use revert::{Reverted, revert};
 pub use snapshot::{SnapshotInfo, delete_snapshot, snapshot, snapshots};

@@ -49,6 +49,7 @@ pub use map_path::MapPath;
 pub use place::check_outside_of_maps;
 pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;
+pub use recovery::side_folder::SideFolder;
 pub use recovery::staged_map::{StagedMap, staging_folder};
 pub use scans::{CatalogEntry, KeptFrame, KeptRecord, ScanRecord, SegmentPlace};
 pub(crate) use scans::{KeptRecords, SegmentScan, check_points, check_scans, read_scans};

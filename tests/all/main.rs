@@ -85,6 +85,7 @@ mod queries;
 mod readers;
 /// Maps that follow their scans: poses move, scans and points go.
 mod remapping;
+mod remapping_beside;
 /// The list of scans that a map keeps.
 mod scan_list;
 /// The stream of scans, in files and from standard input.

@@ -9,8 +9,8 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use voxtile::integrity::{Finding, Severity, repair, verify};
 use voxtile::operations::{
-    NewPoses, Part, Remap, Rework, ScanSelection, clear, delete_snapshot, remap, remove_points, remove_scans,
-    revert, snapshot,
+    NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, delete_snapshot, remap, remove_points,
+    remove_scans, revert, snapshot,
 };
 use voxtile::scan::{PointBatch, ScanPoints, Stop};
 use voxtile::sensor::{Iwlo, SensorModel};
@@ -90,6 +90,12 @@ enum Act {
         seed: u64,
         rest: Option<u64>,
     },
+    /// The same while a mapper inserts scans with these seeds and flushes each.
+    MoveBeside {
+        seed: u64,
+        rest: Option<u64>,
+        meanwhile: std::ops::Range<u64>,
+    },
     RemoveScans(u64, u64),
     RemovePoints(Aabb),
     Snapshot(&'static str),
@@ -130,6 +136,10 @@ fn naive(mut state: State, act: &Act) -> State {
             for (number, pose) in new_poses(scans, *seed, *rest) {
                 scans.get_mut(&number).unwrap().pose = pose;
             }
+        }
+        Act::MoveBeside { seed, rest, meanwhile } => {
+            let moved = naive(state, &Act::Move { seed: *seed, rest: *rest });
+            return naive(moved, &Act::Scans(meanwhile.clone()));
         }
         Act::RemoveScans(first, last) => scans.retain(|number, _| !(first..=last).contains(&number)),
         Act::RemovePoints(region) => {
@@ -177,6 +187,20 @@ fn act(disk: &FaultyDisk, config: &MapConfig, before: &State, act: &Act) -> Resu
         Act::Move { seed, rest } => {
             let poses = NewPoses::Numbered(new_poses(&before.scans.0, *seed, *rest));
             remap(at(disk), &poses, &Remap::new(rework()), |_, _| ()).map(drop)
+        }
+        Act::MoveBeside { seed, rest, meanwhile } => {
+            let poses = NewPoses::Numbered(new_poses(&before.scans.0, *seed, *rest));
+            let mut mapper = open_or_create(disk, config)?;
+            let mut beside = RemapBeside::begin(at(disk), &poses, &Remap::new(rework()))?;
+            for number in meanwhile.clone() {
+                if number % 3 > 0 {
+                    beside.follow(|_| ())?;
+                }
+                insert(&mut mapper, &Taken::new(number, 5))?;
+                mapper.flush()?;
+            }
+            drop(mapper);
+            beside.finish().map(drop)
         }
         Act::RemoveScans(first, last) => {
             let scans = ScanSelection::Numbers(*first, *last);
@@ -243,10 +267,10 @@ fn a_life() -> Vec<Act> {
         Act::RemovePoints(region(2.0, 4.0)),
         Act::Move { seed: 9, rest: None },
         Act::Revert("a"),
-        Act::Scans(7..8),
+        Act::MoveBeside { seed: 3, rest: Some(2), meanwhile: 7..10 },
         Act::Delete("a"),
         Act::RemoveScans(6, 6),
-        Act::Scans(8..9),
+        Act::Scans(10..11),
     ]
 }
 
@@ -274,8 +298,34 @@ impl Life {
         Ok(())
     }
 
+    /// Scans that were flushed before the commit of a remapping beside them are in the map; what is left of that act is
+    /// done.
+    fn redo_what_was_beside(&self, disk: &FaultyDisk, number: usize, what: &str) {
+        let (before, Act::MoveBeside { seed, rest, meanwhile }) = (&self.states[number], &self.acts[number])
+        else {
+            return;
+        };
+        for next in meanwhile.start + 1..=meanwhile.end {
+            let with_some = naive(before.clone(), &Act::Scans(meanwhile.start..next));
+            if is_in_state(disk, &self.config, &with_some) {
+                check_whole(disk, what);
+                let poses = new_poses(&before.scans.0, *seed, *rest);
+                let mut mapper = open_or_create(disk, &self.config).unwrap();
+                let mut beside =
+                    RemapBeside::begin(at(disk), &NewPoses::Numbered(poses), &Remap::new(rework())).unwrap();
+                (next..meanwhile.end).for_each(|seed| insert(&mut mapper, &Taken::new(seed, 5)).unwrap());
+                mapper.flush().unwrap();
+                drop(mapper);
+                beside.follow(|_| ()).unwrap();
+                beside.finish().unwrap();
+                return;
+            }
+        }
+    }
+
     /// The map is in the state before an act or after it, whole, and life goes on to the same end.
     fn check_after_crash(&self, disk: &FaultyDisk, number: usize, what: &str) {
+        self.redo_what_was_beside(disk, number, what);
         let found = [number, number + 1]
             .into_iter()
             .find(|&number| is_in_state(disk, &self.config, &self.states[number]));
@@ -286,15 +336,17 @@ impl Life {
         }
         self.live(disk, from)
             .unwrap_or_else(|(number, error)| panic!("{what}: then {:?}: {error:#}", self.acts[number]));
+        RemapBeside::remove_leftovers(at(disk)).unwrap();
         assert!(is_in_state(disk, &self.config, self.states.last().unwrap()), "{what}: another end");
         check_files(disk, what);
     }
 }
 
-/// Nothing lies around among the kept scans: one catalog, and no more points than there are.
+/// Nothing lies around beside the map or among the kept scans: one catalog, and no more points than there are.
 fn check_files(disk: &FaultyDisk, what: &str) {
     drop(TileStore::open(disk.shared(), map()).unwrap());
     let files = disk.files();
+    assert!(files.keys().all(|path| path.starts_with(map())), "{what}: {:?}", files.keys());
     let catalogs = files.keys().filter(|path| path.to_string_lossy().contains("kept_scans/catalog")).count();
     let snapshots = voxtile::operations::snapshots(at(disk)).unwrap().len();
     assert!((1..=1 + snapshots).contains(&catalogs), "{what}: {catalogs} catalogs");
@@ -305,8 +357,13 @@ fn random_acts(random: &mut Random) -> Vec<Act> {
     let (mut acts, mut snapshots) = (vec![Act::Scans(0..4)], Vec::new());
     for step in 1..12 {
         let act = match random.below(8) {
-            0 | 1 => Act::Scans(10 * step..10 * step + 1 + random.below(3)),
-            2 | 3 => Act::Move { seed: random.next(), rest: Some(random.below(4)) },
+            0 => Act::Scans(10 * step..10 * step + 1 + random.below(3)),
+            1 | 2 => Act::MoveBeside {
+                seed: random.next(),
+                rest: Some(random.below(5)).filter(|&rest| rest < 4),
+                meanwhile: 10 * step..10 * step + random.below(5),
+            },
+            3 => Act::Move { seed: random.next(), rest: Some(random.below(4)) },
             4 => Act::Move { seed: random.next(), rest: None },
             5 => Act::RemovePoints(region(random.between(-2.0, 8.0), 9.0)),
             6 => {

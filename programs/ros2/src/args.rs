@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long, value_name = "TOPIC")]
     pub odometry: Option<String>,
     /// Corrected poses of the sensor at the stamps of its clouds, from a topic of nav_msgs/Path: what moved clouds
-    /// touch is mapped again. Keeps the scans, and takes one topic of clouds
+    /// touch is mapped again beside the mapping. Keeps the scans, and takes one topic of clouds
     #[arg(long, value_name = "TOPIC")]
     pub path: Option<String>,
     /// A path by which no scan moves farther than this, or turns by half a degree, changes nothing
@@ -73,7 +73,7 @@ pub struct Args {
     /// Keep the scans in a new map, so that it can follow its trajectory
     #[arg(long)]
     pub keep_scans: bool,
-    /// Memory for the map and for clouds that wait; the clouds get an eighth
+    /// Memory for the map and for clouds that wait; the clouds get an eighth, and remapping for --path a quarter
     #[arg(long, value_name = "SIZE", default_value = "1GiB")]
     pub memory: ByteSize,
     /// Flush so often
@@ -141,7 +141,12 @@ impl Args {
 
     /// Bytes of the mapper.
     pub fn map_bytes(&self) -> usize {
-        self.memory_bytes() - self.queue_bytes()
+        self.memory_bytes() - self.queue_bytes() - self.remapping_bytes()
+    }
+
+    /// Bytes of what maps the map again beside the mapper.
+    pub fn remapping_bytes(&self) -> usize {
+        if self.path.is_some() { self.memory_bytes() / 4 } else { 0 }
     }
 
     /// Names of the node, of topics and of services.

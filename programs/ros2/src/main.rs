@@ -3,7 +3,7 @@
 //! ```text
 //! DDS -> RawMessage -> CloudQueue, TransformBuffer   node: a thread a topic
 //! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
-//! DDS -> corrected path -> Mapping -> map of moved scans
+//! DDS -> corrected path -> Mapping -> Remapping      beside it: one thread, for as long as it takes
 //! LiveMap -> messages -> DDS                         publishers: one thread
 //! DDS -> orders -> Mapping, questions -> LiveMap     services: a thread a service
 //! ```
@@ -26,6 +26,7 @@ mod node;
 mod parameters;
 mod publishers;
 mod raw_message;
+mod remapping;
 mod services;
 mod stamp_check;
 mod transform_buffer;

@@ -1,19 +1,19 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
-use crate::corrections::Corrections;
 use crate::health::Health;
 use crate::inbox::Inbox;
 use crate::latencies::Latencies;
 use crate::live_map::LiveMap;
 use crate::local_mapping::LocalMapping;
+use crate::remapping::{self, Remapping};
 use crate::services::{Order, PlacedOrder};
 use anyhow::ensure;
-use std::f64::consts::PI;
+use bytesize::ByteSize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
-use voxtile::operations::{self, NewPoses, Part, Remap, Remapped, Rework, remap};
+use voxtile::operations::{self, Part, RemapBeside};
 use voxtile::{
     Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Pose,
     ScanRef, Stop,
@@ -32,8 +32,11 @@ pub struct Mapping {
     orders: Receiver<PlacedOrder>,
     /// Orders to save, with the scan that has to be durable.
     saves: Vec<(u64, PlacedOrder)>,
-    /// A corrected path, with the scan that has to be durable before it is followed.
+    /// A corrected path, with the last scan before it came, which has to be durable before it is followed.
     path: Option<(u64, Vec<StampedPose>)>,
+    remapping: Option<Remapping>,
+    /// Bytes of a remapping.
+    remapping_bytes: usize,
     folder: PathBuf,
     /// What moves scans no farther, in metres, is no correction.
     path_tolerance_m: f64,
@@ -49,8 +52,6 @@ pub struct Mapping {
 const WAIT: Duration = Duration::from_millis(50);
 const TELL_EVERY: Duration = Duration::from_secs(10);
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// By which angle scans turn that are no correction: half a degree.
-const PATH_TOLERANCE: f64 = PI / 360.0;
 /// Beyond the last voxel that has an index.
 const EVERYWHERE: Aabb = Aabb { min: [-1e12; 3], max: [1e12; 3] };
 
@@ -91,6 +92,16 @@ impl Mapping {
             }
             Err(error) => return Err(error.into()),
         };
+        let least_bytes = MemoryLimit::least_bytes(&mapper.config().grid);
+        ensure!(
+            !is_followed || args.remapping_bytes() >= least_bytes,
+            "--memory: --path needs {} for maps with such tiles, to have a quarter of it for remapping",
+            ByteSize::b(4 * least_bytes as u64)
+        );
+        // What a remapping has left that was killed.
+        if let Err(error) = RemapBeside::remove_leftovers(&*args.output) {
+            log::warn!("{error}");
+        }
         let (sensor_m, stamp_ns) = last_place(&args.output);
         let frame = args.frame_id.trim_start_matches('/').to_owned();
         let live = Arc::new(LiveMap::new(frame, mapper.reader()?, sensor_m, stamp_ns));
@@ -107,6 +118,8 @@ impl Mapping {
             orders,
             saves: Vec::new(),
             path: None,
+            remapping: None,
+            remapping_bytes: args.remapping_bytes(),
             folder: args.output.clone(),
             path_tolerance_m: args.path_tolerance,
             flush_every,
@@ -135,21 +148,10 @@ impl Mapping {
             if let Ok(order) = self.orders.try_recv() {
                 self = self.obey(order)?;
             }
-            if let Some(path) = self.inbox.take_path() {
-                // A later one takes its place, and waits no longer for that.
-                let scan = self.path.take().map_or(self.mapper.scan_number(), |(scan, _)| scan);
-                self.path = Some((scan, path));
-            }
-            if let Some((scan, path)) = self.path.take() {
-                if scan <= self.mapper.flushed_scan_number() {
-                    self = self.follow(&path, stop)?;
-                } else {
-                    self.path = Some((scan, path));
-                }
-            }
+            self = self.follow()?;
             self.local.refresh(&self.mapper);
             // One that takes longer than the timer is waited for by the next, not by clouds.
-            let is_wanted = !self.saves.is_empty() || self.path.is_some();
+            let is_wanted = !self.saves.is_empty() || self.awaits_flush();
             let is_time = self.flushed_at.elapsed() >= self.flush_every || is_wanted;
             if is_time && !self.mapper.is_flushing() {
                 if self.mapper.is_dirty() {
@@ -167,6 +169,7 @@ impl Mapping {
                 self.told_at = Instant::now();
             }
         }
+        self.remapping = None;
         self.mapper.flush()?;
         self.answer_saves();
         self.tell();
@@ -183,10 +186,10 @@ impl Mapping {
                 let scan = self.mapper.scan_number();
                 placed.answer(kept.map(|()| format!("snapshot {name} of scan {scan}")));
             }
-            Order::Reset => return self.edit(placed, &|folder| cleared(folder, EVERYWHERE)),
-            Order::Clear(region) => return self.edit(placed, &|folder| cleared(folder, region)),
+            Order::Reset => return self.edit(placed, |folder| cleared(folder, EVERYWHERE)),
+            Order::Clear(region) => return self.edit(placed, |folder| cleared(folder, region)),
             Order::Revert(name) => {
-                return self.edit(placed, &|folder| {
+                return self.edit(placed, |folder| {
                     let done = operations::revert(folder, &name, None, |_, _| ())?;
                     Ok(format!("the map is as of scan {} again", done.scan_number))
                 });
@@ -195,40 +198,62 @@ impl Mapping {
         Ok(self)
     }
 
-    /// Maps again what the scans touch that a corrected path moves.
-    fn follow(self, path: &[StampedPose], stop: &Stop) -> anyhow::Result<Self> {
-        let found = match corrections(&self.folder, path) {
-            Ok(found) => found,
-            Err(error) => {
-                log::warn!("a path is left out: {error}");
-                return Ok(self);
-            }
-        };
-        if found.most_moved_m <= self.path_tolerance_m && found.most_turned <= PATH_TOLERANCE {
-            log::debug!("a path of {} poses changes nothing: it names {} scans", path.len(), found.named);
-            return Ok(self);
+    /// Follows corrected paths, one after the other: beside the mapper, until what is left is short.
+    fn follow(mut self) -> anyhow::Result<Self> {
+        if let Some(path) = self.inbox.take_path() {
+            // A later one takes its place, and does not wait longer for that.
+            let scan = self.path.take().map_or(self.mapper.scan_number(), |(scan, _)| scan);
+            self.path = Some((scan, path));
         }
+        if self.remapping.as_ref().is_some_and(Remapping::is_over)
+            && let Some(remapping) = self.remapping.take()
+        {
+            return match remapping.end() {
+                Ok(Some(remapped)) => self.change_over(remapped),
+                Ok(None) => Ok(self),
+                Err(error) => {
+                    log::warn!("a path is left out: {error}");
+                    Ok(self)
+                }
+            };
+        }
+        let durable = self.mapper.flushed_scan_number();
+        if self.remapping.is_none()
+            && let Some((last_scan, path)) = self.path.take_if(|(scan, _)| *scan <= durable)
+        {
+            let (tolerance_m, memory_bytes) = (self.path_tolerance_m, self.remapping_bytes);
+            let order = remapping::Order { last_scan, tolerance_m, memory_bytes };
+            self.remapping = Some(Remapping::begin(self.folder.clone(), path, order)?);
+        }
+        Ok(self)
+    }
+
+    /// Whether a path goes on with the next flush.
+    fn awaits_flush(&mut self) -> bool {
+        let (scan, durable) = (self.mapper.scan_number(), self.mapper.flushed_scan_number());
+        match &mut self.remapping {
+            Some(remapping) => remapping.advance(scan, durable),
+            None => self.path.is_some(),
+        }
+    }
+
+    /// Makes the map what was mapped beside it.
+    fn change_over(self, remapped: remapping::Remapped) -> anyhow::Result<Self> {
         let begun = Instant::now();
-        let rework = Rework::default().with_stop(stop.clone());
-        let rework = match self.mapper.config().memory {
-            MemoryLimit::Bytes(bytes) => rework.with_memory_bytes(bytes),
-            _ => rework,
-        };
-        let (mut moved, outcome) = self.change(&|folder| {
-            let poses = corrections(folder, path)?.poses;
-            remap(folder, &NewPoses::Numbered(poses), &Remap::new(rework.clone()), |_, _| ())
-        })?;
+        let (last_scan, sensor_m) = remapped.last;
+        let (mut moved, outcome) = self.change(|_| remapped.beside.finish())?;
         match outcome {
-            Ok(Remapped { mapped, largest_move_m, .. }) => {
-                let (sensor_m, _) = last_place(&moved.folder);
-                moved.live.note_opening(moved.mapper.reader()?, Some(sensor_m));
+            Ok(done) => {
+                let sensor_m = sensor_m.filter(|_| moved.mapper.scan_number() == last_scan);
+                moved.live.note_opening(moved.mapper.reader()?, sensor_m);
                 moved.inbox.count(|counters| counters.remapped += 1);
                 log::info!(
-                    "remapped: {} of {} scans moved, by {largest_move_m:.2} m at most, {} of {} tiles, in {:.1?}",
-                    mapped.scans_changed,
-                    mapped.scans,
-                    mapped.tiles_mapped,
-                    mapped.tiles,
+                    "remapped: {} of {} scans moved, by {:.2} m at most, {} of {} tiles; the map was closed for {:.1?}",
+                    done.mapped.scans_changed,
+                    done.mapped.scans,
+                    done.largest_move_m,
+                    done.mapped.tiles_mapped,
+                    done.mapped.tiles,
                     begun.elapsed()
                 );
             }
@@ -241,7 +266,7 @@ impl Mapping {
     fn edit(
         self,
         placed: PlacedOrder,
-        change: &dyn Fn(&Path) -> voxtile::Result<String>,
+        change: impl FnOnce(&Path) -> voxtile::Result<String>,
     ) -> anyhow::Result<Self> {
         let (changed, outcome) = self.change(change)?;
         placed.answer(outcome.map_err(|error| error.to_string()));
@@ -251,8 +276,11 @@ impl Mapping {
     /// Changes the map as a whole: it is flushed and closed for that, and clouds wait.
     fn change<T>(
         mut self,
-        change: &dyn Fn(&Path) -> voxtile::Result<T>,
+        change: impl FnOnce(&Path) -> voxtile::Result<T>,
     ) -> anyhow::Result<(Self, voxtile::Result<T>)> {
+        if self.remapping.take().is_some() {
+            log::warn!("a path is left out: the map is changed meanwhile");
+        }
         self.mapper.flush()?;
         self.answer_saves();
         self.local.forget();
@@ -342,19 +370,6 @@ impl Mapping {
 fn cleared(folder: &Path, region: Aabb) -> voxtile::Result<String> {
     let cleared = operations::clear(folder, &Part::Inside(region), |_, _| ())?;
     Ok(format!("{} voxels are unknown now", cleared.voxels_cleared))
-}
-
-/// What a path means for the scans that the map on disk has.
-fn corrections(folder: &Path, path: &[StampedPose]) -> voxtile::Result<Corrections> {
-    let reader = MapReader::open(folder, 1)?;
-    // Before the map is closed for a path that it cannot follow.
-    reader.check_keeps_all()?;
-    let mut scans = reader.kept_scans()?;
-    let mut records = Vec::new();
-    while let Some(record) = scans.next_record()? {
-        records.push(record);
-    }
-    Corrections::of(&records, path)
 }
 
 /// Where the sensor of a map was last, and when; the origin where the map does not tell.

@@ -7,7 +7,7 @@ hostile: clouds that lie, before each one.
 types: others offer and want the same topics with other types.
 odometry: poses come as nav_msgs/Odometry, and only the mount of the sensor by tf.
 sensors: two sensors with their mounts, so far apart that their clouds do not overlap.
-path: at last a corrected path comes, which BAG.tum gets too.
+path: after the first CLOUDS a corrected path of them comes, which BAG.tum gets too; others follow at once.
 real: the PCD files of a folder, at its poses (poses_tum.txt).
 """
 
@@ -161,6 +161,10 @@ def corrected_path(clouds):
     return poses, Path(header(0, "map"), poses[:1] + [lost] + poses[1:])
 
 
+# Clouds after the path.
+LATER = 20
+
+
 def write_tum(file, poses):
     with open(file, "w") as out:
         for one in poses:
@@ -207,7 +211,7 @@ def write_bag(path, clouds, kind, folder):
 def main():
     domain, bag, clouds = int(sys.argv[1]), pathlib.Path(sys.argv[2]), int(sys.argv[3])
     kind, folder = (*sys.argv[4:], "", "")[:2]
-    write_bag(bag, clouds, kind, folder)
+    write_bag(bag, clouds + (LATER if kind == "path" else 0), kind, folder)
     participant = DomainParticipant(domain)
 
     def writer(name, kind, *policies):
@@ -232,7 +236,17 @@ def main():
             sys.exit("no node answers")
         time.sleep(0.02)
     time.sleep(0.5)
-    for name, message in messages(clouds, kind, folder):
+    sent, more = 0, LATER if kind == "path" else 0
+    for name, message in messages(clouds + more, kind, folder):
+        if more and name == "/cloud_in":
+            sent += 1
+            if sent == clouds + 1:
+                # Until all before is mapped.
+                time.sleep(1.5)
+                poses, path = corrected_path(clouds)
+                write_tum(f"{bag}.tum", poses)
+                writers["/slam_path"].write(path)
+                time.sleep(0.3)
         if kind == "hostile" and name == "/cloud_in":
             liar = cloud(0, 1)
             liar.header.stamp = message.header.stamp
@@ -244,12 +258,7 @@ def main():
             speak(others[1], message)
         writers[name].write(message)
         time.sleep(0.05 if kind == "real" else 0.02)
-    time.sleep(1.5)
-    if kind == "path":
-        poses, path = corrected_path(clouds)
-        write_tum(f"{bag}.tum", poses)
-        writers["/slam_path"].write(path)
-        time.sleep(2.0)
+    time.sleep(3.0 if kind == "path" else 1.5)
 
 
 if __name__ == "__main__":

@@ -3,9 +3,11 @@ use super::revision::{Fate, MappedAgain, Rework, has_pose, rework};
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, pose_of_numbers};
 use crate::scan::Pose;
-use crate::store::{KeptFrame, KeptRecord, MapPath};
+use crate::store::{Disk, KeptFrame, KeptRecord, MapPath};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
 
 /// How a map follows new poses.
 #[derive(Clone, Debug, Default)]
@@ -67,18 +69,43 @@ pub fn remap(
     progress: impl FnMut(u64, u64),
 ) -> Result<Remapped> {
     let (disk, folder) = map.into().into_parts();
-    if let Some((moved_m, turned)) = how.tolerance
-        && !(moved_m >= 0.0 && turned >= 0.0)
-    {
-        return Err(Error::argument("tolerance", "two lengths that are not negative: metres and an angle"));
+    let (mut remapped, moves) = Remapped::by_poses(&disk, &folder, poses, how)?;
+    let fate = |record: &KeptRecord| fate_by(&moves, record);
+    remapped.mapped = rework(MapPath::on(disk, &folder), &how.rework, fate, progress)?;
+    Ok(remapped)
+}
+
+/// New poses of scans that move, by their numbers.
+pub(super) type Moves = FxHashMap<u64, Pose>;
+
+pub(super) fn fate_by(moves: &Moves, record: &KeptRecord) -> Fate {
+    match moves.get(&record.number) {
+        Some(pose) => Fate::Moves(Box::new(*pose)),
+        None => Fate::Stays,
     }
-    let mut remapped = Remapped::default();
-    let poses = {
-        let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
+}
+
+impl Remapped {
+    /// Which scans of the map get a new pose, and how far they move.
+    pub(super) fn by_poses(
+        disk: &Arc<dyn Disk>,
+        folder: &Path,
+        poses: &NewPoses,
+        how: &Remap,
+    ) -> Result<(Self, Moves)> {
+        if let Some((moved_m, turned)) = how.tolerance
+            && !(moved_m >= 0.0 && turned >= 0.0)
+        {
+            return Err(Error::argument(
+                "tolerance",
+                "two lengths that are not negative: metres and an angle",
+            ));
+        }
+        let (mut remapped, mut moves) = (Self::default(), Moves::default());
+        let reader = MapReader::open(MapPath::on(disk.clone(), folder), 1)?;
         reader.check_keeps_all()?;
         let poses = poses.by_number(reader.kept_records()?)?;
         let mut records = reader.kept_records()?;
-        let mut moves = FxHashMap::default();
         while let Some(record) = records.next_kept()? {
             if let Some(pose) = poses.get(&record.number)
                 && remapped.moves(&record, pose, how.tolerance)?
@@ -86,17 +113,9 @@ pub fn remap(
                 moves.insert(record.number, *pose);
             }
         }
-        moves
-    };
-    let fate = |record: &KeptRecord| match poses.get(&record.number) {
-        Some(pose) => Fate::Moves(Box::new(*pose)),
-        None => Fate::Stays,
-    };
-    remapped.mapped = rework(MapPath::on(disk, &folder), &how.rework, fate, progress)?;
-    Ok(remapped)
-}
+        Ok((remapped, moves))
+    }
 
-impl Remapped {
     /// Whether a scan gets a new pose.
     fn moves(&mut self, record: &KeptRecord, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
         let KeptFrame::Sensor(numbers) = &record.frame else {

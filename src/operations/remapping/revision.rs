@@ -4,9 +4,9 @@ use crate::error::{Error, Result};
 use crate::mapper::{KeptScan, Remapper, TileFinder, check_keeps_all};
 use crate::operations::snapshot::check_is_free;
 use crate::persistence::config_from;
-use crate::scan::{Pose, ScanPoints, Stop};
+use crate::scan::{Pose, ScanPoints, ScanReport, Stop};
 use crate::space::{Aabb, TileIndex, TileSelection};
-use crate::store::{CatalogEntry, Disk, KeptFrame, KeptRecord, MapPath, SnapshotName, TileStore};
+use crate::store::{CatalogEntry, Disk, KeptFrame, KeptRecord, Layout, MapPath, SnapshotName, TileStore};
 use rustc_hash::FxHashSet;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -103,37 +103,43 @@ pub(super) fn rework(
 ) -> Result<MappedAgain> {
     let (disk, folder) = map.into_parts();
     let mut store = TileStore::open(disk.clone(), &folder)?;
-    let revision = Revision { disk: disk.clone(), how, fate, counts: MappedAgain::default() };
-    let Some((revision, touched)) = revision.look(&store)? else {
-        return Ok(MappedAgain::default());
-    };
+    let mut revision = Revision::new(disk.clone(), how, fate);
+    let touched = revision.look(&store)?;
     if how.is_dry_run || revision.counts.scans_changed == 0 {
         return Ok(revision.counts);
     }
-    if let Some(name) = &how.keep_as {
-        check_is_free(&store, name)?;
-        store.create_snapshot(name)?;
-    }
-    let outcome = revision.map(store, touched, &mut progress);
-    // What was written in vain gives its room back.
+    keep_as_it_is(&mut store, how)?;
+    tidied(disk, &folder, revision.map(store, touched, &mut progress))
+}
+
+/// Makes the snapshot of the map as it is, if there is to be one.
+pub(super) fn keep_as_it_is(store: &mut TileStore, how: &Rework) -> Result<()> {
+    let Some(name) = &how.keep_as else { return Ok(()) };
+    check_is_free(store, name)?;
+    store.create_snapshot(name)
+}
+
+/// Gives room back that was written to in vain.
+pub(super) fn tidied<T>(disk: Arc<dyn Disk>, folder: &Path, outcome: Result<T>) -> Result<T> {
     if outcome.is_err()
-        && let Err(error) = TileStore::open(disk, &folder)
+        && let Err(error) = TileStore::open(disk, folder)
     {
         log::warn!("{}: not tidied up after an error: {error:#}", folder.display());
     }
     outcome
 }
 
-struct Revision<'a, F> {
+/// A change of scans, and what it comes to.
+pub(super) struct Revision<F> {
     disk: Arc<dyn Disk>,
-    how: &'a Rework,
+    how: Rework,
     fate: F,
-    counts: MappedAgain,
+    pub(super) counts: MappedAgain,
 }
 
 /// What has to be mapped again.
-struct Touched {
-    config: MapConfig,
+pub(super) struct Touched {
+    pub(super) config: MapConfig,
     /// `None` for all.
     tiles: Option<FxHashSet<TileIndex>>,
     /// Segments with points that go.
@@ -141,14 +147,22 @@ struct Touched {
 }
 
 impl Touched {
-    fn has(&self, tile: TileIndex) -> bool {
+    pub(super) fn has(&self, tile: TileIndex) -> bool {
         self.tiles.as_ref().is_none_or(|tiles| tiles.contains(&tile))
+    }
+
+    fn has_any_of(&self, record: &KeptRecord) -> bool {
+        record.tiles.iter().any(|&tile| self.has(tile))
     }
 }
 
-impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
-    /// Finds out what the change touches; `None` for a map without scans.
-    fn look(mut self, store: &TileStore) -> Result<Option<(Self, Touched)>> {
+impl<F: Fn(&KeptRecord) -> Fate> Revision<F> {
+    pub(super) fn new(disk: Arc<dyn Disk>, how: &Rework, fate: F) -> Self {
+        Self { disk, how: how.clone(), fate, counts: MappedAgain::default() }
+    }
+
+    /// Finds out what the change touches.
+    pub(super) fn look(&mut self, store: &TileStore) -> Result<Touched> {
         let config = self.config_of(store)?;
         check_keeps_all(store.keeps_scans().then(|| store.kept_records()).transpose()?, store.folder())?;
         let changed_updates = self.count(store)?;
@@ -192,7 +206,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
         if self.how.is_dry_run {
             self.estimate(store, &touched, began.elapsed().as_secs_f64(), looked_at)?;
         }
-        Ok(Some((self, touched)))
+        Ok(touched)
     }
 
     /// Counts scans and updates; returns the updates of those that change.
@@ -239,6 +253,34 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
         KeptScan::open(&self.disk, store.layout(), record, MOST_POINTS_IN_MEMORY)
     }
 
+    /// # Errors
+    ///
+    /// A request to stop.
+    pub(super) fn check_stop(&self) -> Result<()> {
+        self.how.stop.check()
+    }
+
+    /// Does what happens to a scan by `map`, which maps its points in a selection of tiles or in all; returns its new
+    /// entry. Nothing but poses may change.
+    pub(super) fn map_beside(
+        &mut self,
+        layout: &Layout,
+        record: KeptRecord,
+        touched: &Touched,
+        map: impl FnOnce(&KeptScan, Option<&TileSelection>) -> Result<(ScanReport, Vec<TileIndex>)>,
+    ) -> Result<KeptRecord> {
+        let pose = match (self.fate)(&record) {
+            Fate::Moves(pose) => Some(*pose),
+            Fate::Stays | Fate::Goes | Fate::Loses(_) => None,
+        };
+        if pose.is_none() && !touched.has_any_of(&record) {
+            return Ok(record);
+        }
+        let scan = KeptScan::open(&self.disk, layout, record, MOST_POINTS_IN_MEMORY)?;
+        let scan = pose.map_or(scan.clone(), |pose| scan.with_pose(pose));
+        self.map_points(scan.record().clone(), touched, pose.is_some(), |selection| map(&scan, selection))
+    }
+
     /// Maps the touched tiles again and commits.
     fn map(
         mut self,
@@ -267,7 +309,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
             }
             let is_changed = !matches!(fate, Fate::Stays);
             have_poses_changed |= matches!(fate, Fate::Moves(_));
-            let is_touched = is_changed || record.tiles.iter().any(|&tile| touched.has(tile));
+            let is_touched = is_changed || touched.has_any_of(&record);
             let mut record = *record;
             if is_touched {
                 let scan = KeptScan::open(&self.disk, &layout, record, MOST_POINTS_IN_MEMORY)?;
@@ -296,24 +338,39 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<'_, F> {
             Fate::Stays | Fate::Goes | Fate::Loses(_) => scan,
         };
         let mut record = scan.record().clone();
-        // All tiles of a scan that moved are touched.
-        let selection = touched.tiles.as_ref().filter(|_| !is_moved).map(|tiles| {
-            record.tiles.iter().copied().filter(|tile| tiles.contains(tile)).collect::<TileSelection>()
-        });
-        let (report, tiles) = match fate {
+        let rest;
+        let points: &dyn ScanPoints = match fate {
             Fate::Loses(region) => {
-                let rest = FilteredScan::new(&scan, region, false)?;
+                rest = FilteredScan::new(&scan, region, false)?;
                 record.place = remapper.write_points(&rest)?;
                 record.points = rest.len() as u64;
-                remapper.map(record.number, &rest, &record.rays, selection.as_ref())?
+                &rest
             }
             _ => {
                 if touched.segments.contains(&record.place.segment) {
                     record.place = remapper.copy_points(record.place)?;
                 }
-                remapper.map(record.number, &scan, &record.rays, selection.as_ref())?
+                &scan
             }
         };
+        let (number, rays) = (record.number, record.rays);
+        let map = |selection: Option<&TileSelection>| remapper.map(number, points, &rays, selection);
+        self.map_points(record, touched, is_moved, map)
+    }
+
+    /// Maps the points of a scan in the touched ones of its tiles, and brings its record up to date.
+    fn map_points(
+        &mut self,
+        mut record: KeptRecord,
+        touched: &Touched,
+        is_moved: bool,
+        map: impl FnOnce(Option<&TileSelection>) -> Result<(ScanReport, Vec<TileIndex>)>,
+    ) -> Result<KeptRecord> {
+        // All tiles of a scan that moved are touched.
+        let selection = touched.tiles.as_ref().filter(|_| !is_moved).map(|tiles| {
+            record.tiles.iter().copied().filter(|tile| tiles.contains(tile)).collect::<TileSelection>()
+        });
+        let (report, tiles) = map(selection.as_ref())?;
         self.counts.scans_mapped += 1;
         self.counts.updates_mapped += report.hits + report.misses;
         if selection.is_none() {

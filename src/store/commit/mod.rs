@@ -8,3 +8,4 @@ pub(super) mod committer;
 pub(super) mod flush;
 pub(super) mod input_record;
 pub(super) mod metadata;
+mod take_over;

@@ -3,4 +3,5 @@
 pub(super) mod quarantine;
 pub(super) mod recover;
 pub(super) mod salvage;
+pub(super) mod side_folder;
 pub(super) mod staged_map;

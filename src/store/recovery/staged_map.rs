@@ -117,7 +117,7 @@ fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
 }
 
 /// Removes what an interrupted attempt left; what is not of a map stays, and is an error.
-fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
+pub(super) fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
     match disk.kind_at(folder)? {
         None => return Ok(()),
         Some(EntryKind::Folder) => {}
@@ -136,15 +136,30 @@ const OWN_FILES: [&str; 6] =
 
 fn check_content(disk: &dyn Disk, layout: &Layout) -> Result<()> {
     for name in list(disk, layout.folder())? {
-        if !OWN_FILES.contains(&&*name) && tile_of_folder(&name).is_none() {
-            return Err(not_of_a_map(&layout.folder().join(name)));
+        let path = layout.folder().join(&name);
+        if path == layout.kept_scans() {
+            check_kept_scans(disk, layout)?;
+        } else if !OWN_FILES.contains(&&*name) && tile_of_folder(&name).is_none() {
+            return Err(not_of_a_map(&path));
         }
     }
     Ok(())
 }
 
+fn check_kept_scans(disk: &dyn Disk, layout: &Layout) -> Result<()> {
+    let folder = layout.kept_scans();
+    if disk.kind_at(&folder)? != Some(EntryKind::Folder) {
+        return Err(not_of_a_map(&folder));
+    }
+    let is_own = |name: &str| Layout::generation_of(name).is_some() || Layout::segment_of(name).is_some();
+    match list(disk, &folder)?.into_iter().find(|name| !is_own(name)) {
+        Some(name) => Err(not_of_a_map(&folder.join(name))),
+        None => Ok(()),
+    }
+}
+
 /// Removes the files of a map and the folders of its tiles, those that tell what it is first.
-fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) -> Result<()> {
+pub(super) fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) -> Result<()> {
     check_content(disk, layout)?;
     let remove = |path: &Path| match disk.remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Error::io(path, "remove", error)),
@@ -153,8 +168,10 @@ fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) -> Result<(
     for name in OWN_FILES.iter().filter(|&&name| name != "writer.lock") {
         remove(&layout.folder().join(name))?;
     }
-    for tile in list(disk, layout.folder())?.iter().filter_map(|name| tile_of_folder(name)) {
-        let folder = layout.tile_folder(tile);
+    let names = list(disk, layout.folder())?;
+    let kept_scans = Some(layout.kept_scans()).filter(|kept| names.iter().any(|name| kept.ends_with(name)));
+    let tiles = names.iter().filter_map(|name| tile_of_folder(name)).map(|tile| layout.tile_folder(tile));
+    for folder in tiles.chain(kept_scans) {
         if disk.kind_at(&folder)? != Some(EntryKind::Folder) {
             // A link could lead anywhere.
             return Err(not_of_a_map(&folder));

@@ -1,6 +1,6 @@
 //! The scans that a map keeps, as part of a [`TileStore`].
 
-use super::catalog::KeptRecords;
+use super::catalog::{KeptRecords, generation_of};
 use super::catalog_entry::{CatalogEntry, SegmentPlace};
 use super::scan_keeper::{Catalog, remove_unneeded};
 use super::scan_list::read_scans;
@@ -94,6 +94,15 @@ impl TileStore {
     pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
         let commits = self.commits();
         KeptRecords::open(&**self.disk(), self.layout(), commits.flush_number, commits.scan_number)
+    }
+
+    /// The catalog that they are in. Scans add to it; what changes earlier entries makes another one.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub(crate) fn catalog_generation(&self) -> Result<Option<u64>> {
+        generation_of(&**self.disk(), self.layout(), self.commits().flush_number)
     }
 
     /// Writes what belongs to the next commit, synced.

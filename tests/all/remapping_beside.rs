@@ -1,0 +1,220 @@
+//! Remapping beside a mapper that goes on; what it makes of random lives is tested where the others are (`remapping`).
+
+use crate::support::message_of;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use testkit::random_scans::{Random, random_scan};
+use voxtile::integrity::{Finding, Severity, verify};
+use voxtile::operations::{
+    NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, remap, remove_scans,
+};
+use voxtile::scan::Stop;
+use voxtile::store::SnapshotName;
+use voxtile::{
+    Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Pose, ScanRef, Storage,
+};
+
+fn config() -> MapConfig {
+    let config = MapConfig::new(0.2, 3.2).unwrap().with_range(0.3, 12.0).with_kept_scans(true);
+    config.with_memory_bytes(20 << 20)
+}
+
+fn how() -> Remap {
+    Remap::new(Rework::default().with_memory_bytes(20 << 20))
+}
+
+fn insert(mapper: &mut OutOfCoreTileMapper, number: u64) {
+    let points = random_scan(&mut Random(number), [0.0; 3], 60).points;
+    mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &points)).unwrap();
+}
+
+/// A drive along x; the corrected one is some metres beside it.
+fn pose(number: u64, y: f64) -> Pose {
+    Pose::from_quaternion([0.3 * number as f64, y, 0.0], [0.0, 0.0, 0.1, 1.0]).unwrap()
+}
+
+fn moved(scans: u64) -> NewPoses {
+    NewPoses::Numbered((1..=scans).map(|number| (number, pose(number, 1.7))).collect())
+}
+
+fn with_scans(folder: &Path, config: MapConfig, scans: u64) -> OutOfCoreTileMapper {
+    let mut mapper = OutOfCoreTileMapper::create(folder, config).unwrap();
+    (1..=scans).for_each(|number| insert(&mut mapper, number));
+    mapper.flush().unwrap();
+    mapper
+}
+
+fn digest_of(folder: &Path) -> String {
+    let is_damage = |finding: &Finding| finding.severity == Severity::Damage;
+    let found = |finding: &Finding| assert!(!is_damage(finding), "{finding}");
+    verify(folder, found, |_, _| ()).unwrap();
+    MapReader::open(folder, 1).unwrap().digest().unwrap().to_string()
+}
+
+fn nothing_is_left_beside(folder: &Path) {
+    let names: Vec<_> = std::fs::read_dir(folder.parent().unwrap()).unwrap().flatten().collect();
+    assert!(names.iter().all(|entry| entry.file_name() != "map.remapping"), "{names:?}");
+}
+
+/// A mapper that takes scans, flushes beside them and is read, while another thread follows it; for both storages, and
+/// for poses that move some of the scans or all.
+#[test]
+fn scans_go_on_while_the_map_is_mapped_again() {
+    for (storage, moving) in [(Storage::OctoMap, 40), (Storage::Compact, 8)] {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("map");
+        let mut mapper = with_scans(&folder, config().with_storage(storage), 40);
+        let beside = RemapBeside::begin(&folder, &moved(moving), &how()).unwrap();
+        assert!(beside.moves_scans());
+        let (is_over, mut followed) = (AtomicBool::new(false), 0);
+        let beside = std::thread::scope(|scope| {
+            let follower = scope.spawn(|| {
+                let mut beside = beside;
+                while !is_over.load(Ordering::Relaxed) {
+                    followed += beside.follow(|_| ()).unwrap();
+                }
+                beside
+            });
+            for number in 41..=90 {
+                insert(&mut mapper, number);
+                if number % 10 == 0 {
+                    mapper.begin_flush().unwrap();
+                }
+            }
+            mapper.flush().unwrap();
+            is_over.store(true, Ordering::Relaxed);
+            follower.join().unwrap()
+        });
+        insert(&mut mapper, 91);
+        mapper.flush().unwrap();
+        drop(mapper);
+        let told = beside.finish().unwrap();
+        assert!((40..=91).contains(&followed), "{followed}");
+        assert_eq!((told.mapped.scans, told.mapped.scans_changed), (91, moving), "{told:?}");
+        assert!((told.largest_move_m - 1.7).abs() < 1e-9, "{told:?}");
+        assert!(told.mapped.tiles_mapped > 0 && told.mapped.tiles_mapped <= told.mapped.tiles, "{told:?}");
+
+        // What the command makes of the same scans and poses.
+        let other = place.path().join("other");
+        drop(with_scans(&other, config().with_storage(storage), 91));
+        remap(&*other, &moved(moving), &how(), |_, _| ()).unwrap();
+        assert_eq!(digest_of(&folder), digest_of(&other), "{storage:?}");
+        nothing_is_left_beside(&folder);
+
+        // It goes on, and can be mapped again: its scans know their poses and tiles.
+        for map in [&folder, &other] {
+            let mut mapper = OutOfCoreTileMapper::open(&**map, config()).unwrap();
+            insert(&mut mapper, 92);
+            mapper.flush().unwrap();
+            drop(mapper);
+            remove_scans(&**map, &ScanSelection::Numbers(3, 50), false, &Rework::default(), |_, _| ())
+                .unwrap();
+        }
+        assert_eq!(digest_of(&folder), digest_of(&other), "{storage:?}, without some scans");
+    }
+}
+
+#[test]
+fn poses_that_move_nothing_leave_the_map_alone() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("map");
+    drop(with_scans(&folder, config(), 5));
+    let commits = std::fs::read(folder.join("commits.log")).unwrap();
+    let same = NewPoses::Numbered((1..=5).map(|number| (number, pose(number, 0.0))).collect());
+    let mut beside = RemapBeside::begin(&folder, &same, &how()).unwrap();
+    assert!(!beside.moves_scans());
+    assert_eq!(beside.follow(|_| ()).unwrap(), 0);
+    assert_eq!(beside.finish().unwrap().mapped.scans_changed, 0);
+    assert_eq!(std::fs::read(folder.join("commits.log")).unwrap(), commits);
+}
+
+/// Another process changed earlier scans between the mapper and the end: nothing is taken over.
+#[test]
+fn scans_that_were_changed_meanwhile_are_not_overwritten() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("map");
+    drop(with_scans(&folder, config(), 6));
+    let begun = || {
+        let mut beside = RemapBeside::begin(&folder, &moved(6), &how()).unwrap();
+        beside.follow(|_| ()).unwrap();
+        beside
+    };
+    let beside = begun();
+    remove_scans(&*folder, &ScanSelection::Numbers(2, 2), false, &Rework::default(), |_, _| ()).unwrap();
+    let digest = digest_of(&folder);
+    assert!(matches!(beside.finish(), Err(Error::Changed { .. })));
+    assert_eq!(digest_of(&folder), digest);
+    nothing_is_left_beside(&folder);
+
+    let moved = moved(1);
+    let beside = RemapBeside::begin(&folder, &moved, &how()).unwrap();
+    let region = voxtile::Aabb { min: [0.0; 3], max: [1.0; 3] };
+    clear(&*folder, &Part::Inside(region), |_, _| ()).unwrap();
+    let digest = digest_of(&folder);
+    let message = message_of(beside.finish());
+    assert!(message.contains("a change that is no scan: clear"), "{message}");
+    assert_eq!(digest_of(&folder), digest);
+}
+
+#[test]
+fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("map");
+    let mut mapper = with_scans(&folder, config(), 6);
+    let digest = digest_of(&folder);
+    let stop = Stop::default();
+    let mut stoppable = how();
+    stoppable.rework = stoppable.rework.with_stop(stop.clone());
+    let mut beside = RemapBeside::begin(&folder, &moved(6), &stoppable).unwrap();
+    let second = RemapBeside::begin(&folder, &moved(6), &how());
+    assert!(matches!(second, Err(Error::Locked { .. })), "{second:?}");
+    assert!(place.path().join("map.remapping").exists());
+    assert!(matches!(
+        beside.follow(|scan| if scan == 2 {
+            stop.set()
+        }),
+        Err(Error::Stopped)
+    ));
+    drop(beside);
+    nothing_is_left_beside(&folder);
+    insert(&mut mapper, 7);
+    mapper.flush().unwrap();
+    // Not while the mapper has the map.
+    let beside = RemapBeside::begin(&folder, &moved(6), &how()).unwrap();
+    assert!(matches!(beside.finish(), Err(Error::Locked { .. })));
+    nothing_is_left_beside(&folder);
+    drop(mapper);
+    assert_ne!(digest_of(&folder), digest);
+
+    let message = message_of(RemapBeside::begin(&folder, &moved(8), &how()));
+    assert!(message.contains("no scan with the number 8"), "{message}");
+    let mut dry = how();
+    dry.rework = dry.rework.with_dry_run(true);
+    assert!(message_of(RemapBeside::begin(&folder, &moved(6), &dry)).contains("dry_run"));
+    // What is not of a map stays, and is in the way.
+    std::fs::create_dir_all(place.path().join("map.remapping/kept_scans")).unwrap();
+    std::fs::write(place.path().join("map.remapping/kept_scans/letter.txt"), "dear").unwrap();
+    let message = message_of(RemapBeside::begin(&folder, &moved(6), &how()));
+    assert!(message.contains("letter.txt"), "{message}");
+    assert!(place.path().join("map.remapping/kept_scans/letter.txt").exists());
+}
+
+#[test]
+fn a_snapshot_keeps_the_map_as_it_was_before_the_end() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("map");
+    let mut mapper = with_scans(&folder, config(), 6);
+    let name = SnapshotName::new("before").unwrap();
+    let mut keeping = how();
+    keeping.rework = keeping.rework.with_keep_as(name.clone());
+    let beside = RemapBeside::begin(&folder, &moved(6), &keeping).unwrap();
+    insert(&mut mapper, 7);
+    mapper.flush().unwrap();
+    drop(mapper);
+    let digest = digest_of(&folder);
+    beside.finish().unwrap();
+    let kept = MapReader::open_snapshot(&*folder, &name, 1).unwrap();
+    assert_eq!(kept.digest().unwrap().to_string(), digest);
+    assert_eq!(kept.scan_number(), 7);
+    assert_ne!(digest_of(&folder), digest);
+}
