@@ -10,9 +10,10 @@ use serde::Serialize;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
+use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, OctreeMap};
 use voxtile::operations::{self, Decay, Part, Prefer};
-use voxtile::{Error, Result, SnapshotName, Stop, integrity, octree};
+use voxtile::{Error, Result, SnapshotName, Stop, TileIndex, integrity, octree};
 
 /// Tiles of each map that is read.
 const CACHE_TILES: usize = 32;
@@ -220,14 +221,31 @@ pub fn decay<'py>(
 }
 
 /// Checks every file of a map: a dict of sums, with a list of what was found in `"findings"`. The map is whole if
-/// `"damage"` is 0.
+/// `"damage"` is 0. `tiles` are the only ones to be checked, and nothing else is; `but_tiles` checks all but tiles.
 #[pyfunction]
-#[pyo3(signature = (map, *, progress=None))]
-pub fn verify<'py>(py: Python<'py>, map: PathBuf, progress: Callback) -> PyResult<Bound<'py, PyAny>> {
+#[pyo3(signature = (map, *, tiles=None, but_tiles=false, progress=None))]
+pub fn verify<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    tiles: Option<Vec<[i32; 3]>>,
+    but_tiles: bool,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let scope = match (tiles, but_tiles) {
+        (None, false) => VerifyScope::All,
+        (None, true) => VerifyScope::AllButTiles,
+        (Some(tiles), false) => {
+            VerifyScope::Tiles(tiles.into_iter().map(|[x, y, z]| TileIndex { x, y, z }).collect())
+        }
+        (Some(_), true) => {
+            return Err(wrong(py, "but_tiles", "tiles are named too; leave out one of the two"));
+        }
+    };
     let mut findings = Vec::new();
     let sums = told(py, progress, |_, progress| {
-        integrity::verify(
+        integrity::verify_scope(
             &map,
+            &scope,
             |finding| findings.push(finding.clone()),
             |done, all| progress.tell(done, all),
         )

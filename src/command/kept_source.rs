@@ -1,14 +1,18 @@
 use crate::command::map_at::MapAt;
+use crate::command::new_poses::{PoseFile, poses_for, records_of};
 use crate::io::{PointStore, ScanHead, ScanSource};
 use crate::mapper::KeptScans;
-use crate::scan::ScanPoints;
+use crate::scan::{Pose, ScanPoints};
 use crate::{Error, Result};
+use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
 
 /// The scans that a map or a snapshot of one keeps, as an input like any other.
 pub struct KeptSource {
     path: PathBuf,
     scans: KeptScans,
+    /// Those that take the place of the scans' own, by their numbers.
+    new_poses: FxHashMap<u64, Pose>,
     count: usize,
     crs: Option<String>,
     fingerprint: String,
@@ -23,8 +27,13 @@ pub fn is_map(path: &Path) -> bool {
 }
 
 impl KeptSource {
-    pub fn open(path: &Path) -> Result<Self> {
+    /// Opens them with their own poses, or with those of a file.
+    pub fn open(path: &Path, poses: Option<&PoseFile<'_>>) -> Result<Self> {
         let reader = MapAt::of(path)?.open()?;
+        let new_poses = match poses {
+            Some(poses) => poses_for(poses, &records_of(&reader)?)?.by_number(reader.kept_records()?)?,
+            None => FxHashMap::default(),
+        };
         let (mut records, mut count) = (reader.kept_scans()?, 0);
         while records.next_record()?.is_some() {
             count += 1;
@@ -33,7 +42,8 @@ impl KeptSource {
         let id = ext.map_or("", |ext| &ext.map_id);
         let fingerprint = format!("kept scans of map {id} as of flush {}", reader.flush_number());
         let crs = ext.and_then(|ext| ext.crs.clone());
-        Ok(Self { path: path.to_owned(), scans: reader.kept_scans()?, count, crs, fingerprint })
+        let scans = reader.kept_scans()?;
+        Ok(Self { path: path.to_owned(), scans, new_poses, count, crs, fingerprint })
     }
 }
 
@@ -44,13 +54,14 @@ impl ScanSource for KeptSource {
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
         let Some(scan) = self.scans.next().transpose()? else { return Ok(None) };
-        let Some(world_from_sensor) = scan.world_from_sensor() else {
+        let Some(own) = scan.world_from_sensor() else {
             let reason = format!(
                 "scan {} has its points in the world frame and no pose; `voxtile remap -o` maps it all the same",
                 scan.number()
             );
             return Err(Error::argument(self.path.display().to_string(), reason));
         };
+        let world_from_sensor = self.new_poses.get(&scan.number()).copied().unwrap_or(own);
         points.begin(scan.has_intensities());
         let mut pushed = Ok(());
         scan.for_each_own_chunk(0..scan.len(), &mut |some, intensities| {

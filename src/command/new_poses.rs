@@ -1,6 +1,7 @@
 use crate::command::args::RemapArgs;
 use crate::command::read_options::pose_of;
-use crate::io::read_poses;
+use crate::io::{ReadOptions, read_poses};
+use crate::mapper::MapReader;
 use crate::operations::NewPoses;
 use crate::scan::Pose;
 use crate::store::KeptRecord;
@@ -12,12 +13,51 @@ use voxtile_clouds::poses::{Found, Trajectory};
 /// Most scans that an error names.
 const MOST_NAMED: usize = 5;
 
+/// How a file of poses is read.
+pub struct PoseFile<'a> {
+    pub path: &'a Path,
+    /// The `calib.txt` of KITTI.
+    pub calib: Option<&'a Path>,
+    /// Where the sensor is in the body that the poses are of.
+    pub body_from_sensor: Option<RigidPose>,
+    pub tolerance_ns: i64,
+}
+
+impl<'a> PoseFile<'a> {
+    pub fn of_remap(args: &'a RemapArgs, path: &'a Path) -> Result<Self> {
+        let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
+        let tolerance_ns = (args.pose_tolerance * 1e9).round() as i64;
+        Ok(Self { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns })
+    }
+
+    /// `None` if scans are to keep their own poses.
+    pub fn of_reading(options: &'a ReadOptions) -> Option<Self> {
+        let body = options.clouds.body_from_sensor;
+        Some(Self {
+            path: options.poses.as_deref()?,
+            calib: options.calib.as_deref(),
+            body_from_sensor: (body != RigidPose::IDENTITY).then_some(body),
+            tolerance_ns: options.clouds.pose_tolerance_ns,
+        })
+    }
+}
+
+/// The scans that a map keeps, without their tiles, of which a long drive has many.
+pub fn records_of(reader: &MapReader) -> Result<Vec<KeptRecord>> {
+    reader.check_keeps_all()?;
+    let (mut records, mut scans) = (reader.kept_scans()?, Vec::new());
+    while let Some(mut record) = records.next_record()? {
+        record.tiles = Vec::new();
+        scans.push(record);
+    }
+    Ok(scans)
+}
+
 /// The poses of a file for the scans that a map keeps, as a build with that file would give them.
-pub fn poses_for(args: &RemapArgs, file: &Path, scans: &[KeptRecord]) -> Result<NewPoses> {
-    let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
-    let is_plain = args.calib.is_none() && body_from_sensor.is_none();
-    let tolerance_ns = (args.pose_tolerance * 1e9).round() as i64;
-    let trajectory = Trajectory::read(file, args.calib.as_deref())?;
+pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> {
+    let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns } = from;
+    let is_plain = calib.is_none() && body_from_sensor.is_none();
+    let trajectory = Trajectory::read(file, calib)?;
     // Stamps that mean nothing are all the same.
     if trajectory.span_ns().is_none_or(|[first, last]| first < last) {
         trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));

@@ -2,7 +2,7 @@ use crate::command::args::{InsertName, ModelName, RemapArgs};
 use crate::command::json;
 use crate::command::map_at::{MapAt, whole_map};
 use crate::command::memory;
-use crate::command::new_poses::poses_for;
+use crate::command::new_poses::{PoseFile, poses_for, records_of};
 use crate::command::rework::{self, Job};
 use crate::mapper::{MapReader, MapView};
 use crate::operations::{Remap, Remapped, map_anew, remap};
@@ -35,14 +35,8 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let tolerance = args.tolerance.as_deref().map(tolerance_of).transpose()?;
     let job = Job::of(&args.rework, map)?;
     let poses = {
-        let reader = MapReader::open(map, 1)?;
-        reader.check_keeps_all()?;
-        let (mut records, mut scans) = (reader.kept_scans()?, Vec::new());
-        while let Some(mut record) = records.next_record()? {
-            record.tiles = Vec::new();
-            scans.push(record);
-        }
-        poses_for(args, file, &scans)?
+        let scans = records_of(&MapReader::open(map, 1)?)?;
+        poses_for(&PoseFile::of_remap(args, file)?, &scans)?
     };
     let how = Remap::new(job.rework.clone()).with_tolerance(tolerance);
     let outcome = remap(map, &poses, &how, |done, all| job.progress.set(done, all));

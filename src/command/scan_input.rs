@@ -1,4 +1,5 @@
 use crate::command::kept_source::{KeptSource, is_map};
+use crate::command::new_poses::PoseFile;
 use crate::io::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
 use crate::{Error, Result};
 use std::io::{BufReader, stdin};
@@ -15,11 +16,8 @@ pub fn is_standard_input(scans: &Path) -> bool {
 /// Opens scans, which are a scan stream if they come from standard input.
 pub fn open(scans: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     if is_map(scans) && options.open.format.is_none() {
-        if options.poses.is_some() {
-            let reason = "the scans that a map keeps have their poses; `voxtile remap` gives them others";
-            return Err(Error::argument("--poses", reason));
-        }
-        return Ok(options.selection.clone().of(Box::new(KeptSource::open(scans)?)));
+        let source = KeptSource::open(scans, PoseFile::of_reading(options).as_ref())?;
+        return Ok(options.selection.clone().of(Box::new(source)));
     }
     if !is_standard_input(scans) {
         return open_any_scans(scans, options);

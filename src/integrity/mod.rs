@@ -19,4 +19,4 @@ mod verify;
 
 pub use finding::{Finding, Severity};
 pub use repair::{Action, ActionKind, Repair, repair};
-pub use verify::{Verification, verify};
+pub use verify::{Verification, VerifyScope, verify, verify_scope};

@@ -11,6 +11,7 @@ use crate::store::{
     Disk, EntryKind, KEPT_SCANS, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage,
     SnapshotList, SnapshotName, TileFile, TileStore, TileVersion, check_scans, read_log, tile_of_folder,
 };
+use rustc_hash::FxHashSet;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -26,7 +27,7 @@ pub struct Verification {
     pub flush_number: u64,
     /// Number of the last scan in it.
     pub scan_number: u64,
-    /// Tiles of the map.
+    /// Tiles that were looked at: those of the map, or of the scope.
     pub tiles: u64,
     /// Snapshots of the map.
     pub snapshots: u64,
@@ -60,6 +61,46 @@ pub fn verify(
     found: impl FnMut(&Finding),
     progress: impl FnMut(u64, u64),
 ) -> Result<Verification> {
+    verify_scope(folder, &VerifyScope::All, found, progress)
+}
+
+/// Which part of a map is checked: the scopes of several processes may add up to the whole.
+#[derive(Clone, Debug, Default)]
+pub enum VerifyScope {
+    /// All of it.
+    #[default]
+    All,
+    /// The files of these tiles as of the last flush; those that the map has not got are left out.
+    Tiles(FxHashSet<TileIndex>),
+    /// All but the files of tiles as of the last flush: lists, scans, snapshots, what lies around.
+    AllButTiles,
+}
+
+impl VerifyScope {
+    fn has_tile(&self, tile: TileIndex) -> bool {
+        match self {
+            Self::All => true,
+            Self::Tiles(tiles) => tiles.contains(&tile),
+            Self::AllButTiles => false,
+        }
+    }
+
+    fn has_rest(&self) -> bool {
+        !matches!(self, Self::Tiles(_))
+    }
+}
+
+/// The same for a part of the map. What is wrong with the list of tiles itself is found in every part.
+///
+/// # Errors
+///
+/// As for [`verify`].
+pub fn verify_scope(
+    folder: impl Into<MapPath>,
+    scope: &VerifyScope,
+    found: impl FnMut(&Finding),
+    progress: impl FnMut(u64, u64),
+) -> Result<Verification> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
     let layout = Layout::new(folder);
@@ -67,6 +108,7 @@ pub fn verify(
         listed: None,
         disk: &*disk,
         layout,
+        scope,
         found,
         progress,
         counts: Verification::default(),
@@ -98,6 +140,7 @@ pub fn verify(
 struct Verifier<'a, F, P> {
     disk: &'a dyn Disk,
     layout: Layout,
+    scope: &'a VerifyScope,
     found: F,
     progress: P,
     counts: Verification,
@@ -135,6 +178,25 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 (Some(torn.at), format!("a flush that never happened: {}", torn.reason));
             self.report(note);
         }
+        if self.scope.has_rest() {
+            self.verify_scans(disk, store)?;
+        }
+        let mut tiles: Vec<_> = store.tiles().collect();
+        tiles.sort_unstable();
+        let chosen: Vec<_> = tiles.iter().copied().filter(|&tile| self.scope.has_tile(tile)).collect();
+        self.counts.tiles = chosen.len() as u64;
+        for (done, tile) in (1..).zip(&chosen) {
+            self.verify_tile(store, config, *tile)?;
+            (self.progress)(done, chosen.len() as u64);
+        }
+        if !self.scope.has_rest() {
+            return Ok(());
+        }
+        let seen = self.verify_snapshots(disk, store, config)?;
+        self.look_around(&seen, |tile| tiles.binary_search(&tile).is_ok())
+    }
+
+    fn verify_scans(&mut self, disk: &Arc<dyn Disk>, store: &TileStore) -> Result<()> {
         let records = store.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
         if let Err(error) = check_scans(self.disk, &self.layout, self.counts.flush_number, records) {
             let finding = Finding::of(error)?;
@@ -145,15 +207,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 self.report(error);
             }
         }
-        let mut tiles: Vec<_> = store.tiles().collect();
-        tiles.sort_unstable();
-        self.counts.tiles = tiles.len() as u64;
-        for (done, tile) in (1..).zip(&tiles) {
-            self.verify_tile(store, config, *tile)?;
-            (self.progress)(done, tiles.len() as u64);
-        }
-        let seen = self.verify_snapshots(disk, store, config)?;
-        self.look_around(&seen, |tile| tiles.binary_search(&tile).is_ok())
+        Ok(())
     }
 
     fn verify_tile(&mut self, store: &TileStore, config: &MapConfig, tile: TileIndex) -> Result<()> {

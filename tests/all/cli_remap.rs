@@ -85,6 +85,23 @@ fn a_map_follows_its_poses_and_is_then_as_if_built_with_them() {
     assert!(told.contains("0 scans moved"), "{told}");
 }
 
+/// The map that keeps the scans stays as it is; another one has the new poses.
+#[test]
+fn another_map_is_built_from_kept_scans_with_other_poses() {
+    let kept = Kept::new();
+    let (before, moved) = (digest(&kept.map), kept.poses("moved.txt", 0.3));
+    let wanted = kept.digest_with(&moved, "again");
+    let other = kept.path("other");
+    output(&[&["build", &kept.map, "-o", &other, "--poses", &moved][..], &TILES].concat());
+    assert_eq!((digest(&other), digest(&kept.map)), (wanted.clone(), before));
+    assert_ne!(wanted, digest(&kept.map));
+    // Two poses for three scans.
+    let lines: Vec<_> = fs::read_to_string(&moved).unwrap().lines().take(2).map(str::to_owned).collect();
+    fs::write(&moved, lines.join("\n")).unwrap();
+    let message = fails(&["build", &kept.map, "-o", &kept.path("none"), "--poses", &moved], 2);
+    assert!(message.contains("2 poses for 3 scans that the map keeps: none from scan 3 on"), "{message}");
+}
+
 #[test]
 fn kept_scans_are_told_exported_and_built_again() {
     let kept = Kept::new();

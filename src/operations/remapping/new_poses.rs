@@ -29,7 +29,7 @@ impl NewPoses {
     /// # Errors
     ///
     /// A scan without a pose, a pose without a scan, numbers that are not finite: named.
-    pub(super) fn by_number(&self, mut records: KeptRecords) -> Result<FxHashMap<u64, Pose>> {
+    pub(crate) fn by_number(&self, mut records: KeptRecords) -> Result<FxHashMap<u64, Pose>> {
         let mut scans = Vec::new();
         while let Some(record) = records.next_kept()? {
             scans.push((record.number, record.stamp_ns));

@@ -9,6 +9,7 @@ use crate::setting::{RAYS, Setting, made_up, mib};
 use crate::task::Apart;
 use anyhow::Result;
 use report::{Cell, Table};
+use voxtile::Storage;
 use workload::SurveyName;
 
 /// Worst of a thousand calls by their median.
@@ -18,7 +19,7 @@ const MOST_MS: f64 = 100.0;
 /// CPU time by that of flushes that stop the mapper.
 const MOST_CPU: f64 = 1.1;
 /// What the slow disk moves in a second, reads and writes together.
-const SLOW_BYTES_PER_S: f64 = 40e6;
+const SLOW: DiskSpeed = DiskSpeed::BytesPerSecond(40e6);
 /// As the command has it.
 const LIMIT: Limit = Limit::Bytes(512 << 20);
 
@@ -32,17 +33,21 @@ struct Driven {
 pub fn answer(setting: &Setting) -> Result<Findings> {
     let scans = setting.size(5_000, 60);
     let case = made_up("drive", (SurveyName::Drive, RAYS, scans), [0.1, 10.0, 60.0]);
-    let disks: &[(&str, DiskSpeed)] = setting.size(
-        &[("own speed", DiskSpeed::Own), ("40 MB/s", DiskSpeed::BytesPerSecond(SLOW_BYTES_PER_S))],
-        &[("not synced", DiskSpeed::Unsynced)],
+    let disks: &[(&str, DiskSpeed, Storage)] = setting.size(
+        &[
+            ("own speed", DiskSpeed::Own, Storage::OctoMap),
+            ("40 MB/s", SLOW, Storage::OctoMap),
+            ("40 MB/s, `compact`", SLOW, Storage::Compact),
+        ],
+        &[("not synced", DiskSpeed::Unsynced, Storage::OctoMap)],
     );
     let mut findings = Findings::default();
     let mut driven = Vec::new();
-    for &(disk, speed) in disks {
+    for &(disk, speed, storage) in disks {
         for is_beside in [false, true] {
             let (every_scans, period_s) = setting.size((100, 0.1), (10, 0.0));
             let flushes = Some(Flushes { every_scans, period_s, is_beside });
-            let build = Build { disk: speed, flushes, ..setting.build(&case, LIMIT) };
+            let build = Build { disk: speed, storage, flushes, ..setting.build(&case, LIMIT) };
             let built = build.clone().apart()?;
             findings.keep_build(&build, &built)?;
             driven.push(Driven { disk, is_beside, built });
@@ -86,7 +91,7 @@ impl Driven {
 
 fn table(case: &str, driven: &[Driven]) -> Table {
     let caption = format!(
-        "Wall time of calls at ten scans a second with a flush every ten seconds, limit 512 MiB, storage `octomap`; {case}. \
+        "Wall time of calls at ten scans a second with a flush every ten seconds, limit 512 MiB, storage `octomap` where nothing else is said; {case}. \
          A flush beside the mapper returns once it has begun."
     );
     let columns = [
