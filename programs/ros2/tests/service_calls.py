@@ -9,7 +9,7 @@ EVERYWHERE = Point(-1e3, -1e3, -1e3), Point(1e3, 1e3, 1e3)
 
 
 def check(call, lie, published, diagnostics):
-    """call: a function for each service. lie: sends requests whose lengths lie. The others: messages that came since."""
+    """call: a function for each service. lie: sends requests that lie. The others: messages that came since."""
 
     def whole(binary=True):
         response = call["octomap_in_box"](*EVERYWHERE, binary)

@@ -1,4 +1,4 @@
-"""A node of ROS 2 over Zenoh, written after the design of rmw_zenoh_cpp (docs/design.md there) and not after the node."""
+"""A node of ROS 2 over Zenoh, written after the design of rmw_zenoh_cpp (its docs/design.md) and not after ours."""
 
 import itertools
 import os

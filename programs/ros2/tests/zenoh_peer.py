@@ -45,7 +45,10 @@ def main():
     for number, (name, message) in enumerate(messages(clouds, "friendly", "")):
         if is_hostile and number == 20:
             key = graph.announce("MP", "/cloud_in", "sensor_msgs/PointCloud2", "2::,5:,:,:,,")
+            # What waits is taken before: these push out what is older.
+            time.sleep(0.3)
             hostilities(graph, key)
+            time.sleep(0.3)
         if is_hostile and name == "/cloud_in" and number > 20:
             liar = cloud(0, 1)
             liar.header.stamp = message.header.stamp

@@ -84,6 +84,18 @@ def check_tokens(graph):
     assert ends["SS"]["/voxtile_ros2/save"] == ("std_srvs::srv::dds_::Trigger_", trigger, "::,10:,:,:,,")
 
 
+def eventually(check, seconds=20):
+    """The graph spreads: what is not so at first has to be so at last."""
+    until = time.time() + seconds
+    while True:
+        try:
+            return check()
+        except (AssertionError, ValueError):
+            if time.time() > until:
+                raise
+        time.sleep(0.2)
+
+
 def lie(graph, key):
     """Requests of which nothing is right; each is answered with what is wrong, or not at all."""
     liar = b"\0\1\0\0" + struct.pack("<I", 2**32 - 1)
@@ -107,7 +119,7 @@ def main():
     if sys.argv[3:] == ["again"]:
         print("zenoh: after another router came:", calls["save"][0]().message)
         return
-    check_tokens(graph)
+    eventually(lambda: check_tokens(graph))
     octomap = "octomap_msgs/Octomap"
     published = Topic(graph, "/octomap_binary", octomap, Octomap, latched=True, depth=1)
     diagnostics = Topic(graph, "/diagnostics", "diagnostic_msgs/DiagnosticArray", DiagnosticArray)
