@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# The node beside an independent peer (Cyclone DDS from PyPI), over loopback: the map of the node and the map that
-# `voxtile build` makes of the same messages have one digest, with a hostile peer too; what the node publishes is what
-# `voxtile export` writes, and its services do what they say. Without Python or PyPI it says so and passes.
+# The node beside an independent peer (Cyclone DDS from PyPI; for zenoh, eclipse-zenoh), over loopback: the map of the
+# node and the map that `voxtile build` makes of the same messages have one digest, with a hostile peer too; what the
+# node publishes is what `voxtile export` writes, and its services do what they say. Without Python or PyPI it says so
+# and passes.
 #
-# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood]
+# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [zenoh]
 #
-# VOXTILE_ROS2_PYTHON names a Python that has the packages, VOXTILE and VOXTILE_ROS2 name programs that are built.
+# VOXTILE_ROS2_PYTHON names a Python that has the packages, VOXTILE_ZENOH_PYTHON one that has eclipse-zenoh too; VOXTILE
+# and VOXTILE_ROS2 name programs that are built, VOXTILE_ROS2_ZENOH the node with the feature `zenoh`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -17,7 +19,9 @@ trap 'for one in $node $listener; do kill "$one" 2>/dev/null || true; done; rm -
 python=${VOXTILE_ROS2_PYTHON:-}
 if [ -z "$python" ]; then
     python=$work/venv/bin/python
-    if ! { python3 -m venv "$work/venv" && "$python" -m pip -q install cyclonedds==11.0.1 rosbags numpy; }; then
+    packages="cyclonedds==11.0.1 eclipse-zenoh rosbags numpy"
+    # shellcheck disable=SC2086
+    if ! { python3 -m venv "$work/venv" && "$python" -m pip -q install $packages; }; then
         echo "skipped: no Python with cyclonedds and rosbags; name one with VOXTILE_ROS2_PYTHON"
         exit 0
     fi
@@ -29,7 +33,7 @@ if [ -z "$voxtile" ]; then
     voxtile=$built/voxtile
 fi
 program=${VOXTILE_ROS2:-}
-if [ -z "$program" ]; then
+if [ -z "$program" ] && [ "$*" != zenoh ]; then
     cargo build -q --locked -p voxtile-ros2
     program=$built/voxtile-ros2
 fi
@@ -113,10 +117,29 @@ flood() {
     [ $((mapped + without)) = "$waiting" ] && [ "$mapped" -gt 0 ] || fail "those that waited are not mapped"
 }
 
+# The node is built once more: the feature is off by default.
+zenoh() {
+    local python=${VOXTILE_ZENOH_PYTHON:-$python} program=${VOXTILE_ROS2_ZENOH:-}
+    if ! "$python" -c 'import zenoh, zenoh.ext, cyclonedds, rosbags' 2>/dev/null; then
+        echo "skipped: no Python with eclipse-zenoh; name one with VOXTILE_ZENOH_PYTHON"
+        return
+    fi
+    if [ -z "$program" ]; then
+        cargo build -q --locked -p voxtile-ros2 --features zenoh
+        program=$built/voxtile-ros2
+    fi
+    export python voxtile program outputs radius max_z inflation_range
+    programs/ros2/tests/zenoh.sh "$work"
+}
+
 # A street of real clouds where they are at hand.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
-for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood}; do
+for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood zenoh}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
+    if [ $kind = zenoh ]; then
+        zenoh
+        continue
+    fi
     if [ $kind = flood ]; then
         domain=$((RANDOM % 100 + 100))
         flood

@@ -1,6 +1,7 @@
 use crate::names::Names;
 use crate::publishers::Extent;
 use crate::services::Rmw;
+use crate::transport::TransportName;
 use crate::when_behind::WhenBehind;
 use anyhow::ensure;
 use bytesize::ByteSize;
@@ -13,7 +14,7 @@ use voxtile::{MapConfig, SensorModel};
 
 const DEFAULT_INFLATION_M: f64 = 0.2;
 
-/// Map what the sensors of a robot see, from ROS 2 over DDS, into a map of voxtile. Lengths are metres, times seconds.
+/// Map what the sensors of a robot see, from ROS 2, into a map of voxtile. Lengths are metres, times seconds.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "voxtile-ros2", version, max_term_width = 80, args_override_self = true)]
 pub struct Args {
@@ -121,10 +122,19 @@ pub struct Args {
     /// Gives a topic or a service another name; give it again for each
     #[arg(long, value_name = "FROM:=TO")]
     pub remap: Vec<String>,
-    /// Middleware of those who call services
+    /// What carries messages: DDS, or Zenoh as rmw_zenoh_cpp speaks it
+    #[arg(long, value_enum, default_value_t = TransportName::Dds)]
+    pub transport: TransportName,
+    /// Router of Zenoh; give it again for each
+    #[arg(long, value_name = "ENDPOINT", default_value = "tcp/localhost:7447")]
+    pub zenoh_router: Vec<String>,
+    /// Configuration of Zenoh (JSON5), instead of --zenoh-router and --network
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["zenoh_router", "network"])]
+    pub zenoh_config: Option<PathBuf>,
+    /// Middleware of those who call services over DDS
     #[arg(long, value_enum, default_value_t = Rmw::Fastrtps)]
     pub rmw: Rmw,
-    /// DDS domain
+    /// Domain of ROS
     #[arg(long, value_name = "ID", env = "ROS_DOMAIN_ID", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=232))]
     pub domain_id: u16,

@@ -1,11 +1,12 @@
-//! The node `voxtile_ros2`: clouds and transforms from ROS 2 over DDS, into a map of voxtile. No ROS installation.
+//! The node `voxtile_ros2`: clouds and transforms from ROS 2, over DDS or Zenoh, into a map of voxtile. No ROS
+//! installation.
 //!
 //! ```text
-//! DDS -> RawMessage -> CloudQueue, TransformBuffer   node: a thread a topic
+//! Transport -> CloudQueue, TransformBuffer           node: a thread a topic
 //! CloudQueue -> cloud with its pose -> Mapper        mapping: one thread
-//! DDS -> corrected path -> Mapping -> Remapping      beside it: one thread, for as long as it takes
-//! LiveMap -> messages -> DDS                         publishers: one thread
-//! DDS -> orders -> Mapping, questions -> LiveMap     services: a thread a service
+//! Transport -> corrected path -> Mapping -> Remapping   beside it: one thread, for as long as it takes
+//! LiveMap -> messages -> Transport                   publishers: one thread
+//! Transport -> orders -> Mapping, questions -> LiveMap services: a thread a service
 //! ```
 
 mod args;
@@ -25,11 +26,11 @@ mod names;
 mod node;
 mod parameters;
 mod publishers;
-mod raw_message;
 mod remapping;
 mod services;
 mod stamp_check;
 mod transform_buffer;
+mod transport;
 mod when_behind;
 
 use args::Args;

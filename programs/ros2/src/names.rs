@@ -43,6 +43,12 @@ impl Names {
         self.mapped.iter().find(|[from, _]| *from == name).map_or(name, |[_, to]| to.clone())
     }
 
+    /// The namespace of the node; `/` for none.
+    #[cfg(feature = "zenoh")]
+    pub fn namespace(&self) -> &str {
+        &self.namespace
+    }
+
     /// The same as `ros2-client` takes it.
     ///
     /// # Errors

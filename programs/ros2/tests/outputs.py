@@ -17,9 +17,9 @@ from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from definitions import typestore
 from octrees import binary_leaves, full_leaves, octets, voxels_of
 from ros_messages import LATCHED, RELIABLE, MarkerArray, OccupancyGrid, Octomap, PointCloud2
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 TYPES = {
     "octomap_binary": (Octomap, "octomap_msgs/msg/Octomap"),
@@ -34,14 +34,6 @@ TYPES = {
 
 
 CHANGES = "octomap_point_cloud_changes"
-
-
-def typestore():
-    """ROS's own definitions."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    octomap = "std_msgs/Header header\nbool binary\nstring id\nfloat64 resolution\nint8[] data\n"
-    store.register(get_types_from_msg(octomap, "octomap_msgs/msg/Octomap"))
-    return store
 
 
 class Viewer:
@@ -89,9 +81,28 @@ def plain(name, message):
     return {**head, "resolution": message.resolution, "data": octets(message.data).hex()}
 
 
+class Taken:
+    """The last message of each topic, and how many came."""
+
+    def __init__(self):
+        self.got, self.viewer, self.store = {}, Viewer(), typestore()
+
+    def take(self, name, message, cdr):
+        # The classes here are those of ROS.
+        own = name.split("/")[-1]
+        self.store.deserialize_cdr(cdr, TYPES[own][1])
+        count = self.got.get(name, {"count": 0})["count"] + 1
+        told = self.viewer.take(message) if own == CHANGES else plain(own, message)
+        self.got[name] = {"count": count, "message": told}
+
+    def write(self, file):
+        with open(file, "w") as out:
+            json.dump(self.got, out)
+
+
 def listen(domain, file, seconds, topics):
     participant = DomainParticipant(domain)
-    store, got, readers, viewer = typestore(), {}, {}, Viewer()
+    readers, taken = {}, Taken()
     for name in topics or TYPES:
         qos = Qos(RELIABLE, LATCHED, Policy.History.KeepLast(100 if name == CHANGES else 1))
         kind = TYPES[name.split("/")[-1]][0]
@@ -100,16 +111,10 @@ def listen(domain, file, seconds, topics):
     while time.time() < until:
         for name, reader in readers.items():
             for message in reader.take(10):
-                if not hasattr(message, "serialize"):
-                    continue
-                # The classes here are those of ROS.
-                own = name.split("/")[-1]
-                store.deserialize_cdr(bytes(message.serialize()), TYPES[own][1])
-                count = got.get(name, {"count": 0})["count"] + 1
-                got[name] = {"count": count, "message": viewer.take(message) if own == CHANGES else plain(own, message)}
+                if hasattr(message, "serialize"):
+                    taken.take(name, message, bytes(message.serialize()))
         time.sleep(0.02)
-    with open(file, "w") as out:
-        json.dump(got, out)
+    taken.write(file)
 
 
 def pgm_cells(path):
@@ -216,11 +221,16 @@ def compare_whole(file, all_csv):
     print(f"outputs: {len(log_odds)} voxels in octomap_full")
 
 
-if sys.argv[1] == "whole":
-    compare_whole(*sys.argv[2:4])
-elif sys.argv[1] == "listen":
-    listen(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]), sys.argv[5:])
-else:
-    radius, max_z = map(float, sys.argv[6:8])
-    moment, inflation_range = sys.argv[8], float(sys.argv[9])
-    compare(*sys.argv[2:5], last_place(int(sys.argv[5])), radius, max_z, moment, inflation_range)
+def main():
+    if sys.argv[1] == "whole":
+        compare_whole(*sys.argv[2:4])
+    elif sys.argv[1] == "listen":
+        listen(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]), sys.argv[5:])
+    else:
+        radius, max_z = map(float, sys.argv[6:8])
+        moment, inflation_range = sys.argv[8], float(sys.argv[9])
+        compare(*sys.argv[2:5], last_place(int(sys.argv[5])), radius, max_z, moment, inflation_range)
+
+
+if __name__ == "__main__":
+    main()

@@ -241,14 +241,17 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::Diagnosti
     status: sequence[DiagnosticStatus]
 
 
-def service(package, name, request, response):
-    """Request and response as Cyclone DDS sends them: who asks and the number of the question come first."""
+# Who asks and the number of the question come first in requests and responses of Cyclone DDS.
+MARKS = {"guid": uint64, "number": int64}
+
+
+def service(package, name, request, response, marks):
+    """Request and response."""
     kinds = []
     for kind, fields in [("Request", request), ("Response", response)]:
         fields = fields or {"structure_needs_at_least_one_member": uint8}
-        head = {"guid": uint64, "number": int64}
         namespace = {"__module__": __name__, "__idl_typename__": f"{package}::srv::dds_::{name}_{kind}_"}
-        fields = list({**head, **fields}.items())
+        fields = list({**marks, **fields}.items())
         kinds.append(make_dataclass(f"{name}_{kind}", fields, bases=(IdlStruct,), namespace=namespace))
     return kinds
 
@@ -256,25 +259,29 @@ def service(package, name, request, response):
 OUTCOME = {"success": bool, "message": str}
 BOX = {"min": Point, "max": Point}
 HIT = {**OUTCOME, "hit": bool, "center": Point, "distance": float64, "probability": float64}
-SERVICES = {
-    "save": service("std_srvs", "Trigger", {}, OUTCOME),
-    "reset": service("std_srvs", "Empty", {}, {}),
-    "clear_bbox": service("octomap_msgs", "BoundingBoxQuery", BOX, {}),
-    "octomap_binary": service("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
-    "octomap_full": service("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
-    "octomap_in_box": service("voxtile_msgs", "GetOctomapInBox", {**BOX, "binary": bool}, {**OUTCOME, "map": Octomap}),
-    "snapshot": service("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
-    "revert": service("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
-    "cast_ray": service(
+# Name, type, and the fields of request and response.
+SERVICE_TYPES = {
+    "save": ("std_srvs", "Trigger", {}, OUTCOME),
+    "reset": ("std_srvs", "Empty", {}, {}),
+    "clear_bbox": ("octomap_msgs", "BoundingBoxQuery", BOX, {}),
+    "octomap_binary": ("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
+    "octomap_full": ("octomap_msgs", "GetOctomap", {}, {"map": Octomap}),
+    "octomap_in_box": ("voxtile_msgs", "GetOctomapInBox", {**BOX, "binary": bool}, {**OUTCOME, "map": Octomap}),
+    "snapshot": ("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
+    "revert": ("voxtile_msgs", "Snapshot", {"name": str}, OUTCOME),
+    "cast_ray": (
         "voxtile_msgs",
         "CastRay",
         {"origin": Point, "direction": Vector3, "max_range": float64, "unknown_is_obstacle": bool},
         HIT,
     ),
-    "check_collision": service(
+    "check_collision": (
         "voxtile_msgs",
         "CheckCollision",
         {"from_": Point, "to": Point, "radius": float64, "unknown_is_obstacle": bool},
         HIT,
     ),
 }
+SERVICES = {name: service(*kind, MARKS) for name, kind in SERVICE_TYPES.items()}
+# These have no name of the node in front.
+OPEN = ["octomap_binary", "octomap_full"]

@@ -14,12 +14,10 @@ from cyclonedds.idl.types import int64, uint32, uint64
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
-from octrees import binary_leaves, full_leaves, octets, voxels_of
-from ros_messages import LATCHED, RELIABLE, SERVICES, VOLATILE, DiagnosticArray, Octomap, Point, Vector3
+from ros_messages import LATCHED, OPEN, RELIABLE, SERVICES, VOLATILE, DiagnosticArray, Octomap
+from service_calls import check
 
 GUID = 0x1122334455667788
-EVERYWHERE = Point(-1e3, -1e3, -1e3), Point(1e3, 1e3, 1e3)
-OPEN = ["octomap_binary", "octomap_full"]
 
 
 class Service:
@@ -77,65 +75,7 @@ def main():
         if time.time() > until:
             sys.exit(f"not there: {[name for name, service in call.items() if not service.is_there()]}")
         time.sleep(0.02)
-
-    def whole(binary=True):
-        response = call["octomap_in_box"](*EVERYWHERE, binary)
-        assert response.success, response.message
-        data = octets(response.map.data)
-        return voxels_of((binary_leaves if binary else full_leaves)(data)) if data else {}
-
-    saved = call["save"]()
-    assert saved.success and saved.message == "durable up to scan 30", saved
-    before, before_full = whole(), whole(False)
-    assert len(before) > 10000 and set(before) == set(before_full)
-    assert before == {voxel: log_odds >= 0 for voxel, log_odds in before_full.items()}
-    resolution = call["octomap_full"]().map.resolution
-    for name, leaves in [("octomap_binary", binary_leaves), ("octomap_full", full_leaves)]:
-        around = voxels_of(leaves(octets(call[name]().map.data)))
-        assert 0 < len(around) < len(before) and set(around) < set(before)
-
-    origin = Point(2.0, 0.7, 0.05)
-    hit = call["cast_ray"](origin, Vector3(1.0, 0.0, 0.0), 0.0, False)
-    assert hit.success and hit.hit and hit.distance > 1 and hit.probability > 0.5, hit
-    place = [hit.center.x, hit.center.y, hit.center.z]
-    assert before[tuple(round(at / resolution - 0.5) for at in place)]
-    assert not call["cast_ray"](origin, Vector3(1.0, 0.0, 0.0), hit.distance - 0.2, False).hit
-    touched = call["check_collision"](origin, hit.center, 0.05, False)
-    assert touched.success and touched.hit
-    assert not call["check_collision"](origin, origin, 0.2, False).hit
-    for wrong in [Vector3(0.0, 0.0, 0.0), Vector3(float("nan"), 0.0, 0.0)]:
-        answer = call["cast_ray"](origin, wrong, 0.0, False)
-        assert not answer.success and answer.message
-
-    assert call["snapshot"]("before").success
-    assert not call["snapshot"]("before").success
-    assert not call["snapshot"]("../out").success
-    assert not call["revert"]("never").success
-    lie(domain, call["snapshot"])
-
-    corner = Point(-1e3, -1e3, 0.5)
-    call["clear_bbox"](corner, EVERYWHERE[1])
-    below = {voxel: occupied for voxel, occupied in before.items() if voxel[2] < 5}
-    assert whole() == below and 0 < len(below) < len(before)
-    # A box that is none changes nothing.
-    call["clear_bbox"](EVERYWHERE[1], corner)
-    assert whole() == below
-    call["reset"]()
-    assert whole() == {}
-    time.sleep(1.0)
-    last = published.take(10)[-1]
-    assert len(last.data) == 0, "what was cleared is still published"
-    reverted = call["revert"]("before")
-    assert reverted.success, reverted
-    assert whole(False) == before_full
-    time.sleep(1.0)
-    assert len(published.take(10)[-1].data) > 0, "what came back is not published"
-
-    [status] = diagnostics.take(100)[-1].status
-    values = {value.key: value.value for value in status.values}
-    assert (status.level, values["scan_number"], values["unflushed_scans"]) == (0, "30", "0"), status
-    assert int(values["memory_bytes"]) > 0 and int(values["disk_bytes"]) > 0 and float(values["flush_age_s"]) < 3
-    print(f"services: {len(before)} voxels, {len(below)} below, hit at {hit.distance:.2f} m")
+    check(call, lambda: lie(domain, call["snapshot"]), lambda: published.take(10), lambda: diagnostics.take(100))
 
 
 main()

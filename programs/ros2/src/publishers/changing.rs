@@ -1,17 +1,14 @@
 use super::voxel_changes::VoxelChanges;
 use crate::live_map::MapVersion;
 use crate::messages::{Header, PointCloud2};
-use crate::names::Names;
-use anyhow::anyhow;
-use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
-use ros2_client::{MessageTypeName, Node, Publisher};
+use crate::transport::{Qos, Sender, Transport, TypeName};
 use std::time::{Duration, Instant};
 use voxtile::{Aabb, Grid, VoxelIndex};
 
 /// Publishes the occupied voxels that changed since the last message.
 pub struct Changing {
     topic: String,
-    publisher: Publisher<PointCloud2>,
+    sender: Sender<PointCloud2>,
     changes: VoxelChanges,
     sent: Option<MapVersion>,
     subscribers: usize,
@@ -26,32 +23,24 @@ const WHOLE_EVERY: Duration = Duration::from_secs(30);
 impl Changing {
     /// # Errors
     ///
-    /// DDS refuses.
-    pub fn new(node: &mut Node, names: &Names, topic: &str) -> anyhow::Result<Self> {
-        let qos = QosProfile::publisher_default()
-            .reliability_reliable(WhenFull::DEFAULT)
-            .durability(Durability::TransientLocal)
-            .history(History::KeepLast { depth: DEPTH });
-        let failed = |error: &dyn std::fmt::Debug| anyhow!("{topic}: {error:?}");
-        let type_name = MessageTypeName::new("sensor_msgs", "PointCloud2");
-        let dds_topic =
-            node.create_topic(&names.of(topic)?, type_name, &qos).map_err(|error| failed(&error))?;
-        let publisher = node.create_publisher(&dds_topic, Some(qos)).map_err(|error| failed(&error))?;
-        let (topic, changes) = (names.full(topic), VoxelChanges::default());
-        Ok(Self { topic, publisher, changes, sent: None, subscribers: 0, whole_at: Instant::now() })
+    /// The transport refuses.
+    pub fn new(transport: &mut Transport, topic: &str) -> anyhow::Result<Self> {
+        let sender =
+            transport.advertise(topic, TypeName::new("sensor_msgs", "PointCloud2"), Qos::latched(DEPTH))?;
+        let (topic, changes) = (topic.to_owned(), VoxelChanges::default());
+        Ok(Self { topic, sender, changes, sent: None, subscribers: 0, whole_at: Instant::now() })
     }
 
     /// Sends what changed of the occupied voxels in a box, if somebody listens; to who is new, and now and then, all.
     pub fn refresh(
         &mut self,
-        node: &Node,
         version: MapVersion,
         grid: &Grid,
         region: &Aabb,
         header: Header,
         occupied: impl FnOnce() -> anyhow::Result<Vec<VoxelIndex>>,
     ) {
-        let before = std::mem::replace(&mut self.subscribers, self.publisher.get_subscription_count(node));
+        let before = std::mem::replace(&mut self.subscribers, self.sender.listeners());
         if self.subscribers == 0 {
             (self.changes, self.sent) = (VoxelChanges::default(), None);
             return;
@@ -77,7 +66,7 @@ impl Changing {
             return;
         }
         let points = changes.into_iter().map(|(voxel, state)| (grid.center_m(voxel), state as u8));
-        match self.publisher.publish(PointCloud2::of_states(header, points)) {
+        match self.sender.send(PointCloud2::of_states(header, points)) {
             Ok(()) => {
                 self.changes.note(occupied);
                 self.sent = Some(version);

@@ -1,17 +1,15 @@
 //! Services: what changes the map is an order to the mapping thread, the others ask views beside it.
 //!
 //! ```text
-//! request -> Servers -> orders -> Mapping -> Outcome
-//!                    -> octomaps, queries -> LiveMap
+//! request -> Transport -> orders -> Mapping -> Outcome
+//!                      -> octomaps, queries -> LiveMap
 //! ```
 
-mod marked;
 mod octomaps;
 mod order;
 mod orders;
 mod queries;
 mod rmw;
-mod servers;
 mod start;
 
 pub use order::Order;

@@ -1,7 +1,9 @@
-use super::Rmw;
 use super::marked::Marked;
 use crate::names::Names;
-use anyhow::{Context as _, anyhow};
+use crate::services::Rmw;
+use crate::transport::TypeName;
+use crate::transport::threads::spawn;
+use anyhow::anyhow;
 use futures::StreamExt;
 use futures::executor::block_on;
 use ros2_client::qos::{History, QosProfile};
@@ -28,7 +30,7 @@ impl Servers<'_> {
     pub fn serve<Q, A>(
         &mut self,
         name: &str,
-        [package, type_name]: [&str; 2],
+        kind: TypeName,
         answer: impl Fn(Q) -> A + Send + 'static,
     ) -> anyhow::Result<()>
     where
@@ -37,8 +39,8 @@ impl Servers<'_> {
     {
         let (path, full_name) = (self.names.full(name), self.names.of(name)?);
         match self.rmw {
-            Rmw::Fastrtps => self.serve_enhanced(&full_name, [package, type_name], answer),
-            Rmw::Cyclonedds => self.serve_marked(&path, [package, type_name], answer),
+            Rmw::Fastrtps => self.serve_enhanced(&full_name, kind, answer),
+            Rmw::Cyclonedds => self.serve_marked(&path, kind, answer),
         }
     }
 
@@ -46,7 +48,7 @@ impl Servers<'_> {
     fn serve_enhanced<Q, A>(
         &mut self,
         path: &Name,
-        [package, type_name]: [&str; 2],
+        kind: TypeName,
         answer: impl Fn(Q) -> A + Send + 'static,
     ) -> anyhow::Result<()>
     where
@@ -54,13 +56,13 @@ impl Servers<'_> {
         A: Message + Send + 'static,
     {
         let failed = |error: &dyn std::fmt::Debug| anyhow!("{path}: {error:?}");
-        let type_name = ServiceTypeName::new(package, type_name);
+        let type_name = ServiceTypeName::new(kind.package, kind.name);
         let server = self
             .node
             .create_server::<Q, A>(ServiceMapping::Enhanced, path, &type_name, qos(), qos())
             .map_err(|error| failed(&error))?;
         let label = path.clone();
-        spawn(move || {
+        spawn("service", move || {
             block_on(server.receive_request_stream().for_each(|request| {
                 match request {
                     Ok((id, request)) => {
@@ -72,7 +74,8 @@ impl Servers<'_> {
                 }
                 futures::future::ready(())
             }));
-        })
+        })?;
+        Ok(())
     }
 
     /// For clients that mark the messages themselves. Not by `create_server`: it marks them in both ways, and then
@@ -80,7 +83,7 @@ impl Servers<'_> {
     fn serve_marked<Q, A>(
         &mut self,
         path: &str,
-        [package, type_name]: [&str; 2],
+        kind: TypeName,
         answer: impl Fn(Q) -> A + Send + 'static,
     ) -> anyhow::Result<()>
     where
@@ -88,15 +91,15 @@ impl Servers<'_> {
         A: Message + Send + 'static,
     {
         let failed = |error: &dyn std::fmt::Debug| anyhow!("{path}: {error:?}");
-        let type_name = format!("{package}::srv::dds_::{type_name}");
-        let requests = self.topic(format!("rq{path}Request"), format!("{type_name}_Request_"))?;
-        let responses = self.topic(format!("rr{path}Reply"), format!("{type_name}_Response_"))?;
+        let type_name = kind.of_service();
+        let requests = self.topic(format!("rq{path}Request"), format!("{type_name}Request_"))?;
+        let responses = self.topic(format!("rr{path}Reply"), format!("{type_name}Response_"))?;
         let reader = self.node.create_subscription::<Marked<Q>>(&requests, Some(qos()));
         let reader = reader.map_err(|error| failed(&error))?;
         let writer = self.node.create_publisher::<Marked<A>>(&responses, Some(qos()));
         let writer = writer.map_err(|error| failed(&error))?;
         let label = path.to_owned();
-        spawn(move || {
+        spawn("service", move || {
             block_on(reader.async_stream().for_each(|request| {
                 match request {
                     Ok((Marked { guid, number, body }, _)) => {
@@ -109,7 +112,8 @@ impl Servers<'_> {
                 }
                 futures::future::ready(())
             }));
-        })
+        })?;
+        Ok(())
     }
 
     fn topic(&self, name: String, type_name: String) -> anyhow::Result<Topic> {
@@ -124,10 +128,4 @@ fn qos() -> QosProfile {
 
 fn policies() -> QosPolicies {
     (&qos()).into()
-}
-
-fn spawn(work: impl FnOnce() + Send + 'static) -> anyhow::Result<()> {
-    let thread = std::thread::Builder::new().name("service".to_owned());
-    thread.spawn(work).context("a thread cannot be started")?;
-    Ok(())
 }

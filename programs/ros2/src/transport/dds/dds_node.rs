@@ -1,0 +1,174 @@
+use super::dds_sender::DdsSender;
+use super::raw_message::{RawAdapter, RawMessage};
+use super::servers::Servers;
+use crate::args::Args;
+use crate::inbox::Inbox;
+use crate::names::Names;
+use crate::services::Rmw;
+use crate::transport::threads::spawn;
+use crate::transport::{Put, Qos, TypeName};
+use anyhow::{Context as _, anyhow};
+use futures::StreamExt;
+use futures::executor::block_on;
+use ros2_client::qos::{QosProfile, WhenFull};
+use ros2_client::{Context, Message, MessageTypeName, Node, NodeOptions};
+use rustdds::policy::{Durability, History, Reliability};
+use rustdds::{
+    DomainParticipant, DomainParticipantBuilder, QosPolicies, QosPolicyBuilder, Subscriber, TopicKind,
+};
+use serde::Serialize;
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A node of a DDS domain.
+pub struct DdsNode {
+    participant: DomainParticipant,
+    subscriber: Subscriber,
+    node: Arc<Mutex<Node>>,
+    names: Names,
+    rmw: Rmw,
+    inbox: Arc<Inbox>,
+    /// What keeps the node in the graph.
+    _context: Context,
+}
+
+const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
+/// Below this most fragments of a large cloud are lost.
+const LEAST_RECEIVE_BUFFER_BYTES: usize = 2 << 20;
+
+impl DdsNode {
+    /// Joins the domain.
+    ///
+    /// # Errors
+    ///
+    /// No sockets; names that ROS 2 does not know.
+    pub fn join(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<Self> {
+        let mut builder =
+            DomainParticipantBuilder::new(args.domain_id).socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
+        if !args.network {
+            builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
+        }
+        check_receive_buffer();
+        let names = args.names()?;
+        let domain = format!("--domain-id {}", args.domain_id);
+        let participant = builder.build().map_err(|error| anyhow!("{error:?}")).context(domain)?;
+        let context =
+            Context::from_domain_participant(participant.clone()).map_err(|error| anyhow!("{error:?}"))?;
+        let mut node =
+            context.new_node(names.of_node()?, NodeOptions::new()).map_err(|error| anyhow!("{error:?}"))?;
+        let spinner = node.spinner().map_err(|error| anyhow!("{error:?}"))?;
+        spawn("spinner", move || drop(block_on(spinner.spin())))?;
+        let subscriber = participant
+            .create_subscriber(&policies(Qos::best_effort(5)))
+            .map_err(|error| anyhow!("{error:?}"))?;
+        let node = Arc::new(Mutex::new(node));
+        Ok(Self {
+            participant,
+            subscriber,
+            node,
+            names,
+            rmw: args.rmw,
+            inbox: inbox.clone(),
+            _context: context,
+        })
+    }
+
+    pub fn subscribe(&self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
+        // As ROS 2 names topics in DDS.
+        let name = self.names.of(topic).map(|_| format!("rt{}", self.names.full(topic)))?;
+        let qos = policies(qos);
+        let topic = self
+            .participant
+            .create_topic(name.clone(), kind.of_message(), &qos, TopicKind::NoKey)
+            .map_err(|error| anyhow!("{name}: {error:?}"))?;
+        let reader = self
+            .subscriber
+            .create_simple_datareader_no_key::<RawMessage, RawAdapter>(&topic, Some(qos))
+            .map_err(|error| anyhow!("{name}: {error:?}"))?;
+        let inbox = self.inbox.clone();
+        spawn("reader", move || {
+            block_on(reader.as_async_stream().for_each(|sample| {
+                match sample {
+                    Ok(sample) => put(sample.into_value().cdr),
+                    Err(error) => {
+                        log::debug!("a sample is lost: {error:?}");
+                        inbox.count(|counters| counters.transport_errors += 1);
+                    }
+                }
+                futures::future::ready(())
+            }));
+        })?;
+        Ok(())
+    }
+
+    pub fn advertise<M: Serialize>(
+        &self,
+        topic: &str,
+        kind: TypeName,
+        qos: Qos,
+    ) -> anyhow::Result<DdsSender<M>> {
+        let failed = |error: &dyn std::fmt::Debug| anyhow!("{topic}: {error:?}");
+        let name = self.names.of(topic)?;
+        let qos = profile(qos);
+        let mut node = self.node.lock().unwrap_or_else(PoisonError::into_inner);
+        let kind = MessageTypeName::new(kind.package, kind.name);
+        let dds_topic = node.create_topic(&name, kind, &qos).map_err(|error| failed(&error))?;
+        let publisher = node.create_publisher(&dds_topic, Some(qos)).map_err(|error| failed(&error))?;
+        Ok(DdsSender { node: self.node.clone(), publisher })
+    }
+
+    pub fn serve<Q, A>(
+        &self,
+        service: &str,
+        kind: TypeName,
+        answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> anyhow::Result<()>
+    where
+        Q: Message + Clone + Send + 'static,
+        A: Message + Send + 'static,
+    {
+        let node = &mut self.node.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut servers = Servers { participant: &self.participant, node, names: &self.names, rmw: self.rmw };
+        servers.serve(service, kind, answer)
+    }
+}
+
+/// Says what to do where the system gives sockets too little room: it cuts what is asked for without a word.
+fn check_receive_buffer() {
+    let most = std::fs::read_to_string("/proc/sys/net/core/rmem_max");
+    let Some(most) = most.ok().and_then(|text| text.trim().parse::<usize>().ok()) else { return };
+    if most < LEAST_RECEIVE_BUFFER_BYTES {
+        log::warn!(
+            "the system gives sockets {most} bytes, too few for large clouds, most of which will be lost: \
+             sysctl net.core.rmem_max={RECEIVE_BUFFER_BYTES}"
+        );
+    }
+}
+
+/// Of a reader.
+fn policies(qos: Qos) -> QosPolicies {
+    let reliability = match qos.is_reliable {
+        true => Reliability::Reliable { max_blocking_time: rustdds::Duration::from_millis(100) },
+        false => Reliability::BestEffort,
+    };
+    let durability = if qos.is_latched { Durability::TransientLocal } else { Durability::Volatile };
+    let depth = i32::try_from(qos.depth).unwrap_or(i32::MAX);
+    QosPolicyBuilder::new()
+        .reliability(reliability)
+        .durability(durability)
+        .history(History::KeepLast { depth })
+        .build()
+}
+
+/// Of a publisher.
+fn profile(qos: Qos) -> QosProfile {
+    use ros2_client::qos::{Durability, History};
+    let mut profile = QosProfile::publisher_default().history(History::KeepLast { depth: qos.depth });
+    if qos.is_reliable {
+        profile = profile.reliability_reliable(WhenFull::DEFAULT);
+    }
+    if qos.is_latched {
+        profile = profile.durability(Durability::TransientLocal);
+    }
+    profile
+}

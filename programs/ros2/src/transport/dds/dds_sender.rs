@@ -1,0 +1,21 @@
+use anyhow::anyhow;
+use ros2_client::{Node, Publisher};
+use serde::Serialize;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A publisher, and the node that knows who listens.
+pub struct DdsSender<M: Serialize> {
+    pub node: Arc<Mutex<Node>>,
+    pub publisher: Publisher<M>,
+}
+
+impl<M: Serialize> DdsSender<M> {
+    pub fn listeners(&self) -> usize {
+        let node = self.node.lock().unwrap_or_else(PoisonError::into_inner);
+        self.publisher.get_subscription_count(&node)
+    }
+
+    pub fn send(&self, message: M) -> anyhow::Result<()> {
+        self.publisher.publish(message).map_err(|error| anyhow!("{error}"))
+    }
+}

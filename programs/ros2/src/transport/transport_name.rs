@@ -1,0 +1,8 @@
+/// What carries messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum TransportName {
+    /// DDS, as Fast DDS and Cyclone DDS speak it.
+    Dds,
+    /// Zenoh, as `rmw_zenoh_cpp` speaks it (Jazzy and later).
+    Zenoh,
+}

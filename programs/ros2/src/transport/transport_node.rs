@@ -1,0 +1,97 @@
+use super::dds::DdsNode;
+#[cfg(feature = "zenoh")]
+use super::zenoh::ZenohNode;
+use super::{Put, Qos, Sender, TransportName, TypeName};
+use crate::args::Args;
+use crate::inbox::Inbox;
+use ros2_client::Message;
+use serde::Serialize;
+use std::sync::Arc;
+
+/// The node among others. Topics and services have the names that the node itself uses: remapping is done here.
+pub enum Transport {
+    Dds(DdsNode),
+    #[cfg(feature = "zenoh")]
+    Zenoh(ZenohNode),
+}
+
+impl Transport {
+    /// Joins the others; what does not arrive whole is counted in the inbox.
+    ///
+    /// # Errors
+    ///
+    /// No sockets; names that ROS 2 does not know; a transport that this program was built without.
+    pub fn join(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<Self> {
+        match args.transport {
+            TransportName::Dds => Ok(Self::Dds(DdsNode::join(args, inbox)?)),
+            #[cfg(feature = "zenoh")]
+            TransportName::Zenoh => Ok(Self::Zenoh(ZenohNode::join(args, inbox)?)),
+            #[cfg(not(feature = "zenoh"))]
+            TransportName::Zenoh => anyhow::bail!(
+                "--transport zenoh: this program was built without it; build it with --features zenoh"
+            ),
+        }
+    }
+
+    /// Reads a topic in a thread of its own.
+    ///
+    /// # Errors
+    ///
+    /// A name that is none; the transport refuses.
+    pub fn subscribe(&mut self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
+        match self {
+            Self::Dds(node) => node.subscribe(topic, kind, qos, put),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(node) => node.subscribe(topic, kind, qos, put),
+        }
+    }
+
+    /// Offers a topic.
+    ///
+    /// # Errors
+    ///
+    /// A name that is none; the transport refuses.
+    pub fn advertise<M: Serialize>(
+        &mut self,
+        topic: &str,
+        kind: TypeName,
+        qos: Qos,
+    ) -> anyhow::Result<Sender<M>> {
+        match self {
+            Self::Dds(node) => Ok(Sender::Dds(node.advertise(topic, kind, qos)?)),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(node) => Ok(Sender::Zenoh(node.advertise(topic, kind, qos)?)),
+        }
+    }
+
+    /// Answers a service in a thread of its own, one request after the other.
+    ///
+    /// # Errors
+    ///
+    /// A name that is none; the transport refuses.
+    pub fn serve<Q, A>(
+        &mut self,
+        service: &str,
+        kind: TypeName,
+        answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> anyhow::Result<()>
+    where
+        Q: Message + Clone + Send + 'static,
+        A: Message + Send + 'static,
+    {
+        match self {
+            Self::Dds(node) => node.serve(service, kind, answer),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(node) => node.serve(service, kind, answer),
+        }
+    }
+
+    /// Leaves the others.
+    pub fn leave(self) {
+        match self {
+            Self::Dds(_) => {}
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(node) => node.leave(),
+        }
+    }
+}

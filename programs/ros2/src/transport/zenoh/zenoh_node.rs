@@ -1,0 +1,212 @@
+use super::configuration::configuration;
+use super::graph_name::{Channel, End, GraphName, gid_of};
+use super::listeners::Listeners;
+use super::mailbox::Mailbox;
+use super::service::respond;
+use super::zenoh_sender::ZenohSender;
+use crate::args::Args;
+use crate::inbox::Inbox;
+use crate::names::Names;
+use crate::transport::threads::spawn;
+use crate::transport::{Put, Qos, TypeName};
+use anyhow::anyhow;
+use serde::{Serialize, de::DeserializeOwned};
+use std::sync::Arc;
+use std::sync::atomic::AtomicI64;
+use std::time::Duration;
+use zenoh::key_expr::KeyExpr;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::sample::Sample;
+use zenoh::{Session, Wait as _};
+use zenoh_ext::{
+    AdvancedPublisherBuilderExt as _, AdvancedSubscriberBuilderExt as _, CacheConfig, HistoryConfig,
+    MissDetectionConfig, RecoveryConfig,
+};
+
+/// A node of `rmw_zenoh`'s graph.
+pub struct ZenohNode {
+    session: Session,
+    name: GraphName,
+    names: Names,
+    inbox: Arc<Inbox>,
+    /// Of a message.
+    most_bytes: usize,
+    tokens: Vec<LivelinessToken>,
+    /// Ends the threads that read.
+    closers: Vec<Box<dyn Fn() + Send>>,
+}
+
+/// As services are in ROS 2.
+const SERVICE_QOS: Qos = Qos::reliable(10);
+const MOST_REQUEST_BYTES: usize = 1 << 20;
+/// How often a publisher tells what it has sent last, while something new was sent.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+
+impl ZenohNode {
+    /// Opens the session and announces the node. A router that is not there yet is looked for again and again.
+    ///
+    /// # Errors
+    ///
+    /// A configuration that is none; no sockets; names that ROS 2 does not know.
+    pub fn join(args: &Args, inbox: &Arc<Inbox>) -> anyhow::Result<Self> {
+        let names = args.names()?;
+        names.of_node()?;
+        let session = zenoh::open(configuration(args)?).wait();
+        let session = session.map_err(|error| anyhow!("--transport zenoh: no session: {error}"))?;
+        if session.info().routers_zid().wait().next().is_none() {
+            log::warn!(
+                "no router of Zenoh at {} yet, and the node goes on looking for it: ros2 run rmw_zenoh_cpp rmw_zenohd",
+                args.zenoh_router.join(" ")
+            );
+        }
+        let name = GraphName {
+            domain_id: args.domain_id,
+            zenoh_id: session.zid().to_string(),
+            namespace: names.namespace().to_owned(),
+            node_name: args.node_name.clone(),
+        };
+        let most_bytes = args.queue_bytes();
+        let (tokens, closers) = (Vec::new(), Vec::new());
+        let mut node = Self { session, name, names, inbox: inbox.clone(), most_bytes, tokens, closers };
+        node.announce(node.name.token())?;
+        Ok(node)
+    }
+
+    pub fn subscribe(&mut self, topic: &str, kind: TypeName, qos: Qos, put: Put) -> anyhow::Result<()> {
+        let channel = Channel::topic(&self.names, topic, kind)?;
+        let key = key(&channel.key(self.name.domain_id))?;
+        let mailbox = Mailbox::new(qos.depth, self.most_bytes);
+        let callback = self.receiver(&mailbox);
+        let subscriber = self.session.declare_subscriber(key).callback(callback);
+        let declared = if qos.is_latched {
+            let mut advanced = subscriber
+                .advanced()
+                .subscriber_detection()
+                .history(HistoryConfig::default().detect_late_publishers().max_samples(qos.depth));
+            if qos.is_reliable {
+                advanced = advanced.recovery(RecoveryConfig::default().heartbeat());
+            }
+            advanced.background().wait()
+        } else {
+            subscriber.background().wait()
+        };
+        declared.map_err(|error| anyhow!("{}: {error}", channel.name))?;
+        let its_mailbox = mailbox.clone();
+        spawn("reader", move || {
+            while let Some(cdr) = its_mailbox.take() {
+                put(cdr);
+            }
+        })?;
+        self.closers.push(Box::new(move || mailbox.close()));
+        self.announce_end(End::Subscription, &channel, qos)?;
+        Ok(())
+    }
+
+    pub fn advertise(&mut self, topic: &str, kind: TypeName, qos: Qos) -> anyhow::Result<ZenohSender> {
+        let channel = Channel::topic(&self.names, topic, kind)?;
+        let failed = |error: zenoh::Error| anyhow!("{}: {error}", channel.name);
+        let listeners = Listeners::default();
+        let noted = listeners.clone();
+        self.session
+            .liveliness()
+            .declare_subscriber(key(&self.name.subscriptions(&channel))?)
+            .history(true)
+            .callback(move |sample| noted.note(sample.key_expr().as_str(), sample.kind()))
+            .background()
+            .wait()
+            .map_err(failed)?;
+        let mut publisher =
+            self.session.declare_publisher(key(&channel.key(self.name.domain_id))?).advanced();
+        if qos.is_latched {
+            publisher = publisher
+                .cache(CacheConfig::default().max_samples(qos.depth))
+                .sample_miss_detection(MissDetectionConfig::default().sporadic_heartbeat(HEARTBEAT))
+                .publisher_detection();
+        }
+        let publisher = publisher.wait().map_err(failed)?;
+        let gid = gid_of(&self.announce_end(End::Publisher, &channel, qos)?);
+        Ok(ZenohSender { publisher, listeners, gid, sent: AtomicI64::new(0) })
+    }
+
+    pub fn serve<Q, A>(
+        &mut self,
+        service: &str,
+        kind: TypeName,
+        answer: impl Fn(Q) -> A + Send + 'static,
+    ) -> anyhow::Result<()>
+    where
+        Q: DeserializeOwned,
+        A: Serialize,
+    {
+        let channel = Channel::service(&self.names, service, kind)?;
+        let key = key(&channel.key(self.name.domain_id))?;
+        let mailbox = Mailbox::new(SERVICE_QOS.depth, SERVICE_QOS.depth * MOST_REQUEST_BYTES);
+        let (to, label, inbox) = (mailbox.clone(), channel.name.clone(), self.inbox.clone());
+        self.session
+            .declare_queryable(key.clone())
+            .complete(true)
+            .callback(move |query| {
+                let bytes = query.payload().map_or(0, |payload| payload.len());
+                // Who gets no answer is told so: Zenoh does it where a query is dropped.
+                let lost = if bytes > MOST_REQUEST_BYTES { 1 } else { to.put(query, bytes) };
+                if lost > 0 {
+                    log::debug!("{label}: a request is not answered: too large, or more than can wait");
+                    inbox.count(|counters| counters.transport_errors += lost as u64);
+                }
+            })
+            .background()
+            .wait()
+            .map_err(|error| anyhow!("{}: {error}", channel.name))?;
+        let its_mailbox = mailbox.clone();
+        spawn("service", move || {
+            while let Some(query) = its_mailbox.take() {
+                respond(&query, &key, &answer);
+            }
+        })?;
+        self.closers.push(Box::new(move || mailbox.close()));
+        self.announce_end(End::Service, &channel, SERVICE_QOS)?;
+        Ok(())
+    }
+
+    /// Takes all tokens back and closes the session.
+    pub fn leave(self) {
+        drop(self.tokens);
+        if let Err(error) = self.session.close().wait() {
+            log::warn!("the session of Zenoh was not closed: {error}");
+        }
+        self.closers.iter().for_each(|close| close());
+    }
+
+    /// What Zenoh's threads do with a sample: they only put it where it waits.
+    fn receiver(&self, mailbox: &Arc<Mailbox<Vec<u8>>>) -> impl Fn(Sample) + Send + Sync + 'static {
+        let (mailbox, inbox, most_bytes) = (mailbox.clone(), self.inbox.clone(), self.most_bytes);
+        move |sample| {
+            let bytes = sample.payload().len();
+            if bytes > most_bytes {
+                log::debug!("{}: a message of {bytes} bytes is larger than the queue", sample.key_expr());
+                inbox.count(|counters| counters.too_large += 1);
+                return;
+            }
+            let lost = mailbox.put(sample.payload().to_bytes().into_owned(), bytes);
+            if lost > 0 {
+                inbox.count(|counters| counters.transport_errors += lost as u64);
+            }
+        }
+    }
+
+    fn announce_end(&mut self, end: End, channel: &Channel, qos: Qos) -> anyhow::Result<String> {
+        let token = self.name.token_of(self.tokens.len(), end, channel, qos);
+        self.announce(token.clone())?;
+        Ok(token)
+    }
+
+    fn announce(&mut self, token: String) -> anyhow::Result<()> {
+        let declared = self.session.liveliness().declare_token(key(&token)?).wait();
+        self.tokens.push(declared.map_err(|error| anyhow!("{token}: {error}"))?);
+        Ok(())
+    }
+}
+
+fn key(text: &str) -> anyhow::Result<KeyExpr<'static>> {
+    KeyExpr::try_from(text.to_owned()).map_err(|error| anyhow!("{text}: no key of Zenoh: {error}"))
+}

@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# The node over Zenoh beside an independent peer (eclipse-zenoh from PyPI) and a router, over loopback: its map is that
+# of `voxtile build`, its outputs those of `voxtile export`; services, tokens, who comes late, who lies, another router.
+#
+# zenoh.sh WORK_FOLDER   check.sh runs it, and names the programs in `python`, `voxtile`, `program`, and `outputs`
+set -euo pipefail
+cd "$(dirname "$0")"
+
+work=$1/zenoh
+mkdir "$work"
+port=$((RANDOM % 10000 + 20000)) domain=$((RANDOM % 100 + 100))
+router= node= listener= of_friend=
+trap 'for one in $node $listener $router; do kill "$one" 2>/dev/null || true; done' EXIT
+
+fail() {
+    echo "zenoh: $*"
+    cat "$work"/*.log
+    exit 1
+}
+
+start_router() {
+    "$python" zenoh_router.py $port >"$work/router.out" 2>&1 &
+    router=$!
+    for _ in $(seq 200); do
+        grep -q listening "$work/router.out" && return
+        sleep 0.1
+    done
+    fail "no router"
+}
+
+end_router() {
+    kill $router
+    wait $router || true
+    router=
+}
+
+# Starts the node with a map.
+start() {
+    # shellcheck disable=SC2086
+    "$program" -o "$1" --transport zenoh --zenoh-router tcp/127.0.0.1:$port --domain-id $domain --resolution 0.1 \
+        --memory 128MiB $outputs >"$1.log" 2>&1 &
+    node=$!
+}
+
+end() {
+    kill "-$1" $node
+    wait $node || fail "the node has failed"
+    node=
+}
+
+compare() {
+    "$python" outputs.py compare "$work/$1.outputs" "$work/$1.csv" "$work/$1.pgm" 30 $radius $max_z $2 $inflation_range
+}
+
+"$python" type_hashes.py
+for kind in friendly hostile; do
+    map=$work/$kind
+    # The node comes first: it looks for its router until there is one.
+    start "$map"
+    start_router
+    "$python" zenoh_outputs.py $port $domain "$map.outputs" 15 &
+    listener=$!
+    "$python" zenoh_peer.py $port $domain "$map.bag" 30 $kind || fail "the peer has failed"
+    wait $listener || fail "no outputs"
+    listener=
+    end INT
+    grep 'clouds:' "$map.log" | tail -1 | tee "$map.counters"
+    grep -q ' 30 mapped' "$map.counters" || fail "not all clouds were mapped"
+    "$voxtile" build "$map.bag" -o "$map.built" --resolution 0.1 --tile-size 10 --max-range 60 >/dev/null
+    of_node=$("$voxtile" digest "$map") of_bag=$("$voxtile" digest "$map.built")
+    [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"
+    [ "$of_node" = "${of_friend:-$of_node}" ] || fail "$kind: another map: $of_node, not $of_friend"
+    of_friend=$of_node
+    "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
+    "$voxtile" export "$map" -o "$map.pgm" --z-max $max_z >/dev/null
+    compare $kind live
+    if [ $kind = hostile ]; then
+        grep -q ' 1 too large' "$map.counters" || fail "a cloud larger than the queue is not counted"
+        grep -q ' 0 malformed' "$map.counters" && fail "clouds that lie are not counted"
+    else
+        # It tells who comes late; its router goes away and another one comes.
+        start "$map"
+        "$python" zenoh_outputs.py $port $domain "$map.outputs" 6 || fail "no outputs"
+        compare $kind rest
+        if grep -q '"count": [^1]' "$map.outputs"; then
+            fail "what did not change was published again"
+        fi
+        "$python" zenoh_services.py $port $domain || fail "services"
+        end_router
+        start_router
+        "$python" zenoh_services.py $port $domain again || fail "the node has lost its router"
+        end TERM
+        [ "$("$voxtile" digest "$map")" = "$of_node" ] || fail "starting again changes the map"
+    fi
+    end_router
+    echo "zenoh, $kind: $of_node"
+done

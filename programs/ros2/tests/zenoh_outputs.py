@@ -1,0 +1,37 @@
+"""What the node publishes over Zenoh, as an independent peer gets it; outputs.py compares it.
+
+zenoh_outputs.py PORT DOMAIN FILE SECONDS   writes the last message of each topic, and how many there were
+"""
+
+import sys
+import threading
+import time
+
+from outputs import CHANGES, TYPES, Taken
+from zenoh_graph import Graph, run
+
+
+def main():
+    port, domain, file, seconds = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3], float(sys.argv[4])
+    graph, taken, lock, wrong = Graph(port, domain, "listener"), Taken(), threading.Lock(), []
+
+    def take(name, kind, cdr):
+        with lock:
+            try:
+                taken.take(name, kind.deserialize(cdr), cdr)
+            except Exception as error:
+                wrong.append(f"{name}: {error!r}")
+
+    for name, (kind, ros_name) in TYPES.items():
+        depth = 100 if name == CHANGES else 1
+        to = lambda cdr, name=name, kind=kind: take(name, kind, cdr)
+        graph.subscription("/" + name, ros_name.replace("/msg/", "/"), to, latched=True, depth=depth)
+    time.sleep(seconds)
+    with lock:
+        if wrong:
+            sys.exit(f"wrong messages: {wrong}")
+        taken.write(file)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,17 @@
+"""A router of Zenoh on a port of the loopback interface, until it is killed, as `ros2 run rmw_zenoh_cpp rmw_zenohd` is.
+
+zenoh_router.py PORT
+"""
+
+import signal
+import sys
+
+import zenoh
+
+config = zenoh.Config()
+config.insert_json5("mode", '"router"')
+config.insert_json5("listen/endpoints", f'["tcp/127.0.0.1:{int(sys.argv[1])}"]')
+config.insert_json5("scouting/multicast/enabled", "false")
+with zenoh.open(config):
+    print("listening", flush=True)
+    signal.pause()
