@@ -9,11 +9,12 @@ use object_store::gcp::GoogleCloudStorageBuilder;
 use object_store::http::HttpBuilder;
 use object_store::path::Path as Key;
 use object_store::{
-    BackoffConfig, ClientOptions, ObjectStore, ObjectStoreExt, PutMode, PutOptions, RetryConfig,
+    BackoffConfig, ClientOptions, GetOptions, ObjectStore, ObjectStoreExt, PutMode, PutOptions, RetryConfig,
     UpdateVersion,
 };
-use std::io;
-use std::path::Path;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -39,6 +40,16 @@ pub(super) struct Pending<T>(Receiver<io::Result<T>>);
 pub(super) struct FoundManifest {
     pub(super) manifest: Manifest,
     pub(super) version: UpdateVersion,
+}
+
+/// An object that is there, as a file below the bucket's URL.
+pub(super) struct StoredObject {
+    /// Its name below the URL; its own, where the URL is that of the object.
+    pub(super) name: String,
+    pub(super) is_url: bool,
+    pub(super) bytes: u64,
+    key: Key,
+    e_tag: Option<String>,
 }
 
 /// How often content is fetched that is not what its name says: a proxy may have cut it off.
@@ -249,6 +260,61 @@ impl Bucket {
         })
     }
 
+    /// Whether a map is there.
+    pub fn has_map(&self) -> bool {
+        let (store, key) = (self.store.clone(), self.key(MANIFEST));
+        pending(async move { store.head(&key).await.map_err(|error| refused(&key, &error)) }).wait().is_ok()
+    }
+
+    /// The object of the URL itself, or those below it, by name.
+    pub(super) fn objects_below(&self) -> io::Result<Vec<StoredObject>> {
+        let (store, prefix) = (self.store.clone(), self.prefix.clone());
+        pending(async move {
+            let object = |meta: object_store::ObjectMeta, name: String, is_url| StoredObject {
+                name,
+                is_url,
+                bytes: meta.size,
+                key: meta.location,
+                e_tag: meta.e_tag,
+            };
+            match store.head(&prefix).await {
+                Ok(meta) if meta.size > 0 => {
+                    let name = prefix.filename().unwrap_or_default().to_owned();
+                    return Ok(vec![object(meta, name, true)]);
+                }
+                Ok(_) | Err(object_store::Error::NotFound { .. }) => {}
+                Err(error) => return Err(refused(&prefix, &error)),
+            }
+            let listed = store.list(Some(&prefix)).try_filter_map(|meta| {
+                let name: Option<Key> = meta.location.prefix_match(&prefix).map(|parts| parts.collect());
+                // Some tools put an empty object where a folder would be.
+                let is_file = meta.size > 0 || meta.location.extension().is_some();
+                let name = name.filter(|name| is_file && !name.as_ref().is_empty());
+                std::future::ready(Ok(name.map(|name| object(meta, name.as_ref().to_owned(), false))))
+            });
+            let mut objects: Vec<StoredObject> =
+                listed.try_collect().await.map_err(|error| refused(&prefix, &error))?;
+            objects.sort_by(|a, b| a.name.cmp(&b.name));
+            Ok(objects)
+        })
+        .wait()
+    }
+
+    /// Begins to fetch an object into a file, as it was when it was listed.
+    pub(super) fn fetch_file(&self, object: StoredObject, to: PathBuf) -> Pending<()> {
+        let store = self.store.clone();
+        pending(async move {
+            let began = Instant::now();
+            for _ in 1..FETCHES {
+                match fetch_file_once(&store, &object, &to).await {
+                    Err(error) if error.kind() == io::ErrorKind::Other && began.elapsed() < LATEST_RETRY => {}
+                    outcome => return outcome,
+                }
+            }
+            fetch_file_once(&store, &object, &to).await
+        })
+    }
+
     fn get(&self, key: Key, most_bytes: u64) -> Pending<(Bytes, UpdateVersion)> {
         let store = self.store.clone();
         pending(async move { get(&store, &key, most_bytes).await })
@@ -318,6 +384,30 @@ async fn get_once(store: &dyn ObjectStore, key: &Key, most_bytes: u64) -> io::Re
     Ok((content.into(), version))
 }
 
+async fn fetch_file_once(store: &dyn ObjectStore, object: &StoredObject, to: &Path) -> io::Result<()> {
+    let key = &object.key;
+    let options = GetOptions { if_match: object.e_tag.clone(), ..GetOptions::default() };
+    let found = match store.get_opts(key, options).await {
+        Ok(found) => found,
+        Err(object_store::Error::Precondition { .. }) => {
+            let reason = format!("object {key}: it was changed while it was read; begin again");
+            return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
+        }
+        Err(error) => return Err(refused(key, &error)),
+    };
+    let mut stream = found.into_stream();
+    let on_disk = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", to.display()));
+    let (mut file, mut bytes) = (File::create(to).map_err(on_disk)?, 0);
+    while let Some(chunk) = stream.try_next().await.map_err(|error| refused(key, &error))? {
+        file.write_all(&chunk).map_err(on_disk)?;
+        bytes += chunk.len() as u64;
+    }
+    if bytes == object.bytes {
+        return Ok(());
+    }
+    Err(io::Error::other(format!("object {key}: {bytes} bytes came, and it has {}", object.bytes)))
+}
+
 /// The refusal of an object store, which names the object.
 fn refused(key: &Key, error: &object_store::Error) -> io::Error {
     let kind = match error {
@@ -340,6 +430,12 @@ fn told(error: &object_store::Error) -> String {
             text = format!("{text}: {reason}");
         }
         cause = error.source();
+    }
+    // Without keys the stores' clients ask the machines of their clouds, which are not there elsewhere.
+    if text.contains("169.254.169.254") || text.contains("metadata.google.internal") {
+        let keys = "AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (s3), GOOGLE_SERVICE_ACCOUNT (gs), \
+                    AZURE_STORAGE_ACCOUNT_NAME and AZURE_STORAGE_ACCOUNT_KEY (az)";
+        text = format!("no keys: set {keys} in the environment; without them this was tried: {text}");
     }
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

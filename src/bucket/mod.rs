@@ -3,6 +3,7 @@
 //! ```text
 //! push  map folder -> files as of a flush -> parts, named by content -> pages -> manifest, put last
 //! read  manifest -> BucketDisk, a `Disk` that reads only -> MapReader and all that takes one
+//! fetch objects below a URL -> files in a temporary folder -> what reads scans
 //! pull  manifest -> MAP.unfinished, files whose content is there are kept -> MAP
 //! ```
 //!
@@ -13,6 +14,7 @@
 //! | `manifest` | the one object that changes: which files the map has, by pages of tiles |
 //! | `file_list` | the list of files, with the pages that were asked for |
 //! | `bucket_disk`, `part_reader` | a map in a bucket as files that can be read |
+//! | `fetched_files` | scans and other files of any bucket, for what reads files |
 //! | `push`, `sender`, `prune`, `pull` | maps to buckets and back |
 //!
 //! `docs/format.md` describes the objects.
@@ -20,6 +22,7 @@
 #[expect(clippy::module_inception, reason = "the noun that the rest is about")]
 mod bucket;
 mod bucket_disk;
+mod fetched_files;
 mod file_list;
 mod manifest;
 mod object_name;
@@ -33,5 +36,6 @@ mod sender;
 pub use ::object_store;
 pub use bucket::Bucket;
 pub use bucket_disk::BucketDisk;
+pub use fetched_files::FetchedFiles;
 pub use pull::{Pulled, pull};
 pub use push::{PushOptions, Pushed, push};

@@ -1,5 +1,6 @@
 use crate::command::map_at::MapAt;
 use crate::command::new_poses::{PoseFile, poses_for, records_of};
+use crate::command::place::{is_map_at, url_of};
 use crate::io::{PointStore, ScanHead, ScanSource};
 use crate::mapper::KeptScans;
 use crate::scan::{Pose, ScanPoints};
@@ -23,6 +24,9 @@ pub fn is_map(path: &Path) -> bool {
     let has_files =
         |path: &Path| ["metadata.json", "commits.log"].iter().all(|name| path.join(name).is_file());
     let text = path.to_str().and_then(|text| text.rsplit_once('@'));
+    if let Some(url) = url_of(path) {
+        return is_map_at(url) || text.is_some_and(|(url, _)| url.contains("://") && is_map_at(url));
+    }
     has_files(path) || text.is_some_and(|(map, _)| has_files(Path::new(map)))
 }
 

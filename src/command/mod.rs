@@ -24,6 +24,8 @@ mod export_scans;
 mod export_voxels;
 mod exported;
 mod failure;
+#[cfg(feature = "bucket")]
+mod fetched_source;
 mod flush_schedule;
 mod import;
 mod info;

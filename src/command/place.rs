@@ -1,3 +1,4 @@
+use crate::io::{ReadOptions, ScanSource};
 use crate::store::MapPath;
 use crate::{Error, Result};
 use std::path::Path;
@@ -36,6 +37,34 @@ pub fn check_is_folder(map: &Path) -> Result<()> {
     Err(Error::argument(url, reason))
 }
 
+/// Whether there is a map at a URL; false where nobody can tell.
+#[cfg(feature = "bucket")]
+pub fn is_map_at(url: &str) -> bool {
+    crate::bucket::Bucket::open(url).is_ok_and(|bucket| bucket.has_map())
+}
+
+#[cfg(not(feature = "bucket"))]
+pub fn is_map_at(_: &str) -> bool {
+    false
+}
+
+/// Opens the scans at a URL that is none of a map.
+///
+/// # Errors
+///
+/// As for [`Bucket::open`](crate::bucket::Bucket::open) and
+/// [`FetchedFiles::fetch`](crate::bucket::FetchedFiles::fetch); a URL, where the command was built without buckets.
+#[cfg(feature = "bucket")]
+pub fn scans_at(url: &str, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    let bucket = crate::bucket::Bucket::open(url)?;
+    Ok(Box::new(super::fetched_source::FetchedSource::open(&bucket, options)?))
+}
+
+#[cfg(not(feature = "bucket"))]
+pub fn scans_at(url: &str, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    Err(without_buckets(url))
+}
+
 #[cfg(feature = "bucket")]
 fn in_bucket(url: &str) -> Result<MapPath> {
     use crate::bucket::{Bucket, BucketDisk};
@@ -44,6 +73,11 @@ fn in_bucket(url: &str) -> Result<MapPath> {
 
 #[cfg(not(feature = "bucket"))]
 fn in_bucket(url: &str) -> Result<MapPath> {
+    Err(without_buckets(url))
+}
+
+#[cfg(not(feature = "bucket"))]
+fn without_buckets(url: &str) -> Error {
     let reason = "this voxtile was built without buckets; `cargo install --locked --path . --features bucket` makes one with them";
-    Err(Error::argument(url, reason))
+    Error::argument(url, reason)
 }

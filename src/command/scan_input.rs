@@ -1,5 +1,6 @@
 use crate::command::kept_source::{KeptSource, is_map};
 use crate::command::new_poses::PoseFile;
+use crate::command::place::{scans_at, url_of};
 use crate::io::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
 use crate::{Error, Result};
 use std::io::{BufReader, stdin};
@@ -18,6 +19,9 @@ pub fn open(scans: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + 
     if is_map(scans) && options.open.format.is_none() {
         let source = KeptSource::open(scans, PoseFile::of_reading(options).as_ref())?;
         return Ok(options.selection.clone().of(Box::new(source)));
+    }
+    if let Some(url) = url_of(scans) {
+        return scans_at(url, options);
     }
     if !is_standard_input(scans) {
         return open_any_scans(scans, options);

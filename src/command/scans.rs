@@ -1,6 +1,8 @@
 use crate::command::args::ScansArgs;
 use crate::command::json;
+use crate::command::kept_source;
 use crate::command::map_at::read_map;
+use crate::command::place::url_of;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
 use crate::command::scan_input;
@@ -63,7 +65,10 @@ pub fn run(args: &ScansArgs) -> anyhow::Result<ExitCode> {
 fn is_map(path: &Path) -> bool {
     let has_metadata = |path: &Path| path.join("metadata.json").is_file();
     let text = path.to_str().and_then(|text| text.rsplit_once('@'));
-    has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map)))
+    match url_of(path) {
+        Some(_) => kept_source::is_map(path),
+        None => has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map))),
+    }
 }
 
 fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {

@@ -9,7 +9,7 @@ use tokio::runtime::Runtime;
 use voxtile::bucket::object_store::memory::InMemory;
 use voxtile::bucket::object_store::path::Path as Key;
 use voxtile::bucket::object_store::{ObjectStore, ObjectStoreExt};
-use voxtile::bucket::{Bucket, BucketDisk, PushOptions, Pushed, pull, push};
+use voxtile::bucket::{Bucket, BucketDisk, FetchedFiles, PushOptions, Pushed, pull, push};
 use voxtile::integrity::verify;
 use voxtile::operations::{snapshot, snapshots};
 use voxtile::{
@@ -398,4 +398,35 @@ fn a_map_in_a_bucket_is_not_written_to_and_a_web_server_not_pushed_to() {
     for url in ["maps/city", "ftp://a/b", "s3://", "s3:///x", "https://host/map?key=1"] {
         assert!(matches!(Bucket::open(url), Err(Error::InvalidArgument { .. })), "{url}");
     }
+}
+
+/// Files of a bucket in a folder of their own, which goes when nobody needs it; the URL of a file is that file.
+#[test]
+fn files_are_fetched_as_they_lie_and_go_again() {
+    let (server, place) = (Server::new(), TempDir::new().unwrap());
+    let files: [(&str, Vec<u8>); 3] =
+        [("poses.txt", b"1 2 3".to_vec()), ("scans/1.pcd", vec![7; 100_000]), ("scans/deep/2.pcd", Vec::new())];
+    for (name, content) in &files {
+        server.put(&Key::from(format!("drive/{name}")), content.clone());
+    }
+    // Neither of another drive nor what stands for a folder.
+    server.put(&Key::from("drive2/other.pcd"), vec![1]);
+    server.put(&Key::from("drive/scans"), Vec::new());
+    let at = |prefix: &str| Bucket::on(server.store.clone(), prefix, "s3://test/drive").unwrap();
+    let mut told = Vec::new();
+    let fetched =
+        FetchedFiles::fetch(&at("drive"), place.path(), |done, all| told.push((done, all))).unwrap();
+    assert_eq!((fetched.files(), fetched.bytes()), (3, 100_005));
+    assert_eq!(told.last(), Some(&(100_005, 100_005)));
+    for (name, content) in &files {
+        assert_eq!(&std::fs::read(fetched.path().join(name)).unwrap(), content, "{name}");
+    }
+    assert!(fetched.path().starts_with(place.path()));
+    drop(fetched);
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
+
+    let one = FetchedFiles::fetch(&at("drive/scans/1.pcd"), place.path(), |_, _| ()).unwrap();
+    assert!(one.path().ends_with("1.pcd") && one.path().is_file());
+    let nothing = FetchedFiles::fetch(&at("driv"), place.path(), |_, _| ()).unwrap_err().to_string();
+    assert!(nothing.contains("s3://test/drive: there is nothing"), "{nothing}");
 }

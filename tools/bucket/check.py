@@ -3,9 +3,11 @@
 import http.client
 import json
 import os
+import random
 import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from functools import partial
@@ -197,6 +199,57 @@ def check(port):
         assert name in said, said
         shutil.rmtree(WORK / "broken.unfinished", ignore_errors=True)
     print("objects that were changed, cut and missing are named")
+
+    check_scans(s3, port, bad)
+
+
+def check_scans(s3, port, bad):
+    """Scans that lie in a bucket make the map of those in a folder."""
+    drive, chance = WORK / "web" / "drive", random.Random(3)
+    (drive / "scans").mkdir(parents=True)
+    for number in range(20):
+        points = "\n".join(" ".join(f"{chance.gauss(0, 3):.3f}" for _ in range(3)) for _ in range(200))
+        head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 200\nHEIGHT 1\nPOINTS 200\nDATA ascii\n"
+        (drive / "scans" / f"{number}.pcd").write_text(head + points + "\n")
+    (drive / "poses_kitti.txt").write_text("".join(f"1 0 0 {number} 0 1 0 0 0 0 1 1\n" for number in range(20)))
+    for file in drive.rglob("*.*"):
+        s3.upload_file(str(file), "robots", f"{file.relative_to(WORK / 'web')}")
+    s3.put_object(Bucket="robots", Key="drive/scans/", Body=b"")
+    options = ["--resolution", 0.3, "--keep-scans"]
+    voxtile("build", drive, "-o", WORK / "of_folder", *options, port=port)
+    digest = voxtile("digest", WORK / "of_folder", port=port)
+    for number, (fault, through) in enumerate([(None, port), ("500", bad), ("cut off", bad)]):
+        Proxy.fault = fault
+        made = WORK / f"of_bucket_{number}"
+        voxtile("build", "s3://robots/drive", "-o", made, *options, port=through)
+        Proxy.fault = None
+        assert voxtile("digest", made, port=port) == digest, fault
+        # It is known as what it is, wherever it lies.
+        assert "resum" in voxtile("build", drive, "-o", made, "--resume", "--json", port=port), fault
+    told = json.loads(voxtile("scans", "s3://robots/drive/", "--json", port=port).splitlines()[-1])
+    assert told["scans"] == 20, told
+    web = ThreadingHTTPServer(("127.0.0.1", 0), partial(Files, directory=WORK / "web"))
+    threading.Thread(target=web.serve_forever, daemon=True).start()
+    one = f"http://127.0.0.1:{web.server_port}/drive/scans/7.pcd"
+    voxtile("build", one, "-o", WORK / "one_there", "--resolution", 0.3, "--poses", "identity", port=port)
+    voxtile("build", drive / "scans" / "7.pcd", "-o", WORK / "one", "--resolution", 0.3, "--poses", "identity", port=port)
+    assert voxtile("digest", WORK / "one_there", port=port) == voxtile("digest", WORK / "one", port=port)
+    said = voxtile("build", "s3://robots/nowhere", "-o", WORK / "none", "--resolution", 0.3, port=port, fails=True)
+    assert "s3://robots/nowhere: there is nothing" in said, said
+    assert not list(Path(tempfile.gettempdir()).glob("voxtile-scans-*")), "what was fetched is left behind"
+
+    # The scans that a map keeps, where it lies.
+    voxtile("push", WORK / "of_folder", "s3://robots/kept", port=port)
+    listed = [voxtile("scans", map, port=port) for map in (WORK / "of_folder", "s3://robots/kept")]
+    assert listed[0] == listed[1], listed
+    voxtile("build", "s3://robots/kept", "-o", WORK / "again", "--resolution", 0.3, port=port)
+    assert voxtile("digest", WORK / "again", port=port) == digest
+
+    # Without keys it is said which are missing.
+    lacking = {name: value for name, value in environment(port).items() if not name.startswith("AWS_")}
+    done = subprocess.run([VOXTILE, "info", "s3://robots/kept"], env=lacking, capture_output=True, text=True, timeout=300)
+    assert done.returncode != 0 and "AWS_ACCESS_KEY_ID" in done.stderr, done.stderr
+    print("scans of a bucket make the map of those in a folder")
 
 
 main()

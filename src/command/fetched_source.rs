@@ -1,0 +1,64 @@
+use crate::Result;
+use crate::bucket::{Bucket, FetchedFiles};
+use crate::command::progress::Progress;
+use crate::io::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_any_scans};
+
+/// Scans of a bucket, from files that were fetched.
+pub struct FetchedSource {
+    source: Box<dyn ScanSource + Send>,
+    /// Behind the source, which has some of them open.
+    _files: FetchedFiles,
+}
+
+impl FetchedSource {
+    /// Fetches all files at a URL, then reads them as those of a folder.
+    pub fn open(bucket: &Bucket, options: &ReadOptions) -> Result<Self> {
+        let progress = Progress::over_bytes();
+        let files = FetchedFiles::fetch(bucket, &std::env::temp_dir(), |done, all| progress.set(done, all))?;
+        drop(progress);
+        log::info!("{}: fetched {} files, {} bytes", bucket.url(), files.files(), files.bytes());
+        Ok(Self { source: open_any_scans(files.path(), options)?, _files: files })
+    }
+}
+
+impl ScanSource for FetchedSource {
+    fn len_hint(&self) -> Option<usize> {
+        self.source.len_hint()
+    }
+
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        self.source.read_scan(points)
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        self.source.skip(scans)
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        self.source.pass_unread()
+    }
+
+    fn format(&self) -> String {
+        self.source.format()
+    }
+
+    fn fields(&self) -> Vec<String> {
+        self.source.fields()
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.source.remarks()
+    }
+
+    fn crs(&self) -> Option<String> {
+        self.source.crs()
+    }
+
+    fn pose_source(&self) -> PoseSource {
+        self.source.pose_source()
+    }
+
+    fn fingerprint(&self) -> Result<String> {
+        self.source.fingerprint()
+    }
+}
