@@ -1,0 +1,69 @@
+"""Regions of a build in parts: columns of tiles, and which scans reach each.
+
+Lengths are in metres, boxes are west, south, east, north.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+Box = tuple[float, float, float, float]
+Column = tuple[int, int]
+# The first scan and the one after the last.
+Range = tuple[int, int]
+
+# Scans in a gap are read and mapped to nothing. Going on with a map after a gap takes as long as so many of them.
+JOINED_GAP_SCANS = 20
+
+
+def columns_of(
+    boxes: Sequence[Box | None], size: float, tile_size: float, joined_gap: int = JOINED_GAP_SCANS
+) -> dict[Column, list[Range]]:
+    """The columns that scans may reach, and of each the ranges of scans that do, in their order.
+
+    A drive that comes back leaves out what it drove elsewhere, unless that is at most ``joined_gap`` scans.
+    """
+    columns: dict[Column, list[Range]] = {}
+    for number, box in enumerate(boxes):
+        if box is None:
+            continue
+        for column in reached(box, size, tile_size):
+            ranges = columns.setdefault(column, [])
+            if ranges and number - ranges[-1][1] <= joined_gap:
+                ranges[-1] = (ranges[-1][0], number + 1)
+            else:
+                ranges.append((number, number + 1))
+    return columns
+
+
+def reached(box: Box, size: float, tile_size: float) -> list[Column]:
+    """The columns in which a box may have the center of a tile that it touches."""
+    west, south, east, north = box
+    # A tile whose center is in a column reaches half of its edge beyond; the other half is slack for rounding.
+    margin = tile_size
+    return [
+        (x, y)
+        for x in range(math.floor((west - margin) / size), math.floor((east + margin) / size) + 1)
+        for y in range(math.floor((south - margin) / size), math.floor((north + margin) / size) + 1)
+    ]
+
+
+def region_of(column: Column, size: float) -> list[float]:
+    """The half-open box of a column, as ``voxtile.build`` takes it: low x, y, z and high x, y, z."""
+    x, y = column
+    return [x * size, y * size, -math.inf, (x + 1) * size, (y + 1) * size, math.inf]
+
+
+def tiles_of(column: Column, size: float, tile_size: float) -> list[float]:
+    """The box of the whole tiles whose center is in a column, as ``voxtile.crop`` takes it."""
+    x, y = column
+    low, high = (
+        [math.ceil(number * size / tile_size - 0.5) * tile_size for number in corner]
+        for corner in ((x, y), (x + 1, y + 1))
+    )
+    return [*low, -math.inf, *high, math.inf]
+
+
+def scans_in(ranges: Sequence[Range]) -> int:
+    return sum(last - first for first, last in ranges)
