@@ -11,7 +11,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
 use voxtile::integrity::VerifyScope;
-use voxtile::mapper::{MapReader, OctreeMap};
+use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, Decay, Part, Prefer};
 use voxtile::{Error, Result, SnapshotName, Stop, TileIndex, integrity, octree};
 
@@ -135,6 +135,56 @@ pub fn merge<'py>(
         let maps = maps.iter().map(MapOrSnapshot::open).collect::<Result<Vec<_>>>()?;
         operations::merge(&maps, &output, prefer, |done, all| progress.tell(done, all))
     })
+}
+
+/// Puts the tiles of parts in the place of a map's own, in one commit. Parts are made of the map as of the flush
+/// `of_flush`, each with other tiles; `scans` is how many scans they have more.
+#[pyfunction]
+#[pyo3(signature = (map, parts, *, of_flush, scans, progress=None))]
+pub fn adopt<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    parts: Vec<PathBuf>,
+    of_flush: u64,
+    scans: u64,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    told(py, progress, |_, progress| {
+        let parts =
+            parts.iter().map(|part| MapReader::open(part, CACHE_TILES)).collect::<Result<Vec<_>>>()?;
+        operations::adopt(&map, &parts, of_flush, scans, |done, all| progress.tell(done, all))
+    })
+}
+
+/// What a map says of itself: id, flush and scan numbers, grid and range in metres, whether it keeps its
+/// scans.
+#[pyfunction]
+pub fn describe<'py>(py: Python<'py>, map: MapOrSnapshot) -> PyResult<Bound<'py, PyAny>> {
+    told(py, None, |_, _| {
+        let map = map.open()?;
+        let described = Described {
+            map_id: map.metadata().ext.as_ref().map(|ext| ext.map_id.clone()),
+            flush_number: map.flush_number(),
+            scan_number: map.scan_number(),
+            keeps_scans: map.keeps_scans(),
+            resolution: map.config().grid.resolution_m(),
+            tile_size: map.config().grid.tile_size_m(),
+            max_range: map.config().rays.max_range_m,
+        };
+        Ok(described)
+    })
+}
+
+/// What [`describe`] tells.
+#[derive(Serialize)]
+struct Described {
+    map_id: Option<String>,
+    flush_number: u64,
+    scan_number: u64,
+    keeps_scans: bool,
+    resolution: f64,
+    tile_size: f64,
+    max_range: Option<f64>,
 }
 
 /// Makes a map of the part of another that is in a box, or outside it.

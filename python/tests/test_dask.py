@@ -268,12 +268,178 @@ def test_a_second_run_takes_no_parts_of_other_points(
     assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
 
 
-@pytest.mark.parametrize("name", ["mulran_riverside02_a", "balm_os0_hall"])
-def test_recorded_scans(client: object, name: str, tmp_path: Path) -> None:
+def _again(drive: Path, tmp_path: Path) -> Path:
+    """The same street, driven back along a line beside it and a little beyond its end."""
+    folder = tmp_path / "again"
+    folder.mkdir()
+    poses = np.loadtxt(drive / "poses_kitti.txt")[::-1]
+    poses[:, 3] += 3.0
+    poses[:, 7] += 1.3
+    for number, scan in enumerate(sorted(drive.glob("*.pcd"))):
+        shutil.copy(scan, folder / f"{number:03}.pcd")
+    np.savetxt(folder / "poses_kitti.txt", poses, fmt="%.17g")
+    return folder
+
+
+@pytest.mark.parametrize("region_size", [4.0, 5.3, 100.0])
+def test_new_drives_into_a_map_make_the_map_of_one_build(
+    client: object, region_size: float, drive: Path, tmp_path: Path
+) -> None:
+    again, city = _again(drive, tmp_path), tmp_path / "city"
+    voxtile.build(drive, tmp_path / "whole", **OPTIONS)
+    shutil.copytree(tmp_path / "whole", city)
+    before = voxtile.digest(city)
+    with voxtile.open(city) as reader:
+        voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
+        report = voxtile_dask.build(
+            again, city, update=True, region_size=region_size, client=client, **OPTIONS
+        )
+        # Who opened the map before sees it as it was.
+        assert reader.digest() == before
+        assert reader.refresh() and reader.digest() != before
+        scans = reader.scan_number
+    assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole")
+    assert scans == 24 and report["adopted"]["scan_number"] == 24
+    assert report["adopted"]["tiles_added"] > 0 and report["adopted"]["tiles_changed"] > 0
+    assert voxtile.verify(city)["damage"] == 0
+    # The map goes on with the command, too.
+    for map in (city, tmp_path / "whole"):
+        voxtile.build(drive, map, append=True, again=True, **OPTIONS)
+    assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole")
+
+
+def test_workers_killed_during_an_update_leave_a_map_as_before_or_as_after(drive: Path, tmp_path: Path) -> None:
+    again, city = _again(drive, tmp_path), tmp_path / "city"
+    voxtile.build(drive, city, **OPTIONS)
+    before = voxtile.digest(city)
+    shutil.copytree(city, tmp_path / "whole")
+    voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
+    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)
+    parts, seen, killed = tmp_path / "city.parts", [], []
+    is_over = threading.Event()
+
+    def kill() -> None:
+        while not is_over.is_set() and len(killed) < 2:
+            if len(list(parts.glob("*-*-*"))) > len(killed):
+                seen.append(voxtile.digest(city))
+                pid = list(cluster.workers.values())[len(killed)].process.pid
+                if pid is not None:
+                    os.kill(pid, 9)
+                    killed.append(pid)
+            time.sleep(0.001)
+
+    with cluster, distributed.Client(cluster) as client:
+        killer = threading.Thread(target=kill, daemon=True)
+        killer.start()
+        voxtile_dask.build(again, city, update=True, region_size=4.0, client=client, **OPTIONS)
+        is_over.set()
+        killer.join(10)
+    after = voxtile.digest(tmp_path / "whole")
+    assert killed and set(seen) <= {before, after} and voxtile.digest(city) == after != before
+
+
+def test_an_update_that_was_killed_at_its_end_is_not_done_twice(
+    client: object, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    again, city = _again(drive, tmp_path), tmp_path / "city"
+    voxtile.build(drive, city, **OPTIONS)
+    shutil.copytree(city, tmp_path / "whole")
+    voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
+    remove = shutil.rmtree
+
+    def fail(path: object, *rest: object, **named: object) -> None:
+        if os.fspath(path) == os.fspath(tmp_path / "city.parts"):
+            raise KeyboardInterrupt
+        remove(path, *rest, **named)
+
+    with monkeypatch.context() as broken:
+        broken.setattr("voxtile.dask.building.shutil.rmtree", fail)
+        with pytest.raises(KeyboardInterrupt):
+            voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
+    report = voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
+    assert report["regions_done_before"] == report["regions"]
+    assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole")
+    assert not (tmp_path / "city.parts").exists()
+
+
+def test_an_update_of_a_map_that_somebody_changes_is_an_error(client: object, drive: Path, tmp_path: Path) -> None:
+    again, city = _again(drive, tmp_path), tmp_path / "city"
+    voxtile.build(drive, city, **OPTIONS)
+    changed = []
+
+    def change(done: int, regions: int) -> None:
+        if not changed:
+            voxtile.clear(city, [-1, -1, -1, 1, 1, 1])
+            changed.append(voxtile.digest(city))
+
+    with pytest.raises(errors.ArgumentError, match="somebody has changed it"):
+        voxtile_dask.build(
+            again, city, update=True, region_size=5.0, client=client, progress=change, **OPTIONS
+        )
+    assert voxtile.digest(city) == changed[0]
+    with pytest.raises(errors.VoxtileError, match="no map here"):
+        voxtile_dask.build(again, tmp_path / "none", update=True, client=client)
+    with pytest.raises(errors.ArgumentError, match="^resolution: "):
+        voxtile_dask.build(again, city, update=True, client=client, resolution=0.5)
+
+
+def test_a_drive_that_comes_back_is_read_where_it_was(client: object, drive: Path, tmp_path: Path) -> None:
+    """Thirty scans elsewhere lie between two visits of the street."""
+    folder, scans = tmp_path / "round", sorted(drive.glob("*.pcd"))
+    folder.mkdir()
+    poses = np.loadtxt(drive / "poses_kitti.txt")
+    elsewhere = np.repeat(poses[:1], 30, axis=0)
+    elsewhere[:, 3] += 60.0 + 0.1 * np.arange(30)
+    poses = np.concatenate([poses, elsewhere, poses[::-1]])
+    for number in range(len(poses)):
+        shutil.copy(scans[number % len(scans)], folder / f"{number:03}.pcd")
+    np.savetxt(folder / "poses_kitti.txt", poses, fmt="%.17g")
+    voxtile.build(folder, tmp_path / "whole", **OPTIONS)
+    report = voxtile_dask.build(folder, tmp_path / "map", region_size=20.0, client=client, **OPTIONS)
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
+    assert max(task["ranges"] for task in report["slowest"]) == 2
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".xyz", ".las"])
+def test_files_of_regions_are_those_of_the_command(client: object, suffix: str, drive: Path, tmp_path: Path) -> None:
+    voxtile.build(drive, tmp_path / "map", **OPTIONS)
+    told = voxtile_dask.export(tmp_path / "map", tmp_path / "files", suffix, region_size=5.0, client=client)
+    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == told["files"] and len(told["files"]) > 4
+    for name in told["files"]:
+        x, y = map(int, name.removesuffix(suffix).split("_"))
+        region = [5.0 * x, 5.0 * y, -100.0, 5.0 * (x + 1), 5.0 * (y + 1), 100.0]
+        voxtile.export(tmp_path / "map", tmp_path / f"one{suffix}", region=region)
+        assert (tmp_path / "files" / name).read_bytes() == (tmp_path / f"one{suffix}").read_bytes(), name
+    if suffix == ".xyz":
+        voxtile.export(tmp_path / "map", tmp_path / "whole.xyz")
+        whole = (tmp_path / "whole.xyz").read_text().splitlines()
+        parts = [line for name in told["files"] for line in (tmp_path / "files" / name).read_text().splitlines()]
+        assert sorted(set(whole)) == sorted(set(parts)) and len(whole) > 100
+    with pytest.raises(errors.ArgumentError, match="it exists"):
+        voxtile_dask.export(tmp_path / "map", tmp_path / "files", suffix, client=client)
+
+
+def test_statistics_are_those_of_the_whole_map(client: object, drive: Path, tmp_path: Path) -> None:
+    voxtile.build(drive, tmp_path / "map", **OPTIONS)
+    told = voxtile_dask.statistics(tmp_path / "map", client=client)
+    info = json.loads(
+        subprocess.check_output([sys.executable, "-m", "voxtile", "info", "--json", str(tmp_path / "map")])
+    )
+    assert told["tiles"] == info["tiles"] and told["occupied"] > 0
+    assert [told["observed"], told["occupied"]] == [info["voxels"], info["occupied"]]
+    with voxtile.open(tmp_path / "map") as opened:
+        centers = opened.occupied()[0]
+    assert told["occupied_low"] == centers.min(axis=0).tolist()
+    assert told["occupied_high"] == centers.max(axis=0).tolist()
+
+
+@pytest.mark.parametrize("region_size", [40.0, 70.0])
+@pytest.mark.parametrize("name", ["mulran_riverside02_a", "balm_os0_hall", "fastlio_hku_1"])
+def test_recorded_scans(client: object, name: str, region_size: float, tmp_path: Path) -> None:
     data = Path(os.environ.get("VOXTILE_DATA", "")) / name
     if "VOXTILE_DATA" not in os.environ or not data.is_dir():
         pytest.skip(f"{name} is not there; VOXTILE_DATA names the folder of recorded sets")
     options = {"resolution": 0.5, "max_range": 40.0, "storage": "compact"}
     voxtile.build(data, tmp_path / "whole", **options)
-    voxtile_dask.build(data, tmp_path / "map", region_size=70.0, client=client, **options)
+    voxtile_dask.build(data, tmp_path / "map", region_size=region_size, client=client, **options)
     assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")

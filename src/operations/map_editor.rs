@@ -1,5 +1,5 @@
 use crate::config::MapConfig;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::persistence::TileSaver;
 use crate::persistence::upgrade;
 use crate::persistence::{config_from, load, new_metadata};
@@ -17,6 +17,8 @@ pub(super) struct MapEditor {
     store: TileStore,
     config: MapConfig,
     saver: TileSaver,
+    /// Scans that the map gets with the next commit.
+    added_scans: u64,
     is_written_to: bool,
 }
 
@@ -30,7 +32,7 @@ pub(super) fn edit<T>(
     let store = TileStore::open(disk.clone(), folder)?;
     let config = config_from(store.metadata(), &store.layout().metadata())?;
     let saver = TileSaver::new(&config);
-    let mut editor = MapEditor { store, config, saver, is_written_to: false };
+    let mut editor = MapEditor { store, config, saver, added_scans: 0, is_written_to: false };
     let outcome = change(&mut editor);
     let leaves_something = editor.is_written_to && outcome.is_err();
     drop(editor);
@@ -45,9 +47,24 @@ impl MapEditor {
         &self.config
     }
 
-    /// Number of the last scan in the map.
+    /// Number of the last scan in the map, with those that the next commit adds.
     pub(super) fn scan_number(&self) -> u64 {
-        self.store.commits().scan_number
+        self.store.commits().scan_number + self.added_scans
+    }
+
+    /// Number of the last commit.
+    pub(super) fn flush_number(&self) -> u64 {
+        self.store.commits().flush_number
+    }
+
+    /// Says that what is written from now on has so many scans more.
+    pub(super) fn add_scans(&mut self, scans: u64) -> Result<()> {
+        let before = self.store.commits().scan_number;
+        if before.checked_add(scans).is_none() {
+            return Err(Error::argument("scans", format!("{scans} are more than can follow scan {before}")));
+        }
+        self.added_scans = scans;
+        Ok(())
     }
 
     /// What voxtile adds to the original metadata, if the map is voxtile's own.
@@ -98,7 +115,9 @@ impl MapEditor {
         if let Some(ext) = &mut metadata.ext {
             note(ext);
         }
-        self.store.commit(metadata, self.scan_number())
+        self.store.commit(metadata, self.scan_number())?;
+        self.added_scans = 0;
+        Ok(())
     }
 
     /// Before the first change a map of the original format becomes one of voxtile's own.

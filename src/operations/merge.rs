@@ -121,7 +121,7 @@ fn writer_of_build(
 }
 
 /// Whether every tile is in one map only.
-fn have_no_common_tile(maps: &[MapReader]) -> bool {
+pub(super) fn have_no_common_tile(maps: &[MapReader]) -> bool {
     let mut seen = BTreeSet::new();
     maps.iter().flat_map(MapView::tile_indices).all(|tile| seen.insert(tile))
 }
@@ -166,7 +166,7 @@ fn is_left_alone(table: &Table, rule: MergeRule) -> bool {
     }
 }
 
-fn check_grid(map: &MapReader, first: &MapReader) -> Result<()> {
+pub(super) fn check_grid(map: &MapReader, first: &MapReader) -> Result<()> {
     let (grid, first_grid) = (&map.config().grid, &first.config().grid);
     for (what, found, wanted) in [
         ("resolution", grid.resolution_m(), first_grid.resolution_m()),
@@ -182,7 +182,7 @@ fn check_grid(map: &MapReader, first: &MapReader) -> Result<()> {
 }
 
 /// Whether evidence of a map can be added to that of the first.
-fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
+pub(super) fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
     let (config, wanted) = (map.config(), first.config());
     let first = first.folder().display();
     let what = if !map.is_verified() {

@@ -5,6 +5,7 @@
 //! merge   k readers, the tiles of one place at a time -> MapWriter
 //! crop    one reader -> MapWriter
 //! import  a file of OctoMap -> MapWriter
+//! adopt   readers of parts -> MapEditor: tiles in the place of a map's own -> one commit
 //! clear, decay   MapEditor: tiles read, changed, written beside -> one commit
 //! a flush  -> snapshot -> snapshots/NAME, and the tables that it sees stay
 //! snapshot -> revert   -> one commit
@@ -14,6 +15,7 @@
 //!
 //! What each is for, and its rules: `docs/life_of_a_map.md`.
 
+mod adopt;
 mod clear;
 mod convert;
 mod crop;
@@ -33,6 +35,7 @@ mod snapshot;
 mod table_change;
 mod table_merge;
 
+pub use adopt::{Adopted, adopt};
 pub use clear::{Cleared, clear};
 pub use convert::convert;
 pub use crop::crop;

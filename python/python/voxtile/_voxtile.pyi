@@ -14,6 +14,7 @@ __all__ = [
     "Map",
     "ScanIterator",
     "TileIterator",
+    "adopt",
     "call_build",
     "call_export",
     "clear",
@@ -21,6 +22,7 @@ __all__ = [
     "crop",
     "decay",
     "delete_snapshot",
+    "describe",
     "diff",
     "import_octree",
     "merge",
@@ -272,6 +274,10 @@ def merge(
     prefer: Literal["first", "last", "more-observed"] | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def adopt(
+    map: _Path, parts: Sequence[_Path], *, of_flush: int, scans: int, progress: _Progress | None = None
+) -> dict[str, Any]: ...
+def describe(map: _MapOrSnapshot) -> dict[str, Any]: ...
 def crop(
     map: _MapOrSnapshot,
     output: _Path,

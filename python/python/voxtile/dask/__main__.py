@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from typing import Any
 
@@ -18,15 +19,17 @@ _dask: Any = distributed
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m voxtile.dask", description="Makes one map of scans with the workers of a dask cluster."
+        prog="python -m voxtile.dask",
+        description="Makes one map of scans, or adds scans to one, with the workers of a dask cluster.",
     )
     parser.add_argument("scans", metavar="DATA", help="file or folder of scans, which all workers see")
-    parser.add_argument("-o", "--output", metavar="MAP", required=True, help="the new map")
+    parser.add_argument("-o", "--output", metavar="MAP", required=True, help="the map")
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--scheduler", metavar="ADDRESS", help="a running cluster, such as tcp://host:8786")
     where.add_argument("--local", metavar="N", type=int, help="N processes of this machine")
-    parser.add_argument("--resolution", metavar="M", type=float, required=True, help="edge of a voxel in metres")
-    parser.add_argument("--region-size", metavar="M", type=float, help="edge of a region in metres")
+    parser.add_argument("--resolution", metavar="M", type=float, help="edge of a voxel in metres; a new map needs it")
+    parser.add_argument("--update", action="store_true", help="add the scans to the map, which exists")
+    parser.add_argument("--region-size", metavar="M", type=float, help="edge of a region [default: by --max-range]")
     parser.add_argument("--tile-size", metavar="M", type=float)
     parser.add_argument("--min-range", metavar="M", type=float)
     parser.add_argument("--max-range", metavar="M", type=float)
@@ -47,10 +50,15 @@ def _progress(done: int, regions: int) -> None:
 
 def _report(told: dict[str, Any]) -> None:
     before = f" ({told['regions_done_before']} done before)" if told["regions_done_before"] else ""
-    print(f"{told['output']}: {told['regions']} regions{before}")
+    print(f"{told['output']}: {told['regions']} regions of {told['region_size']:g} m{before}")
     print(f"{told['scans']} scans, read {told['scans_read']} times in all: overlap {told['overlap']:.2f}")
-    if told["slowest"]:
-        print(f"CPU {told['cpu_seconds']:.1f} s; the slowest region took {told['skew']:.2f} of the mean:")
+    if "cpu_seconds" in told:
+        parts = ", ".join(
+            f"{name} {told['seconds'][name]:.1f} s (CPU {told['cpu_seconds'][name]:.1f} s)" for name in told["seconds"]
+        )
+        print(f"{told['workers']} workers: {parts}")
+    if told.get("slowest"):
+        print(f"the slowest region took {told['skew']:.2f} of the mean:")
     for task in told["slowest"]:
         print(f"  region {task['column']}: {task['scans']} scans, {task['seconds']:.1f} s")
 
@@ -68,6 +76,8 @@ def main() -> int:
         if workers is None:
             client = _dask.Client(scheduler)
         else:
+            # A worker is a task, and a task a core: more threads wait for each other and cost CPU.
+            os.environ.setdefault("RAYON_NUM_THREADS", "1")
             client = _dask.Client(n_workers=workers, threads_per_worker=1, processes=True)
         with client:
             print(f"dashboard: {client.dashboard_link}", file=sys.stderr)

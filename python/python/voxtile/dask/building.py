@@ -19,6 +19,7 @@ import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -26,9 +27,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .. import files
-from .._voxtile import merge
+from .._voxtile import adopt, crop, describe, merge
 from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
+from .regions import Box, Column, Range, columns_of, region_of, scans_in, tiles_of
+from .simulation import advised_region_size
 
 try:
     import distributed
@@ -39,16 +42,12 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _Path = str | os.PathLike[str]
-_Box = tuple[float, float, float, float]
-_Column = tuple[int, int]
 # What tells a scan from others, and where it may leave something.
-_Seen = tuple[str, _Box | None]
+_Seen = tuple[str, Box | None]
 
 # Its types are not complete.
 _dask: Any = distributed
 
-# Regions of fewer tiles read most scans many times.
-_DEFAULT_REGION_TILES = 20
 # What does not commute with dividing space, or makes numbers of scans mean something else.
 _READING_ONLY = {"every": 1, "first": 0, "count": None}
 
@@ -74,8 +73,9 @@ def build(
     scans: _Path,
     out: _Path,
     *,
-    resolution: float,
+    resolution: float | None = None,
     region_size: float | None = None,
+    update: bool = False,
     client: distributed.Client | None = None,
     progress: Callable[[int, int], object] | None = None,
     **options: Unpack[BuildOptions],
@@ -84,57 +84,152 @@ def build(
 
     The map has the digest of ``voxtile.build``, for any ``region_size`` (metres, along x and y) and any workers. All
     workers and this process need to see ``scans`` and the folder of ``out``. What is done lies in ``out + ".parts"``
-    until the end; the same call after a failure goes on with it. ``progress`` is called with the regions done and
-    their number. Returns numbers about the build.
+    until the end; the same call after a failure goes on with it.
+
+    With ``update`` the scans are added to the map ``out``, as ``voxtile.build`` does with ``append`` and ``again`` and
+    the same keywords: name ``max_range`` and the like again, for a new run does not take them from the map.
+    Only the regions that they reach are read; one flush puts all of them in place, so readers see the map before or
+    after. A map that somebody else changes meanwhile is left as it is, with an error.
+
+    ``progress`` is called with the regions done and their number. Returns numbers about the build.
     """
+    began = time.perf_counter()
     output = Path(os.path.abspath(out))
     source = os.path.abspath(scans)
-    tile_size = options.get("tile_size", 10.0)
-    size = tile_size * _DEFAULT_REGION_TILES if region_size is None else region_size
-    _check(output, size, tile_size, options)
+    settings: dict[str, Any] = {**options}
+    if resolution is not None:
+        settings["resolution"] = resolution
+    base = _base(output, settings) if update else None
+    tile_size = settings.get("tile_size", 10.0) if base is None else base.tile_size
+    size = advised_region_size(settings.get("max_range"), tile_size) if region_size is None else region_size
+    _check(output, size, tile_size, settings, update)
     found: Any = _dask.Client.current() if client is None else client
-    settings: dict[str, Any] = {"resolution": resolution, **options}
     parts = output.with_name(output.name + ".parts")
     with _locked(parts):
         for attempt in parts.glob("attempt-*"):
             shutil.rmtree(attempt, ignore_errors=True)
-        seen = _plan(found, source, dict(options))
+        seen, plan_cpu = _plan(found, source, dict(options))
+        planned = time.perf_counter()
         boxes = [box for _, box in seen]
-        columns = _columns(boxes, size, tile_size)
+        columns = columns_of(boxes, size, tile_size)
         if not columns:
             raise ArgumentError(f"{source}: no scan has a point, so there is nothing to map")
-        identity = json.dumps([version("voxtile"), source, size, settings, seen], sort_keys=True, default=str)
-        mark = hashlib.sha256(identity.encode()).hexdigest()[:16]
-        wanted = {parts / f"{mark}-{x}-{y}": ((x, y), span) for (x, y), span in columns.items()}
+        drive = _mark(source, size, settings, seen, str(output) if base else None)
+        if base is not None and (adopted := _adopted_before(parts, drive, base)) is not None:
+            shutil.rmtree(parts)
+            return {**adopted, "output": str(output), "regions_done_before": adopted["regions"]}
+        mark = drive if base is None else _mark(drive, base.map_id, base.flush_number)
+        wanted = {parts / f"{mark}-{x}-{y}": ((x, y), ranges) for (x, y), ranges in columns.items()}
         open_parts = {part: what for part, what in wanted.items() if not part.exists()}
+        # Long tasks first: a short one at the end keeps few workers waiting.
+        longest = sorted(open_parts.items(), key=lambda what: -scans_in(what[1][1]))
+        of_map = None if base is None else str(output)
+        how = ((size, tile_size), settings, of_map)
         futures = [
-            found.submit(_map_column, source, str(part), column, size, span, settings, pure=False, retries=2)
-            for part, (column, span) in open_parts.items()
+            found.submit(_map_column, source, str(part), column, ranges, *how, pure=False, retries=2)
+            for part, (column, ranges) in longest
         ]
         try:
-            tasks = []
+            tasks: list[dict[str, Any]] = []
             for future in _dask.as_completed(futures):
                 tasks.append(_result(future))
                 if progress is not None:
                     progress(len(columns) - len(open_parts) + len(tasks), len(columns))
         finally:
             found.cancel(futures)
-        merged = merge([str(part) for part in sorted(wanted)], str(output))
-        read = sum(last - first for first, last in columns.values())
+        mapped, merge_cpu = time.perf_counter(), time.process_time()
+        read = sum(scans_in(ranges) for ranges in columns.values())
+        told = {
+            "output": str(output),
+            "region_size": size,
+            "regions": len(columns),
+            "regions_done_before": len(columns) - len(open_parts),
+            "scans": len(boxes),
+            "scans_read": read,
+            "overlap": read / max(len(boxes), 1),
+        }
+        names = [str(part) for part in sorted(wanted)]
+        if base is None:
+            told["tiles"] = _put_together(names, str(output)).get("tiles")
+        else:
+            _note(parts / _ADOPTING, {"drive": drive, "of_flush": base.flush_number, "told": told})
+            told["adopted"] = adopt(str(output), names, of_flush=base.flush_number, scans=len(boxes))
         shutil.rmtree(parts)
+    ended, ended_cpu = time.perf_counter(), time.process_time()
     seconds = sorted((task["seconds"] for task in tasks), reverse=True)
     return {
-        "output": str(output),
-        "regions": len(columns),
-        "regions_done_before": len(columns) - len(open_parts),
-        "scans": len(boxes),
-        "scans_read": read,
-        "overlap": read / max(len(boxes), 1),
-        "tiles": merged.get("tiles"),
-        "cpu_seconds": sum(task["cpu_seconds"] for task in tasks),
+        **told,
+        "workers": len(found.nthreads()),
+        "dashboard": found.dashboard_link,
+        "seconds": {"plan": planned - began, "map": mapped - planned, "merge": ended - mapped},
+        "cpu_seconds": {
+            "plan": plan_cpu,
+            "map": sum(task["cpu_seconds"] for task in tasks),
+            "merge": ended_cpu - merge_cpu,
+        },
         "skew": seconds[0] * len(seconds) / sum(seconds) if seconds else None,
         "slowest": sorted(tasks, key=lambda task: -task["seconds"])[:5],
     }
+
+
+@dataclass(frozen=True)
+class _Base:
+    """The map that an update goes on with, as of its last flush."""
+
+    map_id: str
+    flush_number: int
+    tile_size: float
+
+
+# Says which update is being put in place, so that it is not done twice.
+_ADOPTING = "adopting.json"
+
+
+def _base(output: Path, settings: dict[str, Any]) -> _Base:
+    told = describe(str(output))
+    if told["keeps_scans"]:
+        raise ArgumentError(f"{output}: it keeps its scans, which a build in parts does not; use voxtile.build")
+    for name in ("resolution", "tile_size"):
+        if settings.get(name, told[name]) != told[name]:
+            raise ArgumentError(f"{name}: the map has {told[name]} m; leave it out")
+    return _Base(str(told["map_id"]), told["flush_number"], told["tile_size"])
+
+
+def _mark(*what: object) -> str:
+    identity = json.dumps([version("voxtile"), *what], sort_keys=True, default=str)
+    return hashlib.sha256(identity.encode()).hexdigest()[:16]
+
+
+def _note(path: Path, what: dict[str, Any]) -> None:
+    beside = path.with_suffix(".new")
+    with open(beside, "w", encoding="utf-8") as file:
+        json.dump(what, file)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(beside, path)
+
+
+def _adopted_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | None:
+    """What a call told that put these scans in place and was killed before it removed the parts."""
+    try:
+        noted: dict[str, Any] = json.loads((parts / _ADOPTING).read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return None
+    if noted["drive"] != drive or base.flush_number <= noted["of_flush"]:
+        return None
+    told: dict[str, Any] = noted["told"]
+    return told
+
+
+def _put_together(parts: list[str], output: str) -> dict[str, Any]:
+    if len(parts) > 1:
+        return merge(parts, output)
+    # One part is the map. A copy gets its name when it is whole.
+    beside = output + ".unfinished"
+    shutil.rmtree(beside, ignore_errors=True)
+    shutil.copytree(parts[0], beside)
+    os.rename(beside, output)
+    return {}
 
 
 def _result(future: Any) -> dict[str, Any]:
@@ -153,13 +248,15 @@ def _result(future: Any) -> dict[str, Any]:
     return done
 
 
-def _check(output: Path, region_size: float, tile_size: float, options: Any) -> None:
+def _check(output: Path, region_size: float, tile_size: float, options: Any, update: bool) -> None:
     # A column narrower than two tiles may have the center of none.
     if not (math.isfinite(region_size) and region_size >= 2 * tile_size):
         raise ArgumentError(f"region_size: {region_size} m is less than two tiles of {tile_size} m; take more")
-    if output.exists():
+    if not update and "resolution" not in options:
+        raise ArgumentError("resolution: a new map needs the edge of its voxels in metres")
+    if not update and output.exists():
         raise ArgumentError(f"{output}: it exists; name a new map, or remove it")
-    allowed = BuildOptions.__annotations__.keys() | ReadOptions.__annotations__.keys()
+    allowed = {"resolution", *BuildOptions.__annotations__, *ReadOptions.__annotations__}
     for name in options:
         if name not in allowed:
             raise ArgumentError(f"{name}: a build in parts does not take it; use voxtile.build")
@@ -185,8 +282,8 @@ def _locked(parts: Path) -> Iterator[None]:
                 shutil.rmtree(parts)
 
 
-def _plan(client: Any, source: str, options: dict[str, Any]) -> list[_Seen]:
-    """What each scan is, and where it may leave something: west, south, east, north. ``None`` is nowhere."""
+def _plan(client: Any, source: str, options: dict[str, Any]) -> tuple[list[_Seen], float]:
+    """What each scan is, and where it may leave something, ``None`` for nowhere; and the seconds of CPU for that."""
     reading = {name: value for name, value in options.items() if name in ReadOptions.__annotations__}
     reach = (options.get("max_range"), options.get("clear_no_return"))
     scans = operator.length_hint(files.scans(source, **reading))
@@ -196,7 +293,8 @@ def _plan(client: Any, source: str, options: dict[str, Any]) -> list[_Seen]:
     # The last one takes what an estimate left out.
     spans = [(first, None if first == firsts[-1] else step) for first in firsts]
     tasks = [client.submit(_boxes, source, *span, reading, reach, pure=False, retries=2) for span in spans]
-    return [scan for part in client.gather(tasks) for scan in part]
+    found = client.gather(tasks)
+    return [scan for part, _ in found for scan in part], sum(cpu for _, cpu in found)
 
 
 def _boxes(
@@ -205,77 +303,87 @@ def _boxes(
     count: int | None,
     reading: dict[str, Any],
     reach: tuple[float | None, float | None],
-) -> list[_Seen]:
+) -> tuple[list[_Seen], float]:
+    began = time.process_time()
     max_range, clear_no_return = reach
     seen: list[_Seen] = []
     options: dict[str, Any] = {**reading, "first": first, "count": count}
     for points, pose, intensities in files.scans(source, **options):
-        content = hashlib.blake2b(points.tobytes() + pose.tobytes(), digest_size=16)
-        content.update(b"" if intensities is None else intensities.tobytes())
-        origin = pose[:2, 3]
-        ends = (points @ pose[:3, :3].T + pose[:3, 3])[:, :2]
-        ends = ends[np.isfinite(ends).all(axis=1)]
-        if max_range is not None:
-            ends = np.clip(ends, origin - max_range, origin + max_range)
-        if clear_no_return is not None:
-            ends = np.concatenate([ends, [origin - clear_no_return, origin + clear_no_return]])
-        if len(ends) == 0:
-            seen.append((content.hexdigest(), None))
-            continue
-        low, high = np.minimum(ends.min(axis=0), origin), np.maximum(ends.max(axis=0), origin)
-        box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+        content = hashlib.blake2b(np.ascontiguousarray(points).data, digest_size=16)
+        content.update(pose.tobytes())
+        if intensities is not None:
+            content.update(np.ascontiguousarray(intensities).data)
+        box = _box(points, pose, max_range, clear_no_return)
         seen.append((content.hexdigest(), box))
-    return seen
+    return seen, time.process_time() - began
 
 
-def _columns(boxes: Sequence[_Box | None], size: float, tile_size: float) -> dict[_Column, tuple[int, int]]:
-    """The columns that scans may reach, and of each the first scan and the one after the last."""
-    columns: dict[_Column, tuple[int, int]] = {}
-    # A tile whose center is in a column reaches half of its edge beyond; the other half is slack for rounding.
-    margin = tile_size
-    for number, box in enumerate(boxes):
-        if box is None:
-            continue
-        west, south, east, north = box
-        for x in range(math.floor((west - margin) / size), math.floor((east + margin) / size) + 1):
-            for y in range(math.floor((south - margin) / size), math.floor((north + margin) / size) + 1):
-                first, _ = columns.get((x, y), (number, number))
-                columns[x, y] = (first, number + 1)
-    return columns
+def _box(points: Any, pose: Any, max_range: float | None, clear_no_return: float | None) -> Box | None:
+    """A box around a scan and its rays."""
+    origin = pose[:2, 3]
+    ends = points @ pose[:2, :3].T + origin
+    if not np.isfinite(ends.sum()):
+        ends = ends[np.isfinite(ends).all(axis=1)]
+    corners = [] if len(ends) == 0 else [ends.min(axis=0), ends.max(axis=0)]
+    if max_range is not None:
+        corners = [np.clip(corner, origin - max_range, origin + max_range) for corner in corners]
+    if clear_no_return is not None:
+        corners += [origin - clear_no_return, origin + clear_no_return]
+    if not corners:
+        return None
+    low, high = np.min([origin, *corners], axis=0), np.max([origin, *corners], axis=0)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
 def _map_column(
-    source: str, part: str, column: _Column, size: float, span: tuple[int, int], settings: dict[str, Any]
+    source: str,
+    part: str,
+    column: Column,
+    ranges: Sequence[Range],
+    sizes: tuple[float, float],
+    settings: dict[str, Any],
+    of_map: str | None,
 ) -> dict[str, Any]:
-    """Maps a column on the worker's disk, and puts it beside the others whole."""
+    """Maps a column on the worker's disk, and puts it beside the others. ``sizes`` are a column's and a tile's."""
     began, cpu_began = time.perf_counter(), time.process_time()
-    x, y = column
-    region = [x * size, y * size, -math.inf, (x + 1) * size, (y + 1) * size, math.inf]
     with tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory) as local:
         made = os.path.join(local, "map")
-        first, last = span
-        options: dict[str, Any] = {**settings, "first": first, "count": last - first, "region": region}
         try:
-            files.build(source, made, **options)
+            if of_map is not None:
+                crop(of_map, made, tiles_of(column, *sizes))
+            for first, last in ranges:
+                options: dict[str, Any] = {**settings, "first": first, "count": last - first}
+                # A later range begins as another input may have: these are other scans.
+                goes_on: dict[str, Any] = {"append": True, "again": True} if os.path.exists(made) else {}
+                files.build(source, made, region=region_of(column, sizes[0]), **options, **goes_on)
         except VoxtileError as error:
             # Of the classes of errors, callers look at the class and the message.
             worker = _dask.get_worker()
             error.args = (f"{error} (worker {worker.address}, whose disk is {worker.local_directory})",)
             raise
-        attempt = os.path.join(os.path.dirname(part), f"attempt-{uuid.uuid4().hex}")
-        try:
-            shutil.copytree(made, attempt)
-            # Another attempt may have been first; both made the same.
-            if not os.path.exists(part):
-                os.rename(attempt, part)
-        except OSError:
-            if not os.path.exists(part):
-                raise
-        finally:
-            shutil.rmtree(attempt, ignore_errors=True)
+        _hand_over(made, part)
     return {
         "column": list(column),
-        "scans": last - first,
+        "ranges": len(ranges),
+        "scans": scans_in(ranges),
         "seconds": time.perf_counter() - began,
         "cpu_seconds": time.process_time() - cpu_began,
     }
+
+
+def _hand_over(made: str, part: str) -> None:
+    """Moves what a worker made to its place, whole; another attempt may have been first, and made the same."""
+    attempt = os.path.join(os.path.dirname(part), f"attempt-{uuid.uuid4().hex}")
+    try:
+        try:
+            # On the same disk nothing is copied.
+            os.rename(made, attempt)
+        except OSError:
+            shutil.copytree(made, attempt)
+        if not os.path.exists(part):
+            os.rename(attempt, part)
+    except OSError:
+        if not os.path.exists(part):
+            raise
+    finally:
+        shutil.rmtree(attempt, ignore_errors=True)

@@ -1,297 +1,131 @@
-"""Work on a map that is there, column by column of its tiles.
+"""Work on a finished map, region by region.
 
-What a task makes it makes on its worker's disk, and puts it beside the others under a name of its own attempt; the
-process that was called gives the whole its name.
+A task reads its own tiles only. It writes beside the output under a name of its own attempt, and then renames that: a
+lost task is run again, and no file is there in part.
 """
 
 from __future__ import annotations
 
-import math
 import os
-import shutil
-import tempfile
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from .. import _voxtile, files
-from .._voxtile import Map
-from ..errors import ArgumentError, VoxtileError
+import distributed
+import numpy as np
+
+from .. import files
+from .._voxtile import Map, describe
+from ..errors import ArgumentError
 from ..files import ExportOptions
-from .regions import Column, tiles_of
+from .simulation import advised_region_size
 from .tiles import Tile, map_tiles
 
-try:
-    import distributed
-except ImportError:
-    raise ImportError("voxtile.dask needs distributed: pip install voxtile[dask]") from None
-
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from typing_extensions import Unpack
 
 _Path = str | os.PathLike[str]
-_Index = tuple[int, int, int]
-_Progress = Callable[[int, int], object] | None
 
 # Its types are not complete.
 _dask: Any = distributed
 
-# Tiles along the edge of a column where nobody names its size.
-_TILES_OF_COLUMN = 20
-_HISTOGRAM_BINS = 20
-
 
 def export(
     map: _Path,
-    folder: _Path,
-    format: str,
+    out: _Path,
+    suffix: str,
     *,
     region_size: float | None = None,
     client: distributed.Client | None = None,
-    progress: _Progress = None,
     **options: Unpack[ExportOptions],
 ) -> dict[str, Any]:
-    """Writes a map as a new folder of files ``X_Y.FORMAT``, one a column of ``region_size`` metres (200 m).
+    """Writes a file for each region of a map into the new folder ``out``, in the format of the ending ``suffix``.
 
-    ``format`` is the ending of a file that ``voxtile.export`` writes; each file is what that writes of the column.
-    ``options`` are its keywords but ``region``. A column in which there is nothing to write has a file that says so.
+    ``x_y`` and the suffix name a file; it has what ``voxtile.export`` writes of that region, byte for byte. Regions
+    without a tile get no file. ``suffix`` is one of a single file (``.ply``, ``.las``, ``.csv`` and so on);
+    ``options`` are those of ``voxtile.export`` but for ``region``. The map is not to be changed meanwhile: name a
+    snapshot, ``"map@snapshot"``, while somebody writes to it.
     """
-    for name in ("region", "format"):
-        if name in options:
-            raise ArgumentError(f"{name}: the columns say it; leave it out")
-    source, output = _places(map, folder)
-    columns, size, tile_size = _columns([source], region_size)
-    made = output.with_name(output.name + ".unfinished")
-    shutil.rmtree(made, ignore_errors=True)
-    made.mkdir()
+    if "region" in options:
+        raise ArgumentError("region: regions are those of the tasks; leave it out, or use voxtile.export")
+    if not suffix.startswith(".") or os.sep in suffix:
+        raise ArgumentError(f"suffix: {suffix!r} is no ending of a file, such as .ply")
+    output = Path(os.path.abspath(out))
+    if output.exists():
+        raise ArgumentError(f"{output}: it exists; name a new folder, or remove it")
+    path, _, snapshot = os.fspath(map).partition("@")
+    source = os.path.abspath(path) + (f"@{snapshot}" if snapshot else "")
+    told = describe((path, snapshot) if snapshot else path)
+    size = advised_region_size(told["max_range"], told["tile_size"]) if region_size is None else region_size
+    if not size >= 2 * told["tile_size"]:
+        raise ArgumentError(f"region_size: {size} m is less than two tiles of {told['tile_size']} m; take more")
+    with Map.open(path, "r", snapshot=snapshot or None) as opened:
+        heights = (float(opened.tiles[:, 2].min(initial=0)), float(opened.tiles[:, 2].max(initial=0)) + 1.0)
+        # A region that cuts a tile gets a part of it, and so does the next one.
+        corners = [np.floor((opened.tiles[:, :2] + end) * told["tile_size"] / size - shift) for end, shift in _ENDS]
+    low, high = (height * told["tile_size"] for height in heights)
+    columns = sorted({(int(x), int(y)) for corner in corners for x, y in corner})
+    found: Any = _dask.Client.current() if client is None else client
+    beside = output.with_name(f"{output.name}.unfinished")
+    beside.mkdir(parents=True, exist_ok=True)
+    futures = [
+        found.submit(
+            _export_region,
+            source,
+            str(beside),
+            f"{x}_{y}{suffix}",
+            [x * size, y * size, low, (x + 1) * size, (y + 1) * size, high],
+            dict(options),
+            pure=False,
+            retries=2,
+        )
+        for x, y in columns
+    ]
     try:
-        tasks = [
-            (_export_column, (source, str(made), column, tiles_of(column, size, tile_size), format, dict(options)))
-            for column in columns
-        ]
-        written = _run(client, tasks, progress)
-        os.rename(made, output)
+        tasks: list[dict[str, Any]] = found.gather(futures)
     finally:
-        shutil.rmtree(made, ignore_errors=True)
-    return {"output": str(output), "files": sum(written), "regions": len(columns)}
+        found.cancel(futures)
+    for attempt in beside.glob("attempt-*"):
+        attempt.unlink()
+    os.rename(beside, output)
+    return {"output": str(output), "region_size": size, "files": sorted(task["file"] for task in tasks)}
 
 
-def decay(
-    map: _Path,
-    out: _Path,
-    halflife_scans: float,
-    *,
-    scans: int | None = None,
-    forget_below: float = 0.0,
-    region_size: float | None = None,
-    client: distributed.Client | None = None,
-    progress: _Progress = None,
+# The low and the high corner of a tile; one that ends where a region begins has nothing in it.
+_ENDS = ((0, 0.0), (1, 1e-9))
+
+
+def _export_region(
+    map: str, folder: str, name: str, region: list[float], options: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Makes a map in which evidence has faded as by ``voxtile.decay``; the map it is made of stays as it is."""
-    source, output = _places(map, out)
-    work: _Work = ("decay", (halflife_scans, scans, forget_below))
-    return _make([source], output, work, region_size, client, progress)
+    attempt = os.path.join(folder, f"attempt-{uuid.uuid4().hex}-{name}")
+    how: Any = {**options, "region": region}
+    files.export(map, attempt, **how)
+    os.replace(attempt, os.path.join(folder, name))
+    return {"file": name}
 
 
-def merge(
-    maps: Sequence[_Path],
-    out: _Path,
-    *,
-    prefer: Literal["first", "last", "more-observed"] | None = None,
-    region_size: float | None = None,
-    client: distributed.Client | None = None,
-    progress: _Progress = None,
+def statistics(
+    map: _Path, *, snapshot: str | None = None, client: distributed.Client | None = None
 ) -> dict[str, Any]:
-    """Merges maps of many sessions as ``voxtile.merge`` does, by the same rules.
-
-    Maps that share a past count it twice without ``prefer``; unlike there, nothing warns of it.
-    """
-    if not maps:
-        raise ArgumentError("maps: there are none; name one or more")
-    places = [_places(map, out) for map in maps]
-    return _make([source for source, _ in places], places[0][1], ("merge", (prefer,)), region_size, client, progress)
-
-
-def verify(
-    map: _Path,
-    *,
-    region_size: float | None = None,
-    client: distributed.Client | None = None,
-    progress: _Progress = None,
-) -> dict[str, Any]:
-    """Checks every file of a map: the sums and ``"findings"`` of ``voxtile.verify``."""
-    source = os.path.abspath(map)
-    try:
-        columns, *_ = _columns([source], region_size)
-    except VoxtileError:
-        # Without its list of tiles a map cannot be divided.
-        return _voxtile.verify(source, progress=progress)
-    tasks = [(_verify_tiles, (source, None)), *((_verify_tiles, (source, tiles)) for tiles in columns.values())]
-    rest, *parts = _run(client, tasks, progress)
-    for part in parts:
-        for name in ("tiles", "voxels", "table_bytes"):
-            rest[name] += part[name]
-        # What is wrong with the lists is found by every task.
-        rest["findings"] += [finding for finding in part["findings"] if finding not in rest["findings"]]
-    damage = sum(finding["severity"] == "damage" for finding in rest["findings"])
-    return {**rest, "damage": damage, "notes": len(rest["findings"]) - damage}
-
-
-def statistics(map: _Path, *, snapshot: str | None = None, client: distributed.Client | None = None) -> dict[str, Any]:
-    """Counts of free and occupied voxels, the heights in metres between which there are occupied ones, and how many
-    have which probability: a histogram of twenty bins from 0 to 1."""
-    found = _dask.Client.current() if client is None else client
+    """Counts a map's tiles, its observed, occupied and free voxels, and the bounds of what is occupied in metres."""
+    found: Any = _dask.Client.current() if client is None else client
     counted = found.compute(map_tiles(map, _count, snapshot=snapshot)).result()
-    heights = [tile[2:4] for tile in counted if tile[1]]
-    histogram = [sum(numbers) for numbers in zip(*(tile[4] for tile in counted), strict=True)]
+    occupied = [tile for tile in counted if tile["occupied"]]
     return {
         "tiles": len(counted),
-        "free": sum(tile[0] for tile in counted),
-        "occupied": sum(tile[1] for tile in counted),
-        "lowest_occupied": min((low for low, _ in heights), default=None),
-        "highest_occupied": max((high for _, high in heights), default=None),
-        "probabilities": histogram or [0] * _HISTOGRAM_BINS,
+        **{name: sum(tile[name] for tile in counted) for name in ("observed", "occupied", "free")},
+        "occupied_low": np.min([tile["low"] for tile in occupied], axis=0).tolist() if occupied else None,
+        "occupied_high": np.max([tile["high"] for tile in occupied], axis=0).tolist() if occupied else None,
     }
 
 
-# The operation and what it is told.
-_Work = tuple[Literal["decay", "merge"], tuple[Any, ...]]
-
-
-def _places(map: _Path, out: _Path) -> tuple[str, Path]:
-    output = Path(os.path.abspath(out))
-    if output.exists():
-        raise ArgumentError(f"{output}: it exists; name a new one, or remove it")
-    return os.path.abspath(map), output
-
-
-def _columns(
-    maps: Sequence[str], region_size: float | None
-) -> tuple[dict[Column, list[_Index]], float, float]:
-    """The columns with tiles of any of the maps, the edge of a column and that of a tile."""
-    tiles: set[_Index] = set()
-    tile_size = 0.0
-    for map in maps:
-        with Map.open(map, "r") as opened:
-            tiles.update((int(x), int(y), int(z)) for x, y, z in opened.tiles)
-            tile_size = tile_size or opened.tile_size
-    size = _TILES_OF_COLUMN * tile_size if region_size is None else region_size
-    if not (math.isfinite(size) and size >= 2 * tile_size):
-        raise ArgumentError(f"region_size: {size} m is less than two tiles of {tile_size} m; take more")
-    columns: dict[Column, list[_Index]] = {}
-    for tile in sorted(tiles):
-        column = (math.floor((tile[0] + 0.5) * tile_size / size), math.floor((tile[1] + 0.5) * tile_size / size))
-        columns.setdefault(column, []).append(tile)
-    return columns, size, tile_size
-
-
-def _run(client: Any, tasks: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]], progress: _Progress) -> list[Any]:
-    """The answers of tasks in their order."""
-    found = _dask.Client.current() if client is None else client
-    futures = [found.submit(function, *given, pure=False, retries=2) for function, given in tasks]
-    try:
-        for done, future in enumerate(_dask.as_completed(futures), 1):
-            future.result()
-            if progress is not None:
-                progress(done, len(futures))
-        answers: list[Any] = found.gather(futures)
-        return answers
-    except _dask.KilledWorker as error:
-        raise VoxtileError(f"{error.last_worker.address}: this worker and others have ended; perhaps memory was short") from error
-    finally:
-        found.cancel(futures)
-
-
-def _make(
-    maps: Sequence[str], output: Path, work: _Work, region_size: float | None, client: Any, progress: _Progress
-) -> dict[str, Any]:
-    """A new map of what is made of each column."""
-    columns, size, tile_size = _columns(maps, region_size)
-    if not columns:
-        return _voxtile.merge(list(maps), str(output))
-    parts = output.with_name(output.name + ".parts")
-    try:
-        parts.mkdir()
-    except FileExistsError:
-        raise ArgumentError(f"{parts}: another process makes this map, or was killed; wait, or remove it") from None
-    try:
-        tasks = [(_make_part, (list(maps), str(parts), column, tiles_of(column, size, tile_size), work)) for column in columns]
-        made = [part for part in _run(client, tasks, progress) if part is not None]
-        merged = _voxtile.merge(made, str(output))
-    finally:
-        shutil.rmtree(parts, ignore_errors=True)
-    return {"output": str(output), "regions": len(columns), "tiles": merged.get("tiles")}
-
-
-def _make_part(maps: Sequence[str], parts: str, column: Column, box: Sequence[float], work: _Work) -> str | None:
-    operation, given = work
-    with _local_folder() as local:
-        crops = []
-        for number, map in enumerate(maps):
-            crop = os.path.join(local, str(number))
-            if _voxtile.crop(map, crop, box).get("tiles", 1):
-                crops.append(crop)
-        if not crops:
-            return None
-        made = crops[0]
-        if operation == "merge" and len(crops) > 1:
-            made = os.path.join(local, "merged")
-            _voxtile.merge(crops, made, prefer=given[0])
-        elif operation == "decay":
-            halflife_scans, scans, forget_below = given
-            _voxtile.decay(made, halflife_scans, scans=scans, forget_below=forget_below)
-        return _put(made, Path(parts) / f"{column[0]}_{column[1]}")
-
-
-def _export_column(
-    map: str, folder: str, column: Column, box: Sequence[float], format: str, options: dict[str, Any]
-) -> int:
-    with _local_folder() as local:
-        files.export(map, os.path.join(local, f"{column[0]}_{column[1]}.{format}"), region=box, **options)
-        names = sorted(os.listdir(local))
-        for name in names:
-            _put(os.path.join(local, name), Path(folder) / name)
-    return len(names)
-
-
-def _verify_tiles(map: str, tiles: Sequence[_Index] | None) -> dict[str, Any]:
-    return _voxtile.verify(map, tiles=tiles, but_tiles=tiles is None)
-
-
-def _count(tile: Tile) -> tuple[int, int, float, float, list[int]]:
-    import numpy as np
-
-    occupancy, corner = tile.dense()
-    probability: NDArray[np.float64] = tile.dense("probability")[0]
-    histogram, _ = np.histogram(probability[occupancy >= 0], bins=_HISTOGRAM_BINS, range=(0.0, 1.0))
-    layers = np.flatnonzero((occupancy == 1).any(axis=(0, 1)))
-    free, occupied = int((occupancy == 0).sum()), int((occupancy == 1).sum())
-    if len(layers) == 0:
-        return free, occupied, 0.0, 0.0, [int(number) for number in histogram]
-    edge = (tile.region[5] - tile.region[2]) / occupancy.shape[2]
-    low, high = float(corner[2]) + edge * layers[0], float(corner[2]) + edge * (layers[-1] + 1)
-    return free, occupied, float(low), float(high), [int(number) for number in histogram]
-
-
-def _local_folder() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory)
-
-
-def _put(made: str, place: Path) -> str:
-    """Copies a file or folder to where others see it, whole or not there."""
-    attempt = place.with_name(f"attempt-{uuid.uuid4().hex}")
-    try:
-        (shutil.copytree if os.path.isdir(made) else shutil.copyfile)(made, attempt)
-        # Another attempt may have been first; both made the same.
-        if not place.exists():
-            os.rename(attempt, place)
-    except OSError:
-        if not place.exists():
-            raise
-    finally:
-        shutil.rmtree(attempt, ignore_errors=True)
-        attempt.unlink(missing_ok=True) if attempt.is_file() else None
-    return str(place)
+def _count(tile: Tile) -> dict[str, Any]:
+    log_odds, _ = tile.dense("log_odds")
+    centers, _ = tile.occupied()
+    observed = int(np.isfinite(log_odds).sum())
+    told = {"observed": observed, "occupied": len(centers), "free": observed - len(centers)}
+    if len(centers) > 0:
+        told.update(low=centers.min(axis=0), high=centers.max(axis=0))
+    return told

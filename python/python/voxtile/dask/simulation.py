@@ -1,0 +1,186 @@
+"""What a build in parts would cost: tasks, bytes and time for a city, without a scan of it.
+
+Streets are lines at equal distances, along x and along y; a car
+drives each once. The planner is that of a build; times are counts multiplied by ``Costs``.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from .regions import Box, columns_of, scans_in
+
+
+@dataclass(frozen=True)
+class Costs:
+    """CPU seconds and bytes. docs/cluster.md says how they were measured."""
+
+    # The first pass: decoding a scan, its box, and its checksum.
+    plan_scan_s: float = 0.0021
+    # A scan that a region's task reads, whether or not it leaves something there.
+    read_scan_s: float = 0.0013
+    # A scan that is mapped, over all regions that it reaches.
+    map_scan_s: float = 0.0100
+    # Starting a task, opening and flushing its map.
+    task_s: float = 0.1
+    # A tile in the last step, which one process does.
+    merge_tile_s: float = 0.0035
+    # A scan of 8000 points in a file of float32.
+    scan_bytes: int = 96_000
+
+
+@dataclass(frozen=True)
+class City:
+    """A square of streets. In the middle, on a ninth of the area, each street is driven ``downtown_times``."""
+
+    streets_km: float = 10_000.0
+    street_distance_m: float = 200.0
+    scan_distance_m: float = 1.0
+    downtown_times: int = 1
+
+
+# What a build in parts may take of the CPU of one build.
+_CPU_GOAL = 1.3
+# Where no range is named: what lidars of cars reach.
+_USUAL_RANGE_M = 100.0
+_TILES_STEP = 10
+# A region that is wider than this leaves nothing to share.
+_MOST_TILES = 1000
+
+
+def cpu_factor(region_size: float, reach: float, costs: Costs = Costs()) -> float:
+    """CPU of a build in parts on a straight drive over that of one build, before the last step."""
+    # A region reads what is beside it as far as scans reach, and along both ends of a street.
+    read_times = (region_size + 2 * reach) / region_size
+    scans_of_region = max(region_size, 1.0)
+    one = costs.read_scan_s + costs.map_scan_s
+    parts = costs.plan_scan_s + read_times * costs.read_scan_s + costs.map_scan_s + costs.task_s / scans_of_region
+    return parts / one
+
+
+def advised_region_size(max_range: float | None, tile_size: float, costs: Costs = Costs()) -> float:
+    """The edge of the smallest regions, in metres, that keep the CPU within 1.3 of one build; small ones share evenly.
+
+    Where no size does, the first one of which the double would gain less than a hundredth.
+    """
+    reach = _USUAL_RANGE_M if max_range is None else max_range
+    for tiles in range(2 * _TILES_STEP, _MOST_TILES + 1, _TILES_STEP):
+        size = tiles * tile_size
+        factor = cpu_factor(size, reach, costs)
+        if factor <= _CPU_GOAL or factor - cpu_factor(2 * size, reach, costs) < 0.01:
+            return size
+    return _MOST_TILES * tile_size
+
+
+def simulate(
+    city: City, *, region_size: float, reach: float, workers: list[int], tile_size: float = 10.0, costs: Costs = Costs()
+) -> dict[str, Any]:
+    """Plans a build of a city and runs the plan: each free worker takes the next task, the longest first."""
+    edge = _edge(city)
+    boxes, weights = _drive(city, edge, reach)
+    columns = columns_of(boxes, region_size, tile_size, joined_gap=1)
+    before = [0]
+    for weight in weights:
+        before.append(before[-1] + weight)
+    tasks, read = [], 0
+    for (x, y), ranges in columns.items():
+        scans = sum(before[last] - before[first] for first, last in ranges)
+        share = sum(
+            weights[number] * _share(boxes[number], x, y, region_size)
+            for first, last in ranges
+            for number in range(first, last)
+        )
+        read += scans
+        tasks.append(costs.task_s + scans * costs.read_scan_s + share * costs.map_scan_s)
+    tasks.sort(reverse=True)
+    scans = before[-1]
+    # Tiles of the ground and of what stands on it, where a scan reaches.
+    tiles = _TILES_HIGH * _ground_tiles(city, edge, reach, tile_size)
+    plan_s, merge_s = scans * costs.plan_scan_s, tiles * costs.merge_tile_s
+    cpu_s = plan_s + sum(tasks) + merge_s
+    one_build_s = scans * (costs.read_scan_s + costs.map_scan_s)
+    return {
+        "city": asdict(city),
+        "region_size": region_size,
+        "scans": scans,
+        "tasks": len(tasks),
+        "scans_read": read,
+        "overlap": read / scans,
+        "bytes_read": (read + scans) * costs.scan_bytes,
+        "cpu_seconds": {"plan": plan_s, "map": sum(tasks), "merge": merge_s},
+        "cpu_factor": cpu_s / one_build_s,
+        "skew": tasks[0] * len(tasks) / sum(tasks),
+        "longest_task_seconds": tasks[0],
+        "workers": [
+            {
+                "workers": count,
+                "plan_seconds": plan_s / count,
+                "map_seconds": _makespan(tasks, count),
+                "merge_seconds": merge_s,
+                "seconds": plan_s / count + _makespan(tasks, count) + merge_s,
+            }
+            for count in workers
+        ],
+    }
+
+
+# Tiles above each other that scans of streets leave something in.
+_TILES_HIGH = 2
+
+
+def _ground_tiles(city: City, edge: float, reach: float, tile_size: float) -> float:
+    """Tiles on the ground that scans reach: a band along each street, counted once where two cross."""
+    covered = min(2 * reach / city.street_distance_m, 1.0)
+    return (1 - (1 - covered) ** 2) * (edge / tile_size) ** 2
+
+
+def _edge(city: City) -> float:
+    """The edge of the square in which streets have the wanted length."""
+    for name, value in asdict(city).items():
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{name}: {value} is not above 0")
+    streets = max(round(math.sqrt(city.streets_km * 1000.0 / (2 * city.street_distance_m))), 1)
+    return streets * city.street_distance_m
+
+
+# Scans are planned in groups, so that a city takes seconds.
+_GROUP_M = 20.0
+
+
+def _drive(city: City, edge: float, reach: float) -> tuple[list[Box | None], list[int]]:
+    """The box around each group of scans, and how many there are in it, in the order of the drive."""
+    boxes: list[Box | None] = []
+    weights: list[int] = []
+    scans = max(round(_GROUP_M / city.scan_distance_m), 1)
+    streets, groups = round(edge / city.street_distance_m), math.ceil(edge / _GROUP_M)
+    for is_along_y in (False, True):
+        for street in range(streets):
+            across = (street + 0.5) * city.street_distance_m
+            order = range(groups) if street % 2 == 0 else range(groups - 1, -1, -1)
+            for group in order:
+                along = (group + 0.5) * _GROUP_M
+                is_downtown = edge / 3 <= across < 2 * edge / 3 and edge / 3 <= along < 2 * edge / 3
+                x, y = (across, along) if is_along_y else (along, across)
+                boxes.append((x - reach, y - reach, x + reach, y + reach))
+                weights.append(scans * (city.downtown_times if is_downtown else 1))
+    return boxes, weights
+
+
+def _share(box: Box | None, x: int, y: int, size: float) -> float:
+    """What part of a box is in a column."""
+    if box is None:
+        return 0.0
+    west, south, east, north = box
+    wide = min(east, (x + 1) * size) - max(west, x * size)
+    high = min(north, (y + 1) * size) - max(south, y * size)
+    return max(wide, 0.0) * max(high, 0.0) / ((east - west) * (north - south))
+
+
+def _makespan(tasks: list[float], workers: int) -> float:
+    free = [0.0] * min(workers, len(tasks))
+    for seconds in tasks:
+        heapq.heapreplace(free, free[0] + seconds)
+    return max(free, default=0.0)
