@@ -52,6 +52,7 @@ compare() {
     "$python" outputs.py compare "$work/$1.outputs" "$work/$1.csv" "$work/$1.pgm" 30 $radius $max_z $2 $inflation_range
 }
 
+declare -A peak_kib
 "$python" type_hashes.py
 for kind in friendly hostile; do
     map=$work/$kind
@@ -63,6 +64,7 @@ for kind in friendly hostile; do
     "$python" zenoh_peer.py $port $domain "$map.bag" 30 $kind || fail "the peer has failed"
     wait $listener || fail "no outputs"
     listener=
+    peak_kib[$kind]=$(sed -n 's/^VmHWM:[^0-9]*\([0-9]*\) kB/\1/p' /proc/$node/status)
     end INT
     grep 'clouds:' "$map.log" | tail -1 | tee "$map.counters"
     grep -q ' 30 mapped' "$map.counters" || fail "not all clouds were mapped"
@@ -76,6 +78,9 @@ for kind in friendly hostile; do
     compare $kind live
     if [ $kind = hostile ]; then
         grep -q ' 1 too large' "$map.counters" || fail "a cloud larger than the queue is not counted"
+        # The message of 17 MiB, the queue's 16 MiB, and what came with them.
+        echo "zenoh: at most $((peak_kib[friendly] >> 10)) MiB of memory, $((peak_kib[hostile] >> 10)) with a hostile peer"
+        [ ${peak_kib[hostile]} -lt $((peak_kib[friendly] + (64 << 10))) ] || fail "a hostile peer takes memory"
         grep -q ' 0 malformed' "$map.counters" && fail "clouds that lie are not counted"
     else
         # It tells who comes late; its router goes away and another one comes.
@@ -86,6 +91,7 @@ for kind in friendly hostile; do
             fail "what did not change was published again"
         fi
         "$python" zenoh_services.py $port $domain || fail "services"
+        timeout 100 "$python" zenoh_sdk.py $port $domain || fail "zenoh_ros2_sdk"
         end_router
         start_router
         "$python" zenoh_services.py $port $domain again || fail "the node has lost its router"
