@@ -9,8 +9,8 @@ cd "$(dirname "$0")"
 work=$1/zenoh
 mkdir "$work"
 port=$((RANDOM % 10000 + 20000)) domain=$((RANDOM % 100 + 100))
-router= node= listener= of_friend=
-trap 'for one in $node $listener $router; do kill "$one" 2>/dev/null || true; done' EXIT
+router= node= listener= peer= of_friend=
+trap 'for one in $node $listener $peer $router; do kill "$one" 2>/dev/null || true; done' EXIT
 
 fail() {
     echo "zenoh: $*"
@@ -34,11 +34,11 @@ end_router() {
     router=
 }
 
-# Starts the node with a map.
+# Starts the node with a map. What a hostile peer does in between takes it long, and no cloud is to miss its pose.
 start() {
     # shellcheck disable=SC2086
     "$program" -o "$1" --transport zenoh --zenoh-router tcp/127.0.0.1:$port --domain-id $domain --resolution 0.1 \
-        --memory 128MiB $outputs >"$1.log" 2>&1 &
+        --memory 128MiB --transform-wait 20 $outputs >"$1.log" 2>&1 &
     node=$!
 }
 
@@ -56,12 +56,27 @@ declare -A peak_kib
 "$python" type_hashes.py
 for kind in friendly hostile; do
     map=$work/$kind
-    # The node comes first: it looks for its router until there is one.
-    start "$map"
-    start_router
-    "$python" zenoh_outputs.py $port $domain "$map.outputs" 15 &
+    if [ $kind = friendly ]; then
+        # The node comes first: it looks for its router until there is one.
+        start "$map"
+        start_router
+    else
+        start_router
+    fi
+    "$python" zenoh_peer.py $port $domain "$map.bag" 30 $kind >"$map.peer" &
+    peer=$!
+    if [ $kind = hostile ]; then
+        # It comes after the static transforms, and gets them.
+        for _ in $(seq 200); do
+            grep -q published "$map.peer" && break
+            sleep 0.1
+        done
+        start "$map"
+    fi
+    "$python" zenoh_outputs.py $port $domain "$map.outputs" 17 &
     listener=$!
-    "$python" zenoh_peer.py $port $domain "$map.bag" 30 $kind || fail "the peer has failed"
+    wait $peer || fail "the peer has failed"
+    peer=
     wait $listener || fail "no outputs"
     listener=
     peak_kib[$kind]=$(sed -n 's/^VmHWM:[^0-9]*\([0-9]*\) kB/\1/p' /proc/$node/status)
