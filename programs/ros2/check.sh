@@ -19,7 +19,7 @@ trap 'for one in $node $listener; do kill "$one" 2>/dev/null || true; done; rm -
 python=${VOXTILE_ROS2_PYTHON:-}
 if [ -z "$python" ]; then
     python=$work/venv/bin/python
-    packages="cyclonedds==11.0.1 eclipse-zenoh rosbags numpy"
+    packages="cyclonedds==11.0.1 eclipse-zenoh zenoh-ros2-sdk rosbags numpy"
     # shellcheck disable=SC2086
     if ! { python3 -m venv "$work/venv" && "$python" -m pip -q install $packages; }; then
         echo "skipped: no Python with cyclonedds and rosbags; name one with VOXTILE_ROS2_PYTHON"

@@ -9,8 +9,8 @@ cd "$(dirname "$0")"
 work=$1/zenoh
 mkdir "$work"
 port=$((RANDOM % 10000 + 20000)) domain=$((RANDOM % 100 + 100))
-router= node= listener= of_friend=
-trap 'for one in $node $listener $router; do kill "$one" 2>/dev/null || true; done' EXIT
+router= node= listener= peer= of_friend=
+trap 'for one in $node $listener $peer $router; do kill "$one" 2>/dev/null || true; done' EXIT
 
 fail() {
     echo "zenoh: $*"
@@ -34,11 +34,11 @@ end_router() {
     router=
 }
 
-# Starts the node with a map.
+# Starts the node with a map. What a hostile peer does in between takes it long, and no cloud is to miss its pose.
 start() {
     # shellcheck disable=SC2086
     "$program" -o "$1" --transport zenoh --zenoh-router tcp/127.0.0.1:$port --domain-id $domain --resolution 0.1 \
-        --memory 128MiB $outputs >"$1.log" 2>&1 &
+        --memory 128MiB --transform-wait 20 $outputs >"$1.log" 2>&1 &
     node=$!
 }
 
@@ -52,17 +52,34 @@ compare() {
     "$python" outputs.py compare "$work/$1.outputs" "$work/$1.csv" "$work/$1.pgm" 30 $radius $max_z $2 $inflation_range
 }
 
+declare -A peak_kib
 "$python" type_hashes.py
 for kind in friendly hostile; do
     map=$work/$kind
-    # The node comes first: it looks for its router until there is one.
-    start "$map"
-    start_router
-    "$python" zenoh_outputs.py $port $domain "$map.outputs" 15 &
+    if [ $kind = friendly ]; then
+        # The node comes first: it looks for its router until there is one.
+        start "$map"
+        start_router
+    else
+        start_router
+    fi
+    "$python" zenoh_peer.py $port $domain "$map.bag" 30 $kind >"$map.peer" &
+    peer=$!
+    if [ $kind = hostile ]; then
+        # It comes after the static transforms, and gets them.
+        for _ in $(seq 200); do
+            grep -q published "$map.peer" && break
+            sleep 0.1
+        done
+        start "$map"
+    fi
+    "$python" zenoh_outputs.py $port $domain "$map.outputs" 17 &
     listener=$!
-    "$python" zenoh_peer.py $port $domain "$map.bag" 30 $kind || fail "the peer has failed"
+    wait $peer || fail "the peer has failed"
+    peer=
     wait $listener || fail "no outputs"
     listener=
+    peak_kib[$kind]=$(sed -n 's/^VmHWM:[^0-9]*\([0-9]*\) kB/\1/p' /proc/$node/status)
     end INT
     grep 'clouds:' "$map.log" | tail -1 | tee "$map.counters"
     grep -q ' 30 mapped' "$map.counters" || fail "not all clouds were mapped"
@@ -76,6 +93,9 @@ for kind in friendly hostile; do
     compare $kind live
     if [ $kind = hostile ]; then
         grep -q ' 1 too large' "$map.counters" || fail "a cloud larger than the queue is not counted"
+        # The message of 17 MiB, the queue's 16 MiB, and what came with them.
+        echo "zenoh: at most $((peak_kib[friendly] >> 10)) MiB of memory, $((peak_kib[hostile] >> 10)) with a hostile peer"
+        [ ${peak_kib[hostile]} -lt $((peak_kib[friendly] + (64 << 10))) ] || fail "a hostile peer takes memory"
         grep -q ' 0 malformed' "$map.counters" && fail "clouds that lie are not counted"
     else
         # It tells who comes late; its router goes away and another one comes.
@@ -86,6 +106,7 @@ for kind in friendly hostile; do
             fail "what did not change was published again"
         fi
         "$python" zenoh_services.py $port $domain || fail "services"
+        timeout 100 "$python" zenoh_sdk.py $port $domain || fail "zenoh_ros2_sdk"
         end_router
         start_router
         "$python" zenoh_services.py $port $domain again || fail "the node has lost its router"

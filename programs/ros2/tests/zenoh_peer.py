@@ -39,10 +39,14 @@ def main():
     for name in topics_of("friendly"):
         kind = TYPES[name].replace("/msg/", "/")
         publishers[name] = graph.publisher(name, kind, name != "/cloud_in", name == "/tf_static")
+    coming = messages(clouds, "friendly", "")
+    name, mounts = next(coming)
+    publishers[name](bytes(mounts.serialize()))
+    print("published", flush=True)
     graph.wait_for("MS", publishers)
     key = None
     time.sleep(0.5)
-    for number, (name, message) in enumerate(messages(clouds, "friendly", "")):
+    for number, (name, message) in enumerate(coming):
         if is_hostile and number == 20:
             key = graph.announce("MP", "/cloud_in", "sensor_msgs/PointCloud2", "2::,5:,:,:,,")
             # What waits is taken before: these push out what is older.
