@@ -404,8 +404,11 @@ fn a_map_in_a_bucket_is_not_written_to_and_a_web_server_not_pushed_to() {
 #[test]
 fn files_are_fetched_as_they_lie_and_go_again() {
     let (server, place) = (Server::new(), TempDir::new().unwrap());
-    let files: [(&str, Vec<u8>); 3] =
-        [("poses.txt", b"1 2 3".to_vec()), ("scans/1.pcd", vec![7; 100_000]), ("scans/deep/2.pcd", Vec::new())];
+    let files: [(&str, Vec<u8>); 3] = [
+        ("poses.txt", b"1 2 3".to_vec()),
+        ("scans/1.pcd", vec![7; 100_000]),
+        ("scans/deep/2.pcd", Vec::new()),
+    ];
     for (name, content) in &files {
         server.put(&Key::from(format!("drive/{name}")), content.clone());
     }
