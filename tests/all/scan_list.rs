@@ -5,38 +5,8 @@ use std::path::Path;
 use tempfile::TempDir;
 use voxtile::integrity::{repair, verify};
 use voxtile::operations::convert;
-use voxtile::scan::{ScanPoints, TakePoints};
 use voxtile::store::ScanRecord;
-use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Scan, Storage};
-
-/// A scan with a time.
-struct Stamped(Scan, i64);
-
-impl ScanPoints for Stamped {
-    fn origin(&self) -> [f64; 3] {
-        self.0.origin
-    }
-
-    fn stamp_ns(&self) -> Option<i64> {
-        Some(self.1)
-    }
-
-    fn len(&self) -> usize {
-        self.0.points.len()
-    }
-
-    fn has_intensities(&self) -> bool {
-        false
-    }
-
-    fn for_each_chunk(
-        &self,
-        range: std::ops::Range<usize>,
-        take: &mut TakePoints<'_>,
-    ) -> voxtile::Result<()> {
-        self.0.for_each_chunk(range, take)
-    }
-}
+use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Scan, ScanRef, Storage};
 
 fn scan(k: u64) -> Scan {
     let x = k as f64;
@@ -53,7 +23,11 @@ fn make_map(folder: &Path, scans: u64) -> OutOfCoreTileMapper {
 fn insert(mapper: &mut OutOfCoreTileMapper, scans: std::ops::Range<u64>) {
     for k in scans {
         match k % 2 {
-            0 => mapper.insert_points(&Stamped(scan(k), -7 + k as i64)).unwrap(),
+            0 => {
+                let Scan { origin, points, .. } = scan(k);
+                let stamped = ScanRef::in_world(origin, &points).with_stamp_ns(-7 + k as i64);
+                mapper.insert_points(&stamped).unwrap()
+            }
             _ => mapper.insert_scan(&scan(k)).unwrap(),
         };
     }
