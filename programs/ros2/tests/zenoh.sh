@@ -94,7 +94,7 @@ for kind in friendly hostile; do
     if [ $kind = hostile ]; then
         grep -q ' 1 too large' "$map.counters" || fail "a cloud larger than the queue is not counted"
         # The message of 17 MiB, the queue's 16 MiB, and what came with them.
-        echo "zenoh: at most $((peak_kib[friendly] >> 10)) MiB of memory, $((peak_kib[hostile] >> 10)) with a hostile peer"
+        echo "zenoh: $((peak_kib[friendly] >> 10)) MiB of memory, $((peak_kib[hostile] >> 10)) with a hostile peer"
         [ ${peak_kib[hostile]} -lt $((peak_kib[friendly] + (64 << 10))) ] || fail "a hostile peer takes memory"
         grep -q ' 0 malformed' "$map.counters" && fail "clouds that lie are not counted"
     else

@@ -3,6 +3,7 @@
 zenoh_outputs.py PORT DOMAIN FILE SECONDS   writes the last message of each topic, and how many there were
 """
 
+import functools
 import sys
 import threading
 import time
@@ -24,8 +25,8 @@ def main():
 
     for name, (kind, ros_name) in TYPES.items():
         depth = 100 if name == CHANGES else 1
-        to = lambda cdr, name=name, kind=kind: take(name, kind, cdr)
-        graph.subscription("/" + name, ros_name.replace("/msg/", "/"), to, latched=True, depth=depth)
+        own_take = functools.partial(take, name, kind)
+        graph.subscription("/" + name, ros_name.replace("/msg/", "/"), own_take, latched=True, depth=depth)
     time.sleep(seconds)
     with lock:
         if wrong:

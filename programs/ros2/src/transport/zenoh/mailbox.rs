@@ -1,7 +1,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
-/// What came and waits for its thread: so many of so many bytes, and the oldest go first. Zenoh's own threads never wait.
+/// What came and waits for its thread: so many of so many bytes, and the oldest go first. Zenoh's threads never wait.
 #[derive(Debug)]
 pub struct Mailbox<T> {
     state: Mutex<State<T>>,

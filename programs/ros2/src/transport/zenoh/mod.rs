@@ -1,5 +1,5 @@
-//! Zenoh, as `rmw_zenoh_cpp` uses it: one session, a key for each topic and service, a liveliness token for the node and
-//! each of its ends, by which others know the graph.
+//! Zenoh, as `rmw_zenoh_cpp` uses it: one session, a key for each topic and service, a liveliness token for the node
+//! and each of its ends, by which others know the graph.
 //!
 //! ```text
 //! sample, query -> Mailbox (bounded) -> a thread of its own -> CDR -> node
