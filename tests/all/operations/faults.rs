@@ -40,16 +40,6 @@ fn crop(disk: &FaultyDisk) -> Result<()> {
     operations::crop(&open(disk, &path("a"))?, &Part::Inside(region()), path("out"), |_, _| {}).map(drop)
 }
 
-/// Puts the tiles of one map into the other, unless that is done.
-fn adopt(disk: &FaultyDisk) -> Result<()> {
-    const OF_FLUSH: u64 = 2;
-    if open(disk, &path("a"))?.flush_number() > OF_FLUSH {
-        return Ok(());
-    }
-    let map = MapPath::on(disk.shared(), path("a"));
-    operations::adopt(map, &[open(disk, &path("b"))?], OF_FLUSH, 3, |_, _| {}).map(drop)
-}
-
 fn clear(disk: &FaultyDisk) -> Result<()> {
     operations::clear(MapPath::on(disk.shared(), path("a")), &Part::Outside(region()), |_, _| {}).map(drop)
 }
@@ -143,12 +133,6 @@ fn a_merge_is_there_whole_or_not_at_all() {
 #[test]
 fn a_crop_is_there_whole_or_not_at_all() {
     check(Storage::OctoMap, "out", crop);
-}
-
-#[test]
-fn tiles_of_parts_are_all_in_the_map_or_none() {
-    check(Storage::OctoMap, "a", adopt);
-    check(Storage::Compact, "a", adopt);
 }
 
 #[test]

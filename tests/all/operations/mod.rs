@@ -1,5 +1,3 @@
-/// Tiles of parts in a map against a naive map; what does not go together is refused.
-mod adopt;
 /// Crop and clear against filters, and what crop cuts apart put together again.
 mod cut;
 /// Decay against the rule, voxel by voxel; exactly once.
