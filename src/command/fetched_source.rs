@@ -12,13 +12,20 @@ pub struct FetchedSource {
 
 impl FetchedSource {
     /// Fetches all files at a URL, then reads them as those of a folder.
-    pub fn open(bucket: &Bucket, options: &ReadOptions) -> Result<Self> {
-        let progress = Progress::over_bytes();
-        let files = FetchedFiles::fetch(bucket, &std::env::temp_dir(), |done, all| progress.set(done, all))?;
-        drop(progress);
-        log::info!("{}: fetched {} files, {} bytes", bucket.url(), files.files(), files.bytes());
+    pub fn open(url: &str, options: &ReadOptions) -> Result<Self> {
+        let files = fetch(url)?;
         Ok(Self { source: open_any_scans(files.path(), options)?, _files: files })
     }
+}
+
+/// Fetches all files at a URL.
+pub fn fetch(url: &str) -> Result<FetchedFiles> {
+    let bucket = Bucket::open(url)?;
+    let progress = Progress::over_bytes();
+    let files = FetchedFiles::fetch(&bucket, &std::env::temp_dir(), |done, all| progress.set(done, all))?;
+    drop(progress);
+    log::info!("{url}: fetched {} files, {} bytes", files.files(), files.bytes());
+    Ok(files)
 }
 
 impl ScanSource for FetchedSource {

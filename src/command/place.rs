@@ -1,7 +1,7 @@
 use crate::io::{ReadOptions, ScanSource};
 use crate::store::MapPath;
 use crate::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How the URLs of maps in buckets begin.
 const SCHEMES: [&str; 7] = ["s3", "gs", "az", "abfs", "abfss", "http", "https"];
@@ -56,13 +56,44 @@ pub fn is_map_at(_: &str) -> bool {
 /// [`FetchedFiles::fetch`](crate::bucket::FetchedFiles::fetch); a URL, where the command was built without buckets.
 #[cfg(feature = "bucket")]
 pub fn scans_at(url: &str, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
-    let bucket = crate::bucket::Bucket::open(url)?;
-    Ok(Box::new(super::fetched_source::FetchedSource::open(&bucket, options)?))
+    Ok(Box::new(super::fetched_source::FetchedSource::open(url, options)?))
 }
 
 #[cfg(not(feature = "bucket"))]
 pub fn scans_at(url: &str, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     Err(without_buckets(url))
+}
+
+/// Scans as files, for as long as this lives.
+pub struct LocalScans {
+    path: PathBuf,
+    #[cfg(feature = "bucket")]
+    _fetched: Option<crate::bucket::FetchedFiles>,
+}
+
+impl LocalScans {
+    /// Fetches what lies at a URL that is none of a map; takes all else as it is.
+    ///
+    /// # Errors
+    ///
+    /// As for [`scans_at`].
+    #[cfg(feature = "bucket")]
+    pub fn of(scans: &Path) -> Result<Self> {
+        let url = url_of(scans).filter(|_| !super::kept_source::is_map(scans));
+        let fetched = url.map(super::fetched_source::fetch).transpose()?;
+        let path = fetched.as_ref().map_or(scans, |files| files.path()).to_owned();
+        Ok(Self { path, _fetched: fetched })
+    }
+
+    #[cfg(not(feature = "bucket"))]
+    pub fn of(scans: &Path) -> Result<Self> {
+        url_of(scans).map_or(Ok(Self { path: scans.to_owned() }), |url| Err(without_buckets(url)))
+    }
+
+    /// Where they are.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
 }
 
 #[cfg(feature = "bucket")]

@@ -1,4 +1,5 @@
 use crate::Error;
+use crate::command::place::LocalScans;
 use crate::command::scan_input;
 use crate::command::scan_queue::{ScanQueue, is_last};
 use crate::io::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
@@ -20,6 +21,8 @@ pub struct ScanReader {
     stop: Stop,
     /// Where scans come from once they are read before anybody asks.
     ahead: Option<Arc<ScanQueue>>,
+    /// Here and not in the thread, which nobody waits for: what was fetched is to go before the process does.
+    _scans: LocalScans,
 }
 
 /// What is known of an input once it is open.
@@ -79,13 +82,15 @@ impl ScanReader {
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
         let (answers_out, answers) = channel();
-        let (path, own_options, here) = (scans.clone(), options.clone(), room.clone());
+        let local = LocalScans::of(&scans)?;
+        let (path, own_options, here) = (local.path().to_owned(), options.clone(), room.clone());
+        let named = scans.clone();
         let read = move || {
             let mut source = match scan_input::open(&path, &own_options) {
                 Ok(source) => source,
                 Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
             };
-            let opened = Opened::of(&path, &*source);
+            let opened = Opened::of(&named, &*source);
             let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
             while is_wanted && let Ok(request) = requests_in.recv() {
                 is_wanted = match request {
@@ -96,7 +101,8 @@ impl ScanReader {
         };
         match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
             Ok(_) => {
-                let mut reader = Self { place: Place::Thread { requests, answers }, stop, ahead: None };
+                let mut reader =
+                    Self { place: Place::Thread { requests, answers }, stop, ahead: None, _scans: local };
                 match reader.wait(&mut || Ok(()))? {
                     Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
                     _ => Ok(None),
@@ -104,9 +110,12 @@ impl ScanReader {
             }
             Err(error) => {
                 log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
-                let source = scan_input::open(&scans, &options)?;
+                let source = scan_input::open(local.path(), &options)?;
                 let opened = Opened::of(&scans, &*source);
-                Ok(Some((Self { place: Place::Here(source, here), stop, ahead: None }, opened)))
+                Ok(Some((
+                    Self { place: Place::Here(source, here), stop, ahead: None, _scans: local },
+                    opened,
+                )))
             }
         }
     }

@@ -215,7 +215,7 @@ def check_scans(s3, port, bad):
     for file in drive.rglob("*.*"):
         s3.upload_file(str(file), "robots", f"{file.relative_to(WORK / 'web')}")
     s3.put_object(Bucket="robots", Key="drive/scans/", Body=b"")
-    options = ["--resolution", 0.3, "--keep-scans"]
+    options = ["--resolution", 0.5, "--keep-scans"]
     voxtile("build", drive, "-o", WORK / "of_folder", *options, port=port)
     digest = voxtile("digest", WORK / "of_folder", port=port)
     for number, (fault, through) in enumerate([(None, port), ("500", bad), ("cut off", bad)]):
@@ -231,10 +231,10 @@ def check_scans(s3, port, bad):
     web = ThreadingHTTPServer(("127.0.0.1", 0), partial(Files, directory=WORK / "web"))
     threading.Thread(target=web.serve_forever, daemon=True).start()
     one = f"http://127.0.0.1:{web.server_port}/drive/scans/7.pcd"
-    voxtile("build", one, "-o", WORK / "one_there", "--resolution", 0.3, "--poses", "identity", port=port)
-    voxtile("build", drive / "scans" / "7.pcd", "-o", WORK / "one", "--resolution", 0.3, "--poses", "identity", port=port)
+    voxtile("build", one, "-o", WORK / "one_there", "--resolution", 0.5, "--poses", "identity", port=port)
+    voxtile("build", drive / "scans" / "7.pcd", "-o", WORK / "one", "--resolution", 0.5, "--poses", "identity", port=port)
     assert voxtile("digest", WORK / "one_there", port=port) == voxtile("digest", WORK / "one", port=port)
-    said = voxtile("build", "s3://robots/nowhere", "-o", WORK / "none", "--resolution", 0.3, port=port, fails=True)
+    said = voxtile("build", "s3://robots/nowhere", "-o", WORK / "none", "--resolution", 0.5, port=port, fails=True)
     assert "s3://robots/nowhere: there is nothing" in said, said
     assert not list(Path(tempfile.gettempdir()).glob("voxtile-scans-*")), "what was fetched is left behind"
 
@@ -242,7 +242,7 @@ def check_scans(s3, port, bad):
     voxtile("push", WORK / "of_folder", "s3://robots/kept", port=port)
     listed = [voxtile("scans", map, port=port) for map in (WORK / "of_folder", "s3://robots/kept")]
     assert listed[0] == listed[1], listed
-    voxtile("build", "s3://robots/kept", "-o", WORK / "again", "--resolution", 0.3, port=port)
+    voxtile("build", "s3://robots/kept", "-o", WORK / "again", "--resolution", 0.5, port=port)
     assert voxtile("digest", WORK / "again", port=port) == digest
 
     # Without keys it is said which are missing.
