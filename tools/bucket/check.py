@@ -7,7 +7,6 @@ import random
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from functools import partial
@@ -17,6 +16,8 @@ from pathlib import Path
 import boto3
 
 VOXTILE, MAP, WORK = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
+TEMPORARY = WORK / "temporary"
+TEMPORARY.mkdir()
 
 
 class Proxy(BaseHTTPRequestHandler):
@@ -79,6 +80,7 @@ def environment(port):
         "AWS_SECRET_ACCESS_KEY": "secret",
         "AWS_REGION": "us-east-1",
         "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",
+        "TMPDIR": str(TEMPORARY),
     }
 
 
@@ -236,12 +238,12 @@ def check_scans(s3, port, bad):
     assert voxtile("digest", WORK / "one_there", port=port) == voxtile("digest", WORK / "one", port=port)
     said = voxtile("build", "s3://robots/nowhere", "-o", WORK / "none", "--resolution", 0.5, port=port, fails=True)
     assert "s3://robots/nowhere: there is nothing" in said, said
-    assert not list(Path(tempfile.gettempdir()).glob("voxtile-scans-*")), "what was fetched is left behind"
+    assert not list(TEMPORARY.glob("voxtile-scans-*")), "what was fetched is left behind"
 
     # The scans that a map keeps, where it lies.
     voxtile("push", WORK / "of_folder", "s3://robots/kept", port=port)
     listed = [voxtile("scans", map, port=port) for map in (WORK / "of_folder", "s3://robots/kept")]
-    assert listed[0] == listed[1], listed
+    assert listed[0].splitlines()[1:] == listed[1].splitlines()[1:], listed
     voxtile("build", "s3://robots/kept", "-o", WORK / "again", "--resolution", 0.5, port=port)
     assert voxtile("digest", WORK / "again", port=port) == digest
 
