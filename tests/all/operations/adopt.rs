@@ -66,7 +66,7 @@ fn tiles_of_parts_take_the_place_of_the_maps_own() {
 fn parts_that_do_not_go_together_leave_the_map_as_it_was() {
     let disk = disk();
     let config = MapConfig::new(0.5, 2.5).unwrap();
-    let voxels = Voxels::from([([0, 0, 0].into(), (0.85_f64.to_bits(), 1))]);
+    let voxels = Voxels::from([([0, 0, 0], (0.85_f64.to_bits(), 1))]);
     write_map(&disk, &path("map"), &config, &voxels);
     write_map(&disk, &path("one"), &config, &voxels);
     write_map(&disk, &path("other"), &config, &voxels);
