@@ -1,6 +1,7 @@
 use super::manifest::{MANIFEST, Manifest};
 use super::object_name::{OBJECTS, ObjectName};
 use crate::error::{Error, Result};
+use crate::store::{Disk, FsDisk};
 use bytes::Bytes;
 use futures_util::TryStreamExt;
 use object_store::aws::AmazonS3Builder;
@@ -12,7 +13,6 @@ use object_store::{
     BackoffConfig, ClientOptions, GetOptions, ObjectStore, ObjectStoreExt, PutMode, PutOptions, RetryConfig,
     UpdateVersion,
 };
-use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -397,7 +397,7 @@ async fn fetch_file_once(store: &dyn ObjectStore, object: &StoredObject, to: &Pa
     };
     let mut stream = found.into_stream();
     let on_disk = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", to.display()));
-    let (mut file, mut bytes) = (File::create(to).map_err(on_disk)?, 0);
+    let (mut file, mut bytes) = (FsDisk.create(to).map_err(on_disk)?, 0);
     while let Some(chunk) = stream.try_next().await.map_err(|error| refused(key, &error))? {
         file.write_all(&chunk).map_err(on_disk)?;
         bytes += chunk.len() as u64;

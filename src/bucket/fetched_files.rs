@@ -1,5 +1,6 @@
 use super::bucket::{Bucket, Pending};
 use crate::error::{Error, Result};
+use crate::store::{Disk, FsDisk};
 use std::collections::VecDeque;
 use std::path::{Component, Path, PathBuf};
 use tempfile::TempDir;
@@ -56,9 +57,7 @@ impl FetchedFiles {
                 wait(first)?;
             }
             let to = folder.path().join(checked_name(bucket, &object.name)?);
-            if let Some(parent) = to.parent() {
-                std::fs::create_dir_all(parent).map_err(|error| Error::io(parent, "make", error))?;
-            }
+            make_folders(folder.path(), &to)?;
             on_their_way.push_back((object.bytes, bucket.fetch_file(object, to)));
         }
         on_their_way.into_iter().try_for_each(wait)?;
@@ -79,6 +78,17 @@ impl FetchedFiles {
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
+}
+
+/// Makes the folders between a folder and a file in it.
+fn make_folders(folder: &Path, file: &Path) -> Result<()> {
+    let between = file.ancestors().skip(1).take_while(|path| *path != folder);
+    for path in between.collect::<Vec<_>>().into_iter().rev() {
+        if FsDisk.kind_at(path)?.is_none() {
+            FsDisk.create_folder(path).map_err(|error| Error::io(path, "create", error))?;
+        }
+    }
+    Ok(())
 }
 
 /// The name of an object below the URL as a path that stays in a folder.

@@ -4,7 +4,7 @@ use crate::persistence::TileSaver;
 use crate::persistence::upgrade;
 use crate::persistence::{config_from, load, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{CatalogEntry, Disk, Extension, TileStore, TileVersion};
+use crate::store::{CatalogEntry, Disk, Extension, MAX_NUMBER, TileStore, TileVersion};
 use crate::tile::Table;
 use std::path::Path;
 use std::sync::Arc;
@@ -60,7 +60,7 @@ impl MapEditor {
     /// Says that what is written from now on has so many scans more.
     pub(super) fn add_scans(&mut self, scans: u64) -> Result<()> {
         let before = self.store.commits().scan_number;
-        if before.checked_add(scans).is_none() {
+        if before.checked_add(scans).is_none_or(|all| all > MAX_NUMBER) {
             return Err(Error::argument("scans", format!("{scans} are more than can follow scan {before}")));
         }
         self.added_scans = scans;
