@@ -82,10 +82,11 @@ impl FetchedFiles {
 
 /// Makes the folders between a folder and a file in it.
 fn make_folders(folder: &Path, file: &Path) -> Result<()> {
+    let disk: &dyn Disk = &FsDisk;
     let between = file.ancestors().skip(1).take_while(|path| *path != folder);
     for path in between.collect::<Vec<_>>().into_iter().rev() {
-        if FsDisk.kind_at(path)?.is_none() {
-            FsDisk.create_folder(path).map_err(|error| Error::io(path, "create", error))?;
+        if disk.kind_at(path)?.is_none() {
+            disk.create_folder(path).map_err(|error| Error::io(path, "create", error))?;
         }
     }
     Ok(())
