@@ -11,7 +11,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-built=${CARGO_TARGET_DIR:-target}/debug
+# Some of the kinds run in folders of their own.
+built=$(realpath -m "${CARGO_TARGET_DIR:-target}")/debug
 work=$(mktemp -d)
 node= listener=
 trap 'for one in $node $listener; do kill "$one" 2>/dev/null || true; done; rm -rf "$work"' EXIT
@@ -37,6 +38,7 @@ if [ -z "$program" ] && [ "$*" != zenoh ]; then
     cargo build -q --locked -p voxtile-ros2
     program=$built/voxtile-ros2
 fi
+voxtile=$(realpath "$voxtile") program=${program:+$(realpath "$program")}
 radius=2.5 max_z=1.0 inflation_range=2.2
 outputs="--max-range 60 --publish-every 0.2 --publish-radius $radius --projected-radius 30 --occupancy-max-z $max_z"
 outputs="$outputs --inflation-range $inflation_range"
@@ -128,6 +130,7 @@ zenoh() {
         cargo build -q --locked -p voxtile-ros2 --features zenoh
         program=$built/voxtile-ros2
     fi
+    program=$(realpath "$program")
     export python voxtile program outputs radius max_z inflation_range
     programs/ros2/tests/zenoh.sh "$work"
 }
