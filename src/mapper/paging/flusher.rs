@@ -56,6 +56,10 @@ pub(super) enum FlushedTile {
 /// Tiles that are written before the locks are taken to note them.
 const NOTED_AT_ONCE: usize = 8;
 
+/// Bytes of files after which they are noted sooner: who waits for memory waits for them, and a slow disk takes some
+/// milliseconds for so many.
+const NOTED_BYTES: u64 = 256 << 10;
+
 impl Flusher {
     pub(super) fn new(config: &MapConfig) -> Self {
         let config = config.clone();
@@ -111,13 +115,17 @@ impl FlushJob {
         let Self { contents, disk, begun, progress } = self;
         let mut saver = TileSaver::new(config);
         loop {
-            let mut written = Vec::new();
+            let (mut written, mut bytes) = (Vec::new(), 0);
             let mut outcome = Ok(());
             while written.len() < NOTED_AT_ONCE
+                && bytes < NOTED_BYTES
                 && let Some(tile) = begun.tiles.pop()
             {
                 match begun.write(&tile, &mut saver, config) {
-                    Ok(version) => written.push((tile, version)),
+                    Ok(version) => {
+                        bytes += version.table.bytes + version.octree.bytes;
+                        written.push((tile, version));
+                    }
                     Err(error) => {
                         begun.tiles.push(tile);
                         outcome = Err(error);
