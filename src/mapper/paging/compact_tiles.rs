@@ -107,12 +107,15 @@ impl CompactTiles {
         true
     }
 
-    /// The dirty tiles, in order of their indices.
-    pub(super) fn dirty_tiles(&self) -> Vec<TileIndex> {
-        let dirty = self.tiles.iter().filter(|(_, entry)| entry.is_dirty);
-        let mut dirty: Vec<_> = dirty.map(|(&index, _)| index).collect();
-        dirty.sort_unstable();
-        dirty
+    /// The dirty tiles that are not being saved, oldest first.
+    pub(super) fn unsaved(&self) -> Vec<TileIndex> {
+        self.to_save.values().copied().collect()
+    }
+
+    /// The dirty tiles that are being saved, in no particular order.
+    pub(super) fn saving(&self) -> impl Iterator<Item = TileIndex> {
+        let saving = self.tiles.iter().filter(|(_, entry)| entry.is_dirty && entry.is_saving);
+        saving.map(|(&index, _)| index)
     }
 
     pub(super) fn oldest(&self) -> Option<TileIndex> {

@@ -7,6 +7,7 @@ use super::tile_state::{Base, StoredTileState, TileState};
 use super::views::{ViewId, Views};
 use super::write_buffer::WriteBuffer;
 use crate::error::{Error, Result};
+use crate::persistence::Saved;
 use crate::space::{TileBox, TileIndex};
 use crate::store::{InputRecord, TileVersion};
 use crate::tile::Tile;
@@ -150,6 +151,20 @@ impl TileContents {
         }
     }
 
+    /// Takes note of a save beside the mapper that has ended. What could not be saved, a flush that waits for it writes.
+    pub(super) fn note_saved(&mut self, saved: Saved, disk: &mut TileDisk) {
+        let index = saved.index;
+        let is_on_disk = saved.result.is_ok();
+        if self.flight.as_mut().is_some_and(|flight| flight.note_saved(index, &saved.tile, is_on_disk)) {
+            log::debug!("tile {index}: could not be saved, so that the flush writes it");
+            return;
+        }
+        let is_current = self.cache.save_ended(index, &saved.tile, is_on_disk);
+        if let Some(version) = disk.note_saved(saved, is_current) {
+            self.views.note_on_disk(index, version);
+        }
+    }
+
     /// Which of these tiles the flush shares with the cache.
     pub(super) fn is_shared_with_flush(&self, index: TileIndex) -> bool {
         self.flight.as_ref().is_some_and(|flight| flight.is_shared(index))
@@ -173,7 +188,9 @@ impl TileContents {
 
     /// Notes that the flush has ended.
     pub(super) fn end_flight(&mut self, flushed: Result<()>) {
-        self.flight = None;
+        for (index, tile) in self.flight.take().map(Flight::into_unsaved).unwrap_or_default() {
+            self.cache.save_ended(index, &tile, false);
+        }
         self.flush_error = flushed.err();
     }
 

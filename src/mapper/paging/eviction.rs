@@ -80,6 +80,21 @@ impl TilePager<'_> {
         self.save_ahead()
     }
 
+    /// Where the disk does not keep up, waits for one tile with each scan: otherwise one of them would have to wait for
+    /// many.
+    pub(super) fn keep_pace(&mut self) {
+        if !self.contents.cache.has_compact_tier() || !self.contents.cache.is_behind() {
+            return;
+        }
+        if self.contents.flight.is_some() {
+            self.wait_for_flight();
+        } else if !self.disk.can_save()
+            && let Some(saved) = self.wait(|disk| disk.stall(|disk| disk.wait_saved()))
+        {
+            self.note_saved(saved);
+        }
+    }
+
     /// [`TilePager::make_room_for`], which saves no tile that need not go.
     pub(super) fn evict_until(&mut self, bytes: usize, tiles: usize) -> Result<()> {
         loop {
@@ -179,18 +194,17 @@ impl TilePager<'_> {
     }
 
     fn note_saved(&mut self, saved: Saved) {
-        let is_current = self.contents.cache.save_ended(saved.index, &saved.tile, saved.result.is_ok());
-        let index = saved.index;
-        if let Some(version) = self.disk.note_saved(saved, is_current) {
-            self.contents.views.note_on_disk(index, version);
-        }
+        self.contents.note_saved(saved, &mut self.disk);
     }
 
-    /// Takes note of saves that have ended.
-    pub(super) fn take_saved(&mut self) {
+    /// Takes note of saves that have ended; tells whether there was one.
+    pub(super) fn take_saved(&mut self) -> bool {
+        let mut is_any = false;
         while let Some(saved) = self.disk.take_saved() {
             self.note_saved(saved);
+            is_any = true;
         }
+        is_any
     }
 
     /// Waits until no version of a tile is being saved: an older one must not come after a newer.

@@ -1,3 +1,4 @@
+use crate::persistence::CompactTile;
 use crate::space::{TileIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
 
@@ -13,6 +14,10 @@ pub(super) struct Flight {
     own_bytes: usize,
     /// Bytes of memory for one tile that it makes.
     bytes_to_make: usize,
+    /// Tiles that were being saved as they are when it began: it waits for that, and does not write them.
+    saving: Vec<TileIndex>,
+    /// Those of them that could not be saved: it writes them after all.
+    unsaved: Vec<(TileIndex, CompactTile)>,
 }
 
 /// A tile on its way to disk.
@@ -25,10 +30,41 @@ struct FlightTile {
 }
 
 impl Flight {
-    /// A flush of some tiles, each with its bytes of memory, which takes so many bytes to make one.
-    pub(super) fn of(tiles: impl Iterator<Item = (TileIndex, usize)>, bytes_to_make: usize) -> Self {
+    /// A flush of some tiles, each with its bytes of memory, which takes so many bytes to make one, and of others that
+    /// are being saved.
+    pub(super) fn of(
+        tiles: impl Iterator<Item = (TileIndex, usize)>,
+        bytes_to_make: usize,
+        saving: Vec<TileIndex>,
+    ) -> Self {
         let tile = |(index, bytes)| (index, FlightTile { bytes, is_shared: true, has_changed: false });
-        Self { tiles: tiles.map(tile).collect(), own_bytes: 0, bytes_to_make }
+        let tiles = tiles.map(tile).collect();
+        Self { tiles, bytes_to_make, saving, ..Self::default() }
+    }
+
+    /// Notes that a save has ended; tells whether it failed, and it is up to the flush to write the tile.
+    pub(super) fn note_saved(&mut self, index: TileIndex, tile: &CompactTile, is_on_disk: bool) -> bool {
+        let Some(place) = self.saving.iter().position(|saving| *saving == index) else { return false };
+        self.saving.swap_remove(place);
+        if !is_on_disk {
+            self.unsaved.push((index, tile.clone()));
+        }
+        !is_on_disk
+    }
+
+    /// Whether it waits for saves.
+    pub(super) fn waits_for_saves(&self) -> bool {
+        !self.saving.is_empty()
+    }
+
+    /// The tiles that it has to write because they could not be saved.
+    pub(super) fn take_unsaved(&mut self) -> Vec<(TileIndex, CompactTile)> {
+        std::mem::take(&mut self.unsaved)
+    }
+
+    /// Those that it will not write.
+    pub(super) fn into_unsaved(self) -> Vec<(TileIndex, CompactTile)> {
+        self.unsaved
     }
 
     /// Bytes of memory that changing these tiles takes on top.

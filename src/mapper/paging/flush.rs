@@ -44,7 +44,7 @@ impl TilePager<'_> {
         // Files are made from tables alone. Syncing keeps octree statistics up to date and puts bricks in order, which
         // speeds up writing.
         self.contents.cache.sync_octrees();
-        let mut compact = self.contents.cache.dirty_compact().into_iter();
+        let mut compact = self.contents.cache.unsaved_compact().into_iter();
         for index in self.contents.cache.resident_indices() {
             // The saving thread writes tiles in the compact form meanwhile.
             while self.disk.can_save()
@@ -76,31 +76,44 @@ impl TilePager<'_> {
         self.write_suspects()?;
         self.upgrade()?;
         // A tile that could not be saved stays dirty, and the flush saves it again; so this error is dropped.
-        let _ = self.end_saves();
+        self.take_saved();
+        let _ = self.disk.take_save_error();
         let bytes_to_make = self.bytes_to_make();
-        self.evict_until(bytes_to_make, self.contents.cache.plan().tiles)?;
-        // Those of tiles that had to go.
-        let _ = self.end_saves();
+        let bytes_beyond = bytes_to_make.saturating_sub(self.contents.flush_reserve);
+        self.evict_until(bytes_beyond, self.contents.cache.plan().tiles)?;
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
         let files = self.store().reader()?;
         let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
-        // The last ones are written first.
+        // The last ones are written first: those that have to leave memory next.
         let mut tiles = self.freeze_buffer();
-        for index in self.contents.cache.dirty_compact() {
+        // What is being saved is not waited for here.
+        let saving = self.saving_as_they_are();
+        let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
+        tiles.extend(dirty.cloned().map(FlushedTile::Resident));
+        for index in self.contents.cache.unsaved_compact().into_iter().rev() {
             if !self.contents.buffer.is_frozen(index) {
                 let tile = self.contents.cache.begin_save(index);
                 tiles.extend(tile.map(|tile| FlushedTile::Compact(index, tile)));
             }
         }
-        let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
-        let first = tiles.len();
-        tiles.extend(dirty.cloned().map(FlushedTile::Resident));
+        // What has changed since it began to be saved is written after that.
+        tiles.sort_by_key(|tile| !self.disk.is_saving(tile.index()));
+        let after_saves = tiles.iter().take_while(|tile| self.disk.is_saving(tile.index())).count();
         // The next scan changes about the tiles that the last one has changed.
+        let is_resident = |tile: &FlushedTile| matches!(tile, FlushedTile::Resident(_));
+        let residents = tiles.iter().skip(after_saves).position(is_resident);
+        let first = residents.map_or(tiles.len(), |first| after_saves + first);
         let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
         let bytes_of_tiles = tiles.iter().map(|tile| (tile.index(), tile.bytes()));
-        self.contents.flight = Some(Flight::of(bytes_of_tiles, bytes_to_make));
+        self.contents.flight = Some(Flight::of(bytes_of_tiles, bytes_to_make, saving));
         self.contents.flush_reserve = self.contents.flush_reserve.max(1);
-        Ok(BegunFlush { scan_number, tiles, soon_changed, writer, files, commit })
+        Ok(BegunFlush { scan_number, tiles, after_saves, soon_changed, writer, files, commit })
+    }
+
+    /// Tiles in the compact form that are being saved as they are, and for which no updates are buffered.
+    fn saving_as_they_are(&self) -> Vec<TileIndex> {
+        let saving = self.contents.cache.saving_compact();
+        saving.filter(|index| !self.contents.buffer.is_frozen(*index)).collect()
     }
 
     /// What is buffered, left to a flush beside the mapper.
@@ -152,6 +165,10 @@ impl TilePager<'_> {
 
     /// Waits until a flush beside the mapper has let go of some tiles, or has ended.
     pub(super) fn wait_for_flight(&mut self) {
+        // A save that the flush waits for lets go of a tile, too.
+        if self.take_saved() {
+            return;
+        }
         let since = Instant::now();
         let Self { contents, disk, flusher, .. } = self;
         let goes_on = unlocked(contents, || shared_disk::unlocked(disk, || flusher.wait_for_some()));

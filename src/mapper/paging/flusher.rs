@@ -7,7 +7,7 @@ use super::shared_contents::SharedContents;
 use super::shared_disk::SharedDisk;
 use super::unapplied_tile::UnappliedTile;
 use crate::config::MapConfig;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::persistence::{CompactTile, TileSaver, Worker};
 use crate::space::TileIndex;
 use crate::store::{BegunCommit, TileReader, TileVersion, TileWriter};
@@ -37,6 +37,9 @@ pub(super) struct BegunFlush {
     pub(super) scan_number: u64,
     /// The dirty tiles.
     pub(super) tiles: Vec<FlushedTile>,
+    /// How many of them, the first ones, are written once no save is in flight any more: an older version of them is
+    /// being saved.
+    pub(super) after_saves: usize,
     /// Those of them that the next scan will change.
     pub(super) soon_changed: Range<usize>,
     pub(super) writer: TileWriter,
@@ -112,13 +115,19 @@ impl FlushJob {
     }
 
     fn write_tiles(&mut self, config: &MapConfig) -> Result<()> {
-        let Self { contents, disk, begun, progress } = self;
         let mut saver = TileSaver::new(config);
+        let mut waiting = Some(self.begun.after_saves);
         loop {
+            if waiting.is_some_and(|waiting| self.begun.tiles.len() <= waiting) {
+                self.end_saves()?;
+                waiting = None;
+            }
+            let Self { contents, disk, begun, progress } = self;
             let (mut written, mut bytes) = (Vec::new(), 0);
             let mut outcome = Ok(());
             while written.len() < NOTED_AT_ONCE
                 && bytes < NOTED_BYTES
+                && begun.tiles.len() > waiting.unwrap_or_default()
                 && let Some(tile) = begun.tiles.pop()
             {
                 match begun.write(&tile, &mut saver, config) {
@@ -149,6 +158,27 @@ impl FlushJob {
             if is_all {
                 return Ok(());
             }
+        }
+    }
+
+    /// Waits until no save is in flight. By now they have mostly ended: the mapper begins none meanwhile.
+    fn end_saves(&mut self) -> Result<()> {
+        loop {
+            let mut disk = self.disk.lock();
+            let saved = disk.wait_saved();
+            let mut contents = self.contents.lock();
+            if let Some(saved) = saved {
+                contents.note_saved(saved, &mut disk);
+                continue;
+            }
+            let Some(flight) = &mut contents.flight else { return Ok(()) };
+            if flight.waits_for_saves() {
+                let lost = std::io::Error::other("the thread that saved tiles has ended early");
+                return Err(Error::io(disk.store().folder(), "flush", lost));
+            }
+            let unsaved = flight.take_unsaved().into_iter();
+            self.begun.tiles.extend(unsaved.map(|(index, tile)| FlushedTile::Compact(index, tile)));
+            return Ok(());
         }
     }
 

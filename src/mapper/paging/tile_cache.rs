@@ -212,9 +212,14 @@ impl TileCache {
         self.compact.remove(index);
     }
 
-    /// The dirty tiles in the compact form, in order of their indices.
-    pub(super) fn dirty_compact(&self) -> Vec<TileIndex> {
-        self.compact.dirty_tiles()
+    /// The dirty tiles in the compact form that are not being saved, oldest first.
+    pub(super) fn unsaved_compact(&self) -> Vec<TileIndex> {
+        self.compact.unsaved()
+    }
+
+    /// The dirty tiles in the compact form that are being saved, in no particular order.
+    pub(super) fn saving_compact(&self) -> impl Iterator<Item = TileIndex> {
+        self.compact.saving()
     }
 
     /// Whether a tile in the compact form is dirty and not being saved.
@@ -226,6 +231,11 @@ impl TileCache {
     pub(super) fn next_to_save(&self) -> Option<TileIndex> {
         let is_nearly_full = self.compact.bytes() > self.plan.compact_bytes / 4 * 3;
         is_nearly_full.then(|| self.compact.next_to_save()).flatten()
+    }
+
+    /// Whether tiles in the compact form will soon have to go, and none is clean.
+    pub(super) fn is_behind(&self) -> bool {
+        self.compact.bytes() > self.plan.compact_bytes / 8 * 7 && self.compact.oldest_clean().is_none()
     }
 
     /// Notes that a tile in the compact form is being saved, and returns it.

@@ -97,7 +97,9 @@ impl TilePager<'_> {
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         let copied = self.contents.bytes_to_copy(updates.tiles.iter().map(|(tile, _)| *tile));
         // A tile that is made new by the updates is one tile more than there are.
-        self.make_room_for(BYTES_OF_UPDATE * all + copied, self.contents.cache.plan().tiles)
+        self.make_room_for(BYTES_OF_UPDATE * all + copied, self.contents.cache.plan().tiles)?;
+        self.keep_pace();
+        Ok(())
     }
 
     /// Accepts the updates, staged parts first: resident tiles take theirs at once, those of other tiles are buffered.
