@@ -145,6 +145,16 @@ impl CompactTiles {
         Some(entry.tile.clone())
     }
 
+    /// Notes that a tile that is not being saved is on disk as it is.
+    pub(super) fn note_on_disk(&mut self, index: TileIndex) {
+        if let Some(entry) = self.tiles.peek_mut(&index).filter(|entry| entry.is_dirty && !entry.is_saving) {
+            entry.is_dirty = false;
+            self.dirty -= 1;
+            self.to_save.remove(&entry.number);
+            self.clean.insert(entry.number, index);
+        }
+    }
+
     /// Notes that a save has ended. Tells whether the tile here still is the version that was saved.
     pub(super) fn save_ended(&mut self, index: TileIndex, saved: &CompactTile, is_on_disk: bool) -> bool {
         let current = self.tiles.peek_mut(&index).filter(|entry| entry.tile.is_same(saved));

@@ -10,7 +10,6 @@ use crate::error::{Error, Result};
 use crate::persistence::Saved;
 use crate::space::{TileBox, TileIndex};
 use crate::store::{InputRecord, TileVersion};
-use crate::tile::Tile;
 
 /// What a map holds after some scan: its tiles in memory and what is buffered for the others.
 #[derive(Debug)]
@@ -101,6 +100,15 @@ impl TileContents {
         }
     }
 
+    /// Notes that a tile goes into the compact form as it is.
+    pub(super) fn leave_packed_to_flush(&mut self, index: TileIndex) {
+        if let Some(flight) = &mut self.flight {
+            flight.note_own(index);
+            let bytes = flight.bytes();
+            self.reserve_for_flush(bytes);
+        }
+    }
+
     /// Keeps memory free for flushes that hold so much alone.
     fn reserve_for_flush(&mut self, bytes: usize) {
         self.flush_reserve = self.flush_reserve.max(bytes + bytes / 4);
@@ -138,7 +146,7 @@ impl TileContents {
                 // Let go first: changing a tile that somebody else holds would copy it.
                 drop(tile);
                 if is_same {
-                    self.cache.change(index, Tile::mark_clean);
+                    self.cache.note_on_disk(index);
                 }
             }
             FlushedTile::Compact(index, tile) => drop(self.cache.save_ended(index, &tile, true)),

@@ -122,7 +122,7 @@ impl TilePager<'_> {
     pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
         log::debug!("tile {index}: evicted");
         if self.contents.cache.has_compact_tier() {
-            self.contents.leave_to_flush(std::iter::once(index));
+            self.contents.leave_packed_to_flush(index);
             return self.contents.cache.make_compact(index);
         }
         if self.contents.cache.is_dirty(index) {

@@ -84,16 +84,17 @@ impl TilePager<'_> {
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
         let files = self.store().reader()?;
         let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
-        // The last ones are written first: those that have to leave memory next.
         let mut tiles = self.freeze_buffer();
         // What is being saved is not waited for here.
         let saving = self.saving_as_they_are();
         let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
         tiles.extend(dirty.cloned().map(FlushedTile::Resident));
+        let mut compact = Vec::new();
         for index in self.contents.cache.unsaved_compact().into_iter().rev() {
             if !self.contents.buffer.is_frozen(index) {
                 let tile = self.contents.cache.begin_save(index);
-                tiles.extend(tile.map(|tile| FlushedTile::Compact(index, tile)));
+                let list = if self.disk.is_saving(index) { &mut tiles } else { &mut compact };
+                list.extend(tile.map(|tile| FlushedTile::Compact(index, tile)));
             }
         }
         // What has changed since it began to be saved is written after that.
@@ -104,10 +105,10 @@ impl TilePager<'_> {
         let residents = tiles.iter().skip(after_saves).position(is_resident);
         let first = residents.map_or(tiles.len(), |first| after_saves + first);
         let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
-        let bytes_of_tiles = tiles.iter().map(|tile| (tile.index(), tile.bytes()));
+        let bytes_of_tiles = tiles.iter().chain(&compact).map(|tile| (tile.index(), tile.bytes()));
         self.contents.flight = Some(Flight::of(bytes_of_tiles, bytes_to_make, saving));
         self.contents.flush_reserve = self.contents.flush_reserve.max(1);
-        Ok(BegunFlush { scan_number, tiles, after_saves, soon_changed, writer, files, commit })
+        Ok(BegunFlush { scan_number, tiles, compact, after_saves, soon_changed, writer, files, commit })
     }
 
     /// Tiles in the compact form that are being saved as they are, and for which no updates are buffered.

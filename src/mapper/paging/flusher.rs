@@ -35,12 +35,13 @@ pub(super) struct FlushJob {
 /// The map as of a scan, as far as it is to be written.
 pub(super) struct BegunFlush {
     pub(super) scan_number: u64,
-    /// The dirty tiles.
+    /// The dirty tiles, those in the compact form apart. The last ones are written first.
     pub(super) tiles: Vec<FlushedTile>,
-    /// How many of them, the first ones, are written once no save is in flight any more: an older version of them is
+    pub(super) compact: Vec<FlushedTile>,
+    /// How many of the former, the first ones, are written once no save is in flight any more: an older version of them is
     /// being saved.
     pub(super) after_saves: usize,
-    /// Those of them that the next scan will change.
+    /// Those of the former that the next scan will change.
     pub(super) soon_changed: Range<usize>,
     pub(super) writer: TileWriter,
     /// What finds the earlier versions of tiles.
@@ -95,7 +96,7 @@ impl FlushJob {
         // In the order in which the mapper takes them.
         let disk = self.disk.lock();
         let mut contents = self.contents.lock();
-        for tile in self.begun.tiles {
+        for tile in self.begun.tiles.into_iter().chain(self.begun.compact) {
             contents.note_not_flushed(tile, &disk);
         }
         contents.end_flight(flushed);
@@ -116,19 +117,17 @@ impl FlushJob {
 
     fn write_tiles(&mut self, config: &MapConfig) -> Result<()> {
         let mut saver = TileSaver::new(config);
-        let mut waiting = Some(self.begun.after_saves);
+        let mut is_behind = false;
         loop {
-            if waiting.is_some_and(|waiting| self.begun.tiles.len() <= waiting) {
+            if self.begun.has_only_to_wait() {
                 self.end_saves()?;
-                waiting = None;
             }
             let Self { contents, disk, begun, progress } = self;
             let (mut written, mut bytes) = (Vec::new(), 0);
             let mut outcome = Ok(());
             while written.len() < NOTED_AT_ONCE
                 && bytes < NOTED_BYTES
-                && begun.tiles.len() > waiting.unwrap_or_default()
-                && let Some(tile) = begun.tiles.pop()
+                && let Some(tile) = begun.next(is_behind)
             {
                 match begun.write(&tile, &mut saver, config) {
                     Ok(version) => {
@@ -152,6 +151,7 @@ impl FlushJob {
                 disk.note_flushed(tile.index(), version);
                 contents.note_flushed(tile, version, &disk);
             }
+            is_behind = contents.cache.is_behind();
             // Nobody may wait for it.
             let _ = progress.send(());
             outcome?;
@@ -177,7 +177,8 @@ impl FlushJob {
                 return Err(Error::io(disk.store().folder(), "flush", lost));
             }
             let unsaved = flight.take_unsaved().into_iter();
-            self.begun.tiles.extend(unsaved.map(|(index, tile)| FlushedTile::Compact(index, tile)));
+            self.begun.compact.extend(unsaved.map(|(index, tile)| FlushedTile::Compact(index, tile)));
+            self.begun.after_saves = 0;
             return Ok(());
         }
     }
@@ -216,6 +217,21 @@ impl FlushJob {
 }
 
 impl BegunFlush {
+    /// The next tile to write. What leaves memory next is written first: resident tiles, unless those in the compact
+    /// form have to go.
+    fn next(&mut self, is_behind: bool) -> Option<FlushedTile> {
+        let compact = if is_behind { self.compact.pop() } else { None };
+        if compact.is_none() && self.tiles.len() > self.after_saves {
+            return self.tiles.pop();
+        }
+        compact.or_else(|| self.compact.pop())
+    }
+
+    /// Whether no tile is left but those that are written once no save is in flight.
+    fn has_only_to_wait(&self) -> bool {
+        self.compact.is_empty() && self.tiles.len() <= self.after_saves
+    }
+
     fn write(&self, tile: &FlushedTile, saver: &mut TileSaver, config: &MapConfig) -> Result<TileVersion> {
         let (writer, scan_number) = (&self.writer, self.scan_number);
         match tile {

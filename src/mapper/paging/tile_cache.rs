@@ -180,6 +180,12 @@ impl TileCache {
         self.resident.iter().map(|tile| tile.index()).chain(self.compact.indices())
     }
 
+    /// Notes that a tile is on disk as it is.
+    pub(super) fn note_on_disk(&mut self, index: TileIndex) {
+        self.resident.change(index, Tile::mark_clean);
+        self.compact.note_on_disk(index);
+    }
+
     /// Whether a tile differs from its version on disk.
     pub(super) fn is_dirty(&self, index: TileIndex) -> bool {
         self.resident.peek(index).is_some_and(|tile| tile.is_dirty()) || self.compact.is_dirty(index)
