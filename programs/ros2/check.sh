@@ -2,12 +2,13 @@
 # The node beside an independent peer (Cyclone DDS from PyPI; for zenoh, eclipse-zenoh), over loopback: the map of the
 # node and the map that `voxtile build` makes of the same messages have one digest, with a hostile peer too; what the
 # node publishes is what `voxtile export` writes, and its services do what they say. Without Python or PyPI it says so
-# and passes.
+# and passes. The kind rclpy is ROS 2 itself: rclpy of Jazzy over Fast DDS, from PyPI (for Python 3.11).
 #
-# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [zenoh]
+# check.sh [friendly] [hostile] [types] [variants] [odometry] [launch] [path] [real] [sensors] [flood] [rclpy] [zenoh]
 #
-# VOXTILE_ROS2_PYTHON names a Python that has the packages, VOXTILE_ZENOH_PYTHON one that has eclipse-zenoh too; VOXTILE
-# and VOXTILE_ROS2 name programs that are built, VOXTILE_ROS2_ZENOH the node with the feature `zenoh`.
+# VOXTILE_ROS2_PYTHON names a Python that has the packages, VOXTILE_ZENOH_PYTHON one that has eclipse-zenoh too,
+# VOXTILE_RCLPY_PYTHON one that has rclpy too; VOXTILE and VOXTILE_ROS2 name programs that are built, VOXTILE_ROS2_ZENOH
+# the node with the feature `zenoh`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -119,6 +120,39 @@ flood() {
     [ $((mapped + without)) = "$waiting" ] && [ "$mapped" -gt 0 ] || fail "those that waited are not mapped"
 }
 
+# Nodes of ROS 2 itself, with its default middleware, get what the node publishes and what it answers, and it gets what
+# they publish.
+rclpy() {
+    local python=${VOXTILE_RCLPY_PYTHON:-$work/rclpy/bin/python}
+    if [ -z "${VOXTILE_RCLPY_PYTHON:-}" ]; then
+        local packages="rclpy rmw-fastrtps-cpp sensor-msgs nav-msgs std-srvs visualization-msgs diagnostic-msgs"
+        # shellcheck disable=SC2046,SC2086
+        if ! { python3 -m venv "$work/rclpy" && "$python" -m pip -q install cyclonedds==11.0.1 rosbags numpy \
+            $(printf 'ros-jazzy-%s ' $packages); }; then
+            echo "skipped: no Python with rclpy; name one with VOXTILE_RCLPY_PYTHON"
+            return
+        fi
+    fi
+    for attempt in 1 2 3; do
+        domain=$((RANDOM % 100 + 100))
+        rm -rf "$map" "$map.saved" "$work/rclpy.bag"
+        start --resolution $resolution $outputs --odometry /odom --frame-id odom
+        "$python" programs/ros2/tests/rclpy_peer.py $domain "$work/rclpy.bag" $count "$voxtile" "$map" $radius $max_z ||
+            fail "the peer has failed"
+        end INT
+        if grep -q " $count mapped" "$work/rclpy.log"; then break; fi
+        grep -q "clouds: $count received" "$work/rclpy.log" && fail "all clouds came, and not all were mapped"
+        if [ $attempt = 3 ]; then
+            echo "skipped: this machine has lost clouds on the way, three times"
+            return
+        fi
+    done
+    built_of -o "$map.built" --odometry /odom
+    of_node=$("$voxtile" digest "$map.saved") of_bag=$("$voxtile" digest "$map.built")
+    [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"
+    echo "rclpy: $of_node"
+}
+
 # The node is built once more: the feature is off by default.
 zenoh() {
     local python=${VOXTILE_ZENOH_PYTHON:-$python} program=${VOXTILE_ROS2_ZENOH:-}
@@ -137,10 +171,10 @@ zenoh() {
 
 # A street of real clouds where they are at hand.
 street=${VOXTILE_DATA:-../shared/data}/mulran_riverside02_a
-for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood zenoh}; do
+for kind in ${*:-friendly hostile types variants odometry launch path real sensors flood rclpy zenoh}; do
     map=$work/$kind count=30 resolution=0.1 seconds=12
-    if [ $kind = zenoh ]; then
-        zenoh
+    if [ $kind = zenoh ] || [ $kind = rclpy ]; then
+        $kind
         continue
     fi
     if [ $kind = flood ]; then

@@ -7,6 +7,7 @@ hostile: clouds that lie, before each one.
 types: others offer and want the same topics with other types.
 odometry: poses come as nav_msgs/Odometry, and only the mount of the sensor by tf.
 sensors: two sensors with their mounts, so far apart that their clouds do not overlap.
+rclpy: clouds in the frame of the odometry, and no tf: what rclpy_peer.py plays.
 path: after the first CLOUDS a corrected path of them comes, which BAG.tum gets too; others follow at once.
 real: the PCD files of a folder, at its poses (poses_tum.txt).
 """
@@ -119,12 +120,13 @@ def messages(clouds, kind, folder):
     mounts = [transform(0, "base", "lidar", 0.2, 0.1)]
     if kind == "sensors":
         mounts.append(transform(0, "base", "rear", -50.0, 2.0))
-    yield "/tf_static", TFMessage(mounts)
+    if kind != "rclpy":
+        yield "/tf_static", TFMessage(mounts)
     for tick in range(5 * clouds + 2):
         stamp_ns = tick * 20_000_000
         odometry = transform(stamp_ns, "odom", "base", tick * 0.01, tick * 0.02)
         moving = [transform(stamp_ns, "map", "odom", 1.0, 0.0), odometry]
-        if kind == "odometry":
+        if kind in ("odometry", "rclpy"):
             at, turn = odometry.transform.translation, odometry.transform.rotation
             pose = PoseWithCovariance(Pose(Point(at.x, at.y, at.z), turn), [0.0] * 36)
             still = TwistWithCovariance(Twist(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)), [0.0] * 36)
@@ -137,6 +139,7 @@ def messages(clouds, kind, folder):
             yield "/rear", rear
         if tick % 5 == 0 and tick // 5 < clouds:
             plain = cloud(stamp_ns + 7_000_000, tick)
+            plain.header.frame_id = "base" if kind == "rclpy" else "lidar"
             yield "/cloud_in", variant(plain, tick // 5) if kind == "variants" else plain
 
 
@@ -175,6 +178,8 @@ def write_tum(file, poses):
 
 def topics_of(kind):
     """The topics of a robot."""
+    if kind == "rclpy":
+        return ["/odom", "/cloud_in"]
     poses = "/odom" if kind == "odometry" else "/tf"
     return ["/tf_static", poses, "/cloud_in"] + (["/rear"] if kind == "sensors" else [])
 

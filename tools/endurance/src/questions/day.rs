@@ -12,15 +12,19 @@ use report::{Cell, Table};
 use voxtile::Storage;
 use workload::SurveyName;
 
-/// Rays of a scan: few, so that the day takes an hour and not two. The short one makes up for its few scans.
+/// Rays of a scan. The short day makes up for its few scans.
 const RAYS: u32 = 1_000;
 const RAYS_SHORT: u32 = 4_000;
-const SCANS_PER_S: usize = 10;
+/// Scans of the survey in a second, of which one in so many is taken: so the day takes half an hour and not two.
+const SURVEYED_PER_S: usize = 10;
+const EVERY: usize = 4;
+const EVERY_SHORT: usize = 96;
 /// How long a day is in each storage; `octomap` writes thirty times the bytes, and is not kept up for so long.
 const HOURS: [(Storage, usize); 2] = [(Storage::Compact, 12), (Storage::OctoMap, 1)];
 /// A day is looked at in so many parts.
 const PARTS: usize = 12;
 const FLUSH_EVERY_S: usize = 10;
+const FLUSH_EVERY_SCANS_SHORT: usize = 100;
 /// Scans of a round, a metre a second.
 const SCANS_PER_ROUND: usize = 24_000;
 /// The last part by the middle one, in which everything has been seen often.
@@ -35,8 +39,9 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     let mut lived = Vec::new();
     for (storage, hours) in HOURS {
         // The short day has as many rounds as fit: its robot is 96 times as fast.
-        let (scans, every) = setting.size((hours * 3_600 * SCANS_PER_S, 1), (3_000, 96));
-        let scans_per_part = setting.size(scans / PARTS, SCANS_PER_ROUND / 96);
+        let of_hours = hours * 3_600 * SURVEYED_PER_S / EVERY;
+        let (scans, every) = setting.size((of_hours, EVERY), (3_000, EVERY_SHORT));
+        let scans_per_part = setting.size(scans / PARTS, SCANS_PER_ROUND / EVERY_SHORT);
         let rays = setting.size(RAYS, RAYS_SHORT);
         let input = Input::EveryNth { survey: SurveyName::Warehouse, rays, scans, every };
         let case = Case {
@@ -50,7 +55,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
             case,
             memory_bytes: setting.size(64, 24) << 20,
             storage,
-            flush_every_scans: FLUSH_EVERY_S * SCANS_PER_S,
+            flush_every_scans: setting.size(FLUSH_EVERY_S * SURVEYED_PER_S / EVERY, FLUSH_EVERY_SCANS_SHORT),
             scans_per_part,
             folder: setting.work.join("day"),
         };
