@@ -39,6 +39,7 @@ mod queries;
 mod ray;
 mod region;
 mod shape;
+mod sifted_tiles;
 mod tile_cursor;
 mod united;
 
