@@ -3,6 +3,7 @@ use crate::command::place::{check_is_folder, place_of};
 use crate::mapper::{MapReader, MapStatistics, MapView, OctreeMap, TileRef};
 use crate::space::{TileBox, TileIndex};
 use crate::store::{SnapshotName, TileVersion};
+use crate::tile::Voxel;
 use crate::{Error, MapConfig, Result};
 use std::path::{Path, PathBuf};
 
@@ -90,6 +91,10 @@ impl MapView for AnyMap {
 
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
         whichever!(self, tile_uncached(index))
+    }
+
+    fn voxels_from(&self, index: TileIndex, from: f64) -> Result<Vec<Voxel>> {
+        whichever!(self, voxels_from(index, from))
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {

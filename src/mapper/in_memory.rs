@@ -105,6 +105,11 @@ impl MapView for InMemoryMapper {
         Ok(self.tiles.get_or_nothing(index).evidence_of_own(voxel))
     }
 
+    #[inline]
+    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
+        Some(self.tiles.get_or_nothing(index))
+    }
+
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
         self.tiles.get(index).map(|tile| tile.table().len() as u64)
     }

@@ -10,7 +10,7 @@ use crate::store::{
     CatalogEntry, Disk, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileFile, TileStore,
     TileVersion, read_scans,
 };
-use crate::tile::{OctreeFactory, Tile};
+use crate::tile::{OctreeFactory, Tile, Voxel};
 use lru::LruCache;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -408,6 +408,19 @@ impl MapView for MapReader {
         let loaded = load::load_uncached(&self.store, &self.config.grid, index);
         let loaded = loaded.map_err(|error| self.explain(error))?;
         Ok(loaded.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
+    }
+
+    fn voxels_from(&self, index: TileIndex, from: f64) -> Result<Vec<Voxel>> {
+        if let Some((tile, _)) = self.found(|cache| cache.tiles.peek(&index).cloned()) {
+            return Ok(tile.voxels_from(from).collect());
+        }
+        self.read_ahead(index);
+        let loaded = load::load_voxels_from(&self.store, &self.config.grid, index, from);
+        let min = self.config.grid.voxels_of_tile(index).min;
+        let voxels = loaded.map_err(|error| self.explain(error))?.unwrap_or_default().into_iter();
+        Ok(voxels
+            .map(|(code, evidence)| Voxel { index: code.to_key().to_index_from(min), evidence })
+            .collect())
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {

@@ -5,6 +5,7 @@ use crate::scan::Stop;
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, VoxelIndex};
 use crate::store::TileVersion;
+use crate::tile::{Tile, Voxel};
 
 /// A map that can be asked until somebody wants it to stop: from then on each tile is answered with
 /// [`Error::Stopped`](crate::Error::Stopped), which ends whatever is asked.
@@ -56,9 +57,19 @@ impl<V: MapView + ?Sized> MapView for Stoppable<'_, V> {
         self.view.tile_uncached(index)
     }
 
+    fn voxels_from(&self, index: TileIndex, from: f64) -> Result<Vec<Voxel>> {
+        self.stop.check()?;
+        self.view.voxels_from(index, from)
+    }
+
     // Asked point by point: whoever asks for many looks at the stop between them.
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         self.view.evidence(voxel)
+    }
+
+    // Likewise.
+    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
+        self.view.tile_at_hand(index)
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {

@@ -5,6 +5,7 @@ use crate::scan::{PointBatch, Scan, ScanPoints, ScanReport};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::store::TileVersion;
+use crate::tile::{Tile, Voxel};
 
 /// A map of tiles. All of [`Queries`](crate::query::Queries) and [`MapQueries`](crate::query::MapQueries) use these few.
 ///
@@ -45,6 +46,18 @@ pub trait MapView: Sync {
     /// A tile that cannot be read.
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
+    /// The observed voxels of a tile whose log-odds are at least `from`, in Morton order; what is read for it leaves memory
+    /// as with [`MapView::tile_uncached`].
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
+    #[doc(hidden)]
+    fn voxels_from(&self, index: TileIndex, from: f64) -> Result<Vec<Voxel>> {
+        let tile = self.tile_uncached(index)?;
+        Ok(tile.map_or(Vec::new(), |tile| tile.voxels_from(from).collect()))
+    }
+
     /// The evidence of a voxel; `None` if it was never observed.
     ///
     /// # Errors
@@ -53,6 +66,15 @@ pub trait MapView: Sync {
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let tile = self.tile(self.config().grid.tile_of_voxel(voxel))?;
         Ok(tile.and_then(|tile| tile.evidence(voxel)))
+    }
+
+    /// A tile, or an empty one if nothing was observed in it, where all tiles stay in memory: then looking one up is
+    /// cheaper than grouping what is asked. `None` where tiles come and go.
+    #[doc(hidden)]
+    #[inline]
+    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
+        let _ = index;
+        None
     }
 
     /// About how many voxels were observed in a tile, where that is known without reading it.

@@ -1,10 +1,12 @@
 //! Tiles from their files. How they get there is `tile_saver.rs`.
 
 use crate::config::Storage;
-use crate::error::{Error, FormatError, Result};
+use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
 use crate::store::{FileChecksum, StoredTile, TileStore, TileVersion, hex};
-use crate::tile::format::{DecodedTable, Trailer, read_compact_file, read_table};
+use crate::tile::format::{
+    Decoded, SiftedVoxels, Trailer, read_compact_file, read_compact_voxels_from, read_table, read_voxels_from,
+};
 use crate::tile::{OctreeFactory, Table, Tile};
 
 /// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
@@ -26,10 +28,30 @@ pub(crate) fn load_uncached(store: &TileStore, grid: &Grid, index: TileIndex) ->
 
 /// Reads the latest version of a tile's table; `None` if there is none.
 pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Result<Option<ReadTable>> {
+    load_made(store, index, |stored| read_stored_table(grid, index, stored))
+}
+
+/// Reads the observed voxels of a tile's latest version whose log-odds are at least `from`, in Morton order. The file is
+/// checked as for a table, but none is built.
+pub(crate) fn load_voxels_from(
+    store: &TileStore,
+    grid: &Grid,
+    index: TileIndex,
+    from: f64,
+) -> Result<Option<SiftedVoxels>> {
+    let read = |stored| read_stored_voxels_from(grid, index, stored, from);
+    Ok(load_made(store, index, read)?.map(|read| read.table))
+}
+
+fn load_made<T>(
+    store: &TileStore,
+    index: TileIndex,
+    read_stored: impl Fn(StoredTile) -> Result<Read<T>>,
+) -> Result<Option<Read<T>>> {
     let read = |stored: Result<Option<StoredTile>>| {
         let Some(stored) = stored? else { return Ok(None) };
         let path = stored.path.clone();
-        let table = read_stored_table(grid, index, stored)?;
+        let table = read_stored(stored)?;
         if table.trailer.is_some() && store.map_id().is_none() && store.is_upgraded_meanwhile()? {
             let reason = "the file was written after the map was opened";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(index)));
@@ -48,30 +70,54 @@ pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Re
     loaded
 }
 
-/// A table that was read from its file and belongs there.
-pub(crate) struct ReadTable {
-    pub table: Table,
+/// A table, or what else was made of it, that was read from its file and belongs there.
+pub(crate) struct Read<T> {
+    pub table: T,
     pub file: FileChecksum,
     /// `None` in a map of the original format.
     pub trailer: Option<Trailer>,
 }
 
+/// A table that was read from its file and belongs there.
+pub(crate) type ReadTable = Read<Table>;
+
 /// Reads a tile's table. In a map with an id it must be that map's, and the version that the log names, if it does.
-pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: StoredTile) -> Result<ReadTable> {
+pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, stored: StoredTile) -> Result<ReadTable> {
     let voxels = grid.voxels_of_tile(index);
-    let decoded = match stored.storage {
+    read_stored(index, stored, |stored| match stored.storage {
         Storage::OctoMap => read_table(&mut stored.input, stored.bytes, &voxels),
         Storage::Compact => read_compact_file(&mut stored.input, stored.bytes, &voxels),
-    };
-    let decoded = decoded.map_err(|error| error.in_map(&stored.path, Some(index)))?;
+    })
+}
+
+/// The same for the voxels whose log-odds are at least `from`.
+fn read_stored_voxels_from(
+    grid: &Grid,
+    index: TileIndex,
+    stored: StoredTile,
+    from: f64,
+) -> Result<Read<SiftedVoxels>> {
+    let voxels = grid.voxels_of_tile(index);
+    read_stored(index, stored, |stored| match stored.storage {
+        Storage::OctoMap => read_voxels_from(&mut stored.input, stored.bytes, &voxels, from),
+        Storage::Compact => read_compact_voxels_from(&mut stored.input, stored.bytes, &voxels, from),
+    })
+}
+
+fn read_stored<T>(
+    index: TileIndex,
+    mut stored: StoredTile,
+    decode: impl FnOnce(&mut StoredTile) -> std::result::Result<Decoded<T>, DecodeError>,
+) -> Result<Read<T>> {
+    let decoded = decode(&mut stored).map_err(|error| error.in_map(&stored.path, Some(index)))?;
     let StoredTile { path, input, map_id, version, storage, .. } = stored;
     let (file, _) = input.finish();
-    let DecodedTable { table, trailer } = decoded;
+    let Decoded { table, trailer } = decoded;
     if let Some(map_id) = map_id {
         check(map_id, index, storage, trailer.as_ref(), file, version)
             .map_err(|error| error.in_map(&path, Some(index)))?;
     }
-    Ok(ReadTable { table, file, trailer })
+    Ok(Read { table, file, trailer })
 }
 
 /// Checks that an intact file belongs to this map and tile and is the version in the log.

@@ -25,6 +25,7 @@ mod hit;
 mod map_queries;
 mod merged;
 mod nearest;
+mod occupancies;
 mod occupancy;
 pub(crate) mod occupied_set;
 mod octree_blocks;
@@ -38,6 +39,7 @@ mod queries;
 mod ray;
 mod region;
 mod shape;
+mod sifted_tiles;
 mod tile_cursor;
 mod united;
 

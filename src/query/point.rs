@@ -1,11 +1,12 @@
 use super::Occupancy;
+use super::occupancies::Occupancies;
 use super::points_by_tile::PointsByTile;
-use super::queries::on_all_cores;
 use crate::error::Result;
 use crate::mapper::MapView;
 use crate::sensor::Evidence;
-use crate::space::{Point, TileIndex};
-use crate::tile::Voxel;
+use crate::space::{Grid, Point, TileIndex, VoxelKey};
+use crate::tile::{AskedVoxels, Tile, Voxel};
+use rayon::prelude::*;
 
 #[inline]
 pub(super) fn voxel_at<V: MapView + ?Sized>(view: &V, point: Point) -> Result<Option<Voxel>> {
@@ -17,40 +18,151 @@ pub(super) fn voxel_at<V: MapView + ?Sized>(view: &V, point: Point) -> Result<Op
 /// Points that are answered by one core at a time.
 const POINTS_AT_A_TIME: usize = 4096;
 
-/// What each of many points is answered, from the evidence of its voxel. Each tile is loaded once for so many of its
-/// points.
-fn at_points<V: MapView, A: Copy + Send>(
+/// Points that are grouped by tile before each tile is loaded for its own.
+const MOST_GROUPED: usize = 1 << 22;
+
+/// What each of many points is answered, from the evidence of its voxel; each core makes an `answer` for some of them.
+fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
     view: &V,
     points: &[Point],
     unknown: A,
-    answer: impl Fn(Evidence) -> A + Sync,
+    answer: impl Fn() -> F + Sync,
 ) -> Result<Vec<A>> {
-    let grid = view.config().grid;
     let mut answers = vec![unknown; points.len()];
-    for (points, answers) in
-        points.chunks(PointsByTile::MOST_POINTS).zip(answers.chunks_mut(PointsByTile::MOST_POINTS))
-    {
-        let by_tile = PointsByTile::of(&grid, points);
-        let chunks: Vec<(TileIndex, &[u32])> = by_tile.chunks(POINTS_AT_A_TIME).collect();
-        let answered = on_all_cores(&chunks, |&(tile, numbers)| {
-            let Some(tile) = view.tile(tile)? else { return Ok(Vec::new()) };
-            let evidence = |number: u32| tile.evidence(grid.voxel_of(points[number as usize])?);
-            Ok(numbers.iter().map(|&number| evidence(number).map(&answer)).collect::<Vec<_>>())
-        })?;
-        for (&(_, numbers), answered) in chunks.iter().zip(answered) {
-            for (&number, answer) in numbers.iter().zip(answered) {
-                answers[number as usize] = answer.unwrap_or(unknown);
-            }
-        }
+    if view.tile_at_hand(TileIndex::default()).is_some() {
+        let chunks = points.par_chunks(POINTS_AT_A_TIME).zip(answers.par_chunks_mut(POINTS_AT_A_TIME));
+        chunks.for_each(|(points, answers)| at_hand(view, points, answers, answer()));
+        return Ok(answers);
+    }
+    for (points, answers) in points.chunks(MOST_GROUPED).zip(answers.chunks_mut(MOST_GROUPED)) {
+        by_tile(view, points, answers, &answer)?;
     }
     Ok(answers)
 }
 
+/// Answers points in their order where every tile is at hand.
+fn at_hand<V: MapView, A>(
+    view: &V,
+    points: &[Point],
+    answers: &mut [A],
+    mut answer: impl FnMut(Evidence) -> A,
+) {
+    let grid = view.config().grid;
+    let mut voxels = AskedVoxels::new();
+    for (points, answers) in points.chunks(AskedVoxels::MOST).zip(answers.chunks_mut(AskedVoxels::MOST)) {
+        let mut places = [0_u8; AskedVoxels::MOST];
+        let mut count = 0;
+        for (place, &point) in points.iter().enumerate() {
+            let Some(voxel) = grid.voxel_of(point) else { continue };
+            let Some(tile) = view.tile_at_hand(grid.tile_of_voxel(voxel)) else { continue };
+            voxels.push(tile.table(), VoxelKey::from_index(voxel));
+            places[count] = place as u8;
+            count += 1;
+        }
+        let mut places = places.iter();
+        voxels.take(|evidence| {
+            if let (Some(&place), Some(evidence)) = (places.next(), evidence) {
+                answers[usize::from(place)] = answer(evidence);
+            }
+        });
+    }
+}
+
+/// Some of a tile's points, beside each other in the order of one group.
+struct PartOfTile<'a, A> {
+    tile: TileIndex,
+    group: &'a PointsByTile,
+    /// The points of the group.
+    points: &'a [Point],
+    /// The number of the group's first point among all.
+    before: usize,
+    /// The place of the part's first point in the group's order.
+    first: usize,
+    /// The part's answers, in the group's order.
+    answers: &'a mut [A],
+}
+
+/// Answers points tile by tile: each is loaded once for so many of its points.
+fn by_tile<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
+    view: &V,
+    points: &[Point],
+    answers: &mut [A],
+    answer: impl Fn() -> F + Sync,
+) -> Result<()> {
+    /// Parts of a tile that are answered by one core at a time.
+    const PARTS_AT_A_TIME: usize = 8;
+    const OF_GROUP: usize = PointsByTile::MOST_POINTS;
+    let grid = view.config().grid;
+    let groups: Vec<PointsByTile> =
+        points.par_chunks(OF_GROUP).map(|points| PointsByTile::of(&grid, points)).collect();
+    let of_groups = groups.iter().zip(points.chunks(OF_GROUP)).zip(answers.chunks_mut(OF_GROUP));
+    let mut parts: Vec<PartOfTile<'_, A>> = Vec::new();
+    for (number, ((group, points), mut answers)) in of_groups.enumerate() {
+        let mut first = 0;
+        for &(tile, count) in group.tiles() {
+            let of_tile;
+            (of_tile, answers) = answers.split_at_mut(count as usize);
+            for answers in of_tile.chunks_mut(POINTS_AT_A_TIME) {
+                let count = answers.len();
+                parts.push(PartOfTile { tile, group, points, before: number * OF_GROUP, first, answers });
+                first += count;
+            }
+        }
+    }
+    parts.sort_by_key(|part| part.tile);
+    let tasks: Vec<_> = parts
+        .chunk_by_mut(|a, b| a.tile == b.tile)
+        .flat_map(|of_tile| of_tile.chunks_mut(PARTS_AT_A_TIME))
+        .collect();
+    let failed = tasks.into_par_iter().filter_map(|parts| {
+        let first = parts.first()?;
+        match view.tile(first.tile) {
+            Ok(tile) => {
+                let tile = tile?;
+                let mut answer = answer();
+                parts.iter_mut().for_each(|part| part.answer(&grid, &tile, &mut answer));
+                None
+            }
+            Err(error) => Some((first.before + first.group.number_at(first.first), error)),
+        }
+    });
+    if let Some((_, error)) = failed.min_by_key(|(first_point, _)| *first_point) {
+        return Err(error);
+    }
+    let of_groups = groups.par_iter().zip(answers.par_chunks_mut(OF_GROUP));
+    of_groups.for_each(|(group, answers)| group.put_in_order_of_points(answers));
+    Ok(())
+}
+
+impl<A> PartOfTile<'_, A> {
+    fn answer(&mut self, grid: &Grid, tile: &Tile, mut answer: impl FnMut(Evidence) -> A) {
+        let mut voxels = AskedVoxels::new();
+        let mut place = self.first;
+        for answers in self.answers.chunks_mut(AskedVoxels::MOST) {
+            for place in place..place + answers.len() {
+                // Each of them has a voxel: a tile holds it.
+                let voxel = grid.voxel_of(self.points[self.group.number_at(place)]).unwrap_or_default();
+                voxels.push(tile.table(), VoxelKey::from_index(voxel));
+            }
+            place += answers.len();
+            let mut answers = answers.iter_mut();
+            voxels.take(|evidence| {
+                if let (Some(to), Some(evidence)) = (answers.next(), evidence) {
+                    *to = answer(evidence);
+                }
+            });
+        }
+    }
+}
+
 pub(super) fn occupancy_at_points<V: MapView>(view: &V, points: &[Point]) -> Result<Vec<Occupancy>> {
     let config = view.config();
-    at_points(view, points, Occupancy::Unknown, |evidence| Occupancy::of(config, Some(evidence)))
+    at_points(view, points, Occupancy::Unknown, || {
+        let mut occupancies = Occupancies::new(config);
+        move |evidence| occupancies.of(evidence)
+    })
 }
 
 pub(super) fn evidence_at_points<V: MapView>(view: &V, points: &[Point]) -> Result<Vec<Option<Evidence>>> {
-    at_points(view, points, None, Some)
+    at_points(view, points, None, || Some)
 }

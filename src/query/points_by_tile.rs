@@ -1,69 +1,120 @@
 use crate::space::{Grid, Point, TileIndex};
 use rustc_hash::FxHashMap;
-use std::ops::Range;
 
-/// Numbers of points, grouped by the tiles that hold them. Points that no tile holds are left out.
+/// At most [`PointsByTile::MOST_POINTS`] points in the order of the tiles that hold them; those that no tile holds come
+/// last.
 pub(super) struct PointsByTile {
-    /// Tiles in order, and where their points are in `numbers`.
-    tiles: Vec<(TileIndex, Range<usize>)>,
-    numbers: Vec<u32>,
+    /// Tiles in the order of their first points, and how many points each has.
+    tiles: Vec<(TileIndex, u32)>,
+    /// The number of each point; empty if the points are in order already.
+    numbers: Vec<u16>,
 }
 
-/// What points get that no tile holds.
-const NOWHERE: u32 = u32::MAX;
-
 impl PointsByTile {
-    /// Most points that can be grouped.
-    pub(super) const MOST_POINTS: usize = 1 << 22;
+    /// Most points that can be grouped: their answers stay in the CPU's cache until they are in the points' order.
+    pub(super) const MOST_POINTS: usize = 1 << 15;
 
-    /// Groups at most [`PointsByTile::MOST_POINTS`] by counting: comparing tiles of points with each other takes longer
-    /// than to look at all of them.
+    /// Groups points by counting: comparing tiles of points with each other takes longer than to look at all of them.
     pub(super) fn of(grid: &Grid, points: &[Point]) -> Self {
         debug_assert!(points.len() <= Self::MOST_POINTS);
-        let mut places: FxHashMap<TileIndex, u32> = FxHashMap::default();
-        let mut counts: Vec<(TileIndex, u32)> = Vec::new();
+        /// What points get that no tile holds.
+        const NOWHERE: u16 = u16::MAX;
+        let mut places: FxHashMap<TileIndex, u16> = FxHashMap::default();
+        let mut tiles: Vec<(TileIndex, u32)> = Vec::new();
         // Neighbours in a list are mostly neighbours in space.
-        let mut last: Option<(TileIndex, u32)> = None;
+        let mut last: Option<(TileIndex, u16)> = None;
+        let (mut is_in_order, mut before) = (true, 0);
         let place_of_point = |&point: &Point| {
-            let Some(tile) = grid.tile_of(point) else { return NOWHERE };
-            let place = match last {
-                Some((last, place)) if last == tile => place,
-                _ => *places.entry(tile).or_insert_with(|| {
-                    counts.push((tile, 0));
-                    counts.len() as u32 - 1
-                }),
-            };
-            last = Some((tile, place));
-            counts[place as usize].1 += 1;
+            let place = grid.tile_of(point).map_or(NOWHERE, |tile| {
+                let place = match last {
+                    Some((last, place)) if last == tile => place,
+                    _ => *places.entry(tile).or_insert_with(|| {
+                        tiles.push((tile, 0));
+                        tiles.len() as u16 - 1
+                    }),
+                };
+                last = Some((tile, place));
+                tiles[usize::from(place)].1 += 1;
+                place
+            });
+            is_in_order &= before <= place;
+            before = place;
             place
         };
-        let place_of: Vec<u32> = points.iter().map(place_of_point).collect();
-        let mut order: Vec<usize> = (0..counts.len()).collect();
-        order.sort_unstable_by_key(|&place| counts[place].0);
-        let (mut begin, mut next) = (0, vec![0; counts.len()]);
-        let tiles = order.into_iter().map(|place| {
-            let (tile, count) = counts[place];
-            next[place] = begin;
-            let range = begin..begin + count as usize;
-            begin = range.end;
-            (tile, range)
-        });
-        let tiles: Vec<_> = tiles.collect();
-        let mut numbers = vec![0; begin];
-        for (number, place) in place_of.into_iter().enumerate().filter(|(_, place)| *place != NOWHERE) {
-            let at = &mut next[place as usize];
-            numbers[*at] = number as u32;
+        let place_of: Vec<u16> = points.iter().map(place_of_point).collect();
+        if is_in_order {
+            return Self { tiles, numbers: Vec::new() };
+        }
+        let mut begin = 0;
+        let mut next: Vec<u32> = Vec::with_capacity(tiles.len());
+        for (_, count) in &tiles {
+            next.push(begin);
+            begin += count;
+        }
+        let mut numbers = vec![0; points.len()];
+        for (number, place) in place_of.into_iter().enumerate() {
+            let at = next.get_mut(usize::from(place)).unwrap_or(&mut begin);
+            numbers[*at as usize] = number as u16;
             *at += 1;
         }
         Self { tiles, numbers }
     }
 
-    /// Tiles in order with the numbers of points in them, at most so many at a time.
-    pub(super) fn chunks(&self, most_points: usize) -> impl Iterator<Item = (TileIndex, &[u32])> {
-        let of_tile = move |(tile, range): &(TileIndex, Range<usize>)| {
-            let tile = *tile;
-            self.numbers[range.clone()].chunks(most_points).map(move |numbers| (tile, numbers))
-        };
-        self.tiles.iter().flat_map(of_tile)
+    /// Tiles in the order of their first points, and how many points each has.
+    pub(super) fn tiles(&self) -> &[(TileIndex, u32)] {
+        &self.tiles
+    }
+
+    /// Which point has a place in the order.
+    #[inline]
+    pub(super) fn number_at(&self, place: usize) -> usize {
+        self.numbers.get(place).map_or(place, |&number| number.into())
+    }
+
+    /// Puts answers in the order of the tiles into that of the points.
+    pub(super) fn put_in_order_of_points<A: Copy>(&self, answers: &mut [A]) {
+        if self.numbers.is_empty() {
+            return;
+        }
+        let by_tile = answers.to_vec();
+        for (&number, answer) in self.numbers.iter().zip(by_tile) {
+            answers[usize::from(number)] = answer;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_point_has_one_place_beside_those_of_its_tile(
+            points in prop::collection::vec(
+                prop::array::uniform3(prop_oneof![9 => -3.0..3.0, 1 => Just(f64::NAN)]), 0..300
+            ),
+            is_sorted in any::<bool>(),
+        ) {
+            let grid = Grid::new(0.1, 2.0).unwrap();
+            let mut points = points;
+            if is_sorted {
+                points.sort_by_key(|&point| (grid.tile_of(point).is_none(), grid.tile_of(point)));
+            }
+            let by_tile = PointsByTile::of(&grid, &points);
+            prop_assert!(!is_sorted || by_tile.numbers.is_empty());
+            let mut place = 0;
+            for &(tile, count) in by_tile.tiles() {
+                prop_assert!(count > 0);
+                for _ in 0..count {
+                    prop_assert_eq!(grid.tile_of(points[by_tile.number_at(place)]), Some(tile));
+                    place += 1;
+                }
+            }
+            let mut order: Vec<usize> = (0..points.len()).map(|place| by_tile.number_at(place)).collect();
+            prop_assert!(order[place..].iter().all(|&number| grid.tile_of(points[number]).is_none()));
+            by_tile.put_in_order_of_points(&mut order);
+            prop_assert!(order.into_iter().eq(0..points.len()));
+        }
     }
 }

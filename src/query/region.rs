@@ -1,4 +1,5 @@
 use super::ray::brick_of;
+use super::sifted_tiles::for_each_from;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
@@ -45,23 +46,26 @@ pub(super) fn for_each_occupied(
     mut visit: impl FnMut(Voxel),
 ) -> Result<()> {
     let threshold = min_log_odds(view.config(), min_probability);
-    match region {
-        Some(region) => {
-            let grid = view.config().grid;
-            let around = voxels_around(&grid, region);
-            tiles_in(view, &around).into_iter().try_for_each(|index| {
-                let Some(tile) = view.tile_uncached(index)? else { return Ok(()) };
-                let bricks = bricks_in(&tile, &around).filter(|brick| brick.may_hold(&tile, threshold));
-                let voxels = bricks.flat_map(|brick| brick.voxels_from(&tile, threshold));
-                voxels.filter(|voxel| region.contains(grid.center_m(voxel.index))).for_each(&mut visit);
-                Ok(())
-            })
-        }
-        None => view.tiles().try_for_each(|tile| {
-            tile?.voxels_from(threshold).for_each(&mut visit);
+    let Some(region) = region else {
+        return for_each_from(view, &view.tile_indices(), threshold, &mut visit, |index, visit| {
+            let tile = view.tile_uncached(index)?;
+            tile.into_iter().for_each(|tile| tile.voxels_from(threshold).for_each(&mut *visit));
             Ok(())
-        }),
-    }
+        });
+    };
+    let grid = view.config().grid;
+    let around = voxels_around(&grid, region);
+    let mut visit = |voxel: Voxel| {
+        if region.contains(grid.center_m(voxel.index)) {
+            visit(voxel);
+        }
+    };
+    for_each_from(view, &tiles_in(view, &around), threshold, &mut visit, |index, visit| {
+        let Some(tile) = view.tile_uncached(index)? else { return Ok(()) };
+        let bricks = bricks_in(&tile, &around).filter(|brick| brick.may_hold(&tile, threshold));
+        bricks.flat_map(|brick| brick.voxels_from(&tile, threshold)).for_each(&mut *visit);
+        Ok(())
+    })
 }
 
 pub(super) fn cached_occupied_voxels(

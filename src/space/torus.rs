@@ -55,10 +55,17 @@ impl Torus {
     pub fn get(&self, cell: Cell) -> u32 {
         let slot = &self.slots[self.slot_of(cell)];
         if !self.far.is_empty() && slot.cell != cell {
-            return self.far.get(&cell).copied().unwrap_or(Self::NONE);
+            return self.get_far(cell);
         }
         let differ = (0..3).fold(0, |differ, k| differ | (slot.cell[k] ^ cell[k]));
         select_unpredictable(differ == 0, slot.number, Self::NONE)
+    }
+
+    /// Apart, so that the rest is small enough to be inlined.
+    #[cold]
+    #[inline(never)]
+    fn get_far(&self, cell: Cell) -> u32 {
+        self.far.get(&cell).copied().unwrap_or(Self::NONE)
     }
 
     /// Sets the number of a cell, from 1.

@@ -16,8 +16,8 @@ mod tile_body;
 
 pub use octocache::{OctreeQueueCounts, OctreeStatistics, OctreeTimes, VoxelCache, VoxelCacheCounts};
 pub use octree::OctreeFactory;
-pub(crate) use table::BrickLook;
 pub use table::Table;
+pub(crate) use table::{AskedVoxels, BrickLook};
 pub use tile_body::{Tile, TileCounts, Voxel};
 
 #[cfg(test)]

@@ -252,6 +252,57 @@ fn models() -> [SensorModel; 4] {
     ]
 }
 
+#[test]
+fn occupied_voxels_of_a_map_on_disk_are_those_of_its_tables_in_their_order() {
+    let folder = TempDir::new().unwrap();
+    let iwlo = SensorModel::Iwlo(Iwlo::default());
+    for (name, config) in [
+        ("octomap", config()),
+        ("compact", config().with_storage(Storage::Compact)),
+        ("rare", config().with_sensor_model(iwlo).with_storage(Storage::Compact)),
+    ] {
+        let path = folder.path().join(name);
+        let mut mapper = OutOfCoreTileMapper::create(&path, config).unwrap();
+        for seed in 0..5 {
+            mapper.insert_scan(&random_scan(&mut Random(seed), [0.2, 0.1, -0.3], 60)).unwrap();
+        }
+        mapper.flush().unwrap();
+        let region = Aabb { min: [-1.55, -2.0, -3.0], max: [2.0, 1.51, 0.4] };
+        let grid = mapper.config().grid;
+        let mut count = 0;
+        for threads in [1, 5] {
+            // Some of the tiles in memory, others not.
+            let reader = MapReader::open(&path, 3).unwrap();
+            reader.occupancy_at([0.0; 3]).unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            for least in [None, Some(0.0), Some(0.3), Some(0.999), Some(1.0)] {
+                for region in [None, Some(&region)] {
+                    let mut expected = Vec::new();
+                    for tile in reader.tiles() {
+                        let tile = tile.unwrap();
+                        let from = match least {
+                            None => reader.config().occupied_log_odds(),
+                            Some(0.0) => f64::NEG_INFINITY,
+                            Some(1.0) => f64::INFINITY,
+                            Some(least) => (least / (1.0_f64 - least)).ln(),
+                        };
+                        expected.extend(tile.voxels().filter(|voxel| {
+                            voxel.evidence.log_odds >= from
+                                && region.is_none_or(|region| region.contains(grid.center_m(voxel.index)))
+                        }));
+                    }
+                    let mut found = Vec::new();
+                    pool.install(|| reader.for_each_occupied(least, region, |voxel| found.push(voxel)))
+                        .unwrap();
+                    assert!(found == expected, "{name} {threads} {least:?} {region:?}");
+                    count += found.len();
+                }
+            }
+        }
+        assert!(count > 10_000, "{count}");
+    }
+}
+
 /// Asks a map about rays, nearest and occupied voxels, and looks at every voxel for the answers.
 fn check_by_every_voxel(map: &impl MapView, random: &mut Random) {
     let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
@@ -343,25 +394,38 @@ fn free_space_is_passed_over_only_where_it_is_free() {
 #[test]
 fn many_points_are_answered_in_their_order() {
     let folder = TempDir::new().unwrap();
-    let (map, out_of_core) = maps(&folder);
+    let (map, mut out_of_core) = maps(&folder);
+    out_of_core.flush().unwrap();
     let mut random = Random(70);
-    // More of a tile than are answered at a time.
-    let mut points: Vec<_> = (0..20_000).map(|_| random.point([0.0; 3], 4.0)).collect();
+    // More of a tile than are answered at a time, and more than are grouped at a time.
+    let mut points: Vec<_> = (0..70_000).map(|_| random.point([0.0; 3], 4.0)).collect();
     points[7] = [f64::NAN; 3];
     points[8] = [1e300, 0.0, 0.0];
     let occupied = map.all_occupied_voxels(None).unwrap();
     points.extend(occupied.iter().map(|voxel| map.config().grid.center_m(voxel.index)));
-    let answers = out_of_core.occupancy_at_points(&points).unwrap();
-    for (point, answer) in points.iter().zip(&answers) {
-        assert_eq!(map.occupancy_at(*point).unwrap(), *answer);
-    }
-    assert!(answers.iter().any(Occupancy::is_occupied) && answers.contains(&Occupancy::Unknown));
-    let evidence = out_of_core.evidence_at_points(&points).unwrap();
-    for (point, evidence) in points.iter().zip(&evidence) {
-        assert_eq!(map.voxel_at(*point).unwrap().map(|voxel| voxel.evidence), *evidence);
+    let reader = MapReader::open(folder.path().join("map"), 2).unwrap();
+    let live = out_of_core.reader().unwrap();
+    let one_by_one: Vec<_> = points.iter().map(|&point| map.occupancy_at(point).unwrap()).collect();
+    assert!(one_by_one.iter().any(Occupancy::is_occupied) && one_by_one.contains(&Occupancy::Unknown));
+    let evidence: Vec<_> =
+        points.iter().map(|&point| map.voxel_at(point).unwrap().map(|voxel| voxel.evidence)).collect();
+    let mut in_order: Vec<usize> = (0..points.len()).collect();
+    in_order.sort_by_key(|&number| map.config().grid.tile_of(points[number]));
+    for order in [(0..points.len()).collect(), in_order] {
+        let points: Vec<_> = order.iter().map(|&number| points[number]).collect();
+        let expected: Vec<_> = order.iter().map(|&number| one_by_one[number]).collect();
+        assert!(map.occupancy_at_points(&points).unwrap() == expected);
+        assert!(out_of_core.occupancy_at_points(&points).unwrap() == expected);
+        assert!(reader.occupancy_at_points(&points).unwrap() == expected);
+        assert!(live.occupancy_at_points(&points).unwrap() == expected);
+        let expected: Vec<_> = order.iter().map(|&number| evidence[number]).collect();
+        assert!(map.evidence_at_points(&points).unwrap() == expected);
+        assert!(out_of_core.evidence_at_points(&points).unwrap() == expected);
+        assert!(reader.evidence_at_points(&points).unwrap() == expected);
     }
     assert!(out_of_core.evidence_at_points(&[]).unwrap().is_empty());
     assert_eq!(out_of_core.evidence_at_points(&[[f64::NAN; 3]; 2]).unwrap(), [None, None]);
+    assert_eq!(map.evidence_at_points(&[[f64::NAN; 3]; 2]).unwrap(), [None, None]);
 }
 
 #[test]

@@ -63,12 +63,14 @@ impl<'a> AnyOrderEntries<'a> {
 }
 
 impl TakeEntries for AnyOrderEntries<'_> {
+    type Made = Table;
+
     fn take(&mut self, entries: &[EntryBytes], offset: u64) -> Result<(), FormatError> {
         (0..).zip(entries).try_for_each(|(number, entry)| self.take_one(entry, offset + number * ENTRY_BYTES))
     }
 
-    fn end(&mut self) -> Result<Table, FormatError> {
+    fn end(mut self) -> Result<Table, FormatError> {
         self.end_run()?;
-        Ok(std::mem::take(&mut self.table))
+        Ok(self.table)
     }
 }

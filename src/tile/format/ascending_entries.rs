@@ -1,4 +1,5 @@
 use super::entry::{Entry, check_evidence, of_another_tile};
+use super::gather::Gather;
 use super::reader::TakeEntries;
 use super::{ENTRY_BYTES, EntryBytes};
 use crate::error::FormatError;
@@ -7,15 +8,16 @@ use crate::space::{
     BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, VoxelBox, VoxelIndex, VoxelKey, is_in_mask, mask_of_box,
     place_of_voxel,
 };
-use crate::tile::Table;
 
 /// Decodes entries in Morton order, as in a file with a trailer; what a brick's entries share is checked once per
 /// brick.
-pub(super) struct AscendingEntries<'a> {
+pub(super) struct AscendingEntries<'a, G> {
     voxels: &'a VoxelBox,
-    table: Table,
+    gather: G,
     brick: Option<OpenBrick>,
-    /// The voxels of the open brick.
+    /// One more than the place of the last voxel in the open brick; 0 if there is none.
+    behind: usize,
+    /// The voxels of the open brick that are needed.
     run: Vec<(usize, Evidence)>,
 }
 
@@ -31,9 +33,9 @@ struct OpenBrick {
 /// The bits of a coordinate that differ within a brick.
 const LOWER: u16 = BRICK_EDGE as u16 - 1;
 
-impl<'a> AscendingEntries<'a> {
-    pub(super) fn new(voxels: &'a VoxelBox) -> Self {
-        Self { voxels, table: Table::default(), brick: None, run: Vec::with_capacity(BRICK_VOXELS) }
+impl<'a, G: Gather> AscendingEntries<'a, G> {
+    pub(super) fn new(voxels: &'a VoxelBox, gather: G) -> Self {
+        Self { voxels, gather, brick: None, behind: 0, run: Vec::with_capacity(BRICK_VOXELS) }
     }
 
     #[inline]
@@ -49,10 +51,13 @@ impl<'a> AscendingEntries<'a> {
             return Err(of_another_tile(key, offset));
         }
         check_evidence(evidence, offset)?;
-        if self.run.last().is_some_and(|&(previous, _)| previous >= place) {
+        if self.behind > place {
             return Err(out_of_order(key, offset));
         }
-        self.run.push((place, evidence));
+        self.behind = place + 1;
+        if self.gather.wants(evidence) {
+            self.run.push((place, evidence));
+        }
         Ok(())
     }
 
@@ -83,21 +88,26 @@ impl<'a> AscendingEntries<'a> {
     }
 
     fn close(&mut self) {
-        if let Some(brick) = self.brick.take() {
-            self.table.insert(brick.code, &self.run);
+        self.behind = 0;
+        if let Some(brick) = self.brick.take()
+            && !self.run.is_empty()
+        {
+            self.gather.add(brick.code, &self.run);
             self.run.clear();
         }
     }
 }
 
-impl TakeEntries for AscendingEntries<'_> {
+impl<G: Gather> TakeEntries for AscendingEntries<'_, G> {
+    type Made = G::Made;
+
     fn take(&mut self, entries: &[EntryBytes], offset: u64) -> Result<(), FormatError> {
         (0..).zip(entries).try_for_each(|(number, entry)| self.take_one(entry, offset + number * ENTRY_BYTES))
     }
 
-    fn end(&mut self) -> Result<Table, FormatError> {
+    fn end(mut self) -> Result<G::Made, FormatError> {
         self.close();
-        Ok(std::mem::take(&mut self.table))
+        Ok(self.gather.made())
     }
 }
 
@@ -108,8 +118,10 @@ fn out_of_order(key: VoxelKey, offset: u64) -> FormatError {
 #[cfg(test)]
 mod tests {
     use super::super::any_order_entries::AnyOrderEntries;
+    use super::super::gather::VoxelSieve;
     use super::*;
     use crate::simulation::Random;
+    use crate::tile::Table;
     use crate::tile::format::encode_entries;
     use std::collections::BTreeMap;
 
@@ -136,7 +148,7 @@ mod tests {
         bytes.as_chunks().0.to_vec()
     }
 
-    fn read(mut entries: impl TakeEntries, bytes: &[EntryBytes]) -> Result<Table, FormatError> {
+    fn read<E: TakeEntries>(mut entries: E, bytes: &[EntryBytes]) -> Result<E::Made, FormatError> {
         // In two chunks, as when a file is read.
         let (first, second) = bytes.split_at(bytes.len() / 3);
         entries.take(first, 16)?;
@@ -163,8 +175,15 @@ mod tests {
                 let end = if random.chance(0.7) { 6 } else { ENTRY_BYTES };
                 bytes[entry][random.below(end) as usize] ^= 1 << random.below(8);
             }
-            let fast = read(AscendingEntries::new(&VOXELS), &bytes);
+            let fast = read(AscendingEntries::new(&VOXELS, Table::default()), &bytes);
             let naive = read(AnyOrderEntries::new(&VOXELS), &bytes);
+            for from in [f64::NEG_INFINITY, -0.25, 0.5, 9.0] {
+                match (read(AscendingEntries::new(&VOXELS, VoxelSieve::from(from)), &bytes), &fast) {
+                    (Ok(sifted), Ok(table)) => assert!(table.iter_from(from).eq(sifted)),
+                    (Err(sifted), Err(table)) => assert_eq!(sifted, *table),
+                    (sifted, _) => panic!("{sifted:?}"),
+                }
+            }
             match (fast, naive, disorder(&bytes)) {
                 (Ok(fast), Ok(naive), None) => {
                     assert!(fast.iter().eq(naive.iter()));

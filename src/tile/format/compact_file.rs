@@ -2,8 +2,9 @@
 //! The checksum is in the front part: a checksum directly behind its data would make the checksum of the whole file a
 //! constant.
 
-use super::compact::{CRC_BYTES, read_compact};
-use super::reader::DecodedTable;
+use super::compact::{CRC_BYTES, read_compact, sift_compact};
+use super::gather::SiftedVoxels;
+use super::reader::{Decoded, DecodedTable};
 use super::trailer::Trailer;
 use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
@@ -34,14 +35,37 @@ pub fn read_compact_file(
     file_bytes: u64,
     voxels: &VoxelBox,
 ) -> Result<DecodedTable, DecodeError> {
+    read_behind_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
+}
+
+/// Reads a `tile.vxt` like [`read_compact_file`], and makes of it the observed voxels whose log-odds are at least `from`,
+/// in Morton order, without a table.
+///
+/// # Errors
+///
+/// Those of [`read_compact_file`].
+pub fn read_compact_voxels_from(
+    input: &mut impl Read,
+    file_bytes: u64,
+    voxels: &VoxelBox,
+    from: f64,
+) -> Result<Decoded<SiftedVoxels>, DecodeError> {
+    read_behind_front(input, file_bytes, |input, bytes| sift_compact(&mut { input }, bytes, voxels, from))
+}
+
+fn read_behind_front<T>(
+    input: &mut impl Read,
+    file_bytes: u64,
+    read: impl FnOnce(&mut dyn Read, u64) -> Result<T, DecodeError>,
+) -> Result<Decoded<T>, DecodeError> {
     let mut input = BufReader::with_capacity(1 << 16, input);
     let front = read_compact_front(&mut input, file_bytes)?;
     let body_bytes = file_bytes - front.bytes();
     let crc = front.table_crc.to_le_bytes();
     let mut compact = input.take(body_bytes).chain(&crc[..]);
-    let table = read_compact(&mut compact, body_bytes + CRC_BYTES, voxels)
-        .map_err(|error| error.further_by(front.bytes()))?;
-    Ok(DecodedTable { table, trailer: Some(front) })
+    let table =
+        read(&mut compact, body_bytes + CRC_BYTES).map_err(|error| error.further_by(front.bytes()))?;
+    Ok(Decoded { table, trailer: Some(front) })
 }
 
 /// Reads only the front part of a `tile.vxt`.

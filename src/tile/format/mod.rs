@@ -16,14 +16,16 @@ mod compact;
 mod compact_file;
 mod entries;
 mod entry;
+mod gather;
 mod reader;
 mod trailer;
 mod writer;
 
 pub use compact::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
-pub use compact_file::{read_compact_file, read_compact_front, write_compact_file};
+pub use compact_file::{read_compact_file, read_compact_front, read_compact_voxels_from, write_compact_file};
 pub use entries::encode_entries;
-pub use reader::{DecodedTable, read_table, read_trailer};
+pub use gather::SiftedVoxels;
+pub use reader::{Decoded, DecodedTable, read_table, read_trailer, read_voxels_from};
 pub use trailer::{TRAILER_BYTES, Trailer};
 pub use writer::{TableChecksums, write_table};
 

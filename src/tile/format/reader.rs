@@ -1,5 +1,6 @@
 use super::any_order_entries::AnyOrderEntries;
 use super::ascending_entries::AscendingEntries;
+use super::gather::{Gather, SiftedVoxels, VoxelSieve};
 use super::trailer::Trailer;
 use super::{ENTRY_BYTES, EntryBytes, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
@@ -7,23 +8,29 @@ use crate::space::VoxelBox;
 use crate::tile::Table;
 use std::io::{self, Read};
 
-/// Decodes entries into a table.
+/// Decodes entries.
 pub(super) trait TakeEntries {
+    /// What is made of them.
+    type Made;
+
     /// Takes the next entries, which start at `offset` in the file.
     fn take(&mut self, entries: &[EntryBytes], offset: u64) -> Result<(), FormatError>;
 
-    /// The table of all entries.
-    fn end(&mut self) -> Result<Table, FormatError>;
+    /// What was made of all entries.
+    fn end(self) -> Result<Self::Made, FormatError>;
 }
 
-/// The content of an `iwlo_meta.bin`.
+/// The content of an `iwlo_meta.bin` or a `tile.vxt`.
 #[derive(Debug)]
-pub struct DecodedTable {
-    /// The exact table.
-    pub table: Table,
+pub struct Decoded<T> {
+    /// The exact table, or what else was made of it.
+    pub table: T,
     /// The trailer; `None` for a file of the original format, which cannot be verified.
     pub trailer: Option<Trailer>,
 }
+
+/// A tile's exact table, and what the file says beside it.
+pub type DecodedTable = Decoded<Table>;
 
 /// Reads an `iwlo_meta.bin` of `file_bytes` bytes that belongs to the tile of `voxels`.
 ///
@@ -38,12 +45,50 @@ pub fn read_table(
     file_bytes: u64,
     voxels: &VoxelBox,
 ) -> Result<DecodedTable, DecodeError> {
+    read_made(input, file_bytes, voxels, Table::default())
+}
+
+/// Reads an `iwlo_meta.bin` like [`read_table`], and makes of it the observed voxels whose log-odds are at least
+/// `from`, in Morton order, without a table where the entries are in order.
+///
+/// # Errors
+///
+/// Those of [`read_table`].
+pub fn read_voxels_from(
+    input: &mut impl Read,
+    file_bytes: u64,
+    voxels: &VoxelBox,
+    from: f64,
+) -> Result<Decoded<SiftedVoxels>, DecodeError> {
+    read_made(input, file_bytes, voxels, VoxelSieve::from(from))
+}
+
+fn read_made<G: Gather>(
+    input: &mut impl Read,
+    file_bytes: u64,
+    voxels: &VoxelBox,
+    gather: G,
+) -> Result<Decoded<G::Made>, DecodeError> {
     let mut crc = crc32fast::Hasher::new();
     let (count, trailer_bytes) = read_header(input, file_bytes, &mut crc)?;
-    let mut entries: Box<dyn TakeEntries> = match trailer_bytes {
-        0 => Box::new(AnyOrderEntries::new(voxels)),
-        _ => Box::new(AscendingEntries::new(voxels)),
-    };
+    if trailer_bytes == 0 {
+        let table = read_entries(input, count, &mut crc, AnyOrderEntries::new(voxels))?;
+        return Ok(Decoded { table: gather.of_table(table), trailer: None });
+    }
+    let table = read_entries(input, count, &mut crc, AscendingEntries::new(voxels, gather))?;
+    let trailer = Trailer::read(input, HEADER_BYTES + count * ENTRY_BYTES, trailer_bytes)?;
+    if trailer.table_crc != crc.finalize() {
+        return Err(FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into());
+    }
+    Ok(Decoded { table, trailer: Some(trailer) })
+}
+
+fn read_entries<E: TakeEntries>(
+    input: &mut impl Read,
+    count: u64,
+    crc: &mut crc32fast::Hasher,
+    mut entries: E,
+) -> Result<E::Made, DecodeError> {
     let mut chunk = vec![0; 4096 * ENTRY_BYTES as usize];
     let mut done = 0;
     while done < count {
@@ -54,15 +99,7 @@ pub fn read_table(
         entries.take(bytes.as_chunks().0, HEADER_BYTES + done * ENTRY_BYTES)?;
         done += entries_here;
     }
-    let table = entries.end()?;
-    if trailer_bytes == 0 {
-        return Ok(DecodedTable { table, trailer: None });
-    }
-    let trailer = Trailer::read(input, HEADER_BYTES + count * ENTRY_BYTES, trailer_bytes)?;
-    if trailer.table_crc != crc.finalize() {
-        return Err(FormatError::at_offset(0, "the entries do not match the checksum in the trailer").into());
-    }
-    Ok(DecodedTable { table, trailer: Some(trailer) })
+    Ok(entries.end()?)
 }
 
 /// Reads only the trailer of an `iwlo_meta.bin`; `None` for a file of the original format. The entries are skipped.

@@ -76,7 +76,19 @@ impl BrickDirectory {
     #[inline]
     pub(crate) fn get(&self, at: Address) -> u32 {
         // Without a branch: presence is unpredictable.
-        self.numbers[self.blocks.get(at.block) as usize][at.brick]
+        self.in_block(self.block(at), at)
+    }
+
+    /// The number of the block at an address.
+    #[inline]
+    pub(crate) fn block(&self, at: Address) -> u32 {
+        self.blocks.get(at.block)
+    }
+
+    /// [`BrickDirectory::get`], with the number of the block.
+    #[inline]
+    pub(crate) fn in_block(&self, block: u32, at: Address) -> u32 {
+        self.numbers[block as usize][at.brick]
     }
 
     /// The marks of the bricks of the block at an address, in Morton order, a bit each.

@@ -7,6 +7,7 @@
 //! A step (state, observation) -> state is computed once a palette; [`MissRuns`](miss_runs::MissRuns) caches long
 //! runs of them. A brick has a [`Summary`], from which the upper nodes of an octree are computed.
 
+mod asked_voxels;
 mod brick;
 mod brick_directory;
 mod brick_look;
@@ -19,6 +20,7 @@ mod summary;
 mod table_update;
 mod unpadded_evidence;
 
+pub(crate) use asked_voxels::AskedVoxels;
 pub(crate) use brick::{Brick, Storage};
 pub(crate) use brick_look::BrickLook;
 pub use brick_table::Table;

@@ -1,8 +1,7 @@
-use super::group_columns::{Columns, Rest, Room};
+use super::group_columns::Rest;
 use super::open_brick::{OpenBrick, Refusal};
-use super::reader::Header;
+use super::reader::TakeGroups;
 use super::symbol::Symbols;
-use crate::error::FormatError;
 use crate::space::{BrickCode, VoxelBox};
 use crate::tile::Table;
 use crate::tile::table::{Palette, Storage};
@@ -22,38 +21,17 @@ impl<'a> GroupReader<'a> {
         let symbols = Symbols::of(palette.len() - 1);
         Self { voxels, symbols, table: Table::with_palette(palette), before: None }
     }
+}
 
-    /// Number of bricks so far.
-    pub(super) fn bricks(&self) -> usize {
+impl TakeGroups for GroupReader<'_> {
+    type Made = Table;
+
+    fn bricks(&self) -> usize {
         self.table.bricks.len()
     }
 
-    /// The limits of the next group.
-    pub(super) fn room(&self, header: &Header) -> Room {
-        Room { bricks: header.bricks - self.bricks(), voxels: header.voxels - self.table.len() }
-    }
-
-    /// The table of all groups.
-    pub(super) fn end(mut self) -> Table {
-        self.table.palette.limit_by_use();
-        self.table
-    }
-
-    /// Adds the next group.
-    pub(super) fn add(&mut self, columns: &Columns) -> Result<(), FormatError> {
-        self.add_bricks(columns).map_err(|reason| FormatError::at_offset(columns.offset, reason))
-    }
-
-    fn add_bricks(&mut self, columns: &Columns) -> Result<(), String> {
-        if columns.bricks == 0 {
-            return Err("a group without bricks".into());
-        }
-        let mut rest = Rest::of(columns);
-        (0..columns.bricks).try_for_each(|_| self.add_brick(&mut rest))?;
-        match rest.is_empty() {
-            true => Ok(()),
-            false => Err("a group has more than its bricks".into()),
-        }
+    fn voxels(&self) -> usize {
+        self.table.len()
     }
 
     fn add_brick(&mut self, rest: &mut Rest<'_>) -> Result<(), String> {
@@ -74,5 +52,10 @@ impl<'a> GroupReader<'a> {
         };
         self.table.add_brick(brick.closed(evidence));
         Ok(())
+    }
+
+    fn end(mut self) -> Table {
+        self.table.palette.limit_by_use();
+        self.table
     }
 }

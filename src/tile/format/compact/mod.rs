@@ -18,6 +18,7 @@ mod effort;
 mod group;
 mod group_columns;
 mod group_reader;
+mod group_sieve;
 mod input;
 mod numbers;
 mod open_brick;
@@ -29,6 +30,7 @@ mod tests;
 mod writer;
 
 pub use effort::CompactEffort;
+pub(super) use reader::sift_compact;
 pub use reader::{CompactReader, read_compact};
 pub use writer::{CompactWriter, write_compact};
 

@@ -97,14 +97,28 @@ impl OpenBrick {
         for (cell, &mask) in cells.all_mut().iter_mut().zip(masks) {
             let symbols = rest.take_symbols(mask.count_ones() as usize)?;
             for (bit, &symbol) in bits(mask).zip(symbols) {
-                let evidence = match symbol {
-                    RARE => rest.take_rare()?,
-                    _ => palette.evidence(self.common(symbol, rest)?),
-                };
-                cell[bit] = evidence.into();
+                cell[bit] = self.evidence(symbol, rest, palette)?.into();
             }
         }
         Ok(cells)
+    }
+
+    /// The evidence of the next voxel, whose symbol is taken already; the palette holds the codebook.
+    pub(super) fn evidence(
+        &self,
+        symbol: u8,
+        rest: &mut Rest<'_>,
+        palette: &Palette,
+    ) -> Result<Evidence, String> {
+        match symbol {
+            RARE => rest.take_rare(),
+            _ => Ok(palette.evidence(self.common(symbol, rest)?)),
+        }
+    }
+
+    /// The palette's state of a codebook number.
+    pub(super) const fn state_of(number: u16) -> StateId {
+        number + 1
     }
 
     /// The codebook's state of a symbol.
@@ -117,23 +131,18 @@ impl OpenBrick {
             self.symbols.number(symbol, rest.take_second()?)
         };
         let number = number.ok_or_else(|| format!("symbol {symbol} stands for no state"))?;
-        Ok(state_of(number as u16))
+        Ok(Self::state_of(number as u16))
     }
-}
-
-/// The palette's state of a codebook number.
-const fn state_of(number: u16) -> StateId {
-    number + 1
 }
 
 /// Sets the states of a mask whose symbols are codebook numbers.
 #[inline]
 fn set(cell: &mut [StateId; CELL_VOXELS], mask: u64, symbols: &[u8]) {
     if let Ok(symbols) = <&[u8; CELL_VOXELS]>::try_from(symbols) {
-        *cell = symbols.map(|symbol| state_of(symbol.into()));
+        *cell = symbols.map(|symbol| OpenBrick::state_of(symbol.into()));
     } else {
         for (bit, &symbol) in bits(mask).zip(symbols) {
-            cell[bit] = state_of(symbol.into());
+            cell[bit] = OpenBrick::state_of(symbol.into());
         }
     }
 }

@@ -1,7 +1,8 @@
 use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
-use super::group_columns::Columns;
+use super::group_columns::{Columns, Rest, Room};
 use super::group_reader::GroupReader;
+use super::group_sieve::GroupSieve;
 use super::input::Input;
 use super::symbol::MAX_STATES;
 use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
@@ -9,6 +10,7 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
 use crate::tile::Table;
 use crate::tile::format::entry::fault_of;
+use crate::tile::format::gather::SiftedVoxels;
 use crate::tile::table::Palette;
 use std::io::{self, Read};
 
@@ -43,6 +45,17 @@ impl CompactReader {
         bytes: u64,
         voxels: &VoxelBox,
     ) -> Result<Table, DecodeError> {
+        self.read_groups(input, bytes, voxels, |palette| GroupReader::new(voxels, palette))
+    }
+
+    /// Reads groups into what begins with the codebook's palette.
+    fn read_groups<G: TakeGroups>(
+        &mut self,
+        input: &mut impl Read,
+        bytes: u64,
+        voxels: &VoxelBox,
+        begin: impl FnOnce(Palette) -> G,
+    ) -> Result<G::Made, DecodeError> {
         if bytes < HEADER_BYTES as u64 + CRC_BYTES {
             let reason = format!("{bytes} bytes are too few for a compact table");
             return Err(FormatError::at_offset(0, reason).into());
@@ -50,18 +63,19 @@ impl CompactReader {
         let mut input = Input::new(input, bytes);
         let header = Header::read(&mut input, voxels)?;
         let palette = read_codebook(header.states, &mut self.column_reader, &mut input)?;
-        let mut groups = GroupReader::new(voxels, palette);
+        let mut groups = begin(palette);
         while groups.bricks() < header.bricks {
-            self.columns.read(&groups.room(&header), &mut self.column_reader, &mut input)?;
+            let room =
+                Room { bricks: header.bricks - groups.bricks(), voxels: header.voxels - groups.voxels() };
+            self.columns.read(&room, &mut self.column_reader, &mut input)?;
             groups.add(&self.columns)?;
         }
-        let table = groups.end();
-        if table.len() != header.voxels {
-            let reason = format!("{} voxels where {} are announced", table.len(), header.voxels);
+        if groups.voxels() != header.voxels {
+            let reason = format!("{} voxels where {} are announced", groups.voxels(), header.voxels);
             return Err(FormatError::at_offset(8, reason).into());
         }
         input.end()?;
-        Ok(table)
+        Ok(groups.end())
     }
 }
 
@@ -74,11 +88,58 @@ pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Res
     CompactReader::new()?.read(input, bytes, voxels)
 }
 
+/// Reads the observed voxels of a table whose log-odds are at least `from`, in Morton order, without the table.
+///
+/// # Errors
+///
+/// Those of [`CompactReader::read`].
+pub(in crate::tile::format) fn sift_compact(
+    input: &mut impl Read,
+    bytes: u64,
+    voxels: &VoxelBox,
+    from: f64,
+) -> Result<SiftedVoxels, DecodeError> {
+    CompactReader::new()?.read_groups(input, bytes, voxels, |palette| GroupSieve::new(voxels, palette, from))
+}
+
+/// What is made of groups of bricks.
+pub(super) trait TakeGroups {
+    type Made;
+
+    /// Number of bricks so far.
+    fn bricks(&self) -> usize;
+
+    /// Number of observed voxels so far.
+    fn voxels(&self) -> usize;
+
+    /// Adds the next group.
+    fn add(&mut self, columns: &Columns) -> Result<(), FormatError> {
+        self.add_bricks(columns).map_err(|reason| FormatError::at_offset(columns.offset, reason))
+    }
+
+    fn add_bricks(&mut self, columns: &Columns) -> Result<(), String> {
+        if columns.bricks == 0 {
+            return Err("a group without bricks".into());
+        }
+        let mut rest = Rest::of(columns);
+        (0..columns.bricks).try_for_each(|_| self.add_brick(&mut rest))?;
+        match rest.is_empty() {
+            true => Ok(()),
+            false => Err("a group has more than its bricks".into()),
+        }
+    }
+
+    fn add_brick(&mut self, rest: &mut Rest<'_>) -> Result<(), String>;
+
+    /// What was made of all groups.
+    fn end(self) -> Self::Made;
+}
+
 /// The header of a compact table.
-pub(super) struct Header {
-    pub(super) voxels: usize,
-    pub(super) bricks: usize,
-    pub(super) states: usize,
+struct Header {
+    voxels: usize,
+    bricks: usize,
+    states: usize,
 }
 
 impl Header {

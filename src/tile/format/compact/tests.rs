@@ -1,6 +1,6 @@
 //! Tables of every kind survive the compact form to the bit; damaged input is an error.
 
-use super::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
+use super::{CompactEffort, CompactReader, CompactWriter, read_compact, sift_compact, write_compact};
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
 use crate::simulation::Random;
@@ -84,10 +84,20 @@ fn written(table: &Table, effort: CompactEffort) -> Vec<u8> {
 }
 
 fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
-    read_compact(&mut &bytes[..], bytes.len() as u64, tile).map_err(|error| match error {
+    let format_error = |error| match error {
         DecodeError::Format(error) => error,
         DecodeError::Io(error) => panic!("memory can be read: {error}"),
-    })
+    };
+    let table = read_compact(&mut &bytes[..], bytes.len() as u64, tile).map_err(format_error);
+    for from in [f64::NEG_INFINITY, -1.0, 0.0, f64::MAX] {
+        let sifted = sift_compact(&mut &bytes[..], bytes.len() as u64, tile, from).map_err(format_error);
+        match (&table, sifted) {
+            (Ok(table), Ok(sifted)) => assert!(table.iter_from(from).eq(sifted)),
+            (Err(table), Err(sifted)) => assert_eq!(*table, sifted),
+            (_, sifted) => panic!("{sifted:?}"),
+        }
+    }
+    table
 }
 
 fn assert_is(table: &Table, voxels: &Voxels) {

@@ -1,0 +1,54 @@
+use crate::error::Result;
+use crate::mapper::MapView;
+use crate::space::TileIndex;
+use crate::tile::Voxel;
+use rayon::prelude::*;
+
+/// Most voxels of tiles that are read together, unless one tile has more: 8 MB.
+const MOST_VOXELS: u64 = 1 << 18;
+/// Most tiles that are read together.
+const MOST_TILES: usize = 64;
+
+/// At most how many voxels of a tile have log-odds of `from` or more, where that is known without reading it.
+fn most_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
+    let version = view.version_of_tile(tile)?;
+    Some(if from >= view.config().occupied_log_odds() { version.occupied } else { version.voxels })
+}
+
+/// The first of `tiles` that are read together: none if the first one has too many voxels, or nobody knows how many.
+fn first_together<'a>(view: &impl MapView, tiles: &'a [TileIndex], from: f64) -> &'a [TileIndex] {
+    let mut room = MOST_VOXELS;
+    let fits = |&&tile: &&TileIndex| {
+        let left = most_from(view, tile, from).and_then(|most| room.checked_sub(most));
+        room = left.unwrap_or(0);
+        left.is_some()
+    };
+    &tiles[..tiles.iter().take(MOST_TILES).take_while(fits).count()]
+}
+
+/// Visits the observed voxels of tiles whose log-odds are at least `from`: tile by tile in their order, in Morton order
+/// within each. Small tiles are read on all cores; `whole` visits those of one that may be too large to be held twice.
+pub(super) fn for_each_from<F: FnMut(Voxel)>(
+    view: &impl MapView,
+    tiles: &[TileIndex],
+    from: f64,
+    visit: &mut F,
+    whole: impl Fn(TileIndex, &mut F) -> Result<()>,
+) -> Result<()> {
+    let mut tiles = tiles;
+    while let Some(&first) = tiles.first() {
+        let together = first_together(view, tiles, from);
+        if together.is_empty() {
+            whole(first, visit)?;
+            tiles = &tiles[1..];
+            continue;
+        }
+        let read: Vec<Result<Vec<Voxel>>> =
+            together.par_iter().map(|&tile| view.voxels_from(tile, from)).collect();
+        for voxels in read {
+            voxels?.into_iter().for_each(&mut *visit);
+        }
+        tiles = &tiles[together.len()..];
+    }
+    Ok(())
+}

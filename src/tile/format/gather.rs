@@ -1,0 +1,78 @@
+use crate::sensor::Evidence;
+use crate::space::{BrickCode, MortonCode};
+use crate::tile::Table;
+
+/// What is made of a tile's observed voxels while its file is read.
+pub(super) trait Gather {
+    /// The result.
+    type Made;
+
+    /// Whether it needs a voxel of this evidence.
+    fn wants(&self, evidence: Evidence) -> bool;
+
+    /// Takes the voxels of a brick that it needs, in Morton order: place and evidence. Bricks come in Morton order, too.
+    fn add(&mut self, brick: BrickCode, voxels: &[(usize, Evidence)]);
+
+    /// What was made of all voxels.
+    fn made(self) -> Self::Made;
+
+    /// What is made of a table that had to be built.
+    fn of_table(self, table: Table) -> Self::Made;
+}
+
+impl Gather for Table {
+    type Made = Self;
+
+    #[inline]
+    fn wants(&self, _: Evidence) -> bool {
+        true
+    }
+
+    fn add(&mut self, brick: BrickCode, voxels: &[(usize, Evidence)]) {
+        self.insert(brick, voxels);
+    }
+
+    fn made(self) -> Self {
+        self
+    }
+
+    fn of_table(self, table: Self) -> Self {
+        table
+    }
+}
+
+/// Voxels that were chosen while a file was read, in Morton order.
+pub type SiftedVoxels = Vec<(MortonCode, Evidence)>;
+
+/// Chooses the voxels whose log-odds are at least a threshold.
+pub(super) struct VoxelSieve {
+    pub(super) from: f64,
+    pub(super) found: SiftedVoxels,
+}
+
+impl From<f64> for VoxelSieve {
+    fn from(from: f64) -> Self {
+        Self { from, found: Vec::new() }
+    }
+}
+
+impl Gather for VoxelSieve {
+    type Made = SiftedVoxels;
+
+    #[inline]
+    fn wants(&self, evidence: Evidence) -> bool {
+        evidence.log_odds >= self.from
+    }
+
+    fn add(&mut self, brick: BrickCode, voxels: &[(usize, Evidence)]) {
+        self.found.extend(voxels.iter().map(|&(place, evidence)| (brick.voxel(place), evidence)));
+    }
+
+    fn made(self) -> SiftedVoxels {
+        self.found
+    }
+
+    fn of_table(self, table: Table) -> SiftedVoxels {
+        table.iter_from(self.from).collect()
+    }
+}
