@@ -1,3 +1,4 @@
+use super::nodes_around::NodesAround;
 use super::place::{cell_at, ones, place_of};
 use super::range::{Ball, Relation};
 use super::rules::Rules;
@@ -19,8 +20,7 @@ pub(super) struct Inflation {
     emptied: Vec<u32>,
     /// Numbers of the blocks around the present one, as its stencil numbers them.
     beside: Vec<u32>,
-    /// Index and number of the node of the last of these.
-    last_node: (VoxelIndex, u32),
+    nodes: NodesAround,
     pages: Vec<u32>,
     /// Inflated voxels.
     pub(super) inflated: usize,
@@ -35,7 +35,7 @@ impl Inflation {
             waiting: Vec::new(),
             emptied: Vec::new(),
             beside: Vec::new(),
-            last_node: ([0; 3], NONE),
+            nodes: NodesAround::default(),
             pages: Vec::new(),
             inflated: 0,
             changes: 0,
@@ -93,6 +93,7 @@ impl Inflation {
         emptied.dedup();
         emptied.drain(..).for_each(|block| tree.drop_if_empty(block));
         self.emptied = emptied;
+        self.nodes = NodesAround::default();
     }
 
     fn update_page(&mut self, tree: &mut Tree, grid: Grid, position: Point, page: u32, has_old_rules: bool) {
@@ -167,42 +168,40 @@ impl Inflation {
         self.beside.clear();
         self.beside.resize(stencil.blocks(), NONE);
         let index = tree.block_index(block);
-        self.last_node = (index.map(|k| k >> 2), tree.blocks.get(block).node);
+        self.nodes.move_to(index.map(|k| k >> 2));
+        self.find_beside(tree, index, begin | end, stencil);
         for place in ones(begin) {
             for &(number, mask) in stencil.of_place(place) {
-                let at = self.beside(tree, index, number, stencil);
-                self.count_up(tree, at, mask);
+                self.count_up(tree, self.beside[number as usize], mask);
             }
         }
         for place in ones(end) {
             for &(number, mask) in stencil.of_place(place) {
-                let at = self.beside(tree, index, number, stencil);
-                self.count_down(tree, at, mask);
+                self.count_down(tree, self.beside[number as usize], mask);
             }
         }
         tree.set_inflating(block, begin, end);
         self.changes += (begin.count_ones() + end.count_ones()) as usize;
     }
 
-    /// The block with a number around the block at `index`.
+    /// Finds the blocks that voxels of the block at `index` inflate; makes those that do not exist.
     #[inline]
-    fn beside(&mut self, tree: &mut Tree, index: VoxelIndex, number: u32, stencil: &Stencil) -> u32 {
-        let known = self.beside[number as usize];
-        if known != NONE {
-            return known;
+    fn find_beside(&mut self, tree: &mut Tree, index: VoxelIndex, voxels: u64, stencil: &Stencil) {
+        for place in ones(voxels) {
+            for &(number, _) in stencil.of_place(place) {
+                if self.beside[number as usize] != NONE {
+                    continue;
+                }
+                let offset = stencil.offset_of(number);
+                let at: VoxelIndex = std::array::from_fn(|k| index[k] + offset[k]);
+                let node = self.nodes.make(tree, at.map(|k| k >> 2), self.rules.current());
+                self.beside[number as usize] = tree.make_block_in(node, place_of(at));
+            }
         }
-        let offset = stencil.offset_of(number);
-        let at: VoxelIndex = std::array::from_fn(|k| index[k] + offset[k]);
-        // Mostly it is in the same node as the last one.
-        let (node_index, node) = self.last_node;
-        let known = match node_index == at.map(|k| k >> 2) {
-            true => tree.nodes.get(node).blocks.get(&tree.lists, place_of(at)),
-            false => None,
-        };
-        let block = known.unwrap_or_else(|| tree.make_block(at, self.rules.current()));
-        self.last_node = (at.map(|k| k >> 2), tree.blocks.get(block).node);
-        self.beside[number as usize] = block;
-        block
+        // Most are not in a cache. Reading all before any changes lets the processor wait for them at once.
+        let found = self.beside.iter().filter(|block| **block != NONE);
+        let inflated = found.fold(0, |any, &block| any | tree.counts.inflated(tree.blocks.get(block).tally));
+        std::hint::black_box(inflated);
     }
 
     fn count_up(&mut self, tree: &mut Tree, id: u32, mask: u64) {
@@ -210,8 +209,8 @@ impl Inflation {
         let new = tree.counts.add(&mut block.tally, mask);
         if new != 0 {
             self.inflated += new.count_ones() as usize;
-            let node = block.node;
-            tree.mark_dirty(node);
+            let (node, place) = (block.node, block.place);
+            tree.mark_dirty(node, place);
         }
     }
 
@@ -223,8 +222,8 @@ impl Inflation {
             if block.tally.is_empty() {
                 self.emptied.push(id);
             }
-            let node = block.node;
-            tree.mark_dirty(node);
+            let (node, place) = (block.node, block.place);
+            tree.mark_dirty(node, place);
         }
     }
 

@@ -33,6 +33,7 @@ mod counts;
 mod frame;
 mod inflation;
 mod map;
+mod nodes_around;
 mod page_table;
 mod parameters;
 mod place;

@@ -11,6 +11,8 @@ pub(super) struct Stencil {
     pub(super) reach: i32,
     /// For each place of the voxel in its block: the blocks, numbered by [`Stencil::number_of`], and their voxels.
     parts: Vec<Vec<(u32, u64)>>,
+    /// The blocks by number, relative to the voxel's own.
+    offsets: Vec<VoxelIndex>,
 }
 
 impl Stencil {
@@ -20,7 +22,7 @@ impl Stencil {
         let radius = radius_m / resolution_m * (1.0 + 1e-9);
         let r = radius.floor() as i32;
         let reach = (r + 3) / 4;
-        let mut stencil = Self { radius_m, reach, parts: vec![Vec::new(); 64] };
+        let mut stencil = Self { radius_m, reach, parts: vec![Vec::new(); 64], offsets: offsets(reach) };
         let mut masks = vec![0_u64; stencil.blocks()];
         for place in 0..64 {
             let from = cell_at([0; 3], place);
@@ -41,7 +43,7 @@ impl Stencil {
 
     /// Blocks in the cube around the stencil.
     pub(super) fn blocks(&self) -> usize {
-        (2 * self.reach + 1).pow(3) as usize
+        self.offsets.len()
     }
 
     /// The blocks, and their voxels, that the voxel at a place of its block inflates.
@@ -59,10 +61,14 @@ impl Stencil {
     /// The block with a number, relative to the voxel's own.
     #[inline]
     pub(super) fn offset_of(&self, number: u32) -> VoxelIndex {
-        let edge = 2 * self.reach + 1;
-        let number = number as i32;
-        [number / (edge * edge), number / edge % edge, number % edge].map(|k| k - self.reach)
+        self.offsets[number as usize]
     }
+}
+
+/// The blocks up to `reach` away along each axis, in the order of [`Stencil::number_of`].
+fn offsets(reach: i32) -> Vec<VoxelIndex> {
+    let along = move || -reach..=reach;
+    along().flat_map(|x| along().flat_map(move |y| along().map(move |z| [x, y, z]))).collect()
 }
 
 /// All offsets of at most a length in voxels.

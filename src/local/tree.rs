@@ -1,5 +1,5 @@
 use super::counts::{Counts, Tally};
-use super::place::{cell_at, place_of};
+use super::place::{cell_at, ones, place_of};
 use super::slab::Slab;
 use super::sparse::{IdLists, Sparse64};
 use crate::space::{VoxelIndex, hash_table_bytes};
@@ -54,6 +54,8 @@ pub(super) struct Node {
     pub(super) blocks: Sparse64,
     /// Blocks that hold voxels with occupancy.
     pub(super) stored: u64,
+    /// Blocks in which voxels changed since the last publication.
+    pub(super) dirty: u64,
 }
 
 /// 4 x 4 x 4 voxels, each with its occupancy and its inflation: half a cache line.
@@ -107,19 +109,27 @@ impl Tree {
 
     /// The block with an index, made if it does not exist; a new node gets the rule.
     pub(super) fn make_block(&mut self, index: VoxelIndex, rule: u8) -> u32 {
-        let node_index = index.map(|k| k >> 2);
-        let page_index = node_index.map(|k| k >> 2);
-        let page = self.make_page(page_index);
-        let in_page = place_of(node_index);
-        let node = match self.pages.get(page).nodes.get(&self.lists, in_page) {
+        let node = self.make_node(index.map(|k| k >> 2), rule);
+        self.make_block_in(node, place_of(index))
+    }
+
+    /// The node with an index, made with the rule if it does not exist.
+    pub(super) fn make_node(&mut self, index: VoxelIndex, rule: u8) -> u32 {
+        let page = self.make_page(index.map(|k| k >> 2));
+        let in_page = place_of(index);
+        match self.pages.get(page).nodes.get(&self.lists, in_page) {
             Some(node) => node,
             None => {
                 let node = self.nodes.insert(Node { page, place: in_page as u8, rule, ..Node::default() });
                 self.pages.get_mut(page).nodes.insert(&mut self.lists, in_page, node);
                 node
             }
-        };
-        let in_node = place_of(index);
+        }
+    }
+
+    /// The block at a place of a node, made if it does not exist.
+    #[inline]
+    pub(super) fn make_block_in(&mut self, node: u32, in_node: usize) -> u32 {
         match self.nodes.get(node).blocks.get(&self.lists, in_node) {
             Some(block) => block,
             None => {
@@ -172,13 +182,13 @@ impl Tree {
 
     /// Sets whether a voxel is occupied; returns whether that changed it.
     pub(super) fn set_occupied(&mut self, block: u32, place: usize, is_occupied: bool) -> bool {
-        let Block { node, occupied, .. } = self.blocks.get_mut(block);
+        let Block { node, place: in_node, occupied, .. } = self.blocks.get_mut(block);
         let was_occupied = *occupied >> place & 1 != 0;
         if was_occupied == is_occupied {
             return false;
         }
         *occupied ^= 1 << place;
-        let number = *node;
+        let (number, in_node) = (*node, *in_node);
         let node = self.nodes.get_mut(number);
         let page = self.pages.get_mut(node.page);
         if is_occupied {
@@ -186,7 +196,7 @@ impl Tree {
         } else {
             (node.occupied, page.occupied) = (node.occupied - 1, page.occupied - 1);
         }
-        self.mark_dirty(number);
+        self.mark_dirty(number, in_node);
         true
     }
 
@@ -203,10 +213,15 @@ impl Tree {
         page.inflating = page.inflating + begin - end;
     }
 
-    /// Marks a node as changed for readers.
+    /// Marks the block at a place of a node as changed for readers.
     #[inline]
-    pub(super) fn mark_dirty(&mut self, node: u32) {
-        let Node { page, place, .. } = *self.nodes.get(node);
+    pub(super) fn mark_dirty(&mut self, node: u32, in_node: u8) {
+        let Node { page, place, dirty, .. } = self.nodes.get_mut(node);
+        let (page, place, was_dirty) = (*page, *place, *dirty != 0);
+        *dirty |= 1 << in_node;
+        if was_dirty {
+            return;
+        }
         let Page { index, dirty, .. } = self.pages.get_mut(page);
         if *dirty == 0 {
             self.dirty.push(*index);
@@ -223,8 +238,12 @@ impl Tree {
     /// Marks these pages as published; keeps the memory for the next call of [`Tree::take_dirty`].
     pub(super) fn shown(&mut self, mut dirty: Vec<VoxelIndex>) {
         for index in dirty.drain(..) {
-            if let Some(page) = self.page_at(index) {
-                self.pages.get_mut(page).dirty = 0;
+            let Some(page) = self.page_at(index) else { continue };
+            let Page { nodes, dirty, .. } = self.pages.get_mut(page);
+            for place in ones(std::mem::take(dirty)) {
+                if let Some(node) = nodes.get(&self.lists, place) {
+                    self.nodes.get_mut(node).dirty = 0;
+                }
             }
         }
         self.dirty = dirty;
@@ -232,7 +251,8 @@ impl Tree {
 
     /// Removes a block if it is empty, and its node and page if they are.
     ///
-    /// Publish the tree before anything new is made: a new node does not know what readers saw in its place.
+    /// Publish the tree before anything new is made: new nodes and blocks do not know what readers saw in their
+    /// places.
     pub(super) fn drop_if_empty(&mut self, block: u32) {
         let Block { node, place, voxels, tally, .. } = self.blocks.get(block).clone();
         if voxels.mask != 0 || !tally.is_empty() {
@@ -292,6 +312,6 @@ mod tests {
 
     #[test]
     fn a_block_is_half_a_cache_line() {
-        assert_eq!((size_of::<Block>(), size_of::<Node>()), (32, 32));
+        assert_eq!((size_of::<Block>(), size_of::<Node>()), (32, 40));
     }
 }

@@ -1,5 +1,5 @@
 use super::place::{cell_at, ones, place_of};
-use super::tree::{Page, Tree};
+use super::tree::{Node, Page, Tree};
 use crate::space::{Grid, Point, VoxelIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -148,12 +148,12 @@ impl PageBuilder {
         let mut mask = 0;
         for (place, &node) in ones(page.nodes.mask).zip(page.nodes.ids(&tree.lists)) {
             let first = self.blocks.len();
+            let before = before.and_then(|page| page.node(place)).unwrap_or_default();
             let of_node = if page.dirty >> place & 1 != 0 {
-                self.add_blocks_of(tree, node)
+                self.add_blocks_of(tree, node, before)
             } else {
-                let node = before.and_then(|page| page.node(place)).unwrap_or_default();
-                self.blocks.extend_from_slice(node.blocks);
-                node.mask
+                self.blocks.extend_from_slice(before.blocks);
+                before.mask
             };
             if of_node != 0 {
                 mask |= 1 << place;
@@ -164,11 +164,23 @@ impl PageBuilder {
         (mask != 0).then_some(PageView { mask, nodes, blocks })
     }
 
-    /// Adds the visible blocks of a node; returns their mask.
-    fn add_blocks_of(&mut self, tree: &Tree, node: u32) -> u64 {
-        let mut mask = 0;
-        let blocks = tree.nodes.get(node).blocks;
-        for (place, &id) in ones(blocks.mask).zip(blocks.ids(&tree.lists)) {
+    /// Adds the visible blocks of a node; `before` is its last view. Returns their mask.
+    fn add_blocks_of(&mut self, tree: &Tree, node: u32, before: NodeView) -> u64 {
+        let Node { blocks, dirty, .. } = tree.nodes.get(node);
+        // Most are not in a cache. Reading all before any decision lets the processor wait for them at once.
+        let changed = ones(blocks.mask & dirty).filter_map(|place| blocks.get(&tree.lists, place));
+        std::hint::black_box(changed.fold(0, |any, id| any | tree.blocks.get(id).occupied));
+        // Blocks that did not change are copied from the view, where they lie together.
+        let mut unchanged = ones(before.mask).zip(before.blocks).filter(|(place, _)| dirty >> place & 1 == 0);
+        let mut mask = before.mask & !dirty;
+        let mut next = unchanged.next();
+        for place in ones(mask | (blocks.mask & dirty)) {
+            if let Some((_, block)) = next.filter(|(at, _)| *at == place) {
+                self.blocks.push(*block);
+                next = unchanged.next();
+                continue;
+            }
+            let Some(id) = blocks.get(&tree.lists, place) else { continue };
             let block = tree.blocks.get(id);
             let (occupied, inflated) = (block.occupied, tree.counts.inflated(block.tally));
             if occupied | inflated != 0 {

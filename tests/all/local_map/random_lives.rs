@@ -153,6 +153,19 @@ fn while_the_radius_changes_every_voxel_has_the_old_one_or_the_new_one() {
 }
 
 #[test]
+fn what_comes_back_inflates_as_it_did_at_first() {
+    let parameters = at_once(LocalParameters::passive_perception().with_max_voxels(Some(1)));
+    let mut map = LocalMap::new(0.1, parameters).unwrap();
+    let mut naive = ReferenceLocal::new(0.1, parameters);
+    // The first inflates across a border of nodes; what the second leaves of it is removed.
+    for (update, point) in [[1.65, 0.85, 0.85], [30.05, 0.85, 0.85]].into_iter().cycle().take(6).enumerate() {
+        map.insert_relayed([0.0; 3], &[point]).unwrap();
+        naive.update([0.0; 3], &[point], false);
+        assert_equal(&map, &naive, &format!("after update {update}"));
+    }
+}
+
+#[test]
 fn real_scans_give_the_naive_map() {
     let recorded = ["fastlio_hku_1", "mulran_riverside02_a", "balm_os0_hall"].map(shared_data);
     for folder in recorded.into_iter().flatten().chain([fixtures("scans_1")]) {
