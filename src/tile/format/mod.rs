@@ -17,6 +17,7 @@ mod compact_file;
 mod entries;
 mod entry;
 mod reader;
+mod renewed;
 mod trailer;
 mod writer;
 
@@ -24,6 +25,7 @@ pub use compact::{CompactEffort, CompactReader, CompactWriter, read_compact, wri
 pub use compact_file::{read_compact_file, read_compact_front, write_compact_file};
 pub use entries::encode_entries;
 pub use reader::{DecodedTable, read_table, read_trailer};
+pub use renewed::{renew_compact_file, renew_table};
 pub use trailer::{TRAILER_BYTES, Trailer};
 pub use writer::{TableChecksums, write_table};
 
