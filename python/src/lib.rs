@@ -45,15 +45,15 @@ mod _voxtile {
     use super::map::Map;
     #[pymodule_export]
     use super::operations::{
-        adopt, clear, convert, crop, decay, delete_snapshot, describe, diff, import_octree, merge, repair,
-        revert, snapshots, verify,
+        adopt, clear, convert, crop, decay, delete_snapshot, describe, diff, import_octree, join, make_piece,
+        merge, repair, revert, snapshots, verify,
     };
     #[pymodule_export]
     use super::remapping::{remap, remap_as, remove_points, remove_scans};
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]
-    use super::scan_iterator::{ScanIterator, open_scans};
+    use super::scan_iterator::{ScanIterator, count_scans, open_scans};
     #[pymodule_export]
     use super::tile_iterator::TileIterator;
     #[pymodule_export]

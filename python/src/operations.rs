@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, Decay, Part, Prefer};
-use voxtile::{Error, Result, SnapshotName, Stop, TileIndex, integrity, octree};
+use voxtile::{Error, MapPath, Result, SnapshotName, Stop, TileIndex, integrity, octree};
 
 /// Tiles of each map that is read.
 const CACHE_TILES: usize = 32;
@@ -134,6 +134,40 @@ pub fn merge<'py>(
     told(py, progress, |_, progress| {
         let maps = maps.iter().map(MapOrSnapshot::open).collect::<Result<Vec<_>>>()?;
         operations::merge(&maps, &output, prefer, |done, all| progress.tell(done, all))
+    })
+}
+
+/// Makes a copy of a map with another id, 32 hexadecimal digits: a piece of a map that `join` makes. Every byte of its
+/// tiles is compared with the log.
+#[pyfunction]
+#[pyo3(signature = (map, output, map_id, *, progress=None))]
+pub fn make_piece<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    output: PathBuf,
+    map_id: &str,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let digits = u128::from_str_radix(map_id, 16).ok().filter(|_| map_id.len() == 32);
+    let id = digits.ok_or_else(|| wrong(py, "map_id", format!("{map_id:?} is not 32 hexadecimal digits")))?;
+    told(py, progress, |_, progress| {
+        let map = MapReader::open(&map, 1)?;
+        operations::make_piece(&map, &output, id.to_be_bytes(), |done, all| progress.tell(done, all))
+    })
+}
+
+/// Makes one map of pieces with the same id that have no tile in common, without reading their tiles.
+#[pyfunction]
+#[pyo3(signature = (pieces, output, *, progress=None))]
+pub fn join<'py>(
+    py: Python<'py>,
+    pieces: Vec<PathBuf>,
+    output: PathBuf,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    told(py, progress, |_, progress| {
+        let pieces: Vec<MapPath> = pieces.into_iter().map(MapPath::from).collect();
+        operations::join(&pieces, &output, |done, all| progress.tell(done, all))
     })
 }
 

@@ -138,6 +138,19 @@ pub fn open_scans(py: Python<'_>, path: PathBuf, arguments: Vec<OsString>) -> Py
     })
 }
 
+/// The number of scans of a path; where only reading tells it, they are read.
+#[pyfunction]
+pub fn count_scans(py: Python<'_>, path: PathBuf, arguments: Vec<OsString>) -> PyResult<usize> {
+    let counted = left_to_itself(py, &Stop::default(), move || -> Result<usize, CallError> {
+        let mut scans = calls::open_scans(&path, arguments)?;
+        match scans.len_hint() {
+            Some(count) => Ok(count),
+            None => Ok(scans.skip(usize::MAX)?),
+        }
+    })?;
+    counted.map_err(|error| exception_of_call(py, &error))
+}
+
 fn is_map(path: &Path) -> bool {
     path.join("metadata.json").is_file() && path.join("commits.log").is_file()
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import threading
@@ -63,6 +64,9 @@ def test_any_regions_make_the_map_of_one_build(
     assert voxtile.digest(tmp_path / "map") == whole
     assert report["scans"] == 12 and (report["regions"] > 4) == (region_size < 100)
     assert not (tmp_path / "map.parts").exists()
+    assert voxtile.verify(tmp_path / "map")["findings"] == []
+    files = [file for file in (tmp_path / "map").rglob("*") if file.is_file()]
+    assert len(files) > 20 and all(file.stat().st_nlink == 1 for file in files)
 
 
 def test_workers_that_are_killed_change_nothing(drive: Path, whole: str, tmp_path: Path) -> None:
@@ -237,12 +241,51 @@ def test_a_second_run_goes_on(
         raise errors.DiskError("the disk is full")
 
     with monkeypatch.context() as broken:
-        broken.setattr("voxtile.dask.building.merge", fail)
+        broken.setattr("voxtile.dask.building.join", fail)
         with pytest.raises(errors.DiskError, match="full"):
             voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
     report = voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
     assert report["regions_done_before"] == report["regions"] > 1 and not report["slowest"]
     assert voxtile.digest(tmp_path / "map") == whole
+
+
+def test_a_part_that_was_damaged_since_is_named_and_no_map_is_made(
+    client: object, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise errors.DiskError("the disk is full")
+
+    def build() -> dict[str, object]:
+        return voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+
+    with monkeypatch.context() as broken:
+        broken.setattr("voxtile.dask.building.join", fail)
+        with pytest.raises(errors.DiskError, match="full"):
+            build()
+    tile = next((tmp_path / "map.parts").glob("*-*-*/tile_*/iwlo_meta.bin"))
+    content = bytearray(tile.read_bytes())
+    content[20] ^= 1
+    tile.write_bytes(content)
+    with pytest.raises(errors.VoxtileError, match=f"{tile}.*remove {tile.parent.parent}"):
+        build()
+    assert not (tmp_path / "map").exists()
+    shutil.rmtree(tile.parent.parent)
+    report = build()
+    assert report["regions_done_before"] == report["regions"] - 1
+    assert voxtile.digest(tmp_path / "map") == whole
+
+
+def test_a_stream_of_scans_in_a_file_makes_the_same_map(client: object, tmp_path: Path) -> None:
+    stream = bytearray(b"VXSCANS\n" + struct.pack("<III", 1, 0, 0))
+    for number, (points, pose) in enumerate(scans_of(11, count=12)):
+        position = [0.7 * number - 3.1, *pose[1:3]]
+        stream += struct.pack("<I7d", len(points), *position, 0.0, 0.0, 0.0, 1.0)
+        stream += np.ascontiguousarray(points[:, :3], dtype="<f4").tobytes()
+    (tmp_path / "drive.scans").write_bytes(stream)
+    voxtile.build(tmp_path / "drive.scans", tmp_path / "whole", **OPTIONS)
+    report = voxtile_dask.build(tmp_path / "drive.scans", tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    assert report["scans"] == 12 and report["regions"] > 1
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
 
 
 def test_a_second_run_takes_no_parts_of_other_points(
@@ -254,7 +297,7 @@ def test_a_second_run_takes_no_parts_of_other_points(
     cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None)
     with cluster, distributed.Client(cluster) as client:
         with monkeypatch.context() as broken:
-            broken.setattr("voxtile.dask.building.merge", fail)
+            broken.setattr("voxtile.dask.building.join", fail)
             with pytest.raises(errors.DiskError, match="full"):
                 voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
         # The first point changes sides along z: the box around the scan is the same.

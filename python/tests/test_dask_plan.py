@@ -34,7 +34,7 @@ def test_more_workers_take_no_longer_and_no_less_than_their_share() -> None:
 
 
 def test_smaller_regions_read_more_and_map_the_same() -> None:
-    free = plan.Costs(task_s=0.0, read_scan_s=0.0)
+    free = plan.Costs(task_s=0.0, read_scan_s=0.0, piece_tile_s=0.0)
     told = [_told(region_size=size, costs=free) for size in (200.0, 400.0, 800.0)]
     assert [row["overlap"] for row in told] == sorted((row["overlap"] for row in told), reverse=True)
     assert all(row["overlap"] >= 1 for row in told)

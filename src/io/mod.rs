@@ -35,6 +35,7 @@ mod selected_scans;
 mod sensor_scan;
 mod source;
 mod stored_scan;
+mod stream_input;
 mod voxel_writer;
 
 #[cfg(feature = "clouds")]

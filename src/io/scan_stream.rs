@@ -2,6 +2,7 @@ use super::fingerprint::Fingerprint;
 use super::point_store::PointStore;
 use super::scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
 use super::source::{ScanHead, ScanSource};
+use super::stream_input::{AnyInput, FileInput, StreamInput};
 use crate::error::{Error, FormatError, Result};
 use crate::scan::Pose;
 use std::io::{ErrorKind, Read};
@@ -17,6 +18,19 @@ use std::path::{Path, PathBuf};
 ///
 /// A stream that fails or has another header; errors in a scan are returned with that scan.
 pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result<impl ScanSource + use<R>> {
+    begin(AnyInput(input), path, is_file)
+}
+
+/// The same of a file: scans that are skipped are not read.
+///
+/// # Errors
+///
+/// As for [`read_scan_stream`].
+pub(super) fn open_scan_stream(path: &Path) -> Result<impl ScanSource + use<>> {
+    begin(FileInput::open(path)?, path, true)
+}
+
+fn begin<R: StreamInput>(input: R, path: &Path, is_file: bool) -> Result<ScanStream<R>> {
     let mut stream = ScanStream {
         path: path.to_owned(),
         is_file,
@@ -26,6 +40,7 @@ pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result
         has_intensities: false,
         done: 0,
         is_past_error: false,
+        chunk: Vec::new(),
     };
     stream.read_header()?;
     Ok(stream)
@@ -41,12 +56,17 @@ struct ScanStream<R> {
     done: u64,
     /// Whether the input is behind the scan that caused an error.
     is_past_error: bool,
+    /// Points as they are in the stream.
+    chunk: Vec<u8>,
 }
+
+/// Points that are read at a time.
+const CHUNK_POINTS: usize = 4096;
 
 /// Most points reserved at once: the count in a damaged stream may be any number.
 const MOST_RESERVED: usize = 1 << 16;
 
-impl<R: Read> ScanStream<R> {
+impl<R: StreamInput> ScanStream<R> {
     fn read_header(&mut self) -> Result<()> {
         if self.bytes("the magic number")? != *MAGIC {
             return Err(self.wrong(0, "this is no scan stream of voxtile's"));
@@ -104,11 +124,54 @@ impl<R: Read> ScanStream<R> {
     }
 
     fn pose_numbers(&mut self) -> Result<[f64; 7]> {
-        let mut numbers = [0.0; 7];
-        for number in &mut numbers {
-            *number = f64::from_le_bytes(self.bytes("a pose")?);
+        let bytes: [u8; 56] = self.bytes("a pose")?;
+        Ok(std::array::from_fn(|k| f64::from_le_bytes(std::array::from_fn(|byte| bytes[8 * k + byte]))))
+    }
+
+    fn point_bytes(&self) -> usize {
+        if self.has_intensities { 16 } else { 12 }
+    }
+
+    /// Reads so many points as they are in the stream.
+    fn read_chunk(&mut self, points: usize) -> Result<()> {
+        let mut chunk = std::mem::take(&mut self.chunk);
+        chunk.resize(points * self.point_bytes(), 0);
+        let mut filled = 0;
+        while filled < chunk.len() {
+            match self.input.read(&mut chunk[filled..]) {
+                Ok(0) => return Err(self.ends_in_points(filled as u64)),
+                Ok(read) => filled += read,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(Error::io(&self.path, "read", error)),
+            }
         }
-        Ok(numbers)
+        self.offset += filled as u64;
+        self.chunk = chunk;
+        Ok(())
+    }
+
+    /// The stream ends so many bytes into points that begin here.
+    fn ends_in_points(&self, bytes: u64) -> Error {
+        let number = bytes - bytes % 4;
+        let what = if number % self.point_bytes() as u64 == 12 { "an intensity" } else { "a point" };
+        self.wrong(self.offset + number, format!("the stream ends in {what}"))
+    }
+
+    /// Passes over a scan; `false` at the end of the stream.
+    fn pass_scan(&mut self) -> Result<bool> {
+        let Some(count) = self.next_count()? else { return Ok(false) };
+        let at = self.offset;
+        let numbers = self.pose_numbers()?;
+        let bytes = u64::from(count) * self.point_bytes() as u64;
+        let passed = self.input.pass(bytes).map_err(|error| Error::io(&self.path, "read", error))?;
+        if passed < bytes {
+            return Err(self.ends_in_points(passed));
+        }
+        self.offset += bytes;
+        self.done += 1;
+        let pose = self.pose(numbers, at);
+        self.is_past_error = pose.is_err();
+        pose.map(|_| true)
     }
 
     /// The pose from the numbers that start at an offset.
@@ -125,7 +188,7 @@ impl<R: Read> ScanStream<R> {
     }
 }
 
-impl<R: Read> ScanSource for ScanStream<R> {
+impl<R: StreamInput> ScanSource for ScanStream<R> {
     fn len_hint(&self) -> Option<usize> {
         None
     }
@@ -142,16 +205,17 @@ impl<R: Read> ScanSource for ScanStream<R> {
         let count = count as usize;
         points.begin(self.has_intensities);
         points.reserve(count.min(MOST_RESERVED));
-        for _ in 0..count {
-            let mut point = [0.0; 3];
-            for coordinate in &mut point {
-                *coordinate = f64::from(f32::from_le_bytes(self.bytes("a point")?));
+        let mut left = count;
+        while left > 0 {
+            let here = left.min(CHUNK_POINTS);
+            self.read_chunk(here)?;
+            let (numbers, _) = self.chunk.as_chunks::<4>();
+            let number = |bytes: [u8; 4]| f32::from_le_bytes(bytes);
+            for point in numbers.chunks_exact(self.point_bytes() / 4) {
+                let intensity = point.get(3).map_or(0.0, |&bytes| number(bytes));
+                points.push(std::array::from_fn(|k| f64::from(number(point[k]))), intensity)?;
             }
-            let intensity = match self.has_intensities {
-                true => f32::from_le_bytes(self.bytes("an intensity")?),
-                false => 0.0,
-            };
-            points.push(point, intensity)?;
+            left -= here;
         }
         let name = self.done.to_string();
         self.done += 1;
@@ -159,6 +223,15 @@ impl<R: Read> ScanSource for ScanStream<R> {
         self.is_past_error = pose.is_err();
         let world_from_sensor = pose?;
         Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        for skipped in 0..scans {
+            if !self.pass_scan()? {
+                return Ok(skipped);
+            }
+        }
+        Ok(scans)
     }
 
     fn pass_unread(&mut self) -> bool {

@@ -3,7 +3,7 @@ use super::point_store::{PointRoom, PointStore};
 use super::pose_source::PoseSource;
 use super::scan_graph::read_scan_graph;
 use super::scan_log::read_scan_log;
-use super::scan_stream::read_scan_stream;
+use super::scan_stream::open_scan_stream;
 use super::sensor_scan::SensorScan;
 use super::stored_scan::StoredScan;
 use crate::error::{Error, Result};
@@ -161,7 +161,7 @@ pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSourc
         }
         "scans" => {
             needs_no_poses("scan stream")?;
-            Ok(Box::new(read_scan_stream(open()?, path, true)?))
+            Ok(Box::new(open_scan_stream(path)?))
         }
         _ => {
             let reason = "not a folder of .pcd files, nor a .pcd, .graph, .log or .scans file";

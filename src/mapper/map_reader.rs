@@ -198,6 +198,11 @@ impl MapReader {
         self.store.folder()
     }
 
+    /// Its files.
+    pub(crate) fn store(&self) -> &TileStore {
+        &self.store
+    }
+
     /// The map's id; `None` for a map of the original format.
     pub(crate) fn map_id(&self) -> Option<[u8; 16]> {
         self.store.map_id()

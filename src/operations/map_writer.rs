@@ -1,10 +1,9 @@
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
-use crate::mapper::MapReader;
-use crate::persistence::TileSaver;
-use crate::persistence::{config_from, new_map_id, new_metadata};
+use crate::mapper::{MapReader, MapView};
+use crate::persistence::{TileSaver, config_from, copy_tile, new_map_id, new_metadata};
 use crate::space::TileIndex;
-use crate::store::{Disk, MapPath, Metadata, StagedMap, id_from_hex};
+use crate::store::{Disk, MapPath, Metadata, StagedMap, TileVersion, id_from_hex};
 use crate::tile::Table;
 use serde::Serialize;
 use std::path::Path;
@@ -120,16 +119,56 @@ impl MapWriter {
     ///
     /// As for [`MapWriter::put`].
     pub fn put_as_of(&mut self, tile: TileIndex, table: &Table, scan_number: u64) -> Result<()> {
-        if let Some(last) = self.last.filter(|&last| last >= tile) {
-            return Err(Error::argument("tile", format!("{tile} does not come after {last}")));
-        }
+        self.check_order(tile)?;
         if table.is_empty() {
             return Ok(());
         }
         let store = self.map.store();
         let version = self.saver.write(&store.writer()?, tile, table, scan_number)?;
         store.note_next(tile, version);
-        self.last = Some(tile);
+        self.added(tile, version)
+    }
+
+    /// The same for a tile of another map of the same parameters and storage, which nobody writes to: its bytes are
+    /// compared with that map's log, and no voxel is looked at.
+    pub(super) fn copy_as_of(&mut self, tile: TileIndex, map: &MapReader, scan_number: u64) -> Result<()> {
+        self.check_order(tile)?;
+        let store = self.map.store();
+        let version = copy_tile(map.store(), &store.writer()?, tile, scan_number)?;
+        store.note_next(tile, version);
+        self.added(tile, version)
+    }
+
+    /// Adds the tiles of another map of the same id, parameters and storage by other names for its files
+    /// ([`TileStore::link_tile`](crate::store::TileStore::link_tile)). They may come before others that are there.
+    ///
+    /// # Errors
+    ///
+    /// A tile that is there already, a damaged one, a disk that refuses.
+    pub(super) fn link_all(&mut self, map: &MapReader, mut progress: impl FnMut()) -> Result<()> {
+        for tile in map.tile_indices() {
+            let store = self.map.store();
+            if store.contains(tile) {
+                let reason =
+                    format!("it has {tile}, and another piece has it, too; make pieces of other regions");
+                return Err(Error::argument(map.folder().display().to_string(), reason));
+            }
+            let version = store.link_tile(map.store(), tile)?;
+            self.added(self.last.map_or(tile, |last| last.max(tile)), version)?;
+            progress();
+        }
+        Ok(())
+    }
+
+    fn check_order(&self, tile: TileIndex) -> Result<()> {
+        match self.last.filter(|&last| last >= tile) {
+            Some(last) => Err(Error::argument("tile", format!("{tile} does not come after {last}"))),
+            None => Ok(()),
+        }
+    }
+
+    fn added(&mut self, last: TileIndex, version: TileVersion) -> Result<()> {
+        self.last = Some(last);
         self.written.tiles += 1;
         self.written.voxels += version.voxels;
         self.written.occupied += version.occupied;

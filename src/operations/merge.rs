@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView, TileRef};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::space::TileIndex;
-use crate::store::MapPath;
 use crate::tile::Table;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -79,10 +78,7 @@ pub fn merge(
         return Err(Error::argument("maps", reason));
     };
     let one_build = OneBuild::of(maps);
-    let mut writer = match one_build {
-        Some(build) => writer_of_build(first, output.as_ref(), &config, build)?,
-        None => MapWriter::create(MapPath::on(first.disk(), output.as_ref()), &config)?,
-    };
+    let mut writer = begin(first, output.as_ref(), config, one_build, new_map_id())?;
     let tiles: BTreeSet<TileIndex> = maps.iter().flat_map(MapView::tile_indices).collect();
     let mut merge = TableMerge::new(rule);
     for (done, &tile) in (0..).zip(&tiles) {
@@ -101,17 +97,20 @@ pub fn merge(
     })
 }
 
-/// Begins the map that one build of all parts would have made; `first` is one of them.
-fn writer_of_build(
+/// Begins the map of several, of which `first` is one: without scans, or as one build of all would have made it.
+pub(super) fn begin(
     first: &MapReader,
     output: &Path,
-    config: &MapConfig,
-    build: OneBuild,
+    mut config: MapConfig,
+    one_build: Option<OneBuild>,
+    map_id: [u8; 16],
 ) -> Result<MapWriter> {
-    let mut config = config.clone();
+    let Some(build) = one_build else {
+        return MapWriter::create_as(first.disk(), output, new_metadata(&config.validated()?, map_id, &[]));
+    };
     config.rays.region = build.region;
     let part = first.metadata().ext.as_ref();
-    let mut metadata = new_metadata(&config, new_map_id(), part.map_or(&[], |ext| &ext.inputs));
+    let mut metadata = new_metadata(&config, map_id, part.map_or(&[], |ext| &ext.inputs));
     if let (Some(ext), Some(part)) = (&mut metadata.ext, part) {
         (ext.scan_number, ext.decayed_scan) = (part.scan_number, part.decayed_scan);
     }
@@ -127,7 +126,7 @@ pub(super) fn have_no_common_tile(maps: &[MapReader]) -> bool {
 }
 
 /// What is in one place in one system is elsewhere in another. A map that names none goes with any.
-fn check_crs(map: &MapReader, first: &MapReader) -> Result<()> {
+pub(super) fn check_crs(map: &MapReader, first: &MapReader) -> Result<()> {
     match (&map.config().crs, &first.config().crs) {
         (Some(found), Some(wanted)) if found != wanted => {
             let found = format!("{found:.80}");

@@ -5,6 +5,7 @@
 //! merge   k readers, the tiles of one place at a time -> MapWriter
 //! crop    one reader -> MapWriter
 //! import  a file of OctoMap -> MapWriter
+//! make_piece, join   a map -> a piece of a map to come; pieces -> MapWriter, by other names for their files
 //! adopt   readers of parts -> MapEditor: tiles in the place of a map's own -> one commit
 //! clear, decay   MapEditor: tiles read, changed, written beside -> one commit
 //! a flush  -> snapshot -> snapshots/NAME, and the tables that it sees stay
@@ -22,12 +23,14 @@ mod crop;
 mod decay;
 mod diff;
 mod import;
+mod join;
 mod kept_bytes;
 mod map_editor;
 mod map_writer;
 mod merge;
 mod merge_rule;
 mod part;
+mod piece;
 mod regions;
 mod remapping;
 mod revert;
@@ -42,11 +45,13 @@ pub use crop::crop;
 pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
 pub use import::import;
+pub use join::join;
 pub use kept_bytes::{KeptBytes, kept_bytes};
 pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::Part;
+pub use piece::make_piece;
 pub use remapping::{
     MappedAgain, MappedAnew, NewPoses, PointsRemoved, Remap, RemapBeside, Remapped, Rework, ScanSelection,
     ScansRemoved, map_anew, remap, remove_points, remove_scans,

@@ -14,19 +14,44 @@ impl OneBuild {
     /// The build that these maps are parts of, if they are: the same scans of the same inputs in the same way, in boxes
     /// of tiles that have none in common and are together a box.
     pub(super) fn of(maps: &[MapReader]) -> Option<Self> {
-        let [first, others @ ..] = maps else { return None };
-        let scans = first.metadata().ext.as_ref()?;
-        if scans.inputs.is_empty() || scans.inputs.iter().any(|input| input.content.is_none()) {
-            return None;
+        let mut regions = Regions::of(maps.first()?);
+        maps.iter().for_each(|map| regions.add(map));
+        regions.one_build()
+    }
+}
+
+/// The regions of maps that are looked at one after the other, for [`OneBuild`].
+#[derive(Debug)]
+pub(super) struct Regions {
+    /// What the first map says of its scans. `None` once a map has no part in their build.
+    scans: Option<Extension>,
+    grid: Grid,
+    regions: Vec<TileBox>,
+}
+
+impl Regions {
+    /// None yet; those of parts of the build that `first` is a part of can be added, `first` too.
+    pub(super) fn of(first: &MapReader) -> Self {
+        let scans = first.metadata().ext.clone();
+        let is_known = |scans: &Extension| {
+            !scans.inputs.is_empty() && scans.inputs.iter().all(|input| input.content.is_some())
+        };
+        Self { scans: scans.filter(is_known), grid: first.config().grid, regions: Vec::new() }
+    }
+
+    pub(super) fn add(&mut self, map: &MapReader) {
+        let ext = map.metadata().ext.as_ref();
+        let has_these = |scans: &Extension| ext.is_some_and(|ext| are_same_scans(ext, scans));
+        match own_region(map).filter(|_| self.scans.as_ref().is_some_and(has_these)) {
+            Some(region) => self.regions.push(region),
+            None => self.scans = None,
         }
-        let regions = maps.iter().map(own_region).collect::<Option<Vec<TileBox>>>()?;
-        let has_these_scans =
-            |map: &MapReader| map.metadata().ext.as_ref().is_some_and(|ext| are_same_scans(ext, scans));
-        if !others.iter().all(has_these_scans) {
-            return None;
-        }
-        let region = united(&regions)?;
-        Some(Self { region: (!is_all_of_space(region, &first.config().grid)).then_some(region) })
+    }
+
+    pub(super) fn one_build(self) -> Option<OneBuild> {
+        self.scans?;
+        let region = united(&self.regions)?;
+        Some(OneBuild { region: (!is_all_of_space(region, &self.grid)).then_some(region) })
     }
 }
 

@@ -3,6 +3,7 @@
 //! ```text
 //! load          store -> table, checked against the log -> Tile
 //! tile_saver    Tile or CompactTile -> table and octree files -> store
+//! copy_tile     a tile of one map -> another map's store, its bytes but for the map's id
 //! compact_tile  a tile in the compact form, in memory; packer makes it
 //! io_threads    one saving and one loading thread, each a `Worker`
 //! priority      threads that give way to the mapper's
@@ -11,6 +12,7 @@
 //! ```
 
 mod compact_tile;
+mod copy_tile;
 mod io_threads;
 pub(crate) mod load;
 mod map_id;
@@ -22,6 +24,7 @@ mod upgrade;
 mod worker;
 
 pub(crate) use compact_tile::CompactTile;
+pub(crate) use copy_tile::copy_tile;
 pub(crate) use io_threads::{IoThreads, Loaded, Saved};
 pub(crate) use map_id::new_map_id;
 pub(crate) use packer::Packer;

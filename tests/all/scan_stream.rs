@@ -91,6 +91,61 @@ fn a_stream_that_ends_or_is_wrong_anywhere_is_an_error_with_its_place() {
     assert!(read(&wrong).is_err());
 }
 
+/// Whatever is skipped and wherever a file ends or is wrong: the answers are those of reading every scan.
+#[test]
+fn skipped_scans_are_looked_at_as_if_they_were_read() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("drive.scans");
+    for has_intensities in [true, false] {
+        let bytes = written("label", has_intensities, &[3, 0, 2, 5, 1].map(sensor_scan));
+        let nan = f64::NAN.to_le_bytes();
+        let pose_of_second = written("label", has_intensities, &[sensor_scan(3)]).len() + 4;
+        let mut wrong = bytes.clone();
+        wrong[pose_of_second..pose_of_second + 8].copy_from_slice(&nan);
+        let cut = (30..bytes.len()).map(|end| bytes[..end].to_vec());
+        for bytes in cut.chain([bytes.clone(), wrong]) {
+            std::fs::write(&path, &bytes).unwrap();
+            for skipped in 0..7 {
+                let stream = || read_scan_stream(&*bytes, &path, true).unwrap();
+                let naive = skip_and_read(&mut stream(), skipped, |source| {
+                    Ok(usize::from(source.next_scan()?.is_some()))
+                });
+                let piped = skip_and_read(&mut stream(), skipped, |source| source.skip(1));
+                let mut of_file = open_scans(&path, None).unwrap();
+                let of_file = skip_and_read(&mut *of_file, skipped, |source| source.skip(1));
+                assert_eq!(naive, piped, "{} bytes, {skipped} skipped", bytes.len());
+                assert_eq!(naive, of_file, "{} bytes, {skipped} skipped", bytes.len());
+            }
+        }
+    }
+}
+
+/// What is read behind so many skipped scans, and the error that ends it. Scans that cannot be read are passed over.
+fn skip_and_read(
+    source: &mut dyn ScanSource,
+    scans: usize,
+    skip: impl Fn(&mut dyn ScanSource) -> voxtile::Result<usize>,
+) -> (Vec<String>, Vec<String>) {
+    let (mut found, mut errors) = (Vec::new(), Vec::new());
+    for number in 0.. {
+        let next = match number < scans {
+            true => skip(source).map(|skipped| (skipped > 0).then(|| "skipped".to_owned())),
+            false => source.next_scan().map(|scan| scan.map(|scan| format!("{scan:?}"))),
+        };
+        match next {
+            Ok(Some(scan)) => found.push(scan),
+            Ok(None) => break,
+            Err(error) => {
+                errors.push(format!("{error:#}"));
+                if !source.pass_unread() {
+                    break;
+                }
+            }
+        }
+    }
+    (found, errors)
+}
+
 #[test]
 fn a_scan_without_intensities_or_a_label_too_long_is_refused() {
     let mut writer = ScanStreamWriter::new(Vec::new(), "", true).unwrap();

@@ -19,12 +19,15 @@ __all__ = [
     "call_export",
     "clear",
     "convert",
+    "count_scans",
     "crop",
     "decay",
     "delete_snapshot",
     "describe",
     "diff",
     "import_octree",
+    "join",
+    "make_piece",
     "merge",
     "open_scans",
     "remap",
@@ -213,6 +216,7 @@ class ScanIterator:
     def __next__(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32] | None]: ...
     def __length_hint__(self) -> int: ...
 
+def count_scans(path: _Path, arguments: Sequence[str]) -> int: ...
 def open_scans(path: _Path, arguments: Sequence[str]) -> ScanIterator: ...
 def call_build(arguments: Sequence[str], progress: _Progress | None = None) -> dict[str, Any]: ...
 def call_export(arguments: Sequence[str], progress: _Progress | None = None) -> dict[str, Any]: ...
@@ -274,6 +278,10 @@ def merge(
     prefer: Literal["first", "last", "more-observed"] | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def make_piece(
+    map: _Path, output: _Path, map_id: str, *, progress: _Progress | None = None
+) -> dict[str, Any]: ...
+def join(pieces: Sequence[_Path], output: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
 def adopt(
     map: _Path, parts: Sequence[_Path], *, of_flush: int, scans: int, progress: _Progress | None = None
 ) -> dict[str, Any]: ...

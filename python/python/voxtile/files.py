@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from ._voxtile import ScanIterator, call_build, call_export, open_scans
+from ._voxtile import count_scans as _count_scans
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -98,6 +99,11 @@ def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
     (``float32``, or ``None``). ``ReadOptions`` lists the keywords.
     """
     return open_scans(_path(path), _arguments(options))
+
+
+def count_scans(path: _Path, **options: Unpack[ReadOptions]) -> int:
+    """The number of scans of a file or folder. Where the format does not tell it, they are read, but in ``.scans``."""
+    return _count_scans(_path(path), _arguments(options))
 
 
 def build(

@@ -1,9 +1,14 @@
-//! Tiles of another map of the same id as next versions of those here.
+//! Tiles of another map as next versions of those here, without a look at what is in them.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
+use crate::store::disk::EntryKind;
+use crate::store::layout::TileFile;
 use crate::store::tile_store::TileStore;
-use crate::store::tiles::tile_writer::make_folder;
+use crate::store::tiles::file_checksum::{Checksumming, FileChecksum};
+use crate::store::tiles::tile_version::TileVersion;
+use crate::store::tiles::tile_writer::{TileWriter, make_folder};
+use std::io;
 
 impl TileStore {
     /// Moves all tiles of `other`, a map of the same id, storage and file system that has committed them and loses them
@@ -33,5 +38,72 @@ impl TileStore {
         }
         self.note_next(tile, version);
         Ok(())
+    }
+
+    /// Gives the files of a tile of `other`, a map of the same id and storage that nobody writes to, a second name
+    /// here, where the next commit finds them; where the file system has no such names, they are copied. Of files that
+    /// are not copied the length alone is compared with the log of `other`.
+    ///
+    /// `other` stays whole. It may be removed once the map is committed, and not be written to before.
+    ///
+    /// # Errors
+    ///
+    /// A file that is missing or of another length, a disk that refuses.
+    pub fn link_tile(&mut self, other: &Self, tile: TileIndex) -> Result<TileVersion> {
+        let version = other.version_to_copy(tile)?;
+        let writer = self.writer()?;
+        make_folder(&**self.disk(), &self.layout().tile_folder(tile))?;
+        for &file in self.layout().files() {
+            let (from, to) = (other.layout().current(tile, file), self.layout().next(tile, file));
+            let damaged = |reason: String| Err(FormatError::at_offset(0, reason).in_map(&from, Some(tile)));
+            let wanted = version.of(file).bytes;
+            match other.disk().kind_at(&from)? {
+                Some(EntryKind::File(bytes)) if bytes == wanted => {}
+                Some(EntryKind::File(bytes)) => {
+                    return damaged(format!("{bytes} bytes where commits.log names {wanted}"));
+                }
+                Some(_) => return damaged("not a regular file; links inside a map are not followed".into()),
+                None => return damaged("the file is missing, and the map holds this tile".into()),
+            }
+            if self.disk().link(&from, &to).is_err() {
+                other.copy_file(&writer, tile, file)?;
+            }
+        }
+        self.note_next(tile, version);
+        Ok(version)
+    }
+
+    /// Writes a copy of one of a tile's files as the next version elsewhere.
+    ///
+    /// # Errors
+    ///
+    /// A file that is not what the log says, a disk that refuses.
+    pub fn copy_file(&self, writer: &TileWriter, tile: TileIndex, file: TileFile) -> Result<FileChecksum> {
+        let wanted = self.version_to_copy(tile)?.of(file);
+        let path = self.layout().current(tile, file);
+        let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
+        let input = match self.disk().open(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return damaged("the file is missing, and the map holds this tile");
+            }
+            input => input.map_err(|error| Error::io(&path, "open", error))?,
+        };
+        let mut input = Checksumming::new(input);
+        let written = match writer.write_next(tile, file, |out| io::copy(&mut input, out).map(drop)) {
+            Err(Error::Io { cause, .. }) if input.has_failed() => Err(Error::io(&path, "read", cause)),
+            written => written,
+        }?;
+        if written == wanted {
+            Ok(written)
+        } else {
+            damaged("the file is not the one that commits.log names")
+        }
+    }
+
+    fn version_to_copy(&self, tile: TileIndex) -> Result<TileVersion> {
+        self.version(tile).ok_or_else(|| {
+            let reason = format!("{} has no checksums of {tile}", self.folder().display());
+            Error::argument("tile", reason)
+        })
     }
 }

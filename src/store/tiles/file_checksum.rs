@@ -14,17 +14,23 @@ pub struct Checksumming<S> {
     stream: S,
     bytes: u64,
     crc: crc32fast::Hasher,
+    has_failed: bool,
 }
 
 impl<S> Checksumming<S> {
     /// Starts at the current position of the stream.
     pub fn new(stream: S) -> Self {
-        Self { stream, bytes: 0, crc: crc32fast::Hasher::new() }
+        Self { stream, bytes: 0, crc: crc32fast::Hasher::new(), has_failed: false }
     }
 
     /// The checksum of all that passed, and the stream.
     pub fn finish(self) -> (FileChecksum, S) {
         (FileChecksum { bytes: self.bytes, crc: self.crc.finalize() }, self.stream)
+    }
+
+    /// Whether a read has failed: who copies from one stream to another cannot tell otherwise whose error it got.
+    pub fn has_failed(&self) -> bool {
+        self.has_failed
     }
 
     fn pass(&mut self, chunk: &[u8]) {
@@ -47,7 +53,7 @@ impl<W: Write> Write for Checksumming<W> {
 
 impl<R: Read> Read for Checksumming<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.stream.read(buffer)?;
+        let read = self.stream.read(buffer).inspect_err(|_| self.has_failed = true)?;
         self.pass(&buffer[..read]);
         Ok(read)
     }

@@ -18,6 +18,7 @@ mod entries;
 mod entry;
 mod gather;
 mod reader;
+mod renewed;
 mod trailer;
 mod writer;
 
@@ -26,6 +27,7 @@ pub use compact_file::{read_compact_file, read_compact_front, read_compact_voxel
 pub use entries::encode_entries;
 pub use gather::SiftedVoxels;
 pub use reader::{Decoded, DecodedTable, read_table, read_trailer, read_voxels_from};
+pub use renewed::{renew_compact_file, renew_table};
 pub use trailer::{TRAILER_BYTES, Trailer};
 pub use writer::{TableChecksums, write_table};
 

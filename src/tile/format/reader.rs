@@ -117,7 +117,7 @@ pub fn read_trailer(input: &mut impl Read, file_bytes: u64) -> Result<Option<Tra
 }
 
 /// The count of entries, checked against the length of the file, and the number of bytes that follow them.
-fn read_header(
+pub(super) fn read_header(
     input: &mut impl Read,
     file_bytes: u64,
     crc: &mut crc32fast::Hasher,

@@ -41,6 +41,30 @@ fn crop(disk: &FaultyDisk) -> Result<()> {
     operations::crop(&open(disk, &path("a"))?, &Part::Inside(region()), path("out"), |_, _| {}).map(drop)
 }
 
+const ID: [u8; 16] = [7; 16];
+
+fn make_piece(disk: &FaultyDisk) -> Result<()> {
+    operations::make_piece(&open(disk, &path("a"))?, path("out"), ID, |_, _| {}).map(drop)
+}
+
+/// A disk with two pieces of `a`.
+fn two_pieces(storage: Storage) -> FaultyDisk {
+    let disk = two_maps(storage);
+    // Between tiles.
+    let west = Aabb { min: [-100.0; 3], max: [3.2, 100.0, 100.0] };
+    for (name, part) in [("inside", Part::Inside(west)), ("outside", Part::Outside(west))] {
+        operations::crop(&open(&disk, &path("a")).unwrap(), &part, path("crop"), |_, _| {}).unwrap();
+        operations::make_piece(&open(&disk, &path("crop")).unwrap(), path(name), ID, |_, _| {}).unwrap();
+        disk.take(&path("crop"));
+    }
+    disk.copy()
+}
+
+fn join(disk: &FaultyDisk) -> Result<()> {
+    let pieces = ["inside", "outside"].map(|name| MapPath::on(disk.shared(), path(name)));
+    operations::join(&pieces, path("out"), |_, _| {}).map(drop)
+}
+
 /// Puts the tiles of one map into the other, unless that is done.
 fn adopt(disk: &FaultyDisk) -> Result<()> {
     const OF_FLUSH: u64 = 2;
@@ -140,6 +164,19 @@ fn check_from(start: &FaultyDisk, name: &str, work: Work) {
 fn a_merge_is_there_whole_or_not_at_all() {
     check(Storage::OctoMap, "out", merge);
     check(Storage::Compact, "out", merge);
+}
+
+#[test]
+fn a_piece_is_there_whole_or_not_at_all() {
+    check(Storage::OctoMap, "out", make_piece);
+    check(Storage::Compact, "out", make_piece);
+}
+
+#[test]
+fn pieces_are_one_map_or_as_they_were() {
+    check_from(&two_pieces(Storage::OctoMap), "out", join);
+    check_from(&two_pieces(Storage::Compact), "out", join);
+    check_from(&two_pieces(Storage::Compact).without_links(), "out", join);
 }
 
 #[test]

@@ -6,6 +6,8 @@ mod cut;
 mod decay;
 /// Every operation fails once and the power goes at every one: the map is as before, or as after.
 mod faults;
+/// Pieces joined against merged ones; what is damaged or does not fit is no map.
+mod join;
 /// New maps from tables: there is none, or the whole one.
 mod map_writer;
 /// Merge against a naive one on random maps.

@@ -1,7 +1,8 @@
 """A build in parts.
 
 Space is divided into columns. A task maps the scans that reach a column into that column's tiles only, so tasks have
-no order and share nothing, and a lost one is run again. Disjoint columns merge to the map of the whole.
+no order and share nothing, and a lost one is run again. Disjoint columns are pieces of the map of the whole, which gets
+their files.
 """
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .. import files
-from .._voxtile import adopt, crop, describe, merge
+from .._voxtile import adopt, crop, describe, join, verify
 from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
+from .pieces import hand_over
 from .regions import Box, Column, Range, columns_of, region_of, scans_in, tiles_of
 from .simulation import advised_region_size
 
@@ -125,18 +127,24 @@ def build(
         longest = sorted(open_parts.items(), key=lambda what: -scans_in(what[1][1]))
         of_map = None if base is None else str(output)
         how = ((size, tile_size), settings, of_map)
+        map_id = _id_of(parts) if base is None else base.map_id
+        checks = [
+            found.submit(_check_part, str(part), pure=False, retries=2) for part in wanted if part not in open_parts
+        ]
         futures = [
-            found.submit(_map_column, source, str(part), column, ranges, *how, pure=False, retries=2)
+            found.submit(_map_column, source, str(part), map_id, column, ranges, *how, pure=False, retries=2)
             for part, (column, ranges) in longest
         ]
         try:
+            for check in _dask.as_completed(checks):
+                _result(check)
             tasks: list[dict[str, Any]] = []
             for future in _dask.as_completed(futures):
                 tasks.append(_result(future))
                 if progress is not None:
                     progress(len(columns) - len(open_parts) + len(tasks), len(columns))
         finally:
-            found.cancel(futures)
+            found.cancel([*checks, *futures])
         mapped, merge_cpu = time.perf_counter(), time.process_time()
         read = sum(scans_in(ranges) for ranges in columns.values())
         told = {
@@ -150,7 +158,7 @@ def build(
         }
         names = [str(part) for part in sorted(wanted)]
         if base is None:
-            told["tiles"] = _put_together(names, str(output)).get("tiles")
+            told["tiles"] = join(names, str(output))["tiles"]
         else:
             _note(parts / _ADOPTING, {"drive": drive, "of_flush": base.flush_number, "told": told})
             told["adopted"] = adopt(str(output), names, of_flush=base.flush_number, scans=len(boxes))
@@ -200,7 +208,7 @@ def _mark(*what: object) -> str:
     return hashlib.sha256(identity.encode()).hexdigest()[:16]
 
 
-def _note(path: Path, what: dict[str, Any]) -> None:
+def _note(path: Path, what: object) -> None:
     beside = path.with_suffix(".new")
     with open(beside, "w", encoding="utf-8") as file:
         json.dump(what, file)
@@ -221,15 +229,28 @@ def _adopted_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | No
     return told
 
 
-def _put_together(parts: list[str], output: str) -> dict[str, Any]:
-    if len(parts) > 1:
-        return merge(parts, output)
-    # One part is the map. A copy gets its name when it is whole.
-    beside = output + ".unfinished"
-    shutil.rmtree(beside, ignore_errors=True)
-    shutil.copytree(parts[0], beside)
-    os.rename(beside, output)
-    return {}
+# The id that all parts have.
+_MAP_ID = "map_id.json"
+
+
+def _id_of(parts: Path) -> str:
+    """The id of the map to come: all its parts have it, those of an earlier call, too."""
+    note = parts / _MAP_ID
+    try:
+        noted: str = json.loads(note.read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        noted = uuid.uuid4().hex
+        _note(note, noted)
+    return noted
+
+
+def _check_part(part: str) -> dict[str, Any]:
+    """Reads a part of an earlier call: what happened to it since, nobody knows."""
+    done = verify(part)
+    for finding in done["findings"]:
+        if finding["severity"] == "damage":
+            raise VoxtileError(f"{finding['path']}: {finding['reason']}; remove {part}, and call again to go on")
+    return done
 
 
 def _result(future: Any) -> dict[str, Any]:
@@ -278,7 +299,7 @@ def _locked(parts: Path) -> Iterator[None]:
             yield
         finally:
             # What was made stays for the next run; a folder without anything does not.
-            if parts.exists() and os.listdir(parts) == ["lock"]:
+            if parts.exists() and set(os.listdir(parts)) <= {"lock", _MAP_ID}:
                 shutil.rmtree(parts)
 
 
@@ -286,7 +307,9 @@ def _plan(client: Any, source: str, options: dict[str, Any]) -> tuple[list[_Seen
     """What each scan is, and where it may leave something, ``None`` for nowhere; and the seconds of CPU for that."""
     reading = {name: value for name, value in options.items() if name in ReadOptions.__annotations__}
     reach = (options.get("max_range"), options.get("clear_no_return"))
-    scans = operator.length_hint(files.scans(source, **reading))
+    # Other formats that do not tell how many there are would be read as a whole for it: a single task does that, too.
+    is_stream = source.lower().endswith(".scans")
+    scans = files.count_scans(source, **reading) if is_stream else operator.length_hint(files.scans(source, **reading))
     workers = max(sum(client.nthreads().values()), 1)
     step = max(math.ceil(scans / (4 * workers)), 1)
     firsts = list(range(0, scans, step)) or [0]
@@ -338,13 +361,17 @@ def _box(points: Any, pose: Any, max_range: float | None, clear_no_return: float
 def _map_column(
     source: str,
     part: str,
+    map_id: str,
     column: Column,
     ranges: Sequence[Range],
     sizes: tuple[float, float],
     settings: dict[str, Any],
     of_map: str | None,
 ) -> dict[str, Any]:
-    """Maps a column on the worker's disk, and puts it beside the others. ``sizes`` are a column's and a tile's."""
+    """Maps a column on the worker's disk, and puts a piece of the map beside the others.
+
+    ``sizes`` are a column's and a tile's.
+    """
     began, cpu_began = time.perf_counter(), time.process_time()
     with tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory) as local:
         made = os.path.join(local, "map")
@@ -356,12 +383,12 @@ def _map_column(
                 # A later range begins as another input may have: these are other scans.
                 goes_on: dict[str, Any] = {"append": True, "again": True} if os.path.exists(made) else {}
                 files.build(source, made, region=region_of(column, sizes[0]), **options, **goes_on)
+            hand_over(made, part, map_id)
         except VoxtileError as error:
             # Of the classes of errors, callers look at the class and the message.
             worker = _dask.get_worker()
             error.args = (f"{error} (worker {worker.address}, whose disk is {worker.local_directory})",)
             raise
-        _hand_over(made, part)
     return {
         "column": list(column),
         "ranges": len(ranges),
@@ -369,21 +396,3 @@ def _map_column(
         "seconds": time.perf_counter() - began,
         "cpu_seconds": time.process_time() - cpu_began,
     }
-
-
-def _hand_over(made: str, part: str) -> None:
-    """Moves what a worker made to its place, whole; another attempt may have been first, and made the same."""
-    attempt = os.path.join(os.path.dirname(part), f"attempt-{uuid.uuid4().hex}")
-    try:
-        try:
-            # On the same disk nothing is copied.
-            os.rename(made, attempt)
-        except OSError:
-            shutil.copytree(made, attempt)
-        if not os.path.exists(part):
-            os.rename(attempt, part)
-    except OSError:
-        if not os.path.exists(part):
-            raise
-    finally:
-        shutil.rmtree(attempt, ignore_errors=True)

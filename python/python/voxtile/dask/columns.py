@@ -1,7 +1,7 @@
 """Whole maps made or checked column by column of their tiles.
 
 What a task makes it makes on its worker's disk, and puts it beside the others under a name of its own attempt; the
-process that was called merges the columns, which have no tile in common.
+process that was called joins the columns, which have no tile in common.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any, Literal
 from .. import _voxtile
 from .._voxtile import Map
 from ..errors import ArgumentError, VoxtileError
+from .pieces import hand_over
 from .regions import Column, tiles_of
 
 try:
@@ -158,15 +159,20 @@ def _make(
     except FileExistsError:
         raise ArgumentError(f"{parts}: another process makes this map, or was killed; wait, or remove it") from None
     try:
-        tasks = [(_make_part, (list(maps), str(parts), column, tiles_of(column, size, tile_size), work)) for column in columns]
+        map_id = uuid.uuid4().hex
+        places = {column: str(parts / f"{column[0]}_{column[1]}") for column in columns}
+        tasks = [
+            (_make_part, (list(maps), place, map_id, tiles_of(column, size, tile_size), work))
+            for column, place in places.items()
+        ]
         made = [part for part in _run(client, tasks, progress) if part is not None]
-        merged = _voxtile.merge(made, str(output))
+        merged = _voxtile.join(made, str(output))
     finally:
         shutil.rmtree(parts, ignore_errors=True)
     return {"output": str(output), "regions": len(columns), "tiles": merged.get("tiles")}
 
 
-def _make_part(maps: Sequence[str], parts: str, column: Column, box: Sequence[float], work: _Work) -> str | None:
+def _make_part(maps: Sequence[str], place: str, map_id: str, box: Sequence[float], work: _Work) -> str | None:
     operation, given = work
     with _local_folder() as local:
         crops = []
@@ -183,7 +189,8 @@ def _make_part(maps: Sequence[str], parts: str, column: Column, box: Sequence[fl
         elif operation == "decay":
             halflife_scans, scans, forget_below = given
             _voxtile.decay(made, halflife_scans, scans=scans, forget_below=forget_below)
-        return _put(made, Path(parts) / f"{column[0]}_{column[1]}")
+        hand_over(made, place, map_id)
+        return place
 
 
 def _verify_tiles(map: str, tiles: Sequence[_Index] | None) -> dict[str, Any]:
@@ -192,19 +199,3 @@ def _verify_tiles(map: str, tiles: Sequence[_Index] | None) -> dict[str, Any]:
 
 def _local_folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory)
-
-
-def _put(made: str, place: Path) -> str:
-    """Copies a map to where others see it, whole or not there."""
-    attempt = place.with_name(f"attempt-{uuid.uuid4().hex}")
-    try:
-        shutil.copytree(made, attempt)
-        # Another attempt may have been first; both made the same.
-        if not place.exists():
-            os.rename(attempt, place)
-    except OSError:
-        if not place.exists():
-            raise
-    finally:
-        shutil.rmtree(attempt, ignore_errors=True)
-    return str(place)

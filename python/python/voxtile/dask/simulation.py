@@ -26,8 +26,10 @@ class Costs:
     map_scan_s: float = 0.0111
     # Opening and flushing a task's map; what dask itself takes is not in it.
     task_s: float = 0.01
+    # A tile that a task copies to its place.
+    piece_tile_s: float = 0.0002
     # A tile in the last step, which one process does.
-    merge_tile_s: float = 0.0008
+    merge_tile_s: float = 0.00016
     # A scan of 8000 points in a file of float32.
     scan_bytes: int = 90_000
 
@@ -95,10 +97,10 @@ def simulate(
         )
         read += scans
         tasks.append(costs.task_s + scans * costs.read_scan_s + share * costs.map_scan_s)
-    tasks.sort(reverse=True)
     scans = before[-1]
     # Tiles of the ground and of what stands on it, where a scan reaches.
     tiles = _TILES_HIGH * _ground_tiles(city, edge, reach, tile_size)
+    tasks = sorted((task + tiles / len(tasks) * costs.piece_tile_s for task in tasks), reverse=True)
     plan_s, merge_s = scans * costs.plan_scan_s, tiles * costs.merge_tile_s
     cpu_s = plan_s + sum(tasks) + merge_s
     one_build_s = scans * (costs.read_scan_s + costs.map_scan_s)

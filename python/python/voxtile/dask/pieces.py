@@ -1,0 +1,36 @@
+"""What tasks make, put where others find it: pieces of one map, under the id that it is to have."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import uuid
+
+from .._voxtile import make_piece
+
+
+def hand_over(made: str, place: str, map_id: str) -> None:
+    """Copies what a worker made to its place, whole and durable, with every byte compared with its log.
+
+    Another attempt may have been first, and made the same.
+    """
+    folder = os.path.dirname(place)
+    attempt = os.path.join(folder, f"attempt-{uuid.uuid4().hex}")
+    try:
+        make_piece(made, attempt, map_id)
+        if not os.path.exists(place):
+            os.rename(attempt, place)
+            _sync(folder)
+    except OSError:
+        if not os.path.exists(place):
+            raise
+    finally:
+        shutil.rmtree(attempt, ignore_errors=True)
+
+
+def _sync(folder: str) -> None:
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)
