@@ -1,4 +1,5 @@
-//! How long does a scan take into the map: in memory, a quarter of its tiles, out of core with room and with next to none?
+//! How long does a scan take into the map: in memory, a quarter of its tiles, out of core with room and with next to
+//! none?
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use voxtile::mapper::MapView;

@@ -46,8 +46,8 @@ pub struct MapConfig {
     pub memory: MemoryLimit,
     /// How the tiles of a new map are stored. Default: the original files.
     pub storage: Storage,
-    /// The coordinate reference system of the map's frame: well-known text, or `EPSG:25832`. It changes no voxel; exports
-    /// that can say it do. Default: none.
+    /// The coordinate reference system of the map's frame: well-known text, or `EPSG:25832`. It changes no voxel;
+    /// exports that can say it do. Default: none.
     pub crs: Option<String>,
     /// Whether the map keeps the scans that it takes, so that it can be mapped again when poses change. A map that
     /// does goes on doing so, whatever is asked for. Default: no.

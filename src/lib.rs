@@ -58,8 +58,8 @@
 //!
 //! - `render`: pictures of maps, numbers to go with them, and levels of detail for viewers.
 //! - `bucket`: maps in a bucket of an object store.
-//! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and `render`. The library needs none of
-//!   it, and no feature changes a result.
+//! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and `render`. The library needs none
+//!   of it, and no feature changes a result.
 
 #[cfg(feature = "bucket")]
 pub mod bucket;

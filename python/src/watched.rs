@@ -49,8 +49,8 @@ fn watched_by<T: Send>(
     }
 }
 
-/// Does work that owns all it needs, in a thread of its own. After Ctrl-C it is asked to stop; if that takes longer than
-/// anybody would wait, its thread finishes it and drops its answer. The interpreter waits for it before it exits.
+/// Does work that owns all it needs, in a thread of its own. After Ctrl-C it is asked to stop; if that takes longer
+/// than anybody would wait, its thread finishes it and drops its answer. The interpreter waits for it before it exits.
 pub fn left_to_itself<T: Send + 'static>(
     py: Python<'_>,
     stop: &Stop,

@@ -12,8 +12,8 @@ const MOST_IN_FLIGHT: usize = 16;
 
 /// Removes the objects that a manifest does not name, which the caller has put; returns how many.
 ///
-/// Objects that are newer than the manifest stay: another push may be about to name them. If it names older ones that go
-/// now, it has read an older manifest and loses to this one.
+/// Objects that are newer than the manifest stay: another push may be about to name them. If it names older ones that
+/// go now, it has read an older manifest and loses to this one.
 pub(super) fn prune(bucket: &Bucket, manifest: Manifest) -> Result<u64> {
     let failed = |error: io::Error| Error::io(bucket.path(), "prune", error);
     let named = named_by(bucket, &manifest).map_err(failed)?;

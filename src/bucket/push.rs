@@ -19,7 +19,8 @@ use std::path::Path;
 /// How to [`push`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PushOptions {
-    /// Remove the objects that no manifest names any more. Whoever reads an earlier state of the map has to open it anew.
+    /// Remove the objects that no manifest names any more. Whoever reads an earlier state of the map has to open it
+    /// anew.
     pub prunes: bool,
 }
 

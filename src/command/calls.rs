@@ -34,7 +34,8 @@ pub fn build(arguments: Vec<OsString>, watch: &Watch) -> Result<Value, CallError
     Ok(serde_json::to_value(summary).map_err(anyhow::Error::from)?)
 }
 
-/// `voxtile export` with these arguments; returns what it prints with `--json`. Where it is stopped, nothing is written.
+/// `voxtile export` with these arguments; returns what it prints with `--json`. Where it is stopped, nothing is
+/// written.
 ///
 /// # Errors
 ///

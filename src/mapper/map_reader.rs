@@ -228,8 +228,8 @@ impl MapReader {
         })
     }
 
-    /// The scans of the map in order: number, time stamp and origin of each. Batches have none, and neither have maps of
-    /// earlier versions.
+    /// The scans of the map in order: number, time stamp and origin of each. Batches have none, and neither have maps
+    /// of earlier versions.
     ///
     /// # Errors
     ///
@@ -295,8 +295,8 @@ impl MapReader {
         })
     }
 
-    /// Bytes on disk of a tile: its table and its octree, of which a snapshot has none; `None` if the map has no such tile
-    /// or is of the original format.
+    /// Bytes on disk of a tile: its table and its octree, of which a snapshot has none; `None` if the map has no such
+    /// tile or is of the original format.
     pub fn tile_bytes(&self, index: TileIndex) -> Option<u64> {
         let version = self.version(index).filter(|_| self.is_verified())?;
         let octree_bytes = if self.snapshot().is_some() { 0 } else { version.octree.bytes };

@@ -70,7 +70,8 @@ impl Remapper {
         })
     }
 
-    /// Commits, with a note where the poses are no longer those of the map's inputs; then removes what nothing needs any more.
+    /// Commits, with a note where the poses are no longer those of the map's inputs; then removes what nothing needs
+    /// any more.
     pub(crate) fn finish(mut self, have_poses_changed: bool) -> Result<()> {
         self.mapper.commit_again(self.scan_number, have_poses_changed)?;
         self.mapper.with_store(TileStore::release_scans);

@@ -3,8 +3,8 @@ use crate::error::Result;
 use crate::scan::{MappedTiles, Overflow, ScanPoints, ScanTracer, ScanUpdates, UpdateOrder};
 use crate::space::TileSelection;
 
-/// What a scan says about the voxels of a selection of tiles or of all, in the form that the map's tiles want. What there is no room for overflows, if there
-/// is a limit.
+/// What a scan says about the voxels of a selection of tiles or of all, in the form that the map's tiles want. What
+/// there is no room for overflows, if there is a limit.
 pub(super) fn trace(
     tracer: &mut ScanTracer,
     config: &MapConfig,

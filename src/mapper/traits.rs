@@ -7,7 +7,8 @@ use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::store::TileVersion;
 use crate::tile::{Tile, Voxel};
 
-/// A map of tiles. All of [`Queries`](crate::query::Queries) and [`MapQueries`](crate::query::MapQueries) use these few.
+/// A map of tiles. All of [`Queries`](crate::query::Queries) and [`MapQueries`](crate::query::MapQueries) use these
+/// few.
 ///
 /// Queries see whole scans, unsaved ones too.
 pub trait MapView: Sync {
@@ -46,8 +47,8 @@ pub trait MapView: Sync {
     /// A tile that cannot be read.
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
-    /// The observed voxels of a tile whose log-odds are at least `from`, in Morton order; what is read for it leaves memory
-    /// as with [`MapView::tile_uncached`].
+    /// The observed voxels of a tile whose log-odds are at least `from`, in Morton order; what is read for it leaves
+    /// memory as with [`MapView::tile_uncached`].
     ///
     /// # Errors
     ///
@@ -121,8 +122,8 @@ pub trait Mapper: MapView + Send {
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport>;
 
     /// Adds what a scan says about some tiles: these are afterwards as after [`Mapper::insert_points`], to the bit, and
-    /// all others as before. Rays are cut before they are walked, so it costs what the tiles cost. The report counts all
-    /// points, but only the updates of these tiles.
+    /// all others as before. Rays are cut before they are walked, so it costs what the tiles cost. The report counts
+    /// all points, but only the updates of these tiles.
     ///
     /// # Errors
     ///

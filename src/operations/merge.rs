@@ -35,8 +35,8 @@ pub struct Merged {
 /// Without a preference log-odds are added, in the order of the maps, and clamped once; counts are added, too. That is
 /// what one map of all scans would have, but for the clamps on the way and the order of additions. It takes maps of the
 /// model [`LogOdds`](crate::sensor::LogOdds) with equal parameters, because evidence of the other model depends on what
-/// was there before, unless no tile is in two maps. With a preference any models go together; sensor model, occupancy threshold and storage are those
-/// of the first map.
+/// was there before, unless no tile is in two maps. With a preference any models go together; sensor model, occupancy
+/// threshold and storage are those of the first map.
 ///
 /// The new map has an id of its own and no scans, unless the maps are regions of one build
 /// ([`RayConfig::region`](crate::RayConfig)) that together are a box: then it is what one build of that box would

@@ -31,8 +31,8 @@ pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Re
     load_made(store, index, |stored| read_stored_table(grid, index, stored))
 }
 
-/// Reads the observed voxels of a tile's latest version whose log-odds are at least `from`, in Morton order. The file is
-/// checked as for a table, but none is built.
+/// Reads the observed voxels of a tile's latest version whose log-odds are at least `from`, in Morton order. The file
+/// is checked as for a table, but none is built.
 pub(crate) fn load_voxels_from(
     store: &TileStore,
     grid: &Grid,

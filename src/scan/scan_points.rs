@@ -40,8 +40,8 @@ pub trait ScanPoints: Sync {
         None
     }
 
-    /// As [`ScanPoints::for_each_chunk`], but in the sensor's frame where [`ScanPoints::world_from_sensor`] is known. The
-    /// pose takes these points to the others, to the bit.
+    /// As [`ScanPoints::for_each_chunk`], but in the sensor's frame where [`ScanPoints::world_from_sensor`] is known.
+    /// The pose takes these points to the others, to the bit.
     ///
     /// # Errors
     ///

@@ -195,8 +195,8 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
             continue;
         }
         if oracle.is_beside {
-            // Before a reader opens the map: one that comes between a commit and its `metadata.json` waits for the writer a
-            // tenth of a second, and this disk has no clock.
+            // Before a reader opens the map: one that comes between a commit and its `metadata.json` waits for the
+            // writer a tenth of a second, and this disk has no clock.
             end_flush(disk, &mut mapper, look, reached, number)?;
         }
         let reader = || MapReader::open(MapPath::on(disk.shared(), map()), 1);

@@ -71,7 +71,8 @@ fn agrees(view: &LiveView, naive: &[Voxels], random: &mut Random) -> bool {
     true
 }
 
-/// Asks until all is done, by views that last for an instant or for many scans. Returns how many did and did not expire.
+/// Asks until all is done, by views that last for an instant or for many scans. Returns how many did and did not
+/// expire.
 fn ask(reader: &LiveReader, naive: &[Voxels], is_over: &AtomicBool, seed: u64) -> (u64, u64) {
     let mut random = Random(seed);
     let (mut expired, mut answered) = (0, 0);

@@ -1,4 +1,5 @@
-//! `voxtile view`, by its server: what it serves is the map, and nothing else, to nobody else, whatever the other side does.
+//! `voxtile view`, by its server: what it serves is the map, and nothing else, to nobody else, whatever the other side
+//! does.
 
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;

@@ -14,8 +14,8 @@ use std::path::Path;
 /// the origin of the rays is given, it is one cloud in the order of the file.
 ///
 /// Stamps are GPS time in nanoseconds, without leap seconds taken off: since 6 January 1980 where the header says that
-/// times are "adjusted standard GPS time" (the 10^9 seconds that such files leave out are added), since the begin of the
-/// week otherwise.
+/// times are "adjusted standard GPS time" (the 10^9 seconds that such files leave out are added), since the begin of
+/// the week otherwise.
 pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let layout = Layout::read(path, &mut file)?;

@@ -11,8 +11,8 @@ const POINT_BYTES: usize = 34;
 const MOST_BUFFER_BYTES: usize = 1 << 16;
 const LEAST_BUFFER_BYTES: usize = POINT_BYTES * 16;
 
-/// Sorts points by time in bounded memory: parts of them are sorted and written to a temporary file, then merged. Points
-/// of the same time keep their order.
+/// Sorts points by time in bounded memory: parts of them are sorted and written to a temporary file, then merged.
+/// Points of the same time keep their order.
 pub(super) struct Sorter {
     memory_bytes: usize,
     scratch: PathBuf,

@@ -123,8 +123,8 @@ impl LasScans {
     }
 }
 
-/// The window of a time after the first, from 0. One that begins a window may be written a little earlier, as rounding has
-/// it: it is taken as its begin.
+/// The window of a time after the first, from 0. One that begins a window may be written a little earlier, as rounding
+/// has it: it is taken as its begin.
 fn window_after(since_s: f64, period_s: f64) -> u64 {
     /// Of a window. Seconds of the GPS epoch have steps of 0.1 us.
     const ROUNDING: f64 = 1e-5;

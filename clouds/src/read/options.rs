@@ -7,8 +7,8 @@ use std::path::PathBuf;
 pub struct OpenOptions {
     /// The format; guessed if `None`.
     pub format: Option<Format>,
-    /// Columns of a `.bin` file, each a float of four bytes: `x`, `y`, `z`, `intensity`, and any others. `None`: KITTI's
-    /// four, or nuScenes' five for a `.pcd.bin`.
+    /// Columns of a `.bin` file, each a float of four bytes: `x`, `y`, `z`, `intensity`, and any others. `None`:
+    /// KITTI's four, or nuScenes' five for a `.pcd.bin`.
     pub fields: Option<Vec<String>>,
     /// A LAS file with GPS times is cut into scans of this many seconds. 0: the file is one cloud.
     pub scan_period_s: f64,

@@ -27,8 +27,8 @@ impl WktUnits {
 }
 
 /// The last unit of length directly within the node that a text starts with: `UNIT["foot",0.3048]`,
-/// `LENGTHUNIT["metre",1]`. Units of what is nested deeper (degrees, parameters) are passed by; axes of newer texts hold
-/// the unit themselves and count if there is none beside them.
+/// `LENGTHUNIT["metre",1]`. Units of what is nested deeper (degrees, parameters) are passed by; axes of newer texts
+/// hold the unit themselves and count if there is none beside them.
 fn last_unit(text: &str) -> Option<f64> {
     let (mut depth, mut is_quoted) = (0_u32, false);
     let (mut own, mut of_axis) = (None, None);

@@ -37,8 +37,8 @@ impl VoxelSink for Nav2Sink {
             self.out.write(&greys)?;
         }
         let [x, y, _] = self.map.corner_m()?;
-        // nav2 compares with `<` and `>`: 0.196 is below the 0.19608 of an unknown cell, which its own saver's 0.25 makes
-        // free.
+        // nav2 compares with `<` and `>`: 0.196 is below the 0.19608 of an unknown cell, which its own saver's 0.25
+        // makes free.
         let yaml = format!(
             "image: {}\nmode: trinary\nresolution: {}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n\
              free_thresh: 0.196\n",

@@ -41,8 +41,8 @@ use std::sync::Arc;
 use voxtile::Stop;
 
 fn main() -> ExitCode {
-    // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks. To a writer of rustdds it
-    // is one when a reader asks again for a message that a newer one has replaced; some readers ask a hundred times.
+    // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks. To a writer of rustdds
+    // it is one when a reader asks again for a message that a newer one has replaced; some readers ask a hundred times.
     let filter = "info,rustdds=error,rustdds::rtps::writer=off,ros2_client=off";
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     let arguments: Vec<_> = std::env::args_os().collect();

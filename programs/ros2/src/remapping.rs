@@ -11,8 +11,8 @@ use voxtile_clouds::ros::messages::StampedPose;
 
 /// A map that is mapped again beside its mapper, by a corrected path, in a thread of its own.
 ///
-/// Once it has caught up with what was flushed it waits for one more flush, so that little is left to do for the time in
-/// which the map is closed.
+/// Once it has caught up with what was flushed it waits for one more flush, so that little is left to do for the time
+/// in which the map is closed.
 pub struct Remapping {
     thread: Option<JoinHandle<voxtile::Result<Option<Remapped>>>>,
     stop: Stop,

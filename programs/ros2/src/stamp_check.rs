@@ -1,7 +1,8 @@
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
-/// Tells stamps that cannot be from a clock that has jumped: a robot's whose time was set, a simulation's that began anew.
+/// Tells stamps that cannot be from a clock that has jumped: a robot's whose time was set, a simulation's that began
+/// anew.
 #[derive(Debug, Default)]
 pub struct StampCheck {
     newest_ns: Option<i64>,

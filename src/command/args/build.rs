@@ -9,9 +9,9 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct BuildArgs {
-    /// Scans: a folder of point clouds (PCD, PLY, LAS, KITTI .bin, depth images) in the sensor's frame or one that holds
-    /// it as scans/, a recording (.bag .mcap .db3, a rosbag2 folder), one file (.laz .e57 .xyz ...), OctoMap's .graph and
-    /// .log, a scan stream (.scans), a map that keeps its scans, or - for a scan stream from standard input
+    /// Scans: a folder of point clouds (PCD, PLY, LAS, KITTI .bin, depth images) in the sensor's frame or one that
+    /// holds it as scans/, a recording (.bag .mcap .db3, a rosbag2 folder), one file (.laz .e57 .xyz ...), OctoMap's
+    /// .graph and .log, a scan stream (.scans), a map that keeps its scans, or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
     /// Folder of the map
@@ -58,12 +58,12 @@ pub struct BuildArgs {
     /// How often one scan updates a voxel [default: per-scan, or as begun with --resume]
     #[arg(long, value_name = "MODE")]
     pub insert: Option<InsertName>,
-    /// Keep the scans in the map, compressed (some 10 bytes a point), so that it can be mapped again when poses change or
-    /// scans have to go: see remap, remove-scans. A map that keeps scans goes on doing so
+    /// Keep the scans in the map, compressed (some 10 bytes a point), so that it can be mapped again when poses change
+    /// or scans have to go: see remap, remove-scans. A map that keeps scans goes on doing so
     #[arg(long)]
     pub keep_scans: bool,
-    /// Map only the tiles whose center is in this box: X0 <= x < X1 and so on, in metres, -inf and inf included; maps of
-    /// boxes that partition space merge to the map of the whole [default: all of space, or as begun with --resume]
+    /// Map only the tiles whose center is in this box: X0 <= x < X1 and so on, in metres, -inf and inf included; maps
+    /// of boxes that partition space merge to the map of the whole [default: all of space, or as begun with --resume]
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, allow_hyphen_values = true)]
     pub region: Option<Vec<f64>>,
     /// Rays without a return clear up to so many metres, or --max-range if that is less: laser scans, depth images,
@@ -86,8 +86,8 @@ pub struct BuildArgs {
     /// Go past scans that cannot be read, and say which, in place of ending with an error
     #[arg(long)]
     pub skip_bad: bool,
-    /// Make durable what was mapped every so many seconds while mapping goes on (60s), or stop every N scans for it (25), or
-    /// only at the end (end): what a crash can lose
+    /// Make durable what was mapped every so many seconds while mapping goes on (60s), or stop every N scans for it
+    /// (25), or only at the end (end): what a crash can lose
     #[arg(long, value_name = "N", default_value = "60s")]
     pub flush_every: FlushEvery,
     /// What becomes of scans from standard input or a pipe that come faster than they can be mapped; those left out are

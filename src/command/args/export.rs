@@ -9,7 +9,8 @@ pub struct ExportArgs {
     /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
     /// File to write; its extension says what: .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet .mcap hold
-    /// voxels, .glb their surface, .pgm a flat map of nav2, .png heights, .bt .ot the whole octree. - is standard output
+    /// voxels, .glb their surface, .pgm a flat map of nav2, .png heights, .bt .ot the whole octree. - is standard
+    /// output
     #[arg(
         short = 'o',
         long = "output",

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct LocalArgs {
-    /// Scans: a folder of point clouds (PCD, PLY, LAS, KITTI .bin, depth images) in the sensor's frame or one that holds
-    /// it as scans/, a recording (.bag .mcap .db3, a rosbag2 folder), one file (.laz .e57 .xyz ...), OctoMap's .graph and
-    /// .log, a scan stream (.scans), or - for a scan stream from standard input
+    /// Scans: a folder of point clouds (PCD, PLY, LAS, KITTI .bin, depth images) in the sensor's frame or one that
+    /// holds it as scans/, a recording (.bag .mcap .db3, a rosbag2 folder), one file (.laz .e57 .xyz ...), OctoMap's
+    /// .graph and .log, a scan stream (.scans), or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
     /// What the map is for; table runs the setups a to e of the voxel mapping paper one after the other

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// A file larger than this is begun anew: most of it is of states that nobody looks at any more.
 const MOST_BYTES: u64 = 4 << 30;
 
-/// Where the coarse nodes of a map are kept: in the user's cache folder, under the map's id, or in a file that goes with
-/// the program where there is no such folder, another program has it, or nothing is to be kept.
+/// Where the coarse nodes of a map are kept: in the user's cache folder, under the map's id, or in a file that goes
+/// with the program where there is no such folder, another program has it, or nothing is to be kept.
 pub fn open(map_id: Option<&str>) -> Result<NodeStore> {
     if let Some(path) = map_id.and_then(path_of) {
         match open_kept(&path) {

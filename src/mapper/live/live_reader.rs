@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 /// Asks a map in other threads while its mapper inserts scans and flushes: a planner beside a mapper.
 ///
-/// Every query sees the map as of one scan, unsaved ones too. It waits for no flush and for no disk but its own reads; it
-/// waits while the mapper changes tiles in memory, which is the shorter part of inserting a scan. Queries that belong
-/// together ask a [`LiveView`].
+/// Every query sees the map as of one scan, unsaved ones too. It waits for no flush and for no disk but its own reads;
+/// it waits while the mapper changes tiles in memory, which is the shorter part of inserting a scan. Queries that
+/// belong together ask a [`LiveView`].
 ///
 /// After the mapper is dropped it goes on seeing the last scan, until another writer opens the map.
 ///

@@ -159,7 +159,8 @@ impl TileContents {
         }
     }
 
-    /// Takes note of a save beside the mapper that has ended. What could not be saved, a flush that waits for it writes.
+    /// Takes note of a save beside the mapper that has ended. What could not be saved, a flush that waits for it
+    /// writes.
     pub(super) fn note_saved(&mut self, saved: Saved, disk: &mut TileDisk) {
         let index = saved.index;
         let is_on_disk = saved.result.is_ok();

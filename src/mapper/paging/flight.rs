@@ -88,8 +88,8 @@ impl Flight {
         }
     }
 
-    /// Notes that the cache has another version of a tile, or none, from now on. One that only went into the compact form
-    /// is the same ([`Flight::note_own`]).
+    /// Notes that the cache has another version of a tile, or none, from now on. One that only went into the compact
+    /// form is the same ([`Flight::note_own`]).
     pub(super) fn note_changed(&mut self, index: TileIndex) {
         self.note_own(index);
         if let Some(tile) = self.tiles.get_mut(&index) {

@@ -68,8 +68,8 @@ impl TilePager<'_> {
         self.wait(|disk| disk.commit(&inputs, scan_number))
     }
 
-    /// Begins a flush of the map as it is now: what dirty tiles hold, which goes on to be shared with the cache; what is
-    /// buffered for others; and the scans that were noted. One that is under way ends first.
+    /// Begins a flush of the map as it is now: what dirty tiles hold, which goes on to be shared with the cache; what
+    /// is buffered for others; and the scans that were noted. One that is under way ends first.
     pub(super) fn begin_flush(&mut self) -> Result<BegunFlush> {
         self.end_flight();
         self.contents.take_flush_error().map_or(Ok(()), Err)?;

@@ -38,8 +38,8 @@ pub(super) struct BegunFlush {
     /// The dirty tiles, those in the compact form apart. The last ones are written first.
     pub(super) tiles: Vec<FlushedTile>,
     pub(super) compact: Vec<FlushedTile>,
-    /// How many of the former, the first ones, are written once no save is in flight any more: an older version of them is
-    /// being saved.
+    /// How many of the former, the first ones, are written once no save is in flight any more: an older version of them
+    /// is being saved.
     pub(super) after_saves: usize,
     /// Those of the former that the next scan will change.
     pub(super) soon_changed: Range<usize>,

@@ -9,7 +9,8 @@
 //!
 //! A tile is resident, compact, or neither. A resident tile has no buffered updates: they are applied when it is
 //! loaded. `eviction` moves tiles towards the disk, `prefetch` loads tiles ahead of use, `flush` commits. A `Flusher`
-//! does so beside the mapper: it shares the tiles as of a scan with the cache, and a `Flight` counts what it holds alone.
+//! does so beside the mapper: it shares the tiles as of a scan with the cache, and a `Flight` counts what it holds
+//! alone.
 
 mod buffered_updates;
 mod compact_tiles;

@@ -14,8 +14,8 @@ use crate::store::TileStore;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 
-/// The tiles of an out-of-core map: what it holds, which readers share, and the disk, which belongs to the mapper and to
-/// the thread that flushes beside it.
+/// The tiles of an out-of-core map: what it holds, which readers share, and the disk, which belongs to the mapper and
+/// to the thread that flushes beside it.
 #[derive(Debug)]
 pub(in crate::mapper) struct PagedTiles {
     config: MapConfig,

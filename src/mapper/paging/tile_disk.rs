@@ -142,8 +142,8 @@ impl TileDisk {
 
     // Writing.
 
-    /// Writes a tile's next version and returns it. No save of the tile may be in flight: an older version must not come after this
-    /// one.
+    /// Writes a tile's next version and returns it. No save of the tile may be in flight: an older version must not
+    /// come after this one.
     ///
     /// # Errors
     ///
@@ -212,8 +212,8 @@ impl TileDisk {
         self.threads.wait_saved()
     }
 
-    /// Takes note of a save that has ended; returns the version that is on disk now. `is_current` tells whether the tile
-    /// in memory still is the version that was saved: otherwise it is written again, and an error does not matter.
+    /// Takes note of a save that has ended; returns the version that is on disk now. `is_current` tells whether the
+    /// tile in memory still is the version that was saved: otherwise it is written again, and an error does not matter.
     pub(super) fn note_saved(&mut self, saved: Saved, is_current: bool) -> Option<TileVersion> {
         let Saved { index, result, .. } = saved;
         match result {

@@ -4,8 +4,8 @@
 //! change of scans -> revision: which tiles? -> those tiles, from all scans that touch them, in order -> one commit
 //! ```
 //!
-//! The map is afterwards as if it had been built from the scans as they are now, to the bit: a tile depends on the scans
-//! that touch it, and on nothing else.
+//! The map is afterwards as if it had been built from the scans as they are now, to the bit: a tile depends on the
+//! scans that touch it, and on nothing else.
 
 mod filtered_scan;
 mod map_anew;

@@ -18,9 +18,9 @@ use std::sync::Arc;
 /// beside:  begin -> follow -> follow -> follow ... | -> finish  |
 /// ```
 ///
-/// Tiles that moved scans touch are mapped again into a map beside the first, `MAP.remapping`: first from the scans that
-/// there are, then from those that were flushed meanwhile, which keep their poses. In the end the map takes these tiles
-/// over. It is then, to the bit, what `remap` would have made of it with the same poses for the same scans.
+/// Tiles that moved scans touch are mapped again into a map beside the first, `MAP.remapping`: first from the scans
+/// that there are, then from those that were flushed meanwhile, which keep their poses. In the end the map takes these
+/// tiles over. It is then, to the bit, what `remap` would have made of it with the same poses for the same scans.
 ///
 /// Memory: [`Rework::memory_bytes`](super::Rework::memory_bytes), beside what the mapper takes. Disk: the touched tiles
 /// once more. Dropping it gives both back; the map is as it was.

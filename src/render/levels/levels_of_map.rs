@@ -250,8 +250,8 @@ impl Levels {
         map.version_of_tile(tile).map(|_| store)
     }
 
-    /// Makes and stores all nodes of a tile; whoever asks for one of them will ask for the others. The bytes of each, and
-    /// how many voxels it has.
+    /// Makes and stores all nodes of a tile; whoever asks for one of them will ask for the others. The bytes of each,
+    /// and how many voxels it has.
     fn make_nodes_of_tile<V: MapView>(
         &self,
         map: &V,
@@ -314,7 +314,8 @@ impl Levels {
         Ok(Some(node_bytes::encode(&head, &cells)))
     }
 
-    /// The occupied voxels of a node: the places of each along the axes, counted from the node's lower corner in voxels of
+    /// The occupied voxels of a node: the places of each along the axes, counted from the node's lower corner in voxels
+    /// of
     /// [`Levels::voxel_edge_m`].
     ///
     /// # Errors

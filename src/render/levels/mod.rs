@@ -1,5 +1,5 @@
-//! Levels of detail: a map of any size as nodes of a bounded number of voxels, coarser and coarser, for viewers that load
-//! only what is near.
+//! Levels of detail: a map of any size as nodes of a bounded number of voxels, coarser and coarser, for viewers that
+//! load only what is near.
 //!
 //! ```text
 //! Scheme        which nodes there are, and which voxels each covers          scheme, node_key

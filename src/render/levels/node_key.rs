@@ -1,8 +1,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Names a node: its level, and its place among the nodes of the level. A node of level `n` has voxels of `2^n` times the
-/// map's resolution, and its eight children are those of level `n - 1` at twice its index, and one more.
+/// Names a node: its level, and its place among the nodes of the level. A node of level `n` has voxels of `2^n` times
+/// the map's resolution, and its eight children are those of level `n - 1` at twice its index, and one more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeKey {
     /// 0 is the map's own resolution.

@@ -48,8 +48,8 @@ pub(super) struct Stored {
 }
 
 impl NodeStore {
-    /// A store in a file that is open for reading and writing: empty, or with what an earlier one left there. What cannot
-    /// be read of it is overwritten. `path` is how errors name the file, which must be nobody else's meanwhile.
+    /// A store in a file that is open for reading and writing: empty, or with what an earlier one left there. What
+    /// cannot be read of it is overwritten. `path` is how errors name the file, which must be nobody else's meanwhile.
     ///
     /// # Errors
     ///

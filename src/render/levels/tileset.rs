@@ -1,4 +1,5 @@
-//! Nodes as [3D Tiles 1.1](https://docs.ogc.org/cs/22-025r4/22-025r4.html): trees of boxes, cut into files of three levels.
+//! Nodes as [3D Tiles 1.1](https://docs.ogc.org/cs/22-025r4/22-025r4.html): trees of boxes, cut into files of three
+//! levels.
 
 use super::levels_of_map::Levels;
 use super::node_key::NodeKey;

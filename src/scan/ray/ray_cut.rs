@@ -54,8 +54,8 @@ impl<'a> RayCut<'a> {
         }
     }
 
-    /// Whether a condition holds for the selected voxels from `low` to `high`, both in the window: for each box of them,
-    /// also given by its lowest and highest voxel.
+    /// Whether a condition holds for the selected voxels from `low` to `high`, both in the window: for each box of
+    /// them, also given by its lowest and highest voxel.
     pub(crate) fn for_all_selected(
         &self,
         window: &Window,

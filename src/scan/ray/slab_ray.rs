@@ -112,8 +112,8 @@ impl<'a> SlabRay<'a> {
     /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last. Voxels outside the
     /// pages' window go to `pass_far`.
     ///
-    /// Slabs outside the ray's span, and the first `skipped`, counted from the origin's, may be left out. With `may_pass_last` the last voxel may
-    /// be passed, too.
+    /// Slabs outside the ray's span, and the first `skipped`, counted from the origin's, may be left out. With
+    /// `may_pass_last` the last voxel may be passed, too.
     #[inline]
     pub(crate) fn pass<F: Footprint>(
         &self,

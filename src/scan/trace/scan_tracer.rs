@@ -34,8 +34,8 @@ pub(crate) enum UpdateOrder {
 }
 
 impl ScanTracer {
-    /// Checks that a scan can be traced, without reading its points: its origin, and that it has intensities if they are
-    /// needed.
+    /// Checks that a scan can be traced, without reading its points: its origin, and that it has intensities if they
+    /// are needed.
     ///
     /// # Errors
     ///
@@ -82,8 +82,9 @@ impl ScanTracer {
         self.trace_points(mapped, model, rays, scan, UpdateOrder::OfRays, None)
     }
 
-    /// The same for any source of points and for the mapped tiles alone: their updates are those of the whole scan. With `overflow`, updates that exceed the memory limit are spilled and the
-    /// rest is returned. The report covers both.
+    /// The same for any source of points and for the mapped tiles alone: their updates are those of the whole scan.
+    /// With `overflow`, updates that exceed the memory limit are spilled and the rest is returned. The report covers
+    /// both.
     ///
     /// # Errors
     ///

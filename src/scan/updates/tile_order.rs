@@ -4,8 +4,8 @@ use crate::scan::ScanReport;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, mask_of_box};
 use rustc_hash::FxHashMap;
 
-/// For each mapped tile the numbers of the bricks that overlap it, in Morton order. `indices` are the bricks': their voxels'
-/// indices divided by 8.
+/// For each mapped tile the numbers of the bricks that overlap it, in Morton order. `indices` are the bricks': their
+/// voxels' indices divided by 8.
 pub(crate) fn bricks_by_tile(mapped: MappedTiles<'_>, indices: &[VoxelIndex]) -> Vec<(TileIndex, Vec<u32>)> {
     let mut tiles: FxHashMap<TileIndex, Vec<(BrickCode, u32)>> = FxHashMap::default();
     for (number, &index) in indices.iter().enumerate() {

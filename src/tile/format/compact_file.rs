@@ -38,8 +38,8 @@ pub fn read_compact_file(
     read_behind_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
 }
 
-/// Reads a `tile.vxt` like [`read_compact_file`], and makes of it the observed voxels whose log-odds are at least `from`,
-/// in Morton order, without a table.
+/// Reads a `tile.vxt` like [`read_compact_file`], and makes of it the observed voxels whose log-odds are at least
+/// `from`, in Morton order, without a table.
 ///
 /// # Errors
 ///

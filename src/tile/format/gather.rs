@@ -10,7 +10,8 @@ pub(super) trait Gather {
     /// Whether it needs a voxel of this evidence.
     fn wants(&self, evidence: Evidence) -> bool;
 
-    /// Takes the voxels of a brick that it needs, in Morton order: place and evidence. Bricks come in Morton order, too.
+    /// Takes the voxels of a brick that it needs, in Morton order: place and evidence. Bricks come in Morton order,
+    /// too.
     fn add(&mut self, brick: BrickCode, voxels: &[(usize, Evidence)]);
 
     /// What was made of all voxels.

@@ -33,7 +33,8 @@ impl<'a> AskedVoxels<'a> {
         self.voxels.push((table, Address::of_key(key)));
     }
 
-    /// Looks the voxels up and forgets them. Takes each one's evidence, in their order; `None` if it was never observed.
+    /// Looks the voxels up and forgets them. Takes each one's evidence, in their order; `None` if it was never
+    /// observed.
     pub(crate) fn take(&mut self, mut take: impl FnMut(Option<Evidence>)) {
         for voxels in self.voxels.chunks(Self::MOST) {
             let mut blocks = [0; Self::MOST];

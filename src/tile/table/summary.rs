@@ -28,8 +28,8 @@ impl Summary {
         self.max = larger(self.max, bound);
     }
 
-    /// Log-odds above which a brick is marked in the directory: more than a miss leads to, less than what most maps take
-    /// for occupied.
+    /// Log-odds above which a brick is marked in the directory: more than a miss leads to, less than what most maps
+    /// take for occupied.
     pub(crate) const MARKED_ABOVE: f32 = -0.05;
 
     /// Whether bricks that are not marked hold nothing from this threshold on.

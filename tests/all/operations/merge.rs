@@ -75,7 +75,8 @@ fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
                 write_map(&disk, path, &config, voxels);
             }
             let before = disk.files();
-            // Of the other model only maps without a common tile go together by themselves: any preference says the same.
+            // Of the other model only maps without a common tile go together by themselves: any preference says the
+            // same.
             let needs_choice = config.sensor_model.needs_intensity() && prefer.is_none();
             let merged = match merge(&disk, &paths, prefer) {
                 Err(Error::InvalidArgument { reason, .. })

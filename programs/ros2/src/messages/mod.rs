@@ -1,5 +1,5 @@
-//! Messages that the node sends and requests that it takes, as ROS 2 defines them; `serde` makes CDR of them, in the order
-//! of their fields. The definitions of our own (`voxtile_msgs`) are in `docs/ros2.md`.
+//! Messages that the node sends and requests that it takes, as ROS 2 defines them; `serde` makes CDR of them, in the
+//! order of their fields. The definitions of our own (`voxtile_msgs`) are in `docs/ros2.md`.
 
 mod box_request;
 mod diagnostic_array;

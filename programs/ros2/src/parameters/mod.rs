@@ -1,5 +1,5 @@
-//! Options from what launch files pass and from parameter files of ROS 2: they are as if they stood on the command line,
-//! before what stands there.
+//! Options from what launch files pass and from parameter files of ROS 2: they are as if they stood on the command
+//! line, before what stands there.
 //!
 //! ```text
 //! --ros-args -> options, parameters

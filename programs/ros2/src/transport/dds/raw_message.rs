@@ -2,8 +2,8 @@ use rustdds::RepresentationIdentifier;
 use rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter};
 use std::convert::Infallible;
 
-/// A message as its bytes, with the four bytes in front that say its encoding: as recordings keep it, so that one decoder
-/// reads both.
+/// A message as its bytes, with the four bytes in front that say its encoding: as recordings keep it, so that one
+/// decoder reads both.
 #[derive(Clone, Debug)]
 pub struct RawMessage {
     pub cdr: Vec<u8>,
