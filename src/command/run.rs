@@ -97,8 +97,11 @@ fn is_parallel(command: &Command) -> bool {
         | Command::RemovePoints(_)
         | Command::Local(_)
         | Command::Demo(_)
+        | Command::Export(_)
         | Command::Picture(_)
         | Command::Report(_) => true,
+        #[cfg(feature = "view")]
+        Command::View(_) => true,
         Command::Info(args) => info::may_draw(args),
         _ => false,
     }

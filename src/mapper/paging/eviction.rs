@@ -80,15 +80,13 @@ impl TilePager<'_> {
         self.save_ahead()
     }
 
-    /// Where the disk does not keep up, waits for one tile with each scan: otherwise one of them would have to wait for
-    /// many.
+    /// Where the disk does not keep up, waits for one save with each scan: otherwise one of them would have to wait for
+    /// many. While a flush goes on nothing is saved, and it is waited for only where it has to be.
     pub(super) fn keep_pace(&mut self) {
-        if !self.contents.cache.has_compact_tier() || !self.contents.cache.is_behind() {
-            return;
-        }
-        if self.contents.flight.is_some() {
-            self.wait_for_flight();
-        } else if !self.disk.can_save()
+        let is_saving = self.contents.flight.is_none() && !self.disk.can_save();
+        if is_saving
+            && self.contents.cache.has_compact_tier()
+            && self.contents.cache.is_behind()
             && let Some(saved) = self.wait(|disk| disk.stall(|disk| disk.wait_saved()))
         {
             self.note_saved(saved);
