@@ -123,11 +123,11 @@ flood() {
 # Nodes of ROS 2 itself, with its default middleware, get what the node publishes and what it answers, and it gets what
 # they publish.
 rclpy() {
-    local python=${VOXTILE_RCLPY_PYTHON:-$work/rclpy/bin/python}
+    local python=${VOXTILE_RCLPY_PYTHON:-$work/venv_ros/bin/python}
     if [ -z "${VOXTILE_RCLPY_PYTHON:-}" ]; then
         local packages="rclpy rmw-fastrtps-cpp sensor-msgs nav-msgs std-srvs visualization-msgs diagnostic-msgs"
         # shellcheck disable=SC2046,SC2086
-        if ! { python3 -m venv "$work/rclpy" && "$python" -m pip -q install cyclonedds==11.0.1 rosbags numpy \
+        if ! { python3 -m venv "$work/venv_ros" && "$python" -m pip -q install cyclonedds==11.0.1 rosbags numpy \
             $(printf 'ros-jazzy-%s ' $packages); }; then
             echo "skipped: no Python with rclpy; name one with VOXTILE_RCLPY_PYTHON"
             return
