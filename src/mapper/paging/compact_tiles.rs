@@ -113,9 +113,9 @@ impl CompactTiles {
     }
 
     /// The dirty tiles that are being saved, in no particular order.
-    pub(super) fn saving(&self) -> impl Iterator<Item = TileIndex> {
+    pub(super) fn saving(&self) -> impl Iterator<Item = (TileIndex, CompactTile)> {
         let saving = self.tiles.iter().filter(|(_, entry)| entry.is_dirty && entry.is_saving);
-        saving.map(|(&index, _)| index)
+        saving.map(|(&index, entry)| (index, entry.tile.clone()))
     }
 
     pub(super) fn oldest(&self) -> Option<TileIndex> {

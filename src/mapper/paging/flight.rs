@@ -15,7 +15,7 @@ pub(super) struct Flight {
     /// Bytes of memory for one tile that it makes.
     bytes_to_make: usize,
     /// Tiles that were being saved as they are when it began: it waits for that, and does not write them.
-    saving: Vec<TileIndex>,
+    saving: Vec<(TileIndex, CompactTile)>,
     /// Those of them that could not be saved: it writes them after all.
     unsaved: Vec<(TileIndex, CompactTile)>,
 }
@@ -35,7 +35,7 @@ impl Flight {
     pub(super) fn of(
         tiles: impl Iterator<Item = (TileIndex, usize)>,
         bytes_to_make: usize,
-        saving: Vec<TileIndex>,
+        saving: Vec<(TileIndex, CompactTile)>,
     ) -> Self {
         let tile = |(index, bytes)| (index, FlightTile { bytes, is_shared: true, has_changed: false });
         let tiles = tiles.map(tile).collect();
@@ -44,7 +44,10 @@ impl Flight {
 
     /// Notes that a save has ended; tells whether it failed, and it is up to the flush to write the tile.
     pub(super) fn note_saved(&mut self, index: TileIndex, tile: &CompactTile, is_on_disk: bool) -> bool {
-        let Some(place) = self.saving.iter().position(|saving| *saving == index) else { return false };
+        // An older version of the tile may be on its way, too.
+        let is_it =
+            |(saving, as_it_is): &(TileIndex, CompactTile)| *saving == index && as_it_is.is_same(tile);
+        let Some(place) = self.saving.iter().position(is_it) else { return false };
         self.saving.swap_remove(place);
         if !is_on_disk {
             self.unsaved.push((index, tile.clone()));

@@ -10,6 +10,7 @@ use super::tile_pager::TilePager;
 use super::tile_state::{Base, StoredTileState};
 use super::unapplied_tile::UnappliedTile;
 use crate::error::{Error, Result};
+use crate::persistence::CompactTile;
 use crate::space::TileIndex;
 use crate::store::{InputRecord, MOST_INPUTS};
 use crate::tile::Tile;
@@ -112,9 +113,9 @@ impl TilePager<'_> {
     }
 
     /// Tiles in the compact form that are being saved as they are, and for which no updates are buffered.
-    fn saving_as_they_are(&self) -> Vec<TileIndex> {
+    fn saving_as_they_are(&self) -> Vec<(TileIndex, CompactTile)> {
         let saving = self.contents.cache.saving_compact();
-        saving.filter(|index| !self.contents.buffer.is_frozen(*index)).collect()
+        saving.filter(|(index, _)| !self.contents.buffer.is_frozen(*index)).collect()
     }
 
     /// What is buffered, left to a flush beside the mapper.

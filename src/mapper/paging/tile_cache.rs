@@ -224,7 +224,7 @@ impl TileCache {
     }
 
     /// The dirty tiles in the compact form that are being saved, in no particular order.
-    pub(super) fn saving_compact(&self) -> impl Iterator<Item = TileIndex> {
+    pub(super) fn saving_compact(&self) -> impl Iterator<Item = (TileIndex, CompactTile)> {
         self.compact.saving()
     }
 

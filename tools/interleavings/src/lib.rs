@@ -24,7 +24,7 @@ mod config {
 }
 
 mod error {
-    pub(crate) use voxtile::{Error, FormatError, Result};
+    pub(crate) use voxtile::{DecodeError, Error, FormatError, Result};
 }
 
 mod octree {
