@@ -5,6 +5,7 @@ zenoh_sdk.py PORT DOMAIN   without the package it says so and passes
 
 import os
 import sys
+import time
 
 try:
     from zenoh_ros2_sdk import ROS2ServiceClient
@@ -18,21 +19,40 @@ except ImportError as error:
 OUTCOME = "bool success\nstring message\n"
 
 
+def asked_again(question, is_whole, seconds=20):
+    """The answer once it is whole: a session that was just opened may not know of others' tokens and services yet."""
+    until = time.time() + seconds
+    while True:
+        answer = question()
+        if is_whole(answer) or time.time() > until:
+            return answer
+        time.sleep(0.1)
+
+
 def main():
     port, domain = int(sys.argv[1]), int(sys.argv[2])
 
     def client(name, kind, request):
         return ROS2ServiceClient(name, kind, request, OUTCOME, domain_id=domain, router_port=port)
 
-    saved = client("/voxtile_ros2/save", "std_srvs/srv/Trigger", "# nothing\n").call()
+    def is_answer(response):
+        return response is not None
+
+    save = client("/voxtile_ros2/save", "std_srvs/srv/Trigger", "# nothing\n")
+    saved = asked_again(save.call, is_answer)
     assert saved is not None and saved.success and saved.message.startswith("durable"), saved
-    named = client("/voxtile_ros2/revert", "voxtile_msgs/srv/Snapshot", "string name\n").call(name="of nobody")
+    revert = client("/voxtile_ros2/revert", "voxtile_msgs/srv/Snapshot", "string name\n")
+    named = asked_again(lambda: revert.call(name="of nobody"), is_answer)
     assert named is not None and not named.success and named.message, named
-    topics = dict(get_topic_names_and_types(domain, router_port=port, timeout=5.0))
-    assert topics["/octomap_binary"] == ["octomap_msgs/msg/Octomap"], topics
-    assert topics["/cloud_in"] == ["sensor_msgs/msg/PointCloud2"], topics
+    wanted = {"/octomap_binary": ["octomap_msgs/msg/Octomap"], "/cloud_in": ["sensor_msgs/msg/PointCloud2"]}
+    topics = asked_again(
+        lambda: dict(get_topic_names_and_types(domain, router_port=port, timeout=5.0)),
+        lambda topics: wanted.keys() <= topics.keys(),
+    )
+    assert wanted.items() <= topics.items(), topics
     session = ZenohSession.get_instance("127.0.0.1", port)
-    replies = session.liveliness.get(f"@ros2_lv/{domain}/*/*/*/MP/*/*/voxtile_ros2/%projected_map/**", timeout=5.0)
+    token = f"@ros2_lv/{domain}/*/*/*/MP/*/*/voxtile_ros2/%projected_map/**"
+    replies = asked_again(lambda: list(session.liveliness.get(token, timeout=5.0)), bool)
     [qos] = [QosProfile.decode(str(reply.ok.key_expr).split("/")[-1]) for reply in replies]
     wanted = QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, 1
     assert (qos.reliability, qos.durability, qos.history_depth) == wanted, qos
