@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::{env, fs};
 
-const SOURCES: [&str; 32] = [
+const SOURCES: [&str; 33] = [
     "tile/octocache/octree_statistics.rs",
     "tile/octocache/octree_worker.rs",
     "tile/octocache/shared_tree.rs",
@@ -17,6 +17,7 @@ const SOURCES: [&str; 32] = [
     "mapper/paging/flight.rs",
     "mapper/paging/flush.rs",
     "mapper/paging/flusher.rs",
+    "mapper/paging/held_tile.rs",
     "mapper/paging/paged_tiles.rs",
     "mapper/paging/prefetch.rs",
     "mapper/paging/resident_tiles.rs",

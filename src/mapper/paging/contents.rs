@@ -100,10 +100,10 @@ impl TileContents {
         }
     }
 
-    /// Notes that a tile goes into the compact form as it is.
+    /// Notes that a tile has gone into the compact form as it is.
     pub(super) fn leave_packed_to_flush(&mut self, index: TileIndex) {
-        if let Some(flight) = &mut self.flight {
-            flight.note_own(index);
+        if let (Some(flight), Some(packed)) = (&mut self.flight, self.cache.compact(index)) {
+            flight.note_packed(index, packed);
             let bytes = flight.bytes();
             self.reserve_for_flush(bytes);
         }
@@ -142,9 +142,9 @@ impl TileContents {
         self.views.note_on_disk(index, version);
         let is_same = self.flight.as_mut().is_some_and(|flight| flight.note_written(index));
         match tile {
-            FlushedTile::Resident(tile) => {
+            FlushedTile::Resident(held) => {
                 // Let go first: changing a tile that somebody else holds would copy it.
-                drop(tile);
+                drop(held);
                 if is_same {
                     self.cache.note_on_disk(index);
                 }

@@ -1,5 +1,6 @@
 //! How room is made: resident tiles go into the compact form, and these to disk, beside the mapper.
 
+use super::contents::TileContents;
 use super::tile_cache::Eviction;
 use super::tile_pager::TilePager;
 use crate::error::{Error, Result};
@@ -97,7 +98,8 @@ impl TilePager<'_> {
     pub(super) fn evict_until(&mut self, bytes: usize, tiles: usize) -> Result<()> {
         loop {
             let (outside, is_flushing) = (self.outside_bytes(), self.contents.flight.is_some());
-            match self.contents.cache.next_eviction(bytes, tiles, outside, is_flushing) {
+            let TileContents { cache, flight, .. } = &*self.contents;
+            match cache.next_eviction(bytes, tiles, outside, flight.as_ref()) {
                 Some(Eviction::Resident(index)) => self.evict(index)?,
                 // It is being written, or cannot be before the flush has ended.
                 Some(Eviction::Compact(index)) if is_flushing && self.contents.cache.is_dirty(index) => {
@@ -120,8 +122,9 @@ impl TilePager<'_> {
     pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
         log::debug!("tile {index}: evicted");
         if self.contents.cache.has_compact_tier() {
+            self.contents.cache.make_compact(index)?;
             self.contents.leave_packed_to_flush(index);
-            return self.contents.cache.make_compact(index);
+            return Ok(());
         }
         if self.contents.cache.is_dirty(index) {
             self.write(index)?;

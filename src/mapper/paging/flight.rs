@@ -1,12 +1,15 @@
+use super::flusher::FlushedTile;
+use super::held_tile::HeldTile;
 use crate::persistence::CompactTile;
 use crate::space::{TileIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// What a flush beside the mapper holds of the tiles as of its scan, until they are written.
 ///
 /// It shares resident tiles with the cache. A scan that changes one leaves the flush with what was there (copy on
 /// write), which then counts on top. So that the next scan needs not wait for that, the flush itself copies the tiles
-/// that it will change.
+/// that it will change. One that has to leave memory meanwhile leaves the flush with its compact form.
 #[derive(Debug, Default)]
 pub(super) struct Flight {
     tiles: FxHashMap<TileIndex, FlightTile>,
@@ -21,24 +24,24 @@ pub(super) struct Flight {
 }
 
 /// A tile on its way to disk.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 struct FlightTile {
     bytes: usize,
     is_shared: bool,
+    /// What the flush will write, where that was resident when it began.
+    held: Option<Arc<HeldTile>>,
     /// Whether the cache may hold something else by now.
     has_changed: bool,
 }
 
 impl Flight {
-    /// A flush of some tiles, each with its bytes of memory, which takes so many bytes to make one, and of others that
-    /// are being saved.
-    pub(super) fn of(
-        tiles: impl Iterator<Item = (TileIndex, usize)>,
+    /// A flush of some tiles, which takes so many bytes of memory to make one, and of others that are being saved.
+    pub(super) fn of<'a>(
+        tiles: impl Iterator<Item = &'a FlushedTile>,
         bytes_to_make: usize,
         saving: Vec<(TileIndex, CompactTile)>,
     ) -> Self {
-        let tile = |(index, bytes)| (index, FlightTile { bytes, is_shared: true, has_changed: false });
-        let tiles = tiles.map(tile).collect();
+        let tiles = tiles.map(|tile| (tile.index(), FlightTile::of(tile))).collect();
         Self { tiles, bytes_to_make, saving, ..Self::default() }
     }
 
@@ -81,6 +84,26 @@ impl Flight {
         self.tiles.get(&index).is_some_and(|tile| tile.is_shared)
     }
 
+    /// Whether a tile of the cache, which nobody else holds, may leave memory in the compact form.
+    pub(super) fn may_be_packed(&self, index: TileIndex) -> bool {
+        let tile = self.tiles.get(&index).filter(|tile| tile.is_shared);
+        tile.and_then(|tile| tile.held.as_ref()).is_some_and(|held| held.may_be_packed())
+    }
+
+    /// Notes that a tile of the cache goes into the compact form as it is. The flush lets go of the tile itself, unless
+    /// it is about to be written or the flush holds an earlier one.
+    pub(super) fn note_packed(&mut self, index: TileIndex, packed: &CompactTile) {
+        if let Some(tile) = self.tiles.get_mut(&index)
+            && tile.is_shared
+            && let Some(held) = &tile.held
+            && held.hold_packed(packed.clone())
+        {
+            tile.bytes = held.bytes();
+            return;
+        }
+        self.note_own(index);
+    }
+
     /// Notes that the flush has a tile of its own from now on, be it a copy.
     pub(super) fn note_own(&mut self, index: TileIndex) {
         if let Some(tile) = self.tiles.get_mut(&index)
@@ -92,7 +115,7 @@ impl Flight {
     }
 
     /// Notes that the cache has another version of a tile, or none, from now on. One that only went into the compact
-    /// form is the same ([`Flight::note_own`]).
+    /// form is the same ([`Flight::note_packed`]).
     pub(super) fn note_changed(&mut self, index: TileIndex) {
         self.note_own(index);
         if let Some(tile) = self.tiles.get_mut(&index) {
@@ -112,5 +135,15 @@ impl Flight {
         self.own_bytes
             + self.bytes_to_make
             + hash_table_bytes::<(TileIndex, FlightTile)>(self.tiles.capacity())
+    }
+}
+
+impl FlightTile {
+    fn of(tile: &FlushedTile) -> Self {
+        let held = match tile {
+            FlushedTile::Resident(held) => Some(held.clone()),
+            FlushedTile::Compact(..) | FlushedTile::Unapplied(_) => None,
+        };
+        Self { bytes: tile.bytes(), is_shared: true, held, has_changed: false }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::flight::Flight;
 use super::flusher::{BegunFlush, FlushedTile};
+use super::held_tile::HeldTile;
 use super::shared_contents::unlocked;
 use super::shared_disk;
 use super::tile_cache::Cached;
@@ -89,7 +90,7 @@ impl TilePager<'_> {
         // What is being saved is not waited for here.
         let saving = self.saving_as_they_are();
         let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
-        tiles.extend(dirty.cloned().map(FlushedTile::Resident));
+        tiles.extend(dirty.cloned().map(|tile| FlushedTile::Resident(Arc::new(HeldTile::new(tile)))));
         let mut compact = Vec::new();
         for index in self.contents.cache.unsaved_compact().into_iter().rev() {
             if !self.contents.buffer.is_frozen(index) {
@@ -106,8 +107,7 @@ impl TilePager<'_> {
         let residents = tiles.iter().skip(after_saves).position(is_resident);
         let first = residents.map_or(tiles.len(), |first| after_saves + first);
         let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
-        let bytes_of_tiles = tiles.iter().chain(&compact).map(|tile| (tile.index(), tile.bytes()));
-        self.contents.flight = Some(Flight::of(bytes_of_tiles, bytes_to_make, saving));
+        self.contents.flight = Some(Flight::of(tiles.iter().chain(&compact), bytes_to_make, saving));
         self.contents.flush_reserve = self.contents.flush_reserve.max(1);
         Ok(BegunFlush { scan_number, tiles, compact, after_saves, soon_changed, writer, files, commit })
     }

@@ -3,6 +3,7 @@
 //! Until it has committed, the mapper saves no tile: a version that a later scan made must not get the name of one that
 //! the commit is to name. Where memory is so short that a dirty tile has to go, the mapper waits for the flush.
 
+use super::held_tile::{HeldForm, HeldTile};
 use super::shared_contents::SharedContents;
 use super::shared_disk::SharedDisk;
 use super::unapplied_tile::UnappliedTile;
@@ -51,7 +52,7 @@ pub(super) struct BegunFlush {
 
 /// A tile as it is to be written.
 pub(super) enum FlushedTile {
-    Resident(Arc<Tile>),
+    Resident(Arc<HeldTile>),
     Compact(TileIndex, CompactTile),
     /// It is made first, and only to be written.
     Unapplied(Box<UnappliedTile>),
@@ -106,11 +107,14 @@ impl FlushJob {
     fn copy_soon_changed(&mut self) {
         let tiles = self.begun.tiles.get_mut(self.begun.soon_changed.clone()).unwrap_or_default();
         for tile in tiles {
-            let FlushedTile::Resident(shared) = tile else { continue };
+            let FlushedTile::Resident(held) = tile else { continue };
             // A scan may have been first.
-            if self.contents.lock().is_shared_with_flush(shared.index()) {
-                *shared = Arc::new(Tile::clone(shared));
-                self.contents.lock().note_copied(shared.index());
+            if self.contents.lock().is_shared_with_flush(held.index())
+                && let Some(shared) = held.resident()
+                && held.hold_copy(Tile::clone(&shared))
+            {
+                drop(shared);
+                self.contents.lock().note_copied(held.index());
             }
         }
     }
@@ -235,7 +239,12 @@ impl BegunFlush {
     fn write(&self, tile: &FlushedTile, saver: &mut TileSaver, config: &MapConfig) -> Result<TileVersion> {
         let (writer, scan_number) = (&self.writer, self.scan_number);
         match tile {
-            FlushedTile::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
+            FlushedTile::Resident(held) => match held.begin_write() {
+                HeldForm::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
+                HeldForm::Compact(tile) => {
+                    saver.write_compact(writer, &config.grid, held.index(), &tile, scan_number)
+                }
+            },
             FlushedTile::Compact(index, tile) => {
                 saver.write_compact(writer, &config.grid, *index, tile, scan_number)
             }

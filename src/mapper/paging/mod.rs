@@ -19,6 +19,7 @@ mod eviction;
 mod flight;
 mod flush;
 mod flusher;
+mod held_tile;
 mod memory_plan;
 mod paged_tiles;
 mod prefetch;

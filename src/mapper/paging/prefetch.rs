@@ -69,7 +69,8 @@ impl TilePager<'_> {
     /// all are used about as often, it would have to go again at once, and its updates had better wait.
     fn may_replace_oldest(&self) -> bool {
         let often_scans = u64::from(self.contents.plan().often_scans);
-        self.contents.cache.scans_since_oldest().is_some_and(|scans| scans > 2 * often_scans)
+        let since = self.contents.cache.scans_since_oldest(self.contents.flight.as_ref());
+        since.is_some_and(|scans| scans > 2 * often_scans)
     }
 
     fn begin_prefetch(&mut self, index: TileIndex) {

@@ -83,19 +83,23 @@ impl ResidentTiles {
         }
     }
 
-    /// The tile whose last use is the longest ago, of those that nobody holds.
-    pub(super) fn least_recently_used(&self) -> Option<TileIndex> {
-        self.oldest().map(|resident| resident.tile.index())
+    /// The tile whose last use is the longest ago, of those that nobody holds, or only one that lets go of it.
+    pub(super) fn least_recently_used(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<TileIndex> {
+        self.oldest(lets_go).map(|resident| resident.tile.index())
     }
 
     /// For how many scans that tile has not been used.
-    pub(super) fn scans_since_oldest(&self) -> Option<u64> {
-        self.oldest().map(|resident| self.scans - resident.used)
+    pub(super) fn scans_since_oldest(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<u64> {
+        self.oldest(lets_go).map(|resident| self.scans - resident.used)
     }
 
-    fn oldest(&self) -> Option<&Resident> {
+    fn oldest(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<&Resident> {
         let mut oldest_first = self.tiles.iter().rev().map(|(_, resident)| resident);
-        oldest_first.find(|resident| Arc::strong_count(&resident.tile) == 1)
+        oldest_first.find(|resident| match Arc::strong_count(&resident.tile) {
+            1 => true,
+            2 => lets_go(resident.tile.index()),
+            _ => false,
+        })
     }
 
     /// Changes a tile, which keeps its place in the order.

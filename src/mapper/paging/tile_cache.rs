@@ -1,4 +1,5 @@
 use super::compact_tiles::CompactTiles;
+use super::flight::Flight;
 use super::memory_plan::MemoryPlan;
 use super::resident_tiles::ResidentTiles;
 use crate::config::{MapConfig, Storage};
@@ -92,8 +93,13 @@ impl TileCache {
     }
 
     /// For how many scans the resident tile that has to go next has not been used; `None` if none can go.
-    pub(super) fn scans_since_oldest(&self) -> Option<u64> {
-        self.resident.scans_since_oldest()
+    pub(super) fn scans_since_oldest(&self, flight: Option<&Flight>) -> Option<u64> {
+        self.resident.scans_since_oldest(|index| self.lets_go(flight, index))
+    }
+
+    /// Whether a flush that holds a resident tile lets go of it for its compact form.
+    fn lets_go(&self, flight: Option<&Flight>, index: TileIndex) -> bool {
+        self.has_compact_tier() && flight.is_some_and(|flight| flight.may_be_packed(index))
     }
 
     pub(super) fn is_resident(&self, index: TileIndex) -> bool {
@@ -218,6 +224,11 @@ impl TileCache {
         self.compact.remove(index);
     }
 
+    /// A tile in the compact form.
+    pub(super) fn compact(&self, index: TileIndex) -> Option<&CompactTile> {
+        self.compact.get(index)
+    }
+
     /// The dirty tiles in the compact form that are not being saved, oldest first.
     pub(super) fn unsaved_compact(&self) -> Vec<TileIndex> {
         self.compact.unsaved()
@@ -283,21 +294,23 @@ impl TileCache {
         self.limited_bytes(outside).saturating_add(bytes) > self.plan.bytes
     }
 
-    /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes. Tiles that somebody holds stay;
-    /// if all are held, nothing goes. While a flush goes on, tiles in the compact form that need no saving go first.
+    /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes. Tiles that somebody holds stay,
+    /// but for those that a flush lets go of; if all are held, nothing goes. While a flush goes on, tiles in the compact
+    /// form that need no saving go first.
     pub(super) fn next_eviction(
         &self,
         bytes: usize,
         tiles: usize,
         outside: usize,
-        is_flushing: bool,
+        flight: Option<&Flight>,
     ) -> Option<Eviction> {
         let is_short = self.is_short(bytes, outside);
         if !self.is_over(bytes, tiles, outside) {
             return None;
         }
-        let clean = if is_flushing { self.compact.oldest_clean() } else { None };
-        match (self.resident.least_recently_used(), clean.or_else(|| self.compact.oldest())) {
+        let clean = flight.and_then(|_| self.compact.oldest_clean());
+        let resident = self.resident.least_recently_used(|index| self.lets_go(flight, index));
+        match (resident, clean.or_else(|| self.compact.oldest())) {
             (_, Some(index)) if is_short && self.compact.bytes() > self.plan.compact_bytes => {
                 Some(Eviction::Compact(index))
             }

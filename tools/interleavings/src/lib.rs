@@ -149,6 +149,9 @@ mod mapper {
         mod flusher {
             source!("flusher.rs");
         }
+        mod held_tile {
+            source!("held_tile.rs");
+        }
         mod memory_plan;
         mod paged_tiles {
             source!("paged_tiles.rs");
