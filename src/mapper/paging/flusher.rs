@@ -209,8 +209,8 @@ impl FlushJob {
         loop {
             let Some(step) = self.disk.lock().store_mut().begin_step()? else { break };
             step.sync_kept()?;
-            for part in 0..step.parts() {
-                self.disk.lock().store_mut().put_in_place(&step, part)?;
+            for &tile in step.tiles() {
+                self.disk.lock().store_mut().put_in_place(&step, tile)?;
             }
             step.sync_names()?;
             self.disk.lock().store_mut().end_step(&step);

@@ -245,17 +245,17 @@ impl TileStore {
         Ok(Some(Step { files: self.files.clone(), tiles, pinned }))
     }
 
-    /// Puts the versions of a part of a step in place, once [`Step::sync_kept`] has succeeded.
+    /// Puts the version of a tile of a step in place, once [`Step::sync_kept`] has succeeded. On a busy disk a rename
+    /// takes milliseconds, so whoever shares the store lets others have it between two tiles.
     ///
     /// # Errors
     ///
     /// An I/O error.
-    pub fn put_in_place(&mut self, step: &Step, part: usize) -> Result<()> {
-        let tiles = step.tiles.chunks(TILES_OF_PART).nth(part).unwrap_or_default();
-        for &tile in step.pinned.iter().filter(|tile| tiles.contains(tile)) {
+    pub fn put_in_place(&mut self, step: &Step, tile: TileIndex) -> Result<()> {
+        if step.pinned.contains(&tile) {
             self.kept.is_durable(tile);
         }
-        self.checkpoint.rename(&self.files, tiles)
+        self.checkpoint.rename(&self.files, &[tile])
     }
 
     /// Ends a step, once [`Step::sync_names`] has succeeded.
@@ -365,8 +365,6 @@ impl TileStore {
 
 /// Tiles whose new names are made durable at once beside the map.
 const TILES_OF_STEP: usize = 64;
-/// Tiles that get their names while the map waits: a rename may take a millisecond.
-const TILES_OF_PART: usize = 8;
 
 /// A commit that has begun.
 #[derive(Debug)]
@@ -443,9 +441,9 @@ impl Step {
         sync_folders(&self.files, &self.pinned, |_| {})
     }
 
-    /// How many parts [`TileStore::put_in_place`] has.
-    pub fn parts(&self) -> usize {
-        self.tiles.len().div_ceil(TILES_OF_PART)
+    /// The tiles for [`TileStore::put_in_place`].
+    pub fn tiles(&self) -> &[TileIndex] {
+        &self.tiles
     }
 
     /// Makes durable that the versions have their names.
