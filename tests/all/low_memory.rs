@@ -1,5 +1,7 @@
 //! A limit in bytes: the layers between the tiles in use and the disk.
 
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
 use testkit::unsynced_disk::UnsyncedDisk;
@@ -140,4 +142,50 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
         let written = statistics.io.bytes_written as f64 / statistics.disk_bytes as f64;
         assert!(written < 4.0, "{written} bytes written for each of the map's");
     }
+}
+
+/// The flush holds all tiles until its disk goes on. They leave memory all the same.
+#[test]
+fn a_flush_that_stands_still_stops_no_scan() {
+    const BYTES: usize = 3_000_000;
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("map");
+    let scans = scans(60);
+    let mut expected = InMemoryMapper::new(config()).unwrap();
+    let gate = Arc::new(Mutex::new(()));
+    let disk = UnsyncedDisk::gated(&gate);
+    let tight = config().with_tight_memory_bytes(BYTES);
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk, &path), tight).unwrap();
+    let (before, beside) = scans.split_at(30);
+    for scan in before {
+        mapper.insert_scan(scan).unwrap();
+        expected.insert_scan(scan).unwrap();
+    }
+    let as_of_flush = expected.digest().unwrap();
+    let (closed, done) = mpsc::channel();
+    let (end, ended) = mpsc::channel::<()>();
+    let holder = thread::spawn(move || {
+        let guard = gate.lock().unwrap();
+        closed.send(()).unwrap();
+        // A scan that waited for the flush would wait for ever.
+        let stood_still = ended.recv_timeout(Duration::from_secs(60)).is_ok();
+        drop(guard);
+        stood_still
+    });
+    done.recv().unwrap();
+    mapper.begin_flush().unwrap();
+    let encoded = mapper.statistics().io.encoded;
+    for scan in beside {
+        mapper.insert_scan(scan).unwrap();
+        expected.insert_scan(scan).unwrap();
+    }
+    assert!(mapper.is_flushing());
+    assert!(mapper.statistics().io.encoded > encoded + 20, "no tile had to go");
+    let _ = end.send(());
+    assert!(holder.join().unwrap(), "a scan waited");
+    mapper.end_flush().unwrap();
+    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), as_of_flush);
+    assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
+    mapper.flush().unwrap();
+    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), expected.digest().unwrap());
 }

@@ -1,7 +1,7 @@
 //! Flushes beside the mapper: a thread writes the tiles as of a scan and commits them, while other scans go on.
 //!
 //! Until it has committed, the mapper saves no tile: a version that a later scan made must not get the name of one that
-//! the commit is to name. Where memory is so short that a dirty tile has to go, the mapper waits for the flush.
+//! the commit is to name. Where the compact form has no room for another dirty tile, the mapper waits for the flush.
 
 use super::held_tile::{HeldForm, HeldTile};
 use super::shared_contents::SharedContents;

@@ -1,6 +1,6 @@
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, FsDisk, ReaderWatch, Scratch};
@@ -14,29 +14,41 @@ pub struct UnsyncedDisk {
     beside_time: Duration,
     /// How long it takes to open a file for reading on the thread of a name.
     read_time: Option<(&'static str, Duration)>,
+    /// While somebody holds it, the thread that flushes beside the mapper begins no file.
+    gate: Arc<Mutex<()>>,
 }
 
 impl UnsyncedDisk {
     pub fn shared() -> Arc<dyn Disk> {
-        Self::taking(Duration::ZERO)
+        Arc::new(Self::new())
+    }
+
+    fn new() -> Self {
+        let (sync_time, beside_time) = (Duration::ZERO, Duration::ZERO);
+        Self { sync_time, beside_time, read_time: None, gate: Arc::default() }
     }
 
     /// A medium that takes so long for a sync, 16 of them at once, whatever has been written.
     pub fn taking(sync_time: Duration) -> Arc<dyn Disk> {
-        Arc::new(Self { sync_time, beside_time: Duration::ZERO, read_time: None })
+        Arc::new(Self { sync_time, ..Self::new() })
     }
 
     /// A disk that is slow for the thread that writes beside the mapping, so that the other thread gets ahead.
     #[allow(dead_code, reason = "benches share this file")]
     pub fn slow_beside(beside_time: Duration) -> Arc<dyn Disk> {
-        Arc::new(Self { sync_time: Duration::ZERO, beside_time, read_time: None })
+        Arc::new(Self { beside_time, ..Self::new() })
     }
 
     /// A disk from which the thread of a name reads slowly.
     #[allow(dead_code, reason = "benches share this file")]
     pub fn slow_to_read_for(thread: &'static str, read_time: Duration) -> Arc<dyn Disk> {
-        let (sync_time, beside_time) = (Duration::ZERO, Duration::ZERO);
-        Arc::new(Self { sync_time, beside_time, read_time: Some((thread, read_time)) })
+        Arc::new(Self { read_time: Some((thread, read_time)), ..Self::new() })
+    }
+
+    /// A disk on which the thread that flushes beside the mapper begins no file while somebody holds this.
+    #[allow(dead_code, reason = "benches share this file")]
+    pub fn gated(gate: &Arc<Mutex<()>>) -> Arc<dyn Disk> {
+        Arc::new(Self { gate: gate.clone(), ..Self::new() })
     }
 }
 
@@ -84,8 +96,10 @@ impl Disk for UnsyncedDisk {
     }
 
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>> {
-        if thread::current().name() == Some("voxtile-save") {
-            wait(self.beside_time);
+        match thread::current().name() {
+            Some("voxtile-save") => wait(self.beside_time),
+            Some("voxtile-flush") => drop(self.gate.lock().unwrap_or_else(PoisonError::into_inner)),
+            _ => {}
         }
         Ok(Box::new(Unsynced(FsDisk.create(path)?, self.sync_time)))
     }
