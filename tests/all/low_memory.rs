@@ -147,7 +147,7 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
 /// The flush holds all tiles until its disk goes on. They leave memory all the same.
 #[test]
 fn a_flush_that_stands_still_stops_no_scan() {
-    const BYTES: usize = 3_000_000;
+    const BYTES: usize = 6_000_000;
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map");
     let scans = scans(60);
@@ -168,7 +168,7 @@ fn a_flush_that_stands_still_stops_no_scan() {
         let guard = gate.lock().unwrap();
         closed.send(()).unwrap();
         // A scan that waited for the flush would wait for ever.
-        let stood_still = ended.recv_timeout(Duration::from_secs(60)).is_ok();
+        let stood_still = ended.recv_timeout(Duration::from_secs(20)).is_ok();
         drop(guard);
         stood_still
     });
