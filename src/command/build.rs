@@ -16,10 +16,11 @@ use crate::io::{PointRoom, ReadOptions, StoredScan};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer};
 use crate::space::Point;
-use crate::store::InputRecord;
-use crate::{Error, MapConfig, MemoryLimit};
+use crate::store::{FsDisk, InputRecord, UnsyncedDisk};
+use crate::{Error, MapConfig, MapPath, MemoryLimit};
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// The share of the limit of memory that the points of a scan may take, as they are read and as they are mapped.
@@ -50,7 +51,7 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     let Some((reader, input)) = opened else { return Ok(None) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
     let mut mapper = match exists {
-        true => Some(OutOfCoreTileMapper::open(&args.output, config.clone())?),
+        true => Some(OutOfCoreTileMapper::open(place_of_map(args), config.clone())?),
         false => None,
     };
     if !intake.read_lead()? {
@@ -68,7 +69,11 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
             check(intake.first(), &config)?;
             let mut config = config;
             config.crs = crs;
-            none.insert(OutOfCoreTileMapper::create(whole_map(&args.output)?, config)?)
+            whole_map(&args.output)?;
+            none.insert(match args.piece_of {
+                None => OutOfCoreTileMapper::create(&args.output, config)?,
+                Some(map_id) => OutOfCoreTileMapper::create_as(place_of_map(args), config, map_id)?,
+            })
         }
     };
     mapper.stop_with(stop.clone());
@@ -243,6 +248,14 @@ fn stopped_early(args: &BuildArgs) -> ExitCode {
     let message = "stopped before the first scan; the map is as it was";
     JsonTo::output_if(args.json).tell_stopped(message);
     ExitCode::from(INTERRUPTED)
+}
+
+/// Where the map is made. A piece of a map is made again after a crash, and made durable when it is handed over.
+fn place_of_map(args: &BuildArgs) -> MapPath {
+    match args.piece_of {
+        None => MapPath::from(&args.output),
+        Some(_) => MapPath::on(Arc::new(UnsyncedDisk::of(Arc::new(FsDisk))), &args.output),
+    }
 }
 
 /// Whether there is a map to go on with.
