@@ -242,6 +242,7 @@ mod tests {
                         .map(point)
                         .for_each(|(point, intensity)| store.push(point, intensity).unwrap()),
                 }
+                assert!(store.points.len() <= store.room.most_points);
             }
             assert_eq!((store.len(), store.file.is_some()), (count, most_bytes < usize::MAX));
             for range in

@@ -60,7 +60,7 @@ fn bounds_of(
             ends = ends.map(|end| end.max(origin - range).min(origin + range));
         }
         if has_ends {
-            bounds = [origin.min(ends[0]), origin.max(ends[1])];
+            bounds = ends;
         }
         let cleared = no_return_range_m.unwrap_or(0.0);
         [bounds[0].min(origin - cleared), bounds[1].max(origin + cleared)]

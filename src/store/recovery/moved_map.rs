@@ -1,5 +1,6 @@
-use super::staged_map::{check_is_free, remove_content, remove_unfinished, staging_folder};
+use super::staged_map::{check_is_free, remove_content, staging_folder};
 use crate::error::{Error, Result};
+use crate::space::TileIndex;
 use crate::store::WriterLock;
 use crate::store::commit::checkpoint::TILES_SYNCED_AT_ONCE;
 use crate::store::disk::Disk;
@@ -14,7 +15,8 @@ use std::sync::Arc;
 /// writer did so or not ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). As a [`StagedMap`](super::staged_map::StagedMap)
 /// the map is there whole, or not at all; each file is synced once, after all have been written.
 ///
-/// `false` if the file system cannot move it there: it is where it was, then. Of each file of a tile the length alone
+/// `false` if the file system cannot move it there, or if an attempt that was killed left something beside that place: it
+/// is where it was, then. Of each file of a tile the length alone
 /// is compared with the log.
 ///
 /// # Errors
@@ -25,16 +27,23 @@ pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool>
     place::check_place(&**disk, folder)?;
     check_is_free(&**disk, folder)?;
     let unfinished = staging_folder(folder)?;
-    remove_all(&**disk, &unfinished)?;
     let parent = map_folder::parent_of(folder);
     map_folder::create_folders(&**disk, parent)?;
     // It goes along with the folder, and keeps others from taking that for something left behind.
     let lock = WriterLock::take(&**disk, &Layout::new(map))?;
+    let store = TileStore::open_read_only(disk.clone(), map)?;
+    let mut tiles: Vec<_> = store.tiles().collect();
+    tiles.sort_unstable();
+    for &tile in &tiles {
+        store.layout().files().iter().try_for_each(|&file| store.check_length(tile, file))?;
+    }
     if disk.rename(map, &unfinished).is_err() {
         return Ok(false);
     }
-    if let Err(error) = finish(disk, &unfinished, folder) {
-        let _ = remove_content(&**disk, &Layout::new(&unfinished), true);
+    let layout = Layout::new(&unfinished).with_storage(store.layout().storage());
+    if let Err(error) = sync_map(&**disk, &layout, &tiles).and_then(|()| finish(&**disk, &unfinished, folder))
+    {
+        let _ = remove_content(&**disk, &layout, true);
         let _ = disk.remove_folder(&unfinished);
         return Err(error);
     }
@@ -43,37 +52,28 @@ pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool>
     Ok(true)
 }
 
-fn finish(disk: &Arc<dyn Disk>, unfinished: &Path, folder: &Path) -> Result<()> {
-    sync_map(&TileStore::open_read_only(disk.clone(), unfinished)?)?;
-    check_is_free(&**disk, folder)?;
-    if disk.kind_at(folder)?.is_some() {
-        disk.remove_folder(folder).map_err(|error| Error::io(folder, "replace", error))?;
-    }
-    disk.rename(unfinished, folder).map_err(|error| Error::io(unfinished, "rename", error))
-}
-
 /// Makes the files of a map durable, and their names.
-fn sync_map(store: &TileStore) -> Result<()> {
-    let (disk, layout) = (&**store.disk(), store.layout());
+fn sync_map(disk: &dyn Disk, layout: &Layout, tiles: &[TileIndex]) -> Result<()> {
     let mut own = vec![layout.metadata(), layout.commit_log()];
     if disk.kind_at(&layout.scans())?.is_some() {
         own.push(layout.scans());
     }
     sync_paths(disk, &own, &[])?;
-    let mut tiles: Vec<_> = store.tiles().collect();
-    tiles.sort_unstable();
     for tiles in tiles.chunks(TILES_SYNCED_AT_ONCE) {
-        let mut files = Vec::with_capacity(tiles.len() * layout.files().len());
-        for &tile in tiles {
-            for &file in layout.files() {
-                store.check_length(tile, file)?;
-                files.push(layout.current(tile, file));
-            }
-        }
+        let files = tiles.iter().flat_map(|&tile| layout.files().iter().map(move |&file| (tile, file)));
+        let files: Vec<_> = files.map(|(tile, file)| layout.current(tile, file)).collect();
         let folders: Vec<_> = tiles.iter().map(|&tile| layout.tile_folder(tile)).collect();
         sync_paths(disk, &files, &folders)?;
     }
     sync_paths(disk, &[], &[layout.folder().to_owned()])
+}
+
+fn finish(disk: &dyn Disk, unfinished: &Path, folder: &Path) -> Result<()> {
+    check_is_free(disk, folder)?;
+    if disk.kind_at(folder)?.is_some() {
+        disk.remove_folder(folder).map_err(|error| Error::io(folder, "replace", error))?;
+    }
+    disk.rename(unfinished, folder).map_err(|error| Error::io(unfinished, "rename", error))
 }
 
 fn sync_paths(disk: &dyn Disk, files: &[PathBuf], folders: &[PathBuf]) -> Result<()> {
@@ -82,14 +82,4 @@ fn sync_paths(disk: &dyn Disk, files: &[PathBuf], folders: &[PathBuf]) -> Result
     paths
         .zip(of_files.into_iter().chain(of_folders))
         .try_for_each(|(path, synced)| synced.map_err(|error| Error::io(path, "sync", error)))
-}
-
-/// Removes what an interrupted attempt left, with its folder.
-fn remove_all(disk: &dyn Disk, unfinished: &Path) -> Result<()> {
-    if disk.kind_at(unfinished)?.is_none() {
-        return Ok(());
-    }
-    remove_unfinished(disk, unfinished)?;
-    remove_content(disk, &Layout::new(unfinished), true)?;
-    disk.remove_folder(unfinished).map_err(|error| Error::io(unfinished, "remove", error))
 }
