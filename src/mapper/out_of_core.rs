@@ -55,7 +55,8 @@ impl OutOfCoreTileMapper {
     }
 
     /// The same with an id that the caller names: a map that is to be a piece of another
-    /// ([`operations::move_piece`](crate::operations::move_piece())). Two maps of an id are otherwise taken for the same.
+    /// ([`operations::move_piece`](crate::operations::move_piece())). Otherwise two maps of an id are taken for the
+    /// same.
     ///
     /// # Errors
     ///

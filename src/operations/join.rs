@@ -6,8 +6,8 @@ use crate::mapper::{MapReader, MapView};
 use crate::store::{MapPath, hex};
 use std::path::Path;
 
-/// Makes one map of pieces ([`make_piece`](super::make_piece), [`move_piece`](super::move_piece())) of the same id, which
-/// it gets.
+/// Makes one map of pieces ([`make_piece`](super::make_piece), [`move_piece`](super::move_piece())) of the same id,
+/// which it gets.
 ///
 /// The map is what [`merge`](super::merge()) would make of the pieces, but no tile is read: its files get a second name
 /// in the map, or are copied where the file system has no such names. Pieces are opened one at a time, and stay whole,

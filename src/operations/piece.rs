@@ -43,8 +43,9 @@ pub fn make_piece(
 /// no tile is read or written, and each file is synced once.
 ///
 /// That needs a map with the id `map_id` and a place in the same file system. Nobody else has seen the map; it may have
-/// been written without syncs ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). Of its tiles' files the length is compared
-/// with the log. A map that cannot be moved is copied, and every byte is compared; it stays where it is then.
+/// been written without syncs ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). Of its tiles' files the length is
+/// compared with the log, and they go on to say of which of the map's scans they are. A map that cannot be moved is
+/// copied, and every byte is compared; it stays where it is then.
 ///
 /// # Errors
 ///

@@ -12,8 +12,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Moves a map that nobody writes to, to a place that is free, and makes all of it durable there, whether the map's
-/// writer did so or not ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). As a [`StagedMap`](super::staged_map::StagedMap)
-/// the map is there whole, or not at all; each file is synced once, after all have been written.
+/// writer did so or not ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). As a
+/// [`StagedMap`](super::staged_map::StagedMap) the map is there whole, or not at all; each file is synced once, after
+/// all have been written.
 ///
 /// `false` if the file system cannot move it there, or if an attempt that was killed left something beside that place: it
 /// is where it was, then. Of each file of a tile the length alone
