@@ -16,9 +16,8 @@ use std::sync::Arc;
 /// [`StagedMap`](super::staged_map::StagedMap) the map is there whole, or not at all; each file is synced once, after
 /// all have been written.
 ///
-/// `false` if the file system cannot move it there, or if an attempt that was killed left something beside that place: it
-/// is where it was, then. Of each file of a tile the length alone
-/// is compared with the log.
+/// `false` if the file system cannot move it there, or if an attempt that was killed left something beside that place:
+/// it is where it was, then. Of each file of a tile the length alone is compared with the log.
 ///
 /// # Errors
 ///
