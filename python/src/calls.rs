@@ -2,6 +2,7 @@
 
 use crate::arrays::object;
 use crate::errors::{exception_of_call, with_keywords};
+use crate::operations::map_id_of;
 use crate::watched::{Teller, left_to_itself};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -10,15 +11,21 @@ use std::sync::Arc;
 use voxtile::Stop;
 use voxtile::command::{CallError, Listener, Watch, calls};
 
-/// `voxtile build` with these arguments: a dict, what it prints with `--json`.
+/// `voxtile build` with these arguments: a dict, what it prints with `--json`. With `piece_of`, 32 hexadecimal digits,
+/// it makes a piece of the map with this id, which is not durable until `move_piece` has moved it.
 #[pyfunction]
-#[pyo3(signature = (arguments, progress=None))]
+#[pyo3(signature = (arguments, progress=None, *, piece_of=None))]
 pub fn call_build<'py>(
     py: Python<'py>,
     arguments: Vec<OsString>,
     progress: Option<Py<PyAny>>,
+    piece_of: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    called(py, progress, move |watch| calls::build(arguments, watch))
+    let piece_of = piece_of.map(|digits| map_id_of(py, "piece_of", digits)).transpose()?;
+    called(py, progress, move |watch| match piece_of {
+        None => calls::build(arguments, watch),
+        Some(map_id) => calls::build_piece(arguments, map_id, watch),
+    })
 }
 
 /// `voxtile export` with these arguments: a dict, what it prints with `--json`.

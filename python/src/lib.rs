@@ -46,14 +46,14 @@ mod _voxtile {
     #[pymodule_export]
     use super::operations::{
         adopt, clear, convert, crop, decay, delete_snapshot, describe, diff, import_octree, join, make_piece,
-        merge, repair, revert, snapshots, verify,
+        merge, move_piece, repair, revert, snapshots, verify,
     };
     #[pymodule_export]
     use super::remapping::{remap, remap_as, remove_points, remove_scans};
     #[pymodule_export]
     use super::report::InsertReport;
     #[pymodule_export]
-    use super::scan_iterator::{ScanIterator, count_scans, open_scans};
+    use super::scan_iterator::{ScanIterator, count_scans, open_scans, scan_reaches};
     #[pymodule_export]
     use super::tile_iterator::TileIterator;
     #[pymodule_export]

@@ -148,12 +148,35 @@ pub fn make_piece<'py>(
     map_id: &str,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let digits = u128::from_str_radix(map_id, 16).ok().filter(|_| map_id.len() == 32);
-    let id = digits.ok_or_else(|| wrong(py, "map_id", format!("{map_id:?} is not 32 hexadecimal digits")))?;
+    let id = map_id_of(py, "map_id", map_id)?;
     told(py, progress, |_, progress| {
         let map = MapReader::open(&map, 1)?;
-        operations::make_piece(&map, &output, id.to_be_bytes(), |done, all| progress.tell(done, all))
+        operations::make_piece(&map, &output, id, |done, all| progress.tell(done, all))
     })
+}
+
+/// Moves a map that nobody needs any more to its place as a piece of a map that `join` makes, and makes it durable. It
+/// is copied as by `make_piece` where it has another id, or is on another file system.
+#[pyfunction]
+#[pyo3(signature = (map, output, map_id, *, progress=None))]
+pub fn move_piece<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    output: PathBuf,
+    map_id: &str,
+    progress: Callback,
+) -> PyResult<Bound<'py, PyAny>> {
+    let id = map_id_of(py, "map_id", map_id)?;
+    told(py, progress, |_, progress| {
+        operations::move_piece(&map, &output, id, |done, all| progress.tell(done, all))
+    })
+}
+
+/// The id of a map from 32 hexadecimal digits.
+pub fn map_id_of(py: Python<'_>, argument: &str, digits: &str) -> PyResult<[u8; 16]> {
+    let id = u128::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 32);
+    let reason = || format!("{digits:?} is not 32 hexadecimal digits");
+    id.map(u128::to_be_bytes).ok_or_else(|| wrong(py, argument, reason()))
 }
 
 /// Makes one map of pieces with the same id that have no tile in common, without reading their tiles.
@@ -221,20 +244,27 @@ struct Described {
     max_range: Option<f64>,
 }
 
-/// Makes a map of the part of another that is in a box, or outside it.
+/// Makes a map of the part of another that is in a box, or outside it. With `piece_of` it is a piece of the map with
+/// this id, and not durable until `move_piece` has moved it.
 #[pyfunction]
-#[pyo3(signature = (map, output, region, *, outside=false, progress=None))]
+#[pyo3(signature = (map, output, region, *, outside=false, piece_of=None, progress=None))]
 pub fn crop<'py>(
     py: Python<'py>,
     map: MapOrSnapshot,
     output: PathBuf,
     region: &Bound<'py, PyAny>,
     outside: bool,
+    piece_of: Option<&str>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let part = part_of(region, outside)?;
+    let piece_of = piece_of.map(|digits| map_id_of(py, "piece_of", digits)).transpose()?;
     told(py, progress, |_, progress| {
-        operations::crop(&map.open()?, &part, &output, |done, all| progress.tell(done, all))
+        let tell = |done, all| progress.tell(done, all);
+        match piece_of {
+            None => operations::crop(&map.open()?, &part, &output, tell),
+            Some(map_id) => operations::crop_piece(&map.open()?, &part, &output, map_id, tell),
+        }
     })
 }
 

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use voxtile::command::{CallError, calls};
-use voxtile::io::{ScanSource, SensorScan};
+use voxtile::io::{ScanReach, ScanSource, SensorScan};
 use voxtile::mapper::{KeptScan, KeptScans, MapReader};
 use voxtile::scan::ScanPoints;
 use voxtile::{Pose, Result as Fallible, Stop};
@@ -116,17 +116,7 @@ impl ScanIterator {
 /// The scans of a path, read with these arguments of `voxtile build`.
 #[pyfunction]
 pub fn open_scans(py: Python<'_>, path: PathBuf, arguments: Vec<OsString>) -> PyResult<ScanIterator> {
-    let opened = left_to_itself(py, &Stop::default(), move || -> Result<Scans, CallError> {
-        if !(arguments.is_empty() && is_map(&path)) {
-            return Ok(Scans::Input(calls::open_scans(&path, arguments)?));
-        }
-        let reader = MapReader::open(&path, 1)?;
-        let (mut records, mut count) = (reader.kept_scans()?, 0);
-        while records.next_record()?.is_some() {
-            count += 1;
-        }
-        Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
-    })?;
+    let opened = left_to_itself(py, &Stop::default(), move || open(&path, arguments))?;
     let scans = opened.map_err(|error| exception_of_call(py, &error))?;
     let count = match &scans {
         Scans::Input(scans) => scans.len_hint(),
@@ -136,6 +126,47 @@ pub fn open_scans(py: Python<'_>, path: PathBuf, arguments: Vec<OsString>) -> Py
         reading: Arc::new(Mutex::new(Reading { scans, read: None })),
         left: AtomicUsize::new(count.unwrap_or(0)),
     })
+}
+
+fn open(path: &Path, arguments: Vec<OsString>) -> Result<Scans, CallError> {
+    if !(arguments.is_empty() && is_map(path)) {
+        return Ok(Scans::Input(calls::open_scans(path, arguments)?));
+    }
+    let reader = MapReader::open(path, 1)?;
+    let (mut records, mut count) = (reader.kept_scans()?, 0);
+    while records.next_record()?.is_some() {
+        count += 1;
+    }
+    Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
+}
+
+/// Content and bounds of a scan: west, south, east, north.
+type Reach = (String, Option<(f64, f64, f64, f64)>);
+
+/// Reads the scans of a path, and tells of each what tells it from others, 32 hexadecimal digits, and a box around it
+/// and its rays along x and y in metres, `None` if it leaves nothing.
+#[pyfunction]
+#[pyo3(signature = (path, arguments, *, max_range=None, no_return_range=None))]
+pub fn scan_reaches(
+    py: Python<'_>,
+    path: PathBuf,
+    arguments: Vec<OsString>,
+    max_range: Option<f64>,
+    no_return_range: Option<f64>,
+) -> PyResult<Vec<Reach>> {
+    let stop = Stop::default();
+    let asked = stop.clone();
+    let reaches = left_to_itself(py, &stop, move || -> Result<Vec<Reach>, CallError> {
+        let (mut scans, mut reaches) = (open(&path, arguments)?, Vec::new());
+        while let Some(scan) = scans.next()? {
+            asked.check()?;
+            let ScanReach { content, bounds } = ScanReach::of(&scan, max_range, no_return_range);
+            let content = content.iter().map(|byte| format!("{byte:02x}")).collect();
+            reaches.push((content, bounds.map(|[low, high]| (low[0], low[1], high[0], high[1]))));
+        }
+        Ok(reaches)
+    })?;
+    reaches.map_err(|error| exception_of_call(py, &error))
 }
 
 /// The number of scans of a path; where only reading tells it, they are read.

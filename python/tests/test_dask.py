@@ -8,6 +8,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -211,6 +212,22 @@ def test_a_scheduler_that_is_killed_is_an_error_and_the_next_run_goes_on(
     with distributed.Client(n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
         report = voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
     assert report["regions_done_before"] >= 2 and voxtile.digest(tmp_path / "map") == whole
+
+
+def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(
+    drive: Path, whole: str, tmp_path: Path
+) -> None:
+    memory = Path("/dev/shm")
+    if not memory.is_dir() or memory.stat().st_dev == tmp_path.stat().st_dev:
+        pytest.skip("there is no other file system")
+    with tempfile.TemporaryDirectory(dir=memory) as local:
+        cluster = distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, local_directory=local
+        )
+        with cluster, distributed.Client(cluster) as client:
+            voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    assert voxtile.digest(tmp_path / "map") == whole
+    assert voxtile.verify(tmp_path / "map")["findings"] == []
 
 
 def test_what_a_build_in_parts_does_not_take_is_named(client: object, drive: Path, tmp_path: Path) -> None:

@@ -7,19 +7,20 @@ use crate::command::map_at::whole_map;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
 use crate::command::scan_queue::{ScanQueue, WhenBehind};
-use crate::command::scan_reader::ScanReader;
+use crate::command::scan_reader::{Marking, ScanReader};
 use crate::command::stop_signal;
 use crate::command::summary::Summary;
 use crate::command::watch::Watch;
 use crate::command::{INTERRUPTED, say};
-use crate::io::{PointRoom, ReadOptions, StoredScan};
+use crate::io::{PointRoom, ReadOptions, ScanMark, StoredScan};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer};
 use crate::space::Point;
-use crate::store::InputRecord;
-use crate::{Error, MapConfig, MemoryLimit};
+use crate::store::{FsDisk, InputRecord, UnsyncedDisk};
+use crate::{Error, MapConfig, MapPath, MemoryLimit};
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// The share of the limit of memory that the points of a scan may take, as they are read and as they are mapped.
@@ -46,11 +47,15 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
     check_no_rays(args, &config)?;
     check_when_behind(args)?;
-    let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room(args, &config), stop.clone())?;
+    // Nobody goes on with a piece, or asks whether it has a scan.
+    let mark: Marking =
+        if args.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
+    let room = room(args, &config);
+    let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room, mark, stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
     let mut mapper = match exists {
-        true => Some(OutOfCoreTileMapper::open(&args.output, config.clone())?),
+        true => Some(OutOfCoreTileMapper::open(place_of_map(args), config.clone())?),
         false => None,
     };
     if !intake.read_lead()? {
@@ -68,7 +73,11 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
             check(intake.first(), &config)?;
             let mut config = config;
             config.crs = crs;
-            none.insert(OutOfCoreTileMapper::create(whole_map(&args.output)?, config)?)
+            whole_map(&args.output)?;
+            none.insert(match args.piece_of {
+                None => OutOfCoreTileMapper::create(&args.output, config)?,
+                Some(map_id) => OutOfCoreTileMapper::create_as(place_of_map(args), config, map_id)?,
+            })
         }
     };
     mapper.stop_with(stop.clone());
@@ -89,6 +98,7 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
         report: ScanReport::default(),
         scans: 0,
         has_rays: !args.no_rays,
+        notes_content: args.piece_of.is_none(),
     };
     let outcome = build.insert_all();
     build.progress.say("flushing");
@@ -121,6 +131,7 @@ struct Build<'a> {
     report: ScanReport,
     scans: u64,
     has_rays: bool,
+    notes_content: bool,
 }
 
 impl Build<'_> {
@@ -134,22 +145,31 @@ impl Build<'_> {
                     Next::Stopped => return Ok(()),
                     Next::End => {
                         // The last scans may have been skipped.
-                        mapper.note_input_content(self.intake.content());
+                        self.note_content();
                         return Ok(());
                     }
                 };
-            let inserted =
-                if self.has_rays { mapper.insert_points(&scan) } else { insert_hits(mapper, &scan) };
+            let inserted = if self.has_rays {
+                self.mapper.insert_points(&scan)
+            } else {
+                insert_hits(self.mapper, &scan)
+            };
             match inserted {
                 Ok(report) => self.report += report,
                 Err(Error::Stopped) => return Ok(()),
                 Err(error) => return Err(error.into()),
             }
-            mapper.note_input_content(self.intake.content());
+            self.note_content();
             self.scans += 1;
             self.progress.step();
-            self.progress.show(mapper);
-            flush_if(schedule.is_due(), mapper, schedule)?;
+            self.progress.show(self.mapper);
+            flush_if(self.schedule.is_due(), self.mapper, &mut self.schedule)?;
+        }
+    }
+
+    fn note_content(&mut self) {
+        if self.notes_content {
+            self.mapper.note_input_content(self.intake.content());
         }
     }
 }
@@ -245,6 +265,14 @@ fn stopped_early(args: &BuildArgs) -> ExitCode {
     ExitCode::from(INTERRUPTED)
 }
 
+/// Where the map is made. A piece of a map is made again after a crash, and made durable when it is handed over.
+fn place_of_map(args: &BuildArgs) -> MapPath {
+    match args.piece_of {
+        None => MapPath::from(&args.output),
+        Some(_) => MapPath::on(Arc::new(UnsyncedDisk::of(Arc::new(FsDisk))), &args.output),
+    }
+}
+
 /// Whether there is a map to go on with.
 fn exists(args: &BuildArgs) -> anyhow::Result<bool> {
     if args.output.is_file() {
@@ -315,7 +343,8 @@ fn begin(
         let (path, what, wanted) = (args.output.clone(), "been built from input", name.to_owned());
         return Err(Error::Mismatch { path, what, found, wanted }.into());
     }
-    mapper.begin_input(InputRecord { content: Some(intake.content()), ..InputRecord::from(name) })?;
+    let content = args.piece_of.is_none().then(|| intake.content());
+    mapper.begin_input(InputRecord { content, ..InputRecord::from(name) })?;
     Ok(Some(0))
 }
 

@@ -4,6 +4,7 @@
 use super::args::{BuildArgs, ExportArgs, ReadArgs};
 use super::call_error::CallError;
 use super::read_options::read_options;
+use super::summary::Summary;
 use super::watch::Watch;
 use super::{build as scans_to_map, export as map_to_file, scan_input};
 use crate::Error;
@@ -30,8 +31,18 @@ struct Arguments<A: Args> {
 ///
 /// What the command fails for; [`Error::Stopped`] before the first scan.
 pub fn build(arguments: Vec<OsString>, watch: &Watch) -> Result<Value, CallError> {
-    let summary = scans_to_map::build(&parse::<BuildArgs>(arguments)?, watch)?.ok_or(Error::Stopped)?;
-    Ok(serde_json::to_value(summary).map_err(anyhow::Error::from)?)
+    told(scans_to_map::build(&parse::<BuildArgs>(arguments)?, watch)?)
+}
+
+/// The same for a map that is to become a piece of another one, whose id it gets. It is not durable: whoever crashes
+/// makes it again, and [`operations::move_piece`](crate::operations::move_piece()) makes it durable.
+///
+/// # Errors
+///
+/// As for [`build`].
+pub fn build_piece(arguments: Vec<OsString>, piece_of: [u8; 16], watch: &Watch) -> Result<Value, CallError> {
+    let args = BuildArgs { piece_of: Some(piece_of), ..parse(arguments)? };
+    told(scans_to_map::build(&args, watch)?)
 }
 
 /// `voxtile export` with these arguments; returns what it prints with `--json`. Where it is stopped, nothing is
@@ -52,6 +63,10 @@ pub fn export(arguments: Vec<OsString>, watch: &Watch) -> Result<Value, CallErro
 pub fn open_scans(scans: &Path, arguments: Vec<OsString>) -> Result<Box<dyn ScanSource + Send>, CallError> {
     let options = read_options(&parse::<ReadArgs>(arguments)?)?;
     Ok(scan_input::open(scans, &options)?)
+}
+
+fn told(summary: Option<Summary>) -> Result<Value, CallError> {
+    Ok(serde_json::to_value(summary.ok_or(Error::Stopped)?).map_err(anyhow::Error::from)?)
 }
 
 fn parse<A: Args>(arguments: Vec<OsString>) -> crate::Result<A> {

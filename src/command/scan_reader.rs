@@ -32,6 +32,9 @@ pub struct Opened {
     pub poses: PoseSource,
 }
 
+/// How scans are told from each other.
+pub type Marking = fn(&StoredScan) -> crate::Result<ScanMark>;
+
 /// A scan, and what tells it from others.
 pub struct ReadScan {
     pub scan: StoredScan,
@@ -52,7 +55,7 @@ pub enum Read {
 
 enum Place {
     Thread { requests: Sender<Request>, answers: Receiver<Answer> },
-    Here(Box<dyn ScanSource + Send>, PointRoom),
+    Here(Box<dyn ScanSource + Send>, PointRoom, Marking),
 }
 
 enum Request {
@@ -78,6 +81,7 @@ impl ScanReader {
         scans: PathBuf,
         options: ReadOptions,
         room: PointRoom,
+        mark: Marking,
         stop: Stop,
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
@@ -94,8 +98,8 @@ impl ScanReader {
             let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
             while is_wanted && let Ok(request) = requests_in.recv() {
                 is_wanted = match request {
-                    Request::Ahead(queue) => read_ahead(&mut *source, &room, &queue),
-                    request => answers_out.send(answer(&mut *source, &request, &room)).is_ok(),
+                    Request::Ahead(queue) => read_ahead(&mut *source, &room, mark, &queue),
+                    request => answers_out.send(answer(&mut *source, &request, &room, mark)).is_ok(),
                 };
             }
         };
@@ -113,7 +117,7 @@ impl ScanReader {
                 let source = scan_input::open(local.path(), &options)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((
-                    Self { place: Place::Here(source, here), stop, ahead: None, _scans: local },
+                    Self { place: Place::Here(source, here, mark), stop, ahead: None, _scans: local },
                     opened,
                 )))
             }
@@ -173,7 +177,9 @@ impl ScanReader {
     ) -> anyhow::Result<Option<Answer>> {
         match &mut self.place {
             Place::Here(..) if self.stop.is_set() => return Ok(None),
-            Place::Here(source, room) => return Ok(Some(answer(&mut **source, &request, room))),
+            Place::Here(source, room, mark) => {
+                return Ok(Some(answer(&mut **source, &request, room, *mark)));
+            }
             // A thread that is gone is noticed by waiting for it.
             Place::Thread { requests, .. } => drop(requests.send(request)),
         }
@@ -219,9 +225,9 @@ fn take(queue: &ScanQueue, stop: &Stop, idle: &mut dyn FnMut() -> crate::Result<
 }
 
 /// Reads an input to its end; tells whether anybody wants more of it.
-fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, queue: &ScanQueue) -> bool {
+fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queue: &ScanQueue) -> bool {
     loop {
-        let read = read(source, room);
+        let read = read(source, room, mark);
         let is_last = is_last(&read);
         let is_wanted = queue.push(read);
         if is_last || !is_wanted {
@@ -230,19 +236,19 @@ fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, queue: &ScanQueue) 
     }
 }
 
-fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom) -> Answer {
+fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom, mark: Marking) -> Answer {
     match request {
-        Request::Scan => Answer::Read(read(source, room)),
+        Request::Scan => Answer::Read(read(source, room, mark)),
         Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
         Request::Remarks => Answer::Remarks(source.remarks()),
         Request::Crs | Request::Ahead(_) => Answer::Crs(source.crs()),
     }
 }
 
-fn read(source: &mut dyn ScanSource, room: &PointRoom) -> crate::Result<Read> {
+fn read(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking) -> crate::Result<Read> {
     match source.next_stored(room) {
         Ok(Some(scan)) => {
-            let mark = ScanMark::of(&scan)?;
+            let mark = mark(&scan)?;
             Ok(Read::Scan(ReadScan { scan, mark }))
         }
         Ok(None) => Ok(Read::End),

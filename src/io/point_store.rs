@@ -109,6 +109,25 @@ impl PointStore {
         Ok(())
     }
 
+    /// Adds points with their intensities, which are ignored if the scan has none.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
+    pub(crate) fn extend(
+        &mut self,
+        mut points: impl ExactSizeIterator<Item = (Point, f32)> + Clone,
+    ) -> Result<()> {
+        if points.len() > self.room.most_points.saturating_sub(self.points.len()) {
+            return points.try_for_each(|(point, intensity)| self.push(point, intensity));
+        }
+        self.points.extend(points.clone().map(|(point, _)| point));
+        if let Some(intensities) = &mut self.intensities {
+            intensities.extend(points.map(|(_, intensity)| intensity));
+        }
+        Ok(())
+    }
+
     #[cold]
     fn put_in_file(&mut self) -> Result<()> {
         let mut file = match self.file.take() {
@@ -215,8 +234,15 @@ mod tests {
         for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
             let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));
             store.begin(has_intensities);
-            for k in 0..count {
-                store.push([k as f64, -0.5 * k as f64, f64::NAN], k as f32).unwrap();
+            let point = |k: usize| ([k as f64, -0.5 * k as f64, f64::NAN], k as f32);
+            for first in (0..count).step_by(1000) {
+                match first % 3000 {
+                    0 => store.extend((first..count.min(first + 1000)).map(point)).unwrap(),
+                    _ => (first..count.min(first + 1000))
+                        .map(point)
+                        .for_each(|(point, intensity)| store.push(point, intensity).unwrap()),
+                }
+                assert!(store.points.len() <= store.room.most_points);
             }
             assert_eq!((store.len(), store.file.is_some()), (count, most_bytes < usize::MAX));
             for range in

@@ -59,6 +59,12 @@ impl ScanMark {
         Ok(Self { scan: mark(&hasher), pose: pose_mark(world_from_sensor), has_points: !store.is_empty() })
     }
 
+    /// A mark that tells nothing but whether the scan has points, for who asks nothing else: marking takes a tenth of
+    /// the time of reading.
+    pub fn without_content(scan: &StoredScan) -> Self {
+        Self { scan: [0; MARK_BYTES], pose: [0; MARK_BYTES], has_points: !scan.points_in_sensor.is_empty() }
+    }
+
     /// Whether the scan has points: one without is like many others.
     pub fn has_points(&self) -> bool {
         self.has_points

@@ -60,6 +60,16 @@ struct ScanStream<R> {
     chunk: Vec<u8>,
 }
 
+/// What stands before the points of a scan.
+struct Head {
+    count: u32,
+    pose_at: u64,
+    pose: [f64; 7],
+}
+
+const COUNT_BYTES: usize = 4;
+const POSE_BYTES: usize = 56;
+
 /// Points that are read at a time.
 const CHUNK_POINTS: usize = 4096;
 
@@ -107,25 +117,32 @@ impl<R: StreamInput> ScanStream<R> {
         Ok(())
     }
 
-    /// The number of points at the start of a scan; `None` at the end of the stream.
-    fn next_count(&mut self) -> Result<Option<u32>> {
-        let mut first = [0];
-        loop {
-            match self.input.read(&mut first) {
-                Ok(0) => return Ok(None),
-                Ok(_) => break,
+    /// What stands before the points of a scan; `None` at the end of the stream. It is read at once: passing over a
+    /// scan takes as long as its reads.
+    fn next_head(&mut self) -> Result<Option<Head>> {
+        let mut bytes = [0; COUNT_BYTES + POSE_BYTES];
+        let mut filled = 0;
+        while filled < bytes.len() {
+            match self.input.read(&mut bytes[filled..]) {
+                Ok(0) => break,
+                Ok(read) => filled += read,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) => return Err(Error::io(&self.path, "read", error)),
             }
         }
-        self.offset += 1;
-        let [b, c, d] = self.bytes("the count of points")?;
-        Ok(Some(u32::from_le_bytes([first[0], b, c, d])))
-    }
-
-    fn pose_numbers(&mut self) -> Result<[f64; 7]> {
-        let bytes: [u8; 56] = self.bytes("a pose")?;
-        Ok(std::array::from_fn(|k| f64::from_le_bytes(std::array::from_fn(|byte| bytes[8 * k + byte]))))
+        let ends_in = |at: u64, what| Err(self.wrong(self.offset + at, format!("the stream ends in {what}")));
+        match filled {
+            0 => return Ok(None),
+            1..COUNT_BYTES => return ends_in(1, "the count of points"),
+            _ if filled < bytes.len() => return ends_in(COUNT_BYTES as u64, "a pose"),
+            _ => {}
+        }
+        let pose_at = self.offset + COUNT_BYTES as u64;
+        self.offset += bytes.len() as u64;
+        let (count, pose) = bytes.split_at(COUNT_BYTES);
+        let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| pose[8 * k + byte]));
+        let count = u32::from_le_bytes(std::array::from_fn(|byte| count[byte]));
+        Ok(Some(Head { count, pose_at, pose: std::array::from_fn(number) }))
     }
 
     fn point_bytes(&self) -> usize {
@@ -159,9 +176,7 @@ impl<R: StreamInput> ScanStream<R> {
 
     /// Passes over a scan; `false` at the end of the stream.
     fn pass_scan(&mut self) -> Result<bool> {
-        let Some(count) = self.next_count()? else { return Ok(false) };
-        let at = self.offset;
-        let numbers = self.pose_numbers()?;
+        let Some(Head { count, pose_at, pose }) = self.next_head()? else { return Ok(false) };
         let bytes = u64::from(count) * self.point_bytes() as u64;
         let passed = self.input.pass(bytes).map_err(|error| Error::io(&self.path, "read", error))?;
         if passed < bytes {
@@ -169,7 +184,7 @@ impl<R: StreamInput> ScanStream<R> {
         }
         self.offset += bytes;
         self.done += 1;
-        let pose = self.pose(numbers, at);
+        let pose = self.pose(pose, pose_at);
         self.is_past_error = pose.is_err();
         pose.map(|_| true)
     }
@@ -198,10 +213,8 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
     }
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
-        let Some(count) = self.next_count()? else { return Ok(None) };
+        let Some(Head { count, pose_at, pose }) = self.next_head()? else { return Ok(None) };
         self.is_past_error = false;
-        let at = self.offset;
-        let numbers = self.pose_numbers()?;
         let count = count as usize;
         points.begin(self.has_intensities);
         points.reserve(count.min(MOST_RESERVED));
@@ -211,15 +224,18 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
             self.read_chunk(here)?;
             let (numbers, _) = self.chunk.as_chunks::<4>();
             let number = |bytes: [u8; 4]| f32::from_le_bytes(bytes);
-            for point in numbers.chunks_exact(self.point_bytes() / 4) {
-                let intensity = point.get(3).map_or(0.0, |&bytes| number(bytes));
-                points.push(std::array::from_fn(|k| f64::from(number(point[k]))), intensity)?;
+            let point = |[x, y, z]: [[u8; 4]; 3]| [x, y, z].map(|bytes| f64::from(number(bytes)));
+            match self.has_intensities {
+                true => points.extend(
+                    numbers.as_chunks::<4>().0.iter().map(|&[x, y, z, i]| (point([x, y, z]), number(i))),
+                )?,
+                false => points.extend(numbers.as_chunks::<3>().0.iter().map(|&xyz| (point(xyz), 0.0)))?,
             }
             left -= here;
         }
         let name = self.done.to_string();
         self.done += 1;
-        let pose = self.pose(numbers, at);
+        let pose = self.pose(pose, pose_at);
         self.is_past_error = pose.is_err();
         let world_from_sensor = pose?;
         Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))

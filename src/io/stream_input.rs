@@ -28,12 +28,16 @@ impl<R: Read> StreamInput for AnyInput<R> {
 pub(super) struct FileInput {
     file: File,
     at: u64,
+    /// How long it was when that was last asked: a file may grow. 0 for a pipe by a name.
+    known_bytes: u64,
+    /// Whether the file has not been told yet where to read on.
+    has_passed: bool,
 }
 
 impl FileInput {
     pub(super) fn open(path: &Path) -> Result<Self> {
         match File::open(path) {
-            Ok(file) => Ok(Self { file, at: 0 }),
+            Ok(file) => Ok(Self { file, at: 0, known_bytes: 0, has_passed: false }),
             Err(error) => Err(Error::io(path, "open", error)),
         }
     }
@@ -41,6 +45,10 @@ impl FileInput {
 
 impl Read for FileInput {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.has_passed {
+            self.file.seek(SeekFrom::Start(self.at))?;
+            self.has_passed = false;
+        }
         let read = self.file.read(buffer)?;
         self.at += read as u64;
         Ok(read)
@@ -49,15 +57,19 @@ impl Read for FileInput {
 
 impl StreamInput for FileInput {
     fn pass(&mut self, bytes: u64) -> io::Result<u64> {
-        let metadata = self.file.metadata()?;
-        if !metadata.is_file() {
-            // A pipe by a name.
-            let passed = io::copy(&mut (&mut self.file).take(bytes), &mut io::sink())?;
-            self.at += passed;
-            return Ok(passed);
+        if bytes > self.known_bytes.saturating_sub(self.at) {
+            let metadata = self.file.metadata()?;
+            if !metadata.is_file() {
+                // A pipe by a name.
+                let passed = io::copy(&mut (&mut self.file).take(bytes), &mut io::sink())?;
+                self.at += passed;
+                return Ok(passed);
+            }
+            self.known_bytes = metadata.len();
         }
-        let passed = bytes.min(metadata.len().saturating_sub(self.at));
-        self.at = self.file.seek(SeekFrom::Start(self.at + passed))?;
+        let passed = bytes.min(self.known_bytes.saturating_sub(self.at));
+        self.at += passed;
+        self.has_passed |= passed > 0;
         Ok(passed)
     }
 }

@@ -51,10 +51,20 @@ impl OutOfCoreTileMapper {
     ///
     /// A wrong configuration, a folder with other content, a disk that refuses.
     pub fn create(folder: impl Into<MapPath>, config: MapConfig) -> Result<Self> {
+        Self::create_as(folder, config, new_map_id())
+    }
+
+    /// The same with an id that the caller names: a map that is to be a piece of another
+    /// ([`operations::move_piece`](crate::operations::move_piece())). Otherwise two maps of an id are taken for the
+    /// same.
+    ///
+    /// # Errors
+    ///
+    /// As for [`OutOfCoreTileMapper::create`].
+    pub fn create_as(folder: impl Into<MapPath>, config: MapConfig, map_id: [u8; 16]) -> Result<Self> {
         let (disk, folder) = folder.into().into_parts();
         let folder = &*folder;
         let config = config.validated()?;
-        let map_id = new_map_id();
         let store = TileStore::create(disk, folder, new_metadata(&config, map_id, &[]), map_id)?;
         Ok(Self::new(config, store))
     }

@@ -4,8 +4,9 @@ use super::table_change::voxels_of_part;
 use crate::error::Result;
 use crate::mapper::{MapReader, MapView};
 use crate::persistence::{new_map_id, new_metadata};
-use crate::store::Metadata;
+use crate::store::{MapPath, Metadata, UnsyncedDisk};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Makes a map of the voxels of another that are in a part of space.
 ///
@@ -20,11 +21,39 @@ pub fn crop(
     map: &MapReader,
     part: &Part,
     output: impl AsRef<Path>,
+    progress: impl FnMut(u64, u64),
+) -> Result<WrittenMap> {
+    crop_to(map, part, MapPath::on(map.disk(), output), new_map_id(), progress)
+}
+
+/// The same for a map that is to become a piece of another one, whose id it gets ([`move_piece`](super::move_piece())).
+/// It is not durable before: whoever crashes makes it again.
+///
+/// # Errors
+///
+/// As for [`crop`].
+pub fn crop_piece(
+    map: &MapReader,
+    part: &Part,
+    output: impl AsRef<Path>,
+    map_id: [u8; 16],
+    progress: impl FnMut(u64, u64),
+) -> Result<WrittenMap> {
+    let disk = Arc::new(UnsyncedDisk::of(map.disk()));
+    crop_to(map, part, MapPath::on(disk, output), map_id, progress)
+}
+
+fn crop_to(
+    map: &MapReader,
+    part: &Part,
+    output: MapPath,
+    map_id: [u8; 16],
     mut progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let grid = map.config().grid;
     let part = part.voxels(&grid)?;
-    let mut writer = MapWriter::create_as(map.disk(), output.as_ref(), metadata_of_part(map))?;
+    let (disk, output) = output.into_parts();
+    let mut writer = MapWriter::create_as(disk, &output, metadata_of_part(map, map_id))?;
     writer.take_scans_of(map)?;
     let mut tiles = map.tile_indices();
     tiles.retain(|&tile| part.share_of(&grid.voxels_of_tile(tile)) != Share::Nothing);
@@ -41,9 +70,9 @@ pub fn crop(
     writer.finish()
 }
 
-/// What a part says of itself: what the whole says, but for its identity.
-fn metadata_of_part(map: &MapReader) -> Metadata {
-    let mut metadata = new_metadata(map.config(), new_map_id(), &[]);
+/// What a part says of itself: what the whole says, but for its identity and its input.
+fn metadata_of_part(map: &MapReader, map_id: [u8; 16]) -> Metadata {
+    let mut metadata = new_metadata(map.config(), map_id, &[]);
     if let (Some(ext), Some(whole)) = (&mut metadata.ext, &map.metadata().ext) {
         (ext.scan_number, ext.decayed_scan) = (whole.scan_number, whole.decayed_scan);
     }

@@ -6,7 +6,8 @@ use crate::mapper::{MapReader, MapView};
 use crate::store::{MapPath, hex};
 use std::path::Path;
 
-/// Makes one map of pieces ([`make_piece`](super::make_piece)) of the same id, which it gets.
+/// Makes one map of pieces ([`make_piece`](super::make_piece), [`move_piece`](super::move_piece())) of the same id,
+/// which it gets.
 ///
 /// The map is what [`merge`](super::merge()) would make of the pieces, but no tile is read: its files get a second name
 /// in the map, or are copied where the file system has no such names. Pieces are opened one at a time, and stay whole,
@@ -44,12 +45,10 @@ pub fn join(
     }
     let mut writer = begin(&first, output.as_ref(), config, regions.one_build(), map_id)?;
     let mut done = 0;
-    for piece in pieces {
-        writer.link_all(&open(piece)?, || {
-            progress(done, all);
-            done += 1;
-        })?;
-    }
+    writer.link_all(pieces.iter().map(open), || {
+        progress(done, all);
+        done += 1;
+    })?;
     progress(all, all);
     writer.finish()
 }

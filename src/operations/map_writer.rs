@@ -44,6 +44,17 @@ pub struct WrittenMap {
     pub octree_bytes: u64,
 }
 
+impl WrittenMap {
+    /// Adds a tile.
+    pub(super) fn add(&mut self, version: TileVersion) {
+        self.tiles += 1;
+        self.voxels += version.voxels;
+        self.occupied += version.occupied;
+        self.table_bytes += version.table.bytes;
+        self.octree_bytes += version.octree.bytes;
+    }
+}
+
 /// Tiles that are made durable together. A commit of the unfinished map means nothing to anybody; it keeps the list of
 /// files to sync short, and the disk at work from the beginning.
 const COMMIT_TILES: usize = 256;
@@ -139,25 +150,31 @@ impl MapWriter {
         self.added(tile, version)
     }
 
-    /// Adds the tiles of another map of the same id, parameters and storage by other names for its files
-    /// ([`TileStore::link_tile`](crate::store::TileStore::link_tile)). They may come before others that are there.
+    /// Adds the tiles of other maps of the same id, parameters and storage by other names for their files
+    /// ([`LinkedTiles`](crate::store::LinkedTiles)), to a map without tiles.
     ///
     /// # Errors
     ///
-    /// A tile that is there already, a damaged one, a disk that refuses.
-    pub(super) fn link_all(&mut self, map: &MapReader, mut progress: impl FnMut()) -> Result<()> {
-        for tile in map.tile_indices() {
-            let store = self.map.store();
-            if store.contains(tile) {
-                let reason =
-                    format!("it has {tile}, and another piece has it, too; make pieces of other regions");
-                return Err(Error::argument(map.folder().display().to_string(), reason));
+    /// A map that cannot be opened, a tile that is in two of them, a damaged one, a disk that refuses.
+    pub(super) fn link_all(
+        &mut self,
+        maps: impl Iterator<Item = Result<MapReader>>,
+        mut progress: impl FnMut(),
+    ) -> Result<()> {
+        let mut linked = self.map.store().link_tiles();
+        for map in maps {
+            let map = map?;
+            for tile in map.tile_indices() {
+                if linked.contains(tile) {
+                    let reason =
+                        format!("it has {tile}, and another piece has it, too; make pieces of other regions");
+                    return Err(Error::argument(map.folder().display().to_string(), reason));
+                }
+                self.written.add(linked.link(map.store(), tile)?);
+                progress();
             }
-            let version = store.link_tile(map.store(), tile)?;
-            self.added(self.last.map_or(tile, |last| last.max(tile)), version)?;
-            progress();
         }
-        Ok(())
+        linked.commit(self.metadata.clone())
     }
 
     fn check_order(&self, tile: TileIndex) -> Result<()> {
@@ -169,11 +186,7 @@ impl MapWriter {
 
     fn added(&mut self, last: TileIndex, version: TileVersion) -> Result<()> {
         self.last = Some(last);
-        self.written.tiles += 1;
-        self.written.voxels += version.voxels;
-        self.written.occupied += version.occupied;
-        self.written.table_bytes += version.table.bytes;
-        self.written.octree_bytes += version.octree.bytes;
+        self.written.add(version);
         self.uncommitted += 1;
         if self.uncommitted == COMMIT_TILES { self.commit() } else { Ok(()) }
     }

@@ -5,7 +5,8 @@
 //! merge   k readers, the tiles of one place at a time -> MapWriter
 //! crop    one reader -> MapWriter
 //! import  a file of OctoMap -> MapWriter
-//! make_piece, join   a map -> a piece of a map to come; pieces -> MapWriter, by other names for their files
+//! make_piece, move_piece   a map -> a piece of a map to come, by copying it or by moving it
+//! join    pieces -> MapWriter, by other names for their files
 //! adopt   readers of parts -> MapEditor: tiles in the place of a map's own -> one commit
 //! clear, decay   MapEditor: tiles read, changed, written beside -> one commit
 //! a flush  -> snapshot -> snapshots/NAME, and the tables that it sees stay
@@ -41,7 +42,7 @@ mod table_merge;
 pub use adopt::{Adopted, adopt};
 pub use clear::{Cleared, clear};
 pub use convert::convert;
-pub use crop::crop;
+pub use crop::{crop, crop_piece};
 pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
 pub use import::import;
@@ -51,7 +52,7 @@ pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::Part;
-pub use piece::make_piece;
+pub use piece::{make_piece, move_piece};
 pub use remapping::{
     MappedAgain, MappedAnew, NewPoses, PointsRemoved, Remap, RemapBeside, Remapped, Rework, ScanSelection,
     ScansRemoved, map_anew, remap, remove_points, remove_scans,

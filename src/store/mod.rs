@@ -11,6 +11,7 @@
 //! | `committed_files` | which files a copy of the map consists of |
 //! | `layout`, `map_files` | file names; operations on them |
 //! | `disk`, `fs_disk` | [`Disk`], through which every file operation goes, and the file system |
+//! | `unsynced_disk` | a disk without its syncs, for maps that are made again after a crash |
 //!
 //! Tests replace [`Disk`] to simulate failures and power cuts. `docs/durability.md` describes the protocol.
 
@@ -28,6 +29,7 @@ mod scans;
 mod snapshots;
 mod tile_store;
 mod tiles;
+mod unsynced_disk;
 mod writer_lock;
 
 pub use crate::scratch::Scratch;
@@ -37,6 +39,7 @@ pub use commit::commits::Commits;
 pub use commit::flush::{BegunCommit, Step, Synced, Unsynced};
 pub(crate) use commit::input_record::MOST_INPUTS;
 pub use commit::input_record::{InputContent, InputRecord};
+pub use commit::linked_tiles::LinkedTiles;
 pub use commit::metadata::{Bounds, Extension, MapParameters, Metadata};
 pub use committed_files::{CommittedContent, CommittedFile, FileVersion};
 pub use disk::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch};
@@ -47,6 +50,7 @@ pub use layout::{
 pub use map_folder::read_log;
 pub use map_path::MapPath;
 pub use place::check_outside_of_maps;
+pub use recovery::moved_map::move_map;
 pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;
 pub use recovery::side_folder::SideFolder;
@@ -65,4 +69,5 @@ pub use tiles::tile_reader::TileReader;
 pub(crate) use tiles::tile_version::MAX_NUMBER;
 pub use tiles::tile_version::TileVersion;
 pub use tiles::tile_writer::TileWriter;
+pub use unsynced_disk::UnsyncedDisk;
 pub use writer_lock::WriterLock;

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
-from ._voxtile import ScanIterator, call_build, call_export, open_scans
+from ._voxtile import ScanIterator, call_build, call_export, open_scans, scan_reaches
 from ._voxtile import count_scans as _count_scans
 
 if TYPE_CHECKING:
@@ -104,6 +104,26 @@ def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
 def count_scans(path: _Path, **options: Unpack[ReadOptions]) -> int:
     """The number of scans of a file or folder. Where the format does not tell it, they are read, but in ``.scans``."""
     return _count_scans(_path(path), _arguments(options))
+
+
+def reaches(
+    path: _Path,
+    *,
+    max_range: float | None = None,
+    clear_no_return: float | None = None,
+    **options: Unpack[ReadOptions],
+) -> list[tuple[str, tuple[float, float, float, float] | None]]:
+    """Of each scan what tells it from others, and a box (west, south, east, north) around it and its rays in metres.
+
+    The box is ``None`` where a scan leaves nothing in a map.
+    """
+    return scan_reaches(_path(path), _arguments(options), max_range=max_range, no_return_range=clear_no_return)
+
+
+def build_piece(path: _Path, output: _Path, map_id: str, **options: Unpack[BuildOptions]) -> dict[str, Any]:
+    """Makes a map as ``build`` does, but as a piece of the map with this id: ``move_piece`` makes it durable."""
+    arguments = [_path(path), f"--output={_path(output)}", *_arguments(options)]
+    return call_build(arguments, piece_of=map_id)
 
 
 def build(

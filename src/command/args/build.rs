@@ -80,6 +80,9 @@ pub struct BuildArgs {
     /// with --append: every scan counts exactly once, however often the command is repeated
     #[arg(long)]
     pub resume: bool,
+    /// The map is made as a piece with this id, and not durably: for callers of `calls::build_piece`
+    #[arg(skip)]
+    pub piece_of: Option<[u8; 16]>,
     /// Add the scans even if the map has scans of this input: they count once more
     #[arg(long, requires = "append", conflicts_with = "resume")]
     pub again: bool,

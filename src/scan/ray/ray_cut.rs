@@ -16,6 +16,9 @@ pub(crate) struct RayCut<'a> {
     /// A box around the selected tiles, relative to the origin, in units of voxels and with [`MARGIN`] on all sides;
     /// `None` if no tile is selected.
     around: Option<(Point, Point)>,
+    /// Where a ray has to end to come near that box, whose own sides do not say so along an axis along which the
+    /// origin is inside.
+    ends: (Point, Point),
     /// The voxels of a box around the selected tiles.
     voxels: VoxelBox,
 }
@@ -40,12 +43,22 @@ impl<'a> RayCut<'a> {
             },
             None => VoxelBox { min: [0; 3], end: [0; 3] },
         };
-        Self { grid, tiles, around, voxels }
+        let (low, high) = around.unwrap_or_default();
+        let end_at = |k: usize, side: f64| origin.point[k] + side;
+        let ends = (
+            std::array::from_fn(|k| if low[k] > 0.0 { end_at(k, low[k]) } else { f64::NEG_INFINITY }),
+            std::array::from_fn(|k| if high[k] < 0.0 { end_at(k, high[k]) } else { f64::INFINITY }),
+        );
+        Self { grid, tiles, around, ends, voxels }
     }
 
     /// The ray to `end`, cut; `None` if it says nothing about a selected tile.
     #[inline]
     pub(crate) fn apply(&self, origin: &RayOrigin, end: RayEnd) -> Option<RayEnd> {
+        // Most rays, of most scans, are where the sensor is: those of another region are told by a look.
+        if (0..3).any(|k| end.point[k] < self.ends.0[k] || end.point[k] > self.ends.1[k]) {
+            return None;
+        }
         let span = self.span(&SlabRay::new(origin, end));
         let hit = end.hit.filter(|_| self.tiles.contains(self.grid.tile_of_voxel(end.voxel)));
         match (span, hit) {

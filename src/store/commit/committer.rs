@@ -83,6 +83,11 @@ impl Committer {
         &self.metadata
     }
 
+    /// Takes what the next log and `metadata.json` say.
+    pub(in crate::store) fn set_metadata(&mut self, metadata: Metadata) {
+        self.metadata = metadata;
+    }
+
     /// Flush number in the `metadata.json` on disk.
     pub(in crate::store) fn written_flush(&self) -> Option<u64> {
         self.written_flush

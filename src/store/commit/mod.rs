@@ -7,5 +7,6 @@ pub(super) mod commits;
 pub(super) mod committer;
 pub(super) mod flush;
 pub(super) mod input_record;
+pub(super) mod linked_tiles;
 pub(super) mod metadata;
 mod take_over;

@@ -40,37 +40,23 @@ impl TileStore {
         Ok(())
     }
 
-    /// Gives the files of a tile of `other`, a map of the same id and storage that nobody writes to, a second name
-    /// here, where the next commit finds them; where the file system has no such names, they are copied. Of files that
-    /// are not copied the length alone is compared with the log of `other`.
-    ///
-    /// `other` stays whole. It may be removed once the map is committed, and not be written to before.
+    /// Looks whether one of a tile's files is there, as long as the log says.
     ///
     /// # Errors
     ///
     /// A file that is missing or of another length, a disk that refuses.
-    pub fn link_tile(&mut self, other: &Self, tile: TileIndex) -> Result<TileVersion> {
-        let version = other.version_to_copy(tile)?;
-        let writer = self.writer()?;
-        make_folder(&**self.disk(), &self.layout().tile_folder(tile))?;
-        for &file in self.layout().files() {
-            let (from, to) = (other.layout().current(tile, file), self.layout().next(tile, file));
-            let damaged = |reason: String| Err(FormatError::at_offset(0, reason).in_map(&from, Some(tile)));
-            let wanted = version.of(file).bytes;
-            match other.disk().kind_at(&from)? {
-                Some(EntryKind::File(bytes)) if bytes == wanted => {}
-                Some(EntryKind::File(bytes)) => {
-                    return damaged(format!("{bytes} bytes where commits.log names {wanted}"));
-                }
-                Some(_) => return damaged("not a regular file; links inside a map are not followed".into()),
-                None => return damaged("the file is missing, and the map holds this tile".into()),
+    pub(in crate::store) fn check_length(&self, tile: TileIndex, file: TileFile) -> Result<()> {
+        let path = self.layout().current(tile, file);
+        let damaged = |reason: String| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
+        let wanted = self.version_to_copy(tile)?.of(file).bytes;
+        match self.disk().kind_at(&path)? {
+            Some(EntryKind::File(bytes)) if bytes == wanted => Ok(()),
+            Some(EntryKind::File(bytes)) => {
+                damaged(format!("{bytes} bytes where commits.log names {wanted}"))
             }
-            if self.disk().link(&from, &to).is_err() {
-                other.copy_file(&writer, tile, file)?;
-            }
+            Some(_) => damaged("not a regular file; links inside a map are not followed".into()),
+            None => damaged("the file is missing, and the map holds this tile".into()),
         }
-        self.note_next(tile, version);
-        Ok(version)
     }
 
     /// Writes a copy of one of a tile's files as the next version elsewhere.
@@ -100,7 +86,7 @@ impl TileStore {
         }
     }
 
-    fn version_to_copy(&self, tile: TileIndex) -> Result<TileVersion> {
+    pub(in crate::store) fn version_to_copy(&self, tile: TileIndex) -> Result<TileVersion> {
         self.version(tile).ok_or_else(|| {
             let reason = format!("{} has no checksums of {tile}", self.folder().display());
             Error::argument("tile", reason)

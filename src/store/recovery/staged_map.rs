@@ -101,7 +101,7 @@ pub fn staging_folder(folder: &Path) -> Result<PathBuf> {
     }
 }
 
-fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
+pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     let is_free = match disk.kind_at(folder)? {
         None => true,
         Some(EntryKind::Folder) => {

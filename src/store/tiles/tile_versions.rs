@@ -171,6 +171,11 @@ impl TileVersions {
         changed
     }
 
+    /// Notes a tile that the next commit names and whose files have their names already.
+    pub(in crate::store) fn note_committed(&mut self, tile: TileIndex, version: TileVersion) {
+        self.commits.tiles.insert(tile, version);
+    }
+
     /// Notes a commit that changes no tile.
     pub(in crate::store) fn committed_nothing(&mut self, number: u64) {
         self.commits.flush_number = number;

@@ -1,12 +1,13 @@
 use super::random_maps::{open, path};
 use std::path::PathBuf;
+use std::sync::Arc;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::operations::{self, Decay, Part};
 use voxtile::space::Aabb;
-use voxtile::store::TileStore;
+use voxtile::store::{TileStore, UnsyncedDisk};
 use voxtile::{
-    Error, MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage,
+    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Result, Storage,
 };
 
 /// A disk with two maps, `a` and `b`.
@@ -45,6 +46,41 @@ const ID: [u8; 16] = [7; 16];
 
 fn make_piece(disk: &FaultyDisk) -> Result<()> {
     operations::make_piece(&open(disk, &path("a"))?, path("out"), ID, |_, _| {}).map(drop)
+}
+
+/// Makes a map that is not durable and moves it to its place, as a task does.
+fn move_piece(disk: &FaultyDisk) -> Result<()> {
+    disk.take(&path("local"));
+    let made = make_local(disk).and_then(|()| {
+        operations::move_piece(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
+    });
+    // A task's folder goes with the task.
+    disk.take(&path("local"));
+    disk.take(&path("local.unfinished"));
+    made.map(drop)
+}
+
+fn make_local(disk: &FaultyDisk) -> Result<()> {
+    let config = open(disk, &path("a"))?.config().clone();
+    let unsynced = Arc::new(UnsyncedDisk::of(disk.shared()));
+    let mut mapper = OutOfCoreTileMapper::create_as(MapPath::on(unsynced, path("local")), config, ID)?;
+    mapper.insert_scan(&random_scan(&mut Random(7), [1.0, 0.0, 0.0], 4))?;
+    mapper.flush()?;
+    mapper.insert_scan(&random_scan(&mut Random(8), [3.0, 0.0, 0.0], 4))?;
+    mapper.flush()
+}
+
+/// The same where the map is a part of another.
+fn move_crop(disk: &FaultyDisk) -> Result<()> {
+    disk.take(&path("local"));
+    let crop = open(disk, &path("a"))
+        .and_then(|map| operations::crop_piece(&map, &Part::Inside(region()), path("local"), ID, |_, _| {}));
+    let made = crop.and_then(|_| {
+        operations::move_piece(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
+    });
+    disk.take(&path("local"));
+    disk.take(&path("local.unfinished"));
+    made.map(drop)
 }
 
 /// A disk with two pieces of `a`.
@@ -170,6 +206,14 @@ fn a_merge_is_there_whole_or_not_at_all() {
 fn a_piece_is_there_whole_or_not_at_all() {
     check(Storage::OctoMap, "out", make_piece);
     check(Storage::Compact, "out", make_piece);
+}
+
+#[test]
+fn a_piece_that_is_moved_is_there_whole_and_durable_or_not_at_all() {
+    for storage in [Storage::OctoMap, Storage::Compact] {
+        check(storage, "out", move_piece);
+        check(storage, "out", move_crop);
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use testkit::random_scans::Random;
 use testkit::reference_map::Voxels;
 use voxtile::integrity::verify;
 use voxtile::mapper::MapView;
-use voxtile::operations::{WrittenMap, make_piece};
+use voxtile::operations::{self, WrittenMap, make_piece};
 use voxtile::store::tile_of_folder;
 use voxtile::{Error, MapConfig, MapPath, Result, Storage};
 
@@ -130,6 +130,56 @@ fn a_piece_without_a_file_or_with_a_shorter_one_is_named_and_there_is_no_map() {
             disk.put(&place, &bytes);
         }
         join(&disk, &[piece]).unwrap();
+    }
+}
+
+fn move_piece(disk: &FaultyDisk, map: &Path, id: [u8; 16]) -> Result<PathBuf> {
+    let piece = map.with_extension("moved");
+    operations::move_piece(MapPath::on(disk.shared(), map), &piece, id, |_, _| {}).map(|_| piece)
+}
+
+#[test]
+fn a_map_that_is_moved_is_the_piece_that_a_copy_is() {
+    for storage in [Storage::OctoMap, Storage::Compact] {
+        let disk = one_map(storage);
+        let copy = piece(&disk, &path("map"), ID).unwrap();
+        let files = tiles(&disk, &copy);
+        // It has another id, so that it is copied, too.
+        let moved = move_piece(&disk, &path("map"), ID).unwrap();
+        assert_eq!(tiles(&disk, &moved), files);
+        assert_eq!(open(&disk, &moved).unwrap().metadata().ext.as_ref().unwrap().map_id, "07".repeat(16));
+        assert!(!tiles(&disk, &path("map")).is_empty());
+        disk.take(&moved);
+        let moved = move_piece(&disk, &copy, ID).unwrap();
+        assert_eq!(tiles(&disk, &moved), files);
+        assert!(disk.files().into_keys().all(|file| !file.starts_with(&copy)));
+        assert_eq!(damage(&disk, &moved), Vec::<String>::new());
+        let taken = path("map.moved");
+        let error = operations::move_piece(MapPath::on(disk.shared(), &moved), taken, ID, |_, _| {});
+        assert!(matches!(error, Err(Error::AlreadyExists { .. })), "{error:?}");
+        assert_eq!(tiles(&disk, &moved), files);
+    }
+}
+
+#[test]
+fn a_map_without_a_file_or_with_a_shorter_one_is_named_and_not_moved() {
+    for storage in [Storage::OctoMap, Storage::Compact] {
+        let disk = one_map(storage);
+        let map = piece(&disk, &path("map"), ID).unwrap();
+        for (file, bytes) in tiles(&disk, &map) {
+            let place = map.join(&file);
+            for is_missing in [true, false] {
+                match is_missing {
+                    true => disk.take(&place),
+                    false => disk.put(&place, &bytes[..bytes.len() - 1]),
+                }
+                let error = move_piece(&disk, &map, ID).unwrap_err();
+                assert!(matches!(error, Error::Damaged { .. }) && error.path() == Some(&*place), "{error:#}");
+                assert!(disk.files().into_keys().all(|file| !file.starts_with(path("map.moved"))));
+            }
+            disk.put(&place, &bytes);
+        }
+        move_piece(&disk, &map, ID).unwrap();
     }
 }
 

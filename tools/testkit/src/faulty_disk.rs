@@ -77,6 +77,26 @@ enum NameChange {
 
 type Names = BTreeMap<PathBuf, Entry>;
 
+impl NameChange {
+    /// A folder around the names has got another name.
+    fn follow(&mut self, from: &Path, to: &Path) {
+        let follow = |name: &mut PathBuf| {
+            if let Ok(rest) = name.strip_prefix(from)
+                && rest != Path::new("")
+            {
+                *name = to.join(rest);
+            }
+        };
+        match self {
+            Self::Put(name, _) | Self::Remove(name) | Self::RemoveFolder(name, _) => follow(name),
+            Self::Rename(old, new) => {
+                follow(old);
+                follow(new);
+            }
+        }
+    }
+}
+
 #[derive(Debug)]
 struct State {
     contents: HashMap<Inode, Content>,
@@ -695,6 +715,10 @@ impl Disk for FaultyDisk {
         state.unreadable.remove(to);
         if state.unreadable.remove(from) {
             state.unreadable.insert(to.to_owned());
+        }
+        if entry == Entry::Folder {
+            // What is on its way to the medium in a folder is so under the folder's new name.
+            state.unsynced_names.iter_mut().for_each(|change| change.follow(from, to));
         }
         state.change_name(NameChange::Rename(from.to_owned(), to.to_owned()));
         Ok(())

@@ -25,8 +25,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from .. import files
 from .._voxtile import adopt, crop, describe, join, verify
 from ..errors import ArgumentError, VoxtileError
@@ -329,33 +327,9 @@ def _boxes(
 ) -> tuple[list[_Seen], float]:
     began = time.process_time()
     max_range, clear_no_return = reach
-    seen: list[_Seen] = []
     options: dict[str, Any] = {**reading, "first": first, "count": count}
-    for points, pose, intensities in files.scans(source, **options):
-        content = hashlib.blake2b(np.ascontiguousarray(points).data, digest_size=16)
-        content.update(pose.tobytes())
-        if intensities is not None:
-            content.update(np.ascontiguousarray(intensities).data)
-        box = _box(points, pose, max_range, clear_no_return)
-        seen.append((content.hexdigest(), box))
+    seen = files.reaches(source, max_range=max_range, clear_no_return=clear_no_return, **options)
     return seen, time.process_time() - began
-
-
-def _box(points: Any, pose: Any, max_range: float | None, clear_no_return: float | None) -> Box | None:
-    """A box around a scan and its rays."""
-    origin = pose[:2, 3]
-    ends = points @ pose[:2, :3].T + origin
-    if not np.isfinite(ends.sum()):
-        ends = ends[np.isfinite(ends).all(axis=1)]
-    corners = [] if len(ends) == 0 else [ends.min(axis=0), ends.max(axis=0)]
-    if max_range is not None:
-        corners = [np.clip(corner, origin - max_range, origin + max_range) for corner in corners]
-    if clear_no_return is not None:
-        corners += [origin - clear_no_return, origin + clear_no_return]
-    if not corners:
-        return None
-    low, high = np.min([origin, *corners], axis=0), np.max([origin, *corners], axis=0)
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
 def _map_column(
@@ -377,12 +351,12 @@ def _map_column(
         made = os.path.join(local, "map")
         try:
             if of_map is not None:
-                crop(of_map, made, tiles_of(column, *sizes))
+                crop(of_map, made, tiles_of(column, *sizes), piece_of=map_id)
             for first, last in ranges:
                 options: dict[str, Any] = {**settings, "first": first, "count": last - first}
                 # A later range begins as another input may have: these are other scans.
                 goes_on: dict[str, Any] = {"append": True, "again": True} if os.path.exists(made) else {}
-                files.build(source, made, region=region_of(column, sizes[0]), **options, **goes_on)
+                files.build_piece(source, made, map_id, region=region_of(column, sizes[0]), **options, **goes_on)
             hand_over(made, part, map_id)
         except VoxtileError as error:
             # Of the classes of errors, callers look at the class and the message.

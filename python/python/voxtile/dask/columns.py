@@ -178,7 +178,9 @@ def _make_part(maps: Sequence[str], place: str, map_id: str, box: Sequence[float
         crops = []
         for number, map in enumerate(maps):
             crop = os.path.join(local, str(number))
-            if _voxtile.crop(map, crop, box).get("tiles", 1):
+            # Of several, what is made of them gets the id.
+            piece_of = map_id if len(maps) == 1 else uuid.uuid4().hex
+            if _voxtile.crop(map, crop, box, piece_of=piece_of).get("tiles", 1):
                 crops.append(crop)
         if not crops:
             return None

@@ -6,18 +6,19 @@ import os
 import shutil
 import uuid
 
-from .._voxtile import make_piece
+from .._voxtile import move_piece
 
 
 def hand_over(made: str, place: str, map_id: str) -> None:
-    """Copies what a worker made to its place, whole and durable, with every byte compared with its log.
+    """Moves what a worker made to its place, whole and durable; ``made`` is gone then.
 
+    From another file system, or where ``made`` has another id, it is copied, and every byte is compared with its log.
     Another attempt may have been first, and made the same.
     """
     folder = os.path.dirname(place)
     attempt = os.path.join(folder, f"attempt-{uuid.uuid4().hex}")
     try:
-        make_piece(made, attempt, map_id)
+        move_piece(made, attempt, map_id)
         if not os.path.exists(place):
             os.rename(attempt, place)
             _sync(folder)
@@ -26,6 +27,8 @@ def hand_over(made: str, place: str, map_id: str) -> None:
             raise
     finally:
         shutil.rmtree(attempt, ignore_errors=True)
+        # Of a failure, a moment ago, on a disk that refused to have it removed.
+        shutil.rmtree(f"{attempt}.unfinished", ignore_errors=True)
 
 
 def _sync(folder: str) -> None:

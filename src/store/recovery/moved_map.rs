@@ -1,0 +1,85 @@
+use super::staged_map::{check_is_free, remove_content, staging_folder};
+use crate::error::{Error, Result};
+use crate::space::TileIndex;
+use crate::store::WriterLock;
+use crate::store::commit::checkpoint::TILES_SYNCED_AT_ONCE;
+use crate::store::disk::Disk;
+use crate::store::layout::Layout;
+use crate::store::map_folder;
+use crate::store::place;
+use crate::store::tile_store::TileStore;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Moves a map that nobody writes to, to a place that is free, and makes all of it durable there, whether the map's
+/// writer did so or not ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). As a
+/// [`StagedMap`](super::staged_map::StagedMap) the map is there whole, or not at all; each file is synced once, after
+/// all have been written.
+///
+/// `false` if the file system cannot move it there, or if an attempt that was killed left something beside that place:
+/// it is where it was, then. Of each file of a tile the length alone is compared with the log.
+///
+/// # Errors
+///
+/// A place that is not free, a map that somebody writes to, a file that is missing or of another length, a disk that
+/// refuses. The map is gone, then, unless it was never moved.
+pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool> {
+    place::check_place(&**disk, folder)?;
+    check_is_free(&**disk, folder)?;
+    let unfinished = staging_folder(folder)?;
+    let parent = map_folder::parent_of(folder);
+    map_folder::create_folders(&**disk, parent)?;
+    // It goes along with the folder, and keeps others from taking that for something left behind.
+    let lock = WriterLock::take(&**disk, &Layout::new(map))?;
+    let store = TileStore::open_read_only(disk.clone(), map)?;
+    let mut tiles: Vec<_> = store.tiles().collect();
+    tiles.sort_unstable();
+    for &tile in &tiles {
+        store.layout().files().iter().try_for_each(|&file| store.check_length(tile, file))?;
+    }
+    if disk.rename(map, &unfinished).is_err() {
+        return Ok(false);
+    }
+    let layout = Layout::new(&unfinished).with_storage(store.layout().storage());
+    if let Err(error) = sync_map(&**disk, &layout, &tiles).and_then(|()| finish(&**disk, &unfinished, folder))
+    {
+        let _ = remove_content(&**disk, &layout, true);
+        let _ = disk.remove_folder(&unfinished);
+        return Err(error);
+    }
+    drop(lock);
+    disk.sync_folder(parent).map_err(|error| Error::io(parent, "sync", error))?;
+    Ok(true)
+}
+
+/// Makes the files of a map durable, and their names.
+fn sync_map(disk: &dyn Disk, layout: &Layout, tiles: &[TileIndex]) -> Result<()> {
+    let mut own = vec![layout.metadata(), layout.commit_log()];
+    if disk.kind_at(&layout.scans())?.is_some() {
+        own.push(layout.scans());
+    }
+    sync_paths(disk, &own, &[])?;
+    for tiles in tiles.chunks(TILES_SYNCED_AT_ONCE) {
+        let files = tiles.iter().flat_map(|&tile| layout.files().iter().map(move |&file| (tile, file)));
+        let files: Vec<_> = files.map(|(tile, file)| layout.current(tile, file)).collect();
+        let folders: Vec<_> = tiles.iter().map(|&tile| layout.tile_folder(tile)).collect();
+        sync_paths(disk, &files, &folders)?;
+    }
+    sync_paths(disk, &[], &[layout.folder().to_owned()])
+}
+
+fn finish(disk: &dyn Disk, unfinished: &Path, folder: &Path) -> Result<()> {
+    check_is_free(disk, folder)?;
+    if disk.kind_at(folder)?.is_some() {
+        disk.remove_folder(folder).map_err(|error| Error::io(folder, "replace", error))?;
+    }
+    disk.rename(unfinished, folder).map_err(|error| Error::io(unfinished, "rename", error))
+}
+
+fn sync_paths(disk: &dyn Disk, files: &[PathBuf], folders: &[PathBuf]) -> Result<()> {
+    let [of_files, of_folders] = disk.sync_all(files, folders);
+    let paths = files.iter().chain(folders);
+    paths
+        .zip(of_files.into_iter().chain(of_folders))
+        .try_for_each(|(path, synced)| synced.map_err(|error| Error::io(path, "sync", error)))
+}
