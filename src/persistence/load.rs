@@ -75,7 +75,7 @@ pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, mut stored: Store
 }
 
 /// Checks that an intact file belongs to this map and tile and is the version in the log.
-fn check(
+pub(super) fn check(
     map_id: [u8; 16],
     index: TileIndex,
     storage: Storage,

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! load          store -> table, checked against the log -> Tile
+//! one_voxel     store -> the evidence of one voxel, from a part of its tile's file
 //! tile_saver    Tile or CompactTile -> table and octree files -> store
 //! compact_tile  a tile in the compact form, in memory; packer makes it
 //! io_threads    one saving and one loading thread, each a `Worker`
@@ -14,6 +15,7 @@ mod compact_tile;
 mod io_threads;
 pub(crate) mod load;
 mod map_id;
+pub(crate) mod one_voxel;
 mod packer;
 mod parameters;
 mod priority;

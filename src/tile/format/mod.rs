@@ -21,7 +21,7 @@ mod trailer;
 mod writer;
 
 pub use compact::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
-pub use compact_file::{read_compact_file, read_compact_front, write_compact_file};
+pub use compact_file::{CompactFileIndex, read_compact_file, read_compact_front, write_compact_file};
 pub use entries::encode_entries;
 pub use reader::{DecodedTable, read_table, read_trailer};
 pub use trailer::{TRAILER_BYTES, Trailer};

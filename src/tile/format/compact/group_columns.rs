@@ -58,6 +58,13 @@ impl Columns {
     }
 }
 
+impl Columns {
+    /// The symbols of all voxels of the group.
+    pub(super) fn symbols(&self) -> &[u8] {
+        &self.symbols
+    }
+}
+
 /// The unread rest of the columns of a group.
 #[derive(Clone, Copy)]
 pub(super) struct Rest<'a> {
@@ -126,9 +133,20 @@ impl<'a> Rest<'a> {
         Ok(second)
     }
 
+    /// Leaves out so many second bytes.
+    pub(super) fn pass_seconds(&mut self, count: usize) -> Result<(), String> {
+        self.seconds = self.seconds.get(count..).ok_or("fewer second bytes than prefixes")?;
+        Ok(())
+    }
+
+    /// Leaves out so many rare states.
+    pub(super) fn pass_rares(&mut self, count: usize) {
+        self.rares_done = self.rares_done.saturating_add(count);
+    }
+
     pub(super) fn take_rare(&mut self) -> Result<Evidence, String> {
         let states = self.rares.len() / STATE_BYTES;
-        if self.rares_done == states || states * STATE_BYTES != self.rares.len() {
+        if self.rares_done >= states || states * STATE_BYTES != self.rares.len() {
             return Err("fewer rare states than their symbols".into());
         }
         let state = state_at(self.rares, self.rares_done);

@@ -1,6 +1,6 @@
 use super::group_columns::{Columns, Rest, Room};
+use super::header::Header;
 use super::open_brick::{OpenBrick, Refusal};
-use super::reader::Header;
 use super::symbol::Symbols;
 use crate::error::FormatError;
 use crate::space::{BrickCode, VoxelBox};
@@ -39,25 +39,30 @@ impl<'a> GroupReader<'a> {
         self.table
     }
 
-    /// Adds the next group.
-    pub(super) fn add(&mut self, columns: &Columns) -> Result<(), FormatError> {
-        self.add_bricks(columns).map_err(|reason| FormatError::at_offset(columns.offset, reason))
+    /// Adds the next group. Its first brick is `first`, or the first step leads to it.
+    pub(super) fn add(&mut self, columns: &Columns, first: Option<BrickCode>) -> Result<(), FormatError> {
+        self.add_bricks(columns, first).map_err(|reason| FormatError::at_offset(columns.offset, reason))
     }
 
-    fn add_bricks(&mut self, columns: &Columns) -> Result<(), String> {
+    fn add_bricks(&mut self, columns: &Columns, mut first: Option<BrickCode>) -> Result<(), String> {
         if columns.bricks == 0 {
             return Err("a group without bricks".into());
         }
         let mut rest = Rest::of(columns);
-        (0..columns.bricks).try_for_each(|_| self.add_brick(&mut rest))?;
+        if first.is_some() && first <= self.before {
+            return Err("the first brick is not behind the previous group".into());
+        }
+        for _ in 0..columns.bricks {
+            let code = first.take().map_or_else(|| rest.take_code(self.before), Ok)?;
+            self.add_brick(code, &mut rest)?;
+        }
         match rest.is_empty() {
             true => Ok(()),
             false => Err("a group has more than its bricks".into()),
         }
     }
 
-    fn add_brick(&mut self, rest: &mut Rest<'_>) -> Result<(), String> {
-        let code = rest.take_code(self.before)?;
+    fn add_brick(&mut self, code: BrickCode, rest: &mut Rest<'_>) -> Result<(), String> {
         self.before = Some(code);
         let observed = rest.take_mask()?;
         let brick = OpenBrick { code, observed, symbols: self.symbols };

@@ -1,4 +1,5 @@
 use super::CRC_BYTES;
+use super::group_index::joined_crc;
 use super::numbers::take_number;
 use crate::error::{DecodeError, FormatError};
 use std::io::Read;
@@ -10,13 +11,51 @@ pub(super) struct Input<R> {
     pub(super) offset: u64,
     /// Bytes before the checksum.
     end: u64,
+    /// Of the part that is being read.
     crc: crc32fast::Hasher,
+    /// Where it begins.
+    part: u64,
+    /// Of the parts before.
+    crc_before: u32,
 }
 
 impl<R: Read> Input<R> {
     /// An input of `bytes` bytes, at least those of a checksum.
     pub(super) fn new(input: R, bytes: u64) -> Self {
-        Self { input, offset: 0, end: bytes - CRC_BYTES, crc: crc32fast::Hasher::new() }
+        Self {
+            input,
+            offset: 0,
+            end: bytes - CRC_BYTES,
+            crc: crc32fast::Hasher::new(),
+            part: 0,
+            crc_before: 0,
+        }
+    }
+
+    /// Bytes that follow before the checksum.
+    pub(super) fn left(&self) -> u64 {
+        self.end - self.offset
+    }
+
+    /// Ends a part; its checksum.
+    pub(super) fn end_part(&mut self) -> u32 {
+        let crc = std::mem::take(&mut self.crc).finalize();
+        self.crc_before = joined_crc(self.crc_before, crc, self.offset - self.part);
+        self.part = self.offset;
+        crc
+    }
+
+    /// Ends a part, which must be so long and have this checksum.
+    pub(super) fn end_part_as(&mut self, what: &str, bytes: u64, crc: u32) -> Result<(), DecodeError> {
+        let (begin, found) = (self.part, self.offset - self.part);
+        let wrong = |reason| Err(FormatError::at_offset(begin, reason).into());
+        if found != bytes {
+            return wrong(format!("the {what} takes {found} bytes where {bytes} are announced"));
+        }
+        match self.end_part() == crc {
+            true => Ok(()),
+            false => wrong(format!("the {what} does not match its checksum")),
+        }
     }
 
     /// An error at the present offset.
@@ -58,7 +97,8 @@ impl<R: Read> Input<R> {
         }
         let mut crc = [0; CRC_BYTES as usize];
         self.input.read_exact(&mut crc)?;
-        if self.crc.clone().finalize() != u32::from_le_bytes(crc) {
+        self.end_part();
+        if self.crc_before != u32::from_le_bytes(crc) {
             return Err(self.wrong("the bytes do not match their checksum"));
         }
         Ok(())

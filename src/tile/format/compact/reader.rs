@@ -1,10 +1,11 @@
+use super::CRC_BYTES;
 use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
 use super::group_columns::Columns;
+use super::group_index::GroupIndex;
 use super::group_reader::GroupReader;
+use super::header::{HEADER_1_BYTES, Header, Version};
 use super::input::Input;
-use super::symbol::MAX_STATES;
-use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
 use crate::tile::Table;
@@ -43,25 +44,61 @@ impl CompactReader {
         bytes: u64,
         voxels: &VoxelBox,
     ) -> Result<Table, DecodeError> {
-        if bytes < HEADER_BYTES as u64 + CRC_BYTES {
+        if bytes < HEADER_1_BYTES as u64 + CRC_BYTES {
             let reason = format!("{bytes} bytes are too few for a compact table");
             return Err(FormatError::at_offset(0, reason).into());
         }
         let mut input = Input::new(input, bytes);
-        let header = Header::read(&mut input, voxels)?;
-        let palette = read_codebook(header.states, &mut self.column_reader, &mut input)?;
-        let mut groups = GroupReader::new(voxels, palette);
-        while groups.bricks() < header.bricks {
-            self.columns.read(&groups.room(&header), &mut self.column_reader, &mut input)?;
-            groups.add(&self.columns)?;
-        }
-        let table = groups.end();
+        let (version, header) = Header::read(&mut input, voxels)?;
+        let table = match version {
+            Version::One => self.read_groups_1(&header, voxels, &mut input)?,
+            Version::Two => self.read_groups(&header, voxels, &mut input)?,
+        };
         if table.len() != header.voxels {
             let reason = format!("{} voxels where {} are announced", table.len(), header.voxels);
             return Err(FormatError::at_offset(8, reason).into());
         }
         input.end()?;
         Ok(table)
+    }
+
+    fn read_groups(
+        &mut self,
+        header: &Header,
+        voxels: &VoxelBox,
+        input: &mut Input<impl Read>,
+    ) -> Result<Table, DecodeError> {
+        let index = GroupIndex::read(header, input)?;
+        input.end_part();
+        let palette = read_codebook(header.states, &mut self.column_reader, input)?;
+        input.end_part_as("codebook", header.codebook_bytes as u64, header.codebook_crc)?;
+        let mut groups = GroupReader::new(voxels, palette);
+        for group in &index.groups {
+            self.columns.read(&groups.room(header), &mut self.column_reader, input)?;
+            input.end_part_as("group", group.bytes.into(), group.crc)?;
+            groups.add(&self.columns, Some(group.first))?;
+        }
+        if groups.bricks() != header.bricks {
+            let reason = format!("{} bricks where {} are announced", groups.bricks(), header.bricks);
+            return Err(FormatError::at_offset(16, reason).into());
+        }
+        Ok(groups.end())
+    }
+
+    /// Of version 1: groups until all bricks are there.
+    fn read_groups_1(
+        &mut self,
+        header: &Header,
+        voxels: &VoxelBox,
+        input: &mut Input<impl Read>,
+    ) -> Result<Table, DecodeError> {
+        let palette = read_codebook(header.states, &mut self.column_reader, input)?;
+        let mut groups = GroupReader::new(voxels, palette);
+        while groups.bricks() < header.bricks {
+            self.columns.read(&groups.room(header), &mut self.column_reader, input)?;
+            groups.add(&self.columns, None)?;
+        }
+        Ok(groups.end())
     }
 }
 
@@ -74,47 +111,6 @@ pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Res
     CompactReader::new()?.read(input, bytes, voxels)
 }
 
-/// The header of a compact table.
-pub(super) struct Header {
-    pub(super) voxels: usize,
-    pub(super) bricks: usize,
-    pub(super) states: usize,
-}
-
-impl Header {
-    fn read(input: &mut Input<impl Read>, voxels: &VoxelBox) -> Result<Self, DecodeError> {
-        let mut header = [0; HEADER_BYTES];
-        input.read(&mut header)?;
-        let u32_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| header[at + k]));
-        let wrong = |offset, reason: String| Err(FormatError::at_offset(offset, reason).into());
-        if u32_at(0) != MAGIC {
-            return wrong(0, format!("the magic number is {:#010x}, not {MAGIC:#010x}", u32_at(0)));
-        }
-        if u32_at(4) != VERSION {
-            let reason = format!("version {} is not known; this program reads version {VERSION}", u32_at(4));
-            return wrong(4, reason);
-        }
-        let count = u64::from(u32_at(8)) | u64::from(u32_at(12)) << 32;
-        let most = voxels_in(voxels);
-        let Some(count) = usize::try_from(count).ok().filter(|&count| count as u64 <= most) else {
-            return wrong(8, format!("{count} voxels in a tile of {most}"));
-        };
-        let [bricks, states] = [u32_at(16), u32_at(20)].map(|count| count as usize);
-        if bricks > count || (bricks == 0) != (count == 0) {
-            return wrong(16, format!("{count} voxels in {bricks} bricks"));
-        }
-        if states > count.min(MAX_STATES) {
-            return wrong(20, format!("a codebook of {states} states for {count} voxels"));
-        }
-        Ok(Self { voxels: count, bricks, states })
-    }
-}
-
-/// Number of voxels of a tile.
-fn voxels_in(voxels: &VoxelBox) -> u64 {
-    (0..3).map(|k| u64::from(voxels.end[k].abs_diff(voxels.min[k]))).product()
-}
-
 /// The codebook as a palette: its states are numbered from 1.
 fn read_codebook(
     states: usize,
@@ -123,12 +119,7 @@ fn read_codebook(
 ) -> Result<Palette, DecodeError> {
     let offset = input.offset;
     let wrong = |reason: String| Err(FormatError::at_offset(offset, reason).into());
-    let mut bytes = Vec::new();
-    let column = Column { name: "codebook", most: states * STATE_BYTES, bytes: &mut bytes };
-    column_reader.take_columns([column], input)?;
-    if bytes.len() != states * STATE_BYTES {
-        return wrong(format!("a codebook of {} bytes for {states} states", bytes.len()));
-    }
+    let bytes = read_codebook_states(states, column_reader, input)?;
     let mut palette = Palette::with_all_room();
     for number in 0..states {
         let state = state_at(&bytes, number);
@@ -141,4 +132,21 @@ fn read_codebook(
         }
     }
     Ok(palette)
+}
+
+/// The states of the codebook, for [`state_at`]. None was looked at.
+pub(super) fn read_codebook_states(
+    states: usize,
+    column_reader: &mut ColumnReader,
+    input: &mut Input<impl Read>,
+) -> Result<Vec<u8>, DecodeError> {
+    let offset = input.offset;
+    let mut bytes = Vec::new();
+    let column = Column { name: "codebook", most: states * STATE_BYTES, bytes: &mut bytes };
+    column_reader.take_columns([column], input)?;
+    if bytes.len() != states * STATE_BYTES {
+        let reason = format!("a codebook of {} bytes for {states} states", bytes.len());
+        return Err(FormatError::at_offset(offset, reason).into());
+    }
+    Ok(bytes)
 }
