@@ -70,8 +70,8 @@ pub struct CompactFileIndex {
 }
 
 impl CompactFileIndex {
-    /// Reads it from the beginning of a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`; `None` if
-    /// the table is of version 1, of which all has to be read.
+    /// Reads it from the beginning of a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`; `None`
+    /// if the table is of version 1, of which all has to be read.
     ///
     /// # Errors
     ///

@@ -28,8 +28,8 @@ impl CompactWriter {
 
     /// Writes a table in compact form. Returns the number of bytes.
     ///
-    /// Equal tables give equal bytes. Writing takes memory for these, up to 80 bytes per state of the palette, and up to
-    /// 12 MB if some bricks do not use the palette.
+    /// Equal tables give equal bytes. Writing takes memory for these, 8 bytes per brick, up to 80 bytes per state of the
+    /// palette, and up to 12 MB if some bricks do not use the palette.
     ///
     /// # Errors
     ///
@@ -50,10 +50,11 @@ impl CompactWriter {
         let codebook = Codebook::of(table);
         // A failed write may have left something behind.
         group.clear();
+        let bricks: Vec<_> = table.bricks_in_order().collect();
         let mut sizes = GroupSizes::default();
-        table
-            .bricks_in_order()
-            .for_each(|brick| sizes.push(brick.observed.iter().map(|word| word.count_ones() as usize).sum()));
+        for brick in &bricks {
+            sizes.push(brick.observed.iter().map(|word| word.count_ones() as usize).sum());
+        }
         let mut out = vec![0; HEADER_BYTES + sizes.groups() * ENTRY_BYTES];
         let codebook_begin = out.len();
         let mut states = Vec::new();
@@ -62,14 +63,14 @@ impl CompactWriter {
         let codebook_bytes = &out[codebook_begin..];
         let header = Header {
             voxels: table.len(),
-            bricks: table.bricks.len(),
+            bricks: bricks.len(),
             states: codebook.states.len(),
             groups: sizes.groups(),
             codebook_bytes: codebook_bytes.len(),
             codebook_crc: crc32fast::hash(codebook_bytes),
         };
         let mut index = GroupIndex::default();
-        for brick in table.bricks_in_order() {
+        for brick in bricks {
             group.push(brick, &codebook, &table.palette);
             if group.is_full() {
                 index.groups.extend(group.end(column_writer, &mut out)?);
