@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::sensor::Evidence;
+use voxtile::sensor::{Evidence, Iwlo, SensorModel};
 use voxtile::space::VoxelIndex;
 use voxtile::store::SnapshotName;
 use voxtile::{Error, MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper, Storage};
@@ -28,6 +28,24 @@ fn small(storage: Storage, seed: u64) -> FaultyDisk {
             mapper.snapshot(&SnapshotName::new("first").unwrap()).unwrap();
         }
     }
+    drop(mapper);
+    disk.copy()
+}
+
+/// A map of a tile whose file is too long to be read at once, in several groups.
+fn long() -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let model = SensorModel::Iwlo(Iwlo { sharpness: 1.0, ..Iwlo::default() });
+    let config = MapConfig::new(0.1, 12.8)
+        .unwrap()
+        .with_range(0.0, 6.0)
+        .with_storage(Storage::Compact)
+        .with_sensor_model(model);
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config).unwrap();
+    for k in 0..4 {
+        mapper.insert_scan(&random_scan(&mut Random(k), [6.4; 3], 4000)).unwrap();
+    }
+    mapper.flush().unwrap();
     drop(mapper);
     disk.copy()
 }
@@ -132,4 +150,58 @@ fn only_the_file_that_the_log_names_is_an_answer() {
     disk.put(&path, &bytes);
     let error = open(&disk).evidence(voxel).unwrap_err();
     assert!(matches!(error, Error::Damaged { .. }), "{error}");
+}
+
+#[test]
+fn of_a_long_file_a_part_is_read() {
+    let disk = long();
+    let whole = open(&disk);
+    let tile = whole.tiles().map(Result::unwrap).max_by_key(|tile| tile.table().len()).unwrap();
+    let known: Vec<_> = tile.voxels().map(|voxel| (voxel.index, voxel.evidence)).collect();
+    let (path, bytes) = table(&disk, &whole, known[0].0);
+    assert!(bytes.len() > 3 * 64 << 10, "{}", bytes.len());
+    let mut random = Random(7);
+    let mut read = Vec::new();
+    for number in 0..300 {
+        let voxel = match number % 3 {
+            0 => std::array::from_fn(|_| random.below(128) as i32),
+            _ => known[random.below(known.len() as u64) as usize].0,
+        };
+        let reader = open(&disk);
+        assert_eq!(bits(reader.evidence(voxel).unwrap()), bits(tile.evidence(voxel)), "{voxel:?}");
+        read.push(reader.statistics().io.bytes_read);
+    }
+    assert!(read.iter().all(|&read| read > 0 && read < bytes.len() as u64), "{read:?}");
+    // Damage is an error, or in a group that is not read.
+    let [mut refused, mut answered] = [0; 2];
+    for _ in 0..300 {
+        let mut wrong = bytes.clone();
+        let at = match random.below(3) {
+            0 => random.below(2000),
+            _ => random.below(bytes.len() as u64),
+        };
+        wrong[at as usize] ^= 1 << random.below(8);
+        disk.put(&path, &wrong);
+        let (voxel, wanted) = known[random.below(known.len() as u64) as usize];
+        match open(&disk).evidence(voxel) {
+            Ok(found) => {
+                assert_eq!(bits(found), bits(Some(wanted)));
+                answered += 1;
+            }
+            Err(error) => {
+                assert!(matches!(error, Error::Damaged { .. }), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 40 && answered > 100, "{refused} {answered}");
+    // A cut is an error, or behind the group that is read.
+    for _ in 0..100 {
+        disk.put(&path, &bytes[..random.below(bytes.len() as u64) as usize]);
+        let (voxel, wanted) = known[random.below(known.len() as u64) as usize];
+        match open(&disk).evidence(voxel) {
+            Ok(found) => assert_eq!(bits(found), bits(Some(wanted))),
+            Err(error) => assert!(matches!(error, Error::Damaged { .. }), "{error}"),
+        }
+    }
 }
