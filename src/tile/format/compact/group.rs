@@ -5,12 +5,15 @@ use super::group_index::GroupEntry;
 use super::numbers::put_number;
 use super::symbol::RARE;
 use crate::sensor::Evidence;
-use crate::space::BrickCode;
+use crate::space::{BRICK_VOXELS, BrickCode};
 use crate::tile::table::{Brick, CELL_VOXELS, Palette, StateId, Storage, UnpaddedEvidence};
 use std::io;
 
-/// A group ends with the brick that reaches this many voxels.
-pub(super) const GROUP_VOXELS: usize = 1 << 16;
+/// A group ends with the brick that reaches this many voxels: one voxel is read with all of its group.
+const GROUP_VOXELS: usize = 1 << 15;
+
+/// What a reader takes; version 1 was written so.
+pub(super) const MOST_GROUP_VOXELS: usize = (1 << 16) + BRICK_VOXELS - 1;
 
 /// Most bricks of a group.
 pub(super) const GROUP_BRICKS: usize = 1 << 10;
@@ -137,7 +140,7 @@ impl Group {
         column_writer.put_columns(columns.map(|column| &column[..]), out)?;
         self.clear();
         let group = &out[begin..];
-        // At most 2^16 + 511 voxels of 14 bytes, and bricks.
+        // At most 2^15 + 511 voxels of 14 bytes, and bricks.
         Ok(Some(GroupEntry { first, bytes: group.len() as u32, crc: crc32fast::hash(group) }))
     }
 
