@@ -48,7 +48,7 @@ fn row(map: &Path, repeats: usize) -> Result<String, Box<dyn Error>> {
     let [fast, small] = [fast, small].map(|tiles| a_voxel(tiles.iter().map(Vec::len).sum::<usize>() as f64));
     let name = map.file_name().unwrap_or_default().display();
     Ok(format!(
-        "| {name} | {} | {voxels} | {:.2} | {fast:.3} | {small:.3} | {:.1}x, {:.1}x | {:.1} | {:.1} | {:.1} | {:.1} |",
+        "| {name} | {} | {voxels} | {:.2} | {fast:.3} | {small:.3} | {:.1}x, {:.1}x | {:.2} | {:.2} | {:.2} | {:.2} |",
         tables.len(),
         a_voxel(table_bytes as f64),
         18.0 / fast,

@@ -10,10 +10,11 @@ use object_store::gcp::GoogleCloudStorageBuilder;
 use object_store::http::HttpBuilder;
 use object_store::path::Path as Key;
 use object_store::{
-    BackoffConfig, ClientOptions, GetOptions, ObjectStore, ObjectStoreExt, PutMode, PutOptions, RetryConfig,
-    UpdateVersion,
+    BackoffConfig, ClientOptions, GetOptions, GetRange, ObjectStore, ObjectStoreExt, PutMode, PutOptions,
+    RetryConfig, UpdateVersion,
 };
 use std::io::{self, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, OnceLock};
@@ -209,7 +210,7 @@ impl Bucket {
         pending(async move {
             let key = this.key(&name.key());
             for _ in 0..FETCHES {
-                let (content, _) = get(&this.store, &key, most_bytes).await?;
+                let (content, _) = get(&this.store, &key, None, most_bytes).await?;
                 // Hashing is work, though short beside the way over the network.
                 if ObjectName::of(&content) == name {
                     return Ok(content);
@@ -217,6 +218,17 @@ impl Bucket {
             }
             let reason = format!("object {key}: its content is not what its name says; push the map again");
             Err(io::Error::new(io::ErrorKind::InvalidData, reason))
+        })
+    }
+
+    /// Begins to fetch some bytes of an object. Nothing tells here whether they are the right ones.
+    pub(super) fn fetch_bytes(&self, name: ObjectName, range: Range<u64>) -> Pending<Bytes> {
+        let this = self.clone();
+        pending(async move {
+            let key = this.key(&name.key());
+            let bytes = range.end.saturating_sub(range.start);
+            let (content, _) = get(&this.store, &key, Some(range), bytes).await?;
+            Ok(content)
         })
     }
 
@@ -317,7 +329,7 @@ impl Bucket {
 
     fn get(&self, key: Key, most_bytes: u64) -> Pending<(Bytes, UpdateVersion)> {
         let store = self.store.clone();
-        pending(async move { get(&store, &key, most_bytes).await })
+        pending(async move { get(&store, &key, None, most_bytes).await })
     }
 
     fn key(&self, name: &str) -> Key {
@@ -351,21 +363,33 @@ fn pending<T: Send + 'static>(request: impl Future<Output = io::Result<T>> + Sen
     Pending(answer)
 }
 
-/// Gets an object. An answer that is cut off is asked for again; the store itself does that only before it begins.
-async fn get(store: &dyn ObjectStore, key: &Key, most_bytes: u64) -> io::Result<(Bytes, UpdateVersion)> {
+/// Gets an object, or some of its bytes. An answer that is cut off is asked for again; the store itself does that only
+/// before it begins.
+async fn get(
+    store: &dyn ObjectStore,
+    key: &Key,
+    range: Option<Range<u64>>,
+    most_bytes: u64,
+) -> io::Result<(Bytes, UpdateVersion)> {
     let began = Instant::now();
     for _ in 1..FETCHES {
-        match get_once(store, key, most_bytes).await {
+        match get_once(store, key, range.clone(), most_bytes).await {
             Err(error) if error.kind() == io::ErrorKind::Other && began.elapsed() < LATEST_RETRY => {}
             outcome => return outcome,
         }
     }
-    get_once(store, key, most_bytes).await
+    get_once(store, key, range, most_bytes).await
 }
 
-async fn get_once(store: &dyn ObjectStore, key: &Key, most_bytes: u64) -> io::Result<(Bytes, UpdateVersion)> {
-    let found = store.get(key).await.map_err(|error| refused(key, &error))?;
-    let bytes = found.meta.size;
+async fn get_once(
+    store: &dyn ObjectStore,
+    key: &Key,
+    range: Option<Range<u64>>,
+    most_bytes: u64,
+) -> io::Result<(Bytes, UpdateVersion)> {
+    let options = GetOptions { range: range.map(GetRange::Bounded), ..GetOptions::default() };
+    let found = store.get_opts(key, options).await.map_err(|error| refused(key, &error))?;
+    let bytes = found.range.end.saturating_sub(found.range.start);
     if bytes > most_bytes {
         let reason = format!("object {key}: {bytes} bytes, and at most {most_bytes} belong there");
         return Err(io::Error::new(io::ErrorKind::InvalidData, reason));

@@ -110,6 +110,27 @@ impl Disk for BucketDisk {
         self.open_from(path, offset)
     }
 
+    fn read_at(&self, path: &Path, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
+        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let file = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
+        let end = offset.saturating_add(bytes as u64).min(file.bytes);
+        let (mut read, mut at) = (Vec::new(), offset);
+        while at < end {
+            let part = usize::try_from(at / PART_BYTES).ok().and_then(|number| file.parts.get(number));
+            let part = *part.ok_or(io::ErrorKind::UnexpectedEof)?;
+            let begin = at % PART_BYTES;
+            let range = begin..(begin + (end - at)).min(PART_BYTES);
+            let wanted = range.end - range.start;
+            let content = self.bucket.fetch_bytes(part, range).wait()?;
+            if content.len() as u64 != wanted {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            read.extend_from_slice(&content);
+            at += wanted;
+        }
+        Ok(read)
+    }
+
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         self.open_from(path, 0)
     }

@@ -15,6 +15,7 @@ use crate::mapper::{MapReader, MapView, OctreeMap, Stoppable};
 use crate::octree::{OctreeFormat, write_bt, write_ot};
 use crate::query::OctreeExport;
 use crate::scan::Stop;
+use crate::sensor::Probabilities;
 use crate::space::{Aabb, Grid, TileIndex, VoxelBox};
 use crate::{Error, MapQueries};
 use indicatif::HumanCount;
@@ -164,6 +165,7 @@ impl<'a> Export<'a> {
             let mut writer = VoxelWriter::new(file, out)?;
             let mut written = Ok(());
             let mut tile = None;
+            let mut probabilities = Probabilities::default();
             let map = Stoppable::new(reader, self.watch.stop());
             map.for_each_occupied(self.least_probability(), self.region.as_ref(), |voxel| {
                 if voxel.evidence.log_odds >= below {
@@ -177,7 +179,7 @@ impl<'a> Export<'a> {
                 if written.is_ok() {
                     written = writer.write(&VoxelRecord {
                         center_m: origin.center_m(voxel.index, &grid),
-                        probability: voxel.evidence.probability(),
+                        probability: probabilities.of(voxel.evidence.log_odds),
                         log_odds: voxel.evidence.log_odds,
                         observation_count: voxel.evidence.observation_count,
                     });

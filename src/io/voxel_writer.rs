@@ -113,16 +113,20 @@ impl<W: Write> VoxelWriter<W> {
         self.written += 1;
         let VoxelRecord { center_m, probability, log_odds, observation_count } = *voxel;
         let [x, y, z] = center_m;
+        // One write for a record: each is a call, and a look at whether to stop.
         match self.file.format {
             VoxelFormat::Csv => {
-                return writeln!(self.out, "{x},{y},{z},{probability},{log_odds},{observation_count}");
+                writeln!(self.out, "{x},{y},{z},{probability},{log_odds},{observation_count}")
             }
             VoxelFormat::Ply => {
-                for coordinate in center_m {
-                    self.out.write_all(&coordinate.to_le_bytes())?;
+                let mut record = [0; 40];
+                for (bytes, coordinate) in record.as_chunks_mut().0.iter_mut().zip(center_m) {
+                    *bytes = coordinate.to_le_bytes();
                 }
-                self.out.write_all(&(probability as f32).to_le_bytes())?;
-                self.out.write_all(&log_odds.to_le_bytes())?;
+                record[24..28].copy_from_slice(&(probability as f32).to_le_bytes());
+                record[28..36].copy_from_slice(&log_odds.to_le_bytes());
+                record[36..].copy_from_slice(&observation_count.to_le_bytes());
+                self.out.write_all(&record)
             }
             VoxelFormat::Pcd => {
                 let reach_m = f64::from(VoxelFile::PCD_REACH_VOXELS) * self.file.resolution_m;
@@ -134,12 +138,14 @@ impl<W: Write> VoxelWriter<W> {
                     );
                     return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
                 }
-                for value in [x, y, z, probability] {
-                    self.out.write_all(&(value as f32).to_le_bytes())?;
+                let mut record = [0; 20];
+                for (bytes, value) in record.as_chunks_mut().0.iter_mut().zip([x, y, z, probability]) {
+                    *bytes = (value as f32).to_le_bytes();
                 }
+                record[16..].copy_from_slice(&observation_count.to_le_bytes());
+                self.out.write_all(&record)
             }
         }
-        self.out.write_all(&observation_count.to_le_bytes())
     }
 
     /// Ends the file.

@@ -5,13 +5,16 @@ use crate::config::{MapConfig, MemoryLimit};
 use crate::error::{Error, Result};
 use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
-use crate::space::{TileBox, TileIndex};
+use crate::persistence::one_voxel::read_voxel;
+use crate::sensor::Evidence;
+use crate::space::{TileBox, TileIndex, VoxelIndex};
 use crate::store::{
     CatalogEntry, Disk, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileFile, TileStore,
     TileVersion, read_scans,
 };
 use crate::tile::{OctreeFactory, Tile, Voxel};
 use lru::LruCache;
+use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -39,18 +42,30 @@ struct ReaderCache {
     /// With their bytes.
     tiles: LruCache<TileIndex, (Arc<Tile>, usize)>,
     bytes: usize,
+    /// Tiles not in memory of which one voxel was asked.
+    asked_once: LruCache<TileIndex, ()>,
     io: IoCounts,
 }
 
+/// Most tiles that are remembered for having been asked once.
+const MOST_ASKED_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
+
 impl Default for ReaderCache {
     fn default() -> Self {
-        Self { tiles: LruCache::unbounded(), bytes: 0, io: IoCounts::default() }
+        Self {
+            tiles: LruCache::unbounded(),
+            bytes: 0,
+            asked_once: LruCache::new(MOST_ASKED_ONCE),
+            io: IoCounts::default(),
+        }
     }
 }
 
 impl ReaderCache {
     fn get(&mut self, index: TileIndex) -> Option<Arc<Tile>> {
-        self.tiles.get(&index).map(|(tile, _)| tile.clone())
+        let (tile, _) = self.tiles.get(&index)?;
+        self.io.hits += 1;
+        Some(tile.clone())
     }
 
     fn remove(&mut self, index: TileIndex) {
@@ -65,6 +80,7 @@ impl ReaderCache {
             MemoryLimit::Bytes(bytes) | MemoryLimit::Tight(bytes) => (usize::MAX, bytes),
         };
         self.remove(index);
+        self.asked_once.pop(&index);
         while (self.tiles.len() >= most_tiles || self.bytes.saturating_add(bytes) > most_bytes)
             && let Some((_, (_, dropped))) = self.tiles.pop_lru()
         {
@@ -387,11 +403,7 @@ impl MapView for MapReader {
     }
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        if let Some(tile) = self.found(|cache| {
-            let tile = cache.get(index)?;
-            cache.io.hits += 1;
-            Some(tile)
-        }) {
+        if let Some(tile) = self.found(|cache| cache.get(index)) {
             return Ok(Some(TileRef::shared(tile)));
         }
         // Other threads find theirs meanwhile.
@@ -403,6 +415,25 @@ impl MapView for MapReader {
             cache.put(tile.clone(), self.config.memory);
         });
         Ok(Some(TileRef::shared(tile)))
+    }
+
+    /// The first voxel asked of a tile that is not in memory is read from a part of its file; with the second one the
+    /// tile is loaded: where two were asked, more will be.
+    fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
+        let index = self.config.grid.tile_of_voxel(voxel);
+        let (tile, is_first) = self.found(|cache| {
+            let tile = cache.get(index);
+            let is_first = tile.is_none() && cache.asked_once.put(index, ()).is_none();
+            (tile, is_first)
+        });
+        if let Some(tile) = tile {
+            return Ok(tile.evidence(voxel));
+        }
+        if is_first && let Some(found) = read_voxel(&self.store, &self.config.grid, voxel) {
+            self.found(|cache| cache.io.bytes_read += found.bytes);
+            return Ok(found.evidence);
+        }
+        Ok(self.tile(index)?.and_then(|tile| tile.evidence(voxel)))
     }
 
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {

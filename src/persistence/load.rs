@@ -121,7 +121,7 @@ fn read_stored<T>(
 }
 
 /// Checks that an intact file belongs to this map and tile and is the version in the log.
-fn check(
+pub(super) fn check(
     map_id: [u8; 16],
     index: TileIndex,
     storage: Storage,

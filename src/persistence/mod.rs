@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! load          store -> table, checked against the log -> Tile
+//! one_voxel     store -> the evidence of one voxel, from a part of its tile's file
 //! tile_saver    Tile or CompactTile -> table and octree files -> store
 //! copy_tile     a tile of one map -> another map's store, its bytes but for the map's id
 //! compact_tile  a tile in the compact form, in memory; packer makes it
@@ -16,6 +17,7 @@ mod copy_tile;
 mod io_threads;
 pub(crate) mod load;
 mod map_id;
+pub(crate) mod one_voxel;
 mod packer;
 mod parameters;
 mod priority;

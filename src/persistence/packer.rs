@@ -19,8 +19,6 @@ impl Packer {
             Some(writer) => writer,
             none => none.insert(CompactWriter::new(CompactEffort::Fast).map_err(failed)?),
         };
-        let mut bytes = Vec::new();
-        writer.write(table, &mut bytes).map_err(failed)?;
-        Ok(bytes)
+        writer.bytes(table).map_err(failed)
     }
 }

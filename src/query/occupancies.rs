@@ -1,34 +1,22 @@
 use super::Occupancy;
 use crate::config::MapConfig;
-use crate::sensor::Evidence;
+use crate::sensor::{Evidence, Probabilities};
 
-/// Makes [`Occupancy::of`] of many voxels: few log-odds are common, and a probability takes as long to compute as its
-/// voxel to find. So the last ones are kept.
+/// Makes [`Occupancy::of`] of many voxels.
 pub(super) struct Occupancies<'a> {
     config: &'a MapConfig,
-    /// By a hash of the log-odds, with their bits.
-    kept: Vec<(u64, Occupancy)>,
+    probabilities: Probabilities,
 }
-
-const KEPT_BITS: u32 = 8;
 
 impl<'a> Occupancies<'a> {
     pub(super) fn new(config: &'a MapConfig) -> Self {
-        // No evidence has these log-odds: no place is empty.
-        let nan = f64::NAN.to_bits();
-        Self { config, kept: vec![(nan, Occupancy::Unknown); 1 << KEPT_BITS] }
+        Self { config, probabilities: Probabilities::default() }
     }
 
     /// The occupancy of a voxel's evidence.
     #[inline]
-    pub(super) fn of(&mut self, evidence: Evidence) -> Occupancy {
-        let bits = evidence.log_odds.to_bits();
-        let place = bits.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - KEPT_BITS);
-        let kept = &mut self.kept[place as usize];
-        if kept.0 != bits {
-            *kept = (bits, Occupancy::of(self.config, Some(evidence)));
-        }
-        kept.1
+    pub(super) fn of(&mut self, Evidence { log_odds, .. }: Evidence) -> Occupancy {
+        Occupancy::with_probability(self.config, log_odds, self.probabilities.of(log_odds))
     }
 }
 

@@ -36,8 +36,16 @@ impl Occupancy {
     pub fn of_log_odds(config: &MapConfig, log_odds: Option<f64>) -> Self {
         match log_odds {
             None => Self::Unknown,
-            Some(log_odds) if log_odds >= config.occupied_log_odds() => Self::Occupied(sigmoid(log_odds)),
-            Some(log_odds) => Self::Free(sigmoid(log_odds)),
+            Some(log_odds) => Self::with_probability(config, log_odds, sigmoid(log_odds)),
+        }
+    }
+
+    /// The occupancy of log-odds whose probability is known.
+    #[inline]
+    pub(super) fn with_probability(config: &MapConfig, log_odds: f64, probability: f64) -> Self {
+        match log_odds >= config.occupied_log_odds() {
+            true => Self::Occupied(probability),
+            false => Self::Free(probability),
         }
     }
 

@@ -9,8 +9,10 @@ mod evidence;
 mod iwlo;
 mod log_odds;
 mod model;
+mod probabilities;
 
 pub use evidence::Evidence;
 pub use iwlo::Iwlo;
 pub use log_odds::LogOdds;
 pub use model::{Observation, SensorModel};
+pub use probabilities::Probabilities;

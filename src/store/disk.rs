@@ -19,6 +19,12 @@ pub trait Disk: Debug + Send + Sync {
         io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
         Ok(input)
     }
+    /// Reads some bytes of a file, fewer if it ends before.
+    fn read_at(&self, path: &Path, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
+        let mut read = Vec::new();
+        self.open_at(path, offset)?.take(bytes as u64).read_to_end(&mut read)?;
+        Ok(read)
+    }
     /// Opens a file for reading and counts as its reader until the result is dropped: [`Disk::watch`] tells. Where
     /// the file system has no locks, the file is opened and nobody can tell.
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;

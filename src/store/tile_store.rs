@@ -327,11 +327,24 @@ impl TileStore {
     ///
     /// A file that the log names and that is missing, and a tile folder that the log does not name.
     pub fn open_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
-        let path = match &self.opened_snapshot {
-            Some(_) => self.path_in_snapshot(tile)?,
-            None => self.latest_path(tile),
-        };
-        self.open_version(tile, path)
+        self.open_version(tile, self.table_path(tile)?)
+    }
+
+    /// Where a reader finds the table of a tile, to read a part of it; `None` if no log names it.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub fn table_location(&self, tile: TileIndex) -> Result<Option<TileLocation>> {
+        let Some(version) = self.version(tile) else { return Ok(None) };
+        Ok(Some(self.location_at(tile, self.table_path(tile)?, Some(version))))
+    }
+
+    fn table_path(&self, tile: TileIndex) -> Result<PathBuf> {
+        match &self.opened_snapshot {
+            Some(_) => self.path_in_snapshot(tile),
+            None => Ok(self.latest_path(tile)),
+        }
     }
 
     /// Where a snapshot's version of a table is while no writer is at work.

@@ -1,9 +1,10 @@
 //! Files of every kind as the version wrote them that first had them: every later version reads them.
 //!
-//! `tests/data/files_1` is never written again. What a later version writes otherwise gets a folder of its own:
-//! `VOXTILE_NEW_FIXTURES=tests/data/files_2 cargo test --test all -- --ignored fixtures_of_this_version`.
+//! Folders of `tests/data` are never written again. What a later version writes otherwise gets a folder of its own:
+//! `VOXTILE_NEW_FIXTURES=tests/data/files_3 cargo test --test all -- --ignored fixtures_of_this_version`.
 
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -13,11 +14,12 @@ use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::verify;
 use voxtile::io::{ScanStreamWriter, open_scans};
 use voxtile::operations::{Decay, Part, clear, decay};
-use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::sensor::{Evidence, Iwlo, SensorModel};
 use voxtile::share::codec::Packet;
 use voxtile::share::{Sender, SenderConfig, VoxelSet, read_layer, write_layer};
-use voxtile::space::Aabb;
+use voxtile::space::{Aabb, VoxelBox, VoxelKey};
 use voxtile::store::SnapshotName;
+use voxtile::tile::format::{CompactFileIndex, read_compact_file, read_compact_voxels_from};
 use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 const MAPS: [&str; 4] = ["plain", "killed", "compact", "seed"];
@@ -129,6 +131,34 @@ fn streams_packets_and_layers_of_all_versions_are_read() {
         }
         assert_eq!(json!(set.digest().to_string()), expected["layer"]);
     }
+}
+
+/// Tiles of the maps above have one group. This one has three, with symbols of one and two bytes and rare states.
+#[test]
+fn a_tile_of_version_1_with_several_groups_is_read() {
+    let file = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/compact_1/tile.vxt")).unwrap();
+    let mut expected = BTreeMap::new();
+    for number in 0..13 * 13 * 13 {
+        let [x, y, z] = [number / 169, number / 13 % 13, number % 13].map(|k| 8 * k);
+        for k in 0..=number % 3 {
+            let (log_odds, observation_count) = match number % 11 {
+                0 => (f64::from(number) * 0.001 + f64::from(k), number % 7),
+                _ => (f64::from(number % 300) * -0.4, number % 300),
+            };
+            let voxel = [x + (number + k) % 8, y + number / 8 % 8, z + k];
+            expected.insert(VoxelKey::from_index(voxel).morton(), Evidence { log_odds, observation_count });
+        }
+    }
+    let voxels = VoxelBox { min: [0; 3], end: [104; 3] };
+    let bytes = file.len() as u64;
+    let read = read_compact_file(&mut &file[..], bytes, &voxels).unwrap();
+    assert!(read.table.iter().eq(expected.iter().map(|(&code, &evidence)| (code, evidence))));
+    assert_eq!(read.trailer.unwrap().scan_number, 5);
+    let sifted = read_compact_voxels_from(&mut &file[..], bytes, &voxels, 0.5).unwrap().table;
+    expected.retain(|_, evidence| evidence.log_odds >= 0.5);
+    assert!(sifted.into_iter().eq(expected));
+    // It has no index.
+    assert!(CompactFileIndex::read(&mut &file[..], bytes, &voxels).unwrap().is_none());
 }
 
 #[test]

@@ -43,7 +43,7 @@ const LAYERS: [(&str, &[&str]); 25] = [
     ("tile", &["config", "error", "octree", "scan", "sensor", "space"]),
     ("store", &["config", "error", "scratch", "sensor", "space"]),
     // The one layer that knows both tiles and files.
-    ("persistence", &["config", "error", "space", "store", "tile"]),
+    ("persistence", &["config", "error", "sensor", "space", "store", "tile"]),
     ("mapper", &["config", "error", "octree", "persistence", "scan", "sensor", "space", "store", "tile"]),
     ("query", &["config", "error", "mapper", "maths", "octree", "scan", "sensor", "space", "store", "tile"]),
     ("io", &["error", "maths", "scan", "space"]),

@@ -44,6 +44,8 @@ mod corruption;
 mod errors;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
 mod faults;
+/// The first voxel asked of a tile on disk.
+mod first_questions;
 /// Files of every kind, of every version.
 mod format_fixtures;
 /// One trait for everything that can be asked.

@@ -12,6 +12,7 @@ use voxtile::bucket::object_store::{ObjectStore, ObjectStoreExt};
 use voxtile::bucket::{Bucket, BucketDisk, FetchedFiles, PushOptions, Pushed, pull, push};
 use voxtile::integrity::verify;
 use voxtile::operations::{snapshot, snapshots};
+use voxtile::store::Disk;
 use voxtile::{
     Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, SnapshotName,
     Storage,
@@ -141,6 +142,9 @@ fn what_is_pushed_is_read_there_and_pulled() {
                 voxtile::Queries::occupancy_at(&here, point).unwrap()
             );
         }
+        // One voxel of each tile.
+        let io = there.statistics().io;
+        assert_eq!((io.loads == 0, io.bytes_read > 0), (storage == Storage::Compact, true), "{io:?}");
         let disk = BucketDisk::open(bucket.clone()).unwrap().into_map_path();
         assert!(verify(disk, |finding| panic!("{finding}"), |_, _| {}).unwrap().is_whole());
 
@@ -158,6 +162,26 @@ fn what_is_pushed_is_read_there_and_pulled() {
         assert_eq!(digest(&pulled), digest(&map));
         assert_whole(&pulled);
     }
+}
+
+#[test]
+fn any_bytes_of_a_file_are_read_there() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    drop(city(&map, Storage::Compact, false));
+    push_now(&map, &bucket);
+    let (disk, mut random) = (BucketDisk::open(bucket).unwrap(), Random(3));
+    let there = Path::new("s3://test/maps/city");
+    for (name, content) in files_of(&map).into_iter().filter(|(name, _)| name.ends_with("tile.vxt")) {
+        for _ in 0..20 {
+            let [from, bytes] = [0; 2].map(|_| random.below(content.len() as u64 + 40) as usize);
+            let wanted = content.get(from..).unwrap_or_default();
+            let read = disk.read_at(&there.join(&name), from as u64, bytes).unwrap();
+            assert_eq!(read, wanted[..bytes.min(wanted.len())]);
+        }
+    }
+    let missing = disk.read_at(&there.join("tile_9_9_9/tile.vxt"), 0, 1);
+    assert_eq!(missing.unwrap_err().kind(), std::io::ErrorKind::NotFound);
 }
 
 #[test]

@@ -42,6 +42,39 @@ impl TileLocation {
         self.tile
     }
 
+    /// What the log says of the tile, if it does.
+    pub fn version(&self) -> Option<TileVersion> {
+        self.version
+    }
+
+    /// Id of the map that the file must name; `None` if it is of the original format.
+    pub fn map_id(&self) -> Option<[u8; 16]> {
+        self.map_id
+    }
+
+    /// Its storage form.
+    pub fn storage(&self) -> Storage {
+        self.storage
+    }
+
+    /// Whether the tile's folder is one, and no link.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn is_in_folder(&self) -> Result<bool> {
+        Ok(self.disk.kind_at(&self.folder)? == Some(EntryKind::Folder))
+    }
+
+    /// Reads some bytes of the table's file, fewer if it ends before.
+    ///
+    /// # Errors
+    ///
+    /// A file that is missing or none, and a disk that refuses.
+    pub fn read_at(&self, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
+        self.disk.read_at(&self.path, offset, bytes)
+    }
+
     /// Opens the table.
     ///
     /// # Errors

@@ -14,17 +14,17 @@ use crate::space::{
 pub(super) struct AscendingEntries<'a, G> {
     voxels: &'a VoxelBox,
     gather: G,
-    brick: Option<OpenBrick>,
+    brick: OpenBrick,
     /// One more than the place of the last voxel in the open brick; 0 if there is none.
     behind: usize,
     /// The voxels of the open brick that are needed.
     run: Vec<(usize, Evidence)>,
 }
 
-#[derive(Clone, Copy)]
 struct OpenBrick {
-    code: BrickCode,
-    /// The common upper bits of its voxels' keys.
+    /// `None` before the first one.
+    code: Option<BrickCode>,
+    /// The common upper bits of its voxels' keys; before the first brick, those of no key.
     upper: [u16; 3],
     /// Its voxels that belong to the tile.
     inside: BrickMask,
@@ -35,19 +35,19 @@ const LOWER: u16 = BRICK_EDGE as u16 - 1;
 
 impl<'a, G: Gather> AscendingEntries<'a, G> {
     pub(super) fn new(voxels: &'a VoxelBox, gather: G) -> Self {
-        Self { voxels, gather, brick: None, behind: 0, run: Vec::with_capacity(BRICK_VOXELS) }
+        let brick = OpenBrick { code: None, upper: [u16::MAX; 3], inside: [0; 8] };
+        Self { voxels, gather, brick, behind: 0, run: Vec::with_capacity(BRICK_VOXELS) }
     }
 
     #[inline]
     fn take_one(&mut self, entry: &EntryBytes, offset: u64) -> Result<(), FormatError> {
         let Entry { key, evidence } = Entry::of(entry);
         let upper = key.0.map(|k| k & !LOWER);
-        let brick = match self.brick {
-            Some(brick) if brick.upper == upper => brick,
-            _ => self.open(Entry { key, evidence }, upper, offset)?,
-        };
+        if self.brick.upper != upper {
+            self.open(Entry { key, evidence }, upper, offset)?;
+        }
         let place = place_of_voxel(key.0.map(i32::from));
-        if !is_in_mask(&brick.inside, place) {
+        if !is_in_mask(&self.brick.inside, place) {
             return Err(of_another_tile(key, offset));
         }
         check_evidence(evidence, offset)?;
@@ -62,7 +62,7 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
     }
 
     #[inline(never)]
-    fn open(&mut self, entry: Entry, upper: [u16; 3], offset: u64) -> Result<OpenBrick, FormatError> {
+    fn open(&mut self, entry: Entry, upper: [u16; 3], offset: u64) -> Result<(), FormatError> {
         let Entry { key, evidence } = entry;
         let voxel = key.to_index_from(self.voxels.min);
         if !self.voxels.contains(voxel) {
@@ -70,14 +70,13 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
         }
         // Errors of the entry itself come first.
         check_evidence(evidence, offset)?;
-        let code = key.morton().brick();
-        if self.brick.is_some_and(|brick| brick.code >= code) {
+        let code = Some(key.morton().brick());
+        if self.brick.code >= code {
             return Err(out_of_order(key, offset));
         }
         self.close();
-        let brick = OpenBrick { code, upper, inside: self.inside(voxel) };
-        self.brick = Some(brick);
-        Ok(brick)
+        self.brick = OpenBrick { code, upper, inside: self.inside(voxel) };
+        Ok(())
     }
 
     /// The tile's voxels in the brick of `voxel`.
@@ -89,10 +88,10 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
 
     fn close(&mut self) {
         self.behind = 0;
-        if let Some(brick) = self.brick.take()
+        if let Some(code) = self.brick.code
             && !self.run.is_empty()
         {
-            self.gather.add(brick.code, &self.run);
+            self.gather.add(code, &self.run);
             self.run.clear();
         }
     }

@@ -1,14 +1,16 @@
 //! `tile.vxt`: a front part like the trailer of `iwlo_meta.bin`, then the table in compact form without its checksum.
 //! The checksum is in the front part: a checksum directly behind its data would make the checksum of the whole file a
-//! constant.
+//! constant. The checksums of a table's parts stand in its index, before the parts, for the same reason.
 
-use super::compact::{CRC_BYTES, read_compact, sift_compact};
+use super::compact::{CRC_BYTES, CompactIndex, joined_crc, read_compact, sift_compact};
 use super::gather::SiftedVoxels;
 use super::reader::{Decoded, DecodedTable};
 use super::trailer::Trailer;
 use crate::error::{DecodeError, FormatError};
-use crate::space::VoxelBox;
+use crate::sensor::Evidence;
+use crate::space::{MortonCode, VoxelBox};
 use std::io::{self, BufReader, Read, Write};
+use std::ops::Range;
 
 /// Writes a table in compact form as `tile.vxt`. The checksum in `front.table_crc` is computed here; the caller's value
 /// is ignored. There is no octree.
@@ -81,10 +83,60 @@ pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trai
     Ok(front)
 }
 
+/// What a `tile.vxt` has before its groups.
+#[derive(Debug)]
+pub struct CompactFileIndex {
+    /// The front part.
+    pub front: Trailer,
+    /// CRC-32 of the whole file, from those of its parts: if it is the right one, so are they.
+    pub crc: u32,
+    index: CompactIndex,
+}
+
+impl CompactFileIndex {
+    /// Reads it from the beginning of a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`; `None`
+    /// if the table is of version 1, of which all has to be read.
+    ///
+    /// # Errors
+    ///
+    /// Anything in these parts that violates the format, with its offset.
+    pub fn read(
+        input: &mut impl Read,
+        file_bytes: u64,
+        voxels: &VoxelBox,
+    ) -> Result<Option<Self>, DecodeError> {
+        let front = read_compact_front(input, file_bytes)?;
+        let body_bytes = file_bytes - front.bytes();
+        let index = CompactIndex::read(input, body_bytes + CRC_BYTES, voxels)
+            .map_err(|error| error.further_by(front.bytes()))?;
+        let Some(index) = index else { return Ok(None) };
+        if index.crc() != front.table_crc {
+            let reason = "the table's parts do not match its checksum";
+            return Err(FormatError::at_offset(44, reason).into());
+        }
+        let crc = joined_crc(crc32fast::hash(&front.to_bytes()), front.table_crc, body_bytes);
+        Ok(Some(Self { front, crc, index }))
+    }
+
+    /// Where in the file the group is that has a voxel, if one has it.
+    pub fn group_of(&self, voxel: MortonCode) -> Option<Range<u64>> {
+        let group = self.index.group_of(voxel)?;
+        Some(group.start + self.front.bytes()..group.end + self.front.bytes())
+    }
+
+    /// The evidence of a voxel, from the bytes of its group; `None` if it was not observed.
+    ///
+    /// # Errors
+    ///
+    /// Other bytes than those that the index tells of; anything that violates the format.
+    pub fn evidence(&self, voxel: MortonCode, group: &[u8]) -> Result<Option<Evidence>, DecodeError> {
+        self.index.evidence(voxel, group)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensor::Evidence;
     use crate::space::{BrickCode, TileIndex};
     use crate::tile::Table;
     use crate::tile::format::{CompactEffort, write_compact};
@@ -137,6 +189,19 @@ mod tests {
             assert!(read(&file[..at]).is_err(), "{at} bytes");
         }
         assert!(read(&[&file[..], &[0]].concat()).is_err());
+    }
+
+    #[test]
+    fn the_parts_tell_the_checksum_of_the_whole() {
+        let (table, file) = (table(0.5), file(&table(0.5), 77));
+        let index = CompactFileIndex::read(&mut &file[..], file.len() as u64, &VOXELS).unwrap().unwrap();
+        assert_eq!(index.crc, crc32fast::hash(&file));
+        assert_eq!(index.front, read(&file).unwrap().trailer.unwrap());
+        for (code, evidence) in table.iter() {
+            let place = index.group_of(code).unwrap();
+            let group = &file[place.start as usize..place.end as usize];
+            assert_eq!(index.evidence(code, group).unwrap(), Some(evidence));
+        }
     }
 
     #[test]

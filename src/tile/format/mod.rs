@@ -23,7 +23,9 @@ mod trailer;
 mod writer;
 
 pub use compact::{CompactEffort, CompactReader, CompactWriter, read_compact, write_compact};
-pub use compact_file::{read_compact_file, read_compact_front, read_compact_voxels_from, write_compact_file};
+pub use compact_file::{
+    CompactFileIndex, read_compact_file, read_compact_front, read_compact_voxels_from, write_compact_file,
+};
 pub use entries::encode_entries;
 pub use gather::SiftedVoxels;
 pub use reader::{Decoded, DecodedTable, read_table, read_trailer, read_voxels_from};

@@ -16,12 +16,12 @@ use voxtile::octree::{
 };
 use voxtile::share::codec::{Packet, Request};
 use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
-use voxtile::space::{Grid, TileIndex};
+use voxtile::space::{Grid, TileIndex, VoxelBox, VoxelKey};
 use voxtile::store::{CommitLog, Metadata};
 use voxtile::tile::Table;
 use voxtile::tile::format::{
-    CompactEffort, TRAILER_BYTES, Trailer, read_compact, read_compact_file, read_compact_front, read_table,
-    write_compact, write_compact_file, write_table,
+    CompactEffort, CompactFileIndex, TRAILER_BYTES, Trailer, read_compact, read_compact_file,
+    read_compact_front, read_table, write_compact, write_compact_file, write_table,
 };
 
 pub type Target = fn(&[u8]) -> bool;
@@ -152,7 +152,15 @@ pub fn compact_file(data: &[u8]) -> bool {
     }
     let voxels = grid().voxels_of_tile(TILES[usize::from(choice >> 1 & 3)]);
     let read = |bytes: &[u8]| read_compact_file(&mut &bytes[..], bytes.len() as u64, &voxels);
+    let index = CompactFileIndex::read(&mut &file[..], file.len() as u64, &voxels);
+    if let Ok(Some(index)) = &index {
+        ask_voxels(index, &file, &voxels, None);
+    }
     let Ok(decoded) = read(&file) else { return false };
+    if let Some(index) = index.expect("the whole was read") {
+        assert_eq!(index.crc, crc32fast::hash(&file));
+        ask_voxels(&index, &file, &voxels, Some(&decoded.table));
+    }
     let front = decoded.trailer.expect("what stands in front was read");
     assert_eq!(read_compact_front(&mut &file[..], file.len() as u64).expect("it was read before"), front);
     let mut written = Vec::new();
@@ -165,14 +173,53 @@ pub fn compact_file(data: &[u8]) -> bool {
     true
 }
 
+/// Asks for some voxels of a `tile.vxt`, one group each; the table has the same if it is given.
+fn ask_voxels(index: &CompactFileIndex, file: &[u8], voxels: &VoxelBox, table: Option<&Table>) {
+    for step in 0..9 {
+        let voxel =
+            std::array::from_fn(|k| voxels.min[k] + (step * [1, 3, 2][k]) % (voxels.end[k] - voxels.min[k]));
+        let code = VoxelKey::from_index(voxel).morton();
+        let place = index.group_of(code);
+        let group = place.map(|place| &file[place.start as usize..place.end as usize]);
+        let found = group.map(|group| index.evidence(code, group));
+        if let Some(table) = table {
+            let found = found.and_then(|found| found.expect("the whole was read"));
+            assert_eq!(found, table.get(code));
+        }
+    }
+}
+
 /// Makes the checksums of a `tile.vxt` right.
 fn seal_compact_file(file: &mut [u8]) {
     let Some((front, behind)) = file.split_at_mut_checked(TRAILER_BYTES) else { return };
     let length = u32::from_le_bytes(std::array::from_fn(|k| front[60 + k]));
     let Some((parameters, body)) = behind.split_at_mut_checked(length as usize) else { return };
+    seal_parts(body);
     front[44..48].copy_from_slice(&crc32fast::hash(body).to_le_bytes());
     front[64..68].copy_from_slice(&crc32fast::hash(parameters).to_le_bytes());
     seal(front);
+}
+
+/// Makes the checksums of codebook and groups right in a table in the compact form, if it is of version 2.
+fn seal_parts(table: &mut [u8]) {
+    let number = |table: &[u8], at: usize| {
+        let bytes = table.get(at..).and_then(|table| table.first_chunk());
+        bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes) as usize)
+    };
+    if number(table, 4) != 2 {
+        return;
+    }
+    let groups = number(table, 24).min(table.len() / 16);
+    let mut begin = 36 + 16 * groups;
+    for part in 0..=groups {
+        let [length, crc] = if part == 0 { [28, 32] } else { [28 + 16 * part, 32 + 16 * part] };
+        let end = begin + number(table, length);
+        if let Some(content) = table.get(begin..end) {
+            let content = crc32fast::hash(content).to_le_bytes();
+            table[crc..crc + 4].copy_from_slice(&content);
+        }
+        begin = end;
+    }
 }
 
 /// A table in its compact form: it comes back from the bytes that are made of it, and these are the same again. Others
@@ -181,6 +228,9 @@ pub fn compact(data: &[u8]) -> bool {
     let Some((&choice, bytes)) = data.split_first() else { return false };
     let mut bytes = bytes.to_vec();
     if choice & 1 == 1 {
+        if let Some((parts, _)) = bytes.split_last_chunk_mut::<4>() {
+            seal_parts(parts);
+        }
         seal(&mut bytes);
     }
     let voxels = grid().voxels_of_tile(TILES[usize::from(choice >> 1 & 3)]);

@@ -1,15 +1,19 @@
 use super::codebook::Codebook;
 use super::column_writer::ColumnWriter;
 use super::columns::put_states;
+use super::group_index::GroupEntry;
 use super::numbers::put_number;
 use super::symbol::RARE;
 use crate::sensor::Evidence;
-use crate::space::BrickCode;
+use crate::space::{BRICK_VOXELS, BrickCode};
 use crate::tile::table::{Brick, CELL_VOXELS, Palette, StateId, Storage, UnpaddedEvidence};
 use std::io;
 
-/// A group ends with the brick that reaches this many voxels.
-pub(super) const GROUP_VOXELS: usize = 1 << 16;
+/// A group ends with the brick that reaches this many voxels: one voxel is read with all of its group.
+const GROUP_VOXELS: usize = 1 << 15;
+
+/// What a reader takes; version 1 was written so.
+pub(super) const MOST_GROUP_VOXELS: usize = (1 << 16) + BRICK_VOXELS - 1;
 
 /// Most bricks of a group.
 pub(super) const GROUP_BRICKS: usize = 1 << 10;
@@ -18,7 +22,7 @@ pub(super) const GROUP_BRICKS: usize = 1 << 10;
 #[derive(Default)]
 pub(super) struct Group {
     bricks: usize,
-    /// Per brick, the difference of its code from the previous brick's.
+    /// Per brick but the first, the difference of its code from the previous brick's.
     steps: Vec<u8>,
     /// Per brick, which words of its mask are not 0.
     words: Vec<u8>,
@@ -30,29 +34,22 @@ pub(super) struct Group {
     seconds: Vec<u8>,
     /// Per voxel whose state is not in the codebook.
     rares: Vec<Evidence>,
-    /// The previous brick, in this group or another.
-    before: Option<BrickCode>,
+    /// The first and the last brick.
+    ends: Option<[BrickCode; 2]>,
 }
 
 impl Group {
-    /// Starts the first group of a table.
-    pub(super) fn begin(&mut self) {
-        self.clear();
-        self.before = None;
-    }
-
     pub(super) fn is_full(&self) -> bool {
-        self.bricks == GROUP_BRICKS || self.symbols.len() >= GROUP_VOXELS
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.bricks == 0
+        is_full(self.bricks, self.symbols.len())
     }
 
     pub(super) fn push(&mut self, brick: &Brick, codebook: &Codebook, palette: &Palette) {
         let code = brick.code();
-        put_number(code.0 - self.before.map_or(0, |before| before.0 + 1), &mut self.steps);
-        self.before = Some(code);
+        let [first, last] = self.ends.unwrap_or([code; 2]);
+        if self.bricks > 0 {
+            put_number(code.0 - last.0 - 1, &mut self.steps);
+        }
+        self.ends = Some([first, code]);
         self.bricks += 1;
         let mut words = 0;
         for (word, &mask) in brick.observed.iter().enumerate().filter(|(_, mask)| **mask != 0) {
@@ -128,24 +125,60 @@ impl Group {
         }
     }
 
-    /// Appends the group's bytes and empties the group.
-    pub(super) fn end(&mut self, column_writer: &mut ColumnWriter, out: &mut Vec<u8>) -> io::Result<()> {
+    /// Appends the group's bytes and empties the group, if there is a brick in it; what the index says of it.
+    pub(super) fn end(
+        &mut self,
+        column_writer: &mut ColumnWriter,
+        out: &mut Vec<u8>,
+    ) -> io::Result<Option<GroupEntry>> {
+        let Some([first, _]) = self.ends else { return Ok(None) };
+        let begin = out.len();
         let mut rares = Vec::new();
         put_states(self.rares.iter().copied(), &mut rares);
         let columns = [&self.steps, &self.words, &self.masks, &self.symbols, &self.seconds, &rares];
         put_number(self.bricks as u64, out);
         column_writer.put_columns(columns.map(|column| &column[..]), out)?;
         self.clear();
-        Ok(())
+        let group = &out[begin..];
+        // At most 2^15 + 511 voxels of 14 bytes, and bricks.
+        Ok(Some(GroupEntry { first, bytes: group.len() as u32, crc: crc32fast::hash(group) }))
     }
 
-    /// Removes the bricks; the code of the last one stays.
-    fn clear(&mut self) {
-        let Self { bricks, steps, words, masks, symbols, seconds, rares, before: _ } = self;
-        *bricks = 0;
+    /// Removes the bricks.
+    pub(super) fn clear(&mut self) {
+        let Self { bricks, steps, words, masks, symbols, seconds, rares, ends } = self;
+        (*bricks, *ends) = (0, None);
         [steps, words, masks, symbols, seconds].into_iter().for_each(Vec::clear);
         rares.clear();
     }
+}
+
+/// How many groups bricks make.
+#[derive(Default)]
+pub(super) struct GroupSizes {
+    full: usize,
+    /// Of the last one, which may be empty.
+    bricks: usize,
+    voxels: usize,
+}
+
+impl GroupSizes {
+    /// Adds a brick of so many voxels.
+    pub(super) fn push(&mut self, voxels: usize) {
+        self.bricks += 1;
+        self.voxels += voxels;
+        if is_full(self.bricks, self.voxels) {
+            *self = Self { full: self.full + 1, bricks: 0, voxels: 0 };
+        }
+    }
+
+    pub(super) fn groups(&self) -> usize {
+        self.full + usize::from(self.bricks > 0)
+    }
+}
+
+fn is_full(bricks: usize, voxels: usize) -> bool {
+    bricks == GROUP_BRICKS || voxels >= GROUP_VOXELS
 }
 
 /// The bits that are set, ascending.

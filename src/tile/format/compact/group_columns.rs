@@ -1,8 +1,9 @@
 use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
-use super::group::{GROUP_BRICKS, GROUP_VOXELS};
+use super::group::{GROUP_BRICKS, MOST_GROUP_VOXELS};
 use super::input::Input;
 use super::numbers::take_number;
+use super::symbol::{RARE, Symbols};
 use crate::error::DecodeError;
 use crate::sensor::Evidence;
 use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
@@ -41,7 +42,7 @@ impl Columns {
         const STEP_BYTES: usize = 6;
         self.offset = input.offset;
         let bricks = input.number("bricks of a group", GROUP_BRICKS.min(room.bricks))?;
-        let voxels = room.voxels.min(GROUP_VOXELS + BRICK_VOXELS - 1).min(bricks * BRICK_VOXELS);
+        let voxels = room.voxels.min(MOST_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
         self.bricks = bricks;
         let column = |name, most, bytes| Column { name, most, bytes };
         column_reader.take_columns(
@@ -58,13 +59,15 @@ impl Columns {
     }
 }
 
+const FEWER_SECONDS: &str = "fewer second bytes than prefixes";
+
 /// The unread rest of the columns of a group.
 #[derive(Clone, Copy)]
 pub(super) struct Rest<'a> {
     steps: &'a [u8],
     words: &'a [u8],
     masks: &'a [[u8; 8]],
-    pub(super) symbols: &'a [u8],
+    symbols: &'a [u8],
     seconds: &'a [u8],
     rares: &'a [u8],
     rares_done: usize,
@@ -121,14 +124,24 @@ impl<'a> Rest<'a> {
     }
 
     pub(super) fn take_second(&mut self) -> Result<u8, String> {
-        let (&second, rest) = self.seconds.split_first().ok_or("fewer second bytes than prefixes")?;
+        let (&second, rest) = self.seconds.split_first().ok_or(FEWER_SECONDS)?;
         self.seconds = rest;
         Ok(second)
     }
 
+    /// Leaves out the second bytes and rare states of symbols.
+    pub(super) fn pass(&mut self, passed: &[u8], symbols: Symbols) -> Result<(), String> {
+        let count = |from| passed.iter().filter(|&&symbol| symbol >= from).count();
+        let rares = count(RARE);
+        let seconds = count(symbols.first_prefix()) - rares;
+        self.seconds = self.seconds.get(seconds..).ok_or(FEWER_SECONDS)?;
+        self.rares_done = self.rares_done.saturating_add(rares);
+        Ok(())
+    }
+
     pub(super) fn take_rare(&mut self) -> Result<Evidence, String> {
         let states = self.rares.len() / STATE_BYTES;
-        if self.rares_done == states || states * STATE_BYTES != self.rares.len() {
+        if self.rares_done >= states || states * STATE_BYTES != self.rares.len() {
             return Err("fewer rare states than their symbols".into());
         }
         let state = state_at(self.rares, self.rares_done);

@@ -1,4 +1,6 @@
 use super::CRC_BYTES;
+use super::group_index::joined_crc;
+use super::header::HEADER_1_BYTES;
 use super::numbers::take_number;
 use crate::error::{DecodeError, FormatError};
 use std::io::Read;
@@ -10,13 +12,60 @@ pub(super) struct Input<R> {
     pub(super) offset: u64,
     /// Bytes before the checksum.
     end: u64,
+    /// Of the part that is being read.
     crc: crc32fast::Hasher,
+    /// Where it begins.
+    part: u64,
+    /// Of the parts before.
+    crc_before: u32,
 }
 
 impl<R: Read> Input<R> {
     /// An input of `bytes` bytes, at least those of a checksum.
     pub(super) fn new(input: R, bytes: u64) -> Self {
-        Self { input, offset: 0, end: bytes - CRC_BYTES, crc: crc32fast::Hasher::new() }
+        Self {
+            input,
+            offset: 0,
+            end: bytes - CRC_BYTES,
+            crc: crc32fast::Hasher::new(),
+            part: 0,
+            crc_before: 0,
+        }
+    }
+
+    /// The input of a table of `bytes` bytes.
+    pub(super) fn of_table(input: R, bytes: u64) -> Result<Self, FormatError> {
+        if bytes < HEADER_1_BYTES as u64 + CRC_BYTES {
+            let reason = format!("{bytes} bytes are too few for a compact table");
+            return Err(FormatError::at_offset(0, reason));
+        }
+        Ok(Self::new(input, bytes))
+    }
+
+    /// Bytes that follow before the checksum.
+    pub(super) fn left(&self) -> u64 {
+        self.end - self.offset
+    }
+
+    /// Ends a part; its checksum.
+    pub(super) fn end_part(&mut self) -> u32 {
+        let crc = std::mem::take(&mut self.crc).finalize();
+        self.crc_before = joined_crc(self.crc_before, crc, self.offset - self.part);
+        self.part = self.offset;
+        crc
+    }
+
+    /// Ends a part, which must be so long and have this checksum.
+    pub(super) fn end_part_as(&mut self, what: &str, bytes: u64, crc: u32) -> Result<(), DecodeError> {
+        let (begin, found) = (self.part, self.offset - self.part);
+        let wrong = |reason| Err(FormatError::at_offset(begin, reason).into());
+        if found != bytes {
+            return wrong(format!("the {what} takes {found} bytes where {bytes} are announced"));
+        }
+        match self.end_part() == crc {
+            true => Ok(()),
+            false => wrong(format!("the {what} does not match its checksum")),
+        }
     }
 
     /// An error at the present offset.
@@ -25,7 +74,7 @@ impl<R: Read> Input<R> {
     }
 
     pub(super) fn read(&mut self, bytes: &mut [u8]) -> Result<(), DecodeError> {
-        let left = self.end - self.offset;
+        let left = self.left();
         if bytes.len() as u64 > left {
             return Err(self.wrong(format!("{} bytes should follow, and {left} do", bytes.len())));
         }
@@ -54,11 +103,12 @@ impl<R: Read> Input<R> {
     /// Checks that only the right checksum follows.
     pub(super) fn end(mut self) -> Result<(), DecodeError> {
         if self.offset != self.end {
-            return Err(self.wrong(format!("{} bytes stand behind the last voxel", self.end - self.offset)));
+            return Err(self.wrong(format!("{} bytes stand behind the last voxel", self.left())));
         }
         let mut crc = [0; CRC_BYTES as usize];
         self.input.read_exact(&mut crc)?;
-        if self.crc.clone().finalize() != u32::from_le_bytes(crc) {
+        self.end_part();
+        if self.crc_before != u32::from_le_bytes(crc) {
             return Err(self.wrong("the bytes do not match their checksum"));
         }
         Ok(())

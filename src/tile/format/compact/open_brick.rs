@@ -34,6 +34,11 @@ impl From<Full> for Refusal {
 }
 
 impl OpenBrick {
+    /// Number of its observed voxels.
+    pub(super) fn voxels(&self) -> usize {
+        self.observed.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
     /// Whether all voxels belong to a tile.
     pub(super) fn check_is_inside(&self, tile: &VoxelBox) -> Result<(), String> {
         let other = || format!("voxels of brick {:#x} belong to another tile", self.code.0);
@@ -121,8 +126,13 @@ impl OpenBrick {
         number + 1
     }
 
-    /// The codebook's state of a symbol.
+    /// The palette's state of a symbol that is not rare.
     fn common(&self, symbol: u8, rest: &mut Rest<'_>) -> Result<StateId, String> {
+        Ok(Self::state_of(self.number(symbol, rest)?))
+    }
+
+    /// The codebook number of a symbol that is not rare.
+    pub(super) fn number(&self, symbol: u8, rest: &mut Rest<'_>) -> Result<u16, String> {
         let number = if symbol < self.symbols.direct() {
             Some(usize::from(symbol))
         } else if symbol < self.symbols.first_prefix() {
@@ -131,7 +141,7 @@ impl OpenBrick {
             self.symbols.number(symbol, rest.take_second()?)
         };
         let number = number.ok_or_else(|| format!("symbol {symbol} stands for no state"))?;
-        Ok(Self::state_of(number as u16))
+        Ok(number as u16)
     }
 }
 

@@ -1,6 +1,8 @@
 //! Tables of every kind survive the compact form to the bit; damaged input is an error.
 
-use super::{CompactEffort, CompactReader, CompactWriter, read_compact, sift_compact, write_compact};
+use super::{
+    CompactEffort, CompactIndex, CompactReader, CompactWriter, read_compact, sift_compact, write_compact,
+};
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
 use crate::simulation::Random;
@@ -97,7 +99,26 @@ fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
             (_, sifted) => panic!("{sifted:?}"),
         }
     }
+    if let Ok(table) = &table {
+        assert_is_found_alone(bytes, tile, table);
+    }
     table
+}
+
+/// Some voxels, observed and not, are what the table says when each is read from its group alone.
+fn assert_is_found_alone(bytes: &[u8], tile: &VoxelBox, table: &Table) {
+    let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, tile).unwrap().unwrap();
+    let middle = (table.len() / 2).saturating_sub(1);
+    let observed = table.iter().step_by(middle.max(1)).map(|(code, _)| code);
+    let corners = [tile.min, tile.end.map(|end| end - 1)].map(|voxel| VoxelKey::from_index(voxel).morton());
+    for code in observed.chain(corners) {
+        let place = index.group_of(code);
+        let found = place.and_then(|place| {
+            index.evidence(code, &bytes[place.start as usize..place.end as usize]).unwrap()
+        });
+        let bits = |of: Evidence| (of.log_odds.to_bits(), of.observation_count);
+        assert_eq!(found.map(bits), table.get(code).map(bits), "{code:?}");
+    }
 }
 
 fn assert_is(table: &Table, voxels: &Voxels) {
@@ -172,6 +193,103 @@ fn what_is_read_goes_on_as_any_table() {
     assert_is(&again, &table.iter().collect());
 }
 
+/// The index of a table, and all its voxels from one group each.
+fn assert_is_voxel_by_voxel(bytes: &[u8], tile: &VoxelBox, voxels: &Voxels) {
+    let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, tile).unwrap().unwrap();
+    let crc = bytes.last_chunk().unwrap();
+    assert_eq!(index.crc(), u32::from_le_bytes(*crc));
+    let [x, y, z] = std::array::from_fn(|k| tile.min[k]..tile.end[k]);
+    for x in x {
+        for y in y.clone() {
+            for z in z.clone() {
+                let code = VoxelKey::from_index([x, y, z]).morton();
+                let group =
+                    index.group_of(code).map(|place| &bytes[place.start as usize..place.end as usize]);
+                let found = group.and_then(|group| index.evidence(code, group).unwrap());
+                let bits = |of: Evidence| (of.log_odds.to_bits(), of.observation_count);
+                assert_eq!(found.map(bits), voxels.get(&code).copied().map(bits), "{code:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_voxel_is_read_from_its_group_alone() {
+    let mut random = Random::of(10, &[]);
+    for _ in 0..40 {
+        let mut tile = any_tile(&mut random);
+        (0..3).for_each(|k| tile.end[k] = tile.end[k].min(tile.min[k].saturating_add(16)));
+        let voxels = any_voxels(&mut random, &tile);
+        let bytes = written(&table_of(&voxels, &mut random), CompactEffort::Fast);
+        assert_is_voxel_by_voxel(&bytes, &tile, &voxels);
+    }
+    // Several groups, symbols of one and two bytes, and rare states in each.
+    let tile = VoxelBox { min: [0; 3], end: [56; 3] };
+    let mut voxels = Voxels::new();
+    for x in 0..56 {
+        for y in 0..56 {
+            for z in (0..56).filter(|z| (x * y + z) % 5 != 0) {
+                let kind = random.below(60).min(3);
+                voxels.insert(VoxelKey::from_index([x, y, z]).morton(), any_state(&mut random, kind.max(1)));
+            }
+        }
+    }
+    let bytes = written(&table_of(&voxels, &mut random), CompactEffort::Fast);
+    let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, &tile).unwrap().unwrap();
+    let mut groups = std::collections::BTreeSet::new();
+    for (number, (&code, evidence)) in voxels.iter().enumerate() {
+        let place = index.group_of(code).unwrap();
+        groups.insert(place.start);
+        if number % 199 == 0 {
+            let found = index.evidence(code, &bytes[place.start as usize..place.end as usize]).unwrap();
+            assert_eq!(found, Some(*evidence), "{code:?}");
+        }
+    }
+    assert!(groups.len() > 1);
+}
+
+/// What one voxel is read from is compared with the checksum of the whole.
+#[test]
+fn every_wrong_bit_before_the_groups_and_in_the_group_is_noticed() {
+    let (tile, table) = small();
+    let bytes = written(&table, CompactEffort::Fast);
+    let (&code, _) =
+        table.iter().collect::<Voxels>().first_key_value().map(|(code, of)| (code, *of)).unwrap();
+    let right = u32::from_le_bytes(*bytes.last_chunk().unwrap());
+    for bit in 0..8 * (bytes.len() - 4) {
+        let mut wrong = bytes.clone();
+        wrong[bit / 8] ^= 1 << (bit % 8);
+        let Ok(Some(index)) = CompactIndex::read(&mut &wrong[..], wrong.len() as u64, &tile) else {
+            continue;
+        };
+        if index.crc() == right {
+            let place = index.group_of(code).unwrap();
+            assert!(place.contains(&(bit as u64 / 8)), "bit {bit}");
+            index.evidence(code, &wrong[place.start as usize..place.end as usize]).unwrap_err();
+        }
+    }
+}
+
+/// Adds the checksum, and makes those of the parts right, as far as there are parts.
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let u32_at = |bytes: &[u8], at: usize| {
+        bytes.get(at..at + 4).map_or(0, |bytes| u32::from_le_bytes(bytes.try_into().unwrap())) as usize
+    };
+    let groups = u32_at(&bytes, 24).min(bytes.len() / 16);
+    let mut begin = 36 + 16 * groups;
+    for number in 0..=groups {
+        let [length, crc] = if number == 0 { [28, 32] } else { [28 + 16 * number, 32 + 16 * number] };
+        let end = begin + u32_at(&bytes, length);
+        if let Some(part) = bytes.get(begin..end) {
+            let part = crc32fast::hash(part).to_le_bytes();
+            bytes[crc..crc + 4].copy_from_slice(&part);
+        }
+        begin = end;
+    }
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    bytes
+}
+
 struct FullDisk;
 
 impl std::io::Write for FullDisk {
@@ -216,6 +334,63 @@ fn small() -> (VoxelBox, Table) {
     (tile, table_of(&voxels, &mut Random::of(1, &[])))
 }
 
+/// A table of three groups, with symbols of one and two bytes and rare states in each.
+fn three_groups() -> (VoxelBox, Table) {
+    let tile = VoxelBox { min: [0; 3], end: [104; 3] };
+    let mut voxels = Voxels::new();
+    for number in 0..13 * 13 * 13 {
+        let [x, y, z] = [number / 169, number / 13 % 13, number % 13].map(|k| 8 * k);
+        for k in 0..=number % 3 {
+            let evidence = match number % 11 {
+                0 => state(f64::from(number) * 0.001 + f64::from(k), number % 7),
+                _ => state(f64::from(number % 300) * -0.4, number % 300),
+            };
+            let voxel = [x + (number + k) % 8, y + number / 8 % 8, z + k];
+            voxels.insert(VoxelKey::from_index(voxel).morton(), evidence);
+        }
+    }
+    (tile, table_of(&voxels, &mut Random::of(1, &[])))
+}
+
+/// With valid checksums: what the index says of groups must be so, and of one group that is read alone too.
+#[test]
+fn an_index_that_does_not_fit_its_groups_is_an_error() {
+    let (tile, table) = three_groups();
+    let bytes = written(&table, CompactEffort::Fast);
+    read(&bytes, &tile).unwrap();
+    let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, &tile).unwrap().unwrap();
+    let codes: Vec<_> = table.iter().map(|(code, _)| code).collect();
+    let groups: Vec<_> = codes.chunk_by(|a, b| index.group_of(*a) == index.group_of(*b)).collect();
+    let places: Vec<_> = groups.iter().map(|group| index.group_of(group[0]).unwrap()).collect();
+    assert_eq!(places.len(), 3);
+    assert!(places.windows(2).all(|pair| pair[0].end == pair[1].start));
+
+    let entry = |group: usize| 36 + 16 * group;
+    let last = groups[0].last().unwrap().brick().0.to_le_bytes();
+    let [shorter, longer] = [(&places[0], -1), (&places[1], 1)]
+        .map(|(place, more)| ((place.end - place.start) as i32 + more).to_le_bytes());
+    type Changes<'a> = &'a [(usize, &'a [u8])];
+    let cases: [(Changes<'_>, u64, &str, bool); 3] = [
+        (&[(entry(1), &last)], places[0].start, "bricks of the next one", true),
+        (&[(entry(0) + 8, &shorter), (entry(1) + 8, &longer)], places[0].start, "are announced", true),
+        (&[(16, &1025_u32.to_le_bytes())], places[1].start, "at most 1", false),
+    ];
+    for (changes, place, reason, is_seen_alone) in cases {
+        let mut wrong = bytes[..bytes.len() - 4].to_vec();
+        for (at, with) in changes {
+            wrong[*at..at + with.len()].copy_from_slice(with);
+        }
+        let wrong = sealed(wrong);
+        let error = read(&wrong, &tile).unwrap_err();
+        assert_eq!(error.at, place, "{error}");
+        assert!(error.reason.contains(reason), "{error}");
+        let index = CompactIndex::read(&mut &wrong[..], wrong.len() as u64, &tile).unwrap().unwrap();
+        let place = index.group_of(codes[0]).unwrap();
+        let alone = index.evidence(codes[0], &wrong[place.start as usize..place.end as usize]);
+        assert_eq!(alone.is_err(), is_seen_alone);
+    }
+}
+
 #[test]
 fn every_truncation_and_every_wrong_bit_is_an_error() {
     let (tile, table) = small();
@@ -238,18 +413,22 @@ fn every_truncation_and_every_wrong_bit_is_an_error() {
 /// With a valid checksum: an error, or a table of this tile.
 #[test]
 fn hostile_bytes_are_an_error_or_a_table_of_the_tile() {
-    let (tile, table) = small();
+    hostile_bytes_of(small(), 20_000, 200);
+    hostile_bytes_of(three_groups(), 1_000, 25);
+}
+
+fn hostile_bytes_of((tile, table): (VoxelBox, Table), times: usize, least_read_well: usize) {
     let bytes = written(&table, CompactEffort::Fast);
     let mut random = Random::of(3, &[]);
     let (mut refused, mut read_well) = (0, 0);
-    for _ in 0..20_000 {
+    for _ in 0..times {
         let mut wrong = bytes[..bytes.len() - 4].to_vec();
         for _ in 0..=random.below(3) {
-            let at = random.below(wrong.len() as u64) as usize;
+            let end = if random.chance(0.5) { wrong.len() as u64 } else { 84 };
+            let at = random.below(end) as usize;
             wrong[at] = [0, 1, 127, 255, random.below(256) as u8][random.below(5) as usize];
         }
-        wrong.extend(crc32fast::hash(&wrong).to_le_bytes());
-        let Ok(table) = read(&wrong, &tile) else {
+        let Ok(table) = read(&sealed(wrong), &tile) else {
             refused += 1;
             continue;
         };
@@ -261,7 +440,7 @@ fn hostile_bytes_are_an_error_or_a_table_of_the_tile() {
         assert!(voxels.values().all(is_evidence));
         assert_is(&read(&written(&table, CompactEffort::Fast), &tile).unwrap(), &voxels);
     }
-    assert!(refused > 5_000 && read_well > 200, "{refused} {read_well}");
+    assert!(refused > times / 4 && read_well > least_read_well, "{refused} {read_well}");
 }
 
 #[test]
@@ -271,19 +450,23 @@ fn what_is_wrong_is_said_where_it_is() {
     let wrong = |at: usize, with: &[u8]| {
         let mut wrong = bytes[..bytes.len() - 4].to_vec();
         wrong[at..at + with.len()].copy_from_slice(with);
-        wrong.extend(crc32fast::hash(&wrong).to_le_bytes());
-        read(&wrong, &tile).unwrap_err()
+        read(&sealed(wrong), &tile).unwrap_err()
     };
     let all = u64::MAX.to_le_bytes();
     for (at, with, place, reason) in [
         (0, &b"IWLO"[..], 0, "magic"),
-        (4, &[2], 4, "version 2"),
+        (4, &[3], 4, "version 3"),
         (8, &all, 8, "18446744073709551615 voxels in a tile of 1728"),
         (8, &[1], 16, "1 voxels in"),
         (16, &all[..4], 16, "bricks"),
         (16, &[0], 16, "0 bricks"),
         (20, &all[..4], 20, "codebook"),
-        (20, &[1], 24, "codebook"),
+        (20, &[1], 52, "codebook"),
+        (24, &all[..4], 24, "groups"),
+        (24, &[0], 24, "0 groups"),
+        (28, &all[..4], 36, "bytes are announced"),
+        (36, &all, 36, "ascend"),
+        (44, &all[..4], 36, "bytes are announced"),
     ] {
         let error = wrong(at, with);
         assert_eq!(error.at, place, "{error}");
@@ -298,7 +481,7 @@ fn what_is_wrong_is_said_where_it_is() {
 fn an_empty_table_and_a_full_brick_have_their_bytes() {
     let tile = VoxelBox { min: [0; 3], end: [8; 3] };
     let empty = written(&Table::default(), CompactEffort::Fast);
-    assert_eq!(empty.len(), 30);
+    assert_eq!(empty.len(), 42);
     assert!(read(&empty, &tile).unwrap().is_empty());
 
     let mut full = Table::default();
@@ -307,6 +490,6 @@ fn an_empty_table_and_a_full_brick_have_their_bytes() {
         &(0..512).map(|place| (place, state(1.5, 2))).collect::<Vec<_>>(),
     );
     let bytes = written(&full, CompactEffort::Fast);
-    assert!(bytes.len() < 120, "{}", bytes.len());
+    assert!(bytes.len() < 150, "{}", bytes.len());
     assert_eq!(read(&bytes, &tile).unwrap().len(), 512);
 }

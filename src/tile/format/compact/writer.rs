@@ -2,8 +2,9 @@ use super::codebook::Codebook;
 use super::column_writer::ColumnWriter;
 use super::columns::put_states;
 use super::effort::CompactEffort;
-use super::group::Group;
-use super::{CRC_BYTES, HEADER_BYTES, MAGIC, VERSION};
+use super::group::{Group, GroupSizes};
+use super::group_index::{ENTRY_BYTES, GroupIndex};
+use super::header::{HEADER_BYTES, Header};
 use crate::tile::Table;
 use std::fmt;
 use std::io::{self, Write};
@@ -13,7 +14,6 @@ use std::io::{self, Write};
 pub struct CompactWriter {
     column_writer: ColumnWriter,
     group: Group,
-    part: Vec<u8>,
 }
 
 impl CompactWriter {
@@ -23,50 +23,65 @@ impl CompactWriter {
     ///
     /// Those of zstd.
     pub fn new(effort: CompactEffort) -> io::Result<Self> {
-        Ok(Self { column_writer: ColumnWriter::new(effort)?, group: Group::default(), part: Vec::new() })
+        Ok(Self { column_writer: ColumnWriter::new(effort)?, group: Group::default() })
     }
 
-    /// Streams a table in compact form. Returns the number of bytes.
+    /// Writes a table in compact form. Returns the number of bytes.
     ///
-    /// Equal tables give equal bytes. Writing takes up to 80 bytes of memory per state of the palette, and up to 12 MB
-    /// if some bricks do not use the palette.
+    /// Equal tables give equal bytes. Writing takes memory for these, 8 bytes per brick, up to 80 bytes per state of
+    /// the palette, and up to 12 MB if some bricks do not use the palette.
     ///
     /// # Errors
     ///
     /// Those of `out` and of zstd.
     pub fn write(&mut self, table: &Table, out: &mut impl Write) -> io::Result<u64> {
-        let Self { column_writer, group, part } = self;
+        let bytes = self.bytes(table)?;
+        out.write_all(&bytes)?;
+        Ok(bytes.len() as u64)
+    }
+
+    /// The bytes of [`CompactWriter::write`].
+    ///
+    /// # Errors
+    ///
+    /// Those of zstd.
+    pub fn bytes(&mut self, table: &Table) -> io::Result<Vec<u8>> {
+        let Self { column_writer, group } = self;
         let codebook = Codebook::of(table);
-        let mut crc = crc32fast::Hasher::new();
-        let mut bytes = 0;
-        let mut write = |part: &mut Vec<u8>| {
-            crc.update(part);
-            bytes += part.len() as u64;
-            let written = out.write_all(part);
-            part.clear();
-            written
-        };
         // A failed write may have left something behind.
-        part.clear();
-        group.begin();
-        part.extend_from_slice(&header(table, &codebook));
+        group.clear();
+        let bricks: Vec<_> = table.bricks_in_order().collect();
+        let mut sizes = GroupSizes::default();
+        for brick in &bricks {
+            sizes.push(brick.observed.iter().map(|word| word.count_ones() as usize).sum());
+        }
+        let mut out = vec![0; HEADER_BYTES + sizes.groups() * ENTRY_BYTES];
+        let codebook_begin = out.len();
         let mut states = Vec::new();
         put_states(codebook.states.iter().copied(), &mut states);
-        column_writer.put_columns([&states], part)?;
-        write(part)?;
-        for brick in table.bricks_in_order() {
+        column_writer.put_columns([&states], &mut out)?;
+        let codebook_bytes = &out[codebook_begin..];
+        let header = Header {
+            voxels: table.len(),
+            bricks: bricks.len(),
+            states: codebook.states.len(),
+            groups: sizes.groups(),
+            codebook_bytes: codebook_bytes.len(),
+            codebook_crc: crc32fast::hash(codebook_bytes),
+        };
+        let mut index = GroupIndex::default();
+        for brick in bricks {
             group.push(brick, &codebook, &table.palette);
             if group.is_full() {
-                group.end(column_writer, part)?;
-                write(part)?;
+                index.groups.extend(group.end(column_writer, &mut out)?);
             }
         }
-        if !group.is_empty() {
-            group.end(column_writer, part)?;
-            write(part)?;
-        }
-        out.write_all(&crc.finalize().to_le_bytes())?;
-        Ok(bytes + CRC_BYTES)
+        index.groups.extend(group.end(column_writer, &mut out)?);
+        let head = header.to_bytes().into_iter().chain(index.to_bytes());
+        out.iter_mut().zip(head).for_each(|(to, from)| *to = from);
+        let crc = index.crc_of_all(crc32fast::hash(&out[..codebook_begin]), &header);
+        out.extend_from_slice(&crc.to_le_bytes());
+        Ok(out)
     }
 }
 
@@ -83,15 +98,4 @@ impl fmt::Debug for CompactWriter {
 /// Those of `out` and of zstd.
 pub fn write_compact(table: &Table, effort: CompactEffort, out: &mut impl Write) -> io::Result<u64> {
     CompactWriter::new(effort)?.write(table, out)
-}
-
-fn header(table: &Table, codebook: &Codebook) -> [u8; HEADER_BYTES] {
-    let mut header = [0; HEADER_BYTES];
-    header[0..4].copy_from_slice(&MAGIC.to_le_bytes());
-    header[4..8].copy_from_slice(&VERSION.to_le_bytes());
-    header[8..16].copy_from_slice(&(table.len() as u64).to_le_bytes());
-    // A tile has at most 2^21.1 bricks.
-    header[16..20].copy_from_slice(&(table.bricks.len() as u32).to_le_bytes());
-    header[20..24].copy_from_slice(&(codebook.states.len() as u32).to_le_bytes());
-    header
 }

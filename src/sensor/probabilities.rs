@@ -1,0 +1,51 @@
+use crate::maths::sigmoid;
+
+/// Makes [`Evidence::probability`](super::Evidence::probability) of many voxels: few log-odds are common, and a
+/// probability takes as long to compute as its voxel to find. So the last ones are kept.
+#[derive(Clone, Debug)]
+pub struct Probabilities {
+    /// By a hash of the log-odds, with their bits.
+    kept: Vec<(u64, f64)>,
+}
+
+const KEPT_BITS: u32 = 8;
+
+impl Probabilities {
+    /// The probability of log-odds.
+    #[inline]
+    pub fn of(&mut self, log_odds: f64) -> f64 {
+        let bits = log_odds.to_bits();
+        let place = bits.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - KEPT_BITS);
+        let kept = &mut self.kept[place as usize];
+        if kept.0 != bits {
+            *kept = (bits, sigmoid(log_odds));
+        }
+        kept.1
+    }
+}
+
+impl Default for Probabilities {
+    fn default() -> Self {
+        // No place is empty.
+        Self { kept: vec![(f64::NAN.to_bits(), sigmoid(f64::NAN)); 1 << KEPT_BITS] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_is_what_is_computed() {
+        let mut probabilities = Probabilities::default();
+        // More than are kept, each several times.
+        for number in 0..20_000_u32 {
+            let log_odds = f64::from(number * 7919 % 1009) * 0.01 - 5.0;
+            assert_eq!(probabilities.of(log_odds), sigmoid(log_odds));
+        }
+        for log_odds in [0.0, -0.0, 1e-300, f64::MAX, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(probabilities.of(log_odds), sigmoid(log_odds));
+        }
+        assert!(probabilities.of(f64::NAN).is_nan());
+    }
+}

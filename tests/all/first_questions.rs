@@ -1,0 +1,207 @@
+//! The first voxel asked of a tile on disk is read from a part of its file.
+
+use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk};
+use testkit::random_scans::{Random, random_scan};
+use voxtile::sensor::{Evidence, Iwlo, SensorModel};
+use voxtile::space::VoxelIndex;
+use voxtile::store::SnapshotName;
+use voxtile::{Error, MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper, Storage};
+
+fn map() -> &'static Path {
+    Path::new("/map")
+}
+
+fn config(storage: Storage) -> MapConfig {
+    MapConfig::new(0.1, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage)
+}
+
+/// A map of some tiles, the first flush kept under a name.
+fn small(storage: Storage, seed: u64) -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config(storage)).unwrap();
+    for k in 0..3 {
+        let scan = random_scan(&mut Random(10 * seed + k), [k as f64, 0.0, 0.0], 60);
+        mapper.insert_scan(&scan).unwrap();
+        mapper.flush().unwrap();
+        if k == 0 {
+            mapper.snapshot(&SnapshotName::new("first").unwrap()).unwrap();
+        }
+    }
+    drop(mapper);
+    disk.copy()
+}
+
+/// A map of a tile whose file is too long to be read at once, in several groups.
+fn long() -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let model = SensorModel::Iwlo(Iwlo { sharpness: 1.0, ..Iwlo::default() });
+    let config = MapConfig::new(0.1, 12.8)
+        .unwrap()
+        .with_range(0.0, 6.0)
+        .with_storage(Storage::Compact)
+        .with_sensor_model(model);
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config).unwrap();
+    for k in 0..4 {
+        mapper.insert_scan(&random_scan(&mut Random(k), [6.4; 3], 4000)).unwrap();
+    }
+    mapper.flush().unwrap();
+    drop(mapper);
+    disk.copy()
+}
+
+fn open(disk: &FaultyDisk) -> MapReader {
+    MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap()
+}
+
+fn bits(evidence: Option<Evidence>) -> Option<(u64, i32)> {
+    evidence.map(|evidence| (evidence.log_odds.to_bits(), evidence.observation_count))
+}
+
+fn any_voxel(random: &mut Random) -> VoxelIndex {
+    std::array::from_fn(|_| random.below(90) as i32 - 35)
+}
+
+#[test]
+fn the_first_voxel_is_the_one_of_the_whole_tile_in_both_storages() {
+    let mut random = Random(5);
+    for (seed, storage) in [(1, Storage::Compact), (2, Storage::Compact), (3, Storage::OctoMap)] {
+        let disk = small(storage, seed);
+        let snapshot = || {
+            let (map, name) = (MapPath::on(disk.shared(), map()), SnapshotName::new("first").unwrap());
+            MapReader::open_snapshot(map, &name, 1).unwrap()
+        };
+        let mut observed = 0;
+        for (whole, first) in
+            [(open(&disk), &(|| open(&disk)) as &dyn Fn() -> MapReader), (snapshot(), &snapshot)]
+        {
+            let tiles: Vec<_> = whole.tiles().map(Result::unwrap).collect();
+            let known: Vec<VoxelIndex> =
+                tiles.iter().flat_map(|tile| tile.voxels().map(|voxel| voxel.index)).collect();
+            for number in 0..150 {
+                let voxel = match number % 2 {
+                    0 => any_voxel(&mut random),
+                    _ => known[random.below(known.len() as u64) as usize],
+                };
+                let tile = whole.tile(whole.config().grid.tile_of_voxel(voxel)).unwrap();
+                let wanted = tile.as_ref().and_then(|tile| tile.evidence(voxel));
+                let reader = first();
+                assert_eq!(bits(reader.evidence(voxel).unwrap()), bits(wanted), "{voxel:?}");
+                let io = reader.statistics().io;
+                let is_loaded = tile.is_some() && storage == Storage::OctoMap;
+                assert_eq!((io.loads, io.bytes_read > 0), (u64::from(is_loaded), tile.is_some()), "{io:?}");
+                // The second one loads the tile, and the answers stay.
+                assert_eq!(bits(reader.evidence(voxel).unwrap()), bits(wanted), "{voxel:?}");
+                assert_eq!(reader.statistics().io.loads, u64::from(tile.is_some()));
+                observed += u64::from(wanted.is_some());
+            }
+        }
+        assert!(observed >= 150, "{observed}");
+    }
+}
+
+/// The path of the table of a tile.
+fn table(disk: &FaultyDisk, reader: &MapReader, voxel: VoxelIndex) -> (PathBuf, Vec<u8>) {
+    let tile = reader.config().grid.tile_of_voxel(voxel);
+    let path = map().join(format!("tile_{}_{}_{}/tile.vxt", tile.x, tile.y, tile.z));
+    let bytes = disk.files().into_iter().find(|(of, _)| *of == path).unwrap().1;
+    (path, bytes)
+}
+
+#[test]
+fn damage_is_an_error_or_beside_what_is_read() {
+    let disk = small(Storage::Compact, 4);
+    let whole = open(&disk);
+    let tile = whole.tiles().map(Result::unwrap).max_by_key(|tile| tile.table().len()).unwrap();
+    let known: Vec<_> = tile.voxels().map(|voxel| (voxel.index, voxel.evidence)).collect();
+    let (path, bytes) = table(&disk, &whole, known[0].0);
+    let mut refused = 0;
+    let mut random = Random(6);
+    for _ in 0..600 {
+        let mut wrong = bytes.clone();
+        wrong[random.below(bytes.len() as u64) as usize] ^= 1 << random.below(8);
+        disk.put(&path, &wrong);
+        let (voxel, wanted) = known[random.below(known.len() as u64) as usize];
+        match open(&disk).evidence(voxel) {
+            Ok(found) => assert_eq!(bits(found), bits(Some(wanted))),
+            Err(error) => {
+                assert!(matches!(error, Error::Damaged { .. }), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 100, "{refused}");
+}
+
+/// A file as long as the one that the log names, and intact, but for the text of its parameters.
+#[test]
+fn only_the_file_that_the_log_names_is_an_answer() {
+    let disk = small(Storage::Compact, 4);
+    let reader = open(&disk);
+    let voxel = [3, 2, 1];
+    let (path, mut bytes) = table(&disk, &reader, voxel);
+    let length = u32::from_le_bytes(bytes[60..64].try_into().unwrap()) as usize;
+    // In the name of a key.
+    bytes[72 + 3] ^= 1;
+    let parameters = crc32fast::hash(&bytes[72..72 + length]);
+    bytes[64..68].copy_from_slice(&parameters.to_le_bytes());
+    let front = crc32fast::hash(&bytes[..68]);
+    bytes[68..72].copy_from_slice(&front.to_le_bytes());
+    disk.put(&path, &bytes);
+    let error = open(&disk).evidence(voxel).unwrap_err();
+    assert!(matches!(error, Error::Damaged { .. }), "{error}");
+}
+
+#[test]
+fn of_a_long_file_a_part_is_read() {
+    let disk = long();
+    let whole = open(&disk);
+    let tile = whole.tiles().map(Result::unwrap).max_by_key(|tile| tile.table().len()).unwrap();
+    let known: Vec<_> = tile.voxels().map(|voxel| (voxel.index, voxel.evidence)).collect();
+    let (path, bytes) = table(&disk, &whole, known[0].0);
+    assert!(bytes.len() > 192 << 10, "{}", bytes.len());
+    let mut random = Random(7);
+    let mut read = Vec::new();
+    for number in 0..300 {
+        let voxel = match number % 3 {
+            0 => std::array::from_fn(|_| random.below(128) as i32),
+            _ => known[random.below(known.len() as u64) as usize].0,
+        };
+        let reader = open(&disk);
+        assert_eq!(bits(reader.evidence(voxel).unwrap()), bits(tile.evidence(voxel)), "{voxel:?}");
+        read.push(reader.statistics().io.bytes_read);
+    }
+    assert!(read.iter().all(|&read| read > 0 && read < bytes.len() as u64), "{read:?}");
+    // Damage is an error, or in a group that is not read.
+    let [mut refused, mut answered] = [0; 2];
+    for _ in 0..300 {
+        let mut wrong = bytes.clone();
+        let at = match random.below(3) {
+            0 => random.below(2000),
+            _ => random.below(bytes.len() as u64),
+        };
+        wrong[at as usize] ^= 1 << random.below(8);
+        disk.put(&path, &wrong);
+        let (voxel, wanted) = known[random.below(known.len() as u64) as usize];
+        match open(&disk).evidence(voxel) {
+            Ok(found) => {
+                assert_eq!(bits(found), bits(Some(wanted)));
+                answered += 1;
+            }
+            Err(error) => {
+                assert!(matches!(error, Error::Damaged { .. }), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 40 && answered > 100, "{refused} {answered}");
+    // A cut is an error, or behind the group that is read.
+    for _ in 0..100 {
+        disk.put(&path, &bytes[..random.below(bytes.len() as u64) as usize]);
+        let (voxel, wanted) = known[random.below(known.len() as u64) as usize];
+        match open(&disk).evidence(voxel) {
+            Ok(found) => assert_eq!(bits(found), bits(Some(wanted))),
+            Err(error) => assert!(matches!(error, Error::Damaged { .. }), "{error}"),
+        }
+    }
+}
