@@ -8,7 +8,7 @@ import os
 import sys
 from typing import Any
 
-import dask
+import dask.config
 import distributed
 
 from ..errors import ArgumentError, VoxtileError
