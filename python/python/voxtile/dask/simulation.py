@@ -19,17 +19,17 @@ class Costs:
     """CPU seconds and bytes. Measured on 120 scans: docs/cluster.md, "The size of regions"."""
 
     # The first pass: decoding a scan, its box, and its checksum.
-    plan_scan_s: float = 0.0017
+    plan_scan_s: float = 0.00016
     # A scan that a region's task reads, whether or not it leaves something there.
     read_scan_s: float = 0.0008
     # A scan that is mapped, over all regions that it reaches.
     map_scan_s: float = 0.0111
     # Opening and flushing a task's map; what dask itself takes is not in it.
     task_s: float = 0.01
-    # A tile that a task copies to its place.
-    piece_tile_s: float = 0.0002
+    # A tile that a task moves to its place.
+    piece_tile_s: float = 0.00007
     # A tile in the last step, which one process does.
-    merge_tile_s: float = 0.00016
+    merge_tile_s: float = 0.00014
     # A scan of 8000 points in a file of float32.
     scan_bytes: int = 90_000
 
