@@ -45,8 +45,8 @@ mod _voxtile {
     use super::map::Map;
     #[pymodule_export]
     use super::operations::{
-        adopt, clear, convert, crop, decay, delete_snapshot, describe, diff, import_octree, join, make_piece,
-        merge, move_piece, repair, revert, snapshots, verify,
+        adopt, clear, convert, crop, decay, delete_snapshot, describe, diff, import_octree, join, merge,
+        move_piece, repair, revert, snapshots, verify,
     };
     #[pymodule_export]
     use super::remapping::{remap, remap_as, remove_points, remove_scans};

@@ -137,26 +137,9 @@ pub fn merge<'py>(
     })
 }
 
-/// Makes a copy of a map with another id, 32 hexadecimal digits: a piece of a map that `join` makes. Every byte of its
-/// tiles is compared with the log.
-#[pyfunction]
-#[pyo3(signature = (map, output, map_id, *, progress=None))]
-pub fn make_piece<'py>(
-    py: Python<'py>,
-    map: PathBuf,
-    output: PathBuf,
-    map_id: &str,
-    progress: Callback,
-) -> PyResult<Bound<'py, PyAny>> {
-    let id = map_id_of(py, "map_id", map_id)?;
-    told(py, progress, |_, progress| {
-        let map = MapReader::open(&map, 1)?;
-        operations::make_piece(&map, &output, id, |done, all| progress.tell(done, all))
-    })
-}
-
-/// Moves a map that nobody needs any more to its place as a piece of a map that `join` makes, and makes it durable. It
-/// is copied as by `make_piece` where it has another id, or is on another file system.
+/// Moves a map that nobody needs any more to its place as a piece of a map that `join` makes, whose id is 32 hexadecimal
+/// digits, and makes it durable. A map of another id, or of another file system, is copied, and every byte of its tiles
+/// is compared with the log.
 #[pyfunction]
 #[pyo3(signature = (map, output, map_id, *, progress=None))]
 pub fn move_piece<'py>(

@@ -176,8 +176,8 @@ impl OutOfCoreTileMapper {
     /// and scans go on meanwhile. [`OutOfCoreTileMapper::flushed_scan_number`] tells when it is durable, and
     /// [`OutOfCoreTileMapper::end_flush`] waits for it. One that is under way ends first.
     ///
-    /// Tiles that a scan changes before they are written are in memory twice; both count in the limit. A tile that has to
-    /// go waits in the compact form; the mapper waits for the flush where these fill their part of the memory.
+    /// Tiles that a scan changes before they are written are in memory twice; both count in the limit. A tile that has
+    /// to go waits in the compact form; the mapper waits for the flush where these fill their part of the memory.
     ///
     /// # Errors
     ///

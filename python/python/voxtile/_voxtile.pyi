@@ -27,7 +27,6 @@ __all__ = [
     "diff",
     "import_octree",
     "join",
-    "make_piece",
     "merge",
     "move_piece",
     "open_scans",
@@ -284,9 +283,6 @@ def merge(
     *,
     prefer: Literal["first", "last", "more-observed"] | None = None,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
-def make_piece(
-    map: _Path, output: _Path, map_id: str, *, progress: _Progress | None = None
 ) -> dict[str, Any]: ...
 def move_piece(
     map: _Path, output: _Path, map_id: str, *, progress: _Progress | None = None

@@ -295,8 +295,8 @@ impl TileCache {
     }
 
     /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes. Tiles that somebody holds stay,
-    /// but for those that a flush lets go of; if all are held, nothing goes. While a flush goes on, tiles in the compact
-    /// form that need no saving go first.
+    /// but for those that a flush lets go of; if all are held, nothing goes. While a flush goes on, tiles in the
+    /// compact form that need no saving go first.
     pub(super) fn next_eviction(
         &self,
         bytes: usize,
