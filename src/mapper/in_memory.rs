@@ -1,5 +1,5 @@
 use super::tile_map::TileMap;
-use super::trace::trace;
+use super::trace_rules::trace_rules;
 use super::{MapStatistics, MapView, Mapper, TileRef};
 use crate::config::MapConfig;
 use crate::error::Result;
@@ -131,12 +131,25 @@ impl MapView for InMemoryMapper {
 
 impl Mapper for InMemoryMapper {
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
-        let updates = trace(&mut self.tracer, &self.config, scan, None, None)?;
+        let updates = self.tracer.trace_points(trace_rules(&self.config, None), scan, None)?;
         Ok(self.accept(updates))
     }
 
+    fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
+        for some in scans.chunks(self.tracer.count_beside(scans.len())) {
+            let traced = self.tracer.trace_beside(trace_rules(&self.config, None), some);
+            for (scan, updates) in some.iter().zip(traced) {
+                reports.push(match updates? {
+                    Some(updates) => self.accept(updates),
+                    None => self.insert_points(*scan)?,
+                });
+            }
+        }
+        Ok(())
+    }
+
     fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport> {
-        let updates = trace(&mut self.tracer, &self.config, scan, Some(tiles), None)?;
+        let updates = self.tracer.trace_points(trace_rules(&self.config, Some(tiles)), scan, None)?;
         Ok(self.accept(updates))
     }
 

@@ -30,7 +30,7 @@ mod stoppable;
 mod tile_finder;
 mod tile_map;
 mod tile_ref;
-mod trace;
+mod trace_rules;
 mod traits;
 
 pub use in_memory::InMemoryMapper;

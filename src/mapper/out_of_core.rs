@@ -1,6 +1,6 @@
 use super::kept_scan::pose_numbers;
 use super::paging::{MemoryPlan, PagedTiles, TilePager};
-use super::trace::trace;
+use super::trace_rules::trace_rules;
 use super::{LiveReader, MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
@@ -42,6 +42,8 @@ pub struct OutOfCoreTileMapper {
     /// What is given to other threads, once somebody asked for it.
     live: OnceLock<LiveReader>,
     tracer: ScanTracer,
+    /// Scans of fewer points are traced beside others.
+    fewest_points_alone: usize,
 }
 
 impl OutOfCoreTileMapper {
@@ -93,7 +95,8 @@ impl OutOfCoreTileMapper {
         config.keeps_scans = store.keeps_scans();
         let scan_bytes = MemoryPlan::new(config.memory).scan_bytes;
         let tiles = PagedTiles::new(config.clone(), store);
-        Self { tiles, live: OnceLock::new(), config, tracer: ScanTracer::with_memory_bytes(scan_bytes) }
+        let tracer = ScanTracer::with_memory_bytes(scan_bytes);
+        Self { tiles, live: OnceLock::new(), config, tracer, fewest_points_alone: usize::MAX }
     }
 
     /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
@@ -268,10 +271,14 @@ impl OutOfCoreTileMapper {
         self.pager().reload(tile, discard_changes)
     }
 
-    /// Inserts what a scan says about a selection of tiles, or about all, and keeps the scan if the map keeps scans.
-    fn insert(&mut self, scan: &dyn ScanPoints, selection: Option<&TileSelection>) -> Result<ScanReport> {
+    /// Inserts a scan by `map`, and keeps it if the map keeps scans.
+    fn insert(
+        &mut self,
+        scan: &dyn ScanPoints,
+        map: impl FnOnce(&mut Self) -> Result<(ScanReport, Vec<TileIndex>)>,
+    ) -> Result<ScanReport> {
         let place = if self.pager().keeps_scans() { Some(self.pager().keep(scan)?) } else { None };
-        let inserted = self.map(scan, selection);
+        let inserted = map(self);
         let mut pager = self.pager();
         match inserted {
             Ok((report, tiles)) => {
@@ -286,6 +293,32 @@ impl OutOfCoreTileMapper {
                 Err(error)
             }
         }
+    }
+
+    /// Inserts scans that are traced beside each other, up to the first that has to be traced by itself; returns how many
+    /// were inserted.
+    fn insert_beside(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<usize> {
+        let mut traced = Vec::with_capacity(scans.len());
+        for (scan, updates) in
+            scans.iter().zip(self.tracer.trace_beside(trace_rules(&self.config, None), scans))
+        {
+            match updates {
+                Ok(Some(updates)) => traced.push(updates),
+                Ok(None) => {
+                    self.fewest_points_alone = scan.len().min(self.fewest_points_alone);
+                    break;
+                }
+                // By itself it fails again, once those before it are in the map.
+                Err(_) => break,
+            }
+        }
+        let count = traced.len();
+        let mut waiting_bytes: usize = traced.iter().map(ScanUpdates::bytes).sum();
+        for (scan, updates) in scans.iter().zip(traced) {
+            waiting_bytes -= updates.bytes();
+            reports.push(self.insert(*scan, |mapper| mapper.accept(updates, waiting_bytes))?);
+        }
+        Ok(count)
     }
 
     /// Maps what a scan says about a selection of tiles, or about all; returns the tiles that it touched, too.
@@ -305,18 +338,19 @@ impl OutOfCoreTileMapper {
         let max_bytes = plan.updates_bytes;
         let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
         let overflow = (max_bytes < usize::MAX).then_some(overflow);
-        let traced = trace(&mut self.tracer, &self.config, scan, selection, overflow);
+        let traced = self.tracer.trace_points(trace_rules(&self.config, selection), scan, overflow);
         let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
-        let inserted = traced.and_then(|updates| self.accept(updates));
+        let inserted = traced.and_then(|updates| self.accept(updates, 0));
         if inserted.is_err() {
             self.pager().discard_staged();
         }
         inserted
     }
 
-    fn accept(&mut self, updates: ScanUpdates) -> Result<(ScanReport, Vec<TileIndex>)> {
+    /// Accepts updates, while those of other scans wait and take so many bytes.
+    fn accept(&mut self, updates: ScanUpdates, waiting_bytes: usize) -> Result<(ScanReport, Vec<TileIndex>)> {
         let report = updates.report;
-        let scan_bytes = self.tracer.bytes() + updates.bytes();
+        let scan_bytes = self.tracer.bytes() + updates.bytes() + waiting_bytes;
         let mut pager = self.pager();
         pager.prepare(&updates, scan_bytes)?;
         pager.prefetch(&updates.tiles);
@@ -435,16 +469,33 @@ impl MapView for OutOfCoreTileMapper {
 
 impl Mapper for OutOfCoreTileMapper {
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
-        self.insert(scan, None)
+        self.insert(scan, |mapper| mapper.map(scan, None))
+    }
+
+    fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
+        let mut left = scans;
+        while !left.is_empty() {
+            let most = self.tracer.count_beside(left.len());
+            let beside = left[..most].iter().take_while(|scan| scan.len() < self.fewest_points_alone).count();
+            let inserted = if beside > 1 { self.insert_beside(&left[..beside], reports)? } else { 0 };
+            left = &left[inserted..];
+            if inserted < beside.max(1)
+                && let Some((alone, others)) = left.split_first()
+            {
+                reports.push(self.insert_points(*alone)?);
+                left = others;
+            }
+        }
+        Ok(())
     }
 
     fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport> {
-        self.insert(scan, Some(tiles))
+        self.insert(scan, |mapper| mapper.map(scan, Some(tiles)))
     }
 
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport> {
         let updates = batch.updates(&self.config.grid, &self.config.sensor_model)?;
-        let (report, _) = self.accept(updates)?;
+        let (report, _) = self.accept(updates, 0)?;
         self.pager().note_batch();
         Ok(report)
     }

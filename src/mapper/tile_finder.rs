@@ -1,5 +1,5 @@
 use super::paging::MemoryPlan;
-use super::trace::trace;
+use super::trace_rules::trace_rules;
 use crate::config::{MapConfig, RayConfig};
 use crate::error::Result;
 use crate::scan::{Overflow, PackedUpdates, ScanPoints, ScanTracer, Stop};
@@ -40,7 +40,7 @@ impl TileFinder {
             Ok(())
         };
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill };
-        let updates = trace(&mut self.tracer, &self.config, scan, None, Some(overflow))?;
+        let updates = self.tracer.trace_points(trace_rules(&self.config, None), scan, Some(overflow))?;
         self.tracer.stop().check()?;
         tiles.extend(updates.tiles.into_iter().map(|(tile, _)| tile));
         Ok(tiles)

@@ -130,6 +130,20 @@ pub trait Mapper: MapView + Send {
     /// As for [`Mapper::insert_points`].
     fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport>;
 
+    /// Adds scans in order: the map is as after [`Mapper::insert_points`] of one after the other, to the bit. Scans
+    /// that are at hand together go to the cores one each, which takes less time than to divide each among all cores.
+    /// Each accepted scan adds its report.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Mapper::insert_points`]. Scans before the one that failed are in the map, and have their reports.
+    fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
+        for scan in scans {
+            reports.push(self.insert_points(*scan)?);
+        }
+        Ok(())
+    }
+
     /// [`Mapper::insert_points`] for a [`Scan`].
     ///
     /// # Errors

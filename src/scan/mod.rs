@@ -37,7 +37,7 @@ pub use scan_ref::ScanRef;
 pub(crate) use spill::Overflow;
 pub use stop::Stop;
 pub use trace::ScanTracer;
-pub(crate) use trace::UpdateOrder;
+pub(crate) use trace::{TraceRules, UpdateOrder};
 pub(crate) use updates::MappedTiles;
 pub use updates::{BrickRuns, BrickUpdate, OrderedUpdates, PackedUpdates, Run, ScanUpdates, TileUpdates};
 pub use world_scan::Scan;

@@ -2,7 +2,8 @@
 
 use super::updates::brick_code;
 use super::{
-    MappedTiles, Overflow, PackedUpdates, Scan, ScanReport, ScanTracer, ScanUpdates, TileUpdates, UpdateOrder,
+    MappedTiles, Overflow, PackedUpdates, Scan, ScanPoints, ScanReport, ScanTracer, ScanUpdates, TileUpdates,
+    TraceRules, UpdateOrder,
 };
 use crate::config::{InsertMode, RayConfig};
 use crate::error::Result;
@@ -77,7 +78,8 @@ impl Setting {
         let Self { grid, model, rays, order, tiles } = self;
         let mapped = MappedTiles { grid, selection: tiles.as_ref() };
         let tracer = &mut ScanTracer::default();
-        let updates = tracer.trace_points(mapped, model, rays, scan, *order, None).unwrap();
+        let updates =
+            tracer.trace_points(TraceRules { mapped, model, rays, order: *order }, scan, None).unwrap();
         let mut said = Said::new();
         updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         (said, updates.report)
@@ -104,7 +106,7 @@ impl Setting {
         let folder = Path::new("map");
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =
-            tracer.trace_points(mapped, model, rays, scan, *order, Some(overflow))?;
+            tracer.trace_points(TraceRules { mapped, model, rays, order: *order }, scan, Some(overflow))?;
         tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
         Ok((said, report, times))
     }
@@ -156,6 +158,37 @@ fn dense_rays_in_little_memory_say_the_same_by_any_number_of_threads() {
 }
 
 #[test]
+fn scans_beside_each_other_say_what_each_says_by_itself_and_those_too_large_are_left() {
+    let scans = [dense(9_000, 5.0), dense(50, 3.0), dense(9_000, 12.0), dense(2, 1.0), dense(400, 4.0)];
+    let beside: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
+    for setting in settings(10.0) {
+        let Setting { grid, model, rays, order, .. } = &setting;
+        let rules = TraceRules { mapped: MappedTiles { grid, selection: None }, model, rays, order: *order };
+        let limited = rays.insert_mode == InsertMode::PerScan;
+        let alone: Vec<_> = scans.iter().map(|scan| setting.whole(scan)).collect();
+        for (threads, bytes) in [(1, None), (2, None), (12, None), (3, Some(512 << 20)), (3, Some(16 << 20))]
+        {
+            let mut tracer = bytes.map_or(ScanTracer::default(), ScanTracer::with_memory_bytes);
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            for _ in 0..2 {
+                let traced = pool.install(|| tracer.trace_beside(rules, &beside));
+                for (number, (alone, updates)) in alone.iter().zip(traced).enumerate() {
+                    let fits = bytes.is_none() || (limited && (number != 2 || bytes > Some(16 << 20)));
+                    let updates = updates.unwrap();
+                    assert_eq!(updates.is_some(), fits, "{threads} {bytes:?} {number}");
+                    let Some(updates) = updates else { continue };
+                    let mut said = Said::new();
+                    updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
+                    assert!((&said, &updates.report) == (&alone.0, &alone.1), "{threads} {bytes:?} {number}");
+                }
+            }
+            // No collector is lost, and none is made twice.
+            assert!(tracer.collectors() <= threads.max(scans.len()));
+        }
+    }
+}
+
+#[test]
 fn long_rays_keep_to_their_memory() {
     let scan = dense(80, 500.0);
     for setting in settings(25.6) {
@@ -178,14 +211,9 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
         let (folder, spill) = (Path::new("some_map"), &mut |_| Ok(()));
         let overflow = Overflow { max_bytes: 1 << 16, max_tiles: usize::MAX, folder, make_scratch, spill };
         let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
-        let traced = tracer.trace_points(
-            MappedTiles { grid, selection: None },
-            model,
-            rays,
-            &scan,
-            *order,
-            Some(overflow),
-        );
+        let mapped = MappedTiles { grid, selection: None };
+        let rules = TraceRules { mapped, model, rays, order: *order };
+        let traced = tracer.trace_points(rules, &scan, Some(overflow));
         assert!(traced.unwrap_err().to_string().contains("some_map"));
     }
 }

@@ -92,6 +92,7 @@ mod remapping_beside;
 mod scan_list;
 /// The stream of scans, in files and from standard input.
 mod scan_stream;
+mod scans_together;
 /// Map sharing: codec, convergence over bad links, layers.
 mod sharing;
 /// The names of snapshots: in their files, and in the log.

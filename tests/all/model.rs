@@ -4,7 +4,8 @@ use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
-    InsertMode, MapConfig, MapPath, MapQueries, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Storage,
+    InsertMode, MapConfig, MapPath, MapQueries, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper,
+    ScanPoints, Storage,
 };
 
 /// One random life of a map beside the naive one, which is set back to the last flush where the map crashes.
@@ -25,11 +26,15 @@ fn live(seed: u64, config: &MapConfig) {
     for _ in 0..60 {
         match random.below(10) {
             0..5 => {
-                let center = [random.between(-3.0, 3.0), 0.0, 0.0];
-                let scan = random_scan(&mut random, center, 12);
-                mapper.insert_scan(&scan).unwrap();
-                reference.insert_scan(&scan);
-                scans += 1;
+                let mut some = Vec::new();
+                for _ in 0..1 + random.below(3) {
+                    let center = [random.between(-3.0, 3.0), 0.0, 0.0];
+                    some.push(random_scan(&mut random, center, 12));
+                }
+                let together: Vec<&dyn ScanPoints> = some.iter().map(|scan| scan as _).collect();
+                mapper.insert_all(&together, &mut Vec::new()).unwrap();
+                some.iter().for_each(|scan| reference.insert_scan(scan));
+                scans += some.len() as u64;
             }
             5 | 6 => {
                 let point = random.point([0.0; 3], 4.0);

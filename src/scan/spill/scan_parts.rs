@@ -91,6 +91,11 @@ impl<'a> ScanParts<'a> {
         }
     }
 
+    /// No parts: adding one fails, and collecting ends.
+    pub(crate) fn refused(mapped: MappedTiles<'a>, stop: &'a Stop) -> Self {
+        Self::new(mapped, stop, 0, 0, &|| Err(io::ErrorKind::Unsupported.into()))
+    }
+
     /// Whether no part was added.
     pub(crate) fn is_empty(&self) -> bool {
         self.is_empty.load(Ordering::Relaxed)

@@ -2,8 +2,9 @@
 
 mod scan_rays;
 mod scan_tracer;
+mod scans_beside;
 mod trace_limit;
 
 pub use scan_tracer::ScanTracer;
-pub(crate) use scan_tracer::{UpdateOrder, check_count, check_intensities};
+pub(crate) use scan_tracer::{TraceRules, UpdateOrder, check_count, check_intensities};
 pub(crate) use trace_limit::{Allowance, CollectorLimit};

@@ -1,4 +1,4 @@
-use super::scan_tracer::origin_voxel;
+use super::scan_tracer::{ScanTracer, TraceRules, origin_voxel};
 use super::trace_limit::{CollectorLimit, TraceLimit};
 use crate::config::RayConfig;
 use crate::error::Result;
@@ -37,6 +37,8 @@ pub(crate) struct ScanRays<'a> {
     cut: Option<RayCut<'a>>,
     window: Window,
     range: RangeRule,
+    /// Most threads that take part.
+    most_threads: usize,
     stop: &'a Stop,
 }
 
@@ -50,12 +52,13 @@ pub(crate) enum PerScanUpdates {
 
 impl<'a> ScanRays<'a> {
     pub(crate) fn new(
-        mapped: MappedTiles<'a>,
-        model: &'a SensorModel,
-        rays: &'a RayConfig,
+        rules: TraceRules<'a>,
         points: &'a dyn ScanPoints,
+        most_threads: usize,
         stop: &'a Stop,
     ) -> Result<Self> {
+        let TraceRules { mapped, model, rays, .. } = rules;
+        ScanTracer::check(mapped.grid, model, points)?;
         let origin_m = points.origin();
         let grid = mapped.grid;
         let voxel = origin_voxel(grid, origin_m)?;
@@ -63,7 +66,8 @@ impl<'a> ScanRays<'a> {
         let cut = mapped.selection.map(|tiles| RayCut::new(grid, tiles, &origin));
         let range = RangeRule::new(rays, origin_m);
         let window = Window::default();
-        let mut scan_rays = Self { mapped, model, rays, points, origin_m, origin, cut, window, range, stop };
+        let mut scan_rays =
+            Self { mapped, model, rays, points, origin_m, origin, cut, window, range, most_threads, stop };
         scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
         Ok(scan_rays)
     }
@@ -165,7 +169,7 @@ impl<'a> ScanRays<'a> {
         parts: &ScanParts<'_>,
     ) -> Result<ScanReport> {
         let all = self.points.len();
-        let threads = limit.collectors(rayon::current_num_threads());
+        let threads = limit.collectors(self.most_threads);
         let each = limit.of_collector(threads);
         let mut report = ScanReport::default();
         let (mut next, mut at_a_time) = (0, FIRST_RAYS);
@@ -275,7 +279,7 @@ impl<'a> ScanRays<'a> {
 
     /// Into how many parts the points are divided, each with its own collector.
     fn threads(&self) -> usize {
-        rayon::current_num_threads().min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
+        self.most_threads.min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
     }
 
     fn goes_on(&self, parts: Option<&ScanParts<'_>>) -> bool {

@@ -17,11 +17,21 @@ use std::borrow::Cow;
 #[derive(Clone, Debug, Default)]
 pub struct ScanTracer {
     /// One per thread.
-    per_scan: Vec<PerScanCollector>,
+    pub(super) per_scan: Vec<PerScanCollector>,
     /// One per part of the rays.
-    per_ray: Vec<PerRayCollector>,
-    limit: TraceLimit,
-    stop: Stop,
+    pub(super) per_ray: Vec<PerRayCollector>,
+    pub(super) limit: TraceLimit,
+    pub(super) stop: Stop,
+}
+
+/// How the scans of a map are traced.
+#[derive(Clone, Copy)]
+pub(crate) struct TraceRules<'a> {
+    /// The tiles whose updates are wanted.
+    pub(crate) mapped: MappedTiles<'a>,
+    pub(crate) model: &'a SensorModel,
+    pub(crate) rays: &'a RayConfig,
+    pub(crate) order: UpdateOrder,
 }
 
 /// The order of a tile's updates in insertion per ray.
@@ -62,7 +72,7 @@ impl ScanTracer {
         scan: &Scan,
     ) -> Result<ScanUpdates> {
         let mapped = MappedTiles { grid, selection: None };
-        self.trace_points(mapped, model, rays, scan, UpdateOrder::OfVoxels, None)
+        self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfVoxels }, scan, None)
     }
 
     /// The same, but in insertion per ray a tile's updates are in the order of the rays, one by one: for octrees whose
@@ -79,7 +89,7 @@ impl ScanTracer {
         scan: &Scan,
     ) -> Result<ScanUpdates> {
         let mapped = MappedTiles { grid, selection: None };
-        self.trace_points(mapped, model, rays, scan, UpdateOrder::OfRays, None)
+        self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfRays }, scan, None)
     }
 
     /// The same for any source of points and for the mapped tiles alone: their updates are those of the whole scan.
@@ -91,24 +101,16 @@ impl ScanTracer {
     /// As for [`ScanTracer::trace`], points that cannot be read, and errors of the spill.
     pub(crate) fn trace_points(
         &mut self,
-        mapped: MappedTiles<'_>,
-        model: &SensorModel,
-        rays: &RayConfig,
+        rules: TraceRules<'_>,
         scan: &dyn ScanPoints,
-        order: UpdateOrder,
         overflow: Option<Overflow<'_>>,
     ) -> Result<ScanUpdates> {
-        let MappedTiles { grid, selection } = mapped;
-        let selection = match (selection, rays.region) {
-            (Some(tiles), Some(region)) => Some(Cow::Owned(tiles.within(region))),
-            (Some(tiles), None) => Some(Cow::Borrowed(tiles)),
-            (None, region) => region.map(|region| Cow::Owned(TileSelection::from(region))),
-        };
-        let mapped = MappedTiles { grid, selection: selection.as_deref() };
-        Self::check(grid, model, scan)?;
-        let scan_rays = ScanRays::new(mapped, model, rays, scan, &self.stop)?;
+        let selection = rules.selection();
+        let rules = rules.with_selection(selection.as_deref());
+        let TraceRules { mapped, rays, .. } = rules;
+        let scan_rays = ScanRays::new(rules, scan, rayon::current_num_threads(), &self.stop)?;
         let is_per_scan = rays.insert_mode == InsertMode::PerScan;
-        let in_order = !is_per_scan && order == UpdateOrder::OfRays;
+        let in_order = rules.are_rays_in_order();
         let Some(mut overflow) = overflow else {
             return match (is_per_scan, in_order) {
                 (true, _) => scan_rays.per_scan(&mut self.per_scan),
@@ -155,6 +157,30 @@ impl ScanTracer {
             self.per_scan.iter().map(|collector| size_of::<PerScanCollector>() + collector.bytes());
         let per_ray = self.per_ray.iter().map(|collector| size_of::<PerRayCollector>() + collector.bytes());
         per_scan.sum::<usize>() + per_ray.sum::<usize>()
+    }
+}
+
+impl<'a> TraceRules<'a> {
+    /// The wanted tiles that are in the region of the rays, or all.
+    pub(super) fn selection(&self) -> Option<Cow<'a, TileSelection>> {
+        match (self.mapped.selection, self.rays.region) {
+            (Some(tiles), Some(region)) => Some(Cow::Owned(tiles.within(region))),
+            (Some(tiles), None) => Some(Cow::Borrowed(tiles)),
+            (None, region) => region.map(|region| Cow::Owned(TileSelection::from(region))),
+        }
+    }
+
+    /// The same rules for the tiles of a selection.
+    pub(super) fn with_selection<'b>(self, selection: Option<&'b TileSelection>) -> TraceRules<'b>
+    where
+        'a: 'b,
+    {
+        TraceRules { mapped: MappedTiles { grid: self.mapped.grid, selection }, ..self }
+    }
+
+    /// Whether all updates of a tile are to be in the order of the rays, one by one.
+    pub(super) fn are_rays_in_order(&self) -> bool {
+        self.rays.insert_mode != InsertMode::PerScan && self.order == UpdateOrder::OfRays
     }
 }
 

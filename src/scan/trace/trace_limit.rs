@@ -33,6 +33,16 @@ impl TraceLimit {
         Self { bytes }
     }
 
+    /// Whether there is no limit.
+    pub(crate) fn is_none(&self) -> bool {
+        self.bytes == usize::MAX
+    }
+
+    /// The limit of each of so many tracers.
+    pub(crate) fn divided(self, tracers: usize) -> Self {
+        if self.is_none() { self } else { Self::new(self.bytes / tracers.max(1)) }
+    }
+
     /// How many of the wanted collectors fit.
     pub(crate) fn collectors(&self, wanted: usize) -> usize {
         wanted.min(self.bytes / MIN_COLLECTOR_BYTES).max(1)

@@ -12,6 +12,7 @@ use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use voxtile::scan::ScanPoints;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Random;
 use voxtile::space::{Point, VoxelIndex};
@@ -72,6 +73,9 @@ struct MapArguments {
 struct BuildArguments {
     #[command(flatten)]
     map: MapArguments,
+    /// Hand in the scans together, not one by one
+    #[arg(long)]
+    together: bool,
     /// Bring the octrees up to date after every scan
     #[arg(long)]
     sync: bool,
@@ -150,7 +154,7 @@ fn build(arguments: &BuildArguments) -> Result<()> {
         let took = if let Some(folder) = &arguments.folder {
             let folder = folder.join(format!("map_{builds}"));
             let mut mapper = OutOfCoreTileMapper::create(&folder, config.clone())?;
-            insert_all(&mut mapper, &scans)?;
+            insert(&mut mapper, &scans, arguments.together)?;
             mapper.flush()?;
             let took = stopwatch.stop()?;
             drop(mapper);
@@ -165,7 +169,7 @@ fn build(arguments: &BuildArguments) -> Result<()> {
                     mapper.sync_octrees();
                 }
             } else {
-                insert_all(&mut mapper, &scans)?;
+                insert(&mut mapper, &scans, arguments.together)?;
             }
             // The map is dropped after the clocks were read.
             stopwatch.stop()?
@@ -186,7 +190,7 @@ fn memory(arguments: &MapArguments) -> Result<()> {
     let scans = arguments.scans()?;
     let before = resident_bytes()?;
     let mut mapper = InMemoryMapper::new(arguments.config()?)?;
-    insert_all(&mut mapper, &scans)?;
+    insert(&mut mapper, &scans, false)?;
     let resident = resident_bytes()?.saturating_sub(before);
     let counts = mapper.statistics().cached;
     mapper.sync_octrees();
@@ -311,12 +315,16 @@ impl MapArguments {
     /// The map of all scans.
     fn mapper(&self) -> Result<InMemoryMapper> {
         let mut mapper = InMemoryMapper::new(self.config()?)?;
-        insert_all(&mut mapper, &self.scans()?)?;
+        insert(&mut mapper, &self.scans()?, false)?;
         Ok(mapper)
     }
 }
 
-fn insert_all(mapper: &mut impl Mapper, scans: &[Scan]) -> voxtile::Result<()> {
+fn insert(mapper: &mut impl Mapper, scans: &[Scan], are_together: bool) -> voxtile::Result<()> {
+    if are_together {
+        let scans: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
+        return mapper.insert_all(&scans, &mut Vec::new());
+    }
     scans.iter().try_for_each(|scan| mapper.insert_scan(scan).map(drop))
 }
 

@@ -1,0 +1,88 @@
+use super::scan_rays::{PerScanUpdates, ScanRays};
+use super::scan_tracer::{ScanTracer, TraceRules};
+use crate::config::InsertMode;
+use crate::error::Result;
+use crate::scan::scan_points::ScanPoints;
+use crate::scan::spill::ScanParts;
+use crate::scan::updates::ScanUpdates;
+use rayon::prelude::*;
+
+impl ScanTracer {
+    /// Traces scans beside each other, each on its share of the cores: scans have nothing in common, while parts of one
+    /// scan mark the same voxels, which are to be merged.
+    ///
+    /// `None` for a scan that does not fit into its share of the memory limit: it is to be traced by itself.
+    ///
+    /// # Errors
+    ///
+    /// For each scan as for [`ScanTracer::trace`].
+    pub(crate) fn trace_beside(
+        &mut self,
+        rules: TraceRules<'_>,
+        scans: &[&dyn ScanPoints],
+    ) -> Vec<Result<Option<ScanUpdates>>> {
+        let selection = rules.selection();
+        let rules = rules.with_selection(selection.as_deref());
+        let most_threads = (rayon::current_num_threads() / scans.len().max(1)).max(1);
+        let mut tracers = self.divided(scans.len(), most_threads);
+        let traced = tracers
+            .par_iter_mut()
+            .zip(scans)
+            .map(|(tracer, scan)| tracer.trace_whole(rules, *scan, most_threads))
+            .collect();
+        for mut tracer in tracers {
+            self.per_scan.append(&mut tracer.per_scan);
+            self.per_ray.append(&mut tracer.per_ray);
+        }
+        traced
+    }
+
+    /// How many collectors are kept.
+    #[cfg(test)]
+    pub(crate) fn collectors(&self) -> usize {
+        self.per_scan.len().max(self.per_ray.len())
+    }
+
+    /// How many of so many scans may be traced beside each other.
+    pub(crate) fn count_beside(&self, scans: usize) -> usize {
+        self.limit.collectors(scans.min(rayon::current_num_threads()))
+    }
+
+    /// Tracers with equal shares of the memory, which take the collectors with them.
+    fn divided(&mut self, parts: usize, collectors: usize) -> Vec<Self> {
+        let limit = self.limit.divided(parts);
+        let divided = (0..parts).map(|_| Self {
+            per_scan: self.per_scan.drain(..collectors.min(self.per_scan.len())).collect(),
+            per_ray: self.per_ray.drain(..collectors.min(self.per_ray.len())).collect(),
+            limit,
+            stop: self.stop.clone(),
+        });
+        divided.collect()
+    }
+
+    /// Traces a scan whose updates fit into memory; `None` if they do not.
+    fn trace_whole(
+        &mut self,
+        rules: TraceRules<'_>,
+        scan: &dyn ScanPoints,
+        most_threads: usize,
+    ) -> Result<Option<ScanUpdates>> {
+        let scan_rays = ScanRays::new(rules, scan, most_threads, &self.stop)?;
+        let updates = match (rules.rays.insert_mode, self.limit.is_none()) {
+            (InsertMode::PerScan, true) => scan_rays.per_scan(&mut self.per_scan)?,
+            (InsertMode::PerScan, false) => {
+                let parts = ScanParts::refused(rules.mapped, &self.stop);
+                match scan_rays.per_scan_in_parts(&mut self.per_scan, &self.limit, &parts)? {
+                    PerScanUpdates::Whole(updates) => updates,
+                    PerScanUpdates::InParts(_) => return Ok(None),
+                }
+            }
+            (InsertMode::PerRay, true) if rules.are_rays_in_order() => scan_rays.per_ray_in_order()?,
+            (InsertMode::PerRay, true) => scan_rays.per_ray(&mut self.per_ray)?,
+            // Their size is not known before they are collected, so that they go to parts.
+            (InsertMode::PerRay, false) => return Ok(None),
+        };
+        self.stop.check()?;
+        Ok(Some(updates))
+    }
+}
