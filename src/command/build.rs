@@ -2,7 +2,7 @@ use crate::command::args::BuildArgs;
 use crate::command::build_config::{config_to_create, config_to_go_on};
 use crate::command::failure::JsonTo;
 use crate::command::flush_schedule::FlushSchedule;
-use crate::command::intake::{Intake, Next};
+use crate::command::intake::{Intake, Next, Taken};
 use crate::command::map_at::whole_map;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
@@ -16,15 +16,18 @@ use crate::io::{PointRoom, ReadOptions, ScanMark, StoredScan};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer};
 use crate::space::Point;
-use crate::store::{FsDisk, InputRecord, UnsyncedDisk};
+use crate::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use crate::{Error, MapConfig, MapPath, MemoryLimit};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The share of the limit of memory that the points of a scan may take, as they are read and as they are mapped.
+/// The share of the limit of memory that the points of scans may take, as they are read and as they are mapped.
 const PARTS_OF_MEMORY: usize = 32;
+
+/// Scans are taken together where there is so much room for the points of each, a lidar's of 128 beams.
+const ROOM_TO_GO_TOGETHER: usize = 3 << 20;
 
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let watch = Watch::at_terminal(stop_signal::catch()?);
@@ -51,6 +54,7 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     let mark: Marking =
         if args.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
     let room = room(args, &config);
+    let most_together = most_together(args, &config);
     let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room, mark, stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
@@ -86,7 +90,9 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     };
 
     if args.when_behind != WhenBehind::Wait {
-        intake.read_ahead(ScanQueue::new(args.when_behind));
+        intake.read_ahead(ScanQueue::new(args.when_behind, ScanQueue::MOST_SCANS));
+    } else if most_together > 1 {
+        intake.read_ahead(ScanQueue::new(args.when_behind, most_together));
     }
     let progress = watch.over_scans(input.scans);
     progress.pass(intake.content().scans);
@@ -98,6 +104,7 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
         report: ScanReport::default(),
         scans: 0,
         has_rays: !args.no_rays,
+        most_together,
         notes_content: args.piece_of.is_none(),
     };
     let outcome = build.insert_all();
@@ -131,6 +138,8 @@ struct Build<'a> {
     report: ScanReport,
     scans: u64,
     has_rays: bool,
+    /// Most scans that are mapped together.
+    most_together: usize,
     notes_content: bool,
 }
 
@@ -138,38 +147,53 @@ impl Build<'_> {
     fn insert_all(&mut self) -> anyhow::Result<()> {
         loop {
             let (mapper, schedule) = (&mut *self.mapper, &mut self.schedule);
+            let most = self.most_together.min(schedule.scans_until_due());
             // An input that is quiet does not keep what came from being made durable.
-            let scan =
-                match self.intake.next(&mut || flush_if(schedule.is_due_waiting(), mapper, schedule))? {
-                    Next::Scan(scan) => scan,
-                    Next::Stopped => return Ok(()),
-                    Next::End => {
-                        // The last scans may have been skipped.
-                        self.note_content();
-                        return Ok(());
-                    }
-                };
-            let inserted = if self.has_rays {
-                self.mapper.insert_points(&scan)
-            } else {
-                insert_hits(self.mapper, &scan)
+            let next =
+                self.intake.next(most, &mut || flush_if(schedule.is_due_waiting(), mapper, schedule))?;
+            let taken = match next {
+                Next::Scans(taken) => taken,
+                Next::Stopped => return Ok(()),
+                Next::End => {
+                    // The last scans may have been skipped.
+                    self.note_content(self.intake.content());
+                    return Ok(());
+                }
             };
+            let mut reports = Vec::with_capacity(taken.len());
+            let inserted = self.insert(&taken, &mut reports);
+            for report in &reports {
+                self.report += *report;
+                self.scans += 1;
+                self.progress.step();
+                self.progress.show(self.mapper);
+            }
+            if let Some(last) = reports.len().checked_sub(1) {
+                self.note_content(taken[last].content.clone());
+            }
             match inserted {
-                Ok(report) => self.report += report,
+                Ok(()) => {}
                 Err(Error::Stopped) => return Ok(()),
                 Err(error) => return Err(error.into()),
             }
-            self.note_content();
-            self.scans += 1;
-            self.progress.step();
-            self.progress.show(self.mapper);
-            flush_if(self.schedule.is_due(), self.mapper, &mut self.schedule)?;
+            flush_if(self.schedule.is_due(reports.len()), self.mapper, &mut self.schedule)?;
         }
     }
 
-    fn note_content(&mut self) {
+    fn insert(&mut self, taken: &[Taken], reports: &mut Vec<ScanReport>) -> crate::Result<()> {
+        if self.has_rays {
+            let scans: Vec<&dyn ScanPoints> = taken.iter().map(|taken| &taken.scan as _).collect();
+            return self.mapper.insert_all(&scans, reports);
+        }
+        for Taken { scan, .. } in taken {
+            reports.push(insert_hits(self.mapper, scan)?);
+        }
+        Ok(())
+    }
+
+    fn note_content(&mut self, content: InputContent) {
         if self.notes_content {
-            self.mapper.note_input_content(self.intake.content());
+            self.mapper.note_input_content(content);
         }
     }
 }
@@ -378,14 +402,30 @@ fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
         _ => Path::new("."),
     };
     match config.memory {
-        MemoryLimit::Bytes(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(args), folder),
+        MemoryLimit::Bytes(bytes) => {
+            PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(args, config), folder)
+        }
         _ => PointRoom::default(),
     }
 }
 
-/// How many scans there may be at a time.
-fn scans_in_memory(args: &BuildArgs) -> usize {
-    if args.when_behind == WhenBehind::Wait { 1 } else { ScanQueue::MOST_SCANS + 1 }
+/// How many scans there may be at a time: those that are mapped, those that wait, and the one that is read.
+fn scans_in_memory(args: &BuildArgs, config: &MapConfig) -> usize {
+    let together = most_together(args, config);
+    match args.when_behind {
+        WhenBehind::Wait if together == 1 => 1,
+        WhenBehind::Wait => 2 * together + 1,
+        _ => together + ScanQueue::MOST_SCANS + 1,
+    }
+}
+
+/// How many scans are taken together if they are at hand: one for each core, as far as there is room for their points.
+fn most_together(args: &BuildArgs, config: &MapConfig) -> usize {
+    let room = match config.memory {
+        MemoryLimit::Bytes(bytes) => bytes / PARTS_OF_MEMORY / ROOM_TO_GO_TOGETHER,
+        _ => usize::MAX,
+    };
+    if args.no_rays { 1 } else { rayon::current_num_threads().min(room.saturating_sub(1) / 2).max(1) }
 }
 
 fn check(scan: Option<&StoredScan>, config: &MapConfig) -> crate::Result<()> {

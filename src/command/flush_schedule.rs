@@ -41,13 +41,23 @@ impl FlushSchedule {
         Self { every, scans: 0, since: Instant::now() }
     }
 
-    /// Asked after every scan: whether to flush now.
-    pub fn is_due(&mut self) -> bool {
-        self.scans += 1;
+    /// Asked after scans: whether to flush now.
+    pub fn is_due(&mut self, scans: usize) -> bool {
+        self.scans += scans as u64;
         match self.every {
             FlushEvery::Scans(scans) => self.scans >= scans,
             FlushEvery::Time(time) => self.since.elapsed() >= time,
             FlushEvery::End => false,
+        }
+    }
+
+    /// How many scans may come before it is asked again.
+    pub fn scans_until_due(&self) -> usize {
+        match self.every {
+            FlushEvery::Scans(scans) => {
+                usize::try_from(scans.saturating_sub(self.scans)).unwrap_or(usize::MAX)
+            }
+            FlushEvery::Time(_) | FlushEvery::End => usize::MAX,
         }
     }
 

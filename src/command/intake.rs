@@ -1,7 +1,7 @@
 use crate::Error;
 use crate::command::scan_queue::ScanQueue;
 use crate::command::scan_reader::{Read, ReadScan, ScanReader};
-use crate::io::{ScanChain, StoredScan};
+use crate::io::{ScanChain, ScanMark, StoredScan};
 use crate::store::InputContent;
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -17,6 +17,8 @@ pub struct Intake {
     scans: PathBuf,
     /// What was read to tell which input this is, and not taken yet.
     lead: VecDeque<Read>,
+    /// What came behind scans that were taken together, and is no scan.
+    behind: Option<crate::Result<Read>>,
     chain: ScanChain,
     begins_with: Option<String>,
     skipped: Vec<u64>,
@@ -27,18 +29,25 @@ pub struct Intake {
     pub left_out: u64,
 }
 
-/// What came of asking for a scan to map.
+/// What came of asking for scans to map.
 pub enum Next {
-    Scan(StoredScan),
+    Scans(Vec<Taken>),
     End,
     Stopped,
+}
+
+/// A scan, and what has been taken of the input with it.
+pub struct Taken {
+    pub scan: StoredScan,
+    pub content: InputContent,
 }
 
 impl Intake {
     pub fn new(reader: ScanReader, scans: PathBuf, skips_bad: bool) -> Self {
         let (lead, chain) = (VecDeque::new(), ScanChain::default());
         let (skipped, unread, left_out) = Default::default();
-        Self { reader, scans, lead, chain, begins_with: None, skipped, skips_bad, unread, left_out }
+        let (behind, begins_with) = (None, None);
+        Self { reader, scans, lead, behind, chain, begins_with, skipped, skips_bad, unread, left_out }
     }
 
     /// See [`ScanReader::read_ahead`].
@@ -168,23 +177,41 @@ impl Intake {
         Ok(true)
     }
 
-    /// The next scan, which counts as taken from now on. While it does not come, `idle` is called ten times a second.
-    pub fn next(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Next> {
-        loop {
+    /// The next scans, which count as taken from now on: one, and up to `most` if they are at hand. While none comes,
+    /// `idle` is called ten times a second.
+    pub fn next(&mut self, most: usize, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Next> {
+        let mut taken = loop {
             match self.read(idle)? {
                 Read::Stopped => return Ok(Next::Stopped),
                 Read::End => return Ok(Next::End),
-                Read::Scan(ReadScan { scan, mark }) => {
-                    self.chain.add(&mark);
-                    return Ok(Next::Scan(scan));
-                }
-                Read::LeftOut(mark) => {
-                    self.chain.add(&mark);
-                    self.left_out += 1;
-                }
+                Read::Scan(scan) => break vec![self.took(scan)],
+                Read::LeftOut(mark) => self.leave_out(&mark),
                 Read::Unread(error) => self.skip(error)?,
             }
+        };
+        while taken.len() < most
+            && let Some(read) = self.read_at_hand()
+        {
+            match read {
+                Ok(Read::Scan(scan)) => taken.push(self.took(scan)),
+                Ok(Read::LeftOut(mark)) => self.leave_out(&mark),
+                other => {
+                    self.behind = Some(other);
+                    break;
+                }
+            }
         }
+        Ok(Next::Scans(taken))
+    }
+
+    fn took(&mut self, ReadScan { scan, mark }: ReadScan) -> Taken {
+        self.chain.add(&mark);
+        Taken { scan, content: self.content() }
+    }
+
+    fn leave_out(&mut self, mark: &ScanMark) {
+        self.chain.add(mark);
+        self.left_out += 1;
     }
 
     fn skip(&mut self, error: Error) -> anyhow::Result<()> {
@@ -204,10 +231,19 @@ impl Intake {
     }
 
     fn read(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Read> {
-        match self.lead.pop_front() {
-            Some(read) => Ok(read),
+        match self.read_before() {
+            Some(read) => Ok(read?),
             None => self.reader.next(idle),
         }
+    }
+
+    fn read_at_hand(&mut self) -> Option<crate::Result<Read>> {
+        self.read_before().or_else(|| self.reader.next_at_hand())
+    }
+
+    /// What was read before and not taken.
+    fn read_before(&mut self) -> Option<crate::Result<Read>> {
+        self.behind.take().or_else(|| self.lead.pop_front().map(Ok))
     }
 
     fn wrong(&self, reason: String) -> anyhow::Error {

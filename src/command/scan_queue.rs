@@ -23,6 +23,9 @@ pub enum WhenBehind {
 pub struct ScanQueue {
     waiting: Mutex<Waiting>,
     came: Condvar,
+    /// There is room again, or nobody takes any more.
+    has_room: Condvar,
+    most_scans: usize,
     when_behind: WhenBehind,
 }
 
@@ -36,18 +39,26 @@ struct Waiting {
 }
 
 impl ScanQueue {
-    /// Most scans that wait.
+    /// Most scans that wait where the input does not.
     pub const MOST_SCANS: usize = 8;
 
-    pub fn new(when_behind: WhenBehind) -> Self {
-        Self { waiting: Mutex::default(), came: Condvar::new(), when_behind }
+    /// A queue in which at most so many scans wait.
+    pub fn new(when_behind: WhenBehind, most_scans: usize) -> Self {
+        let (came, has_room) = (Condvar::new(), Condvar::new());
+        Self { waiting: Mutex::default(), came, has_room, most_scans, when_behind }
     }
 
-    /// Puts in what was read; tells whether anybody will take it.
+    /// Puts in what was read, once there is room if the input is to wait; tells whether anybody will take it.
     pub fn push(&self, read: crate::Result<Read>) -> bool {
         let mut waiting = self.lock();
         match read {
-            Ok(Read::Scan(scan)) => waiting.push_scan(scan, self.when_behind),
+            Ok(Read::Scan(scan)) if self.when_behind == WhenBehind::Wait => {
+                let is_full = |waiting: &mut Waiting| waiting.scans >= self.most_scans && !waiting.is_closed;
+                waiting = self.has_room.wait_while(waiting, is_full).unwrap_or_else(PoisonError::into_inner);
+                waiting.scans += 1;
+                waiting.reads.push_back(Ok(Read::Scan(scan)));
+            }
+            Ok(Read::Scan(scan)) => waiting.push_scan(scan, self.when_behind, self.most_scans),
             other => waiting.reads.push_back(other),
         }
         self.came.notify_all();
@@ -61,12 +72,14 @@ impl ScanQueue {
         let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let read = waiting.reads.pop_front()?;
         waiting.scans -= usize::from(matches!(read, Ok(Read::Scan(_))));
+        self.has_room.notify_all();
         Some(read)
     }
 
     /// Says that nobody takes any more.
     pub fn close(&self) {
         self.lock().is_closed = true;
+        self.has_room.notify_all();
     }
 
     fn lock(&self) -> MutexGuard<'_, Waiting> {
@@ -75,14 +88,14 @@ impl ScanQueue {
 }
 
 impl Waiting {
-    fn push_scan(&mut self, scan: ReadScan, when_behind: WhenBehind) {
+    fn push_scan(&mut self, scan: ReadScan, when_behind: WhenBehind, most_scans: usize) {
         if when_behind == WhenBehind::Thin {
-            self.was_thinned = !self.was_thinned && 2 * self.scans > ScanQueue::MOST_SCANS;
+            self.was_thinned = !self.was_thinned && 2 * self.scans > most_scans;
             if self.was_thinned {
                 return self.reads.push_back(Ok(Read::LeftOut(scan.mark)));
             }
         }
-        if self.scans >= ScanQueue::MOST_SCANS
+        if self.scans >= most_scans
             && let Some(oldest) = self.reads.iter_mut().find(|read| matches!(read, Ok(Read::Scan(_))))
             && let Ok(Read::Scan(ReadScan { mark, .. })) = oldest
         {
@@ -104,6 +117,7 @@ mod tests {
     use super::*;
     use crate::io::{PointStore, ScanMark, StoredScan};
     use nalgebra::Isometry3;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn scan(number: usize) -> ReadScan {
         let mut points_in_sensor = PointStore::default();
@@ -118,7 +132,7 @@ mod tests {
 
     /// What comes out after so many scans: the numbers of those that are to be mapped, and how many were left out.
     fn after(scans: usize, when_behind: WhenBehind) -> (Vec<usize>, usize) {
-        let queue = ScanQueue::new(when_behind);
+        let queue = ScanQueue::new(when_behind, ScanQueue::MOST_SCANS);
         let marks: Vec<String> = (0..scans).map(|number| scan(number).mark.scan_text()).collect();
         assert!((0..scans).all(|number| queue.push(Ok(Read::Scan(scan(number))))));
         assert!(queue.push(Ok(Read::End)));
@@ -158,8 +172,32 @@ mod tests {
 
     #[test]
     fn a_queue_that_nobody_takes_from_says_so() {
-        let queue = ScanQueue::new(WhenBehind::DropOldest);
-        queue.close();
-        assert!(!queue.push(Ok(Read::Scan(scan(0)))));
+        for when_behind in [WhenBehind::Wait, WhenBehind::DropOldest, WhenBehind::Thin] {
+            let queue = ScanQueue::new(when_behind, 1);
+            assert!(queue.push(Ok(Read::Scan(scan(0)))));
+            queue.close();
+            assert!(!queue.push(Ok(Read::Scan(scan(1)))));
+        }
+    }
+
+    #[test]
+    fn an_input_that_is_to_wait_waits_for_room_and_no_longer_than_somebody_takes() {
+        let queue = ScanQueue::new(WhenBehind::Wait, 2);
+        let pushed = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            let input = scope.spawn(|| {
+                while queue.push(Ok(Read::Scan(scan(0)))) {
+                    pushed.fetch_add(1, Ordering::SeqCst);
+                }
+            });
+            for taken in 0..5 {
+                let read = queue.take(Duration::from_secs(60));
+                assert!(matches!(read, Some(Ok(Read::Scan(_)))));
+                assert!(pushed.load(Ordering::SeqCst) <= taken + 3);
+            }
+            queue.close();
+            input.join().unwrap();
+        });
+        assert!((5..=8).contains(&pushed.into_inner()));
     }
 }

@@ -14,8 +14,8 @@ use std::time::Duration;
 /// How long an input may keep us waiting before we look up.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Reads an input on a thread of its own, scan by scan and only when asked to: whoever asks can stop waiting, whatever
-/// the input does, and no scan lies about that was not asked for. Where the system gives no thread, it reads here.
+/// Reads an input on a thread of its own, scan by scan: whoever asks can stop waiting, whatever the input does. Scans are
+/// read when they are asked for, or a few of them ahead. Where the system gives no thread, it reads here.
 pub struct ScanReader {
     place: Place,
     stop: Stop,
@@ -97,10 +97,12 @@ impl ScanReader {
             let opened = Opened::of(&named, &*source);
             let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
             while is_wanted && let Ok(request) = requests_in.recv() {
-                is_wanted = match request {
+                match request {
                     Request::Ahead(queue) => read_ahead(&mut *source, &room, mark, &queue),
-                    request => answers_out.send(answer(&mut *source, &request, &room, mark)).is_ok(),
-                };
+                    request => {
+                        is_wanted = answers_out.send(answer(&mut *source, &request, &room, mark)).is_ok();
+                    }
+                }
             }
         };
         match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
@@ -124,8 +126,8 @@ impl ScanReader {
         }
     }
 
-    /// From here on scans are read as they come, and those that find no room are left out. Where there is no thread to
-    /// read, the input waits.
+    /// From here on scans are read as they come, before anybody asks for them. Where there is no thread to read, they are
+    /// not.
     pub fn read_ahead(&mut self, queue: ScanQueue) {
         if let Place::Thread { requests, .. } = &self.place {
             let queue = Arc::new(queue);
@@ -146,6 +148,11 @@ impl ScanReader {
         }
     }
 
+    /// The next scan if it has been read already.
+    pub fn next_at_hand(&mut self) -> Option<crate::Result<Read>> {
+        self.ahead.as_ref().and_then(|queue| queue.take(Duration::ZERO))
+    }
+
     /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<crate::Result<String>>> {
         match self.ask(Request::Fingerprint, &mut || Ok(()))? {
@@ -154,9 +161,16 @@ impl ScanReader {
         }
     }
 
-    /// What a person should know of the input so far.
+    /// What a person should know of the input, of which no more is wanted. An input that is being waited for tells
+    /// nothing.
     pub fn remarks(&mut self) -> anyhow::Result<Vec<String>> {
-        match self.ask(Request::Remarks, &mut || Ok(()))? {
+        let is_ahead = self.ahead.as_ref().map(|queue| queue.close()).is_some();
+        let mut patience = 10;
+        let mut impatient = || {
+            patience -= 1;
+            if is_ahead && patience == 0 { Err(Error::Stopped) } else { Ok(()) }
+        };
+        match self.ask(Request::Remarks, &mut impatient)? {
             Some(Answer::Remarks(remarks)) => Ok(remarks),
             _ => Ok(Vec::new()),
         }
@@ -224,14 +238,13 @@ fn take(queue: &ScanQueue, stop: &Stop, idle: &mut dyn FnMut() -> crate::Result<
     Ok(Read::Stopped)
 }
 
-/// Reads an input to its end; tells whether anybody wants more of it.
-fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queue: &ScanQueue) -> bool {
+/// Reads an input to its end, or until nobody wants more of it.
+fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queue: &ScanQueue) {
     loop {
         let read = read(source, room, mark);
         let is_last = is_last(&read);
-        let is_wanted = queue.push(read);
-        if is_last || !is_wanted {
-            return is_wanted;
+        if !queue.push(read) || is_last {
+            return;
         }
     }
 }
