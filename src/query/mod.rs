@@ -25,6 +25,7 @@ mod hit;
 mod map_queries;
 mod merged;
 mod nearest;
+mod nearest_in_brick;
 mod occupancies;
 mod occupancy;
 pub(crate) mod occupied_set;

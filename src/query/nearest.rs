@@ -1,3 +1,4 @@
+use super::nearest_in_brick::Nearest;
 use super::region::{BrickPart, tiles_in, voxels_around};
 use super::{Hit, Occupancy};
 use crate::error::{Error, Result};
@@ -45,18 +46,21 @@ fn nearest_in_ball<V: MapView + ?Sized>(view: &V, point: Point, max_distance_m: 
         .map(|index| (distance_to_voxels_m(&grid, &grid.voxels_of_tile(index), point), index))
         .collect();
     tiles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut best: Option<Hit> = None;
+    let mut nearest = Nearest::new(grid, point, threshold, max_distance_m);
+    let mut nearest_first: Vec<(f64, BrickPart)> = Vec::new();
     for (distance_m, index) in tiles {
-        let limit_m = best.map_or(max_distance_m, |best| best.distance_m);
-        if distance_m > limit_m {
+        if distance_m > nearest.limit_m() {
             break;
         }
         let Some(tile) = view.tile(index)? else { continue };
-        let around = voxels_around(&grid, &ball(limit_m)).intersection(&tile.voxel_box());
-        let mut nearest_first: Vec<(f64, BrickPart)> = Vec::new();
+        let around = voxels_around(&grid, &ball(nearest.limit_m())).intersection(&tile.voxel_box());
+        nearest_first.clear();
         let mut note = |brick: BrickPart| {
+            if brick.voxels.intersection(&around).is_empty() {
+                return;
+            }
             let distance_m = distance_to_voxels_m(&grid, &brick.voxels, point);
-            if distance_m <= limit_m && brick.may_hold(&tile, threshold) {
+            if distance_m <= nearest.limit_m() && brick.may_hold(&tile, threshold) {
                 nearest_first.push((distance_m, brick));
             }
         };
@@ -64,23 +68,19 @@ fn nearest_in_ball<V: MapView + ?Sized>(view: &V, point: Point, max_distance_m: 
         if !tile.table().visit_marked(&around, threshold, |lowest| note(BrickPart::whole(lowest))) {
             bricks_around(&tile, &around).for_each(note);
         }
-        nearest_first.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (distance_m, brick) in nearest_first {
-            let limit_m = best.map_or(max_distance_m, |best| best.distance_m);
-            if distance_m > limit_m {
+        nearest_first.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        for (distance_m, brick) in &nearest_first {
+            if *distance_m > nearest.limit_m() {
                 break;
             }
-            for voxel in brick.voxels_from(&tile, threshold) {
-                let hit = Hit::from(&grid, point, voxel.index, None);
-                if hit.distance_m <= max_distance_m && hit.is_nearer_than(best.as_ref()) {
-                    // The probability of one that is not the nearest is never looked at, and costs little here.
-                    let probability = Occupancy::of(config, Some(voxel.evidence)).probability();
-                    best = Some(Hit { probability, ..hit });
-                }
-            }
+            nearest.look_at(&tile, brick);
         }
     }
-    Ok(best)
+    let found = nearest.into_best();
+    Ok(found.map(|(hit, evidence)| Hit {
+        probability: Occupancy::of(config, Some(evidence)).probability(),
+        ..hit
+    }))
 }
 
 /// Bricks of a tile that may have voxels in a box, as wholes, in no particular order.

@@ -163,7 +163,7 @@ impl BrickPart {
         found.map(|(code, evidence)| Voxel { index: tile.index_of(code), evidence })
     }
 
-    fn look<'a>(&self, tile: &'a Tile) -> Option<BrickLook<'a>> {
+    pub(super) fn look<'a>(&self, tile: &'a Tile) -> Option<BrickLook<'a>> {
         let table = tile.table();
         table.number_of_brick(self.code).and_then(|number| table.numbered(number))
     }

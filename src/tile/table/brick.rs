@@ -83,19 +83,18 @@ impl Brick {
 
     /// The observed voxels whose log-odds are at least a threshold.
     pub(crate) fn mask_from(&self, threshold: f64, palette: &Palette) -> BrickMask {
-        let mut mask = [0; 8];
-        for (word, bits) in mask.iter_mut().enumerate() {
-            let from_threshold = match &self.evidence {
-                Storage::Interned(cells) => {
-                    cells.cell(word).map(|cell| bits_of(cell, |state| palette.evidence(state), threshold))
-                }
-                Storage::Plain(cells) => {
-                    cells.cell(word).map(|cell| bits_of(cell, Evidence::from, threshold))
-                }
-            };
-            *bits = from_threshold.unwrap_or(0) & self.observed[word];
-        }
-        mask
+        std::array::from_fn(|word| self.word_from(word, threshold, palette))
+    }
+
+    /// One word of [`Brick::mask_from`].
+    pub(crate) fn word_from(&self, word: usize, threshold: f64, palette: &Palette) -> u64 {
+        let from_threshold = match &self.evidence {
+            Storage::Interned(cells) => {
+                cells.cell(word).map(|cell| bits_of(cell, |state| palette.evidence(state), threshold))
+            }
+            Storage::Plain(cells) => cells.cell(word).map(|cell| bits_of(cell, Evidence::from, threshold)),
+        };
+        from_threshold.unwrap_or(0) & self.observed[word]
     }
 
     /// Makes the brick hold its evidence itself, without the palette.

@@ -28,6 +28,11 @@ impl BrickLook<'_> {
         self.brick.mask_from(log_odds, self.palette)
     }
 
+    /// One word of [`BrickLook::mask_from`]: an octant of the brick.
+    pub(crate) fn word_from(&self, word: usize, log_odds: f64) -> u64 {
+        self.brick.word_from(word, log_odds, self.palette)
+    }
+
     /// Whether no voxel is known to have log-odds of a threshold or more.
     #[inline]
     pub(crate) fn is_below(&self, log_odds: f64) -> bool {

@@ -28,6 +28,8 @@ const POINTS: usize = 1_000_000;
 const NEAREST: usize = 20_000;
 /// How far from a sensor points, nearest voxels and bodies are asked for, in metres.
 const AROUND_M: f64 = 20.0;
+/// What is near a place, in metres.
+const NEAR_M: f64 = 1.0;
 
 fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -85,6 +87,12 @@ fn main() -> Result<()> {
     let places = near(NEAREST);
     note(&mut answers, "nearest_within_10_m", NEAREST, || {
         places.iter().map(|&place| Ok(u64::from(map.nearest_occupied(place, 10.0)?.is_some()))).sum()
+    })?;
+    let beside = |place: &Point| -> Result<bool> { Ok(map.nearest_occupied(*place, NEAR_M)?.is_some()) };
+    let places_beside: Vec<Point> =
+        places.iter().copied().filter(|place| beside(place).unwrap_or(false)).collect();
+    note(&mut answers, "nearest_where_one_is_near", places_beside.len(), || {
+        places_beside.iter().map(|&place| Ok(u64::from(map.nearest_occupied(place, 10.0)?.is_some()))).sum()
     })?;
     note(&mut answers, "collision_of_a_sphere", NEAREST, || {
         let body = |center| Shape::Sphere { center, radius_m: 0.5 };

@@ -1,0 +1,109 @@
+use super::Hit;
+use super::region::BrickPart;
+use crate::sensor::Evidence;
+use crate::space::{BRICK_EDGE, Grid, Point, VoxelIndex};
+use crate::tile::Tile;
+
+/// The nearest voxel to a point among those that were looked at.
+pub(super) struct Nearest {
+    grid: Grid,
+    point: Point,
+    /// Voxels are looked for whose log-odds are at least these.
+    threshold: f64,
+    /// How far away it may be.
+    limit_m: f64,
+    best: Option<(Hit, Evidence)>,
+}
+
+/// Voxels along an edge of an octant: a word of a brick's mask.
+const OCTANT_EDGE: usize = BRICK_EDGE as usize / 2;
+
+/// The coordinates of a bit in an octant's word.
+const OCTANT_VOXELS: [[u8; 3]; 64] = {
+    let mut voxels = [[0; 3]; 64];
+    let mut bit = 0;
+    while bit < 64 {
+        let mut axis = 0;
+        while axis < 3 {
+            voxels[bit][axis] = (bit >> axis & 1 | (bit >> (axis + 3) & 1) << 1) as u8;
+            axis += 1;
+        }
+        bit += 1;
+    }
+    voxels
+};
+
+impl Nearest {
+    pub(super) fn new(grid: Grid, point: Point, threshold: f64, max_distance_m: f64) -> Self {
+        Self { grid, point, threshold, limit_m: max_distance_m, best: None }
+    }
+
+    /// From what distance on voxels need not be looked at.
+    pub(super) fn limit_m(&self) -> f64 {
+        self.limit_m
+    }
+
+    pub(super) fn into_best(self) -> Option<(Hit, Evidence)> {
+        self.best
+    }
+
+    /// Looks at the voxels of a brick, the octant next to the point first.
+    pub(super) fn look_at(&mut self, tile: &Tile, brick: &BrickPart) {
+        let Some(look) = brick.look(tile) else { return };
+        let lowest = brick.voxels.min;
+        let squares = self.squared_distances(lowest);
+        let next_to_point = (0..3).fold(0, |octant, axis| {
+            let [low, high] = [OCTANT_EDGE - 1, OCTANT_EDGE].map(|k| squares[axis][k]);
+            octant | usize::from(high < low) << axis
+        });
+        // Those that share a face with it, then an edge, then a corner.
+        for away in [0, 1, 2, 4, 3, 5, 6, 7] {
+            let octant: usize = next_to_point ^ away;
+            let first: [usize; 3] = std::array::from_fn(|axis| (octant >> axis & 1) * OCTANT_EDGE);
+            let of_axis = |axis: usize| &squares[axis][first[axis]..first[axis] + OCTANT_EDGE];
+            let least = |axis| of_axis(axis).iter().copied().fold(f64::INFINITY, f64::min);
+            if self.is_too_far(least(0) + least(1) + least(2)) {
+                continue;
+            }
+            let mut bits = look.word_from(octant, self.threshold);
+            while bits != 0 {
+                let bit = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let [x, y, z] = OCTANT_VOXELS[bit].map(usize::from);
+                if !self.is_too_far(of_axis(0)[x] + of_axis(1)[y] + of_axis(2)[z]) {
+                    let steps = [first[0] + x, first[1] + y, first[2] + z];
+                    let voxel = std::array::from_fn(|axis| lowest[axis].saturating_add(steps[axis] as i32));
+                    self.compare(voxel, || look.get(octant * 64 + bit));
+                }
+            }
+        }
+    }
+
+    /// The squared distances along each axis to the centers of a brick's voxels.
+    fn squared_distances(&self, lowest: VoxelIndex) -> [[f64; BRICK_EDGE as usize]; 3] {
+        let mut squares = [[0.0; BRICK_EDGE as usize]; 3];
+        for step in 0..BRICK_EDGE {
+            let center_m = self.grid.center_m(lowest.map(|k| k.saturating_add(step)));
+            for axis in 0..3 {
+                squares[axis][step as usize] = (center_m[axis] - self.point[axis]).powi(2);
+            }
+        }
+        squares
+    }
+
+    /// Whether a sum of squares is surely beyond what was found; a margin for the rounding of sums and roots.
+    fn is_too_far(&self, distance_squared: f64) -> bool {
+        distance_squared > self.limit_m * self.limit_m * (1.0 + 1e-12)
+    }
+
+    fn compare(&mut self, voxel: VoxelIndex, evidence: impl FnOnce() -> Option<Evidence>) {
+        let hit = Hit::from(&self.grid, self.point, voxel, None);
+        if hit.distance_m <= self.limit_m
+            && hit.is_nearer_than(self.best.as_ref().map(|(hit, _)| hit))
+            && let Some(evidence) = evidence()
+        {
+            self.limit_m = hit.distance_m;
+            self.best = Some((hit, evidence));
+        }
+    }
+}
