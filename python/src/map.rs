@@ -1,29 +1,33 @@
 //! `voxtile.Map`: an open map.
 
-use crate::arrays::{PointSlice, Points, column, doubles, object, rows, singles};
+use crate::arrays::{PointSlice, Points, column, doubles, object, rows};
 use crate::config::{ConfigArguments, bytes_of, config_of};
 use crate::errors::{exception, exception_of_kind, wrong};
 use crate::questions::{self, bodies_of};
 use crate::report::InsertReport;
-use crate::scan::Frame;
+use crate::scan::GivenScan;
+use crate::scan_iterator::ScanIterator;
 use crate::source::Source;
 use crate::tile_iterator::TileIterator;
 use crate::watched::{at_once, finished, watched};
 use numpy::{Element, PyArray1, PyArray2};
 use parking_lot::RwLock;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList, PyTuple};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use voxtile::mapper::{MapReader, MapView, Mapper, OctreeMap};
 use voxtile::sensor::Evidence;
 use voxtile::{
-    Aabb, MapConfig, MapOptions, MapQueries, OutOfCoreTileMapper, RayQuery, Result, ScanReport, SnapshotName,
-    Stop, TileIndex, UnknownAs,
+    Aabb, MapConfig, MapOptions, MapQueries, OutOfCoreTileMapper, RayQuery, Result, ScanPoints, ScanRef,
+    ScanReport, SnapshotName, Stop, TileIndex, UnknownAs,
 };
 
 /// Questions and points that take less time than anybody waits for Ctrl-C. They are worth no thread of their own.
 const FEW: usize = 128;
+
+/// Most scans of a list that are handed to the mapper together.
+const TOGETHER: usize = 32;
 
 /// A map: what is occupied, free and unknown.
 ///
@@ -79,6 +83,22 @@ impl Map {
         let work = |stop: &Stop| source.change(stop, change);
         let changed = if short { at_once(py, work)? } else { watched(py, work)? };
         changed.ok_or_else(|| closed(py, &self.path))
+    }
+
+    /// Adds scans up to the first that is wrong.
+    fn insert_together(&self, py: Python<'_>, given: &[GivenScan<'_>]) -> PyResult<InsertReport> {
+        let mut scans: Vec<ScanRef<'_>> = Vec::with_capacity(given.len());
+        let outcome = given.iter().try_for_each(|given| given.scan(py).map(|scan| scans.push(scan)));
+        let scans: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
+        let is_short = scans.iter().map(|scan| scan.len()).sum::<usize>() <= FEW;
+        let reports = self.change(py, is_short, |mapper| {
+            let mut reports = Vec::with_capacity(scans.len());
+            mapper.insert_all(&scans, &mut reports).map(|()| reports)
+        })?;
+        outcome?;
+        let mut all = InsertReport::from(ScanReport::default());
+        reports.into_iter().for_each(|report| all.add(&report.into()));
+        Ok(all)
     }
 
     /// Changes the map in a way that cannot be given up once it has begun.
@@ -255,53 +275,55 @@ impl Map {
     /// quaternion) points are in the sensor's frame, with `origin` in the world's. Points that are NaN or masked are
     /// skipped and counted. After an error the map is as it was.
     #[pyo3(signature = (points, pose=None, *, origin=None, intensities=None))]
-    fn insert(
+    fn insert<'py>(
         &self,
-        py: Python<'_>,
-        points: &Bound<'_, PyAny>,
-        pose: Option<&Bound<'_, PyAny>>,
-        origin: Option<&Bound<'_, PyAny>>,
-        intensities: Option<&Bound<'_, PyAny>>,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        pose: Option<&Bound<'py, PyAny>>,
+        origin: Option<&Bound<'py, PyAny>>,
+        intensities: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<InsertReport> {
-        let points = Points::of("points", points)?;
-        let frame = Frame::of(py, pose, origin)?;
-        let intensities = intensities.map(|intensities| singles("intensities", intensities)).transpose()?;
-        let intensities = intensities.as_ref().map(|intensities| intensities.as_slice()).transpose()?;
-        let points = points.slice()?;
-        let scan = frame.scan(points);
-        let scan = match intensities {
-            Some(intensities) => scan.with_intensities(intensities).map_err(|error| exception(py, &error))?,
-            None => scan,
-        };
-        let report = self.change(py, points.len() <= FEW, |mapper| mapper.insert_points(&scan))?;
+        let given = GivenScan::of(points, pose, origin, intensities)?;
+        let scan = given.scan(py)?;
+        let report = self.change(py, scan.len() <= FEW, |mapper| mapper.insert_points(&scan))?;
         Ok(report.into())
     }
 
     /// Adds scans from an iterable of `(points, pose)` or `(points, pose, intensities)`; returns one report of all.
     ///
-    /// After an error the scans before it are in the map.
-    fn insert_many(&self, py: Python<'_>, scans: &Bound<'_, PyAny>) -> PyResult<InsertReport> {
+    /// Scans of a list, of a tuple or of `voxtile.scans` go to the cores one each, which is faster than one after the
+    /// other, and the map is the same. After an error the scans before it are in the map.
+    fn insert_many<'py>(&self, py: Python<'py>, scans: &Bound<'py, PyAny>) -> PyResult<InsertReport> {
+        // What else is iterated may use the memory of a scan for the next one.
+        let has_memory_of_its_own = scans.is_instance_of::<PyList>()
+            || scans.is_instance_of::<PyTuple>()
+            || scans.is_instance_of::<ScanIterator>();
+        let most = if has_memory_of_its_own { TOGETHER } else { 1 };
         let mut all = InsertReport::from(ScanReport::default());
-        for scan in scans.try_iter()? {
-            let scan = scan?;
-            let (points, pose, intensities) = match scan.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>() {
-                Ok((points, pose)) => (points, pose, None),
-                Err(_) => {
-                    let (points, pose, intensities): (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>) =
-                        scan.extract().map_err(|_| {
-                            wrong(
-                                py,
-                                "scans",
-                                "must be pairs of points and pose, or triples with intensities",
-                            )
-                        })?;
-                    (points, pose, Some(intensities).filter(|intensities| !intensities.is_none()))
+        let mut scans = scans.try_iter()?;
+        loop {
+            let mut given = Vec::new();
+            let mut outcome = Ok(());
+            while given.len() < most
+                && let Some(scan) = scans.next()
+            {
+                match scan.and_then(|scan| GivenScan::of_tuple(&scan)) {
+                    Ok(scan) => given.push(scan),
+                    Err(error) => {
+                        outcome = Err(error);
+                        break;
+                    }
                 }
-            };
-            all.add(&self.insert(py, &points, Some(&pose), None, intensities.as_ref())?);
+            }
+            if !given.is_empty() {
+                all.add(&self.insert_together(py, &given)?);
+            }
+            outcome?;
+            if given.len() < most {
+                return Ok(all);
+            }
             py.check_signals()?;
         }
-        Ok(all)
     }
 
     /// Makes everything so far durable, as a whole. Nothing to do for a map that is read.

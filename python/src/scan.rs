@@ -1,8 +1,9 @@
 //! A scan of arrays, as the library takes it.
 
-use crate::arrays::PointSlice;
-use crate::errors::wrong;
+use crate::arrays::{PointSlice, Points, singles};
+use crate::errors::{exception, wrong};
 use crate::pose::{point_of, pose_of};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use voxtile::{Point, Pose, ScanRef};
 
@@ -38,6 +39,55 @@ impl Frame {
             (Self::Sensor(pose), PointSlice::F64(points)) => ScanRef::in_sensor(*pose, points),
             (Self::World(origin), PointSlice::F32(points)) => ScanRef::in_world(*origin, points),
             (Self::World(origin), PointSlice::F64(points)) => ScanRef::in_world(*origin, points),
+        }
+    }
+}
+
+/// A scan as a caller gives it.
+pub struct GivenScan<'py> {
+    points: Points<'py>,
+    frame: Frame,
+    intensities: Option<PyReadonlyArray1<'py, f32>>,
+}
+
+impl<'py> GivenScan<'py> {
+    /// From arguments: points, one of pose and origin, and perhaps intensities.
+    pub fn of(
+        points: &Bound<'py, PyAny>,
+        pose: Option<&Bound<'py, PyAny>>,
+        origin: Option<&Bound<'py, PyAny>>,
+        intensities: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let frame = Frame::of(points.py(), pose, origin)?;
+        let intensities = intensities.map(|intensities| singles("intensities", intensities)).transpose()?;
+        Ok(Self { points: Points::of("points", points)?, frame, intensities })
+    }
+
+    /// From a pair of points and pose, or a triple with intensities.
+    pub fn of_tuple(scan: &Bound<'py, PyAny>) -> PyResult<Self> {
+        type Pair<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+        type Triple<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+        let (points, pose, intensities) = match scan.extract::<Pair<'py>>() {
+            Ok((points, pose)) => (points, pose, None),
+            Err(_) => {
+                let (points, pose, intensities): Triple<'py> = scan.extract().map_err(|_| {
+                    let reason = "must be pairs of points and pose, or triples with intensities";
+                    wrong(scan.py(), "scans", reason)
+                })?;
+                (points, pose, Some(intensities).filter(|intensities| !intensities.is_none()))
+            }
+        };
+        Self::of(&points, Some(&pose), None, intensities.as_ref())
+    }
+
+    /// The scan, borrowed.
+    pub fn scan(&self, py: Python<'_>) -> PyResult<ScanRef<'_>> {
+        let scan = self.frame.scan(self.points.slice()?);
+        match &self.intensities {
+            None => Ok(scan),
+            Some(intensities) => {
+                scan.with_intensities(intensities.as_slice()?).map_err(|error| exception(py, &error))
+            }
         }
     }
 }
