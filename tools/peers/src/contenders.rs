@@ -30,13 +30,16 @@ pub enum Counting {
     Iwlo,
 }
 
-/// What a build of voxtile does beside inserting scans.
+/// How a build of voxtile takes the scans.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Besides {
-    Nothing,
+pub enum Way {
+    /// One by one.
+    OneByOne,
+    /// Handed in together.
+    Together,
     /// Octrees up to date after every scan.
     Sync,
-    /// Out of core, and a flush in the end.
+    /// Handed in together, out of core, and a flush in the end.
     Flush,
 }
 
@@ -71,14 +74,15 @@ impl Contenders {
     }
 
     /// Times a build of voxtile.
-    pub fn build(&self, job: &Job<'_>, threads: u32, besides: Besides) -> Result<BuildOutcome> {
+    pub fn build(&self, job: &Job<'_>, threads: u32, way: Way) -> Result<BuildOutcome> {
         let mut command = self.voxtile_command("build", job);
         command.env("RAYON_NUM_THREADS", threads.to_string());
         command.arg("--least-seconds").arg(self.least_seconds.to_string());
-        match besides {
-            Besides::Nothing => {}
-            Besides::Sync => drop(command.arg("--sync")),
-            Besides::Flush => drop(command.arg("--folder").arg(&job.files.folder)),
+        match way {
+            Way::OneByOne => {}
+            Way::Together => drop(command.arg("--together")),
+            Way::Sync => drop(command.arg("--sync")),
+            Way::Flush => drop(command.arg("--together").arg("--folder").arg(&job.files.folder)),
         }
         outcome(command)
     }

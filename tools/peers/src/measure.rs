@@ -1,4 +1,4 @@
-use crate::contenders::{Besides, Contenders, Counting, Job};
+use crate::contenders::{Contenders, Counting, Job, Way};
 use crate::table::{Pairs, Row, Target};
 use crate::workloads::{Files, Workload};
 use anyhow::{Context, Result};
@@ -12,6 +12,7 @@ struct Samples {
     one_thread: Pairs,
     native: Pairs,
     two_threads: Pairs,
+    together: Pairs,
     synced: Pairs,
     flushed: Pairs,
     iwlo: Pairs,
@@ -54,10 +55,11 @@ impl Samples {
     /// One run of everything.
     fn add(&mut self, contenders: &Contenders, job: &Job<'_>) -> Result<()> {
         let octomap = contenders.octomap(&contenders.octomap, job, true)?;
-        let one = contenders.build(job, 1, Besides::Nothing)?;
-        let two = contenders.build(job, 2, Besides::Nothing)?;
-        let synced = contenders.build(job, 2, Besides::Sync)?;
-        let flushed = contenders.build(job, 2, Besides::Flush)?;
+        let one = contenders.build(job, 1, Way::OneByOne)?;
+        let two = contenders.build(job, 2, Way::OneByOne)?;
+        let together = contenders.build(job, 2, Way::Together)?;
+        let synced = contenders.build(job, 2, Way::Sync)?;
+        let flushed = contenders.build(job, 2, Way::Flush)?;
         let memory = contenders.memory(job)?;
         let questions = contenders.questions(job)?;
         let asked = octomap.questions.context("OctoMap's contender asked no questions")?;
@@ -67,10 +69,11 @@ impl Samples {
         let a_scan = |seconds: f64| seconds / scans;
         self.one_thread.push(a_scan(octomap.cpu_s), a_scan(one.cpu_s));
         self.two_threads.push(a_scan(octomap.wall_s), a_scan(two.wall_s));
+        self.together.push(a_scan(octomap.wall_s), a_scan(together.wall_s));
         self.synced.push(a_scan(octomap.wall_s), a_scan(synced.wall_s));
         self.flushed.push(a_scan(octomap.wall_s + write_s), a_scan(flushed.wall_s));
         if job.files.intensities.is_some() {
-            let iwlo = contenders.build(&Job { counting: Counting::Iwlo, ..*job }, 1, Besides::Nothing)?;
+            let iwlo = contenders.build(&Job { counting: Counting::Iwlo, ..*job }, 1, Way::OneByOne)?;
             self.iwlo.push(a_scan(octomap.cpu_s), a_scan(iwlo.cpu_s));
         }
         if let Some(program) = &contenders.octomap_native {
@@ -79,7 +82,7 @@ impl Samples {
         }
         let rays = Job { scans: job.workload.ray_scans, counting: Counting::PerRay, ..*job };
         let octomap_rays = contenders.octomap(&contenders.octomap, &rays, false)?;
-        let voxtile_rays = contenders.build(&rays, 1, Besides::Nothing)?;
+        let voxtile_rays = contenders.build(&rays, 1, Way::OneByOne)?;
         let ray_scans = octomap_rays.scans as f64;
         self.per_ray.push(octomap_rays.cpu_s / ray_scans, voxtile_rays.cpu_s / ray_scans);
 
@@ -105,6 +108,7 @@ impl Samples {
             ("insert, CPU of 1 thread", &self.one_thread, targets.one_thread),
             ("the same, OctoMap -O3 -march=native", &self.native, None),
             ("insert, wall, 2 threads", &self.two_threads, targets.two_threads),
+            ("insert, scans together, wall, 2 threads", &self.together, None),
             ("insert, octrees up to date after every scan, wall, 2 threads", &self.synced, targets.synced),
             ("scans to flushed files, wall, 2 threads", &self.flushed, targets.flushed),
             ("insert every ray, CPU of 1 thread", &self.per_ray, targets.per_ray),

@@ -152,15 +152,12 @@ fn build(arguments: &BuildArguments) -> Result<()> {
     while builds == 0 || wall.as_secs_f64() < arguments.least_seconds {
         let stopwatch = Stopwatch::start()?;
         let took = if let Some(folder) = &arguments.folder {
-            let folder = folder.join(format!("map_{builds}"));
+            let folder = folder.join(format!("map_{}_{builds}", std::process::id()));
             let mut mapper = OutOfCoreTileMapper::create(&folder, config.clone())?;
             insert(&mut mapper, &scans, arguments.together)?;
             mapper.flush()?;
-            let took = stopwatch.stop()?;
-            drop(mapper);
-            fs::remove_dir_all(&folder)
-                .with_context(|| format!("{}: cannot remove the map", folder.display()))?;
-            took
+            // The map stays: a file system may take its time for files soon after others were removed.
+            stopwatch.stop()?
         } else {
             let mut mapper = InMemoryMapper::new(config.clone())?;
             if arguments.sync {
