@@ -9,6 +9,12 @@ const PLACES: [&[u8]; 3] = [&[0], &[7, 14, 4], &[1, 2, 3, 5, 6, 8, 9, 10, 11, 12
 /// The edges of the squares of cones by which prefixes are extended before each pass.
 const SQUARES: [&[usize]; 3] = [&[], &[8, 4, 2], &[4, 2, 1]];
 
+/// The same for fewer than [`MANY_POINTS`]: examining the smallest squares costs more than such rays have in common.
+const SQUARES_OF_FEW: [&[usize]; 3] = [&[], &[8, 4], &[4, 2]];
+
+/// About three rays for each of the smallest squares.
+const MANY_POINTS: usize = 1 << 14;
+
 /// With fewer points, rays have too little in common.
 const MIN_POINTS: usize = 2048;
 
@@ -27,8 +33,9 @@ pub(crate) fn sampling_passes(points: Range<usize>) -> Vec<SamplingPass> {
     if points.len() < MIN_POINTS {
         return single_pass(points);
     }
+    let squares = if points.len() < MANY_POINTS { &SQUARES_OF_FEW } else { &SQUARES };
     let pass = |(&places, &squares)| SamplingPass { all: points.clone(), stride: STRIDE, places, squares };
-    PLACES.iter().zip(&SQUARES).map(pass).collect()
+    PLACES.iter().zip(squares).map(pass).collect()
 }
 
 /// One pass with all points, in order.

@@ -1,22 +1,24 @@
 use super::footprint::Footprint;
-use super::sparse_page::{BrickContent, SparsePage, part_of_place};
-use super::window::{Local, PAGE_EDGE};
+use super::sparse_page::{BrickContent, PAGE_BRICKS, SparsePage, brick_in_page, part_of_place};
+use super::window::Local;
 use crate::scan::ray::Stretch;
-use crate::space::{BRICK_VOXELS, BrickMask, VoxelIndex};
+use crate::space::{BRICK_VOXELS, BrickMask, VoxelIndex, places};
 
 /// The voxels of a page that the rays of a scan pass or end in.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MarkedPage {
     passed: Marks,
-    /// Few pages have hits: those beside ground and walls.
-    hits: Option<Marks>,
+    /// Few bricks have hits: those beside ground and walls.
+    hits: Option<Box<SparsePage<BrickMask>>>,
+    /// The bricks with marks, by place, once [`MarkedPage::find_bricks`] has looked; no mark is added after that.
+    found: Option<BrickMask>,
 }
 
 /// Marked voxels of a page.
 #[derive(Clone, Debug)]
 enum Marks {
     /// Fast.
-    Columns(Columns),
+    Words(Words),
     /// Small, for when memory is short.
     Bricks(Box<SparsePage<BrickMask>>),
 }
@@ -32,64 +34,43 @@ pub(crate) struct MarkedBrick {
     pub(crate) passed: BrickMask,
 }
 
-/// One word per column of 64 voxels along z, columns in the order of x and then y. Marking a voxel is one operation on
-/// one word, found without a table.
+/// A bit for each voxel of the page, in Morton order, so that eight words are the mask of a brick. Marking a voxel is
+/// one operation on one word, and its brick needs no look-up.
 #[derive(Clone, Debug)]
-struct Columns(Box<[u64; COLUMNS]>);
+struct Words(Box<[u64; WORDS]>);
 
-const COLUMNS: usize = (PAGE_EDGE * PAGE_EDGE) as usize;
+/// Words of a page.
+pub(crate) const WORDS: usize = PAGE_BRICKS * BRICK_VOXELS / 64;
 
-impl Default for Columns {
+impl Default for Words {
     fn default() -> Self {
-        Self(vec![0; COLUMNS].try_into().expect("as many columns"))
+        Self(vec![0; WORDS].try_into().expect("as many words"))
     }
 }
 
-impl Columns {
+impl Words {
     #[inline]
-    fn mark(&mut self, x: u32, y: u32, z: u32) {
-        self.0[((x & 63) << 6 | y & 63) as usize] |= 1 << (z & 63);
+    fn mark(&mut self, place: u32) {
+        self.0[place as usize / 64 % WORDS] |= 1 << (place % 64);
+    }
+
+    /// The mask of each brick, in Morton order.
+    fn bricks(&self) -> &[BrickMask] {
+        self.0.as_chunks().0
+    }
+
+    fn bricks_mut(&mut self) -> &mut [BrickMask] {
+        self.0.as_chunks_mut().0
     }
 
     fn absorb(&mut self, other: &Self) {
-        self.0.iter_mut().zip(other.0.iter()).for_each(|(column, other)| *column |= other);
-    }
-
-    /// The union of the columns through the bricks at `(x, y)`, in bricks: byte `k` is not 0 if brick `k` has marks.
-    fn union(&self, x: usize, y: usize) -> u64 {
-        let row = |x: usize| self.0[64 * x + 8 * y..][..8].iter().fold(0, |union, column| union | column);
-        (8 * x..8 * x + 8).fold(0, |union, x| union | row(x))
-    }
-
-    /// The mask of one brick in Morton order.
-    fn brick(&self, x: usize, y: usize, z: usize) -> BrickMask {
-        /// For each value of four bits of a column, where these bits are in a word of a mask.
-        const SPREAD: [u64; 16] = spread();
-        let mut mask = [0; 8];
-        for dx in 0..8 {
-            for dy in 0..8 {
-                let bits = (self.0[64 * (8 * x + dx) + 8 * y + dy] >> (8 * z)) as usize & 0xff;
-                let word = dx >> 2 | (dy >> 2) << 1;
-                let shift = (dx & 1) | (dy & 1) << 1 | (dx >> 1 & 1) << 3 | (dy >> 1 & 1) << 4;
-                mask[word] |= SPREAD[bits & 15] << shift;
-                mask[word | 4] |= SPREAD[bits >> 4] << shift;
-            }
-        }
-        mask
+        self.0.iter_mut().zip(other.0.iter()).for_each(|(word, other)| *word |= other);
     }
 }
 
-const fn spread() -> [u64; 16] {
-    let mut spread = [0; 16];
-    let mut bits = 0;
-    while bits < 16 {
-        let [b0, b1, b2, b3] = [bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3 & 1];
-        // Bit 2 of a place is bit 0 of z, bit 5 is bit 1.
-        spread[bits] = b0 as u64 | (b1 as u64) << 4 | (b2 as u64) << 32 | (b3 as u64) << 36;
-        bits += 1;
-    }
-    spread
-}
+/// The bits, in a word, of the voxels of a column along z from the first, second, third and fourth on; none.
+const FROM: [u64; 5] =
+    [1 | 1 << 4 | 1 << 32 | 1 << 36, 1 << 4 | 1 << 32 | 1 << 36, 1 << 32 | 1 << 36, 1 << 36, 0];
 
 impl BrickContent for BrickMask {
     const EMPTY: Self = [0; 8];
@@ -97,67 +78,58 @@ impl BrickContent for BrickMask {
 
 impl Default for Marks {
     fn default() -> Self {
-        Self::Columns(Columns::default())
+        Self::Words(Words::default())
     }
 }
 
 impl Marks {
-    fn sparse() -> Self {
-        Self::Bricks(Box::default())
-    }
-
-    fn empty_like(&self) -> Self {
-        match self {
-            Self::Columns(_) => Self::default(),
-            Self::Bricks(_) => Self::sparse(),
-        }
-    }
-
     fn heap_bytes(&self) -> usize {
         match self {
-            Self::Columns(_) => size_of::<[u64; COLUMNS]>(),
-            Self::Bricks(bricks) => size_of::<SparsePage<BrickMask>>() + bricks.bricks_bytes(),
+            Self::Words(_) => size_of::<[u64; WORDS]>(),
+            Self::Bricks(bricks) => bytes_of(bricks),
         }
     }
 
     #[inline]
-    fn mark(&mut self, x: u32, y: u32, z: u32) {
+    fn mark(&mut self, place: u32) {
         match self {
-            Self::Columns(columns) => columns.mark(x, y, z),
-            Self::Bricks(bricks) => mark_small(bricks, [x, y, z]),
+            Self::Words(words) => words.mark(place),
+            Self::Bricks(bricks) => mark_small(bricks, place),
         }
     }
 
-    /// Which bricks at `(x, y)`, in bricks, have marks: byte `k` is not 0 if brick `k` has.
-    fn union(&self, x: usize, y: usize) -> u64 {
+    /// The places of bricks that have marks.
+    fn present(&self) -> BrickMask {
         match self {
-            Self::Columns(columns) => columns.union(x, y),
-            Self::Bricks(bricks) => {
-                let is_in = |z: &usize| bricks.brick_at(place_of_brick(x, y, *z)).is_some();
-                (0..8).filter(is_in).fold(0, |union, z| union | 1 << (8 * z))
+            Self::Words(words) => {
+                let mut present = [0; 8];
+                for (bits, bricks) in present.iter_mut().zip(words.bricks().as_chunks::<64>().0) {
+                    let has_marks =
+                        |brick: &BrickMask| u64::from(brick.iter().fold(0, |all, word| all | word) != 0);
+                    *bits = bricks.iter().rev().fold(0, |bits, brick| bits << 1 | has_marks(brick));
+                }
+                present
             }
+            Self::Bricks(bricks) => present_in(bricks),
         }
     }
 
-    /// The mask of one brick in Morton order.
-    fn brick(&self, x: usize, y: usize, z: usize) -> BrickMask {
+    /// The mask of the brick at a place.
+    #[inline]
+    fn brick(&self, place: usize) -> BrickMask {
         match self {
-            Self::Columns(columns) => columns.brick(x, y, z),
-            Self::Bricks(bricks) => bricks.brick_at(place_of_brick(x, y, z)).copied().unwrap_or_default(),
+            Self::Words(words) => words.bricks()[place],
+            Self::Bricks(bricks) => bricks.brick_at(place).copied().unwrap_or_default(),
         }
     }
 
     fn absorb(&mut self, other: &Self) {
         match (self, other) {
-            (Self::Columns(columns), Self::Columns(others)) => columns.absorb(others),
+            (Self::Words(words), Self::Words(others)) => words.absorb(others),
             (mine, other) => {
-                let bricks = (0..8).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
-                for [x, y, z] in bricks {
-                    let mask = other.brick(x, y, z);
-                    for place in crate::space::places(mask) {
-                        let local = local_of(place);
-                        let at = |k: usize, brick: usize| 8 * brick as u32 + local[k];
-                        mine.mark(at(0, x), at(1, y), at(2, z));
+                for brick in places(other.present()) {
+                    for place in places(other.brick(brick)) {
+                        mine.mark((brick * BRICK_VOXELS + place) as u32);
                     }
                 }
             }
@@ -165,24 +137,28 @@ impl Marks {
     }
 }
 
-/// The voxel at a place of a brick, relative to the brick's lowest.
-fn local_of(place: usize) -> Local {
-    std::array::from_fn(|axis| {
-        (0..3).fold(0, |index, bit| index | (place as u32 >> (3 * bit + axis as u32) & 1) << bit)
-    })
+fn bytes_of(bricks: &SparsePage<BrickMask>) -> usize {
+    size_of::<SparsePage<BrickMask>>() + bricks.bricks_bytes()
 }
 
-/// The place of a brick in its page's Morton order.
-fn place_of_brick(x: usize, y: usize, z: usize) -> usize {
-    let [x, y, z] = [x, y, z].map(|k| 8 * k as u32);
-    (part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z)) as usize / BRICK_VOXELS
+/// The places of a page's bricks.
+fn present_in(bricks: &SparsePage<BrickMask>) -> BrickMask {
+    let mut present = [0; 8];
+    bricks.places().for_each(|(place, _)| crate::space::add_to_mask(&mut present, place as usize));
+    present
+}
+
+/// The place of a voxel in its page's Morton order.
+#[inline]
+fn place_of([x, y, z]: Local) -> u32 {
+    part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z)
 }
 
 // Outlined: it is used only when memory is short, and every instruction of the inner loop counts.
 #[cold]
 #[inline(never)]
-fn mark_small(bricks: &mut SparsePage<BrickMask>, [x, y, z]: Local) {
-    mark(bricks, part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z));
+fn mark_small(bricks: &mut SparsePage<BrickMask>, place: u32) {
+    mark(bricks, place);
 }
 
 #[cold]
@@ -202,100 +178,125 @@ fn mark(bricks: &mut SparsePage<BrickMask>, place: u32) {
 
 impl MarkedPage {
     /// A ray ends in a voxel.
-    pub(crate) fn hit(&mut self, [x, y, z]: VoxelIndex) {
-        let hits = self.hits.get_or_insert_with(|| self.passed.empty_like());
-        hits.mark(x as u32, y as u32, z as u32);
+    pub(crate) fn hit(&mut self, voxel: VoxelIndex) {
+        mark(self.hits.get_or_insert_default(), place_of(voxel.map(|k| k as u32)));
     }
 
     /// Whether all voxels of the page from `low` to `high` are passed or hit; may be false where this is costly to
     /// tell.
     #[inline]
     pub(crate) fn are_marked(&self, low: Local, high: Local) -> bool {
-        let Marks::Columns(passed) = &self.passed else { return false };
-        let hits = self.hits.as_ref().and_then(|hits| match hits {
-            Marks::Columns(hits) => Some(hits),
-            Marks::Bricks(_) => None,
-        });
+        let Marks::Words(passed) = &self.passed else { return false };
         let [x0, y0, z0] = low.map(|k| k & 63);
         let [x1, y1, z1] = high.map(|k| k & 63);
-        let wanted = u64::MAX >> (63 - z1) & u64::MAX << z0;
-        for column in (x0 << 6..=x1 << 6).step_by(64) {
-            for column in (column | y0) as usize..=(column | y1) as usize {
-                let left = wanted & !passed.0[column];
-                if left != 0 && hits.is_none_or(|hits| left & !hits.0[column] != 0) {
-                    return false;
+        for x in x0..=x1 {
+            for y in y0..=y1 {
+                let column = part_of_place(0, x) | part_of_place(1, y);
+                // Up to four voxels along z are in one word.
+                let mut z = z0;
+                while z <= z1 {
+                    let last = z1.min(z | 3);
+                    let run = FROM[z as usize % 4] & !FROM[last as usize % 4 + 1];
+                    let place = column | part_of_place(2, z & !3);
+                    let left = run << (place % 64) & !passed.0[place as usize / 64 % WORDS];
+                    if left != 0 && left & !self.hits_of_word(place as usize / 64) != 0 {
+                        return false;
+                    }
+                    z = last + 1;
                 }
             }
         }
         true
     }
 
+    fn hits_of_word(&self, word: usize) -> u64 {
+        self.hits.as_ref().and_then(|hits| hits.brick_at(word / 8)).map_or(0, |brick| brick[word % 8])
+    }
+
     /// Adds the marks of another page.
     pub(crate) fn absorb(&mut self, other: &Self) {
         self.passed.absorb(&other.passed);
-        if let Some(hits) = &other.hits {
-            self.hits.get_or_insert_with(|| self.passed.empty_like()).absorb(hits);
+        let Some(others) = &other.hits else { return };
+        let hits = self.hits.get_or_insert_default();
+        for (place, number) in others.places() {
+            let brick = hits.brick(place * BRICK_VOXELS as u32);
+            brick.iter_mut().zip(&others.bricks()[number]).for_each(|(word, other)| *word |= other);
         }
     }
 
     /// Number of bricks with marks.
     pub(crate) fn count_bricks(&self) -> usize {
-        let in_column = |(x, y)| {
-            let marks = self.passed.union(x, y) | self.hits.as_ref().map_or(0, |hits| hits.union(x, y));
-            (0..8).filter(|z| marks >> (8 * z) & 0xff != 0).count()
-        };
-        (0..8).flat_map(|x| (0..8).map(move |y| (x, y))).map(in_column).sum()
+        self.present().iter().map(|word| word.count_ones() as usize).sum()
+    }
+
+    /// Looks which bricks have marks, for [`MarkedPage::found`]. No mark is added after that.
+    pub(crate) fn find_bricks(&mut self) {
+        self.found = Some(self.present());
+    }
+
+    /// The places of the bricks that have marks, as [`MarkedPage::find_bricks`] found them.
+    pub(crate) fn found(&self) -> BrickMask {
+        self.found.unwrap_or_else(|| self.present())
+    }
+
+    fn present(&self) -> BrickMask {
+        let passed = self.passed.present();
+        let hits = self.hits.as_deref().map_or([0; 8], present_in);
+        std::array::from_fn(|word| passed[word] | hits[word])
+    }
+
+    /// The marks of the brick at a place: voxels in which rays end, and passed voxels, whether hit or not.
+    #[inline]
+    pub(crate) fn brick(&self, place: usize) -> (BrickMask, BrickMask) {
+        let hits = self.hits.as_ref().and_then(|hits| hits.brick_at(place));
+        (hits.copied().unwrap_or_default(), self.passed.brick(place))
     }
 
     /// The bricks with marks; `page` is the page's index: its voxels' indices divided by 64.
-    pub(crate) fn bricks(&self, page: VoxelIndex) -> Vec<MarkedBrick> {
-        let mut bricks = Vec::new();
-        for (x, y) in (0..8).flat_map(|x| (0..8).map(move |y| (x, y))) {
-            let passed = self.passed.union(x, y);
-            let hit = self.hits.as_ref().map_or(0, |hits| hits.union(x, y));
-            let is_in = |bits: u64, z: usize| bits >> (8 * z) & 0xff != 0;
-            for z in (0..8).filter(|&z| is_in(passed | hit, z)) {
-                let local = [x as i32, y as i32, z as i32];
-                let hits = self.hits.as_ref().filter(|_| is_in(hit, z));
-                bricks.push(MarkedBrick {
-                    index: std::array::from_fn(|k| page[k] * 8 + local[k]),
-                    hits: hits.map_or([0; 8], |hits| hits.brick(x, y, z)),
-                    passed: self.passed.brick(x, y, z),
-                });
-            }
-        }
-        bricks
+    pub(crate) fn bricks(&self, page: VoxelIndex) -> impl Iterator<Item = MarkedBrick> {
+        places(self.found()).map(move |place| {
+            let (hits, passed) = self.brick(place);
+            MarkedBrick { index: brick_in_page(page, place as u32), hits, passed }
+        })
     }
 }
 
 impl Footprint for MarkedPage {
-    /// The indices along the slab.
-    type Cell = (u32, u32);
+    /// The part of the voxel's place that comes from its indices along the slab.
+    type Cell = u32;
 
     fn heap_bytes(&self) -> usize {
-        self.passed.heap_bytes() + self.hits.as_ref().map_or(0, Marks::heap_bytes)
+        self.passed.heap_bytes() + self.hits.as_deref().map_or(0, bytes_of)
     }
 
     fn sparse() -> Self {
-        Self { passed: Marks::sparse(), hits: None }
+        Self { passed: Marks::Bricks(Box::default()), hits: None, found: None }
     }
 
-    #[inline]
-    fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> (u32, u32) {
-        (b, c)
-    }
-
-    #[inline]
-    fn pass<const A: usize>(&mut self, slab: u32, (b, c): (u32, u32)) {
-        match A {
-            0 => self.passed.mark(slab, b, c),
-            1 => self.passed.mark(b, slab, c),
-            _ => self.passed.mark(b, c, slab),
+    /// Pages that are fast are kept. Only their marked bricks are cleared: most pages have few.
+    fn cleared(mut self) -> Option<Self> {
+        let Marks::Words(words) = &mut self.passed else { return None };
+        match self.found.take() {
+            Some(found) => places(found).for_each(|place| words.bricks_mut()[place] = [0; 8]),
+            None => words.0.fill(0),
         }
+        debug_assert!(words.0.iter().all(|word| *word == 0), "marks were added after the bricks were found");
+        self.hits = None;
+        Some(self)
     }
 
     #[inline]
-    fn pass_through<const A: usize>(&mut self, slab: u32, entry: (u32, u32), exit: (u32, u32)) {
+    fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> u32 {
+        part_of_place(B, b) | part_of_place(C, c)
+    }
+
+    #[inline]
+    fn pass<const A: usize>(&mut self, slab: u32, cell: u32) {
+        self.passed.mark(part_of_place(A, slab) | cell);
+    }
+
+    #[inline]
+    fn pass_through<const A: usize>(&mut self, slab: u32, entry: u32, exit: u32) {
         self.pass::<A>(slab, entry);
         self.pass::<A>(slab, exit);
     }
@@ -308,37 +309,9 @@ impl Footprint for MarkedPage {
         a: u32,
     ) -> u32 {
         match &mut self.passed {
-            Marks::Columns(columns) => stretch.pass::<A, B, C, _>(columns, a),
+            Marks::Words(words) => stretch.mark::<A, B, C>(&mut words.0, a),
             Marks::Bricks(bricks) => pass_small::<A, B, C>(bricks, stretch, a),
         }
-    }
-}
-
-impl Footprint for Columns {
-    type Cell = (u32, u32);
-
-    fn heap_bytes(&self) -> usize {
-        size_of::<[u64; COLUMNS]>()
-    }
-
-    #[inline]
-    fn cell<const B: usize, const C: usize>(b: u32, c: u32) -> (u32, u32) {
-        (b, c)
-    }
-
-    #[inline]
-    fn pass<const A: usize>(&mut self, slab: u32, (b, c): (u32, u32)) {
-        match A {
-            0 => self.mark(slab, b, c),
-            1 => self.mark(b, slab, c),
-            _ => self.mark(b, c, slab),
-        }
-    }
-
-    #[inline]
-    fn pass_through<const A: usize>(&mut self, slab: u32, entry: (u32, u32), exit: (u32, u32)) {
-        self.pass::<A>(slab, entry);
-        self.pass::<A>(slab, exit);
     }
 }
 

@@ -32,9 +32,10 @@ impl<F: Footprint> PageMap<F> {
         self.directory.clear();
         self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
         self.far.clear();
-        // At most as many as the last scan had, so a scan with stray rays far away costs no memory for good.
+        // At most as many as the last scan had, so a scan with stray rays far away costs no memory for good; and no more
+        // than may be fast, as those are that are kept.
         self.spare.clear();
-        self.spare.extend(self.pages.drain(..).filter_map(F::cleared));
+        self.spare.extend(self.pages.drain(..).take(max_fast).filter_map(F::cleared));
         self.indices.clear();
     }
 

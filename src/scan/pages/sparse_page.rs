@@ -17,26 +17,29 @@ pub(crate) trait BrickContent: Copy {
     const EMPTY: Self;
 }
 
-const PAGE_BRICKS: usize = 512;
+pub(crate) const PAGE_BRICKS: usize = 512;
 
 /// The part of a voxel's place in Morton order that comes from its index along an axis. Of the page's 18 bits the upper
 /// nine are the place of the brick.
 #[inline]
 pub(crate) fn part_of_place(axis: usize, index: u32) -> u32 {
-    const SPREAD: [u32; PAGE_EDGE as usize] = spread();
-    SPREAD[index as usize % PAGE_EDGE as usize] << axis
+    PARTS[axis][index as usize % PAGE_EDGE as usize]
 }
 
-const fn spread() -> [u32; PAGE_EDGE as usize] {
-    let mut spread = [0; PAGE_EDGE as usize];
+/// By axis, so that a part is one look-up without a shift.
+static PARTS: [[u32; PAGE_EDGE as usize]; 3] = parts();
+
+const fn parts() -> [[u32; PAGE_EDGE as usize]; 3] {
+    let mut parts = [[0; PAGE_EDGE as usize]; 3];
     let mut index = 0;
-    while index < spread.len() {
+    while index < PAGE_EDGE as usize {
         let low = place_of_voxel([index as i32, 0, 0]) as u32;
         let high = place_of_voxel([index as i32 / BRICK_EDGE, 0, 0]) as u32;
-        spread[index] = high << 9 | low;
+        let part = high << 9 | low;
+        (parts[0][index], parts[1][index], parts[2][index]) = (part, part << 1, part << 2);
         index += 1;
     }
-    spread
+    parts
 }
 
 /// The place of a voxel in its page's Morton order.

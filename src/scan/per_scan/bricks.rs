@@ -22,6 +22,21 @@ pub(crate) fn updates_by_tile(
     tiles
 }
 
+/// Adds the updates of other bricks to those of tiles.
+pub(crate) fn add_bricks(
+    tiles: &mut Vec<(TileIndex, Vec<BrickUpdate>)>,
+    others: Vec<(TileIndex, Vec<BrickUpdate>)>,
+) {
+    let mut others: FxHashMap<TileIndex, Vec<BrickUpdate>> = others.into_iter().collect();
+    for (tile, bricks) in tiles.iter_mut() {
+        if let Some(others) = others.remove(tile) {
+            bricks.extend(others);
+            bricks.sort_unstable_by_key(|brick| brick.brick);
+        }
+    }
+    tiles.extend(others);
+}
+
 fn updates_of_tile(
     grid: &Grid,
     tile: TileIndex,
@@ -49,7 +64,7 @@ fn updates_of_tile(
 }
 
 /// The intensities of the given hits of a brick, in the order of the mask.
-fn intensities_of(brick: VoxelIndex, hits: &BrickMask, intensities: &Intensities) -> Box<[f32]> {
+pub(crate) fn intensities_of(brick: VoxelIndex, hits: &BrickMask, intensities: &Intensities) -> Box<[f32]> {
     if intensities.is_empty() {
         return Box::default();
     }
@@ -63,7 +78,7 @@ fn intensities_of(brick: VoxelIndex, hits: &BrickMask, intensities: &Intensities
 
 /// Number of hits and of misses.
 pub(crate) fn hits_and_misses(bricks: &[BrickUpdate]) -> (u64, u64) {
-    let ones = |mask: &BrickMask| mask.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
+    let ones = |mask: &BrickMask| u64::from(mask.map(u64::count_ones).iter().sum::<u32>());
     bricks
         .iter()
         .fold((0, 0), |(hits, misses), brick| (hits + ones(&brick.hits), misses + ones(&brick.misses)))

@@ -1,13 +1,14 @@
-use super::bricks::{Intensities, hits_and_misses, updates_by_tile};
+use super::bricks::{Intensities, add_bricks, hits_and_misses, updates_by_tile};
 use super::far_bricks::FarBricks;
+use super::page_updates::updates_of_pages;
 use crate::scan::ScanReport;
 use crate::scan::coherence::MarkedPrefixes;
 use crate::scan::pages::{Footprint, MarkedBrick, MarkedPage, PAGE_EDGE, PageMap, Window};
 use crate::scan::ray::{RayCut, RayEnd, RayOrigin, SlabRay};
 use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
-use crate::scan::updates::{MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles};
-use crate::space::{VoxelIndex, hash_table_bytes};
+use crate::scan::updates::{BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles};
+use crate::space::{TileIndex, VoxelIndex, hash_table_bytes};
 use rayon::prelude::*;
 
 /// Most rays per call of [`PerScanCollector::take`].
@@ -171,17 +172,35 @@ impl PerScanCollector {
 
     /// The updates. Bricks across a tile border are split.
     pub(crate) fn updates(&mut self, mapped: MappedTiles<'_>, mut report: ScanReport) -> ScanUpdates {
-        let pages = self.pages.pages().par_iter().zip(self.pages.indices());
-        let mut bricks: Vec<MarkedBrick> = pages.flat_map_iter(|(page, index)| page.bricks(*index)).collect();
-        bricks.extend(self.far.take());
-        let tiles = updates_by_tile(mapped, &bricks, &self.intensities);
-        for (_, bricks) in &tiles {
-            let (hits, misses) = hits_and_misses(bricks);
-            report.hits += hits;
-            report.misses += misses;
-        }
-        let tiles = tiles.into_iter().map(|(tile, bricks)| (tile, TileUpdates::Masks(bricks))).collect();
+        // All in one go on the pool: each way there and back is a switch of threads.
+        let tiles = rayon::scope(|_| self.updates_by_tile(mapped));
+        let tiles: Vec<_> = tiles
+            .into_iter()
+            .map(|(tile, bricks)| {
+                let (hits, misses) = hits_and_misses(&bricks);
+                report.hits += hits;
+                report.misses += misses;
+                (tile, TileUpdates::Masks(bricks))
+            })
+            .collect();
         in_order_of_tiles(mapped.grid, tiles, report)
+    }
+
+    fn updates_by_tile(&mut self, mapped: MappedTiles<'_>) -> Vec<(TileIndex, Vec<BrickUpdate>)> {
+        self.pages.pages_mut().par_iter_mut().for_each(MarkedPage::find_bricks);
+        let mut tiles = if mapped.grid.voxels_per_tile_edge() >= PAGE_EDGE as i32 / 2 {
+            updates_of_pages(mapped, &self.pages, &self.intensities)
+        } else {
+            // A page would overlap hundreds of tiles.
+            let pages = self.pages.pages().iter().zip(self.pages.indices());
+            let bricks: Vec<MarkedBrick> = pages.flat_map(|(page, index)| page.bricks(*index)).collect();
+            updates_by_tile(mapped, &bricks, &self.intensities)
+        };
+        let far = self.far.take();
+        if !far.is_empty() {
+            add_bricks(&mut tiles, updates_by_tile(mapped, &far, &self.intensities));
+        }
+        tiles
     }
 }
 

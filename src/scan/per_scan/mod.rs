@@ -5,6 +5,7 @@
 mod bricks;
 mod collector;
 mod far_bricks;
+mod page_updates;
 
 pub(crate) use bricks::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
 pub(crate) use collector::{BATCH, PerScanCollector};

@@ -1,5 +1,5 @@
 use super::slab_ray::SlabRay;
-use crate::scan::pages::{Footprint, PAGE_EDGE};
+use crate::scan::pages::{Footprint, PAGE_EDGE, WORDS, part_of_place};
 use crate::space::VoxelIndex;
 
 /// Voxels along the edge of a page.
@@ -195,6 +195,83 @@ impl Stretch {
         }
         self.slabs
     }
+
+    /// Marks the voxels in the words of a page, in Morton order. Returns the number of slabs for which that is certain;
+    /// of the next one, the first voxel may be marked, too.
+    ///
+    /// At a crossing the ray passes two voxels along `A`, mostly of one word: they are marked together.
+    // Not inlined: on its own, most of what the loop needs is in registers.
+    #[inline(never)]
+    pub(crate) fn mark<const A: usize, const B: usize, const C: usize>(
+        &self,
+        words: &mut [u64; WORDS],
+        mut a: u32,
+    ) -> u32 {
+        const BITS: u32 = EDGE.trailing_zeros();
+        const NEAR: u64 = NEAR_BORDER_IN_PAGE >> BITS;
+        const RAISED: u64 = NEAR << 32 | NEAR;
+        // Of a raised position next to a border all these bits are 0.
+        const FRACTION: u64 = ((1_u64 << (32 - BITS)) - 1) & !(2 * NEAR - 1);
+        let b_of = |at: u64| (at >> (64 - BITS)) as u32;
+        let c_of = |at: u64| (at as u32) >> (32 - BITS);
+        let cell = |at: u64| part_of_place(B, b_of(at)) | part_of_place(C, c_of(at));
+        let mut mark = |place: u32, bits: u64| words[place as usize / 64 % WORDS] |= bits << (place % 64);
+        let Some(last) = self.slabs.checked_sub(1) else { return 0 };
+        let pairs = &PAIRS[usize::from(self.is_up)][A];
+        let step = if self.is_up { 1 } else { u32::MAX };
+        let mut before = u64::from(self.entry.0) << (64 - BITS) | u64::from(self.entry.1) << (32 - BITS);
+        let mut at = self.at.wrapping_add(RAISED);
+        mark(part_of_place(A, a) | cell(before), 1);
+        // Of the word's lowest slab.
+        let mut part = part_of_place(A, a & !3);
+        for done in 0..=last {
+            if at & (FRACTION << 32) == 0 || at & FRACTION == 0 {
+                return done;
+            }
+            // One branch that is seldom taken instead of two that are often mispredicted.
+            let differ = at ^ before;
+            if b_of(differ) * c_of(differ) != 0 {
+                let slopes = [(self.slope as i64) >> 32, self.slope as i32 as i64];
+                let at = at.wrapping_sub(RAISED);
+                let past = [(at >> 32 << BITS) as u32, (at << BITS) as u32];
+                let Some(is_b_first) = is_b_crossed_first(past, slopes) else { return done };
+                let (b, c) = if is_b_first { (at, before) } else { (before, at) };
+                let between = part_of_place(B, b_of(b)) | part_of_place(C, c_of(c));
+                mark(part_of_place(A, a) | between, 1);
+            }
+            if done == last {
+                break;
+            }
+            let cell = cell(at);
+            mark(part | cell, pairs[a as usize % 4]);
+            let next = a.wrapping_add(step);
+            if (a ^ next) & 4 != 0 {
+                mark(part_of_place(A, next) | cell, 1);
+                part = part_of_place(A, next & !3);
+            }
+            a = next;
+            before = at;
+            at = at.wrapping_add(self.slope);
+        }
+        mark(part_of_place(A, a) | cell(at), 1);
+        self.slabs
+    }
+}
+
+/// For rays down and up, along each axis and for each of the four slabs of a word: the bits of the slab and of the next,
+/// if that is in the word, too.
+static PAIRS: [[[u64; 4]; 3]; 2] = pairs();
+
+const fn pairs() -> [[[u64; 4]; 3]; 2] {
+    let mut pairs = [[[0; 4]; 3]; 2];
+    let mut axis = 0;
+    while axis < 3 {
+        let bits = [1_u64, 1 << (1 << axis), 1 << (8 << axis), 1 << (9 << axis)];
+        pairs[0][axis] = [bits[0], bits[1] | bits[0], bits[2] | bits[1], bits[3] | bits[2]];
+        pairs[1][axis] = [bits[0] | bits[1], bits[1] | bits[2], bits[2] | bits[3], bits[3]];
+        axis += 1;
+    }
+    pairs
 }
 
 /// Whether a ray crossed the first of two borders, along two axes, before the second; `None` if the crossings are too

@@ -15,8 +15,8 @@ pub(crate) struct CollectorLimit {
     pub(crate) small_bytes: usize,
 }
 
-/// A fast page, with hits.
-const FAST_PAGE_BYTES: usize = 64 << 10;
+/// A fast page: a bit a voxel, and at most as much again for hits and the numbers of their bricks.
+const FAST_PAGE_BYTES: usize = 66 << 10;
 /// Bytes of a brick while its marks are converted to updates, three times in lists.
 const UPDATE_BYTES: usize = 450;
 /// With less, a collector would be drained all the time.

@@ -52,6 +52,21 @@ impl Brick {
         }
     }
 
+    /// Reads the brick, so that it is in the cache.
+    #[inline]
+    pub(crate) fn look_at_storage(&self) {
+        std::hint::black_box((self.observed[0], self.heap_bytes()));
+    }
+
+    /// Reads of every line of the cells, so that they are in the cache.
+    #[inline]
+    pub(crate) fn look_at_cells(&self) {
+        if let Storage::Interned(cells) = &self.evidence {
+            let look = |cell: &[StateId; CELL_VOXELS]| cell[0] ^ cell[CELL_VOXELS / 2];
+            std::hint::black_box(cells.all().iter().fold(0, |all, cell| all ^ look(cell)));
+        }
+    }
+
     #[inline]
     pub(crate) fn get(&self, place: usize, palette: &Palette) -> Option<Evidence> {
         let (word, bit) = (place / 64, place % 64);

@@ -42,7 +42,8 @@ impl Brick {
     /// Applies an update. Returns how many voxels are observed for the first time. If the palette is full, the
     /// remainder stays in `rest`; the caller makes room, or makes the brick plain, and tries again.
     pub(crate) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
-        let has_hits = rest.hits != [0; 8];
+        // Not by comparison: that is a call.
+        let has_hits = rest.hits.iter().fold(0, |all, word| all | word) != 0;
         self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
         match &mut self.evidence {
             Storage::Interned(cells) => update_interned(cells, &mut self.observed, rest, palette),

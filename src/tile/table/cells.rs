@@ -50,11 +50,15 @@ impl<T: Copy> Cells<T> {
 
     /// Makes the missing cells of the given words (bit `k` for word `k`), filled with `value`.
     pub(crate) fn make(&mut self, words: u8, value: T) {
-        let missing = (0..8).filter(|&word| words >> word & 1 == 1 && self.places[word] == ABSENT);
-        let missing: Vec<usize> = missing.collect();
+        let missing = (0..8).fold(0, |missing, word| {
+            missing | (words >> word & 1 & u8::from(self.places[word] == ABSENT)) << word
+        });
+        if missing == 0 {
+            return;
+        }
         // No slack: this happens at most eight times in a brick's life.
-        self.cells.reserve_exact(missing.len());
-        for word in missing {
+        self.cells.reserve_exact(missing.count_ones() as usize);
+        for word in (0..8).filter(|word| missing >> word & 1 == 1) {
             self.places[word] = self.cells.len() as u8;
             self.cells.push([value; CELL_VOXELS]);
         }

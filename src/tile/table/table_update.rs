@@ -7,11 +7,14 @@ use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdates};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickCode, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
 
+/// Bricks that are updated stage by stage.
+const TOGETHER: usize = 16;
+
 impl Table {
     /// Applies updates of any form; `first` is the tile's lowest voxel.
     pub fn apply(&mut self, model: &SensorModel, first: VoxelIndex, updates: &TileUpdates) {
         match updates {
-            TileUpdates::Masks(bricks) => bricks.iter().for_each(|brick| self.update_brick(model, brick)),
+            TileUpdates::Masks(bricks) => self.update_bricks(model, bricks),
             TileUpdates::Runs(bricks) => self.update_runs(model, bricks),
             TileUpdates::Ordered(updates) => self.update_in_order(model, first, updates),
             TileUpdates::Packed(packed) => {
@@ -22,11 +25,29 @@ impl Table {
 
     /// Applies the update of one brick, in insertion per scan.
     pub fn update_brick(&mut self, model: &SensorModel, update: &BrickUpdate) {
+        self.update_bricks(model, std::slice::from_ref(update));
+    }
+
+    /// Applies the updates of bricks, in insertion per scan.
+    ///
+    /// The bricks of a map lie apart in memory, so each stage of an update is done for some of them before the next:
+    /// the CPU waits for the lines of many bricks at once.
+    pub fn update_bricks(&mut self, model: &SensorModel, updates: &[BrickUpdate]) {
         self.palette.use_model(model);
-        let mut rest = Rest::of(update);
-        if update.hits != [0; 8] || update.misses != [0; 8] {
-            let number = self.number_of(update.brick);
-            self.update_rest(number, &mut rest);
+        let mut numbers = [None; TOGETHER];
+        for updates in updates.chunks(TOGETHER) {
+            for (number, update) in numbers.iter_mut().zip(updates) {
+                let is_empty = (0..8).fold(0, |all, word| all | update.hits[word] | update.misses[word]) == 0;
+                *number = (!is_empty).then(|| self.number_of(update.brick));
+            }
+            let present = numbers[..updates.len()].iter().flatten();
+            present.clone().for_each(|&number| self.bricks[number].look_at_storage());
+            present.clone().for_each(|&number| self.bricks[number].look_at_cells());
+            for (number, update) in numbers.iter().zip(updates) {
+                if let Some(number) = *number {
+                    self.update_rest(number, &mut Rest::of(update));
+                }
+            }
         }
     }
 
