@@ -70,16 +70,19 @@ proptest! {
     fn whatever_the_palette_holds_the_evidence_is_that_of_the_model(
         palette in any_palette(),
         model in any_model(),
-        updates in prop::collection::vec((any::<bool>(), any_update()), 1..24),
+        scans in prop::collection::vec((any::<bool>(), prop::collection::vec(any_update(), 1..24)), 1..4),
     ) {
         let (mut table, mut naive) = (Table::with_palette(palette), Naive::new());
-        for (whole, update) in updates {
-            apply(&mut naive, &model, &update);
+        for (whole, updates) in scans {
+            updates.iter().for_each(|update| apply(&mut naive, &model, update));
             if whole {
-                table.update_brick(&model, &update);
+                table.update_bricks(&model, &updates);
             } else {
-                for (place, observation) in crate::space::places(update.touched()).zip(update.observations()) {
-                    table.update(&model, update.brick.voxel(place), observation);
+                for update in updates {
+                    let observed = crate::space::places(update.touched()).zip(update.observations());
+                    for (place, observation) in observed {
+                        table.update(&model, update.brick.voxel(place), observation);
+                    }
                 }
             }
             assert_eq!(table.bytes(), table.counted_bytes());
