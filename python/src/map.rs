@@ -26,8 +26,11 @@ use voxtile::{
 /// Questions and points that take less time than anybody waits for Ctrl-C. They are worth no thread of their own.
 const FEW: usize = 128;
 
-/// Most scans of a list that are handed to the mapper together.
+/// Most scans that are handed to the mapper together.
 const TOGETHER: usize = 32;
+
+/// With so many points no more scans join them: those of a file take memory only while they are here.
+const POINTS_TOGETHER: usize = 1 << 20;
 
 /// A map: what is occupied, free and unknown.
 ///
@@ -85,17 +88,15 @@ impl Map {
         changed.ok_or_else(|| closed(py, &self.path))
     }
 
-    /// Adds scans up to the first that is wrong.
+    /// Adds scans, one report of all.
     fn insert_together(&self, py: Python<'_>, given: &[GivenScan<'_>]) -> PyResult<InsertReport> {
-        let mut scans: Vec<ScanRef<'_>> = Vec::with_capacity(given.len());
-        let outcome = given.iter().try_for_each(|given| given.scan(py).map(|scan| scans.push(scan)));
+        let scans = given.iter().map(|given| given.scan(py)).collect::<PyResult<Vec<ScanRef<'_>>>>()?;
         let scans: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
         let is_short = scans.iter().map(|scan| scan.len()).sum::<usize>() <= FEW;
         let reports = self.change(py, is_short, |mapper| {
             let mut reports = Vec::with_capacity(scans.len());
             mapper.insert_all(&scans, &mut reports).map(|()| reports)
         })?;
-        outcome?;
         let mut all = InsertReport::from(ScanReport::default());
         reports.into_iter().for_each(|report| all.add(&report.into()));
         Ok(all)
@@ -301,29 +302,25 @@ impl Map {
         let most = if has_memory_of_its_own { TOGETHER } else { 1 };
         let mut all = InsertReport::from(ScanReport::default());
         let mut scans = scans.try_iter()?;
-        loop {
-            let mut given = Vec::new();
-            let mut outcome = Ok(());
-            while given.len() < most
-                && let Some(scan) = scans.next()
-            {
-                match scan.and_then(|scan| GivenScan::of_tuple(&scan)) {
-                    Ok(scan) => given.push(scan),
-                    Err(error) => {
-                        outcome = Err(error);
-                        break;
-                    }
-                }
+        let mut outcome = Ok(true);
+        while matches!(outcome, Ok(true)) {
+            let (mut given, mut points) = (Vec::new(), 0);
+            while matches!(outcome, Ok(true)) && given.len() < most && points < POINTS_TOGETHER {
+                outcome = scans.next().transpose().and_then(|scan| {
+                    let Some(scan) = scan else { return Ok(false) };
+                    let scan = GivenScan::of_tuple(&scan)?;
+                    points += scan.scan(py)?.len();
+                    given.push(scan);
+                    Ok(true)
+                });
             }
+            // Those before one that is wrong are taken.
             if !given.is_empty() {
                 all.add(&self.insert_together(py, &given)?);
+                py.check_signals()?;
             }
-            outcome?;
-            if given.len() < most {
-                return Ok(all);
-            }
-            py.check_signals()?;
         }
+        outcome.map(|_| all)
     }
 
     /// Makes everything so far durable, as a whole. Nothing to do for a map that is read.
