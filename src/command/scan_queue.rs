@@ -186,7 +186,8 @@ mod tests {
         let pushed = AtomicUsize::new(0);
         std::thread::scope(|scope| {
             let input = scope.spawn(|| {
-                while queue.push(Ok(Read::Scan(scan(0)))) {
+                // A queue that makes nobody wait should not be filled for ever.
+                while pushed.load(Ordering::SeqCst) < 100 && queue.push(Ok(Read::Scan(scan(0)))) {
                     pushed.fetch_add(1, Ordering::SeqCst);
                 }
             });
