@@ -39,5 +39,7 @@ pub use stop::Stop;
 pub use trace::ScanTracer;
 pub(crate) use trace::{TraceRules, UpdateOrder};
 pub(crate) use updates::MappedTiles;
-pub use updates::{BrickRuns, BrickUpdate, OrderedUpdates, PackedUpdates, Run, ScanUpdates, TileUpdates};
+pub use updates::{
+    BrickRuns, BrickUpdate, Misses, OrderedUpdates, PackedUpdates, Run, ScanUpdates, TileRuns, TileUpdates,
+};
 pub use world_scan::Scan;

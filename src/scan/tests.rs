@@ -35,8 +35,7 @@ fn add(said: &mut Said, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
             }
         }
         TileUpdates::Runs(bricks) => {
-            for (brick, run) in bricks.iter().flat_map(|brick| brick.runs.iter().map(move |run| (brick, run)))
-            {
+            for (brick, run) in bricks.bricks().flat_map(|brick| brick.iter().map(move |run| (brick, run))) {
                 for _ in 0..run.misses {
                     push(brick.brick.0, run.place.into(), None);
                 }

@@ -50,7 +50,7 @@ fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     const BRICK: usize = 384;
     TILE + match updates {
         TileUpdates::Masks(bricks) => BRICK * bricks.len(),
-        TileUpdates::Runs(bricks) => BRICK * bricks.len(),
+        TileUpdates::Runs(runs) => BRICK * runs.brick_count(),
         // A brick of few voxels takes some 25 bytes packed, and of many as many as they.
         TileUpdates::Packed(packed) => BRICK / 25 * packed.bytes(),
         TileUpdates::Ordered(updates) => 8 * updates.len(),

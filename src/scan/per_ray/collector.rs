@@ -5,8 +5,8 @@ use crate::scan::ray::SlabRay;
 use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
 use crate::scan::updates::{
-    BrickRuns, MappedTiles, Run, ScanUpdates, TileUpdates, brick_code, bricks_by_tile, in_order_of_tiles,
-    part_in_tile,
+    BrickRuns, MappedTiles, Misses, Run, ScanUpdates, TileRuns, TileUpdates, brick_code, bricks_by_tile,
+    in_order_of_tiles, part_in_tile,
 };
 use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex, is_in_mask};
 use rayon::prelude::*;
@@ -112,18 +112,21 @@ impl PerRayCollector {
     }
 
     /// The updates by mapped tile. Bricks across a tile border are split.
-    fn runs_by_tile(&self, mapped: MappedTiles<'_>) -> Vec<(TileIndex, Vec<BrickRuns>)> {
+    fn runs_by_tile(&self, mapped: MappedTiles<'_>) -> Vec<(TileIndex, TileRuns)> {
         let (bricks, indices) = self.bricks();
         let ended = self.ended_by_brick(&bricks);
         let runs_of_tile = |(tile, numbers): (TileIndex, Vec<u32>)| {
-            let mut scratch = [NO_RUN; BRICK_VOXELS];
-            let runs_of_brick = |number: u32| {
+            let mut scratch = Scratch::default();
+            let mut runs = TileRuns::default();
+            for number in numbers {
                 let index = indices[number as usize];
                 let brick = Brick { counts: bricks[number as usize], ended: ended.of_brick(number) };
-                let runs = brick.runs(&part_in_tile(mapped.grid, tile, index), &mut scratch);
-                (!runs.is_empty()).then(|| BrickRuns { brick: brick_code(index), runs })
-            };
-            (tile, numbers.into_iter().filter_map(runs_of_brick).collect())
+                let (ended, misses) = brick.runs(&part_in_tile(mapped.grid, tile, index), &mut scratch);
+                if !(ended.is_empty() && misses.is_empty()) {
+                    runs.push(BrickRuns { brick: brick_code(index), runs: ended, misses });
+                }
+            }
+            (tile, runs)
         };
         bricks_by_tile(mapped, &indices).into_par_iter().map(runs_of_tile).collect()
     }
@@ -190,39 +193,71 @@ impl EndedRun {
     }
 }
 
-impl Brick<'_> {
-    /// The runs of the voxels of a mask.
-    fn runs(&self, part: &BrickMask, scratch: &mut [Run; BRICK_VOXELS]) -> Box<[Run]> {
-        let count = self.passed(part, scratch);
-        let passed = &scratch[..count];
-        if self.ended.is_empty() {
-            return passed.into();
+/// Room for the runs of a brick, used for one after another.
+struct Scratch {
+    ended: Vec<Run>,
+    /// As many as a brick has voxels, and those of a chunk that is written beyond.
+    misses: [Misses; BRICK_VOXELS + CHUNK],
+}
+
+/// All voxels of a brick: it lies in one tile.
+const WHOLE: BrickMask = [u64::MAX; 8];
+/// Voxels whose counts are looked at together.
+const CHUNK: usize = 8;
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self { ended: Vec::new(), misses: [Misses::default(); BRICK_VOXELS + CHUNK] }
+    }
+}
+
+impl<'a> Brick<'a> {
+    /// The runs of the voxels of a mask that ended with a hit, and the misses after them.
+    fn runs<'s>(&self, part: &BrickMask, scratch: &'s mut Scratch) -> (&'s [Run], &'s [Misses])
+    where
+        'a: 's,
+    {
+        let Scratch { ended, misses } = scratch;
+        let mut passed = self.passed(misses);
+        if *part == WHOLE {
+            return (self.ended, &misses[..passed]);
         }
-        let mut runs: Vec<Run> = Vec::with_capacity(self.ended.len() + count);
-        runs.extend(self.ended.iter().filter(|run| is_in_mask(part, run.place.into())));
-        // Both sorts are stable: a voxel's runs stay in order, and the misses after its last hit come last.
-        runs.sort_by_key(|run| run.place);
-        runs.extend_from_slice(passed);
-        runs.sort_by_key(|run| run.place);
-        runs.into()
+        passed = kept(&mut misses[..passed], |misses| is_in_mask(part, misses.place.into()));
+        ended.clear();
+        ended.extend(self.ended.iter().filter(|run| is_in_mask(part, run.place.into())));
+        (ended, &misses[..passed])
     }
 
-    /// Writes the misses since each voxel's last hit, if any, to `runs`; returns the number of voxels with some.
-    fn passed(&self, part: &BrickMask, runs: &mut [Run; BRICK_VOXELS]) -> usize {
+    /// Writes the misses since each voxel's last hit, if any, to the front of `all`; returns how many voxels have some.
+    fn passed(&self, all: &mut [Misses; BRICK_VOXELS + CHUNK]) -> usize {
         let mut count = 0;
-        // Most voxels were not passed, so eight at a time are skipped.
-        for (chunk, first) in self.counts.chunks_exact(8).zip((0..).step_by(8)) {
+        // Most voxels were not passed, so a chunk at a time is skipped.
+        for (chunk, first) in self.counts.chunks_exact(CHUNK).zip((0..).step_by(CHUNK)) {
             if chunk.iter().fold(0, |any, misses| any | misses) == 0 {
                 continue;
             }
+            let out = &mut all[count..][..CHUNK];
+            let mut written = 0;
             // Without a branch: it would be unpredictable.
             for (&misses, place) in chunk.iter().zip(first..) {
-                runs[count] = Run { place, misses, hit: None };
-                count += usize::from(misses > 0 && is_in_mask(part, place.into()));
+                out[written % CHUNK] = Misses { place, misses };
+                written += usize::from(misses > 0);
             }
+            count += written;
         }
         count
     }
+}
+
+/// Moves the values that are to be kept to the front, in order; returns their number.
+fn kept<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
+    let mut count = 0;
+    for k in 0..values.len() {
+        let value = values[k];
+        values[count] = value;
+        count += usize::from(is_kept(&value));
+    }
+    count
 }
 
 /// Moves the updates of several collectors to `parts`; the first collector saw the first rays.
@@ -232,10 +267,10 @@ pub(crate) fn drain_in_order(
     parts: &ScanParts<'_>,
 ) {
     for collector in collectors {
-        for (tile, bricks) in collector.runs_by_tile(mapped) {
-            let (hits, misses) = hits_and_misses(&bricks);
+        for (tile, runs) in collector.runs_by_tile(mapped) {
+            let (hits, misses) = runs.hits_and_misses();
             if hits + misses > 0 {
-                parts.add(std::iter::once((tile, TileUpdates::Runs(bricks), (hits, misses))));
+                parts.add(std::iter::once((tile, TileUpdates::Runs(runs), (hits, misses))));
             }
         }
         if let Some(far) = &mut collector.far {
@@ -244,34 +279,23 @@ pub(crate) fn drain_in_order(
     }
 }
 
-/// Number of hits and of misses.
-fn hits_and_misses(bricks: &[BrickRuns]) -> (u64, u64) {
-    let runs = || bricks.iter().flat_map(|brick| &brick.runs);
-    let hits = runs().filter(|run| run.hit.is_some()).count() as u64;
-    (hits, runs().map(|run| u64::from(run.misses)).sum())
-}
-
 /// The updates of several collectors; the first collector saw the first rays.
 pub(crate) fn updates_in_order(
     mapped: MappedTiles<'_>,
     collectors: &mut [PerRayCollector],
     mut report: ScanReport,
 ) -> ScanUpdates {
-    let mut tiles: FxHashMap<TileIndex, Vec<BrickRuns>> = FxHashMap::default();
+    let mut tiles: FxHashMap<TileIndex, Vec<TileRuns>> = FxHashMap::default();
     for collector in collectors {
         for (tile, runs) in collector.runs_by_tile(mapped) {
-            if !runs.is_empty() {
-                let (hits, misses) = hits_and_misses(&runs);
+            let (hits, misses) = runs.hits_and_misses();
+            if hits + misses > 0 {
                 report.hits += hits;
                 report.misses += misses;
-                tiles.entry(tile).or_default().extend(runs);
+                tiles.entry(tile).or_default().push(runs);
             }
         }
     }
-    let in_order = |(tile, mut bricks): (TileIndex, Vec<BrickRuns>)| {
-        // Stable: for the same brick, runs of earlier rays come first.
-        bricks.sort_by_key(|runs| runs.brick);
-        (tile, TileUpdates::Runs(bricks))
-    };
-    in_order_of_tiles(mapped.grid, tiles.into_iter().map(in_order).collect(), report)
+    let of_tile = |(tile, parts)| (tile, TileUpdates::Runs(TileRuns::merged(parts)));
+    in_order_of_tiles(mapped.grid, tiles.into_iter().map(of_tile).collect(), report)
 }

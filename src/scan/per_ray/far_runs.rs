@@ -1,5 +1,5 @@
 use crate::scan::PackedUpdates;
-use crate::scan::updates::{BrickRuns, Run, TileUpdates, brick_code};
+use crate::scan::updates::{BrickRuns, Run, TileRuns, TileUpdates, brick_code};
 use crate::space::{BRICK_EDGE, Grid, TileIndex, VoxelIndex, place_of_voxel};
 
 /// Updates of consecutive rays outside the window, where every ray counts: packed, tile after tile as each ray reaches
@@ -60,14 +60,14 @@ impl FarRuns {
 
     fn end_tile(&mut self) {
         let Some(tile) = self.tile.take() else { return };
-        let in_order = |BrickOfRay { index, mut runs }: BrickOfRay| {
-            // Stable: a voxel's runs stay in order.
+        // Stable: a voxel's runs stay in order.
+        self.bricks.sort_by_key(|brick| brick_code(brick.index));
+        let mut all = TileRuns::default();
+        for BrickOfRay { index, mut runs } in self.bricks.drain(..) {
             runs.sort_by_key(|run| run.place);
-            BrickRuns { brick: brick_code(index), runs: runs.into() }
-        };
-        let mut bricks: Vec<BrickRuns> = self.bricks.drain(..).map(in_order).collect();
-        bricks.sort_by_key(|runs| runs.brick);
-        let mut packed = PackedUpdates::of(&TileUpdates::Runs(bricks));
+            all.push(BrickRuns { brick: brick_code(index), runs: &runs, misses: &[] });
+        }
+        let mut packed = PackedUpdates::of(&TileUpdates::Runs(all));
         packed.shrink();
         self.bytes += packed.bytes() + 2 * size_of::<Done>();
         let counts = (std::mem::take(&mut self.hits), std::mem::take(&mut self.misses));

@@ -3,9 +3,11 @@
 mod mapped_tiles;
 mod packed_updates;
 mod tile_order;
+mod tile_runs;
 mod tile_updates;
 
 pub(crate) use mapped_tiles::MappedTiles;
 pub use packed_updates::PackedUpdates;
 pub(crate) use tile_order::{brick_code, bricks_by_tile, in_order_of_tiles, part_in_tile};
-pub use tile_updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, ScanUpdates, TileUpdates};
+pub use tile_runs::{BrickRuns, Misses, Run, TileRuns};
+pub use tile_updates::{BrickUpdate, OrderedUpdates, ScanUpdates, TileUpdates};

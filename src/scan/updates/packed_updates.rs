@@ -1,4 +1,5 @@
-use super::tile_updates::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdates};
+use super::tile_runs::{BrickRuns, Run, TileRuns};
+use super::tile_updates::{BrickUpdate, OrderedUpdates, TileUpdates};
 use crate::space::{BrickCode, BrickMask};
 use std::io::{self, BufRead};
 
@@ -36,14 +37,14 @@ impl PackedUpdates {
                     brick.intensities.iter().for_each(|intensity| out.float(*intensity));
                 }
             }
-            TileUpdates::Runs(bricks) => {
+            TileUpdates::Runs(runs) => {
                 out.byte(RUNS);
-                out.number(bricks.len() as u64);
+                out.number(runs.brick_count() as u64);
                 let mut last = 0;
-                for brick in bricks {
+                for brick in runs.bricks() {
                     out.brick(brick.brick, &mut last);
-                    out.number(brick.runs.len() as u64);
-                    brick.runs.iter().for_each(|run| out.run(run));
+                    out.number((brick.runs.len() + brick.misses.len()) as u64);
+                    brick.iter().for_each(|run| out.run(&run));
                 }
             }
             TileUpdates::Ordered(updates) => {
@@ -198,7 +199,7 @@ impl<R: BufRead> Unpacker<R> {
         }
         Ok(Some(match self.byte()? {
             MASKS => TileUpdates::Masks(self.bricks(Self::brick_update)?),
-            RUNS => TileUpdates::Runs(self.bricks(Self::brick_runs)?),
+            RUNS => TileUpdates::Runs(self.tile_runs()?),
             ORDERED => {
                 let voxels = self.many(|input| Ok(u32::from_le_bytes(input.take()?)))?;
                 let intensities = self.many(Self::float)?;
@@ -227,8 +228,17 @@ impl<R: BufRead> Unpacker<R> {
         Ok(BrickUpdate { brick, hits, misses, intensities: self.many(Self::float)?.into() })
     }
 
-    fn brick_runs(&mut self, brick: BrickCode) -> io::Result<BrickRuns> {
-        Ok(BrickRuns { brick, runs: self.many(Self::run)?.into() })
+    /// All as runs: what came after the last of a voxel is one, too.
+    fn tile_runs(&mut self) -> io::Result<TileRuns> {
+        let mut all = TileRuns::default();
+        let (mut last, mut runs) = (0_u64, Vec::new());
+        for _ in 0..self.number()? {
+            last = last.wrapping_add(self.number()?);
+            runs.clear();
+            self.many_to(&mut runs, Self::run)?;
+            all.push(BrickRuns { brick: BrickCode(last), runs: &runs, misses: &[] });
+        }
+        Ok(all)
     }
 
     fn run(&mut self) -> io::Result<Run> {
@@ -257,13 +267,24 @@ impl<R: BufRead> Unpacker<R> {
     }
 
     /// A list behind its length. It grows as items are read, so a wrong length reserves no memory.
-    fn many<T>(&mut self, mut one: impl FnMut(&mut Self) -> io::Result<T>) -> io::Result<Vec<T>> {
+    fn many<T>(&mut self, one: impl FnMut(&mut Self) -> io::Result<T>) -> io::Result<Vec<T>> {
+        let mut all = Vec::new();
+        self.many_to(&mut all, one)?;
+        Ok(all)
+    }
+
+    /// [`Unpacker::many`], appended to `all`.
+    fn many_to<T>(
+        &mut self,
+        all: &mut Vec<T>,
+        mut one: impl FnMut(&mut Self) -> io::Result<T>,
+    ) -> io::Result<()> {
         let count = self.number()? as usize;
-        let mut all = Vec::with_capacity(count.min(MAX_RESERVED));
+        all.reserve(count.min(MAX_RESERVED));
         for _ in 0..count {
             all.push(one(self)?);
         }
-        Ok(all)
+        Ok(())
     }
 
     fn number(&mut self) -> io::Result<u64> {
@@ -298,6 +319,7 @@ impl<R: BufRead> Unpacker<R> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tile_runs::Misses;
     use super::*;
     use crate::sensor::Observation;
     use proptest::prelude::*;
@@ -320,8 +342,13 @@ mod tests {
         let run = (0..512_u16, any::<u16>(), prop::option::of(-1e3..1e3_f32));
         let run = run.prop_map(|(place, misses, hit)| Run { place, misses, hit });
         let brick = (0..1_u64 << 39, prop::collection::vec(run, 0..20));
-        let brick = brick.prop_map(|(code, runs)| BrickRuns { brick: BrickCode(code), runs: runs.into() });
-        prop::collection::vec(brick, 0..6).prop_map(TileUpdates::Runs)
+        prop::collection::vec(brick, 0..6).prop_map(|bricks| {
+            let mut all = TileRuns::default();
+            for (code, runs) in &bricks {
+                all.push(BrickRuns { brick: BrickCode(*code), runs, misses: &[] });
+            }
+            TileUpdates::Runs(all)
+        })
     }
 
     fn ordered() -> impl Strategy<Value = TileUpdates> {
@@ -346,5 +373,17 @@ mod tests {
             prop_assert_eq!(packed.len(), all.iter().map(TileUpdates::len).sum::<usize>());
             prop_assert_eq!(packed.is_empty(), all.is_empty());
         }
+    }
+
+    #[test]
+    fn misses_after_the_runs_come_back_as_runs() {
+        let (run, passed) = (Run { place: 4, misses: 2, hit: Some(1.0) }, Misses { place: 4, misses: 300 });
+        let mut runs = TileRuns::default();
+        runs.push(BrickRuns { brick: BrickCode(7), runs: &[run], misses: &[passed] });
+        let back: Vec<_> = PackedUpdates::of(&TileUpdates::Runs(runs)).iter().collect();
+        let [TileUpdates::Runs(back)] = &back[..] else { panic!("{back:?}") };
+        let all = [run, passed.into()];
+        let wanted = BrickRuns { brick: BrickCode(7), runs: &all, misses: &[] };
+        assert_eq!(back.bricks().collect::<Vec<_>>(), [wanted]);
     }
 }

@@ -1,3 +1,4 @@
+use super::tile_runs::TileRuns;
 use crate::scan::{PackedUpdates, ScanReport};
 use crate::sensor::Observation;
 use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, is_in_mask, places};
@@ -24,7 +25,7 @@ pub enum TileUpdates {
     /// At most one update per voxel: masks per brick, in Morton order.
     Masks(Vec<BrickUpdate>),
     /// Any number of updates per voxel, those of a voxel in order: runs per brick, in Morton order.
-    Runs(Vec<BrickRuns>),
+    Runs(TileRuns),
     /// Any number of updates per voxel, all in order.
     Ordered(OrderedUpdates),
     /// Any of these, packed.
@@ -42,38 +43,6 @@ pub struct BrickUpdate {
     pub misses: BrickMask,
     /// The largest intensity of each hit voxel, in the order of the mask; empty for sensor models that need none.
     pub intensities: Box<[f32]>,
-}
-
-/// Updates of voxels of one brick, any number per voxel.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BrickRuns {
-    /// Which brick.
-    pub brick: BrickCode,
-    /// The runs in Morton order of their voxels; those of a voxel in the order in which they count.
-    pub runs: Box<[Run]>,
-}
-
-/// Consecutive updates of one voxel: misses, and then a hit or nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Run {
-    /// The voxel's place in its brick's Morton order.
-    pub place: u16,
-    /// Number of misses before the hit.
-    pub misses: u16,
-    /// The hit after them, if any: its intensity, which some sensor models use.
-    pub hit: Option<f32>,
-}
-
-impl Run {
-    /// Number of updates.
-    pub fn len(&self) -> usize {
-        usize::from(self.misses) + usize::from(self.hit.is_some())
-    }
-
-    /// Whether there is no update.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
 }
 
 /// Updates of voxels of one tile in the order in which they count.
@@ -171,7 +140,7 @@ impl TileUpdates {
                 .flat_map(|brick| brick.hits.iter().chain(&brick.misses))
                 .map(|word| word.count_ones() as usize)
                 .sum(),
-            Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).map(Run::len).sum(),
+            Self::Runs(runs) => runs.len(),
             Self::Ordered(updates) => updates.len(),
             Self::Packed(updates) => updates.len(),
         }
@@ -181,7 +150,7 @@ impl TileUpdates {
     pub fn is_empty(&self) -> bool {
         match self {
             Self::Masks(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),
-            Self::Runs(bricks) => bricks.iter().flat_map(|brick| &brick.runs).all(Run::is_empty),
+            Self::Runs(runs) => runs.is_empty(),
             Self::Ordered(updates) => updates.is_empty(),
             Self::Packed(updates) => updates.len() == 0,
         }
@@ -194,10 +163,7 @@ impl TileUpdates {
                 let intensities: usize = bricks.iter().map(|brick| size_of_val(&*brick.intensities)).sum();
                 bricks.capacity() * size_of::<BrickUpdate>() + intensities
             }
-            Self::Runs(bricks) => {
-                let runs: usize = bricks.iter().map(|brick| size_of_val(&*brick.runs)).sum();
-                bricks.capacity() * size_of::<BrickRuns>() + runs
-            }
+            Self::Runs(runs) => runs.bytes(),
             Self::Ordered(updates) => (updates.voxels.capacity() + updates.intensities.capacity()) * 4,
             Self::Packed(updates) => updates.bytes(),
         };

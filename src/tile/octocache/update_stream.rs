@@ -48,10 +48,10 @@ impl<'a> UpdateStream<'a> {
                 }
             }
             // Runs do not keep the order of rays or intermediate log-odds, so a run is one update.
-            TileUpdates::Runs(bricks) => {
-                for update in bricks {
-                    table.update_runs(model, std::slice::from_ref(update));
-                    for run in &update.runs {
+            TileUpdates::Runs(runs) => {
+                for update in runs.bricks() {
+                    table.update_runs_of_brick(model, update);
+                    for run in update.iter() {
                         let code = update.brick.voxel(run.place.into());
                         if let Some(evidence) = table.get(code) {
                             self.push(code, evidence.log_odds);

@@ -3,7 +3,7 @@ use super::cells::Cells;
 use super::miss_runs::MissRuns;
 use super::palette::{Full, Palette, StateId, UNKNOWN};
 use super::unpadded_evidence::UnpaddedEvidence;
-use crate::scan::{BrickUpdate, Run};
+use crate::scan::{BrickRuns, BrickUpdate, Misses};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickMask, places};
 
@@ -70,20 +70,22 @@ impl Brick {
         })
     }
 
-    /// Applies runs. Returns how many voxels are observed for the first time, and how many of the runs are done: all of
-    /// them, unless the palette is full or the brick does not use it.
+    /// Applies runs, and takes away those that are done: all of them, unless the palette is full or the brick does not
+    /// use it. Returns how many voxels are observed for the first time.
     pub(crate) fn update_runs(
         &mut self,
-        runs: &[Run],
+        left: &mut BrickRuns<'_>,
         palette: &mut Palette,
         known: &mut MissRuns,
-    ) -> (usize, usize) {
-        let has_hits = runs.iter().any(|run| run.hit.is_some());
+    ) -> usize {
+        let has_hits = left.runs.iter().any(|run| run.hit.is_some());
         self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
-        let Storage::Interned(cells) = &mut self.evidence else { return (0, 0) };
-        cells.make(runs.iter().fold(0, |words, run| words | 1 << (run.place / 64)), UNKNOWN);
+        let Storage::Interned(cells) = &mut self.evidence else { return 0 };
+        let word_of = |place: u16| 1 << (place / 64);
+        let of_runs = left.runs.iter().fold(0, |words, run| words | word_of(run.place));
+        cells.make(left.misses.iter().fold(of_runs, |words, misses| words | word_of(misses.place)), UNKNOWN);
         let mut new = 0;
-        for (done, run) in runs.iter().enumerate() {
+        while let Some((run, later)) = left.runs.split_first() {
             let (word, bit) = (usize::from(run.place / 64), usize::from(run.place % 64));
             let state = &mut cells.cell_mut(word).expect(MADE)[bit];
             let before = *state;
@@ -93,13 +95,14 @@ impl Brick {
                 Some(intensity) => palette.after_hit(missed, intensity),
                 None => Ok(missed),
             });
-            let Ok(after) = after else { return (new, done) };
+            let Ok(after) = after else { return new };
             *state = after;
             // No update leads to the unknown state, and no run is empty.
             self.observed[word] |= u64::from(after != UNKNOWN) << bit;
             new += usize::from(before == UNKNOWN && after != UNKNOWN);
+            left.runs = later;
         }
-        (new, runs.len())
+        new + update_misses(cells, &mut self.observed, &mut left.misses, palette, known)
     }
 
     #[inline]
@@ -151,6 +154,46 @@ impl Brick {
         }
         voxels.len()
     }
+}
+
+/// Applies misses, and takes away those that are done. Returns how many voxels are observed for the first time.
+fn update_misses(
+    cells: &mut Cells<StateId>,
+    observed: &mut BrickMask,
+    left: &mut &[Misses],
+    palette: &mut Palette,
+    known: &mut MissRuns,
+) -> usize {
+    let mut new = 0;
+    while let Some(first) = left.first() {
+        // Those of one cell, which is looked up once.
+        let word = usize::from(first.place / 64);
+        let cell = cells.cell_mut(word).expect(MADE);
+        let (mut passed, mut done) = (0_u64, 0);
+        let mut is_full = false;
+        for &Misses { place, misses } in
+            left.iter().take_while(|misses| usize::from(misses.place / 64) == word)
+        {
+            let state = &mut cell[usize::from(place % 64)];
+            // Without misses an unknown voxel stays unknown.
+            if misses > 0 {
+                let Ok(after) = palette.after_misses(*state, misses, known) else {
+                    is_full = true;
+                    break;
+                };
+                *state = after;
+                passed |= 1 << (place % 64);
+            }
+            done += 1;
+        }
+        new += (passed & !observed[word]).count_ones() as usize;
+        observed[word] |= passed;
+        *left = &left[done..];
+        if is_full {
+            break;
+        }
+    }
+    new
 }
 
 /// Whether both are equal to the bit.

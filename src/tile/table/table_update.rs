@@ -3,7 +3,7 @@ use super::brick_directory::Address;
 use super::brick_table::Table;
 use super::brick_update::Rest;
 use super::miss_runs::MissRuns;
-use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileUpdates};
+use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileRuns, TileUpdates};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickCode, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
 
@@ -15,7 +15,7 @@ impl Table {
     pub fn apply(&mut self, model: &SensorModel, first: VoxelIndex, updates: &TileUpdates) {
         match updates {
             TileUpdates::Masks(bricks) => self.update_bricks(model, bricks),
-            TileUpdates::Runs(bricks) => self.update_runs(model, bricks),
+            TileUpdates::Runs(runs) => self.update_runs(model, runs),
             TileUpdates::Ordered(updates) => self.update_in_order(model, first, updates),
             TileUpdates::Packed(packed) => {
                 packed.iter().for_each(|updates| self.apply(model, first, &updates));
@@ -51,35 +51,46 @@ impl Table {
         }
     }
 
-    /// Applies runs of updates of bricks, in insertion per ray.
-    pub fn update_runs(&mut self, model: &SensorModel, bricks: &[BrickRuns]) {
+    /// Applies runs of updates of bricks, in insertion per ray; stage by stage, as [`Table::update_bricks`].
+    pub fn update_runs(&mut self, model: &SensorModel, runs: &TileRuns) {
         self.palette.use_model(model);
         let mut known = MissRuns::new();
-        for BrickRuns { brick, runs } in bricks {
-            let number = self.number_of(*brick);
-            let mut left = &runs[..];
-            while !left.is_empty() {
-                let brick = &mut self.bricks[number];
-                let (bytes, bound) = (brick.heap_bytes(), brick.bound());
-                let (new, done) = brick.update_runs(left, &mut self.palette, &mut known);
-                self.len += new;
-                self.cell_bytes += brick.heap_bytes() - bytes;
-                self.note_raised(number, bound);
-                left = &left[done..];
-                if let Some((run, later)) = left.split_first() {
-                    let renumberings = self.palette.renumberings();
-                    self.update_run(number, run);
-                    left = later;
-                    if self.palette.renumberings() != renumberings {
-                        known.clear();
-                    }
-                }
+        let mut bricks = runs.bricks().peekable();
+        let mut some = Vec::with_capacity(TOGETHER);
+        while bricks.peek().is_some() {
+            some.clear();
+            some.extend(bricks.by_ref().take(TOGETHER).map(|runs| (self.number_of(runs.brick), runs)));
+            some.iter().for_each(|&(number, _)| self.bricks[number].look_at_storage());
+            some.iter().for_each(|&(number, _)| self.bricks[number].look_at_cells());
+            some.iter().for_each(|&(number, runs)| self.update_runs_at(number, runs, &mut known));
+        }
+    }
+
+    /// Applies runs of updates of one brick, in insertion per ray.
+    pub fn update_runs_of_brick(&mut self, model: &SensorModel, runs: BrickRuns<'_>) {
+        self.palette.use_model(model);
+        let number = self.number_of(runs.brick);
+        self.update_runs_at(number, runs, &mut MissRuns::new());
+    }
+
+    fn update_runs_at(&mut self, number: usize, mut left: BrickRuns<'_>, known: &mut MissRuns) {
+        loop {
+            let brick = &mut self.bricks[number];
+            let (bytes, bound) = (brick.heap_bytes(), brick.bound());
+            self.len += brick.update_runs(&mut left, &mut self.palette, known);
+            self.cell_bytes += brick.heap_bytes() - bytes;
+            self.note_raised(number, bound);
+            let Some(run) = left.take_first() else { return };
+            let renumberings = self.palette.renumberings();
+            self.update_run(number, run);
+            if self.palette.renumberings() != renumberings {
+                known.clear();
             }
         }
     }
 
     /// Applies a run of updates one by one.
-    fn update_run(&mut self, number: usize, run: &Run) {
+    fn update_run(&mut self, number: usize, run: Run) {
         let hit = run.hit.map(Observation::Hit);
         for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
             self.step(number, run.place.into(), observation);
