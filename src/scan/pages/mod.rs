@@ -11,7 +11,7 @@ mod page_map;
 mod sparse_page;
 mod window;
 
-pub(crate) use counted_page::{CountedPage, Counts, MAX_RAYS};
+pub(crate) use counted_page::{BrickCounts, CountedPage, MAX_RAYS};
 pub(crate) use footprint::Footprint;
 pub(crate) use marked_page::{MarkedBrick, MarkedPage, WORDS};
 pub(crate) use page_map::PageMap;

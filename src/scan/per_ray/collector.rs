@@ -1,6 +1,8 @@
 use super::far_runs::FarRuns;
 use crate::scan::ScanReport;
-use crate::scan::pages::{CountedPage, Counts, Footprint, PageMap, Window, brick_in_page, place_in_page};
+use crate::scan::pages::{
+    BrickCounts, CountedPage, Footprint, PageMap, Window, brick_in_page, place_in_page,
+};
 use crate::scan::ray::SlabRay;
 use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
@@ -27,8 +29,8 @@ pub(crate) struct PerRayCollector {
     allowance: Allowance,
 }
 
-/// Most bytes that a ray adds per slab: three eighths of a brick of 1 KiB, and three 64ths of a page.
-const BYTES_PER_SLAB: usize = 448;
+/// Most bytes that a ray adds per slab: three eighths of a brick of 512 bytes, and three 64ths of a page.
+const BYTES_PER_SLAB: usize = 256;
 /// Most bytes that a ray adds beside its slabs: the page and the brick that it ends in.
 const BYTES_PER_RAY: usize = 4 << 10;
 
@@ -44,7 +46,7 @@ struct EndedRun {
 
 /// A brick with counts or hits.
 struct Brick<'a> {
-    counts: &'a Counts,
+    counts: BrickCounts<'a>,
     /// The runs that ended in it with a hit, in order.
     ended: &'a [Run],
 }
@@ -92,7 +94,7 @@ impl PerRayCollector {
             ray.pass(&mut self.pages, 0, false, |voxel| far.push(voxel));
             for voxel in far {
                 let page = self.pages.number_of(voxel);
-                *self.pages.pages_mut()[page].count(place_in_page(voxel)) += 1;
+                self.pages.pages_mut()[page].pass_at(place_in_page(voxel));
             }
             return;
         };
@@ -107,7 +109,7 @@ impl PerRayCollector {
             return far.hit(voxel, intensity);
         }
         let (page, place) = (self.pages.number_of(voxel), place_in_page(voxel));
-        let misses = std::mem::take(self.pages.pages_mut()[page].count(place));
+        let misses = self.pages.pages_mut()[page].take(place);
         self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
     }
 
@@ -132,24 +134,24 @@ impl PerRayCollector {
     }
 
     /// The bricks of all pages, page by page, and their indices: their voxels' indices divided by 8.
-    fn bricks(&self) -> (Vec<&Counts>, Vec<VoxelIndex>) {
-        let bricks: Vec<&Counts> = self.pages.pages().iter().flat_map(CountedPage::bricks).collect();
+    fn bricks(&self) -> (Vec<BrickCounts<'_>>, Vec<VoxelIndex>) {
+        let bricks: Vec<BrickCounts<'_>> = self.pages.pages().iter().flat_map(CountedPage::bricks).collect();
         let mut indices = Vec::with_capacity(bricks.len());
         for (page, &index) in self.pages.pages().iter().zip(self.pages.indices()) {
             let first = indices.len();
-            indices.resize(first + page.bricks().len(), index);
+            indices.resize(first + page.brick_count(), index);
             page.places().for_each(|(place, brick)| indices[first + brick] = brick_in_page(index, place));
         }
         (bricks, indices)
     }
 
     /// The runs that ended with a hit, by brick: a counting sort in two passes.
-    fn ended_by_brick(&self, bricks: &[&Counts]) -> EndedByBrick {
+    fn ended_by_brick(&self, bricks: &[BrickCounts<'_>]) -> EndedByBrick {
         let mut first_of_page = Vec::with_capacity(self.pages.pages().len());
         let mut first = 0;
         for page in self.pages.pages() {
             first_of_page.push(first);
-            first += page.bricks().len();
+            first += page.brick_count();
         }
         let brick_of = |run: &EndedRun| {
             let page = run.page as usize;
@@ -231,16 +233,24 @@ impl<'a> Brick<'a> {
     /// Writes the misses since each voxel's last hit, if any, to the front of `all`; returns how many voxels have some.
     fn passed(&self, all: &mut [Misses; BRICK_VOXELS + CHUNK]) -> usize {
         let mut count = 0;
+        let Some(counts) = self.counts.as_bytes() else {
+            for place in 0..BRICK_VOXELS {
+                let misses = self.counts.get(place);
+                all[count] = Misses { place: place as u16, misses };
+                count += usize::from(misses > 0);
+            }
+            return count;
+        };
         // Most voxels were not passed, so a chunk at a time is skipped.
-        for (chunk, first) in self.counts.chunks_exact(CHUNK).zip((0..).step_by(CHUNK)) {
-            if chunk.iter().fold(0, |any, misses| any | misses) == 0 {
+        for (chunk, first) in counts.as_chunks::<CHUNK>().0.iter().zip((0..).step_by(CHUNK)) {
+            if u64::from_ne_bytes(*chunk) == 0 {
                 continue;
             }
             let out = &mut all[count..][..CHUNK];
             let mut written = 0;
             // Without a branch: it would be unpredictable.
             for (&misses, place) in chunk.iter().zip(first..) {
-                out[written % CHUNK] = Misses { place, misses };
+                out[written % CHUNK] = Misses { place, misses: misses.into() };
                 written += usize::from(misses > 0);
             }
             count += written;

@@ -405,9 +405,10 @@ mod tests {
         let expected = visits(&rays);
         let mut passes = Passes::new();
         for (page, index) in counted.pages().iter().zip(counted.indices()) {
+            let bricks: Vec<_> = page.bricks().collect();
             for (place, brick) in page.places() {
-                let counts = page.bricks()[brick];
-                add(&mut passes, brick_in_page(*index, place), |place| u32::from(counts[place]));
+                let counts = bricks[brick];
+                add(&mut passes, brick_in_page(*index, place), |place| u32::from(counts.get(place)));
             }
         }
         assert_eq!(passes, expected, "{origin:?} to {ends:?}");
