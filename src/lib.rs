@@ -76,6 +76,7 @@ pub mod mapper;
 pub mod maths;
 #[doc(hidden)]
 pub mod octree;
+mod one_heap;
 pub mod operations;
 #[doc(hidden)]
 pub mod path_text;
@@ -103,6 +104,7 @@ pub use mapper::{
 };
 /// The crate of [`Pose::isometry`], in the version that voxtile uses.
 pub use nalgebra;
+pub use one_heap::begin_with_one_heap;
 pub use query::{Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy};
 pub use scan::{Pose, Scan, ScanPoints, ScanRef, ScanReport, Stop};
 pub use sensor::{Evidence, SensorModel};

@@ -41,7 +41,6 @@ mod merge;
 mod new_poses;
 mod octree_choice;
 mod octree_file;
-mod one_heap;
 mod output_file;
 mod part;
 mod picture;

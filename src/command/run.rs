@@ -6,11 +6,12 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, one_heap, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report,
+    merge, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report,
     revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
+use crate::begin_with_one_heap;
 use clap::Parser;
 use std::ffi::OsString;
 use std::io::Write;
@@ -41,7 +42,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         && args.cache_tiles.is_none()
     {
         // Before there is a second thread, and before anything is read from standard input.
-        one_heap::begin_with_one_heap();
+        begin_with_one_heap();
     }
     if is_parallel(&command)
         && let Err(error) = threads::start(threads)

@@ -41,6 +41,8 @@ use std::sync::Arc;
 use voxtile::Stop;
 
 fn main() -> ExitCode {
+    // So that --memory holds: DDS and the mapper have many threads.
+    voxtile::begin_with_one_heap();
     // To ros2-client a topic that nobody has subscribed to yet is an error, whenever one looks. To a writer of rustdds
     // it is one when a reader asks again for a message that a newer one has replaced; some readers ask a hundred times.
     let filter = "info,rustdds=error,rustdds::rtps::writer=off,ros2_client=off";

@@ -1,7 +1,7 @@
-//! Does a scan cost the same however far the map has come?
+//! Does a scan cost the same however far the map has come, and however many tiles it has?
 
 use crate::build::{Build, Built, ScanCost};
-use crate::case::Limit;
+use crate::case::{Case, Limit};
 use crate::findings::Findings;
 use crate::promise::{Promise, Wanted};
 use crate::setting::{RAYS, Setting, made_up};
@@ -24,36 +24,56 @@ const WINDOWS: usize = 40;
 type Clock = (&'static str, fn(&ScanCost) -> f64);
 const CLOCKS: [Clock; 2] = [("CPU", |scan| scan.cpu_ms), ("wall", |scan| scan.wall_ms)];
 
+/// A way, and how it is looked at.
+struct Way {
+    case: Case,
+    stretch_m: f64,
+    /// Names of its table of stretches, its table of latencies and its plot.
+    files: [&'static str; 3],
+}
+
 pub fn answer(setting: &Setting) -> Result<Findings> {
-    let metres = setting.size(20_000, 300);
-    let stretch_m = setting.size(1_000.0, 50.0);
-    let limit_mib = setting.size(64, 24);
-    let case = made_up("drive", (SurveyName::Drive, RAYS, metres), [0.2, 10.0, 60.0]);
-    let build = Build {
-        scans_at_a_time: SCANS_AT_A_TIME,
-        has_digest: false,
-        ..setting.build(&case, Limit::Bytes(limit_mib << 20))
+    let way = |metres| (SurveyName::Drive, RAYS, metres);
+    let long = Way {
+        case: made_up("drive", way(setting.size(20_000, 300)), [0.2, 10.0, 60.0]),
+        stretch_m: setting.size(1_000.0, 50.0),
+        files: ["flat_cost", "latency", "flat_cost"],
     };
-    let built = build.clone().apart()?;
+    let small_tiles = Way {
+        case: made_up("small tiles", way(setting.size(3_000, 60)), [0.1, 2.5, 60.0]),
+        stretch_m: setting.size(500.0, 20.0),
+        files: ["flat_cost_small_tiles", "latency_small_tiles", "flat_cost_small_tiles"],
+    };
+    let limit_mib = setting.size(64, 24);
     let mut findings = Findings::default();
-    findings.keep_build(&build, &built)?;
-    findings.promises = promises(&built, stretch_m);
-    let what = format!("{}, limit {limit_mib} MiB", case.description());
-    findings.answer.tables = vec![stretches(&built, stretch_m, &what), latencies(&built)];
-    findings.answer.plots = vec![plot(&built)];
+    for Way { case, stretch_m, files: [of_stretches, of_latencies, of_plot] } in [long, small_tiles] {
+        let build = Build {
+            scans_at_a_time: SCANS_AT_A_TIME,
+            has_digest: false,
+            ..setting.build(&case, Limit::Bytes(limit_mib << 20))
+        };
+        let built = build.clone().apart()?;
+        findings.keep_build(&build, &built)?;
+        findings.promises.extend(promises(&case.name, &built, stretch_m));
+        let tiles = built.tiles;
+        let what = format!("{}, limit {limit_mib} MiB, {tiles} tiles", case.description());
+        let tables = [stretches(of_stretches, &built, stretch_m, &what), latencies(of_latencies, &built, &what)];
+        findings.answer.tables.extend(tables);
+        findings.answer.plots.push(plot(of_plot, &built, &case.name));
+    }
     Ok(findings)
 }
 
-fn promises(built: &Built, stretch_m: f64) -> Vec<Promise> {
+fn promises(case: &str, built: &Built, stretch_m: f64) -> Vec<Promise> {
     let growth = CLOCKS.map(|(clock, time_of)| {
         let [second, last] = [stretch(built, stretch_m, 1), last_stretch(built, stretch_m)];
         let growth = mean(last, time_of) / mean(second, time_of);
-        let what = format!("{clock} of a scan, last stretch by second");
+        let what = format!("{case}: {clock} of a scan, last stretch by second");
         Promise::about_time(what, growth, Wanted::AtMost(MOST_GROWTH), "")
     });
     let wall_ms = samples(evicting(built), |scan| scan.wall_ms);
     let slow = wall_ms.quantile(0.99) / wall_ms.median();
-    let what = "wall of the 99th percentile of scans by the median, while tiles are pushed out";
+    let what = format!("{case}: wall of the 99th percentile by the median, while tiles are pushed out");
     growth.into_iter().chain([Promise::about_time(what, slow, Wanted::AtMost(MOST_SLOW), "")]).collect()
 }
 
@@ -86,10 +106,10 @@ fn mean(scans: &[ScanCost], time_of: impl Fn(&ScanCost) -> f64) -> f64 {
     scans.iter().map(time_of).sum::<f64>() / scans.len() as f64
 }
 
-fn stretches(built: &Built, stretch_m: f64, what: &str) -> Table {
+fn stretches(file: &'static str, built: &Built, stretch_m: f64, what: &str) -> Table {
     let caption = format!("Mean milliseconds a scan, by stretches of {} km; {what}.", stretch_m / 1e3);
     let columns = ["from km", "CPU ms", "wall ms", "scans"];
-    let mut table = Table::new("flat_cost", caption, columns);
+    let mut table = Table::new(file, caption, columns);
     let end_m = built.scans.last().map_or(0.0, |scan| scan.distance_m);
     for number in 0..(end_m / stretch_m).ceil() as usize {
         let scans = stretch(built, stretch_m, number);
@@ -100,11 +120,12 @@ fn stretches(built: &Built, stretch_m: f64, what: &str) -> Table {
     table
 }
 
-fn latencies(built: &Built) -> Table {
-    let caption =
-        "Wall milliseconds of `insert_scan`: of all scans, and of those while tiles are pushed out.";
+fn latencies(file: &'static str, built: &Built, what: &str) -> Table {
+    let caption = format!(
+        "Wall milliseconds of `insert_scan`: of all scans, and of those while tiles are pushed out; {what}."
+    );
     let columns = ["scans", "how many", "median", "p90", "p99", "worst", "p99 by median"];
-    let mut table = Table::new("latency", caption, columns);
+    let mut table = Table::new(file, caption, columns);
     for (name, scans) in [("all", &built.scans[..]), ("while tiles are pushed out", evicting(built))] {
         let wall_ms = samples(scans, |scan| scan.wall_ms);
         let of = |share| Cell::Number(wall_ms.quantile(share), 2);
@@ -121,7 +142,7 @@ fn latencies(built: &Built) -> Table {
     table
 }
 
-fn plot(built: &Built) -> Plot {
+fn plot(file: &'static str, built: &Built, case: &str) -> Plot {
     let window = built.scans.len().div_ceil(WINDOWS).max(1);
     let panels = CLOCKS.map(|(clock, time_of)| {
         let lines = [("median", 0.5), ("p99", 0.99)].map(|(name, share)| {
@@ -138,8 +159,8 @@ fn plot(built: &Built) -> Plot {
             content: Content::Lines { x_scale: Scale::Linear, y_scale: Scale::Linear, lines: lines.into() },
         }
     });
-    let caption = format!("Milliseconds a scan over distance, in windows of {window} scans");
-    Plot { file: "flat_cost", caption, panels: panels.into() }
+    let caption = format!("Milliseconds a scan over distance, {case}, in windows of {window} scans");
+    Plot { file, caption, panels: panels.into() }
 }
 
 #[cfg(test)]
@@ -171,7 +192,7 @@ mod tests {
 
     #[test]
     fn growth_and_slow_scans_are_found() {
-        let promises = promises(&built(400), 100.0);
+        let promises = promises("way", &built(400), 100.0);
         let found: Vec<f64> = promises.iter().map(|promise| promise.found).collect();
         assert!((found[0] - 8.0 / 6.0).abs() < 1e-9 && !promises[0].is_kept(), "{found:?}");
         assert!((found[1] - 1.0).abs() < 1e-9 && promises[1].is_kept(), "{found:?}");
