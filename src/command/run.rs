@@ -6,8 +6,8 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report,
-    revert, scans, share, snapshot, snapshots, threads, verify,
+    merge, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report, revert,
+    scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};

@@ -7,8 +7,8 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) tiles: usize,
     /// Most bytes of all that grows.
     pub(super) bytes: usize,
-    /// Most bytes of buffered updates; those of one scan may come on top.
-    pub(super) buffer_bytes: usize,
+    /// Most bytes of buffered updates while there is no index; see [`MemoryPlan::buffer_bytes`].
+    buffer_bytes: usize,
     /// Most bytes for tracing a scan.
     pub(in crate::mapper) scan_bytes: usize,
     /// Most bytes of packed updates of a scan; what comes on top goes to files.
@@ -22,8 +22,10 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) spare_bytes: usize,
     /// A tile for which updates of so many scans wait is changed often.
     pub(super) often_scans: u32,
-    /// Most bytes of tiles in the compact form while others have to go.
-    pub(super) compact_bytes: usize,
+    /// Most bytes of tiles in the compact form while there is no index; see [`MemoryPlan::compact_bytes`].
+    compact_bytes: usize,
+    /// Bytes that the index of tiles takes, which grows with the map.
+    index_bytes: usize,
     /// Most bytes of tiles that readers in other threads make, once there are any.
     pub(in crate::mapper) reader_bytes: usize,
     /// Most bytes of what views hold that has changed since.
@@ -46,6 +48,7 @@ impl MemoryPlan {
                 spare_bytes: 0,
                 often_scans: OFTEN_SCANS,
                 compact_bytes: 0,
+                index_bytes: 0,
                 reader_bytes: 64 << 20,
                 view_bytes: usize::MAX,
             },
@@ -56,6 +59,33 @@ impl MemoryPlan {
                 Self { least_scan_bytes: 0, is_enforced: false, ..Self::shares_of(bytes) }
             }
         }
+    }
+
+    /// Whether there are tiles in the compact form.
+    pub(super) fn has_compact_tier(&self) -> bool {
+        self.compact_bytes > 0
+    }
+
+    /// Notes how much the index of tiles takes.
+    pub(super) fn note_index(&mut self, bytes: usize) {
+        self.index_bytes = bytes;
+    }
+
+    /// Most bytes of buffered updates; those of one scan may come on top.
+    pub(super) fn buffer_bytes(&self) -> usize {
+        self.left_by_index(self.buffer_bytes)
+    }
+
+    /// Most bytes of tiles in the compact form while others have to go.
+    pub(super) fn compact_bytes(&self) -> usize {
+        self.left_by_index(self.compact_bytes)
+    }
+
+    /// What the index leaves of a share. It takes from all of them: taken from the tiles ready for use alone, every scan
+    /// would encode and decode more of them the larger the map is.
+    fn left_by_index(&self, share: usize) -> usize {
+        let taken = self.index_bytes.min(self.bytes);
+        share - (share as u128 * taken as u128 / self.bytes.max(1) as u128) as usize
     }
 
     fn shares_of(bytes: usize) -> Self {
@@ -70,8 +100,27 @@ impl MemoryPlan {
             spare_bytes: bytes / 4,
             often_scans: OFTEN_SCANS,
             compact_bytes: bytes / 8 * 3,
+            index_bytes: 0,
             reader_bytes: bytes / 16,
             view_bytes: bytes / 8,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_index_takes_from_every_share_alike() {
+        let mut plan = MemoryPlan::new(MemoryLimit::Bytes(64 << 20));
+        assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (16 << 20, 24 << 20));
+        plan.note_index(8 << 20);
+        assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (14 << 20, 21 << 20));
+        plan.note_index(usize::MAX);
+        assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (0, 0));
+        let mut plan = MemoryPlan::new(MemoryLimit::Tiles { tiles: 3, write_buffer_bytes: 1000 });
+        plan.note_index(1 << 30);
+        assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (1000, 0));
     }
 }

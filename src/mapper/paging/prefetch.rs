@@ -21,7 +21,7 @@ impl TilePager<'_> {
         }
         // Soon these will have to come in.
         let excess =
-            self.contents.buffer.bytes().saturating_sub(self.contents.cache.plan().buffer_bytes / 4 * 3);
+            self.contents.buffer.bytes().saturating_sub(self.contents.cache.plan().buffer_bytes() / 4 * 3);
         if excess > 0 {
             for tile in self.contents.buffer.heaviest(excess) {
                 if !self.is_spilling_cheaper(tile) {

@@ -70,7 +70,7 @@ impl TileCache {
 
     /// Whether there is a tier of tiles in the compact form. There is none where tiles are counted.
     pub(super) fn has_compact_tier(&self) -> bool {
-        self.plan.compact_bytes > 0
+        self.plan.has_compact_tier()
     }
 
     // Resident tiles.
@@ -246,13 +246,13 @@ impl TileCache {
 
     /// The dirty tile in the compact form that should be saved before it has to go, if the tier is nearly full.
     pub(super) fn next_to_save(&self) -> Option<TileIndex> {
-        let is_nearly_full = self.compact.bytes() > self.plan.compact_bytes / 4 * 3;
+        let is_nearly_full = self.compact.bytes() > self.plan.compact_bytes() / 4 * 3;
         is_nearly_full.then(|| self.compact.next_to_save()).flatten()
     }
 
     /// Whether tiles in the compact form will soon have to go, and none is clean.
     pub(super) fn is_behind(&self) -> bool {
-        self.compact.bytes() > self.plan.compact_bytes / 8 * 7 && self.compact.oldest_clean().is_none()
+        self.compact.bytes() > self.plan.compact_bytes() / 8 * 7 && self.compact.oldest_clean().is_none()
     }
 
     /// Notes that a tile in the compact form is being saved, and returns it.
@@ -271,6 +271,11 @@ impl TileCache {
     }
 
     // The memory limit. `outside` are the bytes that grow outside of the cache.
+
+    /// Notes how much memory the index of tiles takes.
+    pub(super) fn note_index(&mut self, bytes: usize) {
+        self.plan.note_index(bytes);
+    }
 
     /// Keeps memory free for scans as large as this one.
     pub(super) fn reserve_for_scan(&mut self, scan_bytes: usize) {
@@ -311,7 +316,7 @@ impl TileCache {
         let clean = flight.and_then(|_| self.compact.oldest_clean());
         let resident = self.resident.least_recently_used(|index| self.lets_go(flight, index));
         match (resident, clean.or_else(|| self.compact.oldest())) {
-            (_, Some(index)) if is_short && self.compact.bytes() > self.plan.compact_bytes => {
+            (_, Some(index)) if is_short && self.compact.bytes() > self.plan.compact_bytes() => {
                 Some(Eviction::Compact(index))
             }
             (Some(index), _) => Some(Eviction::Resident(index)),
@@ -323,7 +328,7 @@ impl TileCache {
     /// Bytes that count towards the limit. The compact tier counts as full: resident tiles leave small free blocks that
     /// its large ones cannot use.
     fn limited_bytes(&self, outside: usize) -> usize {
-        let compact = self.compact.bytes().max(self.plan.compact_bytes);
+        let compact = self.compact.bytes().max(self.plan.compact_bytes());
         self.resident.bytes() + compact + self.scan_bytes + outside
     }
 

@@ -80,6 +80,8 @@ impl TilePager<'_> {
     ///
     /// `scan_bytes` are the bytes of memory that inserting scans takes, with these updates.
     pub(in crate::mapper) fn prepare(&mut self, updates: &ScanUpdates, scan_bytes: usize) -> Result<()> {
+        let index_bytes = self.disk.index_bytes() + self.disk.commit_bytes();
+        self.contents.cache.note_index(index_bytes);
         self.contents.cache.reserve_for_scan(scan_bytes);
         self.check_index(updates)?;
         self.take_finished_io()?;
@@ -230,7 +232,7 @@ impl TilePager<'_> {
 
     /// Shrinks the write buffer to its share of memory: updates are applied, or spilled where that is cheaper.
     fn drain_buffer(&mut self) -> Result<()> {
-        let most_bytes = self.contents.cache.plan().buffer_bytes;
+        let most_bytes = self.contents.cache.plan().buffer_bytes();
         let excess = self.contents.buffer.bytes().saturating_sub(most_bytes);
         let heaviest = if excess > 0 { self.contents.buffer.heaviest(excess) } else { Vec::new() };
         for tile in heaviest {

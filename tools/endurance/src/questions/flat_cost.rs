@@ -57,7 +57,8 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         findings.promises.extend(promises(&case.name, &built, stretch_m));
         let tiles = built.tiles;
         let what = format!("{}, limit {limit_mib} MiB, {tiles} tiles", case.description());
-        let tables = [stretches(of_stretches, &built, stretch_m, &what), latencies(of_latencies, &built, &what)];
+        let tables =
+            [stretches(of_stretches, &built, stretch_m, &what), latencies(of_latencies, &built, &what)];
         findings.answer.tables.extend(tables);
         findings.answer.plots.push(plot(of_plot, &built, &case.name));
     }
