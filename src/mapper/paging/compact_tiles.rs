@@ -83,6 +83,25 @@ impl CompactTiles {
         Ok(())
     }
 
+    /// Encodes the present content of a tile that has an earlier one here, not being saved, which keeps its place in the
+    /// order; tells whether it has.
+    ///
+    /// # Errors
+    ///
+    /// A lack of memory.
+    pub(super) fn renew(&mut self, tile: &Tile, occupied_from: Option<f64>) -> Result<bool> {
+        let index = tile.index();
+        if !self.needs_save(index) {
+            return Ok(false);
+        }
+        let compact = CompactTile::encode(&mut self.packer, tile, occupied_from)?;
+        let Some(entry) = self.tiles.peek_mut(&index) else { return Ok(false) };
+        self.bytes -= entry.bytes();
+        entry.tile = compact;
+        self.bytes += entry.bytes();
+        Ok(true)
+    }
+
     fn put(&mut self, index: TileIndex, tile: CompactTile, is_dirty: bool) {
         self.remove(index);
         let entry = Entry { tile, is_dirty, is_saving: false, number: self.puts };

@@ -173,9 +173,26 @@ impl TilePager<'_> {
             self.wait_for_save()?;
         }
         let writer = self.wait(|disk| disk.writer())?;
+        if let Err(error) = self.apply_before_save(index) {
+            log::debug!("tile {index}: its updates stay buffered: {error}");
+        }
         if let Some(tile) = self.contents.cache.begin_save(index) {
             let scan_number = self.contents.scan_number;
             self.disk.save(writer, index, tile, scan_number);
+        }
+        Ok(())
+    }
+
+    /// Applies what is buffered for a tile in the compact form that is about to be saved. It was not used for long, so
+    /// nothing else would bring it in: the buffer would fill with a few updates of every tile that a way has passed.
+    fn apply_before_save(&mut self, index: TileIndex) -> Result<()> {
+        let buffer = &self.contents.buffer;
+        if !buffer.contains(index) || buffer.is_staged(index) || buffer.is_frozen(index) {
+            return Ok(());
+        }
+        let tile = self.read(index)?;
+        if self.contents.cache.renew_compact(&tile)? {
+            self.contents.buffer.forget(index, &self.disk);
         }
         Ok(())
     }

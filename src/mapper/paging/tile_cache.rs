@@ -219,6 +219,19 @@ impl TileCache {
         Ok(())
     }
 
+    /// Puts a tile's present content in the place of its compact form, which keeps its place in the order; tells whether
+    /// it has one.
+    ///
+    /// # Errors
+    ///
+    /// A lack of memory; the compact form stays as it was.
+    pub(super) fn renew_compact(&mut self, tile: &Tile) -> Result<bool> {
+        let is_renewed = self.compact.renew(tile, self.occupied_from)?;
+        self.encoded += u64::from(is_renewed);
+        self.decoded += u64::from(is_renewed);
+        Ok(is_renewed)
+    }
+
     /// Drops a tile in the compact form.
     pub(super) fn drop_compact(&mut self, index: TileIndex) {
         self.compact.remove(index);
