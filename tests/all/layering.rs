@@ -28,8 +28,9 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
 }
 
 /// Every folder and file of the library, and what of ours it may name. Above them is `command/`, which may name all.
-const LAYERS: [(&str, &[&str]); 25] = [
+const LAYERS: [(&str, &[&str]); 26] = [
     ("maths.rs", &[]),
+    ("one_heap.rs", &[]),
     ("path_text.rs", &[]),
     ("scratch.rs", &[]),
     ("error.rs", &["space"]),

@@ -84,6 +84,34 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     assert!(flushed.stalls.p50_us <= flushed.stalls.p99_us);
 }
 
+/// What a way has passed is written once, with all that was observed: otherwise a few updates of every tile would stay
+/// in memory, and tiles would be read and written again for them, the more of them the longer the way.
+#[test]
+fn tiles_that_are_left_behind_take_their_updates_with_them() {
+    let folder = TempDir::new().unwrap();
+    let config = MapConfig::new(0.2, 1.6).unwrap().with_range(0.0, 20.0);
+    let scans: Vec<Scan> = Survey::tour(3, 1_000).take(160).collect();
+    let mut expected = InMemoryMapper::new(config.clone()).unwrap();
+    let tight = config.with_tight_memory_bytes(2_000_000);
+    let path = MapPath::on(UnsyncedDisk::shared(), folder.path().join("map"));
+    let mut mapper = OutOfCoreTileMapper::create(path, tight).unwrap();
+    for scan in &scans {
+        mapper.insert_scan(scan).unwrap();
+        expected.insert_scan(scan).unwrap();
+    }
+    let statistics = mapper.statistics();
+    let of_tiles = |count: u64| count as f64 / statistics.tiles as f64;
+    let [waiting, saved, read] =
+        [statistics.buffered_tiles, statistics.io.saves, statistics.io.loads].map(of_tiles);
+    let what = format!("{} tiles: {waiting} wait, {saved} saved, {read} read", statistics.tiles);
+    assert!(saved > 0.3, "{what}: too much memory");
+    assert!(waiting < 0.25 && read < 0.05, "{what}");
+    mapper.flush().unwrap();
+    let saved = of_tiles(mapper.statistics().io.saves);
+    assert!(saved < 1.1, "{what}, {saved} saved in all");
+    assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
+}
+
 /// A tile may be wanted, changed and flushed while an older version of it is still on its way to disk.
 #[test]
 fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
