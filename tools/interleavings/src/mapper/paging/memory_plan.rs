@@ -6,12 +6,12 @@ use crate::config::MemoryLimit;
 pub(in crate::mapper) struct MemoryPlan {
     pub(super) tiles: usize,
     pub(super) bytes: usize,
-    pub(super) buffer_bytes: usize,
+    buffer_bytes: usize,
     pub(super) least_scan_bytes: usize,
     pub(super) is_enforced: bool,
     pub(super) spare_bytes: usize,
     pub(super) often_scans: u32,
-    pub(super) compact_bytes: usize,
+    compact_bytes: usize,
     pub(super) view_bytes: usize,
 }
 
@@ -28,5 +28,20 @@ impl MemoryPlan {
             compact_bytes: 1 << 10,
             view_bytes: 2 << 10,
         }
+    }
+
+    pub(super) fn has_compact_tier(&self) -> bool {
+        self.compact_bytes > 0
+    }
+
+    /// The few tiles here have a small index, which takes from no share.
+    pub(super) fn note_index(&mut self, _: usize) {}
+
+    pub(super) fn buffer_bytes(&self) -> usize {
+        self.buffer_bytes
+    }
+
+    pub(super) fn compact_bytes(&self) -> usize {
+        self.compact_bytes
     }
 }
