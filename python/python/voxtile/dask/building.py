@@ -260,7 +260,8 @@ def _result(future: Any) -> dict[str, Any]:
             f"{error.last_worker.address}: this worker and others have ended while they made a region; perhaps memory"
             " was short: take a smaller region_size or memory, or workers with more, and call again to go on"
         ) from error
-    except CancelledError as error:
+    except (CancelledError, _dask.comm.CommClosedError) as error:
+        # The second while the answer is on its way.
         raise VoxtileError(
             f"{error}; the regions that are done are kept: call again to go on, with a client of a scheduler that runs"
         ) from error
