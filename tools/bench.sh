@@ -17,6 +17,7 @@ list() {
     echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/endurance.md"
     echo "  octocache  the questions of the OctoCache paper: docs/octocache.md"
     echo "  peers      speed, memory and exactness beside OctoMap: a table on standard output"
+    echo "  versions   speed beside an earlier version: docs/versions.md; --before COMMIT names it"
 }
 
 run() { # package, arguments
@@ -43,11 +44,34 @@ peers() {
     run peers "${contenders[@]}" --octomap-version "$version" "$@"
 }
 
+# The programs of both versions; the earlier one is built from a checkout of its own.
+versions() {
+    local options=() commit= source=$target/versions/source
+    while [[ $# -gt 0 ]]; do
+        case $1 in
+        --before) commit=${2:?--before: which commit?} && shift 2 ;;
+        *) options+=("$1") && shift ;;
+        esac
+    done
+    [[ -n $commit ]] || { echo "versions: say --before COMMIT" >&2 && exit 2; }
+    cargo build --release --quiet --locked --package voxtile --package peers --package versions
+    git worktree remove --force "$source" 2>/dev/null || rm -rf "$source"
+    git worktree prune
+    git worktree add --quiet --detach "$source" "$commit"
+    # The same questions are put to both.
+    cp tools/peers/src/bin/questions.rs "$source/tools/peers/src/bin/"
+    local before
+    before=$(realpath "$target")/versions/before
+    (cd "$source" && CARGO_TARGET_DIR=$before cargo build --release --quiet --locked --package voxtile --package peers)
+    git worktree remove --force "$source"
+    run versions --before "$before/release" --now "$target/release" "${options[@]}"
+}
+
 name=${1:-}
 shift || true
 case $name in
 "") list ;;
-endurance | octocache | peers) "$name" "$@" ;;
+endurance | octocache | peers | versions) "$name" "$@" ;;
 all)
     failed=()
     for name in endurance octocache peers; do

@@ -11,7 +11,8 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import numpy as np
@@ -212,6 +213,37 @@ def test_a_scheduler_that_is_killed_is_an_error_and_the_next_run_goes_on(
     with distributed.Client(n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
         report = voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
     assert report["regions_done_before"] >= 2 and voxtile.digest(tmp_path / "map") == whole
+
+
+@pytest.mark.parametrize("error", [CancelledError("lost"), distributed.comm.CommClosedError("closed")])
+def test_a_scheduler_that_ends_in_the_midst_of_an_answer_is_an_error_that_says_what_to_do(
+    error: BaseException, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    city, other = tmp_path / "whole", tmp_path / "other"
+
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    with distributed.Client(n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
+        of_future, of_client = (distributed.Future, "result"), (distributed.Client, "gather")
+        calls: list[tuple[tuple[type, str], Callable[[], object]]] = [
+            (of_client, lambda: voxtile_dask.build(drive, other, region_size=4.0, client=client, **OPTIONS)),
+            (of_future, lambda: voxtile_dask.build(drive, other, region_size=4.0, client=client, **OPTIONS)),
+            (of_client, lambda: voxtile_dask.decay(city, tmp_path / "faded", 10.0, client=client)),
+            (of_future, lambda: voxtile_dask.merge([city], tmp_path / "merged", client=client)),
+            (of_client, lambda: voxtile_dask.verify(city, client=client)),
+            (of_client, lambda: voxtile_dask.export(city, tmp_path / "files", ".csv", client=client)),
+            (of_future, lambda: voxtile_dask.statistics(city, client=client)),
+        ]
+        for method, call in calls:
+            with monkeypatch.context() as broken:
+                broken.setattr(*method, fail)
+                with pytest.raises(errors.VoxtileError, match="call again.*a scheduler that runs"):
+                    call()
+        # None of them leaves anything that is in the way of the next call.
+        for _, call in calls[1:]:
+            call()
+    assert voxtile.digest(other) == voxtile.digest(tmp_path / "merged") == whole
 
 
 def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(

@@ -2,6 +2,7 @@ use crate::plot::Plot;
 use crate::table::Table;
 use anyhow::Result;
 use std::path::Path;
+use textwrap::{Options, WordSplitter};
 
 /// What a question yields.
 #[derive(Default)]
@@ -25,10 +26,10 @@ impl Answer {
 
     /// Tables and plots for the page beside the folder `folder`, below what was typed and where it ran.
     pub fn markdown(&self, folder: &str, command: &str, machine: &str) -> String {
-        let mut text = format!("`{command}`; {machine}.\n");
+        let mut text = wrapped(&format!("`{command}`; {machine}."));
         for table in &self.tables {
             let Table { caption, file, .. } = table;
-            text += &format!("\n{caption} ([CSV]({folder}/{file}.csv))\n");
+            text += &format!("\n{}", wrapped(&format!("{caption} ([CSV]({folder}/{file}.csv))")));
             if !table.is_only_csv {
                 text += &format!("\n{}", table.markdown());
             }
@@ -38,5 +39,34 @@ impl Answer {
                 &format!("\n![{caption}]({folder}/{file}.svg)\n", caption = plot.caption, file = plot.file);
         }
         text
+    }
+}
+
+/// Most characters of a line of prose.
+const LINE_WIDTH: usize = 120;
+
+/// A paragraph in lines of at most [`LINE_WIDTH`] characters; a longer word has a line of its own.
+fn wrapped(paragraph: &str) -> String {
+    let options = Options::new(LINE_WIDTH).break_words(false).word_splitter(WordSplitter::NoHyphenation);
+    textwrap::fill(paragraph, options) + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prose_is_wrapped_between_words_and_keeps_all_of_them() {
+        let caption = "Bytes of a long-lived map, by flush, and what readers see of it. ".repeat(6);
+        let table = Table::new("a_file", caption.clone(), ["a column"]);
+        let text =
+            Answer { tables: vec![table], plots: Vec::new() }.markdown("folder", "a command", "a machine");
+        assert!(text.lines().all(|line| line.len() <= LINE_WIDTH), "{text}");
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let expected =
+            format!("`a command`; a machine. {caption} ([CSV](folder/a_file.csv)) | a column | | ---: |");
+        assert_eq!(words(&text), words(&expected));
+        let long_word = "w".repeat(200);
+        assert_eq!(wrapped(&format!("a {long_word} z")), format!("a\n{long_word}\nz\n"));
     }
 }

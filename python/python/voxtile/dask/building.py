@@ -18,7 +18,6 @@ import tempfile
 import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -29,6 +28,7 @@ from .. import files
 from .._voxtile import adopt, crop, describe, join, verify
 from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
+from . import losses
 from .pieces import hand_over
 from .regions import Box, Column, Range, columns_of, region_of, scans_in, tiles_of
 from .simulation import advised_region_size
@@ -253,19 +253,13 @@ def _check_part(part: str) -> dict[str, Any]:
 
 def _result(future: Any) -> dict[str, Any]:
     """What a task answers; an error says which worker to look at."""
-    try:
+    with losses.told(use_less="take a smaller region_size or memory", then=_GO_ON):
         done: dict[str, Any] = future.result()
-    except _dask.KilledWorker as error:
-        raise VoxtileError(
-            f"{error.last_worker.address}: this worker and others have ended while they made a region; perhaps memory"
-            " was short: take a smaller region_size or memory, or workers with more, and call again to go on"
-        ) from error
-    except (CancelledError, _dask.comm.CommClosedError) as error:
-        # The second while the answer is on its way.
-        raise VoxtileError(
-            f"{error}; the regions that are done are kept: call again to go on, with a client of a scheduler that runs"
-        ) from error
     return done
+
+
+# What to do after a loss.
+_GO_ON = "call again to go on: the regions that are done are kept"
 
 
 def _check(output: Path, region_size: float, tile_size: float, options: Any, update: bool) -> None:
@@ -315,7 +309,8 @@ def _plan(client: Any, source: str, options: dict[str, Any]) -> tuple[list[_Seen
     # The last one takes what an estimate left out.
     spans = [(first, None if first == firsts[-1] else step) for first in firsts]
     tasks = [client.submit(_boxes, source, *span, reading, reach, pure=False, retries=2) for span in spans]
-    found = client.gather(tasks)
+    with losses.told(use_less="take workers with fewer threads", then=_GO_ON):
+        found = client.gather(tasks)
     return [scan for part, _ in found for scan in part], sum(cpu for _, cpu in found)
 
 

@@ -18,6 +18,7 @@ from typing import Any, Literal
 from .. import _voxtile
 from .._voxtile import Map
 from ..errors import ArgumentError, VoxtileError
+from . import losses
 from .pieces import hand_over
 from .regions import Column, tiles_of
 
@@ -134,14 +135,13 @@ def _run(client: Any, tasks: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]
     found = _dask.Client.current() if client is None else client
     futures = [found.submit(function, *given, pure=False, retries=2) for function, given in tasks]
     try:
-        for done, future in enumerate(_dask.as_completed(futures), 1):
-            future.result()
-            if progress is not None:
-                progress(done, len(futures))
-        answers: list[Any] = found.gather(futures)
+        with losses.told(use_less="take a smaller region_size", then="call again"):
+            for done, future in enumerate(_dask.as_completed(futures), 1):
+                future.result()
+                if progress is not None:
+                    progress(done, len(futures))
+            answers: list[Any] = found.gather(futures)
         return answers
-    except _dask.KilledWorker as error:
-        raise VoxtileError(f"{error.last_worker.address}: this worker and others have ended; perhaps memory was short") from error
     finally:
         found.cancel(futures)
 

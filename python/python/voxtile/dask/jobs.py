@@ -19,6 +19,7 @@ from .. import files
 from .._voxtile import Map, describe
 from ..errors import ArgumentError
 from ..files import ExportOptions
+from . import losses
 from .simulation import advised_region_size
 from .tiles import Tile, map_tiles
 
@@ -83,7 +84,8 @@ def export(
         for x, y in columns
     ]
     try:
-        tasks: list[dict[str, Any]] = found.gather(futures)
+        with losses.told(use_less="take a smaller region_size", then="call again"):
+            tasks: list[dict[str, Any]] = found.gather(futures)
     finally:
         found.cancel(futures)
     for attempt in beside.glob("attempt-*"):
@@ -111,7 +113,8 @@ def statistics(
 ) -> dict[str, Any]:
     """Counts a map's tiles, its observed, occupied and free voxels, and the bounds of what is occupied in metres."""
     found: Any = _dask.Client.current() if client is None else client
-    counted = found.compute(map_tiles(map, _count, snapshot=snapshot)).result()
+    with losses.told(use_less="take workers with fewer threads", then="call again"):
+        counted = found.compute(map_tiles(map, _count, snapshot=snapshot)).result()
     occupied = [tile for tile in counted if tile["occupied"]]
     return {
         "tiles": len(counted),
