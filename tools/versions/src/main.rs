@@ -1,19 +1,24 @@
 //! The benchmark `versions`: voxtile beside an earlier version of itself, on the same scans. `tools/bench.sh` builds
 //! both.
 
+mod cpu_time;
+mod outcome;
+mod pair;
 mod programs;
 mod questions;
 mod scans;
 mod setting;
+mod versions;
 
 use anyhow::Result;
 use clap::Parser;
-use programs::{Programs, Versions};
+use programs::Programs;
 use questions::QUESTIONS;
 use report::{Bench, Options};
 use setting::Setting;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use versions::Versions;
 
 /// Compares voxtile with an earlier version of itself and writes tables.
 #[derive(Debug, Parser)]

@@ -1,4 +1,4 @@
-use crate::programs::Versions;
+use crate::versions::Versions;
 use std::path::PathBuf;
 
 /// What all questions are put to.

@@ -1,4 +1,4 @@
-use crate::programs::{json_of, number};
+use crate::outcome::{json_of, number};
 use crate::scans::{self, RECORDED, ScanSet};
 use crate::setting::Setting;
 use anyhow::{Result, ensure};

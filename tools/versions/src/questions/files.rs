@@ -1,4 +1,6 @@
-use crate::programs::{Programs, cpu_seconds, json_of, number};
+use crate::cpu_time::cpu_seconds;
+use crate::outcome::{json_of, number};
+use crate::programs::Programs;
 use crate::scans::{self, MAX_RANGE_M, RECORDED};
 use crate::setting::Setting;
 use anyhow::{Context, Result, ensure};

@@ -1,4 +1,6 @@
-use crate::programs::{Pair, Programs, json_of, number};
+use crate::outcome::{json_of, number};
+use crate::pair::Pair;
+use crate::programs::Programs;
 use crate::scans::{self, MAX_RANGE_M, ScanSet, Stream};
 use crate::setting::Setting;
 use anyhow::Result;

@@ -1,4 +1,4 @@
-use crate::programs::{json_lines_of, number};
+use crate::outcome::{json_lines_of, number};
 use crate::scans::RECORDED;
 use crate::setting::Setting;
 use anyhow::Result;

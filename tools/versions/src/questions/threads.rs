@@ -1,4 +1,5 @@
-use crate::programs::{Programs, json_of, number};
+use crate::outcome::{json_of, number};
+use crate::programs::Programs;
 use crate::scans::{self, MAX_RANGE_M, ScanSet, Stream};
 use crate::setting::Setting;
 use anyhow::Result;
