@@ -401,8 +401,7 @@ fn bounds_of_finite(points: &[Point]) -> Option<(Point, Point)> {
         for point in 0..2 {
             low[point] = smaller(low[point], pair[point]);
             high[point] = larger(high[point], pair[point]);
-            all[point] =
-                std::array::from_fn(|axis| all[point][axis] + (pair[point][axis] - pair[point][axis]));
+            all[point] = std::array::from_fn(|axis| all[point][axis] + pair[point][axis] * 0.0);
         }
     }
     let is_finite = all.iter().flatten().all(|sum| *sum == 0.0);
