@@ -7,7 +7,6 @@ their files.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import math
@@ -17,8 +16,7 @@ import shutil
 import tempfile
 import time
 import uuid
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -29,7 +27,7 @@ from .._voxtile import adopt, crop, describe, join, verify
 from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
 from . import losses
-from .pieces import hand_over
+from .pieces import MAP_ID, hand_over, locked, remove
 from .regions import Box, Column, Range, columns_of, region_of, scans_in, tiles_of
 from .simulation import advised_region_size
 
@@ -105,7 +103,7 @@ def build(
     _check(output, size, tile_size, settings, update)
     found: Any = _dask.Client.current() if client is None else client
     parts = output.with_name(output.name + ".parts")
-    with _locked(parts):
+    with locked(parts):
         for attempt in parts.glob("attempt-*"):
             shutil.rmtree(attempt, ignore_errors=True)
         seen, plan_cpu = _plan(found, source, dict(options))
@@ -116,7 +114,7 @@ def build(
             raise ArgumentError(f"{source}: no scan has a point, so there is nothing to map")
         drive = _mark(source, size, settings, seen, str(output) if base else None)
         if base is not None and (adopted := _adopted_before(parts, drive, base)) is not None:
-            shutil.rmtree(parts)
+            remove(parts)
             return {**adopted, "output": str(output), "regions_done_before": adopted["regions"]}
         mark = drive if base is None else _mark(drive, base.map_id, base.flush_number)
         wanted = {parts / f"{mark}-{x}-{y}": ((x, y), ranges) for (x, y), ranges in columns.items()}
@@ -160,7 +158,7 @@ def build(
         else:
             _note(parts / _ADOPTING, {"drive": drive, "of_flush": base.flush_number, "told": told})
             told["adopted"] = adopt(str(output), names, of_flush=base.flush_number, scans=len(boxes))
-        shutil.rmtree(parts)
+        remove(parts)
     ended, ended_cpu = time.perf_counter(), time.process_time()
     seconds = sorted((task["seconds"] for task in tasks), reverse=True)
     return {
@@ -227,13 +225,9 @@ def _adopted_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | No
     return told
 
 
-# The id that all parts have.
-_MAP_ID = "map_id.json"
-
-
 def _id_of(parts: Path) -> str:
     """The id of the map to come: all its parts have it, those of an earlier call, too."""
-    note = parts / _MAP_ID
+    note = parts / MAP_ID
     try:
         noted: str = json.loads(note.read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
@@ -277,23 +271,6 @@ def _check(output: Path, region_size: float, tile_size: float, options: Any, upd
     for name, value in _READING_ONLY.items():
         if options.get(name, value) != value:
             raise ArgumentError(f"{name}: a build in parts takes all scans; leave it out, or use voxtile.build")
-
-
-@contextmanager
-def _locked(parts: Path) -> Iterator[None]:
-    """One process at a time makes a map; the lock ends with the process."""
-    parts.mkdir(parents=True, exist_ok=True)
-    with open(parts / "lock", "w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise ArgumentError(f"{parts}: another process makes this map; wait for it") from None
-        try:
-            yield
-        finally:
-            # What was made stays for the next run; a folder without anything does not.
-            if parts.exists() and set(os.listdir(parts)) <= {"lock", _MAP_ID}:
-                shutil.rmtree(parts)
 
 
 def _plan(client: Any, source: str, options: dict[str, Any]) -> tuple[list[_Seen], float]:

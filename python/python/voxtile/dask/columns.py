@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-import shutil
 import tempfile
 import uuid
 from collections.abc import Callable, Sequence
@@ -19,7 +18,7 @@ from .. import _voxtile
 from .._voxtile import Map
 from ..errors import ArgumentError, VoxtileError
 from . import losses
-from .pieces import hand_over
+from .pieces import hand_over, locked, remove
 from .regions import Column, tiles_of
 
 try:
@@ -153,22 +152,23 @@ def _make(
     columns, size, tile_size = _columns(maps, region_size)
     if not columns:
         return _voxtile.merge(list(maps), str(output))
-    parts = output.with_name(output.name + ".parts")
-    try:
-        parts.mkdir()
-    except FileExistsError:
-        raise ArgumentError(f"{parts}: another process makes this map, or was killed; wait, or remove it") from None
-    try:
-        map_id = uuid.uuid4().hex
-        places = {column: str(parts / f"{column[0]}_{column[1]}") for column in columns}
-        tasks = [
-            (_make_part, (list(maps), place, map_id, tiles_of(column, size, tile_size), work))
-            for column, place in places.items()
-        ]
-        made = [part for part in _run(client, tasks, progress) if part is not None]
-        merged = _voxtile.join(made, str(output))
-    finally:
-        shutil.rmtree(parts, ignore_errors=True)
+    # Not the name that parts of a build have, which are kept if it fails.
+    parts = output.with_name(output.name + ".columns")
+    with locked(parts):
+        try:
+            map_id = uuid.uuid4().hex
+            # In a folder of this attempt: a task of an earlier one that was given up may still be at work.
+            pieces = parts / map_id
+            pieces.mkdir()
+            places = {column: str(pieces / f"{column[0]}_{column[1]}") for column in columns}
+            tasks = [
+                (_make_part, (list(maps), place, map_id, tiles_of(column, size, tile_size), work))
+                for column, place in places.items()
+            ]
+            made = [part for part in _run(client, tasks, progress) if part is not None]
+            merged = _voxtile.join(made, str(output))
+        finally:
+            remove(parts)
     return {"output": str(output), "regions": len(columns), "tiles": merged.get("tiles")}
 
 
