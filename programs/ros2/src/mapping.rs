@@ -291,7 +291,10 @@ impl Mapping {
         let mapper = OutOfCoreTileMapper::open(&self.folder, config)?;
         self.live.note_opening(mapper.reader()?, None);
         let durable = (Instant::now(), mapper.flushed_scan_number());
-        Ok((Self { mapper, durable, ..self }, outcome))
+        let mut changed = Self { mapper, durable, ..self };
+        // Who asked for the change looks at the diagnostics next.
+        changed.look();
+        Ok((changed, outcome))
     }
 
     fn answer_saves(&mut self) {
