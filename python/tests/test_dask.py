@@ -246,6 +246,21 @@ def test_a_scheduler_that_ends_in_the_midst_of_an_answer_is_an_error_that_says_w
     assert voxtile.digest(other) == voxtile.digest(tmp_path / "merged") == whole
 
 
+def test_a_folder_in_the_way_stays_and_what_a_killed_call_left_does_not(
+    client: object, drive: Path, whole: str, tmp_path: Path
+) -> None:
+    beside = tmp_path / "merged.columns"
+    beside.mkdir()
+    (beside / "thesis.txt").write_text("mine")
+    with pytest.raises(errors.ArgumentError, match="thesis.txt in it is of no earlier call"):
+        voxtile_dask.merge([tmp_path / "whole"], tmp_path / "merged", client=client)
+    assert (beside / "thesis.txt").read_text() == "mine"
+    (beside / "thesis.txt").unlink()
+    (beside / ("0" * 32)).mkdir()
+    voxtile_dask.merge([tmp_path / "whole"], tmp_path / "merged", client=client)
+    assert voxtile.digest(tmp_path / "merged") == whole and not list(tmp_path.glob("merged.*"))
+
+
 def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(
     drive: Path, whole: str, tmp_path: Path
 ) -> None:

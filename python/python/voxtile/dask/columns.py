@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import tempfile
 import uuid
 from collections.abc import Callable, Sequence
@@ -32,6 +33,9 @@ _Progress = Callable[[int, int], object] | None
 
 # Its types are not complete.
 _dask: Any = distributed
+
+# The name of an attempt's folder: the id of the map to come.
+_ATTEMPT = re.compile("[0-9a-f]{32}")
 
 # Tiles along the edge of a column where nobody names its size.
 _TILES_OF_COLUMN = 20
@@ -155,6 +159,10 @@ def _make(
     # Not the name that parts of a build have, which are kept if it fails.
     parts = output.with_name(output.name + ".columns")
     with locked(parts):
+        # Of a call that was killed there is nothing but the folders of its attempts.
+        for name in os.listdir(parts):
+            if name != "lock" and not _ATTEMPT.fullmatch(name):
+                raise ArgumentError(f"{parts}: {name} in it is of no earlier call; move the folder away")
         try:
             map_id = uuid.uuid4().hex
             # In a folder of this attempt: a task of an earlier one that was given up may still be at work.

@@ -64,8 +64,7 @@ def remove(folder: Path) -> None:
 
     Tasks that were given up may still be at work. They find no folder of that name, so that they put nothing there.
     """
-    gone = folder.with_name(f"{folder.name}.gone")
-    shutil.rmtree(gone, ignore_errors=True)
+    gone = folder.with_name(f"{folder.name}.gone-{uuid.uuid4().hex}")
     os.rename(folder, gone)
     for _ in range(_ATTEMPTS):
         shutil.rmtree(gone, ignore_errors=True)
