@@ -4,8 +4,8 @@
 #
 #   python/check.sh [PYTEST ARGUMENTS]
 #
-# Needs python3 with venv, and the network for maturin, pytest, mypy and the like. The build is that of the tests, which is made
-# in a few minutes; `maturin build --release` makes the wheel to hand out.
+# Needs python3 with venv, and the network for maturin, pytest, mypy and the like. The build is that of the tests, which
+# is made in a few minutes; `maturin build --release` makes the wheel to hand out.
 set -euo pipefail
 cd "$(dirname "$0")"
 work=$(mktemp -d)

@@ -38,9 +38,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     if quiet {
         progress::hide_all();
     }
-    if let Command::Build(args) = &command
-        && args.cache_tiles.is_none()
-    {
+    if keeps_to_bytes(&command) {
         // Before there is a second thread, and before anything is read from standard input.
         begin_with_one_heap();
     }
@@ -87,6 +85,15 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Man(args) => man::run(&args),
     };
     outcome.unwrap_or_else(|error| json_to.tell(&error))
+}
+
+/// Whether the command maps within a limit of bytes.
+const fn keeps_to_bytes(command: &Command) -> bool {
+    match command {
+        Command::Build(args) => args.cache_tiles.is_none(),
+        Command::Remap(_) | Command::RemoveScans(_) | Command::RemovePoints(_) => true,
+        _ => false,
+    }
 }
 
 /// Whether a command works on several threads.

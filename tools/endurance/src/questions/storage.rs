@@ -104,11 +104,11 @@ impl Measured {
     }
 
     fn promises(&self) -> Vec<Promise> {
-        let [seed, compact] = &self.builds;
+        let [octomap, compact] = &self.builds;
         let what = format!("{}, {}, {}", self.case.name, self.disk, self.limit_name());
-        let smaller = seed.built.map_file_bytes as f64 / compact.built.map_file_bytes as f64;
-        let time = compact.wall_s.median() / seed.wall_s.median();
-        let differ = f64::from(u8::from(seed.built.digest != compact.built.digest));
+        let smaller = octomap.built.map_file_bytes as f64 / compact.built.map_file_bytes as f64;
+        let time = compact.wall_s.median() / octomap.wall_s.median();
+        let differ = f64::from(u8::from(octomap.built.digest != compact.built.digest));
         vec![
             Promise::new(
                 format!("{what}: the map's files, octomap by compact"),
@@ -118,7 +118,7 @@ impl Measured {
             ),
             Promise::new(format!("{what}: digests that differ"), differ, Wanted::AtMost(0.0), ""),
             Promise::about_time(
-                format!("{what}: wall time, compact by seed"),
+                format!("{what}: wall time, compact by octomap"),
                 time,
                 Wanted::AtMost(MOST_TIME),
                 "",

@@ -121,7 +121,7 @@ fn ratios(
 
 fn seconds(workflow: &Workflow, measured: &[Measured]) -> Table {
     let caption =
-        "The times behind it in seconds, and the spread of the runs (largest less smallest by median).";
+        "The times in seconds, and the spread of the runs (largest less smallest by median), are in a file.";
     let columns = [
         "set",
         "scans",
