@@ -201,20 +201,19 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     fn repair_scans(&mut self, store: &mut TileStore) -> Result<()> {
         let path = self.layout.scans();
         let flush_number = store.commits().flush_number;
-        let records = store.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
+        let records = store.listed_records();
         match check_scans(self.disk, &self.layout, flush_number, records) {
             Ok(()) => Ok(()),
             Err(Error::Damaged { cause, .. }) => {
-                if self.kind(&path)?.is_some() {
-                    self.quarantine_copy(&path, &format!("{cause}"))?;
+                if let Some(to) = store.settle_scans()? {
+                    self.note(ActionKind::Quarantined, &path, format!("{cause}; kept as {}", to.display()));
                 }
-                store.settle_scans()?;
                 self.note(ActionKind::Derived, &path, "cut where the damage begins");
                 Ok(())
             }
             Err(error) if Finding::is_of_file(&error) => {
                 self.quarantine(&path, &format!("{error:#}"))?;
-                store.settle_scans()
+                store.settle_scans().map(drop)
             }
             Err(error) => Err(error),
         }

@@ -197,7 +197,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     }
 
     fn verify_scans(&mut self, disk: &Arc<dyn Disk>, store: &TileStore) -> Result<()> {
-        let records = store.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
+        let records = store.listed_records();
         if let Err(error) = check_scans(self.disk, &self.layout, self.counts.flush_number, records) {
             let finding = Finding::of(error)?;
             self.report(finding);

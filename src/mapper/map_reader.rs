@@ -264,7 +264,7 @@ impl MapReader {
             }
             return Ok(scans);
         }
-        let records = self.metadata().ext.as_ref().and_then(|ext| ext.scan_records);
+        let records = self.store.listed_records();
         read_scans(&*self.disk, self.store.layout(), self.flush_number(), records)
     }
 

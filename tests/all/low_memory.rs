@@ -8,6 +8,7 @@ use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::Survey;
 use voxtile::{
     InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan,
+    ScanRef,
 };
 
 fn config() -> MapConfig {
@@ -214,4 +215,28 @@ fn a_flush_that_stands_still_stops_no_scan() {
     assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
     mapper.flush().unwrap();
     assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), expected.digest().unwrap());
+}
+
+#[test]
+fn tables_that_are_kept_for_a_reader_count_as_memory() {
+    let folder = TempDir::new().unwrap();
+    let index_bytes = |name: &str, is_read: bool| {
+        let map = folder.path().join(name);
+        let mut mapper =
+            OutOfCoreTileMapper::create(&*map, MapConfig::new(0.5, 1.0).unwrap().with_range(0.0, 500.0))
+                .unwrap();
+        let points = |shift: f64| (0..400).map(move |k| [f64::from(k) + shift, 0.2, 0.2]).collect::<Vec<_>>();
+        let mut insert = |shift| {
+            mapper.insert_points(&ScanRef::in_world([0.1, 0.2, 0.2], &points(shift))).unwrap();
+            mapper.flush().unwrap();
+            mapper.statistics().memory.index
+        };
+        insert(0.2);
+        let reader = is_read.then(|| MapReader::open(&*map, 1).unwrap());
+        let bytes = insert(0.7);
+        drop(reader);
+        bytes
+    };
+    let [alone, read] = [index_bytes("alone", false), index_bytes("read", true)];
+    assert!(read >= alone + 400 * 100, "{alone} bytes, with a reader {read}");
 }

@@ -55,6 +55,8 @@ mod fuzz_corpus;
 /// Builds that are resumed, maps that are verified and repaired, from the command line.
 #[cfg(feature = "cli")]
 mod interrupted;
+/// Files of kept scans under the hands of a writer.
+mod kept_scans;
 /// What each folder may know.
 mod layering;
 /// Readers in other threads beside the mapper.

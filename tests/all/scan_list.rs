@@ -138,3 +138,32 @@ fn check_damage(map: &Path, at: usize, what: &str) {
     OutOfCoreTileMapper::open(map, config).unwrap().flush().unwrap();
     assert_eq!(scans_of(map), expected(kept), "{what}");
 }
+
+#[test]
+fn a_mapper_that_goes_on_behind_damage_keeps_the_list_as_it_was() {
+    let folder = TempDir::new().unwrap();
+    let flip = |at: usize| {
+        move |mut bytes: Vec<u8>| {
+            bytes[at] ^= 0x40;
+            bytes
+        }
+    };
+    let cut = |length: usize| move |bytes: Vec<u8>| bytes[..length].to_vec();
+    let mut damages: Vec<Box<dyn Fn(Vec<u8>) -> Vec<u8>>> = Vec::new();
+    (0..16 + 3 * 64).step_by(5).for_each(|at| damages.push(Box::new(flip(at))));
+    [0, 15, 16, 79, 80, 207].into_iter().for_each(|length| damages.push(Box::new(cut(length))));
+    for (number, damage) in damages.into_iter().enumerate() {
+        let map = folder.path().join(number.to_string());
+        make_map(&map, 3).flush().unwrap();
+        let path = map.join("scans.bin");
+        let damaged = damage(fs::read(&path).unwrap());
+        fs::write(&path, &damaged).unwrap();
+        let mut mapper = OutOfCoreTileMapper::open(&map, MapReader::config_of(&map).unwrap()).unwrap();
+        insert(&mut mapper, 4..6);
+        mapper.flush().unwrap();
+        drop(mapper);
+        assert_eq!(fs::read(map.join("quarantine/scans.bin")).unwrap(), damaged, "damage {number}");
+        let listed = scans_of(&map);
+        assert!(listed.ends_with(&expected(5)[3..]) && listed.len() < 5, "damage {number}: {listed:?}");
+    }
+}

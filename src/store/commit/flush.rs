@@ -13,6 +13,7 @@ use crate::store::tiles::file_checksum::FileChecksum;
 use crate::store::tiles::tile_version::TileVersion;
 use crate::store::tiles::tile_writer::TileWriter;
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 impl TileStore {
     /// Writes the next version of one of a tile's files; the committed version stays as it is.
@@ -68,17 +69,24 @@ impl TileStore {
         }
     }
 
-    /// Cuts the list of scans to what is whole and committed.
+    /// Cuts the list of scans to what is whole and committed; returns where it is as it was, if it was damaged.
     ///
     /// # Errors
     ///
     /// An I/O error.
-    pub fn settle_scans(&mut self) -> Result<()> {
+    pub fn settle_scans(&mut self) -> Result<Option<PathBuf>> {
         let count = self.scans.pending();
-        let scans = self.scans.write(&self.files, self.versions.commits().flush_number, count)?;
+        let records = self.listed_records();
+        let scans = self.scans.write(&self.files, self.versions.commits().flush_number, records, count)?;
         self.scans.commit(scans, count);
         self.committer.set_scan_records(scans.records);
-        self.write_metadata()
+        self.write_metadata()?;
+        Ok(self.scans.quarantined().map(Path::to_owned))
+    }
+
+    /// Records of the list of scans as of the last commit, if that is known.
+    pub(crate) fn listed_records(&self) -> Option<u64> {
+        self.metadata().ext.as_ref().and_then(|ext| ext.scan_records)
     }
 
     /// Records that from the next commit on the map consists of the scans of an earlier one again, which is open as
@@ -187,7 +195,7 @@ impl TileStore {
         let mut metadata = self.metadata_of(begun);
         let is_new = self.committer.is_new(&metadata);
         let removed = self.versions.removed();
-        let scans = self.scans.write(&self.files, number - 1, begun.listed_scans)?;
+        let scans = self.scans.write(&self.files, number - 1, self.listed_records(), begun.listed_scans)?;
         let kept = self.write_kept()?;
         if let Some(ext) = &mut metadata.ext {
             ext.scan_records = Some(scans.records);

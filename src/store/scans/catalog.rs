@@ -81,22 +81,12 @@ impl CatalogReader {
     }
 
     /// After the last entry: checks that every scan up to this number was there.
-    pub(in crate::store) fn check_end(&self, scan_number: u64) -> Result<()> {
+    fn check_end(&self, scan_number: u64) -> Result<()> {
         if self.last == scan_number {
             return Ok(());
         }
         let reason = format!("it ends with scan {}, the map with scan {scan_number}", self.last);
         Err(self.wrong(FormatError::at_offset(self.at, reason).into()))
-    }
-
-    /// Bytes of what was read so far.
-    pub(super) fn bytes(&self) -> u64 {
-        self.at
-    }
-
-    /// Whether there is more in the file.
-    pub(super) fn has_excess(&self) -> bool {
-        self.at != self.input.file_bytes
     }
 
     fn wrong(&self, error: DecodeError) -> Error {
@@ -112,17 +102,19 @@ impl CatalogReader {
         self.input.read(&mut lengths)?;
         let [length, complement] = [0, 4]
             .map(|at| u32::from_le_bytes([lengths[at], lengths[at + 1], lengths[at + 2], lengths[at + 3]]));
-        if length != !complement || u64::from(length) > left - FRAME_BYTES {
-            // Of a flush that never happened, if nothing is missing.
-            return Ok(None);
-        }
         self.payload.clear();
+        if length != !complement || u64::from(length) > left - FRAME_BYTES {
+            // As far as the number of its flush.
+            self.payload.resize(size_of::<u64>().min((left - FRAME_BYTES) as usize), 0);
+            self.input.read(&mut self.payload)?;
+            return self.end_or_damage("a record of no possible length");
+        }
         self.payload.resize(length as usize, 0);
         self.input.read(&mut self.payload)?;
         let mut checksum = [0; 4];
         self.input.read(&mut checksum)?;
         if crc32fast::hash(&self.payload) != u32::from_le_bytes(checksum) {
-            return Ok(None);
+            return self.end_or_damage("the checksum of a record does not match");
         }
         let wrong = |reason: &str| FormatError::at_offset(self.at, reason);
         let (flush, entry) =
@@ -138,6 +130,18 @@ impl CatalogReader {
         }
         self.at += FRAME_BYTES + u64::from(length);
         Ok(Some(entry))
+    }
+}
+
+impl CatalogReader {
+    /// What a record is that is not whole, by what is left of it: the end, if a flush that did not come to its commit
+    /// has begun to write it (zeros where nothing reached the medium, or the number of a later flush), else damage.
+    fn end_or_damage(&self, reason: &str) -> std::result::Result<Option<CatalogEntry>, DecodeError> {
+        let number = self.payload.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        if number == 0 || number > self.flush_number {
+            return Ok(None);
+        }
+        Err(FormatError::at_offset(self.at, reason).into())
     }
 }
 
@@ -221,18 +225,22 @@ pub(in crate::store) fn generation_of(
     }
 }
 
+/// A flush of a map that keeps its scans.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::store) struct KeptAsOf {
+    pub(in crate::store) flush_number: u64,
+    /// Number of its last scan.
+    pub(in crate::store) scan_number: u64,
+}
+
 /// The kept scans of a map as of a flush, in order, without their points.
 #[derive(Debug)]
 pub(crate) struct KeptRecords(Option<(CatalogReader, u64)>);
 
 impl KeptRecords {
-    /// Opens the list as of a flush, whose last scan has this number.
-    pub(crate) fn open(
-        disk: &dyn Disk,
-        layout: &Layout,
-        flush_number: u64,
-        scan_number: u64,
-    ) -> Result<Self> {
+    /// Opens the list as of a flush.
+    pub(in crate::store) fn open(disk: &dyn Disk, layout: &Layout, as_of: KeptAsOf) -> Result<Self> {
+        let KeptAsOf { flush_number, scan_number } = as_of;
         let Some(generation) = generation_of(disk, layout, flush_number)? else {
             return match scan_number {
                 0 => Ok(Self(None)),
@@ -244,6 +252,11 @@ impl KeptRecords {
         };
         let reader = CatalogReader::open(disk, layout, generation, flush_number)?;
         Ok(Self(Some((reader, scan_number))))
+    }
+
+    /// What was read of the catalog so far: its bytes, and whether there is more in the file. `None` if there is none.
+    pub(super) fn extent(&self) -> Option<(u64, bool)> {
+        self.0.as_ref().map(|(reader, _)| (reader.at, reader.at != reader.input.file_bytes))
     }
 
     /// The next entry of the catalog, `None` after the last.

@@ -1,6 +1,6 @@
 //! The scans that a map keeps, as part of a [`TileStore`].
 
-use super::catalog::{KeptRecords, generation_of};
+use super::catalog::{KeptAsOf, KeptRecords, generation_of};
 use super::catalog_entry::{CatalogEntry, SegmentPlace};
 use super::scan_keeper::{Catalog, remove_unneeded};
 use super::scan_list::read_scans;
@@ -26,7 +26,7 @@ impl TileStore {
     ///
     /// A catalog that is damaged, a disk that refuses.
     pub fn begin_kept_scan(&mut self) -> Result<()> {
-        self.keeper.begin_scan(&self.files, self.versions.commits().flush_number)
+        self.keeper.begin_scan(&self.files, self.last_commit())
     }
 
     /// Adds points to it; all with intensities or all without.
@@ -58,7 +58,7 @@ impl TileStore {
     ///
     /// Damage, a disk that refuses.
     pub fn copy_kept_points(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
-        self.keeper.copy(&self.files, self.versions.commits().flush_number, place)
+        self.keeper.copy(&self.files, self.last_commit(), place)
     }
 
     /// Records an entry of the next commit, if the map keeps its scans.
@@ -92,8 +92,7 @@ impl TileStore {
     ///
     /// Damage, a disk that refuses.
     pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
-        let commits = self.commits();
-        KeptRecords::open(&**self.disk(), self.layout(), commits.flush_number, commits.scan_number)
+        KeptRecords::open(&**self.disk(), self.layout(), self.last_commit())
     }
 
     /// The catalog that they are in. Scans add to it; what changes earlier entries makes another one.
@@ -107,12 +106,16 @@ impl TileStore {
 
     /// Writes what belongs to the next commit, synced.
     pub(in crate::store) fn write_kept(&mut self) -> Result<Option<Catalog>> {
-        let commits = self.versions.commits();
-        let (flush_number, scan_number, has_tiles) =
-            (commits.flush_number, commits.scan_number, !commits.tiles.is_empty());
+        let last_commit = self.last_commit();
+        let has_tiles = !self.versions.commits().tiles.is_empty();
         let files = &self.files;
-        let before = || entries_before(files, flush_number, scan_number, has_tiles);
-        self.keeper.write(files, flush_number, before)
+        let before = || entries_before(files, last_commit, has_tiles);
+        self.keeper.write(files, last_commit, before)
+    }
+
+    fn last_commit(&self) -> KeptAsOf {
+        let commits = self.versions.commits();
+        KeptAsOf { flush_number: commits.flush_number, scan_number: commits.scan_number }
     }
 
     /// Removes catalogs and segments that neither the map nor a snapshot needs.
@@ -120,12 +123,11 @@ impl TileStore {
         if !self.keeper.is_on() {
             return;
         }
-        let snapshots = self.committer.snapshots();
-        let flushes =
-            snapshots.into_iter().flat_map(|listed| listed.names().map(|name| listed.flush_of(name)));
-        // A snapshot of which nobody knows the flush may need any.
-        let Some(mut flushes) = flushes.collect::<Option<Vec<u64>>>() else { return };
-        flushes.push(self.versions.commits().flush_number);
+        // A snapshot that cannot be read may need any.
+        let Some(mut flushes) = self.kept.snapshots().kept_scans_of(self.committer.snapshots()) else {
+            return;
+        };
+        flushes.push(self.last_commit());
         let is_new = |segment| self.keeper.is_writing(segment);
         match remove_unneeded(&**self.files.disk(), self.files.layout(), &flushes, is_new) {
             Ok(removed) => self.leftovers_removed += removed,
@@ -156,8 +158,7 @@ impl TileStore {
 /// What a map had before its scans were kept: its list of scans, and what is not in it.
 fn entries_before(
     files: &MapFiles,
-    flush_number: u64,
-    scan_number: u64,
+    KeptAsOf { flush_number, scan_number }: KeptAsOf,
     has_tiles: bool,
 ) -> Result<Vec<CatalogEntry>> {
     let mut entries = Vec::new();

@@ -18,6 +18,7 @@ mod scan_list;
 mod scan_record;
 mod segment;
 
+pub(in crate::store) use catalog::KeptAsOf;
 pub(crate) use catalog::KeptRecords;
 pub use catalog_entry::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace};
 pub(super) use scan_keeper::ScanKeeper;

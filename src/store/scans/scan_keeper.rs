@@ -1,4 +1,4 @@
-use super::catalog::{CatalogReader, CatalogWriter, generation_of};
+use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords, generation_of};
 use super::catalog_entry::{CatalogEntry, KeptRecord, SegmentPlace};
 use super::segment::{SegmentScan, SegmentWriter};
 use crate::error::{Error, Result};
@@ -25,12 +25,14 @@ pub(in crate::store) struct ScanKeeper {
     /// The catalog that takes the place of the committed one.
     replacement: Option<Replacement>,
     segment: Option<SegmentWriter>,
-    /// Where the scan begins that is being written.
-    scan_offset: u64,
+    /// Where the scan begins that is being written, or was written and is not noted yet.
+    scan_start: Option<ScanStart>,
     /// Segments with scans that are not durable.
     unsynced: BTreeSet<u64>,
     /// What the disk says of these proves nothing any more: it failed to sync them.
     suspects: BTreeSet<u64>,
+    /// Whether that came while a replacement was made.
+    is_replacement_suspect: bool,
     has_new_names: bool,
     /// A catalog that was begun for a commit, which may not have come.
     begun: Option<u64>,
@@ -43,6 +45,13 @@ pub(in crate::store) struct Catalog {
     bytes: u64,
     /// Whether the file may go on behind that.
     has_excess: bool,
+}
+
+/// Where a scan begins among the segments.
+#[derive(Clone, Copy, Debug)]
+struct ScanStart {
+    segment: u64,
+    offset: u64,
 }
 
 enum Replacement {
@@ -91,7 +100,10 @@ impl ScanKeeper {
 
     /// Whether a segment may have scans that no commit names yet.
     pub(in crate::store) fn is_writing(&self, segment: u64) -> bool {
-        self.unsynced.contains(&segment) || self.segment.as_ref().is_some_and(|open| open.segment == segment)
+        // Of suspects what is noted is copied by the next commit.
+        self.unsynced.contains(&segment)
+            || self.suspects.contains(&segment)
+            || self.segment.as_ref().is_some_and(|open| open.segment == segment)
     }
 
     /// Whether there is something for the next commit.
@@ -108,10 +120,21 @@ impl ScanKeeper {
     // Points.
 
     /// Begins a scan.
-    pub(in crate::store) fn begin_scan(&mut self, files: &MapFiles, committed_flush: u64) -> Result<()> {
+    pub(in crate::store) fn begin_scan(&mut self, files: &MapFiles, last_commit: KeptAsOf) -> Result<()> {
+        let (_, start) = self.open_segment(files, last_commit)?;
+        self.scan_start = Some(start);
+        Ok(())
+    }
+
+    /// The segment that scans are written to, and where the next one begins.
+    fn open_segment(
+        &mut self,
+        files: &MapFiles,
+        last_commit: KeptAsOf,
+    ) -> Result<(&mut SegmentWriter, ScanStart)> {
         // A catalog that is damaged is told before anything is written.
         if self.replacement.is_none() {
-            self.find_committed(files, committed_flush)?;
+            self.find_committed(files, last_commit)?;
         }
         let (disk, layout) = (&**files.disk(), files.layout());
         if self.segment.as_ref().is_none_or(SegmentWriter::is_full) {
@@ -120,8 +143,10 @@ impl ScanKeeper {
             self.segment = Some(SegmentWriter::create(disk, layout, segment)?);
             self.has_new_names = true;
         }
-        self.scan_offset = self.segment.as_ref().map_or(0, SegmentWriter::bytes);
-        Ok(())
+        let missing = || Error::io(&layout.kept_scans(), "write", io::Error::other("no segment is open"));
+        let segment = self.segment.as_mut().ok_or_else(missing)?;
+        let start = ScanStart { segment: segment.segment, offset: segment.bytes() };
+        Ok((segment, start))
     }
 
     /// Adds points to the scan.
@@ -135,15 +160,24 @@ impl ScanKeeper {
 
     /// Ends the scan. It is nothing until it is noted.
     pub(in crate::store) fn end_scan(&mut self, has_intensities: bool) -> Result<SegmentPlace> {
-        let Some(segment) = &mut self.segment else { return Ok(SegmentPlace::default()) };
+        let (Some(segment), Some(start)) = (&mut self.segment, self.scan_start) else {
+            return Ok(SegmentPlace::default());
+        };
         self.unsynced.insert(segment.segment);
-        segment.end(self.scan_offset, has_intensities)
+        segment.end(start.offset, has_intensities)
     }
 
-    /// Takes back the scan that was written last.
+    /// Takes back the scan that was begun last and is not noted.
     pub(in crate::store) fn give_up_scan(&mut self, disk: &dyn Disk) {
-        if let Some(segment) = &mut self.segment
-            && segment.cut(disk, self.scan_offset).is_err()
+        if let Some(start) = self.scan_start.take() {
+            self.cut(disk, start);
+        }
+    }
+
+    /// Cuts the open segment, if it is this one.
+    fn cut(&mut self, disk: &dyn Disk, start: ScanStart) {
+        if let Some(segment) = self.segment.as_mut().filter(|segment| segment.segment == start.segment)
+            && segment.cut(disk, start.offset).is_err()
         {
             // What lies in it and is noted stays; the next scan goes to another.
             self.segment = None;
@@ -154,20 +188,30 @@ impl ScanKeeper {
     pub(in crate::store) fn copy(
         &mut self,
         files: &MapFiles,
-        committed_flush: u64,
+        last_commit: KeptAsOf,
         place: SegmentPlace,
     ) -> Result<SegmentPlace> {
-        let mut scan = SegmentScan::open(&**files.disk(), files.layout(), place)?;
-        self.begin_scan(files, committed_flush)?;
-        let Some(segment) = &mut self.segment else { return Ok(place) };
-        self.unsynced.insert(segment.segment);
-        segment.copy(&mut scan)
+        let disk = &**files.disk();
+        let mut scan = SegmentScan::open(disk, files.layout(), place)?;
+        let (segment, start) = self.open_segment(files, last_commit)?;
+        let copied = segment.copy(&mut scan);
+        self.unsynced.insert(start.segment);
+        match copied {
+            // What a scan's owner may still give up lies before it now, and stays.
+            Ok(_) => self.scan_start = self.scan_start.filter(|begun| begun.segment != start.segment),
+            // Half a scan must not move those that follow.
+            Err(_) => self.cut(disk, start),
+        }
+        copied
     }
 
     // Entries.
 
     /// Records an entry of the next commit.
     pub(in crate::store) fn note(&mut self, entry: CatalogEntry) {
+        if matches!(entry, CatalogEntry::Kept(_)) {
+            self.scan_start = None;
+        }
         // What a commit has begun to take along stays as it is.
         let own = self.pending.get_mut(self.begun_entries..).unwrap_or_default();
         if let (Some(CatalogEntry::Unlisted(_, last)), CatalogEntry::Unlisted(first, new_last)) =
@@ -192,6 +236,7 @@ impl ScanKeeper {
         let out = CatalogWriter::create(&**files.disk(), files.layout(), generation)
             .map_err(|error| Error::io(&files.layout().catalog(generation), "create", error))?;
         self.has_new_names = true;
+        self.is_replacement_suspect = false;
         self.replacement = Some(Replacement::Open { generation, out: Mutex::new(out) });
         Ok(())
     }
@@ -216,7 +261,7 @@ impl ScanKeeper {
         self.unsynced.iter().copied().collect()
     }
 
-    /// Writes what belongs to a commit, synced; `committed_flush` is the flush before it. `before` are the entries of
+    /// Writes what belongs to the commit after `last_commit`, synced. `before` are the entries of
     /// what the map had before its scans were kept, for the first catalog. Returns what [`ScanKeeper::commit`] is to be
     /// told.
     ///
@@ -226,7 +271,7 @@ impl ScanKeeper {
     pub(in crate::store) fn write(
         &mut self,
         files: &MapFiles,
-        committed_flush: u64,
+        last_commit: KeptAsOf,
         before: impl FnOnce() -> Result<Vec<CatalogEntry>>,
     ) -> Result<Option<Catalog>> {
         if !self.is_on {
@@ -234,10 +279,10 @@ impl ScanKeeper {
         }
         // Where another takes its place, the committed one may be damaged.
         let committed =
-            if self.replacement.is_some() { None } else { self.find_committed(files, committed_flush)? };
-        self.move_suspects(files, committed_flush)?;
+            if self.replacement.is_some() { None } else { self.find_committed(files, last_commit)? };
+        self.move_suspects(files, last_commit)?;
         self.sync_segments(files)?;
-        let written = self.write_catalog(files, committed_flush, committed, before)?;
+        let written = self.write_catalog(files, last_commit.flush_number, committed, before)?;
         if self.has_new_names {
             files.sync_folder(&files.layout().kept_scans())?;
             self.has_new_names = false;
@@ -316,26 +361,25 @@ impl ScanKeeper {
         }
     }
 
-    fn find_committed(&mut self, files: &MapFiles, committed_flush: u64) -> Result<Option<Catalog>> {
+    /// The catalog as of the last commit. What is behind it in the file may be cut off; what is damaged may not.
+    fn find_committed(&mut self, files: &MapFiles, last_commit: KeptAsOf) -> Result<Option<Catalog>> {
         if let Some(committed) = self.committed {
             return Ok(committed);
         }
         let (disk, layout) = (&**files.disk(), files.layout());
-        remove_catalogs_after(files, committed_flush)?;
-        let found = match generation_of(disk, layout, committed_flush)? {
-            None => None,
-            Some(generation) => {
-                let mut reader = CatalogReader::open(disk, layout, generation, committed_flush)?;
-                while reader.next()?.is_some() {}
-                Some(Catalog { generation, bytes: reader.bytes(), has_excess: reader.has_excess() })
-            }
-        };
+        remove_catalogs_after(files, last_commit.flush_number)?;
+        let generation = generation_of(disk, layout, last_commit.flush_number)?;
+        let mut records = KeptRecords::open(disk, layout, last_commit)?;
+        while records.next_entry()?.is_some() {}
+        let extent = generation.zip(records.extent());
+        let found = extent.map(|(generation, (bytes, has_excess))| Catalog { generation, bytes, has_excess });
         self.committed = Some(found);
         Ok(found)
     }
 
     /// Notes that a sync has failed: what is not durable is copied before a commit names it.
     pub(in crate::store) fn suspect_unsynced(&mut self) {
+        self.is_replacement_suspect |= !self.unsynced.is_empty();
         self.suspects.append(&mut self.unsynced);
         self.segment = None;
     }
@@ -353,11 +397,8 @@ impl ScanKeeper {
     }
 
     /// Copies scans of segments that could not be synced to another: what can still be read of them is checked.
-    fn move_suspects(&mut self, files: &MapFiles, committed_flush: u64) -> Result<()> {
-        if self.suspects.is_empty() {
-            return Ok(());
-        }
-        if self.replacement.is_some() {
+    fn move_suspects(&mut self, files: &MapFiles, last_commit: KeptAsOf) -> Result<()> {
+        if self.replacement.is_some() && self.is_replacement_suspect {
             let error = io::Error::other("an earlier sync failed; begin again");
             return Err(Error::io(&files.layout().kept_scans(), "trust", error));
         }
@@ -367,16 +408,15 @@ impl ScanKeeper {
             if let CatalogEntry::Kept(scan) = entry
                 && self.suspects.contains(&scan.place.segment)
             {
-                moved = self.copy(files, committed_flush, scan.place).map(|place| scan.place = place);
+                moved = self.copy(files, last_commit, scan.place).map(|place| scan.place = place);
                 if moved.is_err() {
                     break;
                 }
             }
         }
         self.pending = pending;
-        moved?;
-        self.suspects.clear();
-        Ok(())
+        // They stay suspects: a scan may be noted yet that was written before.
+        moved
     }
 
     fn make_folder(&mut self, files: &MapFiles) -> Result<()> {
@@ -389,23 +429,23 @@ impl ScanKeeper {
     }
 }
 
-/// Removes the catalogs and segments that no flush in `flushes` needs, but no new segments. A catalog that cannot be
-/// read keeps all.
+/// Removes the catalogs and segments that no flush in `flushes` needs, but no new segments.
+///
+/// # Errors
+///
+/// A catalog that cannot be read to its end: it keeps all. A disk that refuses.
 pub(in crate::store) fn remove_unneeded(
     disk: &dyn Disk,
     layout: &Layout,
-    flushes: &[u64],
+    flushes: &[KeptAsOf],
     is_new: impl Fn(u64) -> bool,
 ) -> Result<u64> {
     let (mut generations, mut segments) = (BTreeSet::new(), BTreeSet::new());
-    for &flush_number in flushes {
-        let Some(generation) = generation_of(disk, layout, flush_number)? else { continue };
-        generations.insert(generation);
-        let mut reader = CatalogReader::open(disk, layout, generation, flush_number)?;
-        while let Some(entry) = reader.next()? {
-            if let CatalogEntry::Kept(scan) = entry {
-                segments.insert(scan.place.segment);
-            }
+    for &as_of in flushes {
+        generations.extend(generation_of(disk, layout, as_of.flush_number)?);
+        let mut records = KeptRecords::open(disk, layout, as_of)?;
+        while let Some(scan) = records.next_kept()? {
+            segments.insert(scan.place.segment);
         }
     }
     let folder = layout.kept_scans();

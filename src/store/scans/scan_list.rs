@@ -3,7 +3,9 @@ use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::store::disk::Disk;
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
+use crate::store::recovery::quarantine::Quarantine;
 use std::io::{self, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
 
 const HEADER_BYTES: usize = 16;
 /// Magic, version, zeros.
@@ -18,6 +20,15 @@ pub(in crate::store) struct ScanList {
     committed: Option<Extent>,
     /// Whether there may be more in the file.
     has_excess: bool,
+    /// Where the file is as it was before damage was cut off.
+    quarantined: Option<PathBuf>,
+}
+
+/// What is found in the file.
+struct Found {
+    committed: Extent,
+    has_excess: bool,
+    quarantined: Option<PathBuf>,
 }
 
 /// A beginning of the file.
@@ -53,8 +64,9 @@ impl ScanList {
         self.pending.len()
     }
 
-    /// Writes what belongs to a commit, the first `count` entries, synced; `committed` is the flush before it. Returns
-    /// what [`ScanList::commit`] is to be told.
+    /// Writes what belongs to a commit, the first `count` entries, synced; `committed` is the flush before it, which has
+    /// `records` in the list if that is known. Returns what [`ScanList::commit`] is to be told. A list that is damaged
+    /// is copied to quarantine before it is cut.
     ///
     /// # Errors
     ///
@@ -63,6 +75,7 @@ impl ScanList {
         &mut self,
         files: &MapFiles,
         committed: u64,
+        records: Option<u64>,
         count: usize,
     ) -> Result<Extent> {
         let pending = self.pending.get(..count).unwrap_or(&self.pending);
@@ -70,9 +83,9 @@ impl ScanList {
         let before = match self.committed {
             Some(before) => before,
             None => {
-                let (found, has_excess) = find_end(&**files.disk(), files.layout(), committed)?;
-                self.has_excess = has_excess;
-                *self.committed.insert(found)
+                let found = find_end(&**files.disk(), files.layout(), committed, records)?;
+                (self.has_excess, self.quarantined) = (found.has_excess, found.quarantined);
+                *self.committed.insert(found.committed)
             }
         };
         if pending.is_empty() && !self.has_excess {
@@ -107,6 +120,11 @@ impl ScanList {
         Ok(Extent { records: before.records + pending.len() as u64 })
     }
 
+    /// Where the file is as it was before damage was cut off, if it was.
+    pub(in crate::store) fn quarantined(&self) -> Option<&Path> {
+        self.quarantined.as_deref()
+    }
+
     /// Notes that what was written is committed.
     pub(in crate::store) fn commit(&mut self, written: Extent, count: usize) {
         (self.committed, self.has_excess) = (Some(written), false);
@@ -114,20 +132,27 @@ impl ScanList {
     }
 }
 
-/// What is committed, and whether there is more in the file.
-fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64) -> Result<(Extent, bool)> {
-    let mut records = 0;
-    match for_each_record(disk, layout, committed, &mut |_, _| records += 1) {
+/// What is committed. What is damaged is copied to quarantine.
+fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u64>) -> Result<Found> {
+    let (mut found, path) = (Extent::default(), layout.scans());
+    let read = for_each_record(disk, layout, committed, &mut |_, _| found.records += 1);
+    let damage = match read {
+        Ok(_) if records.is_some_and(|records| found.records < records) => "its end is missing".to_owned(),
         Ok(file_bytes) => {
-            let found = Extent { records };
-            Ok((found, file_bytes.is_some_and(|bytes| bytes != found.bytes())))
+            let has_excess = file_bytes.is_some_and(|bytes| bytes != found.bytes());
+            return Ok(Found { committed: found, has_excess, quarantined: None });
         }
-        Err(DecodeError::Io(error)) => Err(Error::io(&layout.scans(), "read", error)),
-        Err(DecodeError::Format(error)) => {
-            log::warn!("{}: {error}; what follows there is lost", layout.scans().display());
-            Ok((Extent { records }, true))
-        }
-    }
+        Err(DecodeError::Io(error)) => return Err(Error::io(&path, "read", error)),
+        Err(DecodeError::Format(error)) => error.to_string(),
+    };
+    let quarantined = Quarantine::new(disk, layout).take_copy(&path)?;
+    log::warn!(
+        "{}: {damage}; the list goes on behind record {}{}",
+        path.display(),
+        found.records,
+        quarantined.as_ref().map_or(String::new(), |to| format!(", and is as it was in {}", to.display()))
+    );
+    Ok(Found { committed: found, has_excess: true, quarantined })
 }
 
 /// The scans of a map as of a flush, in order; none for a map that keeps no list.

@@ -90,6 +90,6 @@ impl KeptTables {
 
     /// Bytes of memory, about.
     pub(in crate::store) fn bytes(&self) -> usize {
-        self.snapshots.bytes()
+        self.snapshots.bytes() + self.readers.bytes()
     }
 }

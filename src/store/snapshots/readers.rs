@@ -1,5 +1,5 @@
-use super::seen_tables::{KeptFlushes, SeenTables};
-use crate::space::TileIndex;
+use super::seen_tables::{KeptFlushes, SeenTables, kept_flushes_bytes};
+use crate::space::{TileIndex, hash_table_bytes};
 use crate::store::disk::{Disk, ReaderWatch};
 use crate::store::layout::Layout;
 use rustc_hash::FxHashMap;
@@ -50,6 +50,11 @@ impl Readers {
     /// Whether anybody reads the map.
     pub(in crate::store) fn are_there(&self) -> bool {
         self.watched.iter().any(|watched| watched.watch.has_readers())
+    }
+
+    /// Bytes of memory, about.
+    pub(in crate::store) fn bytes(&self) -> usize {
+        kept_flushes_bytes(&self.kept) + hash_table_bytes::<(TileIndex, u64)>(self.added.capacity())
     }
 
     /// Looks who is still there.

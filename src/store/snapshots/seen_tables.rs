@@ -5,8 +5,9 @@ use crate::space::{TileIndex, TileTable, hash_table_bytes};
 use crate::store::commit::commits::Commits;
 use crate::store::disk::Disk;
 use crate::store::layout::Layout;
+use crate::store::scans::KeptAsOf;
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Tables that were kept when they were replaced: for each tile, the flushes that they were the last version of.
 pub(in crate::store) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
@@ -25,6 +26,8 @@ pub(in crate::store) struct SeenTables {
     see_all: bool,
     /// The snapshots themselves.
     found: SnapshotList,
+    /// For each flush of which a snapshot was read, the scans that it keeps, if it keeps any.
+    kept_scans: BTreeMap<u64, Option<KeptAsOf>>,
 }
 
 impl SeenTables {
@@ -57,7 +60,7 @@ impl SeenTables {
         for name in names {
             let flush_number = match Snapshot::read(disk, layout, &name, map_id, listed) {
                 Ok(snapshot) => {
-                    snapshots.take(&snapshot.commits, kept);
+                    snapshots.take(&snapshot, kept);
                     Some(snapshot.commits.flush_number)
                 }
                 Err(error) => {
@@ -105,8 +108,19 @@ impl SeenTables {
         &self.found
     }
 
-    fn take(&mut self, commits: &Commits, kept: &KeptFlushes) {
-        self.take_tiles(commits.tiles.tiles(), commits.flush_number, kept);
+    fn take(&mut self, snapshot: &Snapshot, kept: &KeptFlushes) {
+        let Commits { flush_number, scan_number, tiles, .. } = &snapshot.commits;
+        self.take_tiles(tiles.tiles(), *flush_number, kept);
+        let keeps_scans = snapshot.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
+        let as_of = KeptAsOf { flush_number: *flush_number, scan_number: *scan_number };
+        self.kept_scans.insert(*flush_number, keeps_scans.then_some(as_of));
+    }
+
+    /// The kept scans that the snapshots of this list need; `None` if that is not known of each.
+    pub(in crate::store) fn kept_scans_of(&self, listed: Option<&SnapshotList>) -> Option<Vec<KeptAsOf>> {
+        let names = listed.into_iter().flat_map(|listed| listed.names().map(|name| listed.flush_of(name)));
+        let needed = names.map(|flush_number| self.kept_scans.get(&flush_number?).copied());
+        needed.collect::<Option<Vec<_>>>().map(|needed| needed.into_iter().flatten().collect())
     }
 
     fn take_tiles(&mut self, tiles: impl Iterator<Item = TileIndex>, as_of_flush: u64, kept: &KeptFlushes) {
@@ -150,12 +164,15 @@ impl SeenTables {
 
     /// Bytes of memory, about.
     pub(in crate::store) fn bytes(&self) -> usize {
-        // A set of few numbers takes a leaf of its tree.
-        const FLUSHES_BYTES: usize = 120;
-        self.shared.bytes()
-            + hash_table_bytes::<(TileIndex, BTreeSet<u64>)>(self.pinned.capacity())
-            + self.pinned.len() * FLUSHES_BYTES
+        self.shared.bytes() + kept_flushes_bytes(&self.pinned)
     }
+}
+
+/// Bytes of memory of what is known of kept tables, about.
+pub(in crate::store) fn kept_flushes_bytes(kept: &KeptFlushes) -> usize {
+    // A set of few numbers takes a leaf of its tree.
+    const FLUSHES_BYTES: usize = 120;
+    hash_table_bytes::<(TileIndex, BTreeSet<u64>)>(kept.capacity()) + kept.len() * FLUSHES_BYTES
 }
 
 /// Which of a tile's kept tables a snapshot of a flush sees; `None` if the one in place.

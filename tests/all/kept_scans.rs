@@ -1,0 +1,218 @@
+//! The files of kept scans under the hands of a writer: what is damaged stays, and what could not be synced is no
+//! scan's undoing.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use voxtile::integrity::{repair, verify};
+use voxtile::mapper::KeptScan;
+use voxtile::scan::ScanPoints;
+use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, TileStore};
+use voxtile::{
+    Error, MapConfig, MapPath, MapReader, Mapper, OutOfCoreTileMapper, RayConfig, Result, ScanRef,
+};
+
+fn map() -> &'static Path {
+    Path::new("/city/map")
+}
+
+fn at(disk: &FaultyDisk) -> MapPath {
+    MapPath::on(disk.shared(), map())
+}
+
+fn config() -> MapConfig {
+    MapConfig::new(0.4, 3.2).unwrap().with_kept_scans(true)
+}
+
+/// The points of a scan, told by its name.
+fn points(name: u64) -> Vec<[f64; 3]> {
+    (0..40).map(|number| [name as f64, 0.1 * f64::from(number), 0.5]).collect()
+}
+
+fn insert(mapper: &mut OutOfCoreTileMapper, name: u64) -> Result<()> {
+    mapper.insert_points(&ScanRef::in_world([0.0; 3], &points(name))).map(drop)
+}
+
+/// A map whose catalog has a scan in each of four flushes, each in a segment of its own.
+fn a_map() -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    for name in 1..=4 {
+        let mut mapper = match name {
+            1 => OutOfCoreTileMapper::create(at(&disk), config()),
+            _ => OutOfCoreTileMapper::open(at(&disk), config()),
+        }
+        .unwrap();
+        insert(&mut mapper, name).unwrap();
+        mapper.flush().unwrap();
+    }
+    disk
+}
+
+fn kept_files(disk: &FaultyDisk) -> BTreeMap<PathBuf, Vec<u8>> {
+    disk.files().into_iter().filter(|(path, _)| path.to_string_lossy().contains("kept_scans")).collect()
+}
+
+fn kept_points(disk: &FaultyDisk) -> Result<Vec<Vec<[f64; 3]>>> {
+    let of_scan = |scan: Result<KeptScan>| {
+        let (scan, mut points) = (scan?, Vec::new());
+        scan.for_each_own_chunk(0..scan.len(), &mut |some, _| {
+            points.extend_from_slice(some);
+            true
+        })?;
+        Ok(points)
+    };
+    MapReader::open(at(disk), 1)?.kept_scans()?.map(of_scan).collect()
+}
+
+fn is_whole(disk: &FaultyDisk) -> bool {
+    let mut findings = 0;
+    verify(at(disk), |_| findings += 1, |_, _| ()).unwrap();
+    findings == 0
+}
+
+#[test]
+fn a_writer_neither_removes_nor_cuts_off_what_is_behind_damage() {
+    let whole = a_map();
+    let files = kept_files(&whole);
+    let [(catalog, bytes)] = files
+        .iter()
+        .filter(|(path, _)| path.to_string_lossy().contains("catalog"))
+        .collect::<Vec<_>>()
+        .try_into()
+        .unwrap();
+    assert_eq!(files.len(), 5, "a catalog and four segments");
+    let mut refused = 0;
+    for offset in 0..bytes.len() {
+        let disk = whole.copy();
+        let mut damaged = bytes.clone();
+        damaged[offset] ^= 0x20;
+        disk.put(catalog, &damaged);
+        let before = kept_files(&disk);
+        let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
+        assert_eq!(kept_files(&disk), before, "opening, a byte at {offset}");
+        let inserted = insert(&mut mapper, 5).and_then(|()| mapper.flush());
+        drop(mapper);
+        match inserted {
+            Ok(()) => assert_eq!(kept_points(&disk).unwrap().len(), 5, "a byte at {offset}"),
+            Err(error) => {
+                assert!(matches!(error, Error::Damaged { .. }), "a byte at {offset}: {error:#}");
+                assert_eq!(kept_files(&disk), before, "inserting, a byte at {offset}");
+                refused += 1;
+            }
+        }
+        repair(at(&disk), |_| (), |_, _| ()).unwrap();
+        let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
+        insert(&mut mapper, 6).and_then(|()| mapper.flush()).unwrap();
+    }
+    assert!(refused > bytes.len() * 9 / 10, "{refused} of {}", bytes.len());
+}
+
+/// A store that keeps scans, whose last begun scan was not noted.
+struct Writer {
+    disk: FaultyDisk,
+    store: TileStore,
+    scan_number: u64,
+}
+
+impl Writer {
+    fn new() -> Self {
+        let disk = FaultyDisk::new(Fault::None);
+        OutOfCoreTileMapper::create(at(&disk), config()).unwrap().flush().unwrap();
+        let store = TileStore::open(disk.shared(), map()).unwrap();
+        Self { disk, store, scan_number: 0 }
+    }
+
+    fn write(&mut self, name: u64) -> Result<SegmentPlace> {
+        self.store.begin_kept_scan()?;
+        self.store.push_kept_points(&points(name), None)?;
+        self.store.end_kept_scan(false)
+    }
+
+    fn note(&mut self, place: SegmentPlace) {
+        self.scan_number += 1;
+        self.store.note_entry(CatalogEntry::Kept(Box::new(KeptRecord {
+            number: self.scan_number,
+            stamp_ns: None,
+            frame: KeptFrame::World([0.0; 3]),
+            rays: RayConfig::default(),
+            points: 40,
+            has_intensities: false,
+            updates: 0,
+            place,
+            tiles: Vec::new(),
+        })));
+    }
+
+    fn commit(&mut self) -> Result<()> {
+        self.store.commit(self.store.metadata().clone(), self.scan_number)
+    }
+
+    /// Commits until it goes, after this fault; returns how often it did not.
+    fn commit_after(&mut self, fault: Fault) -> usize {
+        self.disk.set_fault(fault);
+        let failed = (0..5).take_while(|_| self.commit().is_err()).count();
+        self.disk.set_fault(Fault::None);
+        failed
+    }
+
+    /// The scans that are there when the power has gone now.
+    fn check(&mut self, names: &[u64], what: &str) {
+        self.commit().unwrap();
+        let left = self.disk.after_crash(Unsynced::Dropped);
+        let expected: Vec<_> = names.iter().map(|&name| points(name)).collect();
+        let found = kept_points(&left).unwrap_or_else(|error| panic!("{what}: {error:#}"));
+        assert_eq!(found, expected, "{what}");
+        assert!(is_whole(&left), "{what}");
+    }
+}
+
+#[test]
+fn a_scan_that_is_given_up_after_a_failed_sync_takes_no_other_along() {
+    let mut failed = 0;
+    for change in 0..20 {
+        let mut writer = Writer::new();
+        let first = writer.write(1).unwrap();
+        writer.note(first);
+        writer.write(2).unwrap();
+        failed += writer.commit_after(Fault::LosesSync(change));
+        writer.store.give_up_kept_scan();
+        let third = writer.write(3).unwrap();
+        writer.note(third);
+        writer.check(&[1, 3], &format!("change {change} fails"));
+    }
+    assert!(failed > 0);
+}
+
+#[test]
+fn a_scan_that_is_noted_after_a_failed_sync_is_durable() {
+    let mut failed = 0;
+    for change in 0..20 {
+        let mut writer = Writer::new();
+        let first = writer.write(1).unwrap();
+        writer.note(first);
+        let second = writer.write(2).unwrap();
+        failed += writer.commit_after(Fault::LosesSync(change));
+        writer.note(second);
+        writer.check(&[1, 2], &format!("change {change} fails"));
+    }
+    assert!(failed > 0);
+}
+
+#[test]
+fn a_copy_that_fails_halfway_moves_no_later_scan() {
+    let mut failed = 0;
+    for change in 0..8 {
+        for operation in 0..24 {
+            let mut writer = Writer::new();
+            let first = writer.write(1).unwrap();
+            writer.note(first);
+            writer.disk.set_fault(Fault::LosesSync(change));
+            let _ = writer.commit();
+            failed += writer.commit_after(Fault::Fails(operation));
+            let second = writer.write(2).unwrap();
+            writer.note(second);
+            writer.check(&[1, 2], &format!("change {change} fails, then operation {operation}"));
+        }
+    }
+    assert!(failed > 0);
+}
