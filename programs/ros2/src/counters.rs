@@ -11,7 +11,7 @@ pub struct Counters {
     pub dropped_without_pose: u64,
     /// Clouds and transforms that could not be decoded, or not whole.
     pub malformed: u64,
-    /// Clouds larger than the whole queue.
+    /// Clouds that are larger than the whole queue, with their points decoded.
     pub too_large: u64,
     /// Transforms that are not valid, or more than the buffer takes.
     pub transforms_refused: u64,

@@ -11,6 +11,7 @@
 
 mod args;
 mod cloud;
+mod cloud_points;
 mod cloud_queue;
 mod corrections;
 mod counters;

@@ -1,5 +1,6 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
+use crate::cloud_points::CloudPoints;
 use crate::health::Health;
 use crate::inbox::Inbox;
 use crate::latencies::Latencies;
@@ -15,8 +16,7 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 use voxtile::operations::{self, Part, RemapBeside};
 use voxtile::{
-    Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Pose,
-    ScanRef, Stop,
+    Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Stop,
 };
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::ros::Wire;
@@ -326,20 +326,10 @@ impl Mapping {
     }
 
     fn insert(&mut self, cloud: &Cloud, world_from_sensor: &RigidPose) -> anyhow::Result<()> {
+        // The inbox has decoded it once: it is whole, and there is room for its points.
         let Ok(message) = PointCloud2::decode(Wire::Cdr, &cloud.cdr) else { return Ok(()) };
-        if let Some(shortage) = message.shortage() {
-            log::debug!("a cloud is left out: {shortage}");
-            self.inbox.count(|counters| counters.malformed += 1);
-            return Ok(());
-        }
-        let (mut points, mut intensities) = (Vec::new(), Vec::new());
-        for point in message.points() {
-            // The origin means that nothing came back.
-            points.push(if point.is_return { point.position_m } else { [0.0; 3] });
-            intensities.push(point.intensity);
-        }
-        let intensities = message.has_intensities().then_some(&*intensities);
-        let scan = scan_of(world_from_sensor, cloud.stamp_ns, &points, intensities);
+        let points = CloudPoints::of(&message);
+        let scan = points.scan(world_from_sensor, cloud.stamp_ns);
         match scan.and_then(|scan| self.mapper.insert_points(&scan).map(|_| scan)) {
             Ok(scan) => {
                 // Before others hear of the scan: they publish once what they see then.
@@ -380,18 +370,4 @@ fn last_place(folder: &Path) -> (Point, i64) {
     let scans = MapReader::open(folder, 1).and_then(|reader| reader.scans());
     let last = scans.ok().and_then(|scans| scans.last().copied());
     last.map_or(([0.0; 3], 0), |scan| (scan.origin_m, scan.stamp_ns.unwrap_or(0)))
-}
-
-fn scan_of<'a>(
-    world_from_sensor: &RigidPose,
-    stamp_ns: i64,
-    points: &'a [[f64; 3]],
-    intensities: Option<&'a [f32]>,
-) -> voxtile::Result<ScanRef<'a>> {
-    let pose = Pose::from_quaternion(world_from_sensor.position_m, world_from_sensor.quaternion)?;
-    let scan = ScanRef::in_sensor(pose, points).with_stamp_ns(stamp_ns);
-    match intensities {
-        Some(intensities) => scan.with_intensities(intensities),
-        None => Ok(scan),
-    }
 }
