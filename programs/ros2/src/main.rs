@@ -27,6 +27,7 @@ mod names;
 mod node;
 mod parameters;
 mod publishers;
+mod refusal;
 mod remapping;
 mod services;
 mod stamp_check;
