@@ -340,10 +340,16 @@ impl Mapping {
     }
 
     fn edit(
-        self,
+        mut self,
         placed: PlacedOrder,
         change: impl FnOnce(&Path) -> voxtile::Result<String>,
     ) -> anyhow::Result<Self> {
+        // A path that waits is about the scans before, as the one that is followed; perhaps they are no more.
+        let paths =
+            [self.remapping.take().is_some(), self.path.take().is_some(), self.inbox.take_path().is_some()];
+        if paths.contains(&true) {
+            log::warn!("a path is left out: the map is changed meanwhile");
+        }
         let (changed, outcome) = self.change(change)?;
         placed.answer(outcome.map_err(|error| error.to_string()));
         Ok(changed)
@@ -354,9 +360,6 @@ impl Mapping {
         mut self,
         change: impl FnOnce(&Path) -> voxtile::Result<T>,
     ) -> anyhow::Result<(Self, voxtile::Result<T>)> {
-        if self.remapping.take().is_some() {
-            log::warn!("a path is left out: the map is changed meanwhile");
-        }
         // What is not flushed would be lost, so the map stays as it is.
         let flushed = self.mapper.flush();
         self.note_flush(&flushed);

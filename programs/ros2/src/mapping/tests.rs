@@ -159,3 +159,21 @@ fn a_node_that_ends_by_an_error_leaves_what_was_mapped_durable() {
     assert!(matches!(error.downcast_ref(), Some(Error::Stopped)), "{error:#}");
     assert_eq!(MapReader::open(folder.path().join("map"), 1).unwrap().scan_number(), 1);
 }
+
+#[test]
+fn a_path_that_waits_is_left_out_when_the_map_becomes_what_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut mapping, orders) = open(folder.path(), &["--path", "/path"]);
+    mapping.map(NEAR);
+    mapping.mapper.snapshot(&"before".parse().unwrap()).unwrap();
+    mapping.map(NEAR);
+    mapping.map(NEAR);
+    mapping.path = Some((3, Vec::new()));
+    assert!(mapping.awaits_flush());
+    let asked = std::thread::spawn(move || orders.place(Order::Revert("before".parse().unwrap())));
+    let order = mapping.orders.recv().unwrap();
+    let mut mapping = mapping.obey(order).unwrap();
+    asked.join().unwrap().unwrap();
+    mapping.map(NEAR);
+    assert_eq!((mapping.mapper.scan_number(), mapping.awaits_flush()), (2, false));
+}
