@@ -192,7 +192,9 @@ mod tests {
         let cloud = messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 3000]).cdr();
         std::thread::scope(|scope| {
             scope.spawn(|| (0..4).for_each(|_| inbox.put_cloud(0, cloud.clone())));
-            let taken = (0..40).filter_map(|_| inbox.take(Duration::from_millis(100))).take(4).count();
+            // Mapping one takes a while, in which the next one finds no room.
+            let taken = (0..40).filter_map(|_| inbox.take(Duration::from_millis(100)));
+            let taken = taken.inspect(|_| std::thread::sleep(Duration::from_millis(50))).take(4).count();
             inbox.close();
             assert_eq!((taken, inbox.counters().0.dropped_behind), (4, 0));
         });
