@@ -74,7 +74,7 @@ pub struct Args {
     /// Keep the scans in a new map, so that it can follow its trajectory
     #[arg(long)]
     pub keep_scans: bool,
-    /// Memory for the map and for clouds that wait; the clouds get an eighth, and remapping for --path a quarter
+    /// Memory for the map and for clouds until they are mapped; the clouds get an eighth, and remapping for --path a quarter
     #[arg(long, value_name = "SIZE", default_value = "1GiB")]
     pub memory: ByteSize,
     /// Flush so often

@@ -8,5 +8,7 @@ pub struct Cloud {
     pub stamp_ns: i64,
     pub frame: String,
     pub cdr: Vec<u8>,
+    /// Bytes of memory that its points take on top, once they are decoded.
+    pub points_bytes: usize,
     pub arrived: Instant,
 }

@@ -3,11 +3,14 @@ use crate::counters::Counters;
 use crate::when_behind::WhenBehind;
 use std::collections::VecDeque;
 
-/// Clouds that wait, oldest first, in a bounded number of bytes.
+/// Clouds that wait, oldest first, in a bounded number of bytes. Decoded points count from the beginning, and those of
+/// the cloud that was taken until the next one is: so all of them have room, whenever they are mapped.
 #[derive(Debug)]
 pub struct CloudQueue {
     clouds: VecDeque<Cloud>,
     bytes: usize,
+    /// How many of them are of the cloud that was taken.
+    taken_bytes: usize,
     most_bytes: usize,
     when_behind: WhenBehind,
     /// By topic: whether the last one was left out.
@@ -31,17 +34,17 @@ const CLOUD_BYTES: usize = 256;
 impl CloudQueue {
     pub fn new(most_bytes: usize, topics: usize, when_behind: WhenBehind) -> Self {
         let (clouds, was_thinned) = (VecDeque::new(), vec![false; topics]);
-        Self { clouds, bytes: 0, most_bytes, when_behind, was_thinned }
+        Self { clouds, bytes: 0, taken_bytes: 0, most_bytes, when_behind, was_thinned }
     }
 
     pub fn len(&self) -> usize {
         self.clouds.len()
     }
 
-    /// Whether a cloud of so many bytes has to wait for room outside of the queue.
-    pub fn must_wait(&self, cdr_bytes: usize) -> bool {
-        let needed = self.bytes.saturating_add(cdr_bytes).saturating_add(CLOUD_BYTES);
-        self.when_behind == WhenBehind::Wait && !self.clouds.is_empty() && needed > self.most_bytes
+    /// Whether a cloud has to wait for room outside of the queue.
+    pub fn must_wait(&self, cloud: &Cloud) -> bool {
+        let needed = self.bytes.saturating_add(bytes_of(cloud));
+        self.when_behind == WhenBehind::Wait && self.bytes > 0 && needed > self.most_bytes
     }
 
     pub fn push(&mut self, cloud: Cloud, counters: &mut Counters) {
@@ -60,20 +63,28 @@ impl CloudQueue {
             }
         }
         while self.bytes + bytes > self.most_bytes {
-            let Some(oldest) = self.clouds.pop_front() else { break };
-            self.bytes -= bytes_of(&oldest);
             counters.dropped_behind += 1;
+            // What is left is of the cloud that is being mapped.
+            let Some(oldest) = self.clouds.pop_front() else { return };
+            self.bytes -= bytes_of(&oldest);
         }
         self.bytes += bytes;
         self.clouds.push_back(cloud);
     }
 
-    /// Takes the first cloud that is ready. Those of one topic keep their order; topics do not wait for one another.
+    /// Gives back the room of the cloud that was taken.
+    pub fn let_go(&mut self) {
+        self.bytes -= std::mem::take(&mut self.taken_bytes);
+    }
+
+    /// Takes the first cloud that is ready, and lets go of the one before. Those of one topic keep their order; topics
+    /// do not wait for one another.
     pub fn take_ready<P>(
         &mut self,
         counters: &mut Counters,
         mut verdict: impl FnMut(&Cloud) -> Verdict<P>,
     ) -> Option<(Cloud, P)> {
+        self.let_go();
         let mut waiting: Vec<usize> = Vec::new();
         let mut at = 0;
         while let Some(cloud) = self.clouds.get(at) {
@@ -88,23 +99,23 @@ impl CloudQueue {
                 }
                 Verdict::Hopeless => {
                     counters.dropped_without_pose += 1;
-                    self.remove(at);
+                    let cloud = self.clouds.remove(at)?;
+                    self.bytes -= bytes_of(&cloud);
                 }
-                Verdict::Ready(pose) => return Some((self.remove(at)?, pose)),
+                Verdict::Ready(pose) => {
+                    let cloud = self.clouds.remove(at)?;
+                    self.taken_bytes = bytes_of(&cloud);
+                    return Some((cloud, pose));
+                }
             }
         }
         None
     }
-
-    fn remove(&mut self, at: usize) -> Option<Cloud> {
-        let cloud = self.clouds.remove(at)?;
-        self.bytes -= bytes_of(&cloud);
-        Some(cloud)
-    }
 }
 
 fn bytes_of(cloud: &Cloud) -> usize {
-    cloud.cdr.capacity() + cloud.frame.capacity() + CLOUD_BYTES
+    let own_bytes = cloud.cdr.capacity() + cloud.frame.capacity() + CLOUD_BYTES;
+    own_bytes.saturating_add(cloud.points_bytes)
 }
 
 #[cfg(test)]
@@ -113,7 +124,8 @@ mod tests {
     use std::time::Instant;
 
     fn cloud(topic: usize, stamp_ns: i64) -> Cloud {
-        Cloud { topic, stamp_ns, frame: String::new(), cdr: vec![0; 744], arrived: Instant::now() }
+        let (frame, cdr) = (String::new(), vec![0; 744]);
+        Cloud { topic, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now() }
     }
 
     fn stamps(queue: &mut CloudQueue) -> Vec<i64> {
@@ -153,10 +165,38 @@ mod tests {
     #[test]
     fn wait_asks_for_room_but_takes_one_cloud_always() {
         let (mut queue, mut counters) = (CloudQueue::new(1500, 1, WhenBehind::Wait), Counters::default());
-        assert!(!queue.must_wait(1 << 40));
+        assert!(!queue.must_wait(&Cloud { points_bytes: usize::MAX, ..cloud(0, 1) }));
         queue.push(cloud(0, 1), &mut counters);
-        assert!(queue.must_wait(744));
-        assert!(!CloudQueue::new(1500, 1, WhenBehind::DropOldest).must_wait(744));
+        assert!(queue.must_wait(&cloud(0, 2)));
+        assert!(!CloudQueue::new(1500, 1, WhenBehind::DropOldest).must_wait(&cloud(0, 2)));
+        // It is being mapped, and then it is not.
+        assert_eq!(queue.take_ready(&mut counters, |_| Verdict::Ready(())).unwrap().0.stamp_ns, 1);
+        assert!(queue.must_wait(&cloud(0, 2)));
+        queue.let_go();
+        assert!(!queue.must_wait(&cloud(0, 2)));
+    }
+
+    #[test]
+    fn points_have_room_before_they_are_decoded_and_while_they_are_mapped() {
+        let (mut queue, mut counters) =
+            (CloudQueue::new(3000, 1, WhenBehind::DropOldest), Counters::default());
+        let with_points = |stamp_ns| Cloud { points_bytes: 1000, ..cloud(0, stamp_ns) };
+        queue.push(Cloud { points_bytes: 2001, ..cloud(0, 1) }, &mut counters);
+        queue.push(Cloud { points_bytes: usize::MAX, ..cloud(0, 2) }, &mut counters);
+        assert_eq!((queue.len(), counters.too_large), (0, 2));
+        queue.push(with_points(3), &mut counters);
+        queue.push(with_points(4), &mut counters);
+        assert_eq!((queue.len(), counters.dropped_behind), (1, 1));
+        let taken = queue.take_ready(&mut counters, |_| Verdict::Ready(()));
+        assert_eq!((taken.unwrap().0.stamp_ns, queue.len()), (4, 0));
+        // The second one has no room beside the one that is being mapped and the first one, and then none beside that.
+        queue.push(cloud(0, 5), &mut counters);
+        queue.push(with_points(6), &mut counters);
+        assert_eq!((queue.len(), queue.bytes, counters.dropped_behind), (0, 2000, 3));
+        assert_eq!(stamps(&mut queue), [0; 0]);
+        queue.push(with_points(7), &mut counters);
+        assert_eq!(stamps(&mut queue), [7]);
+        assert_eq!(queue.bytes, 0);
     }
 
     #[test]

@@ -11,8 +11,16 @@ pub struct Counters {
     pub dropped_without_pose: u64,
     /// Clouds and transforms that could not be decoded, or not whole.
     pub malformed: u64,
-    /// Clouds larger than the whole queue.
+    /// Clouds that are larger than the whole queue, with their points decoded.
     pub too_large: u64,
+    /// Clouds for which the map has too little memory.
+    pub refused_memory: u64,
+    /// Clouds that touch a tile that is damaged on disk.
+    pub refused_damaged: u64,
+    /// Clouds for which the disk did not do what it was to do.
+    pub refused_disk: u64,
+    /// Flushes that were to be tried again.
+    pub failed_flushes: u64,
     /// Transforms that are not valid, or more than the buffer takes.
     pub transforms_refused: u64,
     /// How often the map followed a corrected path.
@@ -26,7 +34,8 @@ impl std::fmt::Display for Counters {
         write!(
             f,
             "clouds: {} received, {} mapped, {} dropped behind, {} thinned, {} without a pose, {} malformed, \
-             {} too large; {} transforms refused, {} transport errors",
+             {} too large, {} refused for want of memory, {} for damaged tiles, {} by the disk; {} flushes failed; \
+             {} transforms refused, {} transport errors",
             self.received,
             self.mapped,
             self.dropped_behind,
@@ -34,6 +43,10 @@ impl std::fmt::Display for Counters {
             self.dropped_without_pose,
             self.malformed,
             self.too_large,
+            self.refused_memory,
+            self.refused_damaged,
+            self.refused_disk,
+            self.failed_flushes,
             self.transforms_refused,
             self.transport_errors
         )

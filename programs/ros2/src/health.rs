@@ -11,6 +11,8 @@ pub struct Health {
     /// Since the map on disk was last what is in memory, or made newer.
     pub flush_age: Duration,
     pub is_flushing: bool,
+    /// Whether the last flush has failed.
+    pub has_flush_failed: bool,
     /// Of the local map, beside the statistics.
     pub local_map_bytes: usize,
     pub latencies: Latencies,

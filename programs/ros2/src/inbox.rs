@@ -1,13 +1,14 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
+use crate::cloud_points::CloudPoints;
 use crate::cloud_queue::CloudQueue;
 use crate::counters::Counters;
 use crate::transform_buffer::TransformBuffer;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
-use voxtile_clouds::ros::Wire;
-use voxtile_clouds::ros::messages::{MessageKind, PointCloud2, StampedPose, decode_poses};
+use voxtile_clouds::ros::messages::{Header, MessageKind, PointCloud2, StampedPose, decode_poses};
+use voxtile_clouds::ros::{Wire, WireError};
 
 /// What readers have for the mapping thread.
 #[derive(Debug)]
@@ -38,22 +39,23 @@ impl Inbox {
     }
 
     pub fn put_cloud(&self, topic: usize, cdr: Vec<u8>) {
-        let head = PointCloud2::decode(Wire::Cdr, &cdr).map(|cloud| cloud.header);
+        let head = head(&cdr);
         let mut state = self.lock();
         state.counters.received += 1;
-        let header = match head {
-            Ok(header) => header,
+        let (header, points_bytes) = match head {
+            Ok(head) => head,
             Err(error) => {
                 log::debug!("a cloud cannot be decoded: {error}");
                 state.counters.malformed += 1;
                 return;
             }
         };
-        while state.queue.must_wait(cdr.capacity()) && !state.is_closed {
+        let (stamp_ns, frame) = (header.stamp_ns, header.frame_id);
+        let mut cloud = Cloud { topic, stamp_ns, frame, cdr, points_bytes, arrived: Instant::now() };
+        while state.queue.must_wait(&cloud) && !state.is_closed {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-        let cloud =
-            Cloud { topic, stamp_ns: header.stamp_ns, frame: header.frame_id, cdr, arrived: Instant::now() };
+        cloud.arrived = Instant::now();
         let State { queue, counters, .. } = &mut *state;
         queue.push(cloud, counters);
         self.changed.notify_all();
@@ -102,6 +104,9 @@ impl Inbox {
     /// The next cloud that has its pose, waiting for it at most so long.
     pub fn take(&self, most_wait: Duration) -> Option<(Cloud, RigidPose)> {
         let mut state = self.lock();
+        // The one before is mapped, and what waits for its room may come in.
+        state.queue.let_go();
+        self.changed.notify_all();
         for is_last in [false, true] {
             let State { queue, transforms, counters, .. } = &mut *state;
             let now = Instant::now();
@@ -137,5 +142,61 @@ impl Inbox {
     /// What a thread that panicked left is still whole: each change is one call.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The header of a cloud that has all points that it claims, and the bytes of memory that they will take.
+fn head(cdr: &[u8]) -> Result<(Header, usize), WireError> {
+    let cloud = PointCloud2::decode(Wire::Cdr, cdr)?;
+    match cloud.shortage() {
+        Some(shortage) => Err(shortage),
+        None => Ok((cloud.header.clone(), CloudPoints::bytes_of(&cloud))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages;
+    use clap::Parser;
+
+    fn header() -> messages::Header {
+        messages::Header { frame_id: "map".to_owned(), ..messages::Header::default() }
+    }
+
+    #[test]
+    fn a_cloud_whose_points_take_more_than_the_queue_is_too_large_however_short_it_is() {
+        let inbox = Inbox::new(&Args::parse_from(["voxtile-ros2", "-o", "map", "--memory", "1MiB"]));
+        // 128 KiB for all.
+        inbox.put_cloud(0, messages::PointCloud2::of_bytes(header(), 8000).cdr());
+        inbox.put_cloud(0, messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 4000]).cdr());
+        assert_eq!((inbox.counters().0.too_large, inbox.counters().1), (2, 0));
+        inbox.put_cloud(0, messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 3000]).cdr());
+        let lies = messages::PointCloud2 { width: u32::MAX, ..messages::PointCloud2::of_bytes(header(), 9) };
+        inbox.put_cloud(0, lies.cdr());
+        let (counters, waiting) = inbox.counters();
+        assert_eq!((counters.received, counters.too_large, counters.malformed, waiting), (4, 2, 1, 1));
+    }
+
+    #[test]
+    fn what_waits_for_room_comes_in_when_the_cloud_before_is_mapped() {
+        let inbox = Inbox::new(&Args::parse_from([
+            "voxtile-ros2",
+            "-o",
+            "map",
+            "--memory",
+            "1MiB",
+            "--when-behind",
+            "wait",
+        ]));
+        let cloud = messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 3000]).cdr();
+        std::thread::scope(|scope| {
+            scope.spawn(|| (0..4).for_each(|_| inbox.put_cloud(0, cloud.clone())));
+            // Mapping one takes a while, in which the next one finds no room.
+            let taken = (0..40).filter_map(|_| inbox.take(Duration::from_millis(100)));
+            let taken = taken.inspect(|_| std::thread::sleep(Duration::from_millis(50))).take(4).count();
+            inbox.close();
+            assert_eq!((taken, inbox.counters().0.dropped_behind), (4, 0));
+        });
     }
 }

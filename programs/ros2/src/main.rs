@@ -11,6 +11,7 @@
 
 mod args;
 mod cloud;
+mod cloud_points;
 mod cloud_queue;
 mod corrections;
 mod counters;
@@ -26,6 +27,7 @@ mod names;
 mod node;
 mod parameters;
 mod publishers;
+mod refusal;
 mod remapping;
 mod services;
 mod stamp_check;

@@ -1,10 +1,12 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
+use crate::cloud_points::CloudPoints;
 use crate::health::Health;
 use crate::inbox::Inbox;
 use crate::latencies::Latencies;
 use crate::live_map::LiveMap;
 use crate::local_mapping::LocalMapping;
+use crate::refusal::Refusal;
 use crate::remapping::{self, Remapping};
 use crate::services::{Order, PlacedOrder};
 use anyhow::ensure;
@@ -15,8 +17,7 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 use voxtile::operations::{self, Part, RemapBeside};
 use voxtile::{
-    Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Pose,
-    ScanRef, Stop,
+    Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Stop,
 };
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::ros::Wire;
@@ -42,6 +43,11 @@ pub struct Mapping {
     path_tolerance_m: f64,
     flush_every: Duration,
     flushed_at: Instant,
+    /// Whether one was begun whose end is not known yet.
+    is_flush_begun: bool,
+    has_flush_failed: bool,
+    /// When a refused cloud was last warned of.
+    warned_at: Option<Instant>,
     told_at: Instant,
     looked_at: Instant,
     /// When the map on disk was last seen to be up to date or to have become newer, and its last scan then.
@@ -124,6 +130,9 @@ impl Mapping {
             path_tolerance_m: args.path_tolerance,
             flush_every,
             flushed_at: now,
+            is_flush_begun: false,
+            has_flush_failed: false,
+            warned_at: None,
             told_at: now,
             looked_at: now,
             durable,
@@ -135,29 +144,26 @@ impl Mapping {
         self.live.clone()
     }
 
-    /// Maps until it is told to stop; what was mapped is flushed then.
+    /// Maps until it is told to stop; what was mapped is flushed then. What the map refuses is counted, and mapping
+    /// goes on; so it does after a flush that has failed.
     ///
     /// # Errors
     ///
-    /// The map cannot be written; a flush beside the mapping that failed is told by the next.
+    /// The map is none to go on with, or cannot be written at the end.
     pub fn run(mut self, stop: &Stop) -> anyhow::Result<()> {
         while !stop.is_set() {
-            if let Some((cloud, pose)) = self.inbox.take(WAIT) {
-                self.insert(&cloud, &pose)?;
+            if let Some((cloud, pose)) = self.inbox.take(WAIT)
+                && let Err(error) = self.insert(&cloud, &pose)
+            {
+                return self.give_up(error);
             }
             if let Ok(order) = self.orders.try_recv() {
                 self = self.obey(order)?;
             }
             self = self.follow()?;
             self.local.refresh(&self.mapper);
-            // One that takes longer than the timer is waited for by the next, not by clouds.
-            let is_wanted = !self.saves.is_empty() || self.awaits_flush();
-            let is_time = self.flushed_at.elapsed() >= self.flush_every || is_wanted;
-            if is_time && !self.mapper.is_flushing() {
-                if self.mapper.is_dirty() {
-                    self.mapper.begin_flush()?;
-                }
-                self.flushed_at = Instant::now();
+            if let Err(error) = self.flush_in_time() {
+                return self.give_up(error);
             }
             self.answer_saves();
             if self.looked_at.elapsed() >= LOOK_EVERY {
@@ -174,6 +180,73 @@ impl Mapping {
         self.answer_saves();
         self.tell();
         Ok(())
+    }
+
+    /// Flushes beside the mapping when it is time, or somebody waits for it.
+    ///
+    /// # Errors
+    ///
+    /// One after which the map is none to go on with; others are told, and the next flush makes up for them.
+    fn flush_in_time(&mut self) -> voxtile::Result<()> {
+        let is_awaited = self.awaits_flush();
+        // One that takes longer than the timer is waited for by the next, not by clouds.
+        if self.mapper.is_flushing() {
+            return Ok(());
+        }
+        if std::mem::take(&mut self.is_flush_begun) {
+            let flushed = self.mapper.end_flush();
+            self.note_flush(&flushed);
+            flushed.or_else(if_none_to_go_on_with)?;
+        }
+        // A disk that refuses is not asked after every scan.
+        let is_wanted = !self.saves.is_empty() || (is_awaited && !self.has_flush_failed);
+        if self.flushed_at.elapsed() >= self.flush_every || is_wanted {
+            self.begin_flush()?;
+            self.flushed_at = Instant::now();
+        }
+        Ok(())
+    }
+
+    fn begin_flush(&mut self) -> voxtile::Result<()> {
+        if !self.mapper.is_dirty() {
+            self.note_flush(&Ok(()));
+            return Ok(());
+        }
+        let begun = self.mapper.begin_flush();
+        match begun {
+            Ok(()) => self.is_flush_begun = true,
+            Err(_) => self.note_flush(&begun),
+        }
+        begun.or_else(if_none_to_go_on_with)
+    }
+
+    /// Notes how a flush has ended. Who waits for one that has failed is told so, and the next one makes up for it.
+    fn note_flush(&mut self, flushed: &voxtile::Result<()>) {
+        self.answer_saves();
+        self.has_flush_failed = flushed.is_err();
+        let Err(error) = flushed else { return };
+        self.inbox.count(|counters| counters.failed_flushes += 1);
+        for (_, placed) in std::mem::take(&mut self.saves) {
+            placed.answer(Err(format!("the flush has failed: {error:#}")));
+        }
+        let durable = self.mapper.flushed_scan_number();
+        log::warn!("a flush has failed, and is tried again; durable up to scan {durable}: {error:#}");
+    }
+
+    /// Ends by an error, with all that was mapped made durable if the disk lets it.
+    fn give_up(mut self, error: Error) -> anyhow::Result<()> {
+        match self.mapper.flush() {
+            Ok(()) => log::info!("what was mapped is flushed, up to scan {}", self.mapper.scan_number()),
+            Err(of_flush) => {
+                let durable = self.mapper.flushed_scan_number();
+                log::error!(
+                    "what was mapped after scan {durable} is lost, it cannot be flushed: {of_flush:#}"
+                );
+            }
+        }
+        self.answer_saves();
+        self.tell();
+        Err(error.into())
     }
 
     /// Does what a service asks for, or begins it.
@@ -223,7 +296,10 @@ impl Mapping {
         {
             let (tolerance_m, memory_bytes) = (self.path_tolerance_m, self.remapping_bytes);
             let order = remapping::Order { last_scan, tolerance_m, memory_bytes };
-            self.remapping = Some(Remapping::begin(self.folder.clone(), path, order)?);
+            match Remapping::begin(self.folder.clone(), path, order) {
+                Ok(remapping) => self.remapping = Some(remapping),
+                Err(error) => log::warn!("a path is left out, a thread cannot be started: {error}"),
+            }
         }
         Ok(self)
     }
@@ -264,10 +340,16 @@ impl Mapping {
     }
 
     fn edit(
-        self,
+        mut self,
         placed: PlacedOrder,
         change: impl FnOnce(&Path) -> voxtile::Result<String>,
     ) -> anyhow::Result<Self> {
+        // A path that waits is about the scans before, as the one that is followed; perhaps they are no more.
+        let paths =
+            [self.remapping.take().is_some(), self.path.take().is_some(), self.inbox.take_path().is_some()];
+        if paths.contains(&true) {
+            log::warn!("a path is left out: the map is changed meanwhile");
+        }
         let (changed, outcome) = self.change(change)?;
         placed.answer(outcome.map_err(|error| error.to_string()));
         Ok(changed)
@@ -278,11 +360,12 @@ impl Mapping {
         mut self,
         change: impl FnOnce(&Path) -> voxtile::Result<T>,
     ) -> anyhow::Result<(Self, voxtile::Result<T>)> {
-        if self.remapping.take().is_some() {
-            log::warn!("a path is left out: the map is changed meanwhile");
+        // What is not flushed would be lost, so the map stays as it is.
+        let flushed = self.mapper.flush();
+        self.note_flush(&flushed);
+        if let Err(error) = flushed {
+            return Ok((self, Err(error)));
         }
-        self.mapper.flush()?;
-        self.answer_saves();
         self.local.forget();
         let config = self.mapper.config().clone();
         drop(self.mapper);
@@ -320,26 +403,22 @@ impl Mapping {
             unflushed_scans: scan_number.saturating_sub(flushed),
             flush_age: self.durable.0.elapsed(),
             is_flushing: self.mapper.is_flushing(),
+            has_flush_failed: self.has_flush_failed,
             local_map_bytes: self.local.bytes(),
             latencies: self.latencies.clone(),
         });
     }
 
-    fn insert(&mut self, cloud: &Cloud, world_from_sensor: &RigidPose) -> anyhow::Result<()> {
+    /// Maps a cloud, unless the map refuses it.
+    ///
+    /// # Errors
+    ///
+    /// The map is none to go on with.
+    fn insert(&mut self, cloud: &Cloud, world_from_sensor: &RigidPose) -> voxtile::Result<()> {
+        // The inbox has decoded it once: it is whole, and there is room for its points.
         let Ok(message) = PointCloud2::decode(Wire::Cdr, &cloud.cdr) else { return Ok(()) };
-        if let Some(shortage) = message.shortage() {
-            log::debug!("a cloud is left out: {shortage}");
-            self.inbox.count(|counters| counters.malformed += 1);
-            return Ok(());
-        }
-        let (mut points, mut intensities) = (Vec::new(), Vec::new());
-        for point in message.points() {
-            // The origin means that nothing came back.
-            points.push(if point.is_return { point.position_m } else { [0.0; 3] });
-            intensities.push(point.intensity);
-        }
-        let intensities = message.has_intensities().then_some(&*intensities);
-        let scan = scan_of(world_from_sensor, cloud.stamp_ns, &points, intensities);
+        let points = CloudPoints::of(&message);
+        let scan = points.scan(world_from_sensor, cloud.stamp_ns);
         match scan.and_then(|scan| self.mapper.insert_points(&scan).map(|_| scan)) {
             Ok(scan) => {
                 // Before others hear of the scan: they publish once what they see then.
@@ -348,13 +427,22 @@ impl Mapping {
                 self.live.note_scan(scan_number, sensor_m, cloud.stamp_ns);
                 self.latencies.note(cloud.arrived.elapsed());
                 self.inbox.count(|counters| counters.mapped += 1);
+                Ok(())
             }
-            // A pose that is none or beyond all tiles: the next cloud may do.
-            Err(error @ (Error::InvalidArgument { .. } | Error::Grid(_))) => {
-                log::warn!("a cloud is left out: {error}");
-                self.inbox.count(|counters| counters.malformed += 1);
-            }
-            Err(error) => return Err(error.into()),
+            Err(error) => self.refuse(error),
+        }
+    }
+
+    /// Counts a cloud that the map has refused. The map is as before, and the next cloud may do.
+    fn refuse(&mut self, error: Error) -> voxtile::Result<()> {
+        let Some(refusal) = Refusal::of(&error) else { return Err(error) };
+        self.inbox.count(|counters| refusal.count(counters));
+        // It may be the same with every cloud that comes.
+        if self.warned_at.is_none_or(|at| at.elapsed() >= LOOK_EVERY) {
+            log::warn!("a cloud is left out: {error:#}");
+            self.warned_at = Some(Instant::now());
+        } else {
+            log::debug!("a cloud is left out: {error:#}");
         }
         Ok(())
     }
@@ -367,6 +455,11 @@ impl Mapping {
             self.mapper.scan_number()
         );
     }
+}
+
+/// The error of a flush after which the map is none to go on with.
+fn if_none_to_go_on_with(error: Error) -> voxtile::Result<()> {
+    if Refusal::of(&error).is_some() { Ok(()) } else { Err(error) }
 }
 
 /// Makes the voxels of a box unknown.
@@ -382,16 +475,5 @@ fn last_place(folder: &Path) -> (Point, i64) {
     last.map_or(([0.0; 3], 0), |scan| (scan.origin_m, scan.stamp_ns.unwrap_or(0)))
 }
 
-fn scan_of<'a>(
-    world_from_sensor: &RigidPose,
-    stamp_ns: i64,
-    points: &'a [[f64; 3]],
-    intensities: Option<&'a [f32]>,
-) -> voxtile::Result<ScanRef<'a>> {
-    let pose = Pose::from_quaternion(world_from_sensor.position_m, world_from_sensor.quaternion)?;
-    let scan = ScanRef::in_sensor(pose, points).with_stamp_ns(stamp_ns);
-    match intensities {
-        Some(intensities) => scan.with_intensities(intensities),
-        None => Ok(scan),
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -117,7 +117,8 @@ mod tests {
     }
 
     fn cloud(stamp_ns: i64) -> Cloud {
-        Cloud { topic: 0, stamp_ns, frame: "lidar".to_owned(), cdr: Vec::new(), arrived: Instant::now() }
+        let (frame, cdr) = ("lidar".to_owned(), Vec::new());
+        Cloud { topic: 0, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now() }
     }
 
     #[test]

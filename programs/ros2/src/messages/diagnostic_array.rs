@@ -28,4 +28,5 @@ pub struct DiagnosticArray {
 impl DiagnosticStatus {
     pub const OK: u8 = 0;
     pub const WARN: u8 = 1;
+    pub const ERROR: u8 = 2;
 }

@@ -52,6 +52,20 @@ impl PointCloud2 {
         Self::of_data(header, fields, STEP_WITH_STATE, data)
     }
 
+    /// A cloud whose points take one byte each, and lie on a diagonal.
+    #[cfg(test)]
+    pub fn of_bytes(header: Header, points: u32) -> Self {
+        let field = |name: &str| PointField { name: name.to_owned(), offset: 0, datatype: UINT8, count: 1 };
+        Self::of_data(header, ["x", "y", "z"].map(field).to_vec(), 1, vec![1; points as usize])
+    }
+
+    /// As it comes from others.
+    #[cfg(test)]
+    pub fn cdr(&self) -> Vec<u8> {
+        let body = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(self).unwrap();
+        [vec![0, 1, 0, 0], body].concat()
+    }
+
     fn of_data(header: Header, fields: Vec<PointField>, point_step: u32, data: Vec<u8>) -> Self {
         let row_step = u32::try_from(data.len()).unwrap_or(u32::MAX);
         Self {

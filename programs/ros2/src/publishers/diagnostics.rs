@@ -17,6 +17,9 @@ pub fn diagnostics(
         ("dropped_without_pose", now.dropped_without_pose, before.dropped_without_pose),
         ("malformed", now.malformed, before.malformed),
         ("too_large", now.too_large, before.too_large),
+        ("refused_memory", now.refused_memory, before.refused_memory),
+        ("refused_damaged", now.refused_damaged, before.refused_damaged),
+        ("refused_disk", now.refused_disk, before.refused_disk),
         ("transforms_refused", now.transforms_refused, before.transforms_refused),
         ("transport_errors", now.transport_errors, before.transport_errors),
     ];
@@ -33,7 +36,7 @@ pub fn diagnostics(
         ("clouds_waiting", waiting.to_string()),
     ];
     values.extend(dropped.map(|(why, now, _)| (why, now.to_string())));
-    let Health { statistics, unflushed_scans, flush_age, is_flushing, local_map_bytes, latencies } = health;
+    let Health { statistics, flush_age, latencies, .. } = health;
     let ms =
         |percent| format!("{:.1}", latencies.percentile(percent).unwrap_or_default().as_secs_f64() * 1e3);
     let memory = &statistics.memory;
@@ -50,20 +53,18 @@ pub fn diagnostics(
         ("memory_in_flight_bytes", memory.in_flight.to_string()),
         ("memory_index_bytes", memory.index.to_string()),
         ("memory_readers_bytes", memory.readers.to_string()),
-        ("memory_local_map_bytes", local_map_bytes.to_string()),
+        ("memory_local_map_bytes", health.local_map_bytes.to_string()),
         ("disk_bytes", statistics.disk_bytes.to_string()),
         ("flush_age_s", format!("{:.1}", flush_age.as_secs_f64())),
-        ("flushing", is_flushing.to_string()),
-        ("unflushed_scans", unflushed_scans.to_string()),
+        ("flushing", health.is_flushing.to_string()),
+        ("failed_flushes", now.failed_flushes.to_string()),
+        ("unflushed_scans", health.unflushed_scans.to_string()),
         ("latency_p50_ms", ms(50)),
         ("latency_p99_ms", ms(99)),
         ("stalls", statistics.stalls.count.to_string()),
         ("worst_stall_ms", (statistics.stalls.worst_us / 1000).to_string()),
     ]);
-    let (level, message) = match why.is_empty() {
-        true => (DiagnosticStatus::OK, "mapping".to_owned()),
-        false => (DiagnosticStatus::WARN, format!("losses: {}", why.join(", "))),
-    };
+    let (level, message) = summary(&why, health.has_flush_failed);
     let values = values.into_iter().map(|(key, value)| KeyValue { key: key.to_owned(), value }).collect();
     let status = DiagnosticStatus {
         level,
@@ -75,6 +76,37 @@ pub fn diagnostics(
     let wall_clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let stamp = Time::from_ns(i64::try_from(wall_clock.as_nanos()).unwrap_or(i64::MAX));
     DiagnosticArray { header: Header { stamp, frame_id: String::new() }, status: vec![status] }
+}
+
+/// How bad it is, and what is to be done where the node cannot help itself.
+fn summary(losses: &[&str], has_flush_failed: bool) -> (u8, String) {
+    let remedies = losses.iter().filter_map(|loss| remedy(loss));
+    let remedies: Vec<&str> = remedies.chain(has_flush_failed.then_some(AFTER_FAILED_FLUSH)).collect();
+    let level = match (losses, &*remedies) {
+        ([], []) => return (DiagnosticStatus::OK, "mapping".to_owned()),
+        // Only some places are not mapped.
+        (_, [] | [OF_DAMAGE]) => DiagnosticStatus::WARN,
+        _ => DiagnosticStatus::ERROR,
+    };
+    let losses = if losses.is_empty() { None } else { Some(format!("losses: {}", losses.join(", "))) };
+    let parts: Vec<String> = losses.into_iter().chain(remedies.into_iter().map(str::to_owned)).collect();
+    (level, parts.join("; "))
+}
+
+const OF_DAMAGE: &str =
+    "tiles of the map are damaged: end the node, and see `voxtile verify` and `voxtile repair`";
+const AFTER_FAILED_FLUSH: &str = "the last flush has failed: make room on the disk, or see what the log says";
+
+fn remedy(loss: &str) -> Option<&'static str> {
+    match loss {
+        "refused_memory" => Some(
+            "the map is at its limit of memory: start the node again with more --memory, or begin a map with a larger \
+             --tile-size",
+        ),
+        "refused_damaged" => Some(OF_DAMAGE),
+        "refused_disk" => Some("the disk refuses: make room on it, or see what the log says"),
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -93,5 +125,33 @@ mod tests {
         let warning = (DiagnosticStatus::WARN, "losses: dropped_behind".to_owned(), "10.00".to_owned());
         assert_eq!(told([&before, &now]), warning);
         assert_eq!(told([&now, &now]), (DiagnosticStatus::OK, "mapping".to_owned(), "0.00".to_owned()));
+    }
+
+    #[test]
+    fn what_the_node_cannot_mend_says_what_to_do() {
+        let told = |now: Counters, has_flush_failed| {
+            let health = Health { has_flush_failed, ..Health::default() };
+            let array = diagnostics("n", &health, [&Counters::default(), &now], 0, Duration::from_secs(1));
+            let [status] = array.status.try_into().unwrap();
+            (status.level, status.message)
+        };
+        let none = Counters::default();
+        let (level, message) = told(Counters { refused_damaged: 1, ..none }, false);
+        assert_eq!(level, DiagnosticStatus::WARN);
+        assert!(
+            message.starts_with("losses: refused_damaged; ") && message.contains("voxtile repair"),
+            "{message}"
+        );
+        let (level, message) = told(Counters { refused_memory: 1, malformed: 1, ..none }, false);
+        assert_eq!(level, DiagnosticStatus::ERROR);
+        assert!(message.starts_with("losses: malformed, refused_memory; "), "{message}");
+        assert!(message.contains("more --memory"), "{message}");
+        let (level, message) = told(Counters { refused_disk: 1, ..none }, false);
+        assert!(level == DiagnosticStatus::ERROR && message.contains("make room"), "{message}");
+        let (level, message) = told(none, true);
+        assert!(
+            level == DiagnosticStatus::ERROR && message.starts_with("the last flush has failed"),
+            "{message}"
+        );
     }
 }

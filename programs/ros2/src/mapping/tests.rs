@@ -1,0 +1,179 @@
+use super::*;
+use crate::messages;
+use crate::services::{Orders, orders};
+use clap::Parser;
+use testkit::faulty_disk::{Fault, FaultyDisk};
+use voxtile::MapPath;
+use voxtile::query::Queries;
+
+/// Where the sensor was, far from another place.
+const NEAR: [f64; 3] = [0.05; 3];
+const FAR: [f64; 3] = [500.05, 0.05, 0.05];
+
+fn open(folder: &Path, options: &[&str]) -> (Mapping, Orders) {
+    let map = folder.join("map");
+    let own = ["voxtile-ros2", "-o", map.to_str().unwrap(), "--resolution", "0.1", "--flush-every", "1000"];
+    let args = Args::parse_from(own.iter().chain(options));
+    let (orders, placed) = orders();
+    (Mapping::open(&args, Arc::new(Inbox::new(&args)), placed).unwrap(), orders)
+}
+
+/// The same with its map on a disk that fails as it is told.
+fn open_on(disk: &FaultyDisk, folder: &Path, keeps_scans: bool) -> (Mapping, Orders) {
+    let (mut mapping, orders) = open(folder, &[]);
+    let config = mapping.mapper.config().clone().with_kept_scans(keeps_scans);
+    mapping.mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), "/map"), config).unwrap();
+    (mapping, orders)
+}
+
+fn cloud(points_m: Vec<[f64; 3]>) -> Cloud {
+    let header = messages::Header { frame_id: "map".to_owned(), ..messages::Header::default() };
+    let cdr = messages::PointCloud2::of_points(header, points_m).cdr();
+    Cloud { topic: 0, stamp_ns: 0, frame: "map".to_owned(), cdr, points_bytes: 0, arrived: Instant::now() }
+}
+
+impl Mapping {
+    fn map(&mut self, sensor_m: Point) {
+        let pose = RigidPose { position_m: sensor_m, quaternion: [0.0, 0.0, 0.0, 1.0] };
+        self.insert(&cloud(vec![[2.0, 0.0, 0.0]]), &pose).unwrap();
+    }
+
+    /// Waits until the flush that goes on has ended, and looks how.
+    fn end_flush_in_time(&mut self) {
+        while self.mapper.is_flushing() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.flush_in_time().unwrap();
+    }
+}
+
+#[test]
+fn a_cloud_that_touches_a_damaged_tile_is_counted_and_others_are_mapped() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut mapping, _) = open(folder.path(), &[]);
+    mapping.map(NEAR);
+    mapping.map(FAR);
+    mapping.mapper.flush().unwrap();
+    let tile = mapping.mapper.tile_folder(mapping.mapper.config().grid.tile_of(NEAR).unwrap());
+    drop(mapping);
+    for file in std::fs::read_dir(tile).unwrap() {
+        let path = file.unwrap().path();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(path, bytes).unwrap();
+    }
+    let (mut mapping, _) = open(folder.path(), &[]);
+    mapping.map(NEAR);
+    mapping.map(FAR);
+    mapping.map(NEAR);
+    let (counters, _) = mapping.inbox.counters();
+    assert_eq!((counters.mapped, counters.refused_damaged, counters.malformed), (1, 2, 0));
+    assert!(mapping.mapper.occupancy_at([502.05, 0.05, 0.05]).unwrap().is_occupied());
+    mapping.mapper.flush().unwrap();
+    assert_eq!(mapping.mapper.flushed_scan_number(), 3);
+}
+
+#[test]
+fn after_a_flush_on_a_full_disk_mapping_goes_on_and_the_next_flush_makes_up_for_it() {
+    let (folder, disk) = (tempfile::tempdir().unwrap(), FaultyDisk::new(Fault::None));
+    let (mut mapping, orders) = open_on(&disk, folder.path(), false);
+    mapping.map(NEAR);
+    disk.set_fault(Fault::IsFull(0));
+    let asked = std::thread::spawn(move || orders.place(Order::Save));
+    let order = mapping.orders.recv().unwrap();
+    let mut mapping = mapping.obey(order).unwrap();
+    mapping.flush_in_time().unwrap();
+    mapping.end_flush_in_time();
+    let answer = asked.join().unwrap().unwrap_err();
+    assert!(answer.starts_with("the flush has failed: "), "{answer}");
+    mapping.look();
+    assert!(mapping.live.health().has_flush_failed);
+
+    // A path that waits does not ask the disk after every scan.
+    mapping.path = Some((1, Vec::new()));
+    mapping.map(FAR);
+    mapping.flush_in_time().unwrap();
+    let (counters, _) = mapping.inbox.counters();
+    assert_eq!((counters.mapped, counters.failed_flushes), (2, 1));
+    assert!(!mapping.mapper.is_flushing());
+    disk.make_room();
+    mapping.flush_every = Duration::ZERO;
+    mapping.flush_in_time().unwrap();
+    mapping.end_flush_in_time();
+    assert_eq!((mapping.mapper.flushed_scan_number(), mapping.has_flush_failed), (2, false));
+    assert_eq!(mapping.inbox.counters().0.failed_flushes, 1);
+}
+
+#[test]
+fn a_map_that_cannot_be_flushed_is_not_changed_and_goes_on() {
+    let (folder, disk) = (tempfile::tempdir().unwrap(), FaultyDisk::new(Fault::None));
+    let (mut mapping, orders) = open_on(&disk, folder.path(), false);
+    mapping.map(NEAR);
+    disk.set_fault(Fault::IsFull(0));
+    let asked = std::thread::spawn(move || orders.place(Order::Reset));
+    let order = mapping.orders.recv().unwrap();
+    let mut mapping = mapping.obey(order).unwrap();
+    assert!(asked.join().unwrap().is_err());
+    mapping.map(NEAR);
+    assert_eq!((mapping.mapper.scan_number(), mapping.inbox.counters().0.failed_flushes), (2, 1));
+    disk.make_room();
+    mapping.mapper.flush().unwrap();
+}
+
+#[test]
+fn a_cloud_that_a_full_disk_refuses_is_counted_and_the_next_one_is_mapped() {
+    let (folder, disk) = (tempfile::tempdir().unwrap(), FaultyDisk::new(Fault::None));
+    let (mut mapping, _) = open_on(&disk, folder.path(), true);
+    disk.set_fault(Fault::IsFull(0));
+    mapping.map(NEAR);
+    disk.make_room();
+    mapping.map(NEAR);
+    let (counters, _) = mapping.inbox.counters();
+    assert_eq!((counters.refused_disk, counters.mapped, mapping.mapper.scan_number()), (1, 1, 1));
+}
+
+#[test]
+fn a_map_at_its_limit_of_memory_is_not_taken_for_malformed_clouds() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut mapping, _) = open(folder.path(), &["--tile-size", "0.2", "--memory", "20MiB"]);
+    // Each ray crosses hundreds of such small tiles.
+    let around = |k: u32| [60.0 * f64::from(k).cos(), 60.0 * f64::from(k).sin(), 0.1 * f64::from(k)];
+    let pose = RigidPose { position_m: NEAR, quaternion: [0.0, 0.0, 0.0, 1.0] };
+    mapping.insert(&cloud((0..600).map(around).collect()), &pose).unwrap();
+    mapping.map(NEAR);
+    let (counters, _) = mapping.inbox.counters();
+    assert_eq!((counters.refused_memory, counters.malformed, counters.mapped), (1, 0, 1));
+}
+
+#[test]
+fn a_node_that_ends_by_an_error_leaves_what_was_mapped_durable() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut mapping, _) = open(folder.path(), &[]);
+    mapping.map(NEAR);
+    let stop = Stop::default();
+    stop.set();
+    mapping.mapper.stop_with(stop);
+    mapping.inbox.put_cloud(0, cloud(vec![[2.0, 0.0, 0.0]]).cdr);
+    let error = mapping.run(&Stop::default()).unwrap_err();
+    assert!(matches!(error.downcast_ref(), Some(Error::Stopped)), "{error:#}");
+    assert_eq!(MapReader::open(folder.path().join("map"), 1).unwrap().scan_number(), 1);
+}
+
+#[test]
+fn a_path_that_waits_is_left_out_when_the_map_becomes_what_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut mapping, orders) = open(folder.path(), &["--path", "/path"]);
+    mapping.map(NEAR);
+    mapping.mapper.snapshot(&"before".parse().unwrap()).unwrap();
+    mapping.map(NEAR);
+    mapping.map(NEAR);
+    mapping.path = Some((3, Vec::new()));
+    assert!(mapping.awaits_flush());
+    let asked = std::thread::spawn(move || orders.place(Order::Revert("before".parse().unwrap())));
+    let order = mapping.orders.recv().unwrap();
+    let mut mapping = mapping.obey(order).unwrap();
+    asked.join().unwrap().unwrap();
+    mapping.map(NEAR);
+    assert_eq!((mapping.mapper.scan_number(), mapping.awaits_flush()), (2, false));
+}
