@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -98,3 +99,29 @@ def test_a_map_is_built_again_from_its_scans_with_other_poses(client: object, tm
     before = voxtile.digest(source)
     voxtile.remap(source, [np.vstack([pose.reshape(3, 4), [0, 0, 0, 1]]) for pose in poses])
     assert voxtile.digest(tmp_path / "moved") == voxtile.digest(source) != before
+
+
+def test_threads_of_a_worker_have_maps_of_their_own(tmp_path: Path) -> None:
+    source = _map(tmp_path / "map", 5)
+    with voxtile.Map.open(source, "r") as opened:
+        tiles = [tuple(int(number) for number in tile) for tile in opened.tiles]
+    order: list[tuple[int, ...]] = []
+    is_opened, has_another_begun = threading.Event(), threading.Event()
+
+    def look(tile: object) -> bool:
+        if tile.index not in order:
+            order.append(tile.index)
+        if tile.index == order[0]:
+            opened = tile._reader()
+            is_opened.set()
+            assert has_another_begun.wait(60)
+            # It is of one flush from the task's begin to its end.
+            return tile._reader() is opened
+        assert is_opened.wait(60)
+        # The second task may have begun before the first had opened the map, the third has not.
+        if tile.index == order[-1] != order[1]:
+            has_another_begun.set()
+        return True
+
+    found = voxtile_dask.map_tiles(source, look, tiles=[tile for tile in tiles[:3] for _ in range(16)])
+    assert found.npartitions == 3 and all(found.compute(scheduler="threads", num_workers=2))
