@@ -261,6 +261,29 @@ def test_a_folder_in_the_way_stays_and_what_a_killed_call_left_does_not(
     assert voxtile.digest(tmp_path / "merged") == whole and not list(tmp_path.glob("merged.*"))
 
 
+def test_a_folder_of_that_name_stays_when_a_map_is_built(client: object, drive: Path, tmp_path: Path) -> None:
+    parts = tmp_path / "map.parts"
+    parts.mkdir()
+    (parts / "thesis.txt").write_text("mine")
+    with pytest.raises(errors.ArgumentError, match="thesis.txt in it is of no earlier call"):
+        voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    assert [path.name for path in parts.iterdir()] == ["thesis.txt"] and not (tmp_path / "map").exists()
+
+
+def test_a_stray_point_makes_no_regions_where_rays_are_cut(client: object, drive: Path, tmp_path: Path) -> None:
+    scan = drive / "003.pcd"
+    content = bytearray(scan.read_bytes())
+    struct.pack_into("<2f", content, content.index(b"DATA binary\n") + len(b"DATA binary\n"), 1e7, 1e7)
+    scan.write_bytes(content)
+    without_range = {name: value for name, value in OPTIONS.items() if name != "max_range"}
+    report = voxtile_dask.build(drive, tmp_path / "map", region_size=40.0, client=client, **without_range)
+    voxtile.build(drive, tmp_path / "whole", **without_range)
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole") and report["regions"] < 20
+    with pytest.raises(errors.ArgumentError, match="^scan 3: .*smaller max_range"):
+        voxtile_dask.build(drive, tmp_path / "other", client=client, **{**OPTIONS, "max_range": 1e6})
+    assert {path.name for path in tmp_path.iterdir()} == {"drive", "map", "whole"}
+
+
 def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(
     drive: Path, whole: str, tmp_path: Path
 ) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +28,13 @@ def client() -> Iterator[object]:
         yield found
 
 
-def _map(folder: Path, seed: int, **options: object) -> Path:
+def _map(folder: Path, seed: int, shift: float = 0.0, **options: object) -> Path:
     """A map along a street."""
+    has_intensities = options.get("sensor_model") == "iwlo"
     with voxtile.Map.create(folder, **{**OPTIONS, **options}) as made:
         for number, (points, pose) in enumerate(scans_of(seed, count=10)):
-            pose[0] = 0.7 * number - 3.1
-            made.insert(points, matrix_of(pose))
+            pose[0] = 0.7 * number - 3.1 + shift
+            made.insert(points, matrix_of(pose), intensities=np.ones(len(points), "f4") if has_intensities else None)
     return folder
 
 
@@ -52,6 +55,26 @@ def test_maps_are_merged_and_fade_as_by_one_process(client: object, region_size:
     assert voxtile.verify(tmp_path / "faded")["findings"] == voxtile.verify(tmp_path / "parts last")["findings"] == []
     left = {path.name for path in tmp_path.iterdir()}
     assert left == {"a", "b", "c", "faded", "whole None", "whole last", "parts None", "parts last"}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "prefer"),
+    [
+        ({"storage": "compact"}, {}, None),
+        ({"probabilities": [0.8, 0.4, 0.1, 0.9]}, {"storage": "compact"}, "first"),
+        ({"sensor_model": "iwlo"}, {}, "last"),
+    ],
+)
+def test_where_the_first_map_has_no_tile_the_others_become_like_it(
+    client: object, first: dict[str, object], second: dict[str, object], prefer: str | None, tmp_path: Path
+) -> None:
+    maps = [_map(tmp_path / "a", 1, **first), _map(tmp_path / "b", 2, shift=9.0, **second)]
+    voxtile.merge(maps, tmp_path / "whole", prefer=prefer)
+    voxtile_dask.merge(maps, tmp_path / "parts", prefer=prefer, region_size=4.0, client=client)
+    assert voxtile.digest(tmp_path / "parts") == voxtile.digest(tmp_path / "whole")
+    assert [set(path.name for path in folder.glob("tile_*/*")) for folder in (tmp_path / "parts", maps[0])] == [
+        set(path.name for path in folder.glob("tile_*/*")) for folder in (tmp_path / "whole", tmp_path / "parts")
+    ]
 
 
 def test_maps_that_do_not_go_together_are_refused_and_nothing_is_left(client: object, tmp_path: Path) -> None:
@@ -84,6 +107,8 @@ def test_damage_is_found_whoever_looks(client: object, tmp_path: Path) -> None:
     tables[0].unlink()
     (source / "commits.log").write_bytes(b"nothing")
     assert voxtile_dask.verify(source, client=client)["damage"] > 0
+    with pytest.raises(errors.ArgumentError, match="^region_size: 1.0 m"):
+        voxtile_dask.verify(_map(tmp_path / "sound", 5), region_size=1.0, client=client)
     with pytest.raises(errors.ArgumentError, match="but_tiles"):
         voxtile.verify(source, tiles=[(0, 0, 0)], but_tiles=True)
 
@@ -95,10 +120,27 @@ def test_a_map_is_built_again_from_its_scans_with_other_poses(client: object, tm
         pose[1, 3] += 0.9
         poses.append(pose[:3].reshape(-1))
     np.savetxt(tmp_path / "moved.txt", poses, fmt="%.17g")
-    voxtile_dask.build(source, tmp_path / "moved", poses=tmp_path / "moved.txt", client=client, region_size=4.0, **OPTIONS)
+    poses_file = tmp_path / "moved.txt"
+    voxtile_dask.build(source, tmp_path / "moved", poses=poses_file, client=client, region_size=4.0, **OPTIONS)
     before = voxtile.digest(source)
     voxtile.remap(source, [np.vstack([pose.reshape(3, 4), [0, 0, 0, 1]]) for pose in poses])
     assert voxtile.digest(tmp_path / "moved") == voxtile.digest(source) != before
+
+
+@pytest.mark.parametrize("error", [CancelledError("enough"), KeyError("mine")])
+def test_what_the_callers_progress_raises_is_the_callers(client: object, error: Exception, tmp_path: Path) -> None:
+    source = _map(tmp_path / "map", 5)
+
+    def fail(done: int, columns: int) -> None:
+        raise error
+
+    with pytest.raises(type(error), match=str(error.args[0])):
+        voxtile_dask.decay(source, tmp_path / "faded", 5, client=client, progress=fail)
+    # A task that was just putting its piece there may still remove it.
+    until = time.monotonic() + 10
+    while len(list(tmp_path.iterdir())) > 1 and time.monotonic() < until:
+        time.sleep(0.01)
+    assert [path.name for path in tmp_path.iterdir()] == ["map"]
 
 
 def test_threads_of_a_worker_have_maps_of_their_own(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import json
 import math
 import operator
 import os
+import re
 import shutil
 import tempfile
 import time
@@ -48,6 +49,11 @@ _dask: Any = distributed
 
 # What does not commute with dividing space, or makes numbers of scans mean something else.
 _READING_ONLY = {"every": 1, "first": 0, "count": None}
+
+# Where ``voxtile build`` cuts rays if no range is named, into a new map and into one that it adds to.
+_DEFAULT_RANGE_M = 100.0
+# A plan of more is a mistake: dask would take minutes to hear of the tasks.
+_MOST_REGIONS = 100_000
 
 
 class BuildOptions(ReadOptions, total=False):
@@ -95,21 +101,23 @@ def build(
     output = Path(os.path.abspath(out))
     source = os.path.abspath(scans)
     settings: dict[str, Any] = {**options}
+    if settings.get("max_range") is None:
+        settings["max_range"] = _DEFAULT_RANGE_M
     if resolution is not None:
         settings["resolution"] = resolution
     base = _base(output, settings) if update else None
     tile_size = settings.get("tile_size", 10.0) if base is None else base.tile_size
-    size = advised_region_size(settings.get("max_range"), tile_size) if region_size is None else region_size
+    size = advised_region_size(settings["max_range"], tile_size) if region_size is None else region_size
     _check(output, size, tile_size, settings, update)
     found: Any = _dask.Client.current() if client is None else client
     parts = output.with_name(output.name + ".parts")
-    with locked(parts):
+    with locked(parts, _OWN_NAMES):
         for attempt in parts.glob("attempt-*"):
             shutil.rmtree(attempt, ignore_errors=True)
-        seen, plan_cpu = _plan(found, source, dict(options))
+        seen, plan_cpu = _plan(found, source, settings)
         planned = time.perf_counter()
         boxes = [box for _, box in seen]
-        columns = columns_of(boxes, size, tile_size)
+        columns = columns_of(boxes, size, tile_size, most=_MOST_REGIONS)
         if not columns:
             raise ArgumentError(f"{source}: no scan has a point, so there is nothing to map")
         drive = _mark(source, size, settings, seen, str(output) if base else None)
@@ -187,6 +195,11 @@ class _Base:
 
 # Says which update is being put in place, so that it is not done twice.
 _ADOPTING = "adopting.json"
+
+# What calls leave in the folder of parts.
+_OWN_NAMES = re.compile(
+    r"(map_id|adopting)\.(json|new)|attempt-[0-9a-f]{32}(\.unfinished)?|[0-9a-f]{16}-(-?[0-9]+)-(-?[0-9]+)"
+)
 
 
 def _base(output: Path, settings: dict[str, Any]) -> _Base:
@@ -273,10 +286,10 @@ def _check(output: Path, region_size: float, tile_size: float, options: Any, upd
             raise ArgumentError(f"{name}: a build in parts takes all scans; leave it out, or use voxtile.build")
 
 
-def _plan(client: Any, source: str, options: dict[str, Any]) -> tuple[list[_Seen], float]:
+def _plan(client: Any, source: str, settings: dict[str, Any]) -> tuple[list[_Seen], float]:
     """What each scan is, and where it may leave something, ``None`` for nowhere; and the seconds of CPU for that."""
-    reading = {name: value for name, value in options.items() if name in ReadOptions.__annotations__}
-    reach = (options.get("max_range"), options.get("clear_no_return"))
+    reading = {name: value for name, value in settings.items() if name in ReadOptions.__annotations__}
+    reach = (settings["max_range"], settings.get("clear_no_return"))
     # Other formats that do not tell how many there are would be read as a whole for it: a single task does that, too.
     is_stream = source.lower().endswith(".scans")
     scans = files.count_scans(source, **reading) if is_stream else operator.length_hint(files.scans(source, **reading))
