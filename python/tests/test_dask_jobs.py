@@ -143,6 +143,48 @@ def test_what_the_callers_progress_raises_is_the_callers(client: object, error: 
     assert [path.name for path in tmp_path.iterdir()] == ["map"]
 
 
+def test_a_tile_over_a_corner_of_four_regions_is_in_all_of_them(client: object, tmp_path: Path) -> None:
+    with voxtile.Map.create(tmp_path / "map", **OPTIONS) as made:
+        # One tile, from 4 m to 6 m.
+        made.insert(np.array([[x, y, 0.6] for x in (4.6, 5.4) for y in (4.6, 5.4)]), origin=[5.1, 5.1, 0.6])
+    told = voxtile_dask.export(tmp_path / "map", tmp_path / "files", ".xyz", region_size=5.0, client=client)
+    assert told["files"] == ["0_0.xyz", "0_1.xyz", "1_0.xyz", "1_1.xyz"]
+    lines = [line for name in told["files"] for line in (tmp_path / "files" / name).read_text().splitlines()]
+    voxtile.export(tmp_path / "map", tmp_path / "whole.xyz")
+    assert sorted(lines) == sorted((tmp_path / "whole.xyz").read_text().splitlines()) and len(lines) == 4
+
+
+def test_files_of_another_call_are_not_taken_for_ones_own(client: object, tmp_path: Path) -> None:
+    source, beside = _map(tmp_path / "map", 5), tmp_path / "files.unfinished"
+    beside.mkdir()
+    (beside / "7_7.csv").write_text("mine")
+    with pytest.raises(errors.ArgumentError, match="7_7.csv in it is of no earlier call"):
+        voxtile_dask.export(source, tmp_path / "files", ".csv", client=client)
+    assert (beside / "7_7.csv").read_text() == "mine"
+    # What a call with other options left that was killed.
+    attempt = beside / ("0" * 32)
+    attempt.mkdir()
+    (beside / "7_7.csv").rename(attempt / "7_7.csv")
+    told = voxtile_dask.export(source, tmp_path / "files", ".csv", client=client)
+    assert "7_7.csv" not in told["files"]
+    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == told["files"]
+    assert {path.name for path in tmp_path.iterdir()} == {"map", "files"}
+
+
+def test_a_snapshot_is_named_as_in_the_command(client: object, tmp_path: Path) -> None:
+    source = _map(tmp_path / "city@home", 5)
+    with voxtile.Map.open(source) as opened:
+        opened.snapshot("before")
+    voxtile.export(source, tmp_path / "before.csv", region=[-1000, -1000, -1000, 1000, 1000, 1000])
+    voxtile.clear(source, [-100, -100, -100, 100, 100, 0.5])
+    voxtile.export(source, tmp_path / "now.csv", region=[-1000, -1000, -1000, 1000, 1000, 1000])
+    for name, map in (("now", source), ("before", f"{source}@before")):
+        voxtile_dask.export(map, tmp_path / name, ".csv", region_size=2000.0, client=client)
+        lines = [line for path in (tmp_path / name).iterdir() for line in path.read_text().splitlines()]
+        assert set(lines) == set((tmp_path / f"{name}.csv").read_text().splitlines())
+    assert (tmp_path / "now.csv").read_bytes() != (tmp_path / "before.csv").read_bytes()
+
+
 def test_threads_of_a_worker_have_maps_of_their_own(tmp_path: Path) -> None:
     source = _map(tmp_path / "map", 5)
     with voxtile.Map.open(source, "r") as opened:
