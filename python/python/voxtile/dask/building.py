@@ -18,7 +18,7 @@ import tempfile
 import time
 import uuid
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -124,14 +124,15 @@ def build(
         if base is not None and (adopted := _adopted_before(parts, drive, base)) is not None:
             remove(parts)
             return {**adopted, "output": str(output), "regions_done_before": adopted["regions"]}
-        mark = drive if base is None else _mark(drive, base.map_id, base.flush_number)
+        map_id = _id_of(parts) if base is None else base.map_id
+        # A task of a call that was given up may still put its part here, for a map of another id.
+        mark = _mark(drive, map_id, None if base is None else base.flush_number)
         wanted = {parts / f"{mark}-{x}-{y}": ((x, y), ranges) for (x, y), ranges in columns.items()}
         open_parts = {part: what for part, what in wanted.items() if not part.exists()}
         # Long tasks first: a short one at the end keeps few workers waiting.
         longest = sorted(open_parts.items(), key=lambda what: -scans_in(what[1][1]))
         of_map = None if base is None else str(output)
         how = ((size, tile_size), settings, of_map)
-        map_id = _id_of(parts) if base is None else base.map_id
         checks = [
             found.submit(_check_part, str(part), pure=False, retries=2) for part in wanted if part not in open_parts
         ]
@@ -164,8 +165,7 @@ def build(
         if base is None:
             told["tiles"] = join(names, str(output))["tiles"]
         else:
-            _note(parts / _ADOPTING, {"drive": drive, "of_flush": base.flush_number, "told": told})
-            told["adopted"] = adopt(str(output), names, of_flush=base.flush_number, scans=len(boxes))
+            told["adopted"] = _adopt(output, names, drive, base, told)
         remove(parts)
     ended, ended_cpu = time.perf_counter(), time.process_time()
     seconds = sorted((task["seconds"] for task in tasks), reverse=True)
@@ -190,6 +190,9 @@ class _Base:
 
     map_id: str
     flush_number: int
+    scan_number: int
+    # Scans that its list of scans does not have: those of updates. ``None`` if that is not known.
+    unlisted_scans: int | None
     tile_size: float
 
 
@@ -209,7 +212,9 @@ def _base(output: Path, settings: dict[str, Any]) -> _Base:
     for name in ("resolution", "tile_size"):
         if settings.get(name, told[name]) != told[name]:
             raise ArgumentError(f"{name}: the map has {told[name]} m; leave it out")
-    return _Base(str(told["map_id"]), told["flush_number"], told["tile_size"])
+    scans, listed = told["scan_number"], told["scan_records"]
+    unlisted = None if listed is None else scans - listed
+    return _Base(str(told["map_id"]), told["flush_number"], scans, unlisted, told["tile_size"])
 
 
 def _mark(*what: object) -> str:
@@ -226,16 +231,42 @@ def _note(path: Path, what: object) -> None:
     os.replace(beside, path)
 
 
+def _adopt(output: Path, names: Sequence[str], drive: str, base: _Base, told: dict[str, Any]) -> dict[str, Any]:
+    note = Path(names[0]).parent / _ADOPTING
+    _note(note, {"drive": drive, "map": asdict(base), "told": told})
+    try:
+        adopted: dict[str, Any] = adopt(str(output), names, of_flush=base.flush_number, scans=told["scans"])
+    except ArgumentError:
+        # The map is as somebody else left it. After other errors nobody knows.
+        note.unlink()
+        raise
+    return adopted
+
+
 def _adopted_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | None:
     """What a call told that put these scans in place and was killed before it removed the parts."""
     try:
         noted: dict[str, Any] = json.loads((parts / _ADOPTING).read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
         return None
-    if noted["drive"] != drive or base.flush_number <= noted["of_flush"]:
+    before = _Base(**noted["map"])
+    if noted["drive"] != drive or before.map_id != base.map_id or before.flush_number == base.flush_number:
         return None
     told: dict[str, Any] = noted["told"]
-    return told
+    # The number of a flush tells nothing: it may be another writer's, whose scans are in the list.
+    added = _difference(base.unlisted_scans, before.unlisted_scans)
+    if added == told["scans"]:
+        return told
+    if added is not None and added <= 0:
+        return None
+    raise ArgumentError(
+        f"{parts}: an earlier call ended while it put {told['scans']} scans in place after scan {before.scan_number},"
+        f" and {told['output']} has changed since; look whether it has them, remove {parts}, and call again if not"
+    )
+
+
+def _difference(number: int | None, other: int | None) -> int | None:
+    return None if number is None or other is None else number - other
 
 
 def _id_of(parts: Path) -> str:
