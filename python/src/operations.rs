@@ -196,8 +196,8 @@ pub fn adopt<'py>(
     })
 }
 
-/// What a map says of itself: id, flush and scan numbers, grid and range in metres, whether it keeps its
-/// scans.
+/// What a map says of itself: id, flush and scan numbers, how many records its list of scans has if that is known, grid
+/// and range in metres, whether it keeps its scans.
 #[pyfunction]
 pub fn describe<'py>(py: Python<'py>, map: MapOrSnapshot) -> PyResult<Bound<'py, PyAny>> {
     told(py, None, |_, _| {
@@ -206,6 +206,7 @@ pub fn describe<'py>(py: Python<'py>, map: MapOrSnapshot) -> PyResult<Bound<'py,
             map_id: map.metadata().ext.as_ref().map(|ext| ext.map_id.clone()),
             flush_number: map.flush_number(),
             scan_number: map.scan_number(),
+            scan_records: map.metadata().ext.as_ref().and_then(|ext| ext.scan_records),
             keeps_scans: map.keeps_scans(),
             resolution: map.config().grid.resolution_m(),
             tile_size: map.config().grid.tile_size_m(),
@@ -221,6 +222,7 @@ struct Described {
     map_id: Option<String>,
     flush_number: u64,
     scan_number: u64,
+    scan_records: Option<u64>,
     keeps_scans: bool,
     resolution: f64,
     tile_size: f64,

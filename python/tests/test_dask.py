@@ -261,6 +261,47 @@ def test_a_folder_in_the_way_stays_and_what_a_killed_call_left_does_not(
     assert voxtile.digest(tmp_path / "merged") == whole and not list(tmp_path.glob("merged.*"))
 
 
+def test_a_folder_of_that_name_stays_when_a_map_is_built(client: object, drive: Path, tmp_path: Path) -> None:
+    parts = tmp_path / "map.parts"
+    parts.mkdir()
+    (parts / "thesis.txt").write_text("mine")
+    with pytest.raises(errors.ArgumentError, match="thesis.txt in it is of no earlier call"):
+        voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    assert [path.name for path in parts.iterdir()] == ["thesis.txt"] and not (tmp_path / "map").exists()
+
+
+def test_parts_of_a_call_that_was_given_up_are_in_no_other_map(
+    client: object, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise errors.DiskError("the disk is full")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("voxtile.dask.building.join", fail)
+        with pytest.raises(errors.DiskError, match="full"):
+            voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    # The folder was removed, and these come from tasks that were still at work.
+    (tmp_path / "map.parts" / "map_id.json").unlink()
+    for part in list((tmp_path / "map.parts").glob("*-*-*"))[1:]:
+        shutil.rmtree(part)
+    report = voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
+    assert report["regions_done_before"] == 0 and voxtile.digest(tmp_path / "map") == whole
+
+
+def test_a_stray_point_makes_no_regions_where_rays_are_cut(client: object, drive: Path, tmp_path: Path) -> None:
+    scan = drive / "003.pcd"
+    content = bytearray(scan.read_bytes())
+    struct.pack_into("<2f", content, content.index(b"DATA binary\n") + len(b"DATA binary\n"), 1e7, 1e7)
+    scan.write_bytes(content)
+    without_range = {name: value for name, value in OPTIONS.items() if name != "max_range"}
+    report = voxtile_dask.build(drive, tmp_path / "map", region_size=40.0, client=client, **without_range)
+    voxtile.build(drive, tmp_path / "whole", **without_range)
+    assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole") and report["regions"] < 20
+    with pytest.raises(errors.ArgumentError, match="^scan 3: .*smaller max_range"):
+        voxtile_dask.build(drive, tmp_path / "other", client=client, **{**OPTIONS, "max_range": 1e6})
+    assert {path.name for path in tmp_path.iterdir()} == {"drive", "map", "whole"}
+
+
 def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(
     drive: Path, whole: str, tmp_path: Path
 ) -> None:
@@ -445,25 +486,54 @@ def test_workers_killed_during_an_update_leave_a_map_as_before_or_as_after(drive
     assert killed and set(seen) <= {before, after} and voxtile.digest(city) == after != before
 
 
-def test_an_update_that_was_killed_at_its_end_is_not_done_twice(
+@pytest.mark.parametrize("killed_in", ["adopt", "remove"])
+@pytest.mark.parametrize("is_changed", [False, True])
+def test_an_update_that_was_killed_at_its_end_is_done_once(
+    client: object, killed_in: str, is_changed: bool, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    again, city, whole = _again(drive, tmp_path), tmp_path / "city", tmp_path / "whole"
+    voxtile.build(drive, city, **OPTIONS)
+    shutil.copytree(city, whole)
+
+    def fail(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as broken:
+        broken.setattr(f"voxtile.dask.building.{killed_in}", fail)
+        with pytest.raises(KeyboardInterrupt):
+            voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
+    # Somebody adds as many scans as the update has.
+    others = [drive] if is_changed else []
+    for scans in others:
+        voxtile.build(scans, city, append=True, again=True, **OPTIONS)
+    report = voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
+    is_done_before = killed_in == "remove" or not is_changed
+    assert report["regions_done_before"] == (report["regions"] if is_done_before else 0)
+    for scans in [again, *others] if killed_in == "remove" else [*others, again]:
+        voxtile.build(scans, whole, append=True, again=True, **OPTIONS)
+    assert voxtile.digest(city) == voxtile.digest(whole)
+    assert not (tmp_path / "city.parts").exists()
+
+
+def test_an_update_of_which_nobody_knows_whether_it_was_done_is_an_error(
     client: object, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    again, city = _again(drive, tmp_path), tmp_path / "city"
+    again, city, parts = _again(drive, tmp_path), tmp_path / "city", tmp_path / "city.parts"
     voxtile.build(drive, city, **OPTIONS)
-    shutil.copytree(city, tmp_path / "whole")
-    voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
 
-    def fail(_: Path) -> None:
+    def fail(*_: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as broken:
         broken.setattr("voxtile.dask.building.remove", fail)
         with pytest.raises(KeyboardInterrupt):
             voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
-    report = voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
-    assert report["regions_done_before"] == report["regions"]
-    assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole")
-    assert not (tmp_path / "city.parts").exists()
+    # As of a map of which it was not known then how long its list of scans was.
+    note = json.loads((parts / "adopting.json").read_text())
+    note["map"]["unlisted_scans"] = None
+    (parts / "adopting.json").write_text(json.dumps(note))
+    with pytest.raises(errors.ArgumentError, match=f"12 scans in place after scan 12.*remove {parts}"):
+        voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
 
 
 def test_an_update_of_a_map_that_somebody_changes_is_an_error(client: object, drive: Path, tmp_path: Path) -> None:
@@ -481,6 +551,11 @@ def test_an_update_of_a_map_that_somebody_changes_is_an_error(client: object, dr
             again, city, update=True, region_size=5.0, client=client, progress=change, **OPTIONS
         )
     assert voxtile.digest(city) == changed[0]
+    # The next call adds the scans to what the other one left.
+    shutil.copytree(city, tmp_path / "whole")
+    voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
+    voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
+    assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole") != changed[0]
     with pytest.raises(errors.VoxtileError, match="no map here"):
         voxtile_dask.build(again, tmp_path / "none", update=True, client=client)
     with pytest.raises(errors.ArgumentError, match="^resolution: "):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +28,13 @@ def client() -> Iterator[object]:
         yield found
 
 
-def _map(folder: Path, seed: int, **options: object) -> Path:
+def _map(folder: Path, seed: int, shift: float = 0.0, **options: object) -> Path:
     """A map along a street."""
+    has_intensities = options.get("sensor_model") == "iwlo"
     with voxtile.Map.create(folder, **{**OPTIONS, **options}) as made:
         for number, (points, pose) in enumerate(scans_of(seed, count=10)):
-            pose[0] = 0.7 * number - 3.1
-            made.insert(points, matrix_of(pose))
+            pose[0] = 0.7 * number - 3.1 + shift
+            made.insert(points, matrix_of(pose), intensities=np.ones(len(points), "f4") if has_intensities else None)
     return folder
 
 
@@ -51,6 +55,26 @@ def test_maps_are_merged_and_fade_as_by_one_process(client: object, region_size:
     assert voxtile.verify(tmp_path / "faded")["findings"] == voxtile.verify(tmp_path / "parts last")["findings"] == []
     left = {path.name for path in tmp_path.iterdir()}
     assert left == {"a", "b", "c", "faded", "whole None", "whole last", "parts None", "parts last"}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "prefer"),
+    [
+        ({"storage": "compact"}, {}, None),
+        ({"probabilities": [0.8, 0.4, 0.1, 0.9]}, {"storage": "compact"}, "first"),
+        ({"sensor_model": "iwlo"}, {}, "last"),
+    ],
+)
+def test_where_the_first_map_has_no_tile_the_others_become_like_it(
+    client: object, first: dict[str, object], second: dict[str, object], prefer: str | None, tmp_path: Path
+) -> None:
+    maps = [_map(tmp_path / "a", 1, **first), _map(tmp_path / "b", 2, shift=9.0, **second)]
+    voxtile.merge(maps, tmp_path / "whole", prefer=prefer)
+    voxtile_dask.merge(maps, tmp_path / "parts", prefer=prefer, region_size=4.0, client=client)
+    assert voxtile.digest(tmp_path / "parts") == voxtile.digest(tmp_path / "whole")
+    assert [set(path.name for path in folder.glob("tile_*/*")) for folder in (tmp_path / "parts", maps[0])] == [
+        set(path.name for path in folder.glob("tile_*/*")) for folder in (tmp_path / "whole", tmp_path / "parts")
+    ]
 
 
 def test_maps_that_do_not_go_together_are_refused_and_nothing_is_left(client: object, tmp_path: Path) -> None:
@@ -83,6 +107,8 @@ def test_damage_is_found_whoever_looks(client: object, tmp_path: Path) -> None:
     tables[0].unlink()
     (source / "commits.log").write_bytes(b"nothing")
     assert voxtile_dask.verify(source, client=client)["damage"] > 0
+    with pytest.raises(errors.ArgumentError, match="^region_size: 1.0 m"):
+        voxtile_dask.verify(_map(tmp_path / "sound", 5), region_size=1.0, client=client)
     with pytest.raises(errors.ArgumentError, match="but_tiles"):
         voxtile.verify(source, tiles=[(0, 0, 0)], but_tiles=True)
 
@@ -94,7 +120,92 @@ def test_a_map_is_built_again_from_its_scans_with_other_poses(client: object, tm
         pose[1, 3] += 0.9
         poses.append(pose[:3].reshape(-1))
     np.savetxt(tmp_path / "moved.txt", poses, fmt="%.17g")
-    voxtile_dask.build(source, tmp_path / "moved", poses=tmp_path / "moved.txt", client=client, region_size=4.0, **OPTIONS)
+    poses_file = tmp_path / "moved.txt"
+    voxtile_dask.build(source, tmp_path / "moved", poses=poses_file, client=client, region_size=4.0, **OPTIONS)
     before = voxtile.digest(source)
     voxtile.remap(source, [np.vstack([pose.reshape(3, 4), [0, 0, 0, 1]]) for pose in poses])
     assert voxtile.digest(tmp_path / "moved") == voxtile.digest(source) != before
+
+
+@pytest.mark.parametrize("error", [CancelledError("enough"), KeyError("mine")])
+def test_what_the_callers_progress_raises_is_the_callers(client: object, error: Exception, tmp_path: Path) -> None:
+    source = _map(tmp_path / "map", 5)
+
+    def fail(done: int, columns: int) -> None:
+        raise error
+
+    with pytest.raises(type(error), match=str(error.args[0])):
+        voxtile_dask.decay(source, tmp_path / "faded", 5, client=client, progress=fail)
+    # A task that was just putting its piece there may still remove it.
+    until = time.monotonic() + 10
+    while len(list(tmp_path.iterdir())) > 1 and time.monotonic() < until:
+        time.sleep(0.01)
+    assert [path.name for path in tmp_path.iterdir()] == ["map"]
+
+
+def test_a_tile_over_a_corner_of_four_regions_is_in_all_of_them(client: object, tmp_path: Path) -> None:
+    with voxtile.Map.create(tmp_path / "map", **OPTIONS) as made:
+        # One tile, from 4 m to 6 m.
+        made.insert(np.array([[x, y, 0.6] for x in (4.6, 5.4) for y in (4.6, 5.4)]), origin=[5.1, 5.1, 0.6])
+    told = voxtile_dask.export(tmp_path / "map", tmp_path / "files", ".xyz", region_size=5.0, client=client)
+    assert told["files"] == ["0_0.xyz", "0_1.xyz", "1_0.xyz", "1_1.xyz"]
+    lines = [line for name in told["files"] for line in (tmp_path / "files" / name).read_text().splitlines()]
+    voxtile.export(tmp_path / "map", tmp_path / "whole.xyz")
+    assert sorted(lines) == sorted((tmp_path / "whole.xyz").read_text().splitlines()) and len(lines) == 4
+
+
+def test_files_of_another_call_are_not_taken_for_ones_own(client: object, tmp_path: Path) -> None:
+    source, beside = _map(tmp_path / "map", 5), tmp_path / "files.unfinished"
+    beside.mkdir()
+    (beside / "7_7.csv").write_text("mine")
+    with pytest.raises(errors.ArgumentError, match="7_7.csv in it is of no earlier call"):
+        voxtile_dask.export(source, tmp_path / "files", ".csv", client=client)
+    assert (beside / "7_7.csv").read_text() == "mine"
+    # What a call with other options left that was killed.
+    attempt = beside / ("0" * 32)
+    attempt.mkdir()
+    (beside / "7_7.csv").rename(attempt / "7_7.csv")
+    told = voxtile_dask.export(source, tmp_path / "files", ".csv", client=client)
+    assert "7_7.csv" not in told["files"]
+    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == told["files"]
+    assert {path.name for path in tmp_path.iterdir()} == {"map", "files"}
+
+
+def test_a_snapshot_is_named_as_in_the_command(client: object, tmp_path: Path) -> None:
+    source = _map(tmp_path / "city@home", 5)
+    with voxtile.Map.open(source) as opened:
+        opened.snapshot("before")
+    voxtile.export(source, tmp_path / "before.csv", region=[-1000, -1000, -1000, 1000, 1000, 1000])
+    voxtile.clear(source, [-100, -100, -100, 100, 100, 0.5])
+    voxtile.export(source, tmp_path / "now.csv", region=[-1000, -1000, -1000, 1000, 1000, 1000])
+    for name, map in (("now", source), ("before", f"{source}@before")):
+        voxtile_dask.export(map, tmp_path / name, ".csv", region_size=2000.0, client=client)
+        lines = [line for path in (tmp_path / name).iterdir() for line in path.read_text().splitlines()]
+        assert set(lines) == set((tmp_path / f"{name}.csv").read_text().splitlines())
+    assert (tmp_path / "now.csv").read_bytes() != (tmp_path / "before.csv").read_bytes()
+
+
+def test_threads_of_a_worker_have_maps_of_their_own(tmp_path: Path) -> None:
+    source = _map(tmp_path / "map", 5)
+    with voxtile.Map.open(source, "r") as opened:
+        tiles = [tuple(int(number) for number in tile) for tile in opened.tiles]
+    order: list[tuple[int, ...]] = []
+    is_opened, has_another_begun = threading.Event(), threading.Event()
+
+    def look(tile: object) -> bool:
+        if tile.index not in order:
+            order.append(tile.index)
+        if tile.index == order[0]:
+            opened = tile._reader()
+            is_opened.set()
+            assert has_another_begun.wait(60)
+            # It is of one flush from the task's begin to its end.
+            return tile._reader() is opened
+        assert is_opened.wait(60)
+        # The second task may have begun before the first had opened the map, the third has not.
+        if tile.index == order[-1] != order[1]:
+            has_another_begun.set()
+        return True
+
+    found = voxtile_dask.map_tiles(source, look, tiles=[tile for tile in tiles[:3] for _ in range(16)])
+    assert found.npartitions == 3 and all(found.compute(scheduler="threads", num_workers=2))

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from voxtile import errors
 
 pytest.importorskip("distributed")
 plan = pytest.importorskip("voxtile.dask.simulation")
@@ -85,6 +86,24 @@ def test_whole_tiles_of_columns_are_apart_and_leave_none_out() -> None:
             region = regions.region_of((x, -1), size)
             assert region[0] <= box[0] + tile_size / 2 < region[3]
             assert region[0] <= box[3] - tile_size / 2 < region[3]
+
+
+def test_every_tile_is_in_one_column_and_its_range() -> None:
+    for tile_size in (0.3, 1.2, 2.0, 3.3, 6.4, 10.0, 12.8):
+        for tenths in range(20, 60, 3):
+            size = round(tenths * tile_size / 10, 9)
+            for tile in range(-60, 60):
+                column, _ = regions.column_of((tile, 0), size, tile_size)
+                boxes = {x: regions.tiles_of((x, 0), size, tile_size) for x in range(column - 1, column + 2)}
+                center = (tile + 0.5) * tile_size
+                assert [x for x, box in boxes.items() if box[0] < center < box[3]] == [column], (tile_size, size, tile)
+
+
+def test_a_plan_of_too_many_columns_names_the_scan() -> None:
+    boxes = [(0.0, 0.0, 1.0, 1.0), None, (0.0, 0.0, 1e5, 1e5)]
+    with pytest.raises(errors.ArgumentError, match=r"^scan 2: .*more than 1000 regions of 100\.0 m"):
+        regions.columns_of(boxes, 100.0, 0.5, most=1000)
+    assert len(regions.columns_of(boxes[:2], 100.0, 0.5, most=4)) == 4
 
 
 def test_the_command_tells_the_plan() -> None:

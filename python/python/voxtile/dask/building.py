@@ -12,12 +12,13 @@ import json
 import math
 import operator
 import os
+import re
 import shutil
 import tempfile
 import time
 import uuid
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -48,6 +49,11 @@ _dask: Any = distributed
 
 # What does not commute with dividing space, or makes numbers of scans mean something else.
 _READING_ONLY = {"every": 1, "first": 0, "count": None}
+
+# Where ``voxtile build`` cuts rays if no range is named, into a new map and into one that it adds to.
+_DEFAULT_RANGE_M = 100.0
+# A plan of more is a mistake: dask would take minutes to hear of the tasks.
+_MOST_REGIONS = 100_000
 
 
 class BuildOptions(ReadOptions, total=False):
@@ -95,35 +101,38 @@ def build(
     output = Path(os.path.abspath(out))
     source = os.path.abspath(scans)
     settings: dict[str, Any] = {**options}
+    if settings.get("max_range") is None:
+        settings["max_range"] = _DEFAULT_RANGE_M
     if resolution is not None:
         settings["resolution"] = resolution
     base = _base(output, settings) if update else None
     tile_size = settings.get("tile_size", 10.0) if base is None else base.tile_size
-    size = advised_region_size(settings.get("max_range"), tile_size) if region_size is None else region_size
+    size = advised_region_size(settings["max_range"], tile_size) if region_size is None else region_size
     _check(output, size, tile_size, settings, update)
     found: Any = _dask.Client.current() if client is None else client
     parts = output.with_name(output.name + ".parts")
-    with locked(parts):
+    with locked(parts, _OWN_NAMES):
         for attempt in parts.glob("attempt-*"):
             shutil.rmtree(attempt, ignore_errors=True)
-        seen, plan_cpu = _plan(found, source, dict(options))
+        seen, plan_cpu = _plan(found, source, settings)
         planned = time.perf_counter()
         boxes = [box for _, box in seen]
-        columns = columns_of(boxes, size, tile_size)
+        columns = columns_of(boxes, size, tile_size, most=_MOST_REGIONS)
         if not columns:
             raise ArgumentError(f"{source}: no scan has a point, so there is nothing to map")
         drive = _mark(source, size, settings, seen, str(output) if base else None)
         if base is not None and (adopted := _adopted_before(parts, drive, base)) is not None:
             remove(parts)
             return {**adopted, "output": str(output), "regions_done_before": adopted["regions"]}
-        mark = drive if base is None else _mark(drive, base.map_id, base.flush_number)
+        map_id = _id_of(parts) if base is None else base.map_id
+        # A task of a call that was given up may still put its part here, for a map of another id.
+        mark = _mark(drive, map_id, None if base is None else base.flush_number)
         wanted = {parts / f"{mark}-{x}-{y}": ((x, y), ranges) for (x, y), ranges in columns.items()}
         open_parts = {part: what for part, what in wanted.items() if not part.exists()}
         # Long tasks first: a short one at the end keeps few workers waiting.
         longest = sorted(open_parts.items(), key=lambda what: -scans_in(what[1][1]))
         of_map = None if base is None else str(output)
         how = ((size, tile_size), settings, of_map)
-        map_id = _id_of(parts) if base is None else base.map_id
         checks = [
             found.submit(_check_part, str(part), pure=False, retries=2) for part in wanted if part not in open_parts
         ]
@@ -156,8 +165,7 @@ def build(
         if base is None:
             told["tiles"] = join(names, str(output))["tiles"]
         else:
-            _note(parts / _ADOPTING, {"drive": drive, "of_flush": base.flush_number, "told": told})
-            told["adopted"] = adopt(str(output), names, of_flush=base.flush_number, scans=len(boxes))
+            told["adopted"] = _adopt(output, names, drive, base, told)
         remove(parts)
     ended, ended_cpu = time.perf_counter(), time.process_time()
     seconds = sorted((task["seconds"] for task in tasks), reverse=True)
@@ -182,11 +190,19 @@ class _Base:
 
     map_id: str
     flush_number: int
+    scan_number: int
+    # Scans that its list of scans does not have: those of updates. ``None`` if that is not known.
+    unlisted_scans: int | None
     tile_size: float
 
 
 # Says which update is being put in place, so that it is not done twice.
 _ADOPTING = "adopting.json"
+
+# What calls leave in the folder of parts.
+_OWN_NAMES = re.compile(
+    r"(map_id|adopting)\.(json|new)|attempt-[0-9a-f]{32}(\.unfinished)?|[0-9a-f]{16}-(-?[0-9]+)-(-?[0-9]+)"
+)
 
 
 def _base(output: Path, settings: dict[str, Any]) -> _Base:
@@ -196,7 +212,9 @@ def _base(output: Path, settings: dict[str, Any]) -> _Base:
     for name in ("resolution", "tile_size"):
         if settings.get(name, told[name]) != told[name]:
             raise ArgumentError(f"{name}: the map has {told[name]} m; leave it out")
-    return _Base(str(told["map_id"]), told["flush_number"], told["tile_size"])
+    scans, listed = told["scan_number"], told["scan_records"]
+    unlisted = None if listed is None else scans - listed
+    return _Base(str(told["map_id"]), told["flush_number"], scans, unlisted, told["tile_size"])
 
 
 def _mark(*what: object) -> str:
@@ -213,16 +231,42 @@ def _note(path: Path, what: object) -> None:
     os.replace(beside, path)
 
 
+def _adopt(output: Path, names: Sequence[str], drive: str, base: _Base, told: dict[str, Any]) -> dict[str, Any]:
+    note = Path(names[0]).parent / _ADOPTING
+    _note(note, {"drive": drive, "map": asdict(base), "told": told})
+    try:
+        adopted: dict[str, Any] = adopt(str(output), names, of_flush=base.flush_number, scans=told["scans"])
+    except ArgumentError:
+        # The map is as somebody else left it. After other errors nobody knows.
+        note.unlink()
+        raise
+    return adopted
+
+
 def _adopted_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | None:
     """What a call told that put these scans in place and was killed before it removed the parts."""
     try:
         noted: dict[str, Any] = json.loads((parts / _ADOPTING).read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
         return None
-    if noted["drive"] != drive or base.flush_number <= noted["of_flush"]:
+    before = _Base(**noted["map"])
+    if noted["drive"] != drive or before.map_id != base.map_id or before.flush_number == base.flush_number:
         return None
     told: dict[str, Any] = noted["told"]
-    return told
+    # The number of a flush tells nothing: it may be another writer's, whose scans are in the list.
+    added = _difference(base.unlisted_scans, before.unlisted_scans)
+    if added == told["scans"]:
+        return told
+    if added is not None and added <= 0:
+        return None
+    raise ArgumentError(
+        f"{parts}: an earlier call ended while it put {told['scans']} scans in place after scan {before.scan_number},"
+        f" and {told['output']} has changed since; look whether it has them, remove {parts}, and call again if not"
+    )
+
+
+def _difference(number: int | None, other: int | None) -> int | None:
+    return None if number is None or other is None else number - other
 
 
 def _id_of(parts: Path) -> str:
@@ -273,10 +317,10 @@ def _check(output: Path, region_size: float, tile_size: float, options: Any, upd
             raise ArgumentError(f"{name}: a build in parts takes all scans; leave it out, or use voxtile.build")
 
 
-def _plan(client: Any, source: str, options: dict[str, Any]) -> tuple[list[_Seen], float]:
+def _plan(client: Any, source: str, settings: dict[str, Any]) -> tuple[list[_Seen], float]:
     """What each scan is, and where it may leave something, ``None`` for nowhere; and the seconds of CPU for that."""
-    reading = {name: value for name, value in options.items() if name in ReadOptions.__annotations__}
-    reach = (options.get("max_range"), options.get("clear_no_return"))
+    reading = {name: value for name, value in settings.items() if name in ReadOptions.__annotations__}
+    reach = (settings["max_range"], settings.get("clear_no_return"))
     # Other formats that do not tell how many there are would be read as a whole for it: a single task does that, too.
     is_stream = source.lower().endswith(".scans")
     scans = files.count_scans(source, **reading) if is_stream else operator.length_hint(files.scans(source, **reading))

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import tempfile
 import uuid
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,8 +19,8 @@ from .. import _voxtile
 from .._voxtile import Map
 from ..errors import ArgumentError, VoxtileError
 from . import losses
-from .pieces import hand_over, locked, remove
-from .regions import Column, tiles_of
+from .pieces import attempt_in, hand_over
+from .regions import Column, column_of, tiles_of
 
 try:
     import distributed
@@ -33,9 +33,6 @@ _Progress = Callable[[int, int], object] | None
 
 # Its types are not complete.
 _dask: Any = distributed
-
-# The name of an attempt's folder: the id of the map to come.
-_ATTEMPT = re.compile("[0-9a-f]{32}")
 
 # Tiles along the edge of a column where nobody names its size.
 _TILES_OF_COLUMN = 20
@@ -87,11 +84,12 @@ def verify(
     """Checks every file of a map: the sums and ``"findings"`` of ``voxtile.verify``."""
     source = os.path.abspath(map)
     try:
-        columns, *_ = _columns([source], region_size)
+        tiles, tile_size = _tiles([source])
     except VoxtileError:
         # Without its list of tiles a map cannot be divided.
         return _voxtile.verify(source, progress=progress)
-    tasks = [(_verify_tiles, (source, None)), *((_verify_tiles, (source, tiles)) for tiles in columns.values())]
+    columns, _ = _divided(tiles, tile_size, region_size)
+    tasks = [(_verify_tiles, (source, None)), *((_verify_tiles, (source, some)) for some in columns.values())]
     rest, *parts = _run(client, tasks, progress)
     for part in parts:
         for name in ("tiles", "voxels", "table_bytes"):
@@ -113,24 +111,28 @@ def _places(map: _Path, out: _Path) -> tuple[str, Path]:
     return os.path.abspath(map), output
 
 
-def _columns(
-    maps: Sequence[str], region_size: float | None
-) -> tuple[dict[Column, list[_Index]], float, float]:
-    """The columns with tiles of any of the maps, the edge of a column and that of a tile."""
+def _tiles(maps: Sequence[str]) -> tuple[set[_Index], float]:
+    """The tiles of all maps, and the edge of one."""
     tiles: set[_Index] = set()
     tile_size = 0.0
     for map in maps:
         with Map.open(map, "r") as opened:
             tiles.update((int(x), int(y), int(z)) for x, y, z in opened.tiles)
             tile_size = tile_size or opened.tile_size
+    return tiles, tile_size
+
+
+def _divided(
+    tiles: set[_Index], tile_size: float, region_size: float | None
+) -> tuple[dict[Column, list[_Index]], float]:
+    """Tiles by the column that they are in, and the edge of a column."""
     size = _TILES_OF_COLUMN * tile_size if region_size is None else region_size
     if not (math.isfinite(size) and size >= 2 * tile_size):
         raise ArgumentError(f"region_size: {size} m is less than two tiles of {tile_size} m; take more")
     columns: dict[Column, list[_Index]] = {}
     for tile in sorted(tiles):
-        column = (math.floor((tile[0] + 0.5) * tile_size / size), math.floor((tile[1] + 0.5) * tile_size / size))
-        columns.setdefault(column, []).append(tile)
-    return columns, size, tile_size
+        columns.setdefault(column_of(tile[:2], size, tile_size), []).append(tile)
+    return columns, size
 
 
 def _run(client: Any, tasks: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]], progress: _Progress) -> list[Any]:
@@ -138,63 +140,53 @@ def _run(client: Any, tasks: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]
     found = _dask.Client.current() if client is None else client
     futures = [found.submit(function, *given, pure=False, retries=2) for function, given in tasks]
     try:
-        with losses.told(use_less="take a smaller region_size", then="call again"):
-            for done, future in enumerate(_dask.as_completed(futures), 1):
+        for done, future in enumerate(_dask.as_completed(futures), 1):
+            with _losses_told():
                 future.result()
-                if progress is not None:
-                    progress(done, len(futures))
+            # What this raises is its caller's.
+            if progress is not None:
+                progress(done, len(futures))
+        with _losses_told():
             answers: list[Any] = found.gather(futures)
         return answers
     finally:
         found.cancel(futures)
 
 
+def _losses_told() -> AbstractContextManager[None]:
+    return losses.told(use_less="take a smaller region_size", then="call again")
+
+
 def _make(
     maps: Sequence[str], output: Path, work: _Work, region_size: float | None, client: Any, progress: _Progress
 ) -> dict[str, Any]:
     """A new map of what is made of each column."""
-    columns, size, tile_size = _columns(maps, region_size)
+    tiles, tile_size = _tiles(maps)
+    columns, size = _divided(tiles, tile_size, region_size)
     if not columns:
         return _voxtile.merge(list(maps), str(output))
     # Not the name that parts of a build have, which are kept if it fails.
-    parts = output.with_name(output.name + ".columns")
-    with locked(parts):
-        # Of a call that was killed there is nothing but the folders of its attempts.
-        for name in os.listdir(parts):
-            if name != "lock" and not _ATTEMPT.fullmatch(name):
-                raise ArgumentError(f"{parts}: {name} in it is of no earlier call; move the folder away")
-        try:
-            map_id = uuid.uuid4().hex
-            # In a folder of this attempt: a task of an earlier one that was given up may still be at work.
-            pieces = parts / map_id
-            pieces.mkdir()
-            places = {column: str(pieces / f"{column[0]}_{column[1]}") for column in columns}
-            tasks = [
-                (_make_part, (list(maps), place, map_id, tiles_of(column, size, tile_size), work))
-                for column, place in places.items()
-            ]
-            made = [part for part in _run(client, tasks, progress) if part is not None]
-            merged = _voxtile.join(made, str(output))
-        finally:
-            remove(parts)
+    with attempt_in(output.with_name(output.name + ".columns")) as pieces:
+        map_id = pieces.name
+        tasks = [
+            (_make_part, (list(maps), str(pieces / f"{x}_{y}"), map_id, tiles_of((x, y), size, tile_size), work))
+            for x, y in columns
+        ]
+        merged = _voxtile.join(_run(client, tasks, progress), str(output))
     return {"output": str(output), "regions": len(columns), "tiles": merged.get("tiles")}
 
 
-def _make_part(maps: Sequence[str], place: str, map_id: str, box: Sequence[float], work: _Work) -> str | None:
+def _make_part(maps: Sequence[str], place: str, map_id: str, box: Sequence[float], work: _Work) -> str:
     operation, given = work
     with _local_folder() as local:
-        crops = []
-        for number, map in enumerate(maps):
-            crop = os.path.join(local, str(number))
+        crops = [os.path.join(local, str(number)) for number in range(len(maps))]
+        for map, crop in zip(maps, crops, strict=True):
             # Of several, what is made of them gets the id.
-            piece_of = map_id if len(maps) == 1 else uuid.uuid4().hex
-            if _voxtile.crop(map, crop, box, piece_of=piece_of).get("tiles", 1):
-                crops.append(crop)
-        if not crops:
-            return None
+            _voxtile.crop(map, crop, box, piece_of=map_id if len(maps) == 1 else uuid.uuid4().hex)
         made = crops[0]
-        if operation == "merge" and len(crops) > 1:
+        if operation == "merge" and len(maps) > 1:
             made = os.path.join(local, "merged")
+            # Those without a tile here, too: what the map is like is told by the first, and all are to go with it.
             _voxtile.merge(crops, made, prefer=given[0])
         elif operation == "decay":
             halflife_scans, scans, forget_below = given

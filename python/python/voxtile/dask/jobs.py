@@ -20,10 +20,13 @@ from .._voxtile import Map, describe
 from ..errors import ArgumentError
 from ..files import ExportOptions
 from . import losses
+from .pieces import attempt_in
+from .regions import Column
 from .simulation import advised_region_size
 from .tiles import Tile, map_tiles
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from typing_extensions import Unpack
 
 _Path = str | os.PathLike[str]
@@ -55,47 +58,55 @@ def export(
     output = Path(os.path.abspath(out))
     if output.exists():
         raise ArgumentError(f"{output}: it exists; name a new folder, or remove it")
-    path, _, snapshot = os.fspath(map).partition("@")
-    source = os.path.abspath(path) + (f"@{snapshot}" if snapshot else "")
-    told = describe((path, snapshot) if snapshot else path)
+    path, snapshot = _map_at(os.fspath(map))
+    told = describe(path if snapshot is None else (path, snapshot))
     size = advised_region_size(told["max_range"], told["tile_size"]) if region_size is None else region_size
     if not size >= 2 * told["tile_size"]:
         raise ArgumentError(f"region_size: {size} m is less than two tiles of {told['tile_size']} m; take more")
-    with Map.open(path, "r", snapshot=snapshot or None) as opened:
+    with Map.open(path, "r", snapshot=snapshot) as opened:
         heights = (float(opened.tiles[:, 2].min(initial=0)), float(opened.tiles[:, 2].max(initial=0)) + 1.0)
-        # A region that cuts a tile gets a part of it, and so does the next one.
-        corners = [np.floor((opened.tiles[:, :2] + end) * told["tile_size"] / size - shift) for end, shift in _ENDS]
+        columns = _columns(opened.tiles[:, :2], told["tile_size"], size)
     low, high = (height * told["tile_size"] for height in heights)
-    columns = sorted({(int(x), int(y)) for corner in corners for x, y in corner})
     found: Any = _dask.Client.current() if client is None else client
-    beside = output.with_name(f"{output.name}.unfinished")
-    beside.mkdir(parents=True, exist_ok=True)
-    futures = [
-        found.submit(
-            _export_region,
-            source,
-            str(beside),
-            f"{x}_{y}{suffix}",
-            [x * size, y * size, low, (x + 1) * size, (y + 1) * size, high],
-            dict(options),
-            pure=False,
-            retries=2,
-        )
-        for x, y in columns
-    ]
-    try:
-        with losses.told(use_less="take a smaller region_size", then="call again"):
-            tasks: list[dict[str, Any]] = found.gather(futures)
-    finally:
-        found.cancel(futures)
-    for attempt in beside.glob("attempt-*"):
-        attempt.unlink()
-    os.rename(beside, output)
+    with attempt_in(output.with_name(f"{output.name}.unfinished")) as folder:
+        futures = [
+            found.submit(
+                _export_region,
+                os.path.abspath(map),
+                str(folder),
+                f"{x}_{y}{suffix}",
+                [x * size, y * size, low, (x + 1) * size, (y + 1) * size, high],
+                dict(options),
+                pure=False,
+                retries=2,
+            )
+            for x, y in columns
+        ]
+        try:
+            with losses.told(use_less="take a smaller region_size", then="call again"):
+                tasks: list[dict[str, Any]] = found.gather(futures)
+        finally:
+            found.cancel(futures)
+        for attempt in folder.glob("attempt-*"):
+            attempt.unlink()
+        os.rename(folder, output)
     return {"output": str(output), "region_size": size, "files": sorted(task["file"] for task in tasks)}
 
 
-# The low and the high corner of a tile; one that ends where a region begins has nothing in it.
-_ENDS = ((0, 0.0), (1, 1e-9))
+def _map_at(text: str) -> tuple[str, str | None]:
+    """A map and the name of a snapshot, as the command reads ``MAP@SNAPSHOT``: not where that is a file's name."""
+    map, at, name = text.rpartition("@")
+    if not at or os.sep in name or os.path.lexists(text):
+        return text, None
+    return map, name
+
+
+def _columns(tiles: NDArray[np.int32], tile_size: float, size: float) -> list[Column]:
+    """The regions that have a part of a tile: of one that a border cuts two, of one with a corner inside four."""
+    # Regions are no smaller than tiles. A tile that ends where a region begins has nothing in it.
+    low, high = (np.floor((tiles + end) * tile_size / size - shift) for end, shift in ((0, -1e-9), (1, 1e-9)))
+    corners = (np.stack([x[:, 0], y[:, 1]], axis=1) for x in (low, high) for y in (low, high))
+    return sorted({(int(x), int(y)) for corner in corners for x, y in corner})
 
 
 def _export_region(

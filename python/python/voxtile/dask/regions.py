@@ -6,7 +6,9 @@ Lengths are in metres, boxes are west, south, east, north.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+
+from ..errors import ArgumentError
 
 Box = tuple[float, float, float, float]
 Column = tuple[int, int]
@@ -18,11 +20,16 @@ JOINED_GAP_SCANS = 20
 
 
 def columns_of(
-    boxes: Sequence[Box | None], size: float, tile_size: float, joined_gap: int = JOINED_GAP_SCANS
+    boxes: Sequence[Box | None],
+    size: float,
+    tile_size: float,
+    joined_gap: int = JOINED_GAP_SCANS,
+    most: float = math.inf,
 ) -> dict[Column, list[Range]]:
     """The columns that scans may reach, and of each the ranges of scans that do, in their order.
 
     A drive that comes back leaves out what it drove elsewhere, unless that is at most ``joined_gap`` scans.
+    More columns than ``most`` are an error.
     """
     columns: dict[Column, list[Range]] = {}
     for number, box in enumerate(boxes):
@@ -30,6 +37,11 @@ def columns_of(
             continue
         for column in reached(box, size, tile_size):
             ranges = columns.setdefault(column, [])
+            if len(columns) > most:
+                raise ArgumentError(
+                    f"scan {number}: with it, scans reach more than {most} regions of {size} m; look at its pose and"
+                    " points, or take a smaller max_range or clear_no_return, or a larger region_size"
+                )
             if ranges and number - ranges[-1][1] <= joined_gap:
                 ranges[-1] = (ranges[-1][0], number + 1)
             else:
@@ -37,16 +49,16 @@ def columns_of(
     return columns
 
 
-def reached(box: Box, size: float, tile_size: float) -> list[Column]:
+def reached(box: Box, size: float, tile_size: float) -> Iterator[Column]:
     """The columns in which a box may have the center of a tile that it touches."""
     west, south, east, north = box
     # A tile whose center is in a column reaches half of its edge beyond; the other half is slack for rounding.
     margin = tile_size
-    return [
+    return (
         (x, y)
         for x in range(math.floor((west - margin) / size), math.floor((east + margin) / size) + 1)
         for y in range(math.floor((south - margin) / size), math.floor((north + margin) / size) + 1)
-    ]
+    )
 
 
 def region_of(column: Column, size: float) -> list[float]:
@@ -59,10 +71,30 @@ def tiles_of(column: Column, size: float, tile_size: float) -> list[float]:
     """The box of the whole tiles whose center is in a column, as ``voxtile.crop`` takes it."""
     x, y = column
     low, high = (
-        [math.ceil(number * size / tile_size - 0.5) * tile_size for number in corner]
-        for corner in ((x, y), (x + 1, y + 1))
+        [_first_tile(number, size, tile_size) * tile_size for number in corner] for corner in ((x, y), (x + 1, y + 1))
     )
     return [*low, -math.inf, *high, math.inf]
+
+
+def column_of(tile: tuple[int, int], size: float, tile_size: float) -> Column:
+    """The column that has the center of a tile."""
+    x, y = (_column_along_axis(number, size, tile_size) for number in tile)
+    return x, y
+
+
+def _first_tile(column: int, size: float, tile_size: float) -> int:
+    """The first tile of a column along an axis, rounded as ``voxtile.build`` does it."""
+    return math.ceil(column * size / tile_size - 0.5)
+
+
+def _column_along_axis(tile: int, size: float, tile_size: float) -> int:
+    # Rounded otherwise: a center on a border may be in the one beside.
+    column = math.floor((tile + 0.5) * tile_size / size)
+    while tile < _first_tile(column, size, tile_size):
+        column -= 1
+    while tile >= _first_tile(column + 1, size, tile_size):
+        column += 1
+    return column
 
 
 def scans_in(ranges: Sequence[Range]) -> int:

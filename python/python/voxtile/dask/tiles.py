@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
@@ -30,8 +31,14 @@ _bag: Any = dask.bag
 _TILES_AT_ONCE = 16
 
 
-# The map of the task at hand, by process, path and snapshot.
-_opened: dict[tuple[int, str, str | None], Map] = {}
+class _Opened(threading.local):
+    """The map of the task at hand, by process, path and snapshot; threads of a worker have tasks of their own."""
+
+    def __init__(self) -> None:
+        self.maps: dict[tuple[int, str, str | None], Map] = {}
+
+
+_opened = _Opened()
 
 
 @dataclass(frozen=True)
@@ -61,10 +68,10 @@ class Tile:
     def _reader(self) -> Map:
         # A process that was forked opens its own.
         key = (os.getpid(), self.map, self.snapshot)
-        reader = _opened.get(key)
+        reader = _opened.maps.get(key)
         if reader is None:
-            _opened.clear()
-            reader = _opened[key] = Map.open(self.map, "r", snapshot=self.snapshot)
+            _opened.maps.clear()
+            reader = _opened.maps[key] = Map.open(self.map, "r", snapshot=self.snapshot)
         return reader
 
 
@@ -93,5 +100,5 @@ def map_tiles(
 
 def _apply(tiles: Sequence[Tile], function: Callable[[Tile], _T]) -> list[_T]:
     # What an earlier task has opened may be an earlier flush.
-    _opened.clear()
+    _opened.maps.clear()
     return [function(tile) for tile in tiles]
