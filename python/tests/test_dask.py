@@ -302,6 +302,16 @@ def test_a_stray_point_makes_no_regions_where_rays_are_cut(client: object, drive
     assert {path.name for path in tmp_path.iterdir()} == {"drive", "map", "whole"}
 
 
+def test_maps_without_tiles_fade_and_merge_like_others(client: object, tmp_path: Path) -> None:
+    empty = tmp_path / "empty"
+    voxtile.Map.create(empty, resolution=0.2).close()
+    voxtile_dask.decay(empty, tmp_path / "faded", 10.0, client=client)
+    voxtile_dask.merge([empty, empty], tmp_path / "merged", client=client)
+    for made in ["faded", "merged"]:
+        assert voxtile.digest(tmp_path / made) == voxtile.digest(empty)
+        assert voxtile.open(tmp_path / made).resolution == 0.2
+
+
 def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(
     drive: Path, whole: str, tmp_path: Path
 ) -> None:

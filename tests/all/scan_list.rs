@@ -142,21 +142,19 @@ fn check_damage(map: &Path, at: usize, what: &str) {
 #[test]
 fn a_mapper_that_goes_on_behind_damage_keeps_the_list_as_it_was() {
     let folder = TempDir::new().unwrap();
-    let flip = |at: usize| {
-        move |mut bytes: Vec<u8>| {
-            bytes[at] ^= 0x40;
-            bytes
-        }
-    };
-    let cut = |length: usize| move |bytes: Vec<u8>| bytes[..length].to_vec();
-    let mut damages: Vec<Box<dyn Fn(Vec<u8>) -> Vec<u8>>> = Vec::new();
-    (0..16 + 3 * 64).step_by(5).for_each(|at| damages.push(Box::new(flip(at))));
-    [0, 15, 16, 79, 80, 207].into_iter().for_each(|length| damages.push(Box::new(cut(length))));
-    for (number, damage) in damages.into_iter().enumerate() {
-        let map = folder.path().join(number.to_string());
+    // A byte that is another one, or the length that is left.
+    let flips = (0..16 + 3 * 64).step_by(5).map(|at| (at, true));
+    let cuts = [0, 15, 16, 79, 80, 207].map(|length| (length, false));
+    for (at, is_flip) in flips.chain(cuts) {
+        let number = format!("{at} {is_flip}");
+        let map = folder.path().join(&number);
         make_map(&map, 3).flush().unwrap();
         let path = map.join("scans.bin");
-        let damaged = damage(fs::read(&path).unwrap());
+        let mut damaged = fs::read(&path).unwrap();
+        match is_flip {
+            true => damaged[at] ^= 0x40,
+            false => damaged.truncate(at),
+        }
         fs::write(&path, &damaged).unwrap();
         let mut mapper = OutOfCoreTileMapper::open(&map, MapReader::config_of(&map).unwrap()).unwrap();
         insert(&mut mapper, 4..6);

@@ -163,8 +163,8 @@ def _make(
     """A new map of what is made of each column."""
     tiles, tile_size = _tiles(maps)
     columns, size = _divided(tiles, tile_size, region_size)
-    if not columns:
-        return _voxtile.merge(list(maps), str(output))
+    # A map without tiles has parameters all the same.
+    columns = columns or {(0, 0): []}
     # Not the name that parts of a build have, which are kept if it fails.
     with attempt_in(output.with_name(output.name + ".columns")) as pieces:
         map_id = pieces.name
