@@ -39,13 +39,17 @@ pub struct OctreeMap {
     id: String,
     /// In order.
     tiles: Vec<TileIndex>,
-    cache: Mutex<LruCache<TileIndex, Arc<Tile>>>,
+    cache: Mutex<TileCache>,
 }
 
 /// Edge of the tiles that a file is cut into, about.
 const TILE_SIZE_M: f64 = 10.0;
+/// Most voxels of a tile that is asked: 150 MB.
+const MOST_TILE_VOXELS: u64 = 1 << 26;
 /// Tiles in memory.
 const CACHE_TILES: NonZeroUsize = NonZeroUsize::new(32).expect("more than none");
+/// Bytes of these, but for the last one.
+const CACHE_BYTES: usize = 128 << 20;
 /// Most tiles that the leaves of a file may stand for: one of twenty bytes can stand for 2^48 voxels.
 const MOST_TILES: u64 = 1 << 22;
 /// Depth of bricks in OctoMap's tree.
@@ -70,7 +74,7 @@ impl OctreeMap {
         let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, 1024.0);
         let config = MapConfig::new(resolution_m, edge * resolution_m)?;
         let tiles = tiles_of(&config, &tree)?;
-        Ok(Self { config, tree, format, id, tiles, cache: Mutex::new(LruCache::new(CACHE_TILES)) })
+        Ok(Self { config, tree, format, id, tiles, cache: Mutex::default() })
     }
 
     /// Which of OctoMap's formats the file has.
@@ -89,7 +93,11 @@ impl OctreeMap {
     }
 
     /// Makes the table of a tile.
-    pub(crate) fn table_of(&self, index: TileIndex) -> Table {
+    ///
+    /// # Errors
+    ///
+    /// More voxels than so many.
+    pub(crate) fn table_of(&self, index: TileIndex, most_voxels: u64) -> Result<Table> {
         let end = FIRST_VOXEL.map(|first| -first);
         let voxels = self.config.grid.voxels_of_tile(index);
         let voxels = voxels.intersection(&VoxelBox { min: FIRST_VOXEL, end });
@@ -109,9 +117,19 @@ impl OctreeMap {
                         table.insert(BrickCode::of_voxel([x, y, z]), &known);
                     }
                 }
+                if table.len() as u64 > most_voxels {
+                    let what = "number of voxels that the file stands for in one tile";
+                    let hint = "such a file is made by pruning large cubes; import it with `voxtile import`";
+                    return Err(Error::TooLarge { what, size: table.len() as u64, limit: most_voxels, hint });
+                }
             }
         }
-        table
+        Ok(table)
+    }
+
+    fn make_tile(&self, index: TileIndex) -> Result<Arc<Tile>> {
+        let table = self.table_of(index, MOST_TILE_VOXELS)?;
+        Ok(Arc::new(Tile::uncached(&self.config.grid, index, table)))
     }
 
     /// Collects the known voxels of a brick that lie in a box: place and evidence, in Morton order.
@@ -131,6 +149,34 @@ impl OctreeMap {
 
     fn has(&self, index: TileIndex) -> bool {
         self.tiles.binary_search(&index).is_ok()
+    }
+}
+
+/// The tiles that were made last.
+#[derive(Debug)]
+struct TileCache {
+    tiles: LruCache<TileIndex, Arc<Tile>>,
+    bytes: usize,
+}
+
+impl Default for TileCache {
+    fn default() -> Self {
+        Self { tiles: LruCache::new(CACHE_TILES), bytes: 0 }
+    }
+}
+
+impl TileCache {
+    fn put(&mut self, index: TileIndex, tile: &Arc<Tile>) {
+        self.bytes += tile.bytes();
+        if let Some((_, other)) = self.tiles.push(index, tile.clone()) {
+            self.bytes = self.bytes.saturating_sub(other.bytes());
+        }
+        while self.bytes > CACHE_BYTES
+            && self.tiles.len() > 1
+            && let Some((_, oldest)) = self.tiles.pop_lru()
+        {
+            self.bytes = self.bytes.saturating_sub(oldest.bytes());
+        }
     }
 }
 
@@ -187,7 +233,7 @@ impl MapView for OctreeMap {
 
     fn cached_tile_indices(&self) -> Vec<TileIndex> {
         let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut indices: Vec<_> = cache.iter().map(|(index, _)| *index).collect();
+        let mut indices: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
         indices.sort_unstable();
         indices
     }
@@ -197,18 +243,20 @@ impl MapView for OctreeMap {
             return Ok(None);
         }
         let cache = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(tile) = cache().get(&index) {
+        if let Some(tile) = cache().tiles.get(&index) {
             return Ok(Some(TileRef::shared(tile.clone())));
         }
         // Other threads find theirs meanwhile.
-        let tile = Arc::new(Tile::uncached(&self.config.grid, index, self.table_of(index)));
-        cache().put(index, tile.clone());
+        let tile = self.make_tile(index)?;
+        cache().put(index, &tile);
         Ok(Some(TileRef::shared(tile)))
     }
 
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        let make = || Arc::new(Tile::uncached(&self.config.grid, index, self.table_of(index)));
-        Ok(self.has(index).then(|| TileRef::shared(make())))
+        match self.has(index) {
+            true => Ok(Some(TileRef::shared(self.make_tile(index)?))),
+            false => Ok(None),
+        }
     }
 
     fn voxels_of_tile_hint(&self, _: TileIndex) -> Option<u64> {

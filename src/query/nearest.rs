@@ -3,7 +3,7 @@ use super::region::{BrickPart, tiles_in, voxels_around};
 use super::{Hit, Occupancy};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::{Aabb, BRICK_EDGE, Grid, Point, TileIndex, VoxelBox};
+use crate::space::{Aabb, BRICK_EDGE, Grid, Point, TileBox, TileIndex, VoxelBox};
 use crate::tile::Tile;
 
 /// Radius of the first ball that is searched, in edges of a brick. Each other one is twice as large as the one before.
@@ -18,6 +18,9 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     // Small balls first: what is near is found without a look at the rest of the map.
     let grid = &view.config().grid;
     let brick_m = f64::from(BRICK_EDGE) * grid.resolution_m();
+    // Beyond the last tile there is nothing, and every ball that holds all of them is the same.
+    let Some(tiles) = view.tile_bounds() else { return Ok(None) };
+    let max_distance_m = max_distance_m.min(distance_to_farthest_m(grid, &tiles, point));
     let radii_m = std::iter::successors(Some(FIRST_BRICKS * brick_m), |radius_m| Some(2.0 * radius_m));
     for radius_m in radii_m.take_while(|radius_m| *radius_m < max_distance_m) {
         if let Some(nearest) = nearest_in_ball(view, point, radius_m)? {
@@ -25,6 +28,18 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
         }
     }
     nearest_in_ball(view, point, max_distance_m)
+}
+
+/// A distance within which all voxels of a box of tiles are.
+fn distance_to_farthest_m(grid: &Grid, tiles: &TileBox, point: Point) -> f64 {
+    let [low, high] = [grid.voxels_of_tile(tiles.min()).min, grid.voxels_of_tile(tiles.max()).end];
+    // A margin of a voxel for rounding.
+    let border_m = |voxel: i32, margin: f64| (f64::from(voxel) + margin) * grid.resolution_m();
+    let farthest_m = |k: usize| {
+        let (low_m, high_m) = (border_m(low[k], -1.0), border_m(high[k], 1.0));
+        (low_m - point[k]).abs().max((high_m - point[k]).abs())
+    };
+    (0..3).map(|k| farthest_m(k).powi(2)).sum::<f64>().sqrt()
 }
 
 /// # Errors

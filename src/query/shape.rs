@@ -37,15 +37,27 @@ impl Shape {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] for a body that is not finite, and for a length below 0.
+    /// [`Error::InvalidArgument`] for a body that is not finite, for a length below 0, and for a box whose upper corner
+    /// is below the lower one.
     pub fn bounds(&self) -> Result<Aabb> {
+        // The lower and the higher of two numbers pass over one that is none.
+        if let Self::SweptSphere { from, to, .. } = self
+            && !from.iter().chain(to).all(|coordinate| coordinate.is_finite())
+        {
+            return Err(Error::argument("body", format!("its way from {from:?} to {to:?} m is not finite")));
+        }
         let bounds = match *self {
             Self::Sphere { center, radius_m } => grown(center, center, checked_radius(radius_m)?),
             Self::SweptSphere { from, to, radius_m } => {
                 let Aabb { min, max } = Aabb::from_corners(from, to);
                 grown(min, max, checked_radius(radius_m)?)
             }
-            Self::Box(bounds) => bounds,
+            Self::Box(bounds) => {
+                if (0..3).any(|k| bounds.min[k] > bounds.max[k]) {
+                    return Err(Error::argument("body", format!("{bounds} ends below its beginning")));
+                }
+                bounds
+            }
             Self::OrientedBox { world_from_box, half_extents_m } => {
                 if half_extents_m.iter().any(|extent| extent.is_nan() || *extent < 0.0) {
                     let reason = format!("{half_extents_m:?} m are not lengths of at least 0");

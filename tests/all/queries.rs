@@ -2,15 +2,17 @@ use std::collections::HashMap;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
-use testkit::reference_map::voxels_of;
+use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
+use voxtile::mapper::OctreeMap;
+use voxtile::octree::read;
 use voxtile::query::{RayQuery, Shape, UnknownAs};
 use voxtile::scan::{PointBatch, RayWalk};
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
 use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, Occupancy,
-    OutOfCoreTileMapper, Queries, Storage,
+    OutOfCoreTileMapper, Queries, Scan, Storage,
 };
 
 fn config() -> MapConfig {
@@ -462,4 +464,64 @@ fn wrong_questions_are_told_what_is_wrong() {
     let huge = Shape::Sphere { center: [0.0; 3], radius_m: 1e6 };
     assert!(map.collision(&huge, UnknownAs::Obstacle).unwrap_err().to_string().contains("limit"));
     assert_eq!(map.collision(&huge, UnknownAs::Free).unwrap(), None);
+    for (from, to) in [([f64::NAN, 0.0, 1.0], [2.0, 0.0, 1.0]), ([0.0; 3], [0.0, f64::INFINITY, 0.0])] {
+        let swept = Shape::SweptSphere { from, to, radius_m: 0.3 };
+        assert!(map.collision(&swept, UnknownAs::Free).unwrap_err().to_string().contains("not finite"));
+    }
+    for unknown in [UnknownAs::Free, UnknownAs::Obstacle] {
+        let swapped = Shape::Box(Aabb { min: [0.0, 1.0, 0.0], max: [1.0, 0.5, 1.0] });
+        let message = map.collision(&swapped, unknown).unwrap_err().to_string();
+        assert!(message.contains("below its beginning"), "{message}");
+    }
+}
+
+#[test]
+fn a_ray_that_hardly_moves_along_an_axis_ends_and_meets_what_is_ahead() {
+    let mut map = InMemoryMapper::new(config()).unwrap();
+    // A wall in front of a sensor that is on voxel borders: what leaves them downwards is below.
+    let wall = (-5..5).map(|y| [2.05, 0.1 * f64::from(y) + 0.05, 0.05]).collect();
+    map.insert_scan(&Scan { origin: [0.05, 0.05, 0.05], points: wall, intensities: None }).unwrap();
+    for slow in [-1e-310, -f64::from_bits(1), 1e-310, -1e-300] {
+        for max_range_m in [None, Some(5.0)] {
+            let (origin, direction) = ([0.05, 0.0, 0.05], [1.0, slow, 0.0]);
+            let query = RayQuery { origin, direction, max_range_m, unknown: UnknownAs::Free };
+            let hit = map.cast_ray(&query).unwrap().expect("the wall");
+            assert_eq!(hit.voxel, [20, if slow < 0.0 { -1 } else { 0 }, 0], "{slow}");
+        }
+    }
+    let scan = Scan { origin: [0.0; 3], points: vec![[1.05, -1e-310, 0.0]], intensities: None };
+    for insert_mode in [InsertMode::PerScan, InsertMode::PerRay] {
+        let config = config().with_insert_mode(insert_mode);
+        let mut map = InMemoryMapper::new(config.clone()).unwrap();
+        map.insert_scan(&scan).unwrap();
+        let mut naive = ReferenceMap::new(&config);
+        naive.insert_scan(&scan);
+        assert_eq!(voxels_of(&map), naive.voxels);
+        assert_eq!(naive.voxels.len(), 12);
+    }
+}
+
+#[test]
+fn the_nearest_voxel_of_a_map_without_any_is_looked_for_once() {
+    let folder = TempDir::new().unwrap();
+    let config = config().with_range(0.0, 30.0).with_cache_tiles(1);
+    let mut map = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
+    // Free space alone.
+    let scan = Scan { origin: [0.05; 3], points: vec![[100.0, 0.05, 0.05]], intensities: None };
+    map.insert_scan(&scan).unwrap();
+    map.flush().unwrap();
+    let tiles = map.tile_indices().len() as u64;
+    assert_eq!(map.nearest_occupied([0.5; 3], f64::INFINITY).unwrap(), None);
+    let loads = map.statistics().io.loads;
+    assert!(tiles > 20 && loads < 10 * tiles, "{loads} loads of {tiles} tiles");
+}
+
+#[test]
+fn a_tile_that_a_pruned_cube_fills_is_refused_where_it_would_not_fit() {
+    // One leaf of 2^45 voxels, below the root.
+    let header = "# Octomap OcTree binary file\nid OcTree\nsize 2\nres 0.01\ndata\n";
+    let file = [header.as_bytes(), &[1, 0]].concat();
+    let map = OctreeMap::of(read(&*file).unwrap()).unwrap();
+    let message = map.occupancy_at([-1.0; 3]).unwrap_err().to_string();
+    assert!(message.contains("voxtile import"), "{message}");
 }

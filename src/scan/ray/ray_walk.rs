@@ -7,7 +7,7 @@ pub const MAX_RAY_STEPS: u64 = 1_000_000;
 /// traversal algorithm for ray tracing", Eurographics 1987), in closed form.
 ///
 /// In units of voxels, the time of an axis' k-th crossing is `(boundary_k - origin) * inv_direction`, computed anew
-/// each time and never accumulated; at equal times the lowest axis goes first. So whether a ray visits a voxel depends
+/// each time and never accumulated; at equal times the lowest axis goes first. `inv_direction` is at most `f64::MAX`. So whether a ray visits a voxel depends
 /// on that voxel and the ray alone, and every algorithm that uses this formula visits the same voxels.
 #[derive(Clone, Debug)]
 pub struct RayWalk {
@@ -57,7 +57,8 @@ impl RayWalk {
     fn new(origin: Point, start: VoxelIndex, direction: Point, last: VoxelIndex) -> Self {
         let mut walk = Self {
             origin,
-            inv_direction: direction.map(|d| 1.0 / d),
+            // Finite, so that a border through the origin is crossed at time 0 however slowly the ray moves.
+            inv_direction: direction.map(|d| (1.0 / d).clamp(-f64::MAX, f64::MAX)),
             step: std::array::from_fn(|k| (i64::from(last[k]) - i64::from(start[k])).signum() as i32),
             voxel: start,
             next: [f64::INFINITY; 3],
@@ -348,6 +349,21 @@ mod tests {
     #[test]
     fn a_ray_inside_one_voxel_takes_no_step() {
         assert_eq!(voxels(walk([0.1, 0.2, 0.3], [0.9, 0.2, 0.4])), [[0, 0, 0]]);
+    }
+
+    #[test]
+    fn a_border_through_the_origin_is_left_at_once_however_slowly_the_ray_moves() {
+        let least = f64::from_bits(1);
+        for slow in [-1e-310, -least, -f64::MIN_POSITIVE, -1e-300] {
+            let visited = voxels(walk([0.5, 0.0, 0.5], [2.5, slow, 0.5]));
+            assert_eq!(visited, [[0, 0, 0], [0, -1, 0], [1, -1, 0], [2, -1, 0]], "{slow}");
+            let region = VoxelBox { min: [-4; 3], end: [4; 3] };
+            let mut endless = RayWalk::along([0.5, 0.0, 0.5], [0; 3], [1.0, slow, 0.0]);
+            let advanced = endless.clone().advance_in(&region, f64::INFINITY, |_| true);
+            assert_eq!(advanced, Advanced::Left, "{slow}");
+            endless.leave(&region);
+            assert_eq!(endless.voxel(), [4, -1, 0], "{slow}");
+        }
     }
 
     proptest! {

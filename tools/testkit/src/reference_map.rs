@@ -97,7 +97,7 @@ impl ReferenceMap {
             let mut next = (f64::INFINITY, 0);
             for k in (0..3).rev().filter(|&k| voxel[k] != last[k]) {
                 let boundary = f64::from(voxel[k]) + if last[k] > voxel[k] { 1.0 } else { 0.0 };
-                let time = (boundary - o[k]) * (1.0 / (e[k] - o[k]));
+                let time = (boundary - o[k]) * (1.0 / (e[k] - o[k])).clamp(-f64::MAX, f64::MAX);
                 next = if time <= next.0 { (time, k) } else { next };
             }
             voxel[next.1] += (last[next.1] - voxel[next.1]).signum();
