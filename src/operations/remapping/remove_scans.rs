@@ -50,17 +50,17 @@ pub fn remove_scans(
 ) -> Result<ScansRemoved> {
     let (disk, folder) = map.into().into_parts();
     let path = || MapPath::on(disk.clone(), &folder);
-    let (selected, selection) = {
+    let (selected, selection, seen) = {
         let reader = MapReader::open(path(), 1)?;
         reader.check_keeps_all()?;
         let selection = Selection::of(scans, &reader)?;
-        (numbers(&reader, &selection)?, selection)
+        (numbers(&reader, &selection)?, selection, reader.flush_number())
     };
     if selected.is_empty() {
         return Err(Error::argument("scans", format!("the map keeps none {}", selection.described)));
     }
     let fate = |record: &KeptRecord| if selection.has(record) { Fate::Goes } else { Fate::Stays };
-    let mapped = rework(path(), how, fate, progress)?;
+    let mapped = rework(path(), seen, how, fate, progress)?;
     let mut removed =
         ScansRemoved { mapped, scans_removed: selected.len() as u64, ..ScansRemoved::default() };
     let store = TileStore::open_read_only(disk.clone(), &folder)?;
