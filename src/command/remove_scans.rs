@@ -50,7 +50,9 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
     }
     let would = if args.rework.dry_run { "would be " } else { "" };
     writeln!(out, "removed   {} scans {would}gone", HumanCount(removed.scans_removed))?;
-    rework::print(&removed.mapped, args.rework.dry_run, &mut out)?;
+    if removed.scans_removed > 0 {
+        rework::print(&removed.mapped, args.rework.dry_run, &mut out)?;
+    }
     for name in &removed.snapshots_deleted {
         writeln!(out, "snapshot  {name} held some of them and is deleted")?;
     }

@@ -395,8 +395,8 @@ impl OutOfCoreTileMapper {
         self.map(scan, selection)
     }
 
-    /// The store, to write a catalog of kept scans.
-    pub(super) fn with_store<T>(&mut self, work: impl FnOnce(&mut TileStore) -> T) -> T {
+    /// The store, to write a catalog of kept scans, or to leave nothing of a commit to the next opening.
+    pub(crate) fn with_store<T>(&mut self, work: impl FnOnce(&mut TileStore) -> T) -> T {
         work(self.pager().store_mut())
     }
 

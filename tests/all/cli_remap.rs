@@ -2,6 +2,7 @@ use crate::cli::{failure, json, output, scans, text, voxtile};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use voxtile::MapReader;
 
 /// A map of three scans that it keeps, the scans, and where both are.
 struct Kept {
@@ -177,6 +178,54 @@ fn what_cannot_be_mapped_again_is_refused_with_what_to_do() {
     assert!(message.contains("a change that is no scan: clear"), "{message}");
 }
 
+/// Another map is made of all scans or not at all, just as a map follows its poses.
+#[test]
+fn another_map_is_refused_where_the_map_is_more_than_its_kept_scans() {
+    let kept = Kept::new();
+    let fine = kept.path("fine");
+    let refused = |map: &str| {
+        let message = fails(&["remap", map, "-o", &fine, "--resolution", "0.2"], 2);
+        assert!(!Path::new(&fine).exists(), "{message}");
+        message
+    };
+    let partly = kept.path("partly");
+    output(&[&["build", text(&kept.scans), "-o", &partly, "--count", "1"][..], &TILES].concat());
+    let rest = ["build", text(&kept.scans), "-o", &partly, "--append", "--again", "--keep-scans"];
+    output(&[&rest[..], &TILES].concat());
+    let message = refused(&partly);
+    assert!(message.contains("scan 1, whose points are not kept"), "{message}");
+    output(&["clear", &kept.map, "--region", "0", "0", "0", "1", "1", "1"]);
+    let message = refused(&kept.map);
+    assert!(message.contains("a change that is no scan: clear"), "{message}");
+}
+
+/// A region is said in tiles: of another size it stays where it is in space, or is refused.
+#[test]
+fn another_map_has_the_region_of_the_map_in_tiles_of_any_size() {
+    let kept = Kept::new();
+    let (part, wanted, found) = (kept.path("part"), kept.path("wanted"), kept.path("found"));
+    let region = ["--region", "1", "-inf", "-inf", "inf", "inf", "inf"];
+    let build = |out: &str, how: &[&str]| {
+        output(&[&["build", text(&kept.scans), "-o", out][..], &region, how].concat());
+    };
+    build(&part, &["--tile-size", "1", "--keep-scans"]);
+    build(&wanted, &["--tile-size", "0.5"]);
+    output(&["remap", &part, "-o", &found, "--tile-size", "0.5"]);
+    assert_ne!(digest(&part), digest(&kept.map));
+    assert!(json(&["info", &found, "--json"])["voxels"].as_u64().unwrap() > 0);
+    assert_eq!(digest(&found), digest(&wanted));
+    let of = |map: &str| MapReader::config_of(map).unwrap().rays.region;
+    assert_eq!(of(&found), of(&wanted));
+    assert_ne!(of(&found), of(&part));
+    let other = kept.path("other");
+    let message = fails(&["remap", &part, "-o", &other, "--tile-size", "0.7"], 2);
+    assert!(
+        message.contains("0.7 m does not fit the region") && message.contains("divides 1 m"),
+        "{message}"
+    );
+    assert!(!Path::new(&other).exists());
+}
+
 #[test]
 fn a_damaged_segment_is_named_and_repaired_around() {
     let kept = Kept::new();
@@ -196,5 +245,7 @@ fn a_damaged_segment_is_named_and_repaired_around() {
     assert!(output(&["verify", &kept.map]).contains("whole"));
     assert_eq!(digest(&kept.map), before);
     let message = fails(&["remap", &kept.map, "--poses", &poses], 2);
+    assert!(message.contains("scan 3, whose points are not kept"), "{message}");
+    let message = fails(&["remap", &kept.map, "-o", &kept.path("fine"), "--resolution", "0.2"], 2);
     assert!(message.contains("scan 3, whose points are not kept"), "{message}");
 }

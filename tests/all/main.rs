@@ -90,6 +90,7 @@ mod readers;
 /// Maps that follow their scans: poses move, scans and points go.
 mod remapping;
 mod remapping_beside;
+mod remapping_changed;
 /// The list of scans that a map keeps.
 mod scan_list;
 /// The stream of scans, in files and from standard input.

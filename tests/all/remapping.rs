@@ -658,3 +658,108 @@ fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
     assert_eq!(removed.snapshots_deleted, [name("old")]);
     check_files(&disk, "nothing is left of them");
 }
+
+/// A map of five scans of two inputs, which two snapshots hold, too.
+fn a_map_with_snapshots() -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
+    for (input, seeds) in [("first", 0..3), ("second", 3..5)] {
+        mapper.begin_input(input).unwrap();
+        for seed in seeds {
+            let Taken { points, intensities, pose } = Taken::new(seed, 5);
+            let scan = ScanRef::in_sensor(pose, &points).with_stamp_ns(seed as i64);
+            mapper.insert_points(&scan.with_intensities(&intensities).unwrap()).unwrap();
+        }
+        mapper.snapshot(&name(input)).unwrap();
+    }
+    mapper.snapshot(&name("third")).unwrap();
+    drop(mapper);
+    disk.copy()
+}
+
+fn snapshot_names(disk: &FaultyDisk) -> Vec<String> {
+    let mut names: Vec<_> =
+        voxtile::operations::snapshots(at(disk)).unwrap().into_iter().map(|info| info.name).collect();
+    names.sort_unstable();
+    names
+}
+
+/// What is gone from the map is still found in snapshots, however it is selected.
+#[test]
+fn scans_that_the_map_has_no_more_are_removed_from_its_snapshots() {
+    let selections =
+        [ScanSelection::Numbers(4, 5), ScanSelection::Time(3, 4), ScanSelection::Input("second".to_owned())];
+    for scans in selections {
+        let disk = a_map_with_snapshots();
+        let remove =
+            |from_snapshots, how: &Rework| remove_scans(at(&disk), &scans, from_snapshots, how, |_, _| ());
+        let removed = remove(false, &rework()).unwrap();
+        assert_eq!((removed.scans_removed, removed.snapshots_with_them.len()), (2, 2), "{scans:?}");
+        assert!(message_of(remove(false, &rework())).contains("the map keeps none"), "{scans:?}");
+        let told = remove(true, &rework().with_dry_run(true)).unwrap();
+        assert_eq!((told.scans_removed, told.snapshots_with_them.len()), (0, 2), "{scans:?}");
+        // The one that is to keep them does.
+        let kept = remove(true, &rework().with_keep_as(name("third"))).unwrap();
+        assert_eq!(kept.snapshots_deleted, [name("second")], "{scans:?}");
+        assert_eq!(kept.snapshots_with_them, [name("third")], "{scans:?}");
+        assert_eq!(remove(true, &rework()).unwrap().snapshots_deleted, [name("third")], "{scans:?}");
+        assert_eq!(snapshot_names(&disk), ["first"], "{scans:?}");
+        assert!(message_of(remove(true, &rework())).contains("the map keeps none"), "{scans:?}");
+        check_files(&disk, "removed");
+    }
+}
+
+/// A map that has changed by something else since is not mapped again, and its snapshots go.
+#[test]
+fn snapshots_go_whatever_has_become_of_the_map() {
+    let disk = a_map_with_snapshots();
+    let scans = ScanSelection::Numbers(4, 5);
+    remove_scans(at(&disk), &scans, false, &rework(), |_, _| ()).unwrap();
+    clear(at(&disk), &Part::Inside(region(0.0, 1.0)), |_, _| ()).unwrap();
+    let removed = remove_scans(at(&disk), &scans, true, &rework(), |_, _| ()).unwrap();
+    assert_eq!(removed.snapshots_deleted, [name("second"), name("third")]);
+}
+
+#[test]
+fn a_snapshot_that_cannot_be_read_is_told_after_the_others_are_gone() {
+    let disk = a_map_with_snapshots();
+    disk.put(&map().join("snapshots/second"), b"nothing");
+    let scans = ScanSelection::Numbers(4, 5);
+    let remove = || remove_scans(at(&disk), &scans, true, &rework(), |_, _| ());
+    for _ in 0..2 {
+        let message = message_of(remove());
+        assert!(message.contains("snapshots/second") && message.contains("may hold some"), "{message}");
+        assert_eq!(snapshot_names(&disk), ["first", "second"]);
+    }
+    assert_eq!(MapReader::open(at(&disk), 1).unwrap().scans().unwrap().len(), 3);
+    delete_snapshot(at(&disk), &name("second")).unwrap();
+    assert!(message_of(remove()).contains("the map keeps none"));
+}
+
+/// Whatever fails and wherever the process is killed: the same call does the rest.
+#[test]
+fn a_removal_that_ended_between_map_and_snapshots_is_completed() {
+    let start = a_map_with_snapshots();
+    let remove = |disk: &FaultyDisk| {
+        let scans = ScanSelection::Numbers(4, 5);
+        remove_scans(at(disk), &scans, true, &rework(), |_, _| ()).map(drop)
+    };
+    let undisturbed = start.copy();
+    remove(&undisturbed).unwrap();
+    let left = snapshot_names(&undisturbed);
+    let fails = some_of(0..undisturbed.operations(), 3).map(Fault::Fails);
+    for fault in fails.chain(some_of(0..undisturbed.changes(), 2).map(Fault::Crashes)) {
+        let disk = start.copy();
+        disk.set_fault(fault);
+        let is_done = remove(&disk).is_ok();
+        let disk = disk.after_kill();
+        match remove(&disk) {
+            Ok(()) => {}
+            Err(Error::InvalidArgument { .. }) if is_done || snapshot_names(&disk) == left => {}
+            Err(error) => panic!("{fault:?}: {error:#}"),
+        }
+        assert_eq!(snapshot_names(&disk), left, "{fault:?}");
+        assert_eq!(MapReader::open(at(&disk), 1).unwrap().scans().unwrap().len(), 3, "{fault:?}");
+        check_files(&disk, &format!("{fault:?}"));
+    }
+}

@@ -14,6 +14,7 @@ mod remap;
 mod remap_beside;
 mod remove_points;
 mod remove_scans;
+mod retiling;
 mod revision;
 
 pub use map_anew::{MappedAnew, map_anew};

@@ -3,11 +3,9 @@ use super::revision::{Fate, MappedAgain, Rework, has_pose, rework};
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, pose_of_numbers};
 use crate::scan::Pose;
-use crate::store::{Disk, KeptFrame, KeptRecord, MapPath};
+use crate::store::{KeptFrame, KeptRecord, MapPath};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
-use std::path::Path;
-use std::sync::Arc;
 
 /// How a map follows new poses.
 #[derive(Clone, Debug, Default)]
@@ -60,8 +58,9 @@ pub struct Remapped {
 /// # Errors
 ///
 /// A map that keeps no scans or consists of more than these; poses that are not finite, missing or too many; scans
-/// whose points are in the world frame, which no pose moves; a damaged segment or catalog; another writer; a disk that
-/// refuses; a request to stop. The map is as it was then; the snapshot that keeps it may have been made.
+/// whose points are in the world frame, which no pose moves; a damaged segment or catalog; another writer, and
+/// [`Error::Changed`] if one has flushed before the map was locked; a disk that refuses; a request to stop. The map is
+/// as it was then; the snapshot that keeps it may have been made.
 pub fn remap(
     map: impl Into<MapPath>,
     poses: &NewPoses,
@@ -69,9 +68,13 @@ pub fn remap(
     progress: impl FnMut(u64, u64),
 ) -> Result<Remapped> {
     let (disk, folder) = map.into().into_parts();
-    let (mut remapped, moves) = Remapped::by_poses(&disk, &folder, poses, how)?;
+    let path = || MapPath::on(disk.clone(), &folder);
+    let reader = MapReader::open(path(), 1)?;
+    let (mut remapped, moves) = Remapped::by_poses(&reader, poses, how)?;
+    let seen = reader.flush_number();
+    drop(reader);
     let fate = |record: &KeptRecord| fate_by(&moves, record);
-    remapped.mapped = rework(MapPath::on(disk, &folder), &how.rework, fate, progress)?;
+    remapped.mapped = rework(path(), seen, &how.rework, fate, progress)?;
     Ok(remapped)
 }
 
@@ -87,12 +90,7 @@ pub(super) fn fate_by(moves: &Moves, record: &KeptRecord) -> Fate {
 
 impl Remapped {
     /// Which scans of the map get a new pose, and how far they move.
-    pub(super) fn by_poses(
-        disk: &Arc<dyn Disk>,
-        folder: &Path,
-        poses: &NewPoses,
-        how: &Remap,
-    ) -> Result<(Self, Moves)> {
+    pub(super) fn by_poses(reader: &MapReader, poses: &NewPoses, how: &Remap) -> Result<(Self, Moves)> {
         if let Some((moved_m, turned)) = how.tolerance
             && !(moved_m >= 0.0 && turned >= 0.0)
         {
@@ -102,7 +100,6 @@ impl Remapped {
             ));
         }
         let (mut remapped, mut moves) = (Self::default(), Moves::default());
-        let reader = MapReader::open(MapPath::on(disk.clone(), folder), 1)?;
         reader.check_keeps_all()?;
         let poses = poses.by_number(reader.kept_records()?)?;
         let mut records = reader.kept_records()?;

@@ -2,7 +2,7 @@ use super::new_poses::NewPoses;
 use super::remap::{Remap, Remapped, fate_by};
 use super::revision::{Fate, Revision, Touched, keep_as_it_is, tidied};
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, Remapper, SideMapper, check_keeps_all};
+use crate::mapper::{KeptScan, MapReader, Remapper, SideMapper, check_keeps_all};
 use crate::persistence::give_way;
 use crate::space::TileSelection;
 use crate::store::{CatalogEntry, Disk, KeptRecord, MapPath, SideFolder, TileStore};
@@ -62,7 +62,9 @@ impl RemapBeside {
         let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| give_way()).build();
         let threads =
             threads.map_err(|error| Error::io(&folder, "start threads for", std::io::Error::other(error)))?;
-        let (remapped, moves) = Remapped::by_poses(&disk, &folder, poses, how)?;
+        let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
+        let (remapped, moves) = Remapped::by_poses(&reader, poses, how)?;
+        drop(reader);
         let fates: Fates = Box::new(move |record| fate_by(&moves, record));
         let mut revision = Revision::new(disk.clone(), &how.rework, fates);
         let store = TileStore::open_read_only(disk.clone(), &folder)?;

@@ -36,7 +36,7 @@ pub fn remove_points(
     let (disk, folder) = map.into().into_parts();
     check_region(region, &folder)?;
     let (mut changed, mut points_removed) = (FxHashSet::default(), 0);
-    {
+    let seen = {
         let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
         reader.check_keeps_all()?;
         for scan in reader.kept_scans()? {
@@ -48,11 +48,12 @@ pub fn remove_points(
                 changed.insert(scan.number());
             }
         }
-    }
+        reader.flush_number()
+    };
     let fate = |record: &KeptRecord| match changed.contains(&record.number) {
         true => Fate::Loses(*region),
         false => Fate::Stays,
     };
-    let mapped = rework(MapPath::on(disk, &folder), how, fate, progress)?;
+    let mapped = rework(MapPath::on(disk, &folder), seen, how, fate, progress)?;
     Ok(PointsRemoved { mapped, points_removed })
 }

@@ -21,10 +21,10 @@ pub enum ScanSelection {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ScansRemoved {
-    /// What was mapped again.
+    /// What was mapped again; nothing where the map kept none of them any more.
     #[serde(flatten)]
     pub mapped: MappedAgain,
-    /// Scans that are gone.
+    /// Scans that are gone from the map.
     pub scans_removed: u64,
     /// Snapshots that still hold some of them.
     pub snapshots_with_them: Vec<SnapshotName>,
@@ -36,11 +36,13 @@ pub struct ScansRemoved {
 /// numbers, which no other scan gets.
 ///
 /// Snapshots stay what they are, with what they hold of these scans, unless `from_snapshots`: then those that hold any
-/// are deleted. `progress` is told the scans done and all.
+/// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later, the
+/// same call deletes those that are left. `progress` is told the scans done and all.
 ///
 /// # Errors
 ///
-/// As for [`remap`](super::remap()); no scan that is selected.
+/// As for [`remap`](super::remap()); no scan that is selected. What befalls a snapshot, which may hold some of the
+/// scans then, is told once the map and the other snapshots are done.
 pub fn remove_scans(
     map: impl Into<MapPath>,
     scans: &ScanSelection,
@@ -50,81 +52,116 @@ pub fn remove_scans(
 ) -> Result<ScansRemoved> {
     let (disk, folder) = map.into().into_parts();
     let path = || MapPath::on(disk.clone(), &folder);
-    let (selected, selection) = {
-        let reader = MapReader::open(path(), 1)?;
-        reader.check_keeps_all()?;
-        let selection = Selection::of(scans, &reader)?;
-        (numbers(&reader, &selection)?, selection)
-    };
-    if selected.is_empty() {
-        return Err(Error::argument("scans", format!("the map keeps none {}", selection.described)));
-    }
-    let fate = |record: &KeptRecord| if selection.has(record) { Fate::Goes } else { Fate::Stays };
-    let mapped = rework(path(), how, fate, progress)?;
-    let mut removed =
-        ScansRemoved { mapped, scans_removed: selected.len() as u64, ..ScansRemoved::default() };
-    let store = TileStore::open_read_only(disk.clone(), &folder)?;
-    for name in store.snapshot_names()? {
-        if how.keep_as.as_ref() == Some(&name) || !holds_any(&store, &name, &selected)? {
-            continue;
-        }
-        if from_snapshots && !how.is_dry_run {
-            delete_snapshot(path(), &name)?;
-            removed.snapshots_deleted.push(name);
-        } else {
-            removed.snapshots_with_them.push(name);
+    let mut removed = remove_from_map(path, scans, from_snapshots, how, progress)?;
+    let (mut outcome, is_to_go) = (Ok(()), from_snapshots && !how.is_dry_run);
+    for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshot_names()? {
+        // The one that was asked for keeps them.
+        let is_to_go = is_to_go && how.keep_as.as_ref() != Some(&name);
+        if let Err(error) = removed.look_at_snapshot(path, name, scans, is_to_go) {
+            log::warn!("{error:#}");
+            outcome = outcome.and(Err(error));
         }
     }
-    if let Some(name) = &how.keep_as
-        && !how.is_dry_run
-    {
-        removed.snapshots_with_them.push(name.clone());
+    outcome?;
+    if removed.scans_removed == 0 && !removed.has_found_snapshots() {
+        return Err(none_selected(scans, &MapReader::open(path(), 1)?));
     }
     Ok(removed)
 }
 
-/// A selection that needs no list of inputs any more.
-struct Selection {
-    kind: Kind,
-    described: String,
+/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays.
+fn remove_from_map(
+    path: impl Fn() -> MapPath,
+    scans: &ScanSelection,
+    from_snapshots: bool,
+    how: &Rework,
+    progress: impl FnMut(u64, u64),
+) -> Result<ScansRemoved> {
+    let (selection, scans_removed, seen) = {
+        let reader = MapReader::open(path(), 1)?;
+        let selection = Selection::of(scans, &reader);
+        let scans_removed = selection.count(&reader)?;
+        if scans_removed == 0 && from_snapshots {
+            return Ok(ScansRemoved::default());
+        }
+        reader.check_keeps_all()?;
+        if scans_removed == 0 {
+            return Err(none_selected(scans, &reader));
+        }
+        (selection, scans_removed, reader.flush_number())
+    };
+    let fate = |record: &KeptRecord| if selection.has(record) { Fate::Goes } else { Fate::Stays };
+    let mapped = rework(path(), seen, how, fate, progress)?;
+    Ok(ScansRemoved { mapped, scans_removed, ..ScansRemoved::default() })
 }
 
-enum Kind {
+impl ScansRemoved {
+    /// Notes a snapshot that holds any of the scans, and deletes it if it is to go.
+    fn look_at_snapshot(
+        &mut self,
+        path: impl Fn() -> MapPath,
+        name: SnapshotName,
+        scans: &ScanSelection,
+        is_to_go: bool,
+    ) -> Result<()> {
+        if !holds_any(path(), &name, scans).map_err(may_hold_some)? {
+            return Ok(());
+        }
+        if is_to_go {
+            delete_snapshot(path(), &name)?;
+            self.snapshots_deleted.push(name);
+        } else {
+            self.snapshots_with_them.push(name);
+        }
+        Ok(())
+    }
+
+    fn has_found_snapshots(&self) -> bool {
+        !(self.snapshots_with_them.is_empty() && self.snapshots_deleted.is_empty())
+    }
+}
+
+/// A selection that needs no list of inputs any more: that of a map or of one of its snapshots.
+enum Selection {
     Numbers(Vec<(u64, u64)>),
     Time(i64, i64),
 }
 
 impl Selection {
-    fn of(scans: &ScanSelection, reader: &MapReader) -> Result<Self> {
-        let (kind, described) = match scans {
-            ScanSelection::Numbers(first, last) => {
-                (Kind::Numbers(vec![(*first, *last)]), format!("with numbers from {first} to {last}"))
-            }
-            ScanSelection::Time(first, last) => {
-                (Kind::Time(*first, *last), format!("from {first} to {last} ns"))
-            }
+    fn of(scans: &ScanSelection, reader: &MapReader) -> Self {
+        match scans {
+            ScanSelection::Numbers(first, last) => Self::Numbers(vec![(*first, *last)]),
+            ScanSelection::Time(first, last) => Self::Time(*first, *last),
             ScanSelection::Input(name) => {
-                let inputs = reader.metadata().ext.as_ref().map_or(&[][..], |ext| &ext.inputs);
-                let ranges = ranges_of(name, inputs, reader.scan_number());
-                if ranges.is_empty() {
-                    let names: Vec<_> = inputs.iter().map(|input| &*input.name).collect();
-                    let reason = format!("the map has none of {name:?}; it has {}", names.join(", "));
-                    return Err(Error::argument("input", reason));
-                }
-                (Kind::Numbers(ranges), format!("of input {name:?}"))
+                Self::Numbers(ranges_of(name, inputs_of(reader), reader.scan_number()))
             }
-        };
-        Ok(Self { kind, described })
+        }
     }
 
     fn has(&self, record: &KeptRecord) -> bool {
-        match &self.kind {
-            Kind::Numbers(ranges) => {
+        match self {
+            Self::Numbers(ranges) => {
                 ranges.iter().any(|&(first, last)| (first..=last).contains(&record.number))
             }
-            Kind::Time(first, last) => record.stamp_ns.is_some_and(|stamp| (*first..=*last).contains(&stamp)),
+            Self::Time(first, last) => record.stamp_ns.is_some_and(|stamp| (*first..=*last).contains(&stamp)),
         }
     }
+
+    /// How many of the scans that are kept it has.
+    fn count(&self, reader: &MapReader) -> Result<u64> {
+        if !reader.keeps_scans() {
+            return Ok(0);
+        }
+        let (mut records, mut count) = (reader.kept_records()?, 0);
+        while let Some(record) = records.next_kept()? {
+            count += u64::from(self.has(&record));
+        }
+        Ok(count)
+    }
+}
+
+fn inputs_of(reader: &MapReader) -> &[InputRecord] {
+    reader.metadata().ext.as_ref().map_or(&[], |ext| &ext.inputs)
 }
 
 /// The numbers of the scans of an input, first and last; the map may have gone back to it later.
@@ -134,27 +171,39 @@ fn ranges_of(name: &str, inputs: &[InputRecord], scan_number: u64) -> Vec<(u64, 
     of_inputs.map(|(input, end)| (input.first_scan + 1, end)).collect()
 }
 
-fn numbers(reader: &MapReader, selection: &Selection) -> Result<Vec<u64>> {
-    let (mut records, mut numbers) = (reader.kept_records()?, Vec::new());
-    while let Some(record) = records.next_kept()? {
-        if selection.has(&record) {
-            numbers.push(record.number);
+/// The error of a selection that has no scan.
+fn none_selected(scans: &ScanSelection, reader: &MapReader) -> Error {
+    let described = match scans {
+        ScanSelection::Numbers(first, last) => format!("with numbers from {first} to {last}"),
+        ScanSelection::Time(first, last) => format!("from {first} to {last} ns"),
+        ScanSelection::Input(name) => {
+            let names: Vec<_> = inputs_of(reader).iter().map(|input| &*input.name).collect();
+            if !names.contains(&&**name) {
+                let reason = format!("the map has none of {name:?}; it has {}", names.join(", "));
+                return Error::argument("input", reason);
+            }
+            format!("of input {name:?}")
         }
-    }
-    Ok(numbers)
+    };
+    Error::argument("scans", format!("the map keeps none {described}"))
 }
 
 /// Whether a snapshot keeps any of these scans.
-fn holds_any(store: &TileStore, name: &SnapshotName, numbers: &[u64]) -> Result<bool> {
-    let past = TileStore::open_snapshot(store.disk().clone(), store.folder(), name)?;
-    if !past.keeps_scans() {
-        return Ok(false);
-    }
-    let mut records = past.kept_records()?;
-    while let Some(record) = records.next_kept()? {
-        if numbers.binary_search(&record.number).is_ok() {
-            return Ok(true);
+fn holds_any(map: MapPath, name: &SnapshotName, scans: &ScanSelection) -> Result<bool> {
+    let past = MapReader::open_snapshot(map, name, 1)?;
+    Ok(Selection::of(scans, &past).count(&past)? > 0)
+}
+
+/// The error of a snapshot that cannot be read, with what to do about it.
+fn may_hold_some(error: Error) -> Error {
+    match error {
+        Error::Damaged { path, tile, mut cause } => {
+            cause.reason.push_str(
+                "; this snapshot may hold some of the scans that are to go: delete it, or repair the map, and run \
+                 this again",
+            );
+            Error::Damaged { path, tile, cause }
         }
+        other => other,
     }
-    Ok(false)
 }

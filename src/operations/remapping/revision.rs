@@ -94,15 +94,20 @@ const PART_FOR_ALL: u64 = 3;
 /// Points of a kept scan that are read into memory; those of a larger one are read again when needed.
 const MOST_POINTS_IN_MEMORY: u64 = 1 << 18;
 
-/// Maps again what scans touch whose fate is not to stay. `progress` is told the scans done and all.
+/// Maps again what scans touch whose fate is not to stay. The fates were decided by what flush `seen` has; nothing may
+/// have come since, whose fate nobody has looked at. `progress` is told the scans done and all.
 pub(super) fn rework(
     map: MapPath,
+    seen: u64,
     how: &Rework,
     fate: impl Fn(&KeptRecord) -> Fate,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<MappedAgain> {
     let (disk, folder) = map.into_parts();
     let mut store = TileStore::open(disk.clone(), &folder)?;
+    if store.commits().flush_number != seen {
+        return Err(Error::Changed { path: folder });
+    }
     let mut revision = Revision::new(disk.clone(), how, fate);
     let touched = revision.look(&store)?;
     if how.is_dry_run || revision.counts.scans_changed == 0 {

@@ -16,11 +16,11 @@ use std::sync::Arc;
 /// What an interrupted attempt left is removed by the next one, and when this value is dropped before
 /// [`StagedMap::finish`].
 #[derive(Debug)]
-pub struct StagedMap {
+pub struct StagedMap<W = TileStore> {
     disk: Arc<dyn Disk>,
     folder: PathBuf,
-    /// Holds the lock of the unfinished folder. `None` once the map has its name.
-    store: Option<TileStore>,
+    /// Who writes; it holds the lock of the unfinished folder. `None` once the map has its name.
+    writer: Option<W>,
 }
 
 impl StagedMap {
@@ -30,12 +30,34 @@ impl StagedMap {
     ///
     /// A folder with other content, another process that makes the same map, a disk that refuses.
     pub fn begin(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
+        let create = |unfinished: &Path| TileStore::create(disk.clone(), unfinished, metadata, map_id);
+        Self::begin_by(disk.clone(), folder, create)
+    }
+
+    /// The map's tiles, to be written and committed; a commit makes them durable, and nothing else.
+    pub fn store(&mut self) -> &mut TileStore {
+        self.writer()
+    }
+}
+
+impl<W> StagedMap<W> {
+    /// Begins a map that will be in `folder`, which does not exist yet or is empty. `create` makes it in the folder that
+    /// it is told, and holds that folder's lock from then on.
+    ///
+    /// # Errors
+    ///
+    /// As for [`StagedMap::begin`], and those of `create`.
+    pub fn begin_by(
+        disk: Arc<dyn Disk>,
+        folder: &Path,
+        create: impl FnOnce(&Path) -> Result<W>,
+    ) -> Result<Self> {
         place::check_place(&*disk, folder)?;
         check_is_free(&*disk, folder)?;
         let unfinished = staging_folder(folder)?;
         remove_unfinished(&*disk, &unfinished)?;
-        let store = TileStore::create(disk.clone(), &unfinished, metadata, map_id)?;
-        Ok(Self { disk, folder: folder.to_owned(), store: Some(store) })
+        let writer = create(&unfinished)?;
+        Ok(Self { disk, folder: folder.to_owned(), writer: Some(writer) })
     }
 
     /// Where the map will be.
@@ -43,9 +65,9 @@ impl StagedMap {
         &self.folder
     }
 
-    /// The map's tiles, to be written and committed; a commit makes them durable, and nothing else.
-    pub fn store(&mut self) -> &mut TileStore {
-        self.store.as_mut().expect("taken by finish alone, which takes the map")
+    /// Who writes the map.
+    pub fn writer(&mut self) -> &mut W {
+        self.writer.as_mut().expect("taken by finish alone, which takes the map")
     }
 
     /// Gives the map its name: all that was committed is there from then on, and durable when this returns.
@@ -65,20 +87,20 @@ impl StagedMap {
         }
         if cfg!(windows) {
             // A folder with an open file cannot be renamed there. Elsewhere nobody else begins meanwhile.
-            self.store = None;
+            self.writer = None;
         }
         if let Err(error) = self.disk.rename(&unfinished, &self.folder) {
             return Err(Error::io(&unfinished, "rename", error));
         }
-        self.store = None;
+        self.writer = None;
         let parent = map_folder::parent_of(&self.folder);
         self.disk.sync_folder(parent).map_err(|error| Error::io(parent, "sync", error))
     }
 }
 
-impl Drop for StagedMap {
+impl<W> Drop for StagedMap<W> {
     fn drop(&mut self) {
-        if let (Some(_lock), Ok(unfinished)) = (&self.store, staging_folder(&self.folder)) {
+        if let (Some(_lock), Ok(unfinished)) = (&self.writer, staging_folder(&self.folder)) {
             // What stays after all is removed by the next attempt.
             let _ = remove_content(&*self.disk, &Layout::new(&unfinished), true);
             let _ = self.disk.remove_folder(&unfinished);

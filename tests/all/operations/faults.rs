@@ -4,6 +4,7 @@ use std::sync::Arc;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::operations::{self, Decay, Part};
+use voxtile::scan::Stop;
 use voxtile::space::Aabb;
 use voxtile::store::{TileStore, UnsyncedDisk};
 use voxtile::{
@@ -110,6 +111,30 @@ fn adopt(disk: &FaultyDisk) -> Result<()> {
     }
     let map = MapPath::on(disk.shared(), path("a"));
     operations::adopt(map, &[open(disk, &path("b"))?], OF_FLUSH, 3, |_, _| {}).map(drop)
+}
+
+/// A disk with a map of the same scans that keeps them.
+fn a_map_with_kept_scans(storage: Storage) -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage);
+    let config = config.with_kept_scans(true);
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), path("a")), config).unwrap();
+    let mut random = Random(1);
+    for x in [0.0, 3.0] {
+        mapper.insert_scan(&random_scan(&mut random, [x, 0.0, 0.0], 4)).unwrap();
+    }
+    mapper.flush().unwrap();
+    drop(mapper);
+    disk.copy()
+}
+
+/// With room for one tile, so that others are written before the end.
+fn map_anew(disk: &FaultyDisk) -> Result<()> {
+    let map = open(disk, &path("a"))?;
+    let config = MapConfig::new(0.2, 3.2)?.with_range(0.0, 3.0).with_storage(map.config().storage);
+    let config = config.with_kept_scans(true).with_cache_tiles(1).with_write_buffer_bytes(600);
+    let output = MapPath::on(disk.shared(), path("out"));
+    operations::map_anew(&map, output, config, |rays| *rays, &Stop::default(), |_, _| ()).map(drop)
 }
 
 fn clear(disk: &FaultyDisk) -> Result<()> {
@@ -221,6 +246,34 @@ fn pieces_are_one_map_or_as_they_were() {
     check_from(&two_pieces(Storage::OctoMap), "out", join);
     check_from(&two_pieces(Storage::Compact), "out", join);
     check_from(&two_pieces(Storage::Compact).without_links(), "out", join);
+}
+
+#[test]
+fn a_map_of_kept_scans_is_there_whole_or_not_at_all() {
+    check_from(&a_map_with_kept_scans(Storage::OctoMap), "out", map_anew);
+    check_from(&a_map_with_kept_scans(Storage::Compact), "out", map_anew);
+}
+
+/// A request to stop leaves nothing behind, and no map that could be taken for the one that was asked for.
+#[test]
+fn a_map_of_kept_scans_that_is_given_up_is_not_there() {
+    let disk = a_map_with_kept_scans(Storage::Compact);
+    let map = open(&disk, &path("a")).unwrap();
+    let (stop, output) = (Stop::default(), MapPath::on(disk.shared(), path("out")));
+    let config = map.config().clone();
+    let made = operations::map_anew(
+        &map,
+        output,
+        config,
+        |rays| *rays,
+        &stop,
+        |done, all| {
+            assert_eq!((done, all), (1, 2));
+            stop.set();
+        },
+    );
+    assert!(matches!(made, Err(Error::Stopped)), "{made:?}");
+    assert!(disk.files().keys().all(|file| file.starts_with(path("a"))), "{:?}", disk.files().keys());
 }
 
 #[test]

@@ -1,0 +1,98 @@
+use crate::config::RayConfig;
+use crate::error::{Error, Result};
+use crate::space::{Grid, TileBox};
+
+/// From tiles of one size to tiles of another. A region is said in tiles, and stays where it is in space.
+pub(super) struct Retiling {
+    from_m: f64,
+    to_m: f64,
+}
+
+/// How far a border may be from one of the other tiles, in these: what rounding makes of the largest numbers.
+const TOLERANCE: f64 = 1e-6;
+
+impl Retiling {
+    pub(super) fn between(from: &Grid, to: &Grid) -> Self {
+        Self { from_m: from.tile_size_m(), to_m: to.tile_size_m() }
+    }
+
+    /// The same rays, their region said in the other tiles.
+    ///
+    /// # Errors
+    ///
+    /// A region with a border where the other tiles have none.
+    pub(super) fn rays(&self, rays: &RayConfig) -> Result<RayConfig> {
+        let region = rays.region.map(|region| self.region(region)).transpose()?;
+        Ok(RayConfig { region, ..*rays })
+    }
+
+    fn region(&self, region: TileBox) -> Result<TileBox> {
+        if self.from_m == self.to_m {
+            return Ok(region);
+        }
+        let corners = [region.min().to_array(), region.max().to_array()];
+        let edges = [0, 1, 2].map(|axis| self.edge(corners[0][axis], corners[1][axis]));
+        match edges {
+            [Some(x), Some(y), Some(z)] => Ok(TileBox::new([x.0, y.0, z.0].into(), [x.1, y.1, z.1].into())),
+            _ => Err(self.refuse(region)),
+        }
+    }
+
+    /// The first and the last of the other tiles along an axis. The ends of the range stand for a region without a
+    /// border there.
+    fn edge(&self, first: i32, last: i32) -> Option<(i32, i32)> {
+        let begin = if first == i32::MIN { first } else { self.border(i64::from(first))? };
+        let end = if last >= i32::MAX - 1 { i32::MAX } else { self.border(i64::from(last) + 1)? };
+        (begin < end).then(|| (begin, end - 1))
+    }
+
+    /// The tile that begins where the tile of this number does.
+    fn border(&self, number: i64) -> Option<i32> {
+        let exact = number as f64 * self.from_m / self.to_m;
+        let whole = exact.round();
+        let is_border = (exact - whole).abs() <= TOLERANCE;
+        let is_number = f64::from(i32::MIN) < whole && whole < f64::from(i32::MAX);
+        (is_border && is_number).then_some(whole as i32)
+    }
+
+    fn refuse(&self, region: TileBox) -> Error {
+        let Self { from_m, to_m } = self;
+        let reason = format!(
+            "{to_m} m does not fit the region that the map was built of, tiles {} to {} of {from_m} m: a border of it \
+             would be inside a tile; keep the tile size, or take one that divides {from_m} m",
+            region.min(),
+            region.max()
+        );
+        Error::argument("tile size", reason)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn retiled(from_m: f64, to_m: f64, min: [i32; 3], max: [i32; 3]) -> Option<TileBox> {
+        let retiling = Retiling { from_m, to_m };
+        retiling.region(TileBox::new(min.into(), max.into())).ok()
+    }
+
+    #[test]
+    fn a_region_stays_where_it_is_or_is_refused() {
+        let tiles = |min: [i32; 3], max: [i32; 3]| Some(TileBox::new(min.into(), max.into()));
+        let (min, max) = ([-2, 0, 4], [1, 0, 5]);
+        assert_eq!(retiled(10.0, 2.5, min, max), tiles([-8, 0, 16], [7, 3, 23]));
+        assert_eq!(retiled(0.3, 0.1, min, max), tiles([-6, 0, 12], [5, 2, 17]));
+        assert_eq!(retiled(10.0, 20.0, min, max), None);
+        assert_eq!(retiled(10.0, 20.0, [-2, 0, 4], [1, 1, 5]), tiles([-1, 0, 2], [0, 0, 2]));
+        assert_eq!(retiled(10.0, 10.0, min, max), tiles(min, max));
+        assert_eq!(retiled(10.0, 3.0, min, max), None);
+    }
+
+    #[test]
+    fn a_region_without_borders_keeps_none_and_numbers_stay_in_their_range() {
+        let all = ([i32::MIN, i32::MIN, 0], [i32::MAX - 1, -1, i32::MAX - 1]);
+        let tiles = TileBox::new(all.0.into(), all.1.into());
+        assert_eq!(retiled(10.0, 2.5, all.0, all.1), Some(tiles));
+        assert_eq!(retiled(1000.0, 0.001, [0; 3], [9_999_999; 3]), None);
+    }
+}
