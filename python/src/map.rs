@@ -39,10 +39,12 @@ const POINTS_TOGETHER: usize = 1 << 20;
 /// thread may ask while another inserts: it sees whole scans.
 #[pyclass(frozen, module = "voxtile")]
 pub struct Map {
-    /// `None` once it is closed.
-    source: RwLock<Option<Arc<Source>>>,
+    /// `None` once it is closed. Shared with the work that closes it, which may outlive the call.
+    source: Arc<RwLock<Option<Arc<Source>>>>,
     config: MapConfig,
     path: PathBuf,
+    /// Its name, if it is one.
+    snapshot: Option<String>,
 }
 
 type Found<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<i32>>);
@@ -58,7 +60,7 @@ impl Map {
         let at = path.clone();
         let source = finished(py, move |_| open(&at))?;
         let config = source.config();
-        Ok(Self { source: RwLock::new(Some(Arc::new(source))), config, path })
+        Ok(Self { source: Arc::new(RwLock::new(Some(Arc::new(source)))), config, path, snapshot: None })
     }
 
     fn source(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
@@ -75,7 +77,8 @@ impl Map {
         Err(exception_of_kind(py, "read_only", &message))
     }
 
-    /// Changes the map in a thread of its own, or at once if it is `short`.
+    /// Changes the map in a thread of its own, or at once if it is `short` and no other thread's change is waited for:
+    /// Ctrl-C ends the waiting.
     fn change<T: Send>(
         &self,
         py: Python<'_>,
@@ -83,9 +86,12 @@ impl Map {
         change: impl FnOnce(&mut OutOfCoreTileMapper) -> Result<T> + Send,
     ) -> PyResult<T> {
         let source = self.writer(py)?;
-        let work = |stop: &Stop| source.change(stop, change);
-        let changed = if short { at_once(py, work)? } else { watched(py, work)? };
-        changed.ok_or_else(|| closed(py, &self.path))
+        let mut change = Some(change);
+        if short && let Some(changed) = at_once(py, |stop| source.change_if_free(stop, &mut change))? {
+            return Ok(changed);
+        }
+        let changed = change.map(|change| watched(py, |stop| source.change(stop, change))).transpose()?;
+        changed.flatten().ok_or_else(|| closed(py, &self.path))
     }
 
     /// Adds scans, one report of all.
@@ -125,7 +131,7 @@ impl Map {
         Ok(column(py, answers))
     }
 
-    /// Asks the map in a thread of its own, or at once if there are few questions.
+    /// Asks the map in a thread of its own, or at once if there are few questions and nothing is waited for.
     fn ask<T: Send>(
         &self,
         py: Python<'_>,
@@ -134,7 +140,7 @@ impl Map {
     ) -> PyResult<T> {
         let source = self.source(py)?;
         let work = |stop: &Stop| ask(&source, stop);
-        if questions <= FEW { at_once(py, work) } else { watched(py, work) }
+        if questions <= FEW && source.is_free() { at_once(py, work) } else { watched(py, work) }
     }
 }
 
@@ -203,7 +209,10 @@ impl Map {
         let reader = |reader: MapReader| Source::Reader(Box::new(RwLock::new(reader)));
         match (mode, name) {
             ("r", Some(name)) => {
-                Self::opened(py, path, move |path| options.open_snapshot(path, &name).map(reader))
+                let snapshot = Some(name.to_string());
+                let found =
+                    Self::opened(py, path, move |path| options.open_snapshot(path, &name).map(reader))?;
+                Ok(Self { snapshot, ..found })
             }
             ("r", None) if is_octree => Self::opened(py, path, Source::octree),
             ("r", None) => Self::opened(py, path, move |path| options.open_read_only(path).map(reader)),
@@ -350,19 +359,12 @@ impl Map {
     /// gives up what no flush has made durable.
     #[pyo3(signature = (*, flush=true))]
     fn close(&self, py: Python<'_>, flush: bool) -> PyResult<()> {
-        if self.closed() {
-            return Ok(());
-        }
-        if flush {
-            self.flush(py, true)?;
-        }
-        let Some(source) = self.source.write().take() else { return Ok(()) };
+        let Some(source) = self.source.read().clone() else { return Ok(()) };
+        let open = self.source.clone();
         finished(py, move |stop| {
             // Another thread may still ask; the lock on the map's files goes now.
-            if let Some(mut mapper) = source.mapper(stop)? {
-                drop(mapper.take());
-            }
-            drop(source);
+            source.close(stop, flush)?;
+            drop((source, open.write().take()));
             Ok(())
         })
     }
@@ -596,8 +598,9 @@ impl Map {
 
     /// Opens the viewer in a browser, in a process of its own, which is returned. What is not flushed is not seen.
     fn view(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().source(slf.py())?;
-        Ok(slf.py().import("voxtile.pictures")?.call_method1("view", (&slf.get().path,))?.unbind())
+        let (py, map) = (slf.py(), slf.get());
+        map.source(py)?;
+        Ok(py.import("voxtile.pictures")?.call_method1("view", (&map.path, &map.snapshot))?.unbind())
     }
 
     fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {

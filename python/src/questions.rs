@@ -14,8 +14,8 @@ use voxtile::{
 const POINTS_AT_A_TIME: usize = 1 << 20;
 /// Rays likewise: each may cross a million voxels.
 const RAYS_AT_A_TIME: usize = 1 << 14;
-/// Most voxels of a dense array.
-const MOST_DENSE_VOXELS: u64 = 1 << 31;
+/// Most bytes of a dense array.
+const MOST_DENSE_BYTES: u64 = 1 << 32;
 
 /// Boxes of an array of N x 6 or N x 2 x 3: lower and upper corner, in metres.
 pub fn bodies_of(boxes: &Bound<'_, PyAny>) -> PyResult<Vec<Shape>> {
@@ -109,17 +109,32 @@ pub fn dense<T: Clone>(
     let voxels = map.config().grid.voxels_in(region);
     let edges: [u64; 3] =
         std::array::from_fn(|k| (i64::from(voxels.end[k]) - i64::from(voxels.min[k])).max(0) as u64);
-    let count = edges.iter().try_fold(1_u64, |count, &edge| count.checked_mul(edge)).unwrap_or(u64::MAX);
-    if count > MOST_DENSE_VOXELS {
-        let hint = "ask for a smaller region, or for the occupied voxels alone";
-        let what = "number of voxels of the array";
-        return Err(Error::TooLarge { what, size: count, limit: MOST_DENSE_VOXELS, hint });
-    }
-    let mut values = vec![unknown; count as usize];
+    let mut values = array_of(edges, unknown)?;
     map.for_each_voxel_in(region, |voxel| {
         let [x, y, z]: [usize; 3] =
             std::array::from_fn(|k| (i64::from(voxel.index[k]) - i64::from(voxels.min[k])) as usize);
         values[(x * edges[1] as usize + y) * edges[2] as usize + z] = of(voxel.evidence);
     })?;
     Ok((voxels, values))
+}
+
+/// An array with the same value everywhere, if there is memory for it: an allocation that fails would end the process.
+fn array_of<T: Clone>(edges: [u64; 3], value: T) -> Result<Vec<T>> {
+    let count = edges.iter().try_fold(1_u64, |count, &edge| count.checked_mul(edge)).unwrap_or(u64::MAX);
+    let bytes = count.saturating_mul(size_of::<T>() as u64);
+    let too_large =
+        |limit, hint| Error::TooLarge { what: "number of bytes of the array", size: bytes, limit, hint };
+    if bytes > MOST_DENSE_BYTES {
+        return Err(too_large(
+            MOST_DENSE_BYTES,
+            "ask for a smaller region, or for the occupied voxels alone",
+        ));
+    }
+    let mut values = Vec::new();
+    // How much memory there is, nobody knows: less than this.
+    let no_memory =
+        |_| too_large(bytes.saturating_sub(1), "there is no memory for it: ask for a smaller region");
+    values.try_reserve_exact(count as usize).map_err(no_memory)?;
+    values.resize(count as usize, value);
+    Ok(values)
 }

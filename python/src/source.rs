@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::time::Duration;
-use voxtile::mapper::{LiveReader, MapReader, MapView, OctreeMap, Stoppable};
+use voxtile::mapper::{LiveReader, MapReader, MapView, Mapper, OctreeMap, Stoppable};
 use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop, octree};
 
 /// What is asked: ends at the next tile once its stop is set.
@@ -91,10 +91,51 @@ impl Source {
         change: impl FnOnce(&mut OutOfCoreTileMapper) -> Result<T>,
     ) -> Result<Option<T>> {
         let Some(mut guard) = self.mapper(stop)? else { return Ok(None) };
-        let Some(mut mapper) = guard.take() else { return Ok(None) };
-        mapper.stop_with(stop.clone());
-        let changed = change(&mut mapper);
-        *guard = Some(mapper);
-        changed.map(Some)
+        changed(&mut guard, stop, change)
     }
+
+    /// Changes the map if no other thread uses it now. If one does, or the map is closed, the change is still there.
+    pub fn change_if_free<T, C>(&self, stop: &Stop, change: &mut Option<C>) -> Result<Option<T>>
+    where
+        C: FnOnce(&mut OutOfCoreTileMapper) -> Result<T>,
+    {
+        let Self::Writer { mapper, .. } = self else { return Ok(None) };
+        let Some(mut guard) = mapper.try_lock() else { return Ok(None) };
+        match change.take_if(|_| guard.is_some()) {
+            Some(change) => changed(&mut guard, stop, change),
+            None => Ok(None),
+        }
+    }
+
+    /// Whether a question waits for no other thread: a view that is being refreshed is read by nobody.
+    pub fn is_free(&self) -> bool {
+        match self {
+            Self::Reader(reader) => reader.try_read().is_some(),
+            Self::Writer { .. } | Self::Octree(_) => true,
+        }
+    }
+
+    /// Closes a map that takes scans, and makes it durable before if it is to `flush`. No other thread's scan comes
+    /// between. After an error, and after a stop, the map is open.
+    pub fn close(&self, stop: &Stop, flush: bool) -> Result<()> {
+        let Some(mut guard) = self.mapper(stop)? else { return Ok(()) };
+        if flush {
+            changed(&mut guard, stop, Mapper::flush)?;
+            stop.check()?;
+        }
+        drop(guard.take());
+        Ok(())
+    }
+}
+
+fn changed<T>(
+    guard: &mut Option<Box<OutOfCoreTileMapper>>,
+    stop: &Stop,
+    change: impl FnOnce(&mut OutOfCoreTileMapper) -> Result<T>,
+) -> Result<Option<T>> {
+    let Some(mut mapper) = guard.take() else { return Ok(None) };
+    mapper.stop_with(stop.clone());
+    let changed = change(&mut mapper);
+    *guard = Some(mapper);
+    changed.map(Some)
 }

@@ -1,5 +1,8 @@
 """An open map: scans in, answers out."""
 
+import subprocess
+import sys
+import textwrap
 import time
 from pathlib import Path
 
@@ -180,6 +183,43 @@ def test_an_error_leaves_the_map_as_it_is(tmp_path: Path, room: list[Scan]) -> N
         with pytest.raises(errors.TooLargeError):
             found.to_dense([[-1e6] * 3, [1e6] * 3])
         assert found.digest() == digest
+
+
+def test_an_array_for_which_there_is_no_memory_is_an_error(tmp_path: Path, room: list[Scan]) -> None:
+    resource = pytest.importorskip("resource")
+    made(tmp_path / "map", room).close()
+    # A process of its own: it would end.
+    script = """
+        import resource, sys, numpy as np, voxtile
+        found = voxtile.Map.open(sys.argv[1], "r")
+        pages = int(open("/proc/self/statm").read().split()[0])
+        most = pages * resource.getpagesize() + (512 << 20)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+        for voxels in (500, 1000):
+            try:
+                found.to_dense([[0, 0, 0], np.full(3, 0.25 * voxels)], "log_odds")
+            except voxtile.errors.TooLargeError as error:
+                print(error)
+        """
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("no /proc")
+    assert resource is not None
+    command = [sys.executable, "-c", textwrap.dedent(script), str(tmp_path / "map")]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert len(told) == 2 and "1000000000" in told[0] and "8000000000" in told[1], told
+
+
+def test_the_viewer_of_a_snapshot_shows_the_snapshot(
+    tmp_path: Path, room: list[Scan], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr("subprocess.Popen", lambda command: shown.append(command[-1]))
+    with made(tmp_path / "map", room) as found:
+        found.snapshot("before")
+        found.view()
+    with voxtile.Map.open(tmp_path / "map", "r", snapshot="before") as found:
+        found.view()
+    assert shown == [str(tmp_path / "map"), f"{tmp_path / 'map'}@before"]
 
 
 def test_insert_many_ends_at_an_error_of_the_iterable(tmp_path: Path, room: list[Scan]) -> None:

@@ -56,6 +56,33 @@ def test_two_threads_two_maps_and_one(tmp_path: Path) -> None:
         assert (a.scan_number, b.scan_number) == (12, 24)
 
 
+def test_a_scan_that_was_taken_while_another_thread_closes_is_in_the_map(tmp_path: Path) -> None:
+    scan = np.random.default_rng(1).uniform(-20, 20, (5_000, 3))
+    for attempt in range(3):
+        found = voxtile.Map.create(tmp_path / str(attempt), 0.2, tile_size=2.0, memory="1GiB")
+        found.insert(scan, np.eye(4))
+        taken: list[int] = []
+
+        def insert(found: voxtile.Map = found, taken: list[int] = taken) -> None:
+            try:
+                while True:
+                    found.insert([[1.0, 2.0, 3.0]], np.eye(4))
+                    taken.append(1)
+            except voxtile.errors.ClosedError:
+                pass
+
+        threads = [threading.Thread(target=insert) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        time.sleep(0.1)
+        found.close()
+        for thread in threads:
+            thread.join(timeout=60)
+        assert found.closed and len(taken) > 0
+        with voxtile.open(tmp_path / str(attempt)) as kept:
+            assert kept.scan_number == len(taken) + 1
+
+
 def interrupted(script: str, *arguments: object) -> tuple[str, float]:
     """Runs a script until it has printed a line and a moment longer, sends Ctrl-C, and returns what it prints then and
     after how many seconds."""
@@ -95,6 +122,30 @@ def test_ctrl_c_ends_a_long_scan_and_the_map_is_whole(tmp_path: Path) -> None:
     line, took = interrupted(script, tmp_path / "map")
     assert line == "interrupted 1" and took < 2
     assert voxtile.verify(tmp_path / "map")["damage"] == 0
+
+
+def test_ctrl_c_ends_a_short_call_that_waits_for_another_thread(tmp_path: Path) -> None:
+    script = """
+        import os
+        import sys
+        import threading
+        import time
+        import numpy as np
+        import voxtile
+        ends = np.random.default_rng(1).normal(size=(2_000_000, 3))
+        ends *= 400 / np.linalg.norm(ends, axis=1)[:, None]
+        found = voxtile.Map.create(sys.argv[1], 0.02, tile_size=10.0, insert_mode="per-ray")
+        threading.Thread(target=lambda: found.insert(ends, np.eye(4)), daemon=True).start()
+        time.sleep(0.5)
+        print("begun", flush=True)
+        try:
+            found.insert([[1.0, 2.0, 3.0]], np.eye(4))
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+        os._exit(0)
+        """
+    line, took = interrupted(script, tmp_path / "map")
+    assert line == "interrupted" and took < 2
 
 
 def test_ctrl_c_in_a_flush_leaves_it_to_itself(tmp_path: Path) -> None:

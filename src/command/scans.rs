@@ -7,17 +7,22 @@ use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
 use crate::command::scan_input;
 use crate::io::{PointRoom, ScanSource};
+use crate::mapper::MapReader;
 use crate::space::Point;
 use crate::store::ScanRecord;
 use anyhow::Context;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, IntoInnerError, Seek, Write};
 use std::path::Path;
 use std::process::ExitCode;
+use tempfile::SpooledTempFile;
 
 /// Bytes of memory for the points of one scan; more go to a temporary file.
 const ROOM_BYTES: usize = 64 << 20;
+
+/// Bytes of memory for the rows of a map; more go to a temporary file.
+const ROWS_BYTES: usize = 4 << 20;
 
 /// What an input or a map has of scans.
 #[derive(Debug, Default, Serialize)]
@@ -72,28 +77,38 @@ fn is_map(path: &Path) -> bool {
 }
 
 fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
-    let mut overview = Overview { format: "map".to_owned(), ..Overview::default() };
-    read_map(&args.data, |reader| {
-        overview = Overview { format: overview.format.clone(), ..Overview::default() };
-        if !reader.keeps_scans() {
-            overview.remarks.push("it keeps no scans; build with --keep-scans to have them".to_owned());
-            return reader.scans()?.iter().try_for_each(|scan| overview.add(&Row::of(scan), args, out));
-        }
-        overview.points = Some(0);
-        let mut scans = reader.kept_scans()?;
-        while let Some(scan) = scans.next_record()? {
-            let listed = ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m());
-            let (points, tiles) = (Some(scan.points), Some(scan.tiles.len() as u64));
-            let row = Row { points, tiles, kept_bytes: Some(scan.place.bytes), ..Row::of(&listed) };
-            overview.kept_bytes = Some(overview.kept_bytes.unwrap_or_default() + scan.place.bytes);
-            overview.add(&row, args, out)?;
-        }
-        let not_kept = (reader.scans()?.len() as u64).saturating_sub(overview.scans);
-        if not_kept > 0 {
-            overview.remarks.push(format!("{not_kept} more scans are in the map, whose points are not kept"));
-        }
-        Ok(())
+    // What an attempt lists is printed once it has come to its end.
+    let (overview, mut rows) = read_map(&args.data, |reader| {
+        let mut rows = BufWriter::new(SpooledTempFile::new(ROWS_BYTES));
+        let overview = listed(reader, args, &mut rows)?;
+        Ok((overview, rows.into_inner().map_err(IntoInnerError::into_error)?))
     })?;
+    rows.rewind()?;
+    std::io::copy(&mut rows, out)?;
+    Ok(overview)
+}
+
+/// The scans of one state of a map.
+fn listed(reader: &MapReader, args: &ScansArgs, rows: &mut impl Write) -> anyhow::Result<Overview> {
+    let mut overview = Overview { format: "map".to_owned(), ..Overview::default() };
+    if !reader.keeps_scans() {
+        overview.remarks.push("it keeps no scans; build with --keep-scans to have them".to_owned());
+        reader.scans()?.iter().try_for_each(|scan| overview.add(&Row::of(scan), args, rows))?;
+        return Ok(overview);
+    }
+    overview.points = Some(0);
+    let mut scans = reader.kept_scans()?;
+    while let Some(scan) = scans.next_record()? {
+        let listed = ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m());
+        let (points, tiles) = (Some(scan.points), Some(scan.tiles.len() as u64));
+        let row = Row { points, tiles, kept_bytes: Some(scan.place.bytes), ..Row::of(&listed) };
+        overview.kept_bytes = Some(overview.kept_bytes.unwrap_or_default() + scan.place.bytes);
+        overview.add(&row, args, rows)?;
+    }
+    let not_kept = (reader.scans()?.len() as u64).saturating_sub(overview.scans);
+    if not_kept > 0 {
+        overview.remarks.push(format!("{not_kept} more scans are in the map, whose points are not kept"));
+    }
     Ok(overview)
 }
 

@@ -9,19 +9,30 @@ use std::process::{Command, ExitCode};
 /// times as large.
 pub fn run(args: &ShareArgs) -> anyhow::Result<ExitCode> {
     let program = beside_this_program().unwrap_or_else(|| PathBuf::from(name()));
-    let status = match Command::new(program).args(&args.arguments).status() {
+    match become_it(Command::new(program).args(&args.arguments)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound && asks_for_help(&args.arguments) => {
             println!("{HELP}");
-            return Ok(ExitCode::SUCCESS);
+            Ok(ExitCode::SUCCESS)
         }
-        status => status.with_context(|| {
+        ran => ran.with_context(|| {
             let hint =
                 "put it beside voxtile or on the PATH (cargo install --path programs/share installs it)";
             format!("cannot run {}: {hint}", name())
-        })?,
-    };
-    // Ended by a signal: there is no code.
-    let code = status.code().and_then(|code| u8::try_from(code).ok());
+        }),
+    }
+}
+
+/// Runs a program in place of this one, which ends here: signals that are sent to this process are the program's.
+#[cfg(unix)]
+fn become_it(program: &mut Command) -> io::Result<ExitCode> {
+    Err(std::os::unix::process::CommandExt::exec(program))
+}
+
+/// Runs a program and ends as it does.
+#[cfg(not(unix))]
+fn become_it(program: &mut Command) -> io::Result<ExitCode> {
+    // Ended from outside: there may be no code.
+    let code = program.status()?.code().and_then(|code| u8::try_from(code).ok());
     Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
 }
 

@@ -1,9 +1,13 @@
-use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting};
+use crate::survey::{Scans, digest, folder_for_maps, is_whole, setting, voxtile};
+use serde_json::Value;
 use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
+use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
 
 const SCANS: usize = 40;
 const READERS: usize = 3;
@@ -53,4 +57,41 @@ fn every_digest_that_a_reader_sees_is_that_of_some_flush() {
     println!("{} answers of {} flushes while {flushed} were made", seen.len(), different.len());
     assert!(different.len() > 3, "the readers did not read beside the writer");
     assert!(is_whole(&map));
+}
+
+/// The list of scans is read while a writer flushes and what is not read yet goes: it is read again, and printed once.
+#[test]
+fn a_list_of_scans_that_is_read_again_is_printed_once() {
+    const COUNT: u64 = 3000;
+    let (_folder, map) = folder_for_maps();
+    let config = MapConfig::new(0.5, 5.0).unwrap().with_kept_scans(true);
+    let mut mapper = OutOfCoreTileMapper::create(&map, config).unwrap();
+    let scan = Scan { origin: [0.0; 3], points: vec![[1.0, 0.5, 0.25]], intensities: None };
+    for _ in 0..COUNT {
+        mapper.insert_scan(&scan).unwrap();
+    }
+    mapper.flush().unwrap();
+    let mut command = voxtile();
+    command.args(["scans", map.to_str().unwrap(), "--each", "--json"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    // It prints more than fits into the pipe.
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let first = lines.next();
+    mapper.insert_scan(&scan).unwrap();
+    mapper.flush().unwrap();
+    let kept = std::fs::read_dir(map.join("kept_scans")).unwrap().map(|entry| entry.unwrap().path());
+    let catalog = kept.filter(|path| path.to_str().unwrap().contains("catalog")).min().unwrap();
+    let half = std::fs::metadata(&catalog).unwrap().len() / 2;
+    assert!(half > 1 << 16, "all of it was read at once");
+    std::fs::OpenOptions::new().write(true).open(&catalog).unwrap().set_len(half).unwrap();
+    let rows =
+        first.into_iter().chain(lines).map(|line| serde_json::from_str::<Value>(&line.unwrap()).unwrap());
+    let numbers: Vec<u64> = rows.filter_map(|row| row["number"].as_u64()).collect();
+    assert!(
+        numbers.iter().copied().eq(1..=COUNT),
+        "{} rows, the last ones {:?}",
+        numbers.len(),
+        numbers.last()
+    );
+    assert!(child.wait().unwrap().success());
 }

@@ -132,3 +132,27 @@ fn a_scan_that_takes_minutes_is_given_up() {
     assert_eq!(build.child.wait().unwrap().code(), Some(130));
     assert_eq!(digest(&map).unwrap().0, 0);
 }
+
+#[test]
+fn a_signal_to_share_ends_the_program_that_shares() {
+    // It would run for a minute.
+    const PROGRAM: &str = "#!/bin/sh\ntrap 'echo ended; exit 7' TERM\necho begun\n\
+        for k in $(seq 600); do sleep 0.1; done\n";
+    let folder = tempfile::tempdir().unwrap();
+    // By processes of their own: what this one writes cannot be run while a child of another test holds it open.
+    let line = r#"cp "$0" "$1/voxtile"; printf '%s' "$2" >"$1/voxtile-share"; chmod +x "$1/voxtile-share""#;
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", line, env!("CARGO_BIN_EXE_voxtile")]).arg(folder.path()).arg(PROGRAM);
+    assert!(shell.status().unwrap().success());
+    let mut command = std::process::Command::new(folder.path().join("voxtile"));
+    let mut child = command.arg("share").stdout(Stdio::piped()).spawn().unwrap();
+    let mut said = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    said.read_line(&mut line).unwrap();
+    assert_eq!(line, "begun\n");
+    signal(&child, "TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(7));
+    line.clear();
+    said.read_to_string(&mut line).unwrap();
+    assert_eq!(line, "ended\n");
+}

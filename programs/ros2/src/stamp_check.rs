@@ -2,14 +2,21 @@ use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 /// Tells stamps that cannot be from a clock that has jumped: a robot's whose time was set, a simulation's that began
-/// anew.
+/// anew. Each child frame is judged by itself: one with a wrong clock costs the others nothing.
 #[derive(Debug, Default)]
 pub struct StampCheck {
+    /// Of all frames.
     newest_ns: Option<i64>,
-    /// Since when there is nothing but stamps far in the future.
-    early_since: Option<Instant>,
-    /// By child frame: the newest stamp, and since when there is nothing but far older ones.
-    children: HashMap<String, (i64, Option<Instant>)>,
+    children: HashMap<String, Child>,
+}
+
+/// What is known of a child frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Child {
+    newest_ns: Option<i64>,
+    taken: Option<Instant>,
+    /// Since when there is nothing but stamps far in the future, or far older ones.
+    off_since: Option<Instant>,
 }
 
 /// What is to be done with a transform.
@@ -17,13 +24,13 @@ pub struct StampCheck {
 pub enum StampVerdict {
     Take,
     Refuse,
-    /// The clock is another one: what was known of these frames is of no use.
+    /// The clock is another one: what was known of these frames is of no use. All of them if most have jumped.
     Jump(Vec<String>),
 }
 
-/// So far ahead of all others a stamp is none, unless all are.
+/// So far ahead of all others a stamp is none, unless all of its frame are.
 const MOST_AHEAD_NS: i64 = 10_000_000_000;
-/// So far behind the last one of its frame it is none, unless all are.
+/// So far behind the last one of its frame it is none, unless all of its frame are.
 const MOST_BEHIND_NS: i64 = 2_000_000_000;
 /// Bound of what a flood can fill.
 const MOST_CHILDREN: usize = 4000;
@@ -32,36 +39,49 @@ const PROOF: Duration = Duration::from_millis(500);
 
 impl StampCheck {
     pub fn verdict(&mut self, child: &str, stamp_ns: i64, now: Instant) -> StampVerdict {
+        let known = self.children.get(child).copied().unwrap_or_default();
         let is_early = self.newest_ns.is_some_and(|newest| stamp_ns > newest.saturating_add(MOST_AHEAD_NS));
-        let (newest_ns, late_since) = self.children.get(child).copied().unwrap_or((stamp_ns, None));
-        let is_late = stamp_ns < newest_ns.saturating_sub(MOST_BEHIND_NS);
-        let since = if is_early { self.early_since } else { late_since };
-        if is_early || is_late {
-            let since = since.unwrap_or(now);
-            if now.saturating_duration_since(since) >= PROOF {
-                let before = std::mem::take(self);
-                self.newest_ns = Some(stamp_ns);
-                self.note(child, stamp_ns, None);
-                return StampVerdict::Jump(before.children.into_keys().collect());
-            }
-            if is_early {
-                self.early_since = Some(since);
-            } else {
-                self.note(child, newest_ns, Some(since));
-            }
+        let is_late = known.newest_ns.is_some_and(|newest| stamp_ns < newest.saturating_sub(MOST_BEHIND_NS));
+        if !is_early && !is_late {
+            self.newest_ns = self.newest_ns.max(Some(stamp_ns));
+            let newest_ns = known.newest_ns.max(Some(stamp_ns));
+            self.note(child, Child { newest_ns, taken: Some(now), off_since: None });
+            return StampVerdict::Take;
+        }
+        let since = known.off_since.unwrap_or(now);
+        if now.saturating_duration_since(since) < PROOF {
+            self.note(child, Child { off_since: Some(since), ..known });
             return StampVerdict::Refuse;
         }
-        self.early_since = None;
-        self.newest_ns = Some(self.newest_ns.map_or(stamp_ns, |newest| newest.max(stamp_ns)));
-        self.note(child, newest_ns.max(stamp_ns), None);
-        StampVerdict::Take
+        StampVerdict::Jump(self.follow(child, stamp_ns, since, now))
     }
 
-    fn note(&mut self, child: &str, newest_ns: i64, late_since: Option<Instant>) {
-        if let Some(known) = self.children.get_mut(child) {
-            *known = (newest_ns, late_since);
+    /// Follows the clock of a child that has been off since then, and returns whose past is of no use.
+    fn follow(&mut self, child: &str, stamp_ns: i64, since: Instant, now: Instant) -> Vec<String> {
+        let jumped = if self.are_most_off(since) {
+            // Frames that were not heard meanwhile have their stamps of the clock before.
+            std::mem::take(&mut self.children).into_keys().collect()
+        } else {
+            vec![child.to_owned()]
+        };
+        self.note(child, Child { newest_ns: Some(stamp_ns), taken: Some(now), off_since: None });
+        // Who goes back alone leaves the time of the others as it is.
+        self.newest_ns = self.children.values().filter_map(|known| known.newest_ns).max();
+        jumped
+    }
+
+    /// Whether more frames are off than have had a stamp taken since then.
+    fn are_most_off(&self, since: Instant) -> bool {
+        let is_off = |known: &&Child| known.off_since.is_some();
+        let is_on_time = |known: &&Child| !is_off(known) && known.taken.is_some_and(|taken| taken >= since);
+        self.children.values().filter(is_off).count() > self.children.values().filter(is_on_time).count()
+    }
+
+    fn note(&mut self, name: &str, child: Child) {
+        if let Some(known) = self.children.get_mut(name) {
+            *known = child;
         } else if self.children.len() < MOST_CHILDREN {
-            self.children.insert(child.to_owned(), (newest_ns, late_since));
+            self.children.insert(name.to_owned(), child);
         }
     }
 }
@@ -107,5 +127,53 @@ mod tests {
             assert_eq!(check.verdict("base", stamp_s * S, now), Take);
         }
         assert_eq!(check.verdict("odom", 130 * S, now), Take);
+    }
+
+    /// How many stamps of a frame are refused while another one has its own clock: both every 10 ms, stamps in seconds.
+    fn refused(other_s: impl Fn(i64) -> i64, good_s: impl Fn(i64) -> i64) -> usize {
+        let (mut check, start) = (StampCheck::default(), Instant::now());
+        let mut refused = 0;
+        for number in 0..3000 {
+            let now = start + Duration::from_millis(10) * number as u32;
+            let elapsed_ns = number * S / 100;
+            check.verdict("other", other_s(number) * S, now);
+            let verdict = check.verdict("good", good_s(number) * S + elapsed_ns, now);
+            if let Jump(forgotten) = &verdict {
+                assert_eq!(forgotten, &["good"]);
+            }
+            refused += usize::from(verdict == Refuse);
+        }
+        refused
+    }
+
+    #[test]
+    fn a_frame_without_stamps_that_comes_first_costs_the_others_half_a_second() {
+        assert_eq!(refused(|_| 0, |_| 1_700_000_000), 50);
+    }
+
+    #[test]
+    fn a_frame_whose_clock_falls_back_costs_the_others_nothing() {
+        assert_eq!(refused(|number| if number < 100 { 1000 } else { 5 }, |_| 1000), 0);
+        assert_eq!(refused(|number| if number < 100 { 1000 } else { 90_000 }, |_| 1000), 0);
+    }
+
+    #[test]
+    fn when_most_frames_go_back_all_are_forgotten() {
+        let (mut check, start) = (StampCheck::default(), Instant::now());
+        for child in ["rests", "odom", "base", "arm"] {
+            assert_eq!(check.verdict(child, 1000 * S, start), Take);
+        }
+        let mut jumps = Vec::new();
+        for number in 1..100 {
+            let now = start + Duration::from_millis(20) * number as u32;
+            for (child, stamp_s) in [("arm", 1000), ("odom", 5), ("base", 5)] {
+                if let Jump(mut forgotten) = check.verdict(child, stamp_s * S + number * S / 50, now) {
+                    forgotten.sort_unstable();
+                    jumps.push(forgotten.join(" "));
+                }
+            }
+        }
+        // The arm is the one that is early then.
+        assert_eq!(jumps, ["arm base odom rests", "arm"]);
     }
 }

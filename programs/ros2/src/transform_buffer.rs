@@ -60,13 +60,16 @@ impl TransformBuffer {
         self.samples.0 += 1;
     }
 
-    /// Whether a stamp is one of the robot's clock. If that has jumped, what was before it is forgotten.
+    /// Whether a stamp is one of the robot's clock. If that of a frame has jumped, what was before it is forgotten.
     fn is_of_now(&mut self, child: &str, stamp_ns: i64, now: Instant) -> bool {
         match self.stamps.verdict(child, stamp_ns, now) {
             StampVerdict::Take => true,
             StampVerdict::Refuse => false,
             StampVerdict::Jump(children) => {
-                log::warn!("the clock of the transforms has jumped: those before are forgotten");
+                let (count, of) = (children.len(), if children.len() > 1 { " and others" } else { "" });
+                log::warn!(
+                    "the clock of {child}{of} has jumped: the transforms of {count} frames before are forgotten"
+                );
                 for child in children {
                     if self.transforms.is_moving(&child) {
                         self.transforms.detach(&child);
@@ -162,6 +165,26 @@ mod tests {
         assert_eq!(found(&buffer, 60 * S), Some(6.0));
         assert_eq!(found(&buffer, 5 * S + S / 10), None);
         assert!((300..330).contains(&counters.transforms_refused), "{counters}");
+    }
+
+    #[test]
+    fn a_frame_whose_clock_falls_back_costs_the_others_no_history() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut counters);
+        for number in 0..500 {
+            let now = start + Duration::from_millis(20) * number as u32;
+            let stamp_ns = 1000 * S + number * S / 50;
+            let of_arm = if number < 250 { stamp_ns } else { number * S / 50 };
+            buffer.insert(&pose("base", "arm", of_arm, 0.0), false, now, &mut counters);
+            buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, now, &mut counters);
+            let found = buffer.verdict(&cloud(stamp_ns), now);
+            assert!(
+                matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 4.0),
+                "{number}: {found:?}"
+            );
+        }
+        assert_eq!(counters.transforms_refused, 25);
     }
 
     #[test]

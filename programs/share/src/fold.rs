@@ -1,6 +1,7 @@
 use crate::args::Args;
 use crate::files::{load_layer, open_map};
 use crate::json;
+use crate::output;
 use std::path::Path;
 use voxtile::Mapper;
 use voxtile::share::merge_layer;
@@ -13,10 +14,10 @@ pub fn run(args: &Args, layer: &Path, map: &Path) -> anyhow::Result<()> {
     if args.json {
         json::print(&report)?;
     } else {
-        println!(
+        output::print(format_args!(
             "folded    {} voxels: {} got a hit, {} were known",
             report.voxels, report.hits, report.known
-        );
+        ))?;
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! What `--json` prints: objects of one line, as `voxtile` prints them.
 
+use crate::output;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use voxtile::{Error, Place};
@@ -16,8 +17,12 @@ struct Versioned<'a, T> {
 
 /// Prints an object.
 pub fn print(object: &impl Serialize) -> anyhow::Result<()> {
-    println!("{}", serde_json::to_string(&Versioned { version: VERSION, object })?);
-    Ok(())
+    Ok(output::print(line(object)?)?)
+}
+
+/// The line of an object.
+pub fn line(object: &impl Serialize) -> serde_json::Result<String> {
+    serde_json::to_string(&Versioned { version: VERSION, object })
 }
 
 /// What a program gets to know of a failure; what does not apply is missing.

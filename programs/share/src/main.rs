@@ -11,6 +11,7 @@ mod layer_store;
 mod link;
 mod measure;
 mod network_file;
+mod output;
 mod publish;
 mod reports;
 mod robot_name;
@@ -27,7 +28,7 @@ fn main() -> ExitCode {
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("voxtile share: {error:#}");
+            output::tell(format_args!("{error:#}"));
             if args.json {
                 // There is nobody to tell that it is refused.
                 let _ = json::print(&json::failure(&error));

@@ -1,5 +1,6 @@
 use crate::args::{Args, seconds};
 use crate::json;
+use crate::output;
 use crate::publish::next;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -32,9 +33,9 @@ pub fn run(args: &Args, scans: &[PathBuf]) -> anyhow::Result<()> {
     if args.json {
         return rows.iter().try_for_each(json::print);
     }
-    println!(
-        "set                    points  voxels  sent B  again  status    asks answers   total B  of 16 B  of 46 B  most/frame  at receiver"
-    );
+    output::print(
+        "set                    points  voxels  sent B  again  status    asks answers   total B  of 16 B  of 46 B  most/frame  at receiver",
+    )?;
     for row in &rows {
         let Row {
             set,
@@ -49,7 +50,7 @@ pub fn run(args: &Args, scans: &[PathBuf]) -> anyhow::Result<()> {
             ..
         } = row;
         let share = |bytes: u64| 100.0 * *total as f64 / (bytes * points).max(1) as f64;
-        println!(
+        output::print(format_args!(
             "{set:20} {points:8} {voxels:7} {packet_bytes:7} {again:6} {status_bytes:7} {ask_bytes:7} {answer_bytes:7} \
              {total:9} {:7.2}% {:7.2}% {:11} {:7.2}%{}",
             share(16),
@@ -57,7 +58,7 @@ pub fn run(args: &Args, scans: &[PathBuf]) -> anyhow::Result<()> {
             row.most_a_frame,
             100.0 * row.found as f64 / (*voxels).max(1) as f64,
             if row.is_equal { ", equal" } else { "" },
-        );
+        ))?;
     }
     Ok(())
 }

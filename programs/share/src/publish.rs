@@ -1,6 +1,8 @@
 use crate::args::{Args, seconds};
+use crate::inbox::Message;
 use crate::json;
 use crate::link::{Link, answers_key, packets_key, parse_key};
+use crate::output;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -50,8 +52,7 @@ pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> 
             say(args, scans, &mut sender)?;
             is_said = true;
         }
-        let deadline = now + STEP;
-        while let Some(message) = link.next(deadline.saturating_sub(begin.elapsed())) {
+        for message in asks(Instant::now() + STEP, stop, |wait| link.next(wait)) {
             if let Some((_, _, Some(receiver))) = parse_key(&message.key) {
                 // Whatever is no ask is not answered.
                 let answers = sender.answer(receiver, &message.bytes, begin.elapsed()).unwrap_or_default();
@@ -66,6 +67,19 @@ pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> 
     }
     link.close();
     Ok(())
+}
+
+/// What comes until a time, or until the stop is set, however much keeps coming.
+fn asks(
+    deadline: Instant,
+    stop: &AtomicBool,
+    mut next: impl FnMut(Duration) -> Option<Message>,
+) -> impl Iterator<Item = Message> {
+    std::iter::from_fn(move || {
+        let left = deadline.saturating_duration_since(Instant::now());
+        let is_over = left.is_zero() || stop.load(Ordering::Relaxed);
+        if is_over { None } else { next(left) }
+    })
 }
 
 /// Where voxels come from.
@@ -134,11 +148,11 @@ fn say(args: &Args, scans: u64, sender: &mut Sender) -> anyhow::Result<()> {
         });
         json::print(&line)?;
     } else {
-        println!("{robot}: {voxels} voxels, digest {digest}");
-        println!(
+        output::print(format_args!("{robot}: {voxels} voxels, digest {digest}"))?;
+        output::print(format_args!(
             "sent      {} bytes in {} packets of {} frames",
             counts.packet_bytes, counts.packets, counts.frames
-        );
+        ))?;
     }
     Ok(())
 }
@@ -155,4 +169,33 @@ pub fn random_number() -> u64 {
     hasher.write_u128(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos()));
     hasher.write_u32(std::process::id());
     hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ask() -> Message {
+        Message { key: "voxtile/a/asks/1".to_owned(), bytes: vec![0; 8] }
+    }
+
+    #[test]
+    fn asks_without_end_are_left_at_the_deadline() {
+        let (stop, most) = (AtomicBool::new(false), Duration::from_secs(30));
+        let begin = Instant::now();
+        let came = asks(begin + STEP, &stop, |_| (begin.elapsed() < most).then(ask)).count();
+        assert!(came > 0 && begin.elapsed() < most);
+    }
+
+    #[test]
+    fn asks_without_end_are_left_at_a_stop() {
+        let stop = AtomicBool::new(false);
+        let mut left = 1000;
+        let next = |_| {
+            left -= 1;
+            stop.store(left == 990, Ordering::Relaxed);
+            (left > 0).then(ask)
+        };
+        assert_eq!(asks(Instant::now() + Duration::from_secs(600), &stop, next).count(), 10);
+    }
 }

@@ -1,3 +1,4 @@
+use crate::output;
 use crate::robot_name::RobotName;
 use std::collections::BTreeMap;
 
@@ -39,22 +40,17 @@ impl Reports {
         }
         if self.told.len() >= MAX_TOLD {
             self.is_full = true;
-            eprintln!("voxtile share: more than {MAX_TOLD} faults of robots; no further ones are told");
+            output::tell(format_args!("more than {MAX_TOLD} faults of robots; no further ones are told"));
             return;
         }
         let text = text();
-        eprintln!("voxtile share: {robot}: {text}");
+        output::tell(format_args!("{robot}: {text}"));
         self.told.insert((robot.clone(), kind), text);
     }
 
     /// Notes that it is over: next time it is new.
     pub fn is_over(&mut self, robot: &RobotName, kind: Kind) {
         self.told.remove(&(robot.clone(), kind));
-    }
-
-    /// Whether it was told of a robot, and is not over.
-    pub fn has_told(&self, robot: &RobotName, kind: Kind) -> bool {
-        self.told.contains_key(&(robot.clone(), kind))
     }
 
     /// What was told of a robot.

@@ -3,6 +3,7 @@ use crate::files::{layers_folder, lengths, load_layer, open_map};
 use crate::json;
 use crate::layer_store::{LayerRoom, LayerStore};
 use crate::link::{Link, asks_key, parse_key};
+use crate::output;
 use crate::publish::random_number;
 use crate::reports::{Kind, Reports};
 use crate::robot_name::RobotName;
@@ -134,9 +135,9 @@ impl Subscriber<'_> {
     /// Tells of the first robot that there is no room for. There may be any number of them.
     fn refuse(&mut self, robot: &RobotName, reason: &str) -> bool {
         if !std::mem::replace(&mut self.has_refused, true) {
-            eprintln!(
-                "voxtile share: {robot}, and maybe others, is not listened to: {reason}; --robot names those that count"
-            );
+            output::tell(format_args!(
+                "{robot}, and maybe others, is not listened to: {reason}; --robot names those that count"
+            ));
         }
         false
     }
@@ -252,18 +253,19 @@ impl Subscriber<'_> {
             let kept = (!robot.store.has(&mut layer)).then_some(layer);
             left.push((name, robot.store, kept, told));
         }
-        let mut at_fault = Vec::new();
+        let (mut at_fault, mut lines) = (Vec::new(), Vec::new());
         for (name, store, kept, (voxels, digest, is_equal, counts)) in left {
-            let is_saved = kept.is_none();
+            let (is_saved, mut is_folded) = (kept.is_none(), true);
             if let Some(grid) = grid.as_ref().filter(|_| !args.keep_apart) {
                 let layer = kept.map_or_else(|| load_layer(store.path(), u64::MAX), Ok);
                 if let Err(error) =
                     layer.and_then(|layer| fold(map, grid, &layer, args.memory.as_u64() as usize))
                 {
+                    is_folded = false;
                     reports.tell(&name, Kind::Fold, || format!("{error:#}; its layer is not folded"));
                 }
             }
-            if !is_saved || reports.has_told(&name, Kind::Fold) {
+            if !(is_saved && is_folded) {
                 at_fault.push(name.to_string());
             }
             let faults: Vec<&str> = reports.of(&name).collect();
@@ -272,17 +274,20 @@ impl Subscriber<'_> {
                     "robot": name.to_string(), "voxels": voxels, "digest": digest, "is_equal": is_equal,
                     "is_saved": is_saved, "faults": faults, "counts": counts,
                 });
-                json::print(&line)?;
+                lines.push(json::line(&line)?);
             } else {
                 let state = if is_equal { "equal to the robot's" } else { "not known to be equal" };
-                println!("{name}: {voxels} voxels, digest {digest}, {state}");
-                println!("received  {} bytes, asked {} bytes", counts.bytes, counts.ask_bytes);
+                let (bytes, ask_bytes) = (counts.bytes, counts.ask_bytes);
+                lines.push(format!("{name}: {voxels} voxels, digest {digest}, {state}"));
+                lines.push(format!("received  {bytes} bytes, asked {ask_bytes} bytes"));
             }
         }
+        // Only now: a disk that takes no more of them is no reason not to fold.
+        let printed = lines.iter().try_for_each(output::print);
         if !at_fault.is_empty() {
             bail!("not saved, or not folded into {}: {}; see above", map.display(), at_fault.join(", "));
         }
-        Ok(())
+        Ok(printed?)
     }
 }
 

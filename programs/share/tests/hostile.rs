@@ -68,7 +68,6 @@ fn peak_rss_bytes(process: u32) -> u64 {
 }
 
 /// Says what a process tells on standard error, line by line.
-#[cfg(target_os = "linux")]
 fn told_by(process: &mut Process) -> Receiver<String> {
     let (out, told) = channel();
     let lines = BufReader::new(process.0.stderr.take().unwrap()).lines();
@@ -224,6 +223,43 @@ fn one_robots_fault_stays_its_own() {
     let layer = layers.join("honest.layer");
     let again = run(&["--fold", layer.to_str().unwrap(), "-o", map.to_str().unwrap(), "--json"]);
     assert!(again.status.success());
+}
+
+/// There are bounds to what is told, and none to what is wrong.
+#[test]
+fn a_layer_that_is_not_folded_is_a_failure_though_nothing_more_is_told() {
+    const FULL: &str = "no further ones are told";
+    let folder = TempDir::new().unwrap();
+    let (honest, other, map) = (endpoint(), endpoint(), folder.path().join("map"));
+    // No map can be made here.
+    fs::write(&map, b"").unwrap();
+    let layers = folder.path().join("map.layers");
+    fs::create_dir_all(&layers).unwrap();
+    let damaged: Vec<String> = (0..1002).map(|number| format!("n{number}")).collect();
+    for robot in &damaged {
+        fs::write(layers.join(format!("{robot}.layer")), b"no layer").unwrap();
+    }
+    let session = open(&other);
+    let mut honest_publisher = publisher("honest", &scans(folder.path(), 3, 5), &honest);
+    set_of(&mut honest_publisher);
+    let args = ["--subscribe", "-o", map.to_str().unwrap(), "--json", "--connect", &honest, "--connect"];
+    let mut command = Command::new(SHARE);
+    let command = command.args(args).arg(&other).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut subscriber = Process(command.spawn().unwrap());
+    let told = told_by(&mut subscriber);
+    let begin = Instant::now();
+    while !told.try_iter().any(|line| line.contains(FULL)) {
+        assert!(begin.elapsed() < Duration::from_secs(200), "there are never enough faults");
+        for robot in &damaged {
+            session.put(format!("voxtile/{robot}/packets"), vec![0; 8]).wait().unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(300));
+    }
+    std::thread::sleep(Duration::from_secs(5));
+    stop(&subscriber);
+    let (came, is_success) = layers_and_success(&mut subscriber);
+    assert_eq!(came.iter().map(|layer| layer.0.as_str()).collect::<Vec<_>>(), ["honest"]);
+    assert!(!is_success);
 }
 
 fn aside(layers: &Path, robot: &str) -> std::path::PathBuf {

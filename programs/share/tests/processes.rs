@@ -2,9 +2,10 @@
 
 mod support;
 
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use support::bad_link::BadLink;
-use support::{SHARE, endpoint, layers_of, publisher, run, scans, set_of, start, subscriber};
+use support::{Process, SHARE, endpoint, layers_of, publisher, run, scans, set_of, start, subscriber};
 use tempfile::TempDir;
 
 #[test]
@@ -165,5 +166,27 @@ fn what_is_wrong_on_the_command_line_is_said() {
         let output = run(&args);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && said.contains(word), "{args:?}: {said}");
+    }
+}
+
+/// Whoever reads what is said may go first: that is no reason not to fold.
+#[test]
+fn all_layers_are_folded_though_nobody_reads_what_is_said() {
+    let folder = TempDir::new().unwrap();
+    let (robots, map) = ([endpoint(), endpoint()], folder.path().join("map"));
+    let mut publishers = [("a", 41, &robots[0]), ("b", 42, &robots[1])]
+        .map(|(name, seed, endpoint)| publisher(name, &scans(folder.path(), seed, 10), endpoint));
+    let sets = publishers.each_mut().map(set_of);
+    let mut command = Command::new(SHARE);
+    command.args(["--subscribe", "-o", map.to_str().unwrap(), "--json", "--for", "10"]);
+    command.args(robots.iter().flat_map(|robot| ["--connect", robot]));
+    let mut subscriber = Process(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
+    drop((subscriber.0.stdout.take(), subscriber.0.stderr.take()));
+    assert!(subscriber.0.wait().unwrap().success());
+    for (name, (voxels, _)) in ["a", "b"].into_iter().zip(sets) {
+        let layer = folder.path().join(format!("map.layers/{name}.layer"));
+        let again = run(&["--fold", layer.to_str().unwrap(), "-o", map.to_str().unwrap(), "--json"]);
+        let report: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+        assert_eq!((report["voxels"].as_u64(), report["hits"].as_u64()), (Some(voxels), Some(0)), "{name}");
     }
 }

@@ -95,6 +95,8 @@ def _picture_html(map: Map) -> str:
     return f'<img alt="from above" src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
 
 
-def view(path: str | os.PathLike[str]) -> subprocess.Popen[bytes]:
-    """Opens the viewer in a browser. The process that serves it ends with ``terminate``."""
-    return subprocess.Popen([sys.executable, "-m", "voxtile", "view", os.path.abspath(path)])
+def view(path: str | os.PathLike[str], snapshot: str | None = None) -> subprocess.Popen[bytes]:
+    """Opens the viewer in a browser, on a map or a snapshot of it. The process that serves it ends with
+    ``terminate``."""
+    shown = os.path.abspath(path) if snapshot is None else f"{os.path.abspath(path)}@{snapshot}"
+    return subprocess.Popen([sys.executable, "-m", "voxtile", "view", shown])

@@ -11,7 +11,8 @@ pub struct Attachment {
 }
 
 pub const GID_BYTES: usize = 16;
-const BYTES: usize = 8 + 8 + 1 + GID_BYTES;
+/// Of every attachment.
+pub const BYTES: usize = 8 + 8 + 1 + GID_BYTES;
 
 impl Attachment {
     /// One of this moment.

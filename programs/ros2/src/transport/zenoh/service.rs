@@ -1,10 +1,19 @@
-use super::attachment::Attachment;
+use super::attachment::{Attachment, BYTES as ATTACHMENT_BYTES};
 use super::cdr;
 use anyhow::{Context as _, anyhow};
 use serde::{Serialize, de::DeserializeOwned};
 use zenoh::Wait as _;
 use zenoh::key_expr::KeyExpr;
 use zenoh::query::Query;
+
+/// What a request takes while it waits, all of it. `None` if its attachment is none of `rmw_zenoh`: such a one is of any
+/// size.
+pub fn waiting_bytes(query: &Query) -> Option<usize> {
+    let attachment = query.attachment().map_or(0, |attachment| attachment.len());
+    let is_ours = attachment == 0 || attachment == ATTACHMENT_BYTES;
+    let payload = query.payload().map_or(0, |payload| payload.len());
+    is_ours.then(|| payload.saturating_add(attachment).saturating_add(query.parameters().as_str().len()))
+}
 
 /// Answers a request, and tells who asks in a wrong way what is wrong.
 pub fn respond<Q: DeserializeOwned, A: Serialize>(query: &Query, key: &KeyExpr<'_>, answer: impl Fn(Q) -> A) {
@@ -32,4 +41,42 @@ fn response<Q: DeserializeOwned, A: Serialize>(
     // The response has the number and the gid of the request.
     let bytes = cdr::encode(&answer(request))?;
     Ok((bytes, Attachment::now(asked.number, asked.gid)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::channel;
+    use std::time::Duration;
+    use zenoh::Config;
+
+    /// What requests take, sent to a node in the same process.
+    fn bytes_of(requests: &[(&str, usize, Option<usize>)]) -> Vec<Option<usize>> {
+        let mut config = Config::default();
+        for (key, value) in [("scouting/multicast/enabled", "false"), ("listen/endpoints", "[]")] {
+            config.insert_json5(key, value).unwrap();
+        }
+        let session = zenoh::open(config).wait().unwrap();
+        let (out, seen) = channel();
+        let note = move |query: Query| out.send(waiting_bytes(&query)).unwrap();
+        let _queryable = session.declare_queryable("service").callback(note).wait().unwrap();
+        let ask = |&(selector, payload, attachment): &(&str, usize, Option<usize>)| {
+            let attachment = attachment.map(|bytes| vec![0_u8; bytes]);
+            session.get(selector).payload(vec![0_u8; payload]).attachment(attachment).wait().unwrap();
+            seen.recv_timeout(Duration::from_secs(60)).unwrap()
+        };
+        requests.iter().map(ask).collect()
+    }
+
+    #[test]
+    fn all_of_a_request_is_counted_and_other_attachments_are_refused() {
+        let requests = [
+            ("service", 10, Some(ATTACHMENT_BYTES)),
+            ("service?a=123456", 10, Some(ATTACHMENT_BYTES)),
+            ("service", 10, None),
+            ("service", 10, Some(ATTACHMENT_BYTES - 1)),
+            ("service", 10, Some(1 << 20)),
+        ];
+        assert_eq!(bytes_of(&requests), [Some(43), Some(51), Some(10), None, None]);
+    }
 }

@@ -2,7 +2,7 @@ use super::configuration::configuration;
 use super::graph_name::{Channel, End, GraphName, gid_of};
 use super::listeners::Listeners;
 use super::mailbox::Mailbox;
-use super::service::respond;
+use super::service::{respond, waiting_bytes};
 use super::zenoh_sender::ZenohSender;
 use crate::args::Args;
 use crate::inbox::Inbox;
@@ -38,6 +38,7 @@ pub struct ZenohNode {
 
 /// As services are in ROS 2.
 const SERVICE_QOS: Qos = Qos::reliable(10);
+/// With its attachment and its parameters.
 const MOST_REQUEST_BYTES: usize = 1 << 20;
 /// How often a publisher tells what it has sent last, while something new was sent.
 const HEARTBEAT: Duration = Duration::from_millis(500);
@@ -148,11 +149,13 @@ impl ZenohNode {
             .declare_queryable(key.clone())
             .complete(true)
             .callback(move |query| {
-                let bytes = query.payload().map_or(0, |payload| payload.len());
                 // Who gets no answer is told so: Zenoh does it where a query is dropped.
-                let lost = if bytes > MOST_REQUEST_BYTES { 1 } else { to.put(query, bytes) };
+                let lost = match waiting_bytes(&query) {
+                    Some(bytes) if bytes <= MOST_REQUEST_BYTES => to.put(query, bytes),
+                    _ => 1,
+                };
                 if lost > 0 {
-                    log::debug!("{label}: a request is not answered: too large, or more than can wait");
+                    log::debug!("{label}: a request is not answered: none, too large, or more than can wait");
                     inbox.count(|counters| counters.transport_errors += lost as u64);
                 }
             })
