@@ -18,8 +18,9 @@ use voxtile::{
     Storage,
 };
 
-const PRUNE: PushOptions = PushOptions { prunes: true };
-const KEEP: PushOptions = PushOptions { prunes: false };
+const PRUNE: PushOptions = PushOptions { prunes: true, replaces: false };
+const KEEP: PushOptions = PushOptions { prunes: false, replaces: false };
+const REPLACE: PushOptions = PushOptions { prunes: false, replaces: true };
 
 /// A store in memory and what tests do to it.
 struct Server {
@@ -255,6 +256,104 @@ fn a_pull_replaces_an_earlier_state_and_fetches_what_is_new() {
     ));
 }
 
+/// Goes on with a map by some scans, each a flush.
+fn go_on(map: &Path, seed: u64, flushes: u64) {
+    let mut mapper = OutOfCoreTileMapper::open(map, config(Storage::OctoMap)).unwrap();
+    for number in 0..flushes {
+        mapper.insert_scan(&scan_at(seed + number, 20.0)).unwrap();
+        mapper.flush().unwrap();
+    }
+}
+
+fn message_of<T: std::fmt::Debug>(outcome: voxtile::Result<T>) -> String {
+    format!("{:#}", anyhow::Error::from(outcome.unwrap_err()))
+}
+
+/// Two robots go on with copies of one map: neither's way is lost, neither there nor on its own disk.
+#[test]
+fn copies_that_went_different_ways_do_not_replace_each_other() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let [map, ours, theirs] = ["map", "ours", "theirs"].map(|name| folder.path().join(name));
+    let bucket = server.bucket();
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    for copy in [&ours, &theirs] {
+        pull(&bucket, copy, false, |_, _| {}).unwrap();
+    }
+    go_on(&ours, 100, 2);
+    go_on(&theirs, 200, 5);
+    // What was never there is not replaced by an earlier state, and not by that of another.
+    push_now(&ours, &bucket);
+    let (ours_pushed, theirs_now) = (digest(&ours), digest(&theirs));
+    let refused = message_of(push(theirs.as_path(), &bucket, KEEP, |_, _| {}));
+    assert!(refused.contains("voxtile merge") && refused.contains("--replace"), "{refused}");
+    assert_eq!(digest_there(&bucket).unwrap(), ours_pushed);
+    go_on(&ours, 110, 5);
+    push_now(&ours, &bucket);
+    let refused = message_of(pull(&bucket, &theirs, true, |_, _| {}));
+    assert!(refused.contains("voxtile merge") && refused.contains("theirs"), "{refused}");
+    assert_eq!(digest(&theirs), theirs_now);
+    // The first copy did not go on: it takes what is there, and goes on from it.
+    pull(&bucket, &map, true, |_, _| {}).unwrap();
+    assert_eq!(digest(&map), digest(&ours));
+    assert_whole(&map);
+    go_on(&map, 300, 1);
+    push_now(&map, &bucket);
+    // Whoever insists loses what is there.
+    go_on(&theirs, 210, 20);
+    push(theirs.as_path(), &bucket, REPLACE, |_, _| {}).unwrap();
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&theirs));
+}
+
+/// Earlier versions noted nothing: of two states of one flush only the one that is there may be pushed.
+#[test]
+fn another_state_of_the_same_flush_is_refused() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let [map, copy] = ["map", "copy"].map(|name| folder.path().join(name));
+    let bucket = server.bucket();
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &copy, false, |_, _| {}).unwrap();
+    go_on(&map, 100, 2);
+    go_on(&copy, 200, 2);
+    push_now(&map, &bucket);
+    for at in [&map, &copy] {
+        std::fs::remove_file(at.join("bucket_states")).unwrap();
+    }
+    let refused = message_of(push(copy.as_path(), &bucket, KEEP, |_, _| {}));
+    assert!(refused.contains("voxtile merge"), "{refused}");
+    assert_eq!(push_now(&map, &bucket).objects_sent, 0);
+    go_on(&map, 110, 1);
+    push_now(&map, &bucket);
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
+}
+
+/// What a push or a pull notes in the folder is of no map, and in nobody's way.
+#[test]
+fn what_is_noted_in_the_folder_is_in_nobodys_way() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    for at in [&map, &pulled] {
+        assert!(at.join("bucket_states").is_file());
+        assert_whole(at);
+        voxtile::integrity::repair(at.as_path(), |_| {}, |_, _| {}).unwrap();
+        assert_whole(at);
+    }
+    // A push that ends before it has noted that it came through finds itself there.
+    go_on(&map, 100, 1);
+    push_now(&map, &bucket);
+    let path = map.join("bucket_states");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (before, last) = text.trim_end().rsplit_once('\n').unwrap();
+    std::fs::write(&path, format!("{before}\n{}\n", last.replace("there", "offered"))).unwrap();
+    pull(&bucket, &map, true, |_, _| {}).unwrap();
+    go_on(&map, 110, 1);
+    push_now(&map, &bucket);
+}
+
 #[test]
 fn an_interrupted_pull_goes_on() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
@@ -274,7 +373,8 @@ fn an_interrupted_pull_goes_on() {
     server.put(&key, content);
     let again = pull(&bucket, &pulled, false, |_, _| {}).unwrap();
     assert!(again.files_fetched < again.files / 2, "{again:?}");
-    assert_eq!(files_of(&pulled).len(), again.files as usize);
+    // And what the pull notes.
+    assert_eq!(files_of(&pulled).len(), again.files as usize + 1);
     assert_eq!(digest(&pulled), digest(&map));
 }
 
