@@ -130,7 +130,7 @@ impl Earlier {
         Ok(Some(Self { store, known: known.unwrap_or_default(), _lock: lock }))
     }
 
-    /// Where a file is that is as it was.
+    /// Where a file is that is as it was, by what the log says.
     fn place_of(&self, path: &str, file: &StoredFile) -> Option<PathBuf> {
         let place = self.store.folder().join(path);
         let (folder, name) = path.split_once('/')?;
@@ -267,7 +267,10 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         }
         if let Some(earlier) = self.earlier.as_ref().and_then(|earlier| earlier.place_of(path, file)) {
             let _ = self.disk.remove_file(place);
-            if self.disk.link(&earlier, place).is_ok()
+            // What the log says of a file does not tell whether it was damaged since.
+            let is_whole = self.is_there(&earlier, file).unwrap_or(false);
+            if is_whole
+                && self.disk.link(&earlier, place).is_ok()
                 && self.kind(place)? == Some(EntryKind::File(file.bytes))
             {
                 return Ok(());
@@ -289,7 +292,7 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         io::copy(&mut input, &mut out).and_then(|_| out.flush()).map_err(failed)
     }
 
-    /// Whether an interrupted pull has fetched a file.
+    /// Whether a file is there with the right content, as an interrupted pull has fetched it.
     fn is_there(&self, place: &Path, file: &StoredFile) -> Result<bool> {
         if self.kind(place)? != Some(EntryKind::File(file.bytes)) {
             return Ok(false);

@@ -354,6 +354,26 @@ fn what_is_noted_in_the_folder_is_in_nobodys_way() {
     push_now(&map, &bucket);
 }
 
+/// A file that was damaged in the folder is fetched and not taken along.
+#[test]
+fn a_pull_takes_no_damaged_file_along() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
+    drop(city(&map, Storage::Compact, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    let (name, mut content) =
+        files_of(&pulled).into_iter().find(|(name, _)| name.ends_with("tile.vxt")).unwrap();
+    let middle = content.len() / 2;
+    content[middle] ^= 1;
+    std::fs::write(pulled.join(&name), content).unwrap();
+    let again = pull(&bucket, &pulled, true, |_, _| {}).unwrap();
+    // It, and the files that belong to no tile.
+    assert!(again.files_fetched < again.files / 2, "{again:?}");
+    assert_whole(&pulled);
+    assert_eq!(digest(&pulled), digest(&map));
+}
+
 #[test]
 fn an_interrupted_pull_goes_on() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
