@@ -127,6 +127,8 @@ impl Earlier {
         }
         let known = KnownStates::read(&**store.disk(), folder)?;
         check_was_there(bucket, &store, known.as_ref(), manifest)?;
+        // Now, and not after everything was fetched.
+        check_is_of_map(&FsDisk, folder)?;
         Ok(Some(Self { store, known: known.unwrap_or_default(), _lock: lock }))
     }
 

@@ -374,6 +374,23 @@ fn a_pull_takes_no_damaged_file_along() {
     assert_eq!(digest(&pulled), digest(&map));
 }
 
+/// What is in the way of the map that is to be replaced is told before anything is fetched.
+#[test]
+fn what_is_in_the_way_is_told_before_anything_is_fetched() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    std::fs::create_dir(pulled.join("quarantine")).unwrap();
+    let refused = message_of(pull(&bucket, &pulled, true, |_, _| panic!("something was fetched")));
+    assert!(refused.contains("quarantine") && refused.contains("move it away"), "{refused}");
+    assert!(!folder.path().join("pulled.unfinished").exists());
+    std::fs::remove_dir(pulled.join("quarantine")).unwrap();
+    pull(&bucket, &pulled, true, |_, _| {}).unwrap();
+    assert_whole(&pulled);
+}
+
 #[test]
 fn an_interrupted_pull_goes_on() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
