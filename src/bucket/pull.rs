@@ -44,8 +44,8 @@ const MOST_IN_FLIGHT: usize = 8;
 /// # Errors
 ///
 /// [`Error::NoMap`] if there is none in the bucket; [`Error::Mismatch`] if the folder has another map, or a state of this
-/// one that was in no bucket; [`Error::AlreadyExists`] if there is something in the folder, and no
-/// earlier state of this map is to be replaced; an object that is missing or damaged, named; a disk that refuses.
+/// one that was in no bucket; [`Error::AlreadyExists`] if there is something in the folder, and no earlier state of this
+/// map is to be replaced; an object that is missing or damaged, named; a disk that refuses.
 pub fn pull(
     bucket: &Bucket,
     folder: impl AsRef<Path>,

@@ -57,8 +57,8 @@ const ATTEMPTS: usize = 20;
 /// # Errors
 ///
 /// [`Error::Mismatch`] if another map is there, a later state of this one, or a state that it does not build on: a copy
-/// of the map went another way and was pushed. A map that cannot be read or is damaged; a
-/// store that refuses; another push that came first, whose state then stays.
+/// of the map went another way and was pushed. A map that cannot be read or is damaged; a store that refuses; another
+/// push that came first, whose state then stays.
 pub fn push(
     map: impl Into<MapPath>,
     bucket: &Bucket,
@@ -182,7 +182,11 @@ impl<'a> Push<'a> {
         }
         // A push that was interrupted behind its last step finds itself there: that is told when all is known.
         let may_be_same = before.flush_number == manifest.flush_number;
-        if self.builds_on(before)? || may_be_same { Ok(()) } else { Err(self.went_another_way(before, folder)) }
+        if self.builds_on(before)? || may_be_same {
+            Ok(())
+        } else {
+            Err(self.went_another_way(before, folder))
+        }
     }
 
     /// Of two states of one flush that differ, one went another way.

@@ -3,11 +3,13 @@
 use futures_util::TryStreamExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
 use tokio::runtime::Runtime;
 use voxtile::bucket::object_store::memory::InMemory;
 use voxtile::bucket::object_store::path::Path as Key;
+use voxtile::bucket::object_store::throttle::{ThrottleConfig, ThrottledStore};
 use voxtile::bucket::object_store::{ObjectStore, ObjectStoreExt};
 use voxtile::bucket::{Bucket, BucketDisk, FetchedFiles, PushOptions, Pushed, pull, push};
 use voxtile::integrity::verify;
@@ -579,7 +581,8 @@ fn files_are_fetched_as_they_lie_and_go_again() {
     let at = |prefix: &str| Bucket::on(server.store.clone(), prefix, "s3://test/drive").unwrap();
     let mut told = Vec::new();
     let fetched =
-        FetchedFiles::fetch(&at("drive"), place.path(), |done, all| told.push((done, all))).unwrap();
+        FetchedFiles::fetch(&at("drive"), place.path(), &|| false, |done, all| told.push((done, all)))
+            .unwrap();
     assert_eq!((fetched.files(), fetched.bytes()), (3, 100_005));
     assert_eq!(told.last(), Some(&(100_005, 100_005)));
     for (name, content) in &files {
@@ -589,8 +592,27 @@ fn files_are_fetched_as_they_lie_and_go_again() {
     drop(fetched);
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
 
-    let one = FetchedFiles::fetch(&at("drive/scans/1.pcd"), place.path(), |_, _| ()).unwrap();
+    let one = FetchedFiles::fetch(&at("drive/scans/1.pcd"), place.path(), &|| false, |_, _| ()).unwrap();
     assert!(one.path().ends_with("1.pcd") && one.path().is_file());
-    let nothing = FetchedFiles::fetch(&at("driv"), place.path(), |_, _| ()).unwrap_err().to_string();
+    let nothing =
+        FetchedFiles::fetch(&at("driv"), place.path(), &|| false, |_, _| ()).unwrap_err().to_string();
     assert!(nothing.contains("s3://test/drive: there is nothing"), "{nothing}");
+}
+
+/// Whoever is asked to stop while the content of files does not come does so soon, and leaves nothing.
+#[test]
+fn a_fetch_that_is_stopped_ends_soon_and_leaves_nothing() {
+    let (server, place) = (Server::new(), TempDir::new().unwrap());
+    for number in 0..20 {
+        server.put(&Key::from(format!("drive/{number}.pcd")), vec![1; 100]);
+    }
+    let slow = ThrottleConfig { wait_get_per_byte: Duration::from_secs(1), ..ThrottleConfig::default() };
+    let store = Arc::new(ThrottledStore::new(server.store.fork(), slow));
+    let bucket = Bucket::on(store, "drive", "s3://test/drive").unwrap();
+    let began = Instant::now();
+    let is_stopped = || began.elapsed() > Duration::from_secs(1);
+    let stopped = FetchedFiles::fetch(&bucket, place.path(), &is_stopped, |_, _| ());
+    assert!(matches!(stopped, Err(Error::Stopped)), "{stopped:?}");
+    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
 }

@@ -117,11 +117,8 @@ impl ServedMap {
         // What cannot be read now may be the next time.
         let Ok(found) = place_of(&self.at.map).and_then(snapshots) else { return Arc::default() };
         let whole = found.into_iter().filter(|info| info.damage.is_none());
-        let listed = whole.map(|info| Listed {
-            name: info.name,
-            flush_number: info.flush_number,
-            tiles: info.tiles,
-        });
+        let listed =
+            whole.map(|info| Listed { name: info.name, flush_number: info.flush_number, tiles: info.tiles });
         let listed = Arc::new(listed.collect::<Vec<_>>());
         *self.listed.lock() = Some((stamp, listed.clone()));
         listed

@@ -73,11 +73,7 @@ impl NodeStore {
 
     /// The same with a file that has at most so many bytes: before it gets longer, `empty` empties it and it is begun
     /// anew. Most of it is of states that nobody looks at any more, and all of it can be made again.
-    pub fn with_limit(
-        self,
-        most_bytes: u64,
-        empty: impl FnMut() -> io::Result<()> + Send + 'static,
-    ) -> Self {
+    pub fn with_limit(self, most_bytes: u64, empty: impl FnMut() -> io::Result<()> + Send + 'static) -> Self {
         self.spool.lock().limit = Some(Limit { most_bytes, empty: Box::new(empty) });
         self
     }
@@ -235,7 +231,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("nodes");
         let open = || {
-            let options = std::fs::OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+            let options =
+                std::fs::OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
             let file = options.unwrap();
             let same = file.try_clone().unwrap();
             NodeStore::open(file, &path).unwrap().with_limit(MOST, move || same.set_len(0))
@@ -249,7 +246,8 @@ mod tests {
             assert!(store.bytes() <= MOST && std::fs::metadata(&path).unwrap().len() <= MOST, "{number}");
         }
         assert_eq!(store.get(key_of(0), 7).unwrap(), None);
-        let there = |store: &NodeStore| (0..100).filter(|&k| store.get(key_of(k), 7).unwrap().is_some()).count();
+        let there =
+            |store: &NodeStore| (0..100).filter(|&k| store.get(key_of(k), 7).unwrap().is_some()).count();
         let kept = there(&store);
         assert!(kept > 1 && store.nodes.lock().len() == kept);
         drop(store);
