@@ -16,10 +16,11 @@ use object_store::{
 use std::io::{self, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
+use tokio::task::AbortHandle;
 
 /// A place for one map in an object store.
 ///
@@ -35,7 +36,11 @@ pub struct Bucket {
 }
 
 /// What a request will answer, while others are made.
-pub(super) struct Pending<T>(Receiver<io::Result<T>>);
+pub(super) struct Pending<T> {
+    answer: Receiver<io::Result<T>>,
+    /// Ends the request.
+    task: Option<AbortHandle>,
+}
 
 /// A manifest and what tells it from its successor.
 pub(super) struct FoundManifest {
@@ -58,6 +63,9 @@ const FETCHES: usize = 3;
 
 /// What took longer to fail is not tried again.
 const LATEST_RETRY: Duration = Duration::from_secs(10);
+
+/// How long an answer may keep us waiting before we look up.
+const PATIENCE: Duration = Duration::from_millis(100);
 
 /// The longest manifest or page that is read.
 const MOST_LIST_BYTES: u64 = 1 << 28;
@@ -278,8 +286,8 @@ impl Bucket {
         pending(async move { store.head(&key).await.map_err(|error| refused(&key, &error)) }).wait().is_ok()
     }
 
-    /// The object of the URL itself, or those below it, by name.
-    pub(super) fn objects_below(&self) -> io::Result<Vec<StoredObject>> {
+    /// Begins to list the object of the URL itself, or those below it, by name.
+    pub(super) fn objects_below(&self) -> Pending<Vec<StoredObject>> {
         let (store, prefix) = (self.store.clone(), self.prefix.clone());
         pending(async move {
             let object = |meta: object_store::ObjectMeta, name: String, is_url| StoredObject {
@@ -309,7 +317,6 @@ impl Bucket {
             objects.sort_by(|a, b| a.name.cmp(&b.name));
             Ok(objects)
         })
-        .wait()
     }
 
     /// Begins to fetch an object into a file, as it was when it was listed.
@@ -341,8 +348,34 @@ impl Bucket {
 impl<T> Pending<T> {
     /// Waits for the answer.
     pub(super) fn wait(self) -> io::Result<T> {
-        self.0.recv().unwrap_or_else(|_| Err(io::Error::other("the request was given up")))
+        self.answer.recv().unwrap_or_else(|_| Err(given_up()))
     }
+
+    /// Waits for the answer; `None` if that is to stop before it comes. Nothing of the request goes on then.
+    pub(super) fn wait_unless(self, is_stopped: &dyn Fn() -> bool) -> Option<io::Result<T>> {
+        while !is_stopped() {
+            match self.answer.recv_timeout(PATIENCE) {
+                Ok(answer) => return Some(answer),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Some(Err(given_up())),
+            }
+        }
+        self.give_up();
+        None
+    }
+
+    /// Ends the request, and waits until nothing of it goes on.
+    pub(super) fn give_up(self) {
+        if let Some(task) = &self.task {
+            task.abort();
+        }
+        // An answer after all, or the end of who would have sent one.
+        let _ = self.answer.recv();
+    }
+}
+
+fn given_up() -> io::Error {
+    io::Error::other("the request was given up")
 }
 
 /// Begins a request on threads of its own, so that the caller may be on any thread, even one of another runtime.
@@ -353,14 +386,15 @@ fn pending<T: Send + 'static>(request: impl Future<Output = io::Result<T>> + Sen
         builder.worker_threads(2).thread_name("voxtile-bucket").enable_all().build()
     };
     let (out, answer) = sync_channel(1);
-    match RUNTIME.get_or_init(new) {
-        Ok(runtime) => drop(runtime.spawn(async move { out.send(request.await) })),
+    let task = match RUNTIME.get_or_init(new) {
+        Ok(runtime) => Some(runtime.spawn(async move { out.send(request.await) }).abort_handle()),
         Err(error) => {
             let reason = format!("no threads for the network: {error}");
             let _ = out.send(Err(io::Error::other(reason)));
+            None
         }
-    }
-    Pending(answer)
+    };
+    Pending { answer, task }
 }
 
 /// Gets an object, or some of its bytes. An answer that is cut off is asked for again; the store itself does that only

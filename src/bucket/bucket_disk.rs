@@ -85,6 +85,16 @@ impl Ahead {
         Some(pending)
     }
 
+    /// Asks for a file, if another thread has not done so.
+    fn ask(&mut self, name: String, bytes: u64, fetch: impl FnOnce() -> Pending<Bytes>) {
+        if self.files.contains(&name) {
+            return;
+        }
+        self.make_room(bytes);
+        self.files.put(name, (bytes, fetch()));
+        self.bytes += bytes;
+    }
+
     /// Makes room for a file; those asked for longest ago, which nobody wanted, go.
     fn make_room(&mut self, bytes: u64) {
         while (self.files.len() >= 2 * FILES_AHEAD || self.bytes + bytes > BYTES_AHEAD)
@@ -169,10 +179,7 @@ impl Disk for BucketDisk {
         }
         let Ok(Some(file)) = self.list.file(&name) else { return };
         let &[part] = &file.parts[..] else { return };
-        let mut ahead = self.ahead();
-        ahead.make_room(file.bytes);
-        ahead.files.put(name, (file.bytes, self.bucket.fetch(part, PART_BYTES)));
-        ahead.bytes += file.bytes;
+        self.ahead().ask(name, file.bytes, || self.bucket.fetch(part, PART_BYTES));
     }
 
     fn watch(&self, _: &Path) -> io::Result<Box<dyn ReaderWatch>> {
@@ -217,5 +224,26 @@ impl Disk for BucketDisk {
 
     fn lock(&self, _: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
         read_only()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bucket::object_name::ObjectName;
+    use object_store::memory::InMemory;
+
+    #[test]
+    fn a_file_that_two_threads_ask_for_is_counted_once() {
+        let bucket = Bucket::on(Arc::new(InMemory::new()), "map", "s3://test/map").unwrap();
+        let mut ahead = Ahead { files: LruCache::unbounded(), bytes: 0 };
+        for name in ["a", "b", "a"] {
+            ahead.ask(name.to_owned(), 10, || bucket.fetch(ObjectName::of(b""), 10));
+        }
+        assert_eq!((ahead.files.len(), ahead.bytes), (2, 20));
+        for name in ["a", "b"] {
+            assert!(ahead.take(name).is_some());
+        }
+        assert_eq!(ahead.bytes, 0);
     }
 }

@@ -1,4 +1,4 @@
-use super::bucket::{Bucket, Pending};
+use super::bucket::{Bucket, Pending, StoredObject};
 use crate::error::{Error, Result};
 use crate::store::{Disk, FsDisk};
 use std::collections::VecDeque;
@@ -19,18 +19,22 @@ pub struct FetchedFiles {
 const MOST_IN_FLIGHT: usize = 8;
 
 impl FetchedFiles {
-    /// Fetches them into a new folder in `parent`. An object that changes meanwhile is an error. `progress` hears of
-    /// bytes done and of all bytes.
+    /// Fetches them into a new folder in `parent`. An object that changes meanwhile is an error. `is_stopped` is asked
+    /// ten times a second; `progress` hears of bytes done and of all bytes. Where it fails or is stopped, nothing stays.
     ///
     /// # Errors
     ///
     /// Nothing there; an object that is missing, cut or changed, or whose name leads out of the folder, named; a disk
-    /// that refuses.
-    pub fn fetch(bucket: &Bucket, parent: &Path, mut progress: impl FnMut(u64, u64)) -> Result<Self> {
-        let failed = |error| Error::io(Path::new(bucket.url()), "read", error);
+    /// that refuses; [`Error::Stopped`].
+    pub fn fetch(
+        bucket: &Bucket,
+        parent: &Path,
+        is_stopped: &dyn Fn() -> bool,
+        progress: impl FnMut(u64, u64),
+    ) -> Result<Self> {
         let folder = tempfile::Builder::new().prefix("voxtile-scans-").tempdir_in(parent);
         let folder = folder.map_err(|error| Error::io(parent, "make a folder in", error))?;
-        let objects = bucket.objects_below().map_err(failed)?;
+        let objects = wait(bucket, bucket.objects_below(), is_stopped)?;
         let (files, bytes) = (objects.len() as u64, objects.iter().map(|object| object.bytes).sum());
         let path = match &*objects {
             [] => {
@@ -43,24 +47,12 @@ impl FetchedFiles {
             [one] if one.is_url => folder.path().join(checked_name(bucket, &one.name)?),
             _ => folder.path().to_owned(),
         };
-        let (mut done, mut on_their_way) = (0, VecDeque::<(u64, Pending<()>)>::new());
-        let mut wait = |(fetched, pending): (u64, Pending<()>)| -> Result<()> {
-            pending.wait().map_err(failed)?;
-            done += fetched;
-            progress(done, bytes);
-            Ok(())
-        };
-        for object in objects {
-            if on_their_way.len() == MOST_IN_FLIGHT
-                && let Some(first) = on_their_way.pop_front()
-            {
-                wait(first)?;
-            }
-            let to = folder.path().join(checked_name(bucket, &object.name)?);
-            make_folders(folder.path(), &to)?;
-            on_their_way.push_back((object.bytes, bucket.fetch_file(object, to)));
-        }
-        on_their_way.into_iter().try_for_each(wait)?;
+        let on_their_way = VecDeque::new();
+        let mut fetching = Fetching { bucket, is_stopped, progress, on_their_way, done: 0, bytes };
+        let fetched = fetching.all(objects, folder.path());
+        // Nobody writes into the folder any more when it goes.
+        fetching.on_their_way.into_iter().for_each(|(_, pending)| pending.give_up());
+        fetched?;
         Ok(Self { _folder: folder, path, files, bytes })
     }
 
@@ -78,6 +70,47 @@ impl FetchedFiles {
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
+}
+
+/// Objects that are being fetched.
+struct Fetching<'a, P> {
+    bucket: &'a Bucket,
+    is_stopped: &'a dyn Fn() -> bool,
+    progress: P,
+    /// With the bytes of each, in order.
+    on_their_way: VecDeque<(u64, Pending<()>)>,
+    done: u64,
+    bytes: u64,
+}
+
+impl<P: FnMut(u64, u64)> Fetching<'_, P> {
+    fn all(&mut self, objects: Vec<StoredObject>, folder: &Path) -> Result<()> {
+        for object in objects {
+            if self.on_their_way.len() == MOST_IN_FLIGHT {
+                self.end_first()?;
+            }
+            let to = folder.join(checked_name(self.bucket, &object.name)?);
+            make_folders(folder, &to)?;
+            self.on_their_way.push_back((object.bytes, self.bucket.fetch_file(object, to)));
+        }
+        while !self.on_their_way.is_empty() {
+            self.end_first()?;
+        }
+        Ok(())
+    }
+
+    fn end_first(&mut self) -> Result<()> {
+        let Some((bytes, pending)) = self.on_their_way.pop_front() else { return Ok(()) };
+        wait(self.bucket, pending, self.is_stopped)?;
+        self.done += bytes;
+        (self.progress)(self.done, self.bytes);
+        Ok(())
+    }
+}
+
+fn wait<T>(bucket: &Bucket, pending: Pending<T>, is_stopped: &dyn Fn() -> bool) -> Result<T> {
+    let answer = pending.wait_unless(is_stopped).ok_or(Error::Stopped)?;
+    answer.map_err(|error| Error::io(bucket.path(), "read", error))
 }
 
 /// Makes the folders between a folder and a file in it.

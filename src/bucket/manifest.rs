@@ -74,7 +74,8 @@ impl Manifest {
         serde_json::to_vec_pretty(&Self { checksum: Some(self.computed_checksum()?), ..self.clone() })
     }
 
-    fn computed_checksum(&self) -> serde_json::Result<ObjectName> {
+    /// What tells this state of the map from all others.
+    pub(super) fn computed_checksum(&self) -> serde_json::Result<ObjectName> {
         Ok(ObjectName::of(&serde_json::to_vec(&Self { checksum: None, ..self.clone() })?))
     }
 

@@ -15,6 +15,7 @@
 //! | `file_list` | the list of files, with the pages that were asked for |
 //! | `bucket_disk`, `part_reader` | a map in a bucket as files that can be read |
 //! | `fetched_files` | scans and other files of any bucket, for what reads files |
+//! | `known_states` | what a folder builds on: the states that were pushed from it or pulled into it |
 //! | `push`, `sender`, `prune`, `pull` | maps to buckets and back |
 //!
 //! `docs/format.md` describes the objects.
@@ -24,6 +25,7 @@ mod bucket;
 mod bucket_disk;
 mod fetched_files;
 mod file_list;
+mod known_states;
 mod manifest;
 mod object_name;
 mod part_reader;

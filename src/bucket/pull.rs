@@ -1,5 +1,6 @@
 use super::bucket::{Bucket, Pending};
 use super::file_list::FileList;
+use super::known_states::{BUCKET_STATES, BUCKET_STATES_NEXT, KnownStates};
 use super::manifest::{Manifest, PART_BYTES, StoredFile};
 use super::object_name::ObjectName;
 use super::part_reader::PartReader;
@@ -38,12 +39,13 @@ const MOST_IN_FLIGHT: usize = 8;
 /// interrupted pull has fetched is not fetched again. `progress` hears of bytes done and of all bytes.
 ///
 /// With `replaces` there may be an earlier state of the map in the folder: files that are as they were are taken from
-/// there, and in the end the two change places at once. What it has and the bucket lacks is lost.
+/// there, and in the end the two change places at once. It must not have been changed since it was pushed or pulled.
 ///
 /// # Errors
 ///
-/// [`Error::NoMap`] if there is none in the bucket; [`Error::AlreadyExists`] if there is something in the folder, and no
-/// earlier state of this map is to be replaced; an object that is missing or damaged, named; a disk that refuses.
+/// [`Error::NoMap`] if there is none in the bucket; [`Error::Mismatch`] if the folder has another map, or a state of this
+/// one that was in no bucket; [`Error::AlreadyExists`] if there is something in the folder, and no earlier state of this
+/// map is to be replaced; an object that is missing or damaged, named; a disk that refuses.
 pub fn pull(
     bucket: &Bucket,
     folder: impl AsRef<Path>,
@@ -54,12 +56,13 @@ pub fn pull(
     let found = bucket.manifest()?.ok_or_else(|| Error::NoMap { path: bucket.path().to_owned() })?;
     let manifest = found.manifest;
     let (disk, unfinished) = (FsDisk, staging_folder(folder)?);
-    let earlier = Earlier::find(&disk, folder, &manifest, replaces)?;
+    let earlier = Earlier::find(&disk, bucket, folder, &manifest, replaces)?;
     begin(&disk, &unfinished)?;
     let lock = WriterLock::take(&disk, &Layout::new(&unfinished))?;
     check_is_of_map(&disk, &unfinished)?;
     let pulled = Pulled { flush_number: manifest.flush_number, tiles: manifest.tiles, ..Pulled::default() };
     let all_bytes = manifest.bytes;
+    let known = known_with(bucket, &manifest, earlier.as_ref())?;
     let list = FileList::new(bucket.clone(), manifest);
     let mut pull = Pull {
         bucket,
@@ -73,6 +76,7 @@ pub fn pull(
     };
     pull.take_all(&list)?;
     let Pull { pulled, earlier, .. } = pull;
+    known.write(&disk, &unfinished)?;
     take_place(&disk, &unfinished, folder, earlier.is_some())?;
     drop(lock);
     Ok(pulled)
@@ -81,12 +85,19 @@ pub fn pull(
 /// The state of the map that is replaced.
 struct Earlier {
     store: TileStore,
+    known: KnownStates,
     _lock: WriterLock,
 }
 
 impl Earlier {
     /// The map in a folder; `None` if there is nothing.
-    fn find(disk: &FsDisk, folder: &Path, manifest: &Manifest, replaces: bool) -> Result<Option<Self>> {
+    fn find(
+        disk: &FsDisk,
+        bucket: &Bucket,
+        folder: &Path,
+        manifest: &Manifest,
+        replaces: bool,
+    ) -> Result<Option<Self>> {
         let is_free = match disk.kind(folder).map_err(|error| Error::io(folder, "look at", error))? {
             None => true,
             Some(EntryKind::Folder) => list(disk, folder)?.is_empty(),
@@ -114,10 +125,14 @@ impl Earlier {
             let wanted = format!("at most {} as the bucket; push it", manifest.flush_number);
             return Err(Error::Mismatch { path, what: "flush", found, wanted });
         }
-        Ok(Some(Self { store, _lock: lock }))
+        let known = KnownStates::read(&**store.disk(), folder)?;
+        check_was_there(bucket, &store, known.as_ref(), manifest)?;
+        // Now, and not after everything was fetched.
+        check_is_of_map(&FsDisk, folder)?;
+        Ok(Some(Self { store, known: known.unwrap_or_default(), _lock: lock }))
     }
 
-    /// Where a file is that is as it was.
+    /// Where a file is that is as it was, by what the log says.
     fn place_of(&self, path: &str, file: &StoredFile) -> Option<PathBuf> {
         let place = self.store.folder().join(path);
         let (folder, name) = path.split_once('/')?;
@@ -133,6 +148,39 @@ impl Earlier {
             (file.bytes, file.crc32, file.scan_number) == (bytes, Some(crc), Some(version.scan_number));
         is_same.then_some(place)
     }
+}
+
+/// What a folder has and no bucket ever had is not replaced: it may be the only copy. Where nobody has noted what was
+/// in a bucket, as earlier versions did not, the flush alone tells.
+fn check_was_there(
+    bucket: &Bucket,
+    store: &TileStore,
+    known: Option<&KnownStates>,
+    manifest: &Manifest,
+) -> Result<()> {
+    let flush_number = store.commits().flush_number;
+    let Some(known) = known else { return Ok(()) };
+    if known.were_there(flush_number) || known.name(name_of(bucket, manifest)?) {
+        return Ok(());
+    }
+    let path = store.folder().to_owned();
+    let wanted = format!(
+        "one that was in a bucket, and the bucket's {} lacks what was mapped since; push it, or where that is refused, \
+         pull into a new folder and `voxtile merge` the two",
+        manifest.flush_number
+    );
+    Err(Error::Mismatch { path, what: "flush", found: flush_number.to_string(), wanted })
+}
+
+/// What the folder builds on with this state in it.
+fn known_with(bucket: &Bucket, manifest: &Manifest, earlier: Option<&Earlier>) -> Result<KnownStates> {
+    let mut known = earlier.map(|earlier| earlier.known.clone()).unwrap_or_default();
+    known.note(manifest, name_of(bucket, manifest)?, true);
+    Ok(known)
+}
+
+fn name_of(bucket: &Bucket, manifest: &Manifest) -> Result<ObjectName> {
+    manifest.computed_checksum().map_err(|error| Error::io(bucket.path(), "read", error.into()))
 }
 
 /// A pull that goes on.
@@ -221,7 +269,10 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         }
         if let Some(earlier) = self.earlier.as_ref().and_then(|earlier| earlier.place_of(path, file)) {
             let _ = self.disk.remove_file(place);
-            if self.disk.link(&earlier, place).is_ok()
+            // What the log says of a file does not tell whether it was damaged since.
+            let is_whole = self.is_there(&earlier, file).unwrap_or(false);
+            if is_whole
+                && self.disk.link(&earlier, place).is_ok()
                 && self.kind(place)? == Some(EntryKind::File(file.bytes))
             {
                 return Ok(());
@@ -243,7 +294,7 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         io::copy(&mut input, &mut out).and_then(|_| out.flush()).map_err(failed)
     }
 
-    /// Whether an interrupted pull has fetched a file.
+    /// Whether a file is there with the right content, as an interrupted pull has fetched it.
     fn is_there(&self, place: &Path, file: &StoredFile) -> Result<bool> {
         if self.kind(place)? != Some(EntryKind::File(file.bytes)) {
             return Ok(false);
@@ -302,8 +353,16 @@ fn check_is_of_map(disk: &FsDisk, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-const OWN_FILES: [&str; 6] =
-    ["metadata.json", "metadata.json.next", "commits.log", "commits.log.next", "scans.bin", "writer.lock"];
+const OWN_FILES: [&str; 8] = [
+    "metadata.json",
+    "metadata.json.next",
+    "commits.log",
+    "commits.log.next",
+    "scans.bin",
+    "writer.lock",
+    BUCKET_STATES,
+    BUCKET_STATES_NEXT,
+];
 
 /// Gives the map that was pulled its name, durably.
 fn take_place(disk: &FsDisk, unfinished: &Path, folder: &Path, replaces: bool) -> Result<()> {

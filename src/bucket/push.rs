@@ -1,5 +1,6 @@
 use super::bucket::Bucket;
 use super::file_list::FileList;
+use super::known_states::KnownStates;
 use super::manifest::{Files, Manifest, StoredFile, page_from_bytes};
 use super::object_name::ObjectName;
 use super::prune::prune;
@@ -22,6 +23,9 @@ pub struct PushOptions {
     /// Remove the objects that no manifest names any more. Whoever reads an earlier state of the map has to open it
     /// anew.
     pub prunes: bool,
+    /// Replace whatever earlier state of the same map is there, also one that the folder does not build on: what that
+    /// has and the folder lacks is lost.
+    pub replaces: bool,
 }
 
 /// What a push did.
@@ -52,8 +56,9 @@ const ATTEMPTS: usize = 20;
 ///
 /// # Errors
 ///
-/// [`Error::Mismatch`] if another map is there or a later state of this one; a map that cannot be read or is damaged; a
-/// store that refuses; another push that came first, whose state then stays.
+/// [`Error::Mismatch`] if another map is there, a later state of this one, or a state that it does not build on: a copy
+/// of the map went another way and was pushed. A map that cannot be read or is damaged; a store that refuses; another
+/// push that came first, whose state then stays.
 pub fn push(
     map: impl Into<MapPath>,
     bucket: &Bucket,
@@ -62,7 +67,7 @@ pub fn push(
 ) -> Result<Pushed> {
     bucket.check_can_write()?;
     let map = map.into();
-    let mut push = Push::begin(bucket)?;
+    let mut push = Push::begin(bucket, &map, options)?;
     let mut manifest = push.send_map(&map, &mut progress);
     for _ in 1..ATTEMPTS {
         if !matches!(manifest, Err(Error::Changed { .. })) {
@@ -71,9 +76,8 @@ pub fn push(
         manifest = push.send_map(&map, &mut progress);
     }
     let manifest = manifest.map_err(|error| push.overtaken().unwrap_or(error))?;
-    if push.before.as_ref() != Some(&manifest) {
-        bucket.replace_manifest(&manifest, push.version)?;
-    }
+    push.check_is_same_or_later(&manifest, map.folder())?;
+    push.put(&map, &manifest)?;
     let mut pushed = Pushed {
         flush_number: manifest.flush_number,
         tiles: manifest.tiles,
@@ -95,6 +99,9 @@ struct Push<'a> {
     /// The manifest that was there, and what tells it from its successor.
     before: Option<Manifest>,
     version: Option<UpdateVersion>,
+    /// What the folder builds on, if that is known.
+    known: Option<KnownStates>,
+    replaces: bool,
     /// Its files.
     list: Option<FileList>,
     sender: Sender<'a>,
@@ -104,14 +111,17 @@ struct Push<'a> {
 }
 
 impl<'a> Push<'a> {
-    fn begin(bucket: &'a Bucket) -> Result<Self> {
+    fn begin(bucket: &'a Bucket, map: &MapPath, options: PushOptions) -> Result<Self> {
+        let (disk, folder) = map.clone().into_parts();
+        let known = KnownStates::read(&*disk, &folder)?;
         let found = bucket.manifest()?;
         let (before, version) = found.map(|found| (found.manifest, found.version)).unzip();
         let list = before.clone().map(|before| FileList::new(bucket.clone(), before));
         let mut sender = Sender::new(bucket);
         sender.note(list.iter().flat_map(|list| list.own_files().values()));
         let sent = FxHashMap::default();
-        Ok(Self { bucket, before, version, list, sender, sent, tiles_sent: 0 })
+        let replaces = options.replaces;
+        Ok(Self { bucket, before, version, known, replaces, list, sender, sent, tiles_sent: 0 })
     }
 
     /// Sends what the bucket lacks of the map's last flush; the manifest that names all of it.
@@ -170,7 +180,73 @@ impl<'a> Push<'a> {
             let wanted = format!("at most {} as {}", manifest.flush_number, folder.display());
             return Err(Error::Mismatch { path, what: "flush", found, wanted });
         }
+        // A push that was interrupted behind its last step finds itself there: that is told when all is known.
+        let may_be_same = before.flush_number == manifest.flush_number;
+        if self.builds_on(before)? || may_be_same {
+            Ok(())
+        } else {
+            Err(self.went_another_way(before, folder))
+        }
+    }
+
+    /// Of two states of one flush that differ, one went another way.
+    fn check_is_same_or_later(&self, manifest: &Manifest, folder: &Path) -> Result<()> {
+        match &self.before {
+            Some(before)
+                if before != manifest
+                    && before.flush_number == manifest.flush_number
+                    && !(self.known.is_some() && self.builds_on(before)?)
+                    && !self.replaces =>
+            {
+                Err(self.went_another_way(before, folder))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether the folder builds on what is there. Where nobody has noted it, as earlier versions did not, it is
+    /// believed.
+    fn builds_on(&self, before: &Manifest) -> Result<bool> {
+        let Some(known) = &self.known else { return Ok(true) };
+        Ok(self.replaces || known.name(self.name_of(before)?))
+    }
+
+    fn went_another_way(&self, before: &Manifest, folder: &Path) -> Error {
+        let wanted = format!(
+            "one that {} builds on: a copy of the map went another way and was pushed; pull that into a new folder and \
+             `voxtile merge` the two, or push with --replace, and what is there alone is lost",
+            folder.display()
+        );
+        let found = before.flush_number.to_string();
+        Error::Mismatch { path: self.bucket.path().to_owned(), what: "flush", found, wanted }
+    }
+
+    fn name_of(&self, manifest: &Manifest) -> Result<ObjectName> {
+        let failed = |error: serde_json::Error| Error::io(self.bucket.path(), "write", error.into());
+        manifest.computed_checksum().map_err(failed)
+    }
+
+    /// Puts the manifest, and notes in the folder that this state is there. It is noted as offered before: whoever is
+    /// interrupted in between finds on the next push what they know.
+    fn put(&mut self, map: &MapPath, manifest: &Manifest) -> Result<()> {
+        let name = self.name_of(manifest)?;
+        if self.before.as_ref() != Some(manifest) {
+            self.note(map, manifest, name, false);
+            self.bucket.replace_manifest(manifest, self.version.take())?;
+        }
+        self.note(map, manifest, name, true);
         Ok(())
+    }
+
+    /// A folder that may only be read is pushed all the same.
+    fn note(&mut self, map: &MapPath, manifest: &Manifest, name: ObjectName, was_there: bool) {
+        let (disk, folder) = map.clone().into_parts();
+        let mut known = self.known.clone().unwrap_or_default();
+        known.note(manifest, name, was_there);
+        match known.write(&*disk, &folder) {
+            Ok(()) => self.known = Some(known),
+            Err(error) => log::warn!("{error:#}; the folder does not know that it was pushed"),
+        }
     }
 
     /// The files that a page lists by now.

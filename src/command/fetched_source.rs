@@ -2,6 +2,7 @@ use crate::Result;
 use crate::bucket::{Bucket, FetchedFiles};
 use crate::command::progress::Progress;
 use crate::io::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_any_scans};
+use crate::scan::Stop;
 
 /// Scans of a bucket, from files that were fetched.
 pub struct FetchedSource {
@@ -13,16 +14,18 @@ pub struct FetchedSource {
 impl FetchedSource {
     /// Fetches all files at a URL, then reads them as those of a folder.
     pub fn open(url: &str, options: &ReadOptions) -> Result<Self> {
-        let files = fetch(url)?;
+        let files = fetch(url, &Stop::default())?;
         Ok(Self { source: open_any_scans(files.path(), options)?, _files: files })
     }
 }
 
-/// Fetches all files at a URL.
-pub fn fetch(url: &str) -> Result<FetchedFiles> {
+/// Fetches all files at a URL, until it is asked to stop.
+pub fn fetch(url: &str, stop: &Stop) -> Result<FetchedFiles> {
     let bucket = Bucket::open(url)?;
     let progress = Progress::over_bytes();
-    let files = FetchedFiles::fetch(&bucket, &std::env::temp_dir(), |done, all| progress.set(done, all))?;
+    let is_stopped = || stop.is_set();
+    let report = |done, all| progress.set(done, all);
+    let files = FetchedFiles::fetch(&bucket, &std::env::temp_dir(), &is_stopped, report)?;
     drop(progress);
     log::info!("{url}: fetched {} files, {} bytes", files.files(), files.bytes());
     Ok(files)

@@ -2,12 +2,15 @@ use crate::command::args::{LocalArgs, PresetName};
 use crate::command::json;
 use crate::command::local_table::{Row, print_table};
 use crate::command::output_file::{OutputFile, check_picture};
+use crate::command::place::LocalScans;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
 use crate::command::scan_input::{self, is_standard_input};
+use crate::command::stop_signal;
 use crate::io::ScanSource;
 use crate::local::{LocalMap, LocalParameters, LocalReader, LocalState};
 use crate::render::{OverTime, Panel};
+use crate::scan::Stop;
 use crate::space::{Grid, Point};
 use crate::{Error, Scan};
 use std::io::Write;
@@ -35,12 +38,13 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     for setup in &setups {
         LocalMap::new(args.resolution, setup.parameters)?;
     }
+    let input = Input::of(args)?;
     let mut rows = Vec::new();
     for (number, setup) in setups.iter().enumerate() {
         let mut panels = (number == 0).then(Vec::new);
-        let mut row = run_setup(args, setup, panels.as_mut())?;
+        let mut row = run_setup(args, &input, setup, panels.as_mut())?;
         for _ in 1..args.repeat {
-            row.take_least(&run_setup(args, setup, None)?);
+            row.take_least(&run_setup(args, &input, setup, None)?);
         }
         row.finish();
         rows.push(row);
@@ -98,8 +102,26 @@ fn setups(args: &LocalArgs) -> Vec<Setup> {
     setups
 }
 
-fn run_setup(args: &LocalArgs, setup: &Setup, mut panels: Option<&mut Vec<Panel>>) -> anyhow::Result<Row> {
-    let mut source = scan_input::open(&args.scans, &read_options(&args.read)?)?;
+/// The scans, which all runs read.
+struct Input {
+    scans: LocalScans,
+    stop: Stop,
+}
+
+impl Input {
+    fn of(args: &LocalArgs) -> anyhow::Result<Self> {
+        let stop = stop_signal::catch_if_fetched(&args.scans)?;
+        Ok(Self { scans: LocalScans::of(&args.scans, &stop)?, stop })
+    }
+}
+
+fn run_setup(
+    args: &LocalArgs,
+    input: &Input,
+    setup: &Setup,
+    mut panels: Option<&mut Vec<Panel>>,
+) -> anyhow::Result<Row> {
+    let mut source = scan_input::open(input.scans.path(), &read_options(&args.read)?)?;
     let scans = source.len_hint();
     let progress = Progress::over_scans(scans);
     let mut map = LocalMap::new(args.resolution, setup.parameters)?;
@@ -111,6 +133,7 @@ fn run_setup(args: &LocalArgs, setup: &Setup, mut panels: Option<&mut Vec<Panel>
     let mut path = Vec::new();
     let mut number = 0;
     while let Some(scan) = next_scan(&mut *source, args.points)? {
+        input.stop.check()?;
         let relayed = relay.as_mut().map(|relay| relay.points(&scan)).transpose()?;
         let begin = cpu_seconds();
         let report = match relayed {

@@ -1,4 +1,5 @@
 use crate::io::{ReadOptions, ScanSource};
+use crate::scan::Stop;
 use crate::store::MapPath;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -72,21 +73,21 @@ pub struct LocalScans {
 }
 
 impl LocalScans {
-    /// Fetches what lies at a URL that is none of a map; takes all else as it is.
+    /// Fetches what lies at a URL that is none of a map, until it is asked to stop; takes all else as it is.
     ///
     /// # Errors
     ///
-    /// As for [`scans_at`].
+    /// As for [`scans_at`]; [`Error::Stopped`].
     #[cfg(feature = "bucket")]
-    pub fn of(scans: &Path) -> Result<Self> {
+    pub fn of(scans: &Path, stop: &Stop) -> Result<Self> {
         let url = url_of(scans).filter(|_| !super::kept_source::is_map(scans));
-        let fetched = url.map(super::fetched_source::fetch).transpose()?;
+        let fetched = url.map(|url| super::fetched_source::fetch(url, stop)).transpose()?;
         let path = fetched.as_ref().map_or(scans, |files| files.path()).to_owned();
         Ok(Self { path, _fetched: fetched })
     }
 
     #[cfg(not(feature = "bucket"))]
-    pub fn of(scans: &Path) -> Result<Self> {
+    pub fn of(scans: &Path, _: &Stop) -> Result<Self> {
         url_of(scans).map_or(Ok(Self { path: scans.to_owned() }), |url| Err(without_buckets(url)))
     }
 

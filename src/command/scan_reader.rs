@@ -86,7 +86,10 @@ impl ScanReader {
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
         let (answers_out, answers) = channel();
-        let local = LocalScans::of(&scans)?;
+        let local = match LocalScans::of(&scans, &stop) {
+            Err(Error::Stopped) => return Ok(None),
+            local => local?,
+        };
         let (path, own_options, here) = (local.path().to_owned(), options.clone(), room.clone());
         let named = scans.clone();
         let read = move || {

@@ -2,10 +2,11 @@ use crate::command::args::ScansArgs;
 use crate::command::json;
 use crate::command::kept_source;
 use crate::command::map_at::read_map;
-use crate::command::place::url_of;
+use crate::command::place::{LocalScans, url_of};
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
 use crate::command::scan_input;
+use crate::command::stop_signal;
 use crate::io::{PointRoom, ScanSource};
 use crate::mapper::MapReader;
 use crate::space::Point;
@@ -116,7 +117,9 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
     let mut options = read_options(&args.read)?;
     // What a build would leave out is listed all the same, and said.
     options.clouds.may_lack_poses = true;
-    let mut source: Box<dyn ScanSource + Send> = scan_input::open(&args.data, &options)?;
+    let stop = stop_signal::catch_if_fetched(&args.data)?;
+    let local = LocalScans::of(&args.data, &stop)?;
+    let mut source: Box<dyn ScanSource + Send> = scan_input::open(local.path(), &options)?;
     let progress = Progress::over_scans(source.len_hint());
     let room = PointRoom::new(ROOM_BYTES, &std::env::temp_dir());
     let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
@@ -135,6 +138,7 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
         };
         overview.add(&row, args, out)?;
         progress.step();
+        stop.check()?;
     }
     overview.fields = source.fields();
     overview.remarks = source.remarks();

@@ -1,9 +1,11 @@
 use crate::command::INTERRUPTED;
+use crate::command::place::url_of;
 use crate::scan::Stop;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use std::io::Write;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::thread;
@@ -26,6 +28,18 @@ pub fn catch() -> anyhow::Result<Stop> {
 /// The same for work that is done as a whole or not at all.
 pub fn catch_undone() -> anyhow::Result<Stop> {
     catch_saying("stopping: the map stays as it was", "ended at once: the map is as it was")
+}
+
+/// The same for work that only reads. Where that is the files of a folder, nothing is to be removed in the end, and
+/// signals do what they always do.
+pub fn catch_if_fetched(scans: &Path) -> anyhow::Result<Stop> {
+    match url_of(scans) {
+        Some(_) => catch_saying(
+            "stopping: what was fetched is removed first",
+            "ended at once: what was fetched stays",
+        ),
+        None => Ok(Stop::default()),
+    }
 }
 
 fn catch_saying(first_answer: &'static str, second_answer: &'static str) -> anyhow::Result<Stop> {

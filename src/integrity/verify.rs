@@ -340,6 +340,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                         self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
                     }
                 }
+                // What was pushed or pulled (`bucket::known_states`).
+                ("bucket_states", _) => {}
                 // What of it belongs to the map has been read; the rest goes when a writer opens the map.
                 (KEPT_SCANS, _) => {}
                 (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,

@@ -144,6 +144,11 @@ impl Viewer {
         self.nodes(map).iter().filter(is_finest).flat_map(|path| self.voxels(path)).collect()
     }
 
+    fn bytes_read(&self) -> u64 {
+        let io = fs::read_to_string(format!("/proc/{}/io", self.process.id())).unwrap();
+        io.lines().find_map(|line| line.strip_prefix("rchar: ")).unwrap().parse().unwrap()
+    }
+
     fn resident_bytes(&self) -> u64 {
         let status = fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap();
         let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
@@ -423,6 +428,43 @@ fn snapshots_and_what_changed_since_are_shown() {
     let path = PathBuf::from(format!("{}@monday", map.display()));
     let viewer = Viewer::ready(&[&path], &folder.path().join("cache"));
     assert_eq!(viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>(), before);
+}
+
+#[test]
+fn a_snapshot_that_is_made_again_under_its_name_is_the_new_one() {
+    let (folder, map) = a_map();
+    let before = exported(folder.path(), text(&map));
+    run(&["snapshot", text(&map), "monday"]);
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let shown = || viewer.finest("0@monday").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>();
+    assert_eq!(shown(), before);
+    run(&["snapshot", text(&map), "monday", "--delete"]);
+    assert_eq!(viewer.get("maps/0@monday/tileset.json").status, 404);
+    run(&["snapshot", text(&map), "monday"]);
+    assert_eq!(shown(), before);
+    run(&["snapshot", text(&map), "monday", "--delete"]);
+    build(folder.path(), &map, 3..4);
+    run(&["snapshot", text(&map), "monday"]);
+    let after = exported(folder.path(), text(&map));
+    assert_ne!(after, before);
+    assert_eq!(shown(), after);
+}
+
+/// A request about one snapshot does not read what there is of all.
+#[test]
+fn snapshots_are_not_read_for_every_request() {
+    let (folder, map) = a_map();
+    for number in 0..20 {
+        run(&["snapshot", text(&map), &format!("day{number}")]);
+    }
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let ask = || assert_eq!(viewer.get("maps/0@day7/tileset.json").status, 200);
+    ask();
+    let before = viewer.bytes_read();
+    (0..50).for_each(|_| ask());
+    let per_request = (viewer.bytes_read() - before) / 50;
+    let snapshot = fs::metadata(map.join("snapshots/day7")).unwrap().len();
+    assert!(per_request < 10 * snapshot, "{per_request} bytes, and a snapshot has {snapshot}");
 }
 
 #[test]

@@ -3,11 +3,13 @@
 use futures_util::TryStreamExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
 use tokio::runtime::Runtime;
 use voxtile::bucket::object_store::memory::InMemory;
 use voxtile::bucket::object_store::path::Path as Key;
+use voxtile::bucket::object_store::throttle::{ThrottleConfig, ThrottledStore};
 use voxtile::bucket::object_store::{ObjectStore, ObjectStoreExt};
 use voxtile::bucket::{Bucket, BucketDisk, FetchedFiles, PushOptions, Pushed, pull, push};
 use voxtile::integrity::verify;
@@ -18,8 +20,9 @@ use voxtile::{
     Storage,
 };
 
-const PRUNE: PushOptions = PushOptions { prunes: true };
-const KEEP: PushOptions = PushOptions { prunes: false };
+const PRUNE: PushOptions = PushOptions { prunes: true, replaces: false };
+const KEEP: PushOptions = PushOptions { prunes: false, replaces: false };
+const REPLACE: PushOptions = PushOptions { prunes: false, replaces: true };
 
 /// A store in memory and what tests do to it.
 struct Server {
@@ -255,6 +258,141 @@ fn a_pull_replaces_an_earlier_state_and_fetches_what_is_new() {
     ));
 }
 
+/// Goes on with a map by some scans, each a flush.
+fn go_on(map: &Path, seed: u64, flushes: u64) {
+    let mut mapper = OutOfCoreTileMapper::open(map, config(Storage::OctoMap)).unwrap();
+    for number in 0..flushes {
+        mapper.insert_scan(&scan_at(seed + number, 20.0)).unwrap();
+        mapper.flush().unwrap();
+    }
+}
+
+fn message_of<T: std::fmt::Debug>(outcome: voxtile::Result<T>) -> String {
+    format!("{:#}", anyhow::Error::from(outcome.unwrap_err()))
+}
+
+/// Two robots go on with copies of one map: neither's way is lost, neither there nor on its own disk.
+#[test]
+fn copies_that_went_different_ways_do_not_replace_each_other() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let [map, ours, theirs] = ["map", "ours", "theirs"].map(|name| folder.path().join(name));
+    let bucket = server.bucket();
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    for copy in [&ours, &theirs] {
+        pull(&bucket, copy, false, |_, _| {}).unwrap();
+    }
+    go_on(&ours, 100, 2);
+    go_on(&theirs, 200, 5);
+    // What was never there is not replaced by an earlier state, and not by that of another.
+    push_now(&ours, &bucket);
+    let (ours_pushed, theirs_now) = (digest(&ours), digest(&theirs));
+    let refused = message_of(push(theirs.as_path(), &bucket, KEEP, |_, _| {}));
+    assert!(refused.contains("voxtile merge") && refused.contains("--replace"), "{refused}");
+    assert_eq!(digest_there(&bucket).unwrap(), ours_pushed);
+    go_on(&ours, 110, 5);
+    push_now(&ours, &bucket);
+    let refused = message_of(pull(&bucket, &theirs, true, |_, _| {}));
+    assert!(refused.contains("voxtile merge") && refused.contains("theirs"), "{refused}");
+    assert_eq!(digest(&theirs), theirs_now);
+    // The first copy did not go on: it takes what is there, and goes on from it.
+    pull(&bucket, &map, true, |_, _| {}).unwrap();
+    assert_eq!(digest(&map), digest(&ours));
+    assert_whole(&map);
+    go_on(&map, 300, 1);
+    push_now(&map, &bucket);
+    // Whoever insists loses what is there.
+    go_on(&theirs, 210, 20);
+    push(theirs.as_path(), &bucket, REPLACE, |_, _| {}).unwrap();
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&theirs));
+}
+
+/// Earlier versions noted nothing: of two states of one flush only the one that is there may be pushed.
+#[test]
+fn another_state_of_the_same_flush_is_refused() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let [map, copy] = ["map", "copy"].map(|name| folder.path().join(name));
+    let bucket = server.bucket();
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &copy, false, |_, _| {}).unwrap();
+    go_on(&map, 100, 2);
+    go_on(&copy, 200, 2);
+    push_now(&map, &bucket);
+    for at in [&map, &copy] {
+        std::fs::remove_file(at.join("bucket_states")).unwrap();
+    }
+    let refused = message_of(push(copy.as_path(), &bucket, KEEP, |_, _| {}));
+    assert!(refused.contains("voxtile merge"), "{refused}");
+    assert_eq!(push_now(&map, &bucket).objects_sent, 0);
+    go_on(&map, 110, 1);
+    push_now(&map, &bucket);
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
+}
+
+/// What a push or a pull notes in the folder is of no map, and in nobody's way.
+#[test]
+fn what_is_noted_in_the_folder_is_in_nobodys_way() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    for at in [&map, &pulled] {
+        assert!(at.join("bucket_states").is_file());
+        assert_whole(at);
+        voxtile::integrity::repair(at.as_path(), |_| {}, |_, _| {}).unwrap();
+        assert_whole(at);
+    }
+    // A push that ends before it has noted that it came through finds itself there.
+    go_on(&map, 100, 1);
+    push_now(&map, &bucket);
+    let path = map.join("bucket_states");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (before, last) = text.trim_end().rsplit_once('\n').unwrap();
+    std::fs::write(&path, format!("{before}\n{}\n", last.replace("there", "offered"))).unwrap();
+    pull(&bucket, &map, true, |_, _| {}).unwrap();
+    go_on(&map, 110, 1);
+    push_now(&map, &bucket);
+}
+
+/// A file that was damaged in the folder is fetched and not taken along.
+#[test]
+fn a_pull_takes_no_damaged_file_along() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
+    drop(city(&map, Storage::Compact, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    let (name, mut content) =
+        files_of(&pulled).into_iter().find(|(name, _)| name.ends_with("tile.vxt")).unwrap();
+    let middle = content.len() / 2;
+    content[middle] ^= 1;
+    std::fs::write(pulled.join(&name), content).unwrap();
+    let again = pull(&bucket, &pulled, true, |_, _| {}).unwrap();
+    // It, and the files that belong to no tile.
+    assert!(again.files_fetched < again.files / 2, "{again:?}");
+    assert_whole(&pulled);
+    assert_eq!(digest(&pulled), digest(&map));
+}
+
+/// What is in the way of the map that is to be replaced is told before anything is fetched.
+#[test]
+fn what_is_in_the_way_is_told_before_anything_is_fetched() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    std::fs::create_dir(pulled.join("quarantine")).unwrap();
+    let refused = message_of(pull(&bucket, &pulled, true, |_, _| panic!("something was fetched")));
+    assert!(refused.contains("quarantine") && refused.contains("move it away"), "{refused}");
+    assert!(!folder.path().join("pulled.unfinished").exists());
+    std::fs::remove_dir(pulled.join("quarantine")).unwrap();
+    pull(&bucket, &pulled, true, |_, _| {}).unwrap();
+    assert_whole(&pulled);
+}
+
 #[test]
 fn an_interrupted_pull_goes_on() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
@@ -274,7 +412,8 @@ fn an_interrupted_pull_goes_on() {
     server.put(&key, content);
     let again = pull(&bucket, &pulled, false, |_, _| {}).unwrap();
     assert!(again.files_fetched < again.files / 2, "{again:?}");
-    assert_eq!(files_of(&pulled).len(), again.files as usize);
+    // And what the pull notes.
+    assert_eq!(files_of(&pulled).len(), again.files as usize + 1);
     assert_eq!(digest(&pulled), digest(&map));
 }
 
@@ -442,7 +581,8 @@ fn files_are_fetched_as_they_lie_and_go_again() {
     let at = |prefix: &str| Bucket::on(server.store.clone(), prefix, "s3://test/drive").unwrap();
     let mut told = Vec::new();
     let fetched =
-        FetchedFiles::fetch(&at("drive"), place.path(), |done, all| told.push((done, all))).unwrap();
+        FetchedFiles::fetch(&at("drive"), place.path(), &|| false, |done, all| told.push((done, all)))
+            .unwrap();
     assert_eq!((fetched.files(), fetched.bytes()), (3, 100_005));
     assert_eq!(told.last(), Some(&(100_005, 100_005)));
     for (name, content) in &files {
@@ -452,8 +592,27 @@ fn files_are_fetched_as_they_lie_and_go_again() {
     drop(fetched);
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
 
-    let one = FetchedFiles::fetch(&at("drive/scans/1.pcd"), place.path(), |_, _| ()).unwrap();
+    let one = FetchedFiles::fetch(&at("drive/scans/1.pcd"), place.path(), &|| false, |_, _| ()).unwrap();
     assert!(one.path().ends_with("1.pcd") && one.path().is_file());
-    let nothing = FetchedFiles::fetch(&at("driv"), place.path(), |_, _| ()).unwrap_err().to_string();
+    let nothing =
+        FetchedFiles::fetch(&at("driv"), place.path(), &|| false, |_, _| ()).unwrap_err().to_string();
     assert!(nothing.contains("s3://test/drive: there is nothing"), "{nothing}");
+}
+
+/// Whoever is asked to stop while the content of files does not come does so soon, and leaves nothing.
+#[test]
+fn a_fetch_that_is_stopped_ends_soon_and_leaves_nothing() {
+    let (server, place) = (Server::new(), TempDir::new().unwrap());
+    for number in 0..20 {
+        server.put(&Key::from(format!("drive/{number}.pcd")), vec![1; 100]);
+    }
+    let slow = ThrottleConfig { wait_get_per_byte: Duration::from_secs(1), ..ThrottleConfig::default() };
+    let store = Arc::new(ThrottledStore::new(server.store.fork(), slow));
+    let bucket = Bucket::on(store, "drive", "s3://test/drive").unwrap();
+    let began = Instant::now();
+    let is_stopped = || began.elapsed() > Duration::from_secs(1);
+    let stopped = FetchedFiles::fetch(&bucket, place.path(), &is_stopped, |_, _| ());
+    assert!(matches!(stopped, Err(Error::Stopped)), "{stopped:?}");
+    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
 }

@@ -12,6 +12,9 @@ pub struct PushArgs {
     /// Remove the objects there that the map does not need any more; who reads an earlier push has to open it anew
     #[arg(long)]
     pub prune: bool,
+    /// Replace a state there that a copy of this map went to on a way of its own; what only that state has is lost
+    #[arg(long)]
+    pub replace: bool,
     /// Print JSON; sizes in bytes
     #[arg(long)]
     pub json: bool,

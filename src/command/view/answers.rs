@@ -30,7 +30,8 @@ fn describe(number: usize, map: &ServedMap) -> Value {
         let corner = |tile: [i32; 3], more: i64| tile.map(|k| (i64::from(k) + more) as f64 * edge_m);
         json!({ "min": corner(tiles.min().to_array(), 0), "max": corner(tiles.max().to_array(), 1) })
     });
-    let snapshots = map.snapshots().into_iter().map(|(name, tiles)| json!({ "name": name, "tiles": tiles }));
+    let listed = map.snapshots();
+    let snapshots = listed.iter().map(|listed| json!({ "name": listed.name, "tiles": listed.tiles }));
     json!({
         "id": number.to_string(),
         "name": map.name(),

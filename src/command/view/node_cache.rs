@@ -3,7 +3,7 @@ use crate::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 
-/// A file larger than this is begun anew: most of it is of states that nobody looks at any more.
+/// A file that would get larger than this is begun anew: most of it is of states that nobody looks at any more.
 const MOST_BYTES: u64 = 4 << 30;
 
 /// Where the coarse nodes of a map are kept: in the user's cache folder, under the map's id, or in a file that goes
@@ -11,7 +11,7 @@ const MOST_BYTES: u64 = 4 << 30;
 pub fn open(map_id: Option<&str>) -> Result<NodeStore> {
     if let Some(path) = map_id.and_then(path_of) {
         match open_kept(&path) {
-            Ok(Some(file)) => match NodeStore::open(file, &path) {
+            Ok(Some(file)) => match open_limited(file, &path) {
                 Ok(store) => return Ok(store),
                 Err(error) => log::warn!("{error:#}; nothing is kept for the next time"),
             },
@@ -22,7 +22,13 @@ pub fn open(map_id: Option<&str>) -> Result<NodeStore> {
     let folder = std::env::temp_dir();
     let file =
         tempfile::tempfile().map_err(|error| Error::io(&folder, "create a temporary file in", error))?;
-    NodeStore::open(file, folder)
+    open_limited(file, &folder)
+}
+
+/// A store that begins its file anew before it gets too large.
+fn open_limited(file: File, path: &Path) -> Result<NodeStore> {
+    let same = file.try_clone().map_err(|error| Error::io(path, "open", error))?;
+    Ok(NodeStore::open(file, path)?.with_limit(MOST_BYTES, move || same.set_len(0)))
 }
 
 /// `None` if another program has it.

@@ -23,8 +23,20 @@ pub struct ServedMap {
     name: String,
     store: Arc<NodeStore>,
     now: RwLock<Arc<MapState>>,
+    /// Which snapshots there are, and when that was so.
+    listed: Mutex<Option<(Stamp, Arc<Vec<Listed>>)>>,
     /// Snapshots that were looked at, those used last at the end.
-    snapshots: Mutex<Vec<(SnapshotName, Arc<MapState>)>>,
+    snapshots: Mutex<Vec<(Listed, Arc<MapState>)>>,
+    /// Held while the levels of a snapshot are made: others wait for the same, and memory stays bounded.
+    making: Mutex<()>,
+}
+
+/// A snapshot of the map. One that was deleted and made again is another: its flush tells.
+#[derive(Clone, PartialEq)]
+pub struct Listed {
+    pub name: String,
+    pub flush_number: u64,
+    pub tiles: u64,
 }
 
 /// How often a map is looked at for a new flush.
@@ -40,13 +52,14 @@ const GROUP: u32 = 3;
 /// Snapshots whose levels stay in memory.
 const SNAPSHOTS_KEPT: usize = 4;
 
-/// What tells whether a map was flushed: length and time of its log and its metadata.
+/// What tells whether a map was flushed, or a snapshot of it made or deleted: length and time of its log, its metadata,
+/// and the folder of its snapshots.
 #[derive(PartialEq)]
-struct Stamp([Option<(u64, SystemTime)>; 2]);
+struct Stamp([Option<(u64, SystemTime)>; 3]);
 
 impl Stamp {
     fn of(map: &Path) -> Self {
-        Self(["commits.log", "metadata.json"].map(|name| {
+        Self(["commits.log", "metadata.json", "snapshots"].map(|name| {
             let metadata = std::fs::metadata(map.join(name)).ok()?;
             Some((metadata.len(), metadata.modified().ok()?))
         }))
@@ -73,7 +86,9 @@ impl ServedMap {
             name,
             store,
             now: RwLock::new(Arc::new(now)),
+            listed: Mutex::default(),
             snapshots: Mutex::default(),
+            making: Mutex::default(),
         })
     }
 
@@ -87,11 +102,26 @@ impl ServedMap {
     }
 
     /// The snapshots that can be shown; none of a map that is shown as one.
-    pub fn snapshots(&self) -> Vec<(String, u64)> {
+    pub fn snapshots(&self) -> Arc<Vec<Listed>> {
         let is_map = self.at.snapshot.is_none() && matches!(self.now().map, AnyMap::Map(_));
-        let found =
-            if is_map { place_of(&self.at.map).and_then(snapshots).unwrap_or_default() } else { Vec::new() };
-        found.into_iter().filter(|info| info.damage.is_none()).map(|info| (info.name, info.tiles)).collect()
+        if !is_map {
+            return Arc::default();
+        }
+        // From before they are read: one that is made in between is seen the next time.
+        let stamp = Stamp::of(&self.at.map);
+        if let Some((at, listed)) = &*self.listed.lock()
+            && *at == stamp
+        {
+            return listed.clone();
+        }
+        // What cannot be read now may be the next time.
+        let Ok(found) = place_of(&self.at.map).and_then(snapshots) else { return Arc::default() };
+        let whole = found.into_iter().filter(|info| info.damage.is_none());
+        let listed =
+            whole.map(|info| Listed { name: info.name, flush_number: info.flush_number, tiles: info.tiles });
+        let listed = Arc::new(listed.collect::<Vec<_>>());
+        *self.listed.lock() = Some((stamp, listed.clone()));
+        listed
     }
 
     /// The state that a path names; `None` if there is no such snapshot.
@@ -103,27 +133,44 @@ impl ServedMap {
 
     fn state(&self, at: &At) -> crate::Result<Option<Arc<MapState>>> {
         let At::Snapshot(name) = at else { return Ok(Some(self.now())) };
-        if !self.snapshots().iter().any(|(known, _)| known == name.as_str()) {
-            return Ok(None);
+        let listed = self.snapshots();
+        let Some(listed) = listed.iter().find(|listed| listed.name == name.as_str()) else { return Ok(None) };
+        if let Some(state) = self.kept(listed) {
+            return Ok(Some(state));
         }
-        // Held while the levels are made: others wait for the same, and memory stays bounded.
+        let _making = self.making.lock();
+        // Perhaps it was made while this waited.
+        if let Some(state) = self.kept(listed) {
+            return Ok(Some(state));
+        }
+        let Some(state) = self.made(name)? else { return Ok(None) };
         let mut kept = self.snapshots.lock();
-        if let Some(at) = kept.iter().position(|(known, _)| known == name) {
-            let found = kept.remove(at);
-            kept.push(found.clone());
-            return Ok(Some(found.1));
+        // One of this name that was deleted is of no use any more.
+        kept.retain(|(known, _)| known.name != listed.name);
+        if kept.len() == SNAPSHOTS_KEPT {
+            kept.remove(0);
         }
+        kept.push((listed.clone(), state.clone()));
+        Ok(Some(state))
+    }
+
+    /// A snapshot that was looked at, which becomes the one used last.
+    fn kept(&self, listed: &Listed) -> Option<Arc<MapState>> {
+        let mut kept = self.snapshots.lock();
+        let at = kept.iter().position(|(known, _)| known == listed)?;
+        let found = kept.remove(at);
+        kept.push(found.clone());
+        Some(found.1)
+    }
+
+    /// A snapshot with its levels.
+    fn made(&self, name: &SnapshotName) -> crate::Result<Option<Arc<MapState>>> {
         let at = MapAt { map: self.at.map.clone(), snapshot: Some(name.clone()) };
         let map = AnyMap::Map(Box::new(at.open()?));
         let tiles = map.tile_indices();
         let Some(levels) = Levels::build(&map, &tiles, &self.store, &|_| true)? else { return Ok(None) };
         let state = MapState { map, levels, store: self.store.clone(), generation: 0, pending_tiles: 0 };
-        let state = Arc::new(state);
-        if kept.len() == SNAPSHOTS_KEPT {
-            kept.remove(0);
-        }
-        kept.push((name.clone(), state.clone()));
-        Ok(Some(state))
+        Ok(Some(Arc::new(state)))
     }
 
     /// Makes the levels, and makes them anew whenever the map was flushed, in a thread of its own that ends with the

@@ -35,6 +35,13 @@ type Nodes = FxHashMap<(NodeKey, u64), Stored>;
 struct Spool {
     file: Box<dyn Scratch>,
     end: u64,
+    limit: Option<Limit>,
+}
+
+/// How long the file may be, and what empties it.
+struct Limit {
+    most_bytes: u64,
+    empty: Box<dyn FnMut() -> io::Result<()> + Send>,
 }
 
 /// Where a node is.
@@ -60,8 +67,15 @@ impl NodeStore {
     ) -> Result<Self> {
         let path = path.into();
         let (nodes, end) = read_all(&mut file).map_err(|error| Error::io(&path, "read", error))?;
-        let spool = Mutex::new(Spool { file: Box::new(file), end });
+        let spool = Mutex::new(Spool { file: Box::new(file), end, limit: None });
         Ok(Self { spool, nodes: Mutex::new(nodes), path })
+    }
+
+    /// The same with a file that has at most so many bytes: before it gets longer, `empty` empties it and it is begun
+    /// anew. Most of it is of states that nobody looks at any more, and all of it can be made again.
+    pub fn with_limit(self, most_bytes: u64, empty: impl FnMut() -> io::Result<()> + Send + 'static) -> Self {
+        self.spool.lock().limit = Some(Limit { most_bytes, empty: Box::new(empty) });
+        self
     }
 
     /// Bytes of the file.
@@ -75,13 +89,13 @@ impl NodeStore {
 
     /// The bytes of a node; `None` if it is not here or no longer what it was.
     pub(super) fn get(&self, key: NodeKey, version: u64) -> Result<Option<Vec<u8>>> {
+        // Nobody begins the file anew between the look for the node and the look at it.
+        let mut spool = self.spool.lock();
         let Some(stored) = self.find(key, version) else { return Ok(None) };
         let mut record = vec![0; RECORD_BYTES + stored.bytes as usize];
-        let read = {
-            let mut spool = self.spool.lock();
-            let start = stored.offset - RECORD_BYTES as u64;
-            spool.file.seek(SeekFrom::Start(start)).and_then(|_| spool.file.read_exact(&mut record))
-        };
+        let start = stored.offset - RECORD_BYTES as u64;
+        let read = spool.file.seek(SeekFrom::Start(start)).and_then(|_| spool.file.read_exact(&mut record));
+        drop(spool);
         read.map_err(|error| Error::io(&self.path, "read", error))?;
         let is_right = parse(&record).is_some_and(|(found, _)| found == (key, version)) && is_whole(&record);
         if !is_right {
@@ -112,6 +126,7 @@ impl NodeStore {
         let crc = checksum(&record);
         record[44..48].copy_from_slice(&crc.to_le_bytes());
         let mut spool = self.spool.lock();
+        self.make_room(&mut spool, record.len() as u64)?;
         let start = spool.end;
         let written = (|| {
             spool.file.seek(SeekFrom::Start(start))?;
@@ -123,11 +138,23 @@ impl NodeStore {
         written.map_err(|error| Error::io(&self.path, "write", error))?;
         let start = if start == 0 { HEADER.len() as u64 } else { start };
         spool.end = start + record.len() as u64;
-        drop(spool);
         let offset = start + RECORD_BYTES as u64;
         let stored = Stored { offset, bytes: bytes.len() as u32, bounds, voxels };
         self.nodes.lock().insert((key, version), stored);
+        drop(spool);
         Ok(stored)
+    }
+
+    /// Begins the file anew if it would get too long.
+    fn make_room(&self, spool: &mut Spool, bytes: u64) -> Result<()> {
+        let end = spool.end.max(HEADER.len() as u64);
+        let Some(limit) = spool.limit.as_mut().filter(|limit| end + bytes > limit.most_bytes) else {
+            return Ok(());
+        };
+        self.nodes.lock().clear();
+        (limit.empty)().map_err(|error| Error::io(&self.path, "empty", error))?;
+        spool.end = 0;
+        Ok(())
     }
 }
 
@@ -186,5 +213,44 @@ impl std::fmt::Debug for NodeStore {
             .field("path", &self.path)
             .field("bytes", &self.bytes())
             .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOST: u64 = 4096;
+
+    fn key_of(number: i32) -> NodeKey {
+        NodeKey { level: 1, index: [number, 0, -number] }
+    }
+
+    #[test]
+    fn a_file_that_would_get_too_long_is_begun_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("nodes");
+        let open = || {
+            let options =
+                std::fs::OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+            let file = options.unwrap();
+            let same = file.try_clone().unwrap();
+            NodeStore::open(file, &path).unwrap().with_limit(MOST, move || same.set_len(0))
+        };
+        let store = open();
+        for number in 0..100 {
+            let bytes = vec![number as u8; 100 + number as usize];
+            store.put(key_of(number), 7, &bytes, [[0; 3]; 2], 1).unwrap();
+            // What was put last is there, whatever went.
+            assert_eq!(store.get(key_of(number), 7).unwrap(), Some(bytes));
+            assert!(store.bytes() <= MOST && std::fs::metadata(&path).unwrap().len() <= MOST, "{number}");
+        }
+        assert_eq!(store.get(key_of(0), 7).unwrap(), None);
+        let there =
+            |store: &NodeStore| (0..100).filter(|&k| store.get(key_of(k), 7).unwrap().is_some()).count();
+        let kept = there(&store);
+        assert!(kept > 1 && store.nodes.lock().len() == kept);
+        drop(store);
+        assert_eq!(there(&open()), kept);
     }
 }
