@@ -44,7 +44,7 @@ pub fn map_anew(
     let rays = |own: &RayConfig| retiling.rays(own).map(|own| rays(&own));
     let of_map = RayConfig { region: map.config().rays.region, ..config.rays };
     let config = MapConfig { rays: rays(&of_map)?, ..config };
-    let count = count_scans(map, &rays)?;
+    let count = count_scans(map, rays)?;
     let (disk, folder) = output.into().into_parts();
     let create =
         |unfinished: &Path| OutOfCoreTileMapper::create(MapPath::on(disk.clone(), unfinished), config);
