@@ -408,3 +408,40 @@ fn the_last_part_of_a_split_bag_may_be_cut_off() {
     assert!(clouds.iter().any(|(head, _)| head.world_from_sensor.is_some()));
     assert!(remarks.iter().any(|remark| remark.contains("drive_1.bag.active has no index")), "{remarks:?}");
 }
+
+/// Where the checksums of the chunks of an MCAP file are.
+fn checksums(file: &[u8]) -> Vec<usize> {
+    let (mut at, mut found) = (8, Vec::new());
+    while let Some(length) = file.get(at + 1..at + 9) {
+        if file[at] == 6 {
+            found.push(at + 9 + 24);
+        }
+        at += 9 + u64::from_le_bytes(length.try_into().unwrap()) as usize;
+    }
+    found
+}
+
+#[test]
+fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut checked = 0;
+    for name in ["none.mcap", "lz4.mcap", "zstd.mcap", "ros1.mcap"] {
+        let whole = std::fs::read(data(name)).unwrap();
+        for at in checksums(&whole) {
+            let has_checksum = whole[at..at + 4] != [0; 4];
+            for (bytes, is_damaged) in [([1, 2, 3, 4], true), ([0; 4], false)] {
+                let mut file = whole.clone();
+                file[at..at + 4].copy_from_slice(&bytes);
+                std::fs::write(&path, file).unwrap();
+                let (_, mut errors, remarks) = read(from_ref(&path), &topic("/points"));
+                errors.extend(remarks);
+                assert_eq!(!errors.is_empty(), is_damaged, "{name}: {errors:?}");
+                let is_told = errors.iter().all(|error| error.contains("that in its header 04030201"));
+                assert!(is_told, "{name}: {errors:?}");
+            }
+            checked += usize::from(has_checksum);
+        }
+    }
+    assert!(checked > 0, "the fixtures have checksums");
+}
