@@ -13,6 +13,7 @@ mod deskew;
 mod error;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod guard;
+mod inside;
 mod lines;
 mod pose;
 pub mod poses;

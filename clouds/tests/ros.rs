@@ -445,3 +445,56 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
     }
     assert!(checked > 0, "the fixtures have checksums");
 }
+
+/// Metadata from elsewhere are not to open any file of the machine.
+#[test]
+fn files_out_of_the_folder_of_a_bag_are_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    std::fs::create_dir(&bag).unwrap();
+    let outside = folder.path().join("a.mcap");
+    std::fs::copy(data("none.mcap"), &outside).unwrap();
+    for name in ["../a.mcap".to_owned(), "x/../../a.mcap".to_owned(), outside.display().to_string()] {
+        std::fs::create_dir_all(bag.join("x")).unwrap();
+        std::fs::write(bag.join("metadata.yaml"), format!("relative_file_paths:\n- {name}\n")).unwrap();
+        let error = open_recording(from_ref(&bag)).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains(&format!("names {name}, which leads out of the folder")), "{error}");
+    }
+    // The name of a recorder's own folder, and the file moved since.
+    std::fs::rename(&outside, bag.join("a.mcap")).unwrap();
+    assert!(open_recording(&[bag]).is_ok());
+}
+
+/// `a/drive.mcap.zstd` and `b/drive.mcap.zstd` are both `drive.mcap` once they are unpacked.
+#[test]
+fn packed_parts_of_the_same_name_are_all_read() {
+    let folder = tempfile::tempdir().unwrap();
+    for (part, name) in [("a", "none.mcap"), ("b", "only_points.mcap")] {
+        std::fs::create_dir(folder.path().join(part)).unwrap();
+        let packed = zstd::encode_all(std::fs::read(data(name)).unwrap().as_slice(), 3).unwrap();
+        std::fs::write(folder.path().join(part).join("drive.mcap.zstd"), packed).unwrap();
+    }
+    let metadata = "relative_file_paths:\n- a/drive.mcap.zstd\n- b/drive.mcap.zstd\n";
+    std::fs::write(folder.path().join("metadata.yaml"), metadata).unwrap();
+    let mut recording = open_recording(&[folder.path().to_owned()]).unwrap();
+    let topics: Vec<usize> = (0..recording.topics().len()).collect();
+    recording.begin(&topics).unwrap();
+    let mut messages = 0;
+    while recording.next_message().unwrap().is_some() {
+        messages += 1;
+    }
+    assert_eq!(messages, 41 + 4);
+}
+
+#[test]
+fn packed_files_are_unpacked_where_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let packed = zstd::encode_all(std::fs::read(data("only_points.mcap")).unwrap().as_slice(), 3).unwrap();
+    std::fs::write(folder.path().join("a.mcap.zstd"), packed).unwrap();
+    let paths = [folder.path().to_owned()];
+    let gone = folder.path().join("gone");
+    let scratch = |scratch: &Path| BagOptions { scratch: Some(scratch.to_owned()), ..BagOptions::default() };
+    let error = open_bag(&paths, &scratch(&gone)).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(error.contains("cannot unpack a recording into") && error.contains("gone"), "{error}");
+    assert_eq!(read(&paths, &scratch(folder.path())).0.len(), 4);
+}

@@ -3,7 +3,7 @@ use super::bag_poses::BagPoses;
 use super::bag_topic::{Chosen, choose_clouds};
 use super::cloud_message::CloudMessage;
 use super::messages::CameraInfo;
-use super::open::open_recording;
+use super::open::open_recording_with;
 use super::recording::{Message, Recording, Topic};
 use super::wire::{Wire, WireError};
 use crate::cloud::{CloudHead, CloudPoint, CloudSource};
@@ -44,7 +44,7 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
         }
         error => error,
     };
-    let mut recording = open_recording(paths).map_err(name_it)?;
+    let mut recording = open_recording_with(paths, options.scratch.as_deref()).map_err(name_it)?;
     let chosen = choose_clouds(recording.as_mut(), options.topic.as_deref()).map_err(name_it)?;
     let poses = BagPoses::read(recording.as_mut(), options).map_err(name_it)?;
     let topic = recording.topics().get(chosen.index).cloned();
