@@ -23,7 +23,7 @@ pub mod ros;
 mod stamp;
 pub mod write;
 
-pub use cloud::{CloudHead, CloudPoint, CloudSource};
+pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 pub use deskew::Deskew;
 pub use error::{Error, Place, Result};
 pub use pose::RigidPose;
