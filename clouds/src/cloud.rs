@@ -42,6 +42,9 @@ impl CloudPoint {
     }
 }
 
+/// Where a sensor was at a time in nanoseconds, if that is known.
+pub type PoseAt = Box<dyn Fn(i64) -> Option<RigidPose> + Send>;
+
 /// Clouds one at a time, in order. Memory does not grow with their number, nor with the points of a cloud where the
 /// format allows it.
 pub trait CloudSource: Send {
@@ -68,8 +71,9 @@ pub trait CloudSource: Send {
     /// A file that cannot be read or is invalid; the first error of `visit`.
     fn read_points(&mut self, visit: &mut dyn FnMut(CloudPoint) -> Result<()>) -> Result<()>;
 
-    /// Where the sensor of the cloud at hand was at another time, if the source knows.
-    fn pose_at(&mut self, _stamp_ns: i64) -> Option<RigidPose> {
+    /// Where the sensor of the cloud at hand was at other times, if the source knows. It may be asked while the points
+    /// of that cloud are read.
+    fn poses(&self) -> Option<PoseAt> {
         None
     }
 

@@ -13,6 +13,7 @@ mod deskew;
 mod error;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod guard;
+mod inside;
 mod lines;
 mod pose;
 pub mod poses;
@@ -22,7 +23,7 @@ pub mod ros;
 mod stamp;
 pub mod write;
 
-pub use cloud::{CloudHead, CloudPoint, CloudSource};
+pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 pub use deskew::Deskew;
 pub use error::{Error, Place, Result};
 pub use pose::RigidPose;

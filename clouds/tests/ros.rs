@@ -408,3 +408,163 @@ fn the_last_part_of_a_split_bag_may_be_cut_off() {
     assert!(clouds.iter().any(|(head, _)| head.world_from_sensor.is_some()));
     assert!(remarks.iter().any(|remark| remark.contains("drive_1.bag.active has no index")), "{remarks:?}");
 }
+
+/// A bag of one cloud, `/tf`, and a topic of poses.
+fn with_odometry(folder: &Path, poses: &[Vec<u8>], type_name: &str) -> PathBuf {
+    let stamp_ns = 1_700_000_000_000_000_000;
+    let tf = MessageWriter::ros1().tf(stamp_ns, "map", "lidar", &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let point = [1.0, 2.0, 3.0_f32].map(f32::to_le_bytes).concat();
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let cloud = MessageWriter::ros1().point_cloud2(stamp_ns, "lidar", &fields, &[point]);
+    let mut messages = vec![(0, stamp_ns, tf), (1, stamp_ns, cloud)];
+    messages.extend(poses.iter().map(|pose| (2, stamp_ns, pose.clone())));
+    let topics =
+        [("/tf", "tf2_msgs/TFMessage"), ("/points", "sensor_msgs/PointCloud2"), ("/odom", type_name)];
+    let path = folder.join("a.bag");
+    std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+    path
+}
+
+/// The map would be of other poses than those that were asked for.
+#[test]
+fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let pose = |frame: &str, x_m: f64| {
+        let header = MessageWriter::ros1().header(1_700_000_000_000_000_000, frame);
+        header.f64s(&[x_m, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]).done()
+    };
+    let options = BagOptions {
+        poses: PoseSource::Odometry,
+        odometry_topic: Some("/odom".to_owned()),
+        ..BagOptions::default()
+    };
+    let cut = pose("odom", 1.0)[..20].to_vec();
+    for (poses, told) in [
+        (vec![], "--odometry /odom: none of its 0 messages gives a pose"),
+        (vec![pose("odom", f64::NAN), pose("", 1.0)], "; 2 are not valid, or their frames have no name"),
+        (vec![cut], "; 1 messages or chunks with poses cannot be read; the first: /odom: "),
+    ] {
+        let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
+        let error = open_bag(&[path], &options).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains(told), "{error}");
+    }
+    // One is enough.
+    let poses = [pose("odom", f64::NAN), pose("odom", 7.0)];
+    let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
+    let (clouds, _, remarks) = read(&[path], &options);
+    assert_eq!(clouds[0].0.world_from_sensor.unwrap().position_m, [7.0, 0.0, 0.0]);
+    assert!(remarks.iter().any(|remark| remark.starts_with("1 poses are not valid")), "{remarks:?}");
+}
+
+/// Every message of a path tells the way so far.
+#[test]
+fn a_path_that_grows_is_one_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let path_of = |count: i64| {
+        let start_ns = 1_700_000_000_000_000_000;
+        let whole = MessageWriter::ros1().header(start_ns, "odom").u32(count as u32);
+        let add = |path: MessageWriter, k: i64| {
+            path.header(start_ns + (k - 2) * 100_000_000, "").f64s(&[k as f64, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        };
+        (0..count).fold(whole, add).done()
+    };
+    let options = BagOptions { poses: PoseSource::Odometry, ..BagOptions::default() };
+    let messages: Vec<Vec<u8>> = (1..6).map(path_of).collect();
+    let (clouds, errors, remarks) =
+        read(&[with_odometry(folder.path(), &messages, "nav_msgs/Path")], &options);
+    assert_eq!((errors, clouds.len()), (vec![], 1));
+    assert_eq!(clouds[0].0.world_from_sensor.unwrap().position_m, [2.0, 0.0, 0.0]);
+    assert_eq!(remarks.len(), 1, "{remarks:?}");
+}
+
+/// Where the checksums of the chunks of an MCAP file are.
+fn checksums(file: &[u8]) -> Vec<usize> {
+    let (mut at, mut found) = (8, Vec::new());
+    while let Some(length) = file.get(at + 1..at + 9) {
+        if file[at] == 6 {
+            found.push(at + 9 + 24);
+        }
+        at += 9 + u64::from_le_bytes(length.try_into().unwrap()) as usize;
+    }
+    found
+}
+
+#[test]
+fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut checked = 0;
+    for name in ["none.mcap", "lz4.mcap", "zstd.mcap", "ros1.mcap"] {
+        let whole = std::fs::read(data(name)).unwrap();
+        for at in checksums(&whole) {
+            let has_checksum = whole[at..at + 4] != [0; 4];
+            for (bytes, is_damaged) in [([1, 2, 3, 4], true), ([0; 4], false)] {
+                let mut file = whole.clone();
+                file[at..at + 4].copy_from_slice(&bytes);
+                std::fs::write(&path, file).unwrap();
+                let (_, mut errors, remarks) = read(from_ref(&path), &topic("/points"));
+                errors.extend(remarks);
+                assert_eq!(!errors.is_empty(), is_damaged, "{name}: {errors:?}");
+                let is_told = errors.iter().all(|error| error.contains("that in its header 04030201"));
+                assert!(is_told, "{name}: {errors:?}");
+            }
+            checked += usize::from(has_checksum);
+        }
+    }
+    assert!(checked > 0, "the fixtures have checksums");
+}
+
+/// Metadata from elsewhere are not to open any file of the machine.
+#[test]
+fn files_out_of_the_folder_of_a_bag_are_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    std::fs::create_dir(&bag).unwrap();
+    let outside = folder.path().join("a.mcap");
+    std::fs::copy(data("none.mcap"), &outside).unwrap();
+    for name in ["../a.mcap".to_owned(), "x/../../a.mcap".to_owned(), outside.display().to_string()] {
+        std::fs::create_dir_all(bag.join("x")).unwrap();
+        std::fs::write(bag.join("metadata.yaml"), format!("relative_file_paths:\n- {name}\n")).unwrap();
+        let error = open_recording(from_ref(&bag)).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains(&format!("names {name}, which leads out of the folder")), "{error}");
+    }
+    // The name of a recorder's own folder, and the file moved since.
+    std::fs::rename(&outside, bag.join("a.mcap")).unwrap();
+    assert!(open_recording(&[bag]).is_ok());
+}
+
+/// `a/drive.bag.zstd` and `b/drive.bag.zstd` are both `drive.bag` once they are unpacked.
+#[test]
+fn packed_parts_of_the_same_name_are_all_read() {
+    let folder = tempfile::tempdir().unwrap();
+    // More than is buffered of a file that is open.
+    for (part, count) in [("a", 100), ("b", 1)] {
+        std::fs::create_dir(folder.path().join(part)).unwrap();
+        let messages: Vec<_> = (0..count).map(|stamp_ns| (0, stamp_ns, vec![7; 4000])).collect();
+        let bag = bag1(&[("/text", "std_msgs/String")], &messages);
+        let packed = zstd::encode_all(bag.as_slice(), 3).unwrap();
+        std::fs::write(folder.path().join(part).join("drive.bag.zstd"), packed).unwrap();
+    }
+    let metadata = "relative_file_paths:\n- a/drive.bag.zstd\n- b/drive.bag.zstd\n";
+    std::fs::write(folder.path().join("metadata.yaml"), metadata).unwrap();
+    let mut recording = open_recording(&[folder.path().to_owned()]).unwrap();
+    recording.begin(&[0]).unwrap();
+    let mut messages = 0;
+    while recording.next_message().unwrap().is_some() {
+        messages += 1;
+    }
+    assert_eq!(messages, 101);
+}
+
+#[test]
+fn packed_files_are_unpacked_where_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let packed = zstd::encode_all(std::fs::read(data("only_points.mcap")).unwrap().as_slice(), 3).unwrap();
+    std::fs::write(folder.path().join("a.mcap.zstd"), packed).unwrap();
+    let paths = [folder.path().to_owned()];
+    let gone = folder.path().join("gone");
+    let scratch = |scratch: &Path| BagOptions { scratch: Some(scratch.to_owned()), ..BagOptions::default() };
+    let error = open_bag(&paths, &scratch(&gone)).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(error.contains("cannot unpack a recording into") && error.contains("gone"), "{error}");
+    assert_eq!(read(&paths, &scratch(folder.path())).0.len(), 4);
+}

@@ -201,6 +201,7 @@ impl Build<'_> {
 /// How the input is read; without rays no poses are needed.
 fn options_of(args: &BuildArgs) -> crate::Result<ReadOptions> {
     let mut options = read_options(&args.read)?;
+    options.open.scratch = Some(folder_beside(args).to_owned());
     options.clouds.has_no_returns = args.clear_no_return.is_some();
     if args.no_rays && options.poses.is_none() {
         options.clouds.may_lack_poses = true;
@@ -393,14 +394,15 @@ fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
     Error::argument(args.scans.display().to_string(), reason).into()
 }
 
-/// Points of a scan that the limit of memory has no room for lie in the map's folder or, where that is still to be
-/// made, beside it: not where the system may keep files in memory.
+/// For temporary files: the map's folder or, where that is still to be made, the nearest folder around it. The system may
+/// keep its own in memory.
+fn folder_beside(args: &BuildArgs) -> &Path {
+    args.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
+}
+
+/// Points of a scan that the limit of memory has no room for go to a file.
 fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
-    let folder = match args.output.parent() {
-        _ if args.output.is_dir() => &*args.output,
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_beside(args);
     match config.memory {
         MemoryLimit::Bytes(bytes) => {
             PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(args, config), folder)

@@ -95,7 +95,8 @@ fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
     }
     let count = files.len() as u64;
     let poses = poses_for(path, options, count == 1, Some(count))?;
-    Ok(Box::new(PosedClouds::new(Box::new(PcdClouds::new(files)), path, poses, options.clouds.clone())?))
+    let clouds = Box::new(PcdClouds::new(files, options.open.scratch.as_deref()));
+    Ok(Box::new(PosedClouds::new(clouds, path, poses, options.clouds.clone())?))
 }
 
 /// Where the poses of an input come from; some formats bring their own.
@@ -138,6 +139,7 @@ fn open_recording(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSou
         fixed_frame: recording.fixed_frame.clone(),
         poses,
         most_gap_ns: Some(options.clouds.pose_tolerance_ns),
+        scratch: options.open.scratch.clone(),
     };
     Ok(Box::new(open_bag(&[path.to_owned()], &bag)?))
 }

@@ -1,7 +1,7 @@
 use super::file_order::name_of;
 use super::pcd::read_pcd_file;
 use super::point_store::{PointRoom, PointStore};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose, stamp_of_name};
 
 /// PCD files as clouds, for poses and options that [`PcdFolder`](super::pcd_folder::PcdFolder) does not know.
@@ -15,8 +15,10 @@ pub(super) struct PcdClouds {
 const ROOM_BYTES: usize = 64 << 20;
 
 impl PcdClouds {
-    pub(super) fn new(files: Vec<PathBuf>) -> Self {
-        let points = PointStore::new(PointRoom::new(ROOM_BYTES, &std::env::temp_dir()));
+    /// Points beyond the room go to a file in `scratch`; `None` is the system's folder for temporary files.
+    pub(super) fn new(files: Vec<PathBuf>, scratch: Option<&Path>) -> Self {
+        let folder = scratch.map_or_else(std::env::temp_dir, Path::to_owned);
+        let points = PointStore::new(PointRoom::new(ROOM_BYTES, &folder));
         Self { files, next: 0, points }
     }
 }

@@ -6,7 +6,7 @@ use crate::scan::{Pose, no_return};
 use crate::space::Point;
 use std::path::{Path, PathBuf};
 use voxtile_clouds::poses::{Found, Trajectory};
-use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, Deskew, Place, RigidPose};
+use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, Deskew, Place, PoseAt, RigidPose};
 
 /// How clouds get their poses, and what becomes of their points.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,6 +77,10 @@ pub(super) struct PosedClouds {
     /// Why they have none, and the names of the first of each reason.
     reasons: Vec<(String, Vec<String>)>,
     fields: Vec<String>,
+    /// Points that `is_deskewed` left where they were, as there is no pose at their time.
+    stayed: u64,
+    /// Clouds without times of points, of which it moved none.
+    without_times: u64,
 }
 
 /// Most reasons that are told, and most clouds that are named for each.
@@ -89,6 +93,10 @@ impl PosedClouds {
         poses: CloudPoses,
         options: CloudOptions,
     ) -> Result<Self> {
+        if options.is_deskewed && options.is_world_frame {
+            let reason = "points that are in the world frame already have no motion left in them; leave one of the two out";
+            return Err(Error::argument("--deskew, --world-frame", reason));
+        }
         if let CloudPoses::File(_, trajectory) = &poses
             && trajectory.span_ns().is_none()
             && let Some(clouds) = source.len_hint()
@@ -96,6 +104,7 @@ impl PosedClouds {
             trajectory.check_clouds(clouds)?;
         }
         let (number, without_pose, is_at_end, has_pose, reasons, fields) = Default::default();
+        let (stayed, without_times) = Default::default();
         Ok(Self {
             source,
             path: path.to_owned(),
@@ -107,6 +116,8 @@ impl PosedClouds {
             has_pose,
             reasons,
             fields,
+            stayed,
+            without_times,
         })
     }
 
@@ -186,17 +197,19 @@ impl PosedClouds {
         }
         let Self { source, options, poses, .. } = self;
         let stamp_ns = head.stamp_ns.filter(|_| options.is_deskewed && head.has_times);
-        let deskew = stamp_ns.map(|stamp_ns| {
+        let own = stamp_ns.and_then(|_| source.poses());
+        self.without_times += u64::from(options.is_deskewed && stamp_ns.is_none());
+        let mut deskew = stamp_ns.map(|stamp_ns| {
             let pose_at =
-                |at_ns| Some(body_at(&mut **source, poses, options, at_ns)?.then(&options.body_from_sensor));
+                |at_ns| Some(body_at(poses, own.as_ref(), options, at_ns)?.then(&options.body_from_sensor));
             Deskew::new(stamp_ns, &sensor, pose_at)
         });
         points.begin(head.has_intensities);
         let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
-        source.read_points(&mut |point| {
+        let read = source.read_points(&mut |point| {
             let CloudPoint { position_m, intensity, is_return, .. } = point;
             let place = match is_return {
-                true => deskew.as_ref().map_or(position_m, |deskew| deskew.apply(&point)),
+                true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
                 false if options.has_no_returns => {
                     // As long as a direction is known.
                     let direction = std::array::from_fn(|k| position_m[k] - origin[k]);
@@ -213,15 +226,17 @@ impl PosedClouds {
             let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
             let in_sensor = if options.is_world_frame { in_sensor } else { place };
             points.push(in_sensor, intensity).map_err(keep)
-        })?;
+        });
+        self.stayed += deskew.map_or(0, |deskew| deskew.stayed());
+        read?;
         Ok(world_from_sensor)
     }
 }
 
 /// Where the body was at another time than that of the cloud at hand.
 fn body_at(
-    source: &mut dyn CloudSource,
     poses: &CloudPoses,
+    own: Option<&PoseAt>,
     options: &CloudOptions,
     at_ns: i64,
 ) -> Option<RigidPose> {
@@ -230,7 +245,7 @@ fn body_at(
             Found::Exact(body) | Found::Between(body) => Some(body),
             _ => None,
         },
-        CloudPoses::Source => source.pose_at(at_ns),
+        CloudPoses::Source => own?(at_ns),
         CloudPoses::Identity | CloudPoses::Missing => None,
     }
 }
@@ -369,6 +384,20 @@ impl ScanSource for PosedClouds {
             let clouds = if self.without_pose == 1 { "cloud has" } else { "clouds have" };
             let why = self.why_without_pose();
             remarks.push(format!("{} {clouds} no pose, left out ({why})", self.without_pose));
+        }
+        if self.without_times > 0 {
+            let clouds = if self.without_times == 1 { "cloud has" } else { "clouds have" };
+            remarks.push(format!(
+                "{} {clouds} no times of points, or no stamp: --deskew moved nothing there",
+                self.without_times
+            ));
+        }
+        if self.stayed > 0 {
+            let points = if self.stayed == 1 { "point" } else { "points" };
+            remarks.push(format!(
+                "{} {points} stayed: no pose is known at their own times (--deskew)",
+                self.stayed
+            ));
         }
         remarks
     }

@@ -43,6 +43,7 @@ impl Selection {
             selection: self,
             passed: 0,
             taken: 0,
+            bad: 0,
             unfiltered: PointStore::default(),
         })
     }
@@ -55,6 +56,8 @@ struct SelectedScans {
     /// Scans of the source that were passed over or taken.
     passed: u64,
     taken: u64,
+    /// Scans that were passed over and cannot be read.
+    bad: u64,
     unfiltered: PointStore,
 }
 
@@ -70,12 +73,17 @@ impl SelectedScans {
         }
         let wanted = self.selection.first + self.taken * self.selection.every.max(1);
         while self.passed < wanted {
-            let some = usize::try_from(wanted - self.passed).unwrap_or(usize::MAX);
-            let skipped = self.source.skip(some)? as u64;
-            self.passed += skipped;
-            if skipped == 0 {
-                return Ok(false);
+            // One at a time: a scan that cannot be read has a number as the others do, and was not wanted.
+            match self.source.skip(1) {
+                Ok(0) => return Ok(false),
+                Ok(_) => {}
+                Err(error) if !self.source.pass_unread() => return Err(error),
+                Err(error) => {
+                    log::debug!("scan {} is passed over and cannot be read: {error}", self.passed);
+                    self.bad += 1;
+                }
             }
+            self.passed += 1;
         }
         Ok(true)
     }
@@ -161,7 +169,11 @@ impl ScanSource for SelectedScans {
     }
 
     fn remarks(&self) -> Vec<String> {
-        self.source.remarks()
+        let mut remarks = self.source.remarks();
+        if self.bad > 0 {
+            remarks.push(format!("{} of the scans that were passed over cannot be read", self.bad));
+        }
+        remarks
     }
 
     fn crs(&self) -> Option<String> {

@@ -370,3 +370,90 @@ fn name_crs(file: &Path, crs: &str) {
     bytes[6] &= !16;
     fs::write(file, bytes).unwrap();
 }
+
+/// Clouds of one point, by number; some of them damaged.
+fn numbered(folder: &Path, count: usize, bad: &[usize]) -> (PathBuf, PathBuf) {
+    let scans = folder.join("scans");
+    fs::create_dir(&scans).unwrap();
+    let head =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+    for number in 0..count {
+        let text = match bad.contains(&number) {
+            true => "ply\nformat of no kind\n".to_owned(),
+            false => format!("{head}end_header\n4 0 0\n"),
+        };
+        fs::write(scans.join(format!("{number}.ply")), text).unwrap();
+    }
+    let poses = folder.join("poses.txt");
+    let rows: Vec<String> = (0..count).map(|k| format!("1 0 0 {k} 0 1 0 0 0 0 1 0\n")).collect();
+    fs::write(&poses, rows.concat()).unwrap();
+    (scans, poses)
+}
+
+fn origins_of(map: &Path) -> Vec<f64> {
+    let told = output(&["scans", text(map), "--each", "--json"]);
+    let scans = told.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
+}
+
+/// One that is passed over has a number as the others do, and cannot end a build that never asked for it.
+#[test]
+fn damaged_clouds_shift_no_others_of_a_selection() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scans, poses) = numbered(folder.path(), 40, &[5, 20]);
+    let build = |map: &Path, options: &[&str]| {
+        let input = ["build", text(&scans), "--poses", text(&poses), "-o", text(map)];
+        output(&[&input, options].concat());
+        origins_of(map)
+    };
+    let map = |name: &str| folder.path().join(name);
+    assert_eq!(build(&map("a"), &["--every", "10", "--skip-bad"]), [0.0, 10.0, 30.0]);
+    assert_eq!(build(&map("b"), &["--every", "12"]), [0.0, 12.0, 24.0, 36.0]);
+    assert_eq!(build(&map("c"), &["--first", "7", "--count", "2"]), [7.0, 8.0]);
+    let told = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
+    assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
+}
+
+/// Points that stay where they are, and clouds that know no times, are not passed over in silence.
+#[test]
+fn what_deskewing_does_not_move_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    let path = scans.join("1600000000.000000000.xyz");
+    fs::write(&path, "x y z time\n4 0 0 0\n4 1 0 0.5\n4 2 0 0.75\n4 3 0 0.8\n").unwrap();
+    fs::write(scans.join("1600000000.500000000.xyz"), "4 0 0\n").unwrap();
+    let poses = folder.path().join("poses.txt");
+    fs::write(&poses, "1599999999.9 0 0 1 0 0 0 1\n1600000000.6 7 0 1 0 0 0 1\n").unwrap();
+    let input = ["scans", text(&scans), "--poses", text(&poses), "--pose-tolerance", "2"];
+    let told = output(&[&input[..], &["--deskew"]].concat());
+    for part in [
+        "1 cloud has no times of points, or no stamp: --deskew moved nothing there",
+        "2 points stayed: no pose is known at their own times (--deskew)",
+    ] {
+        assert!(told.contains(part), "{told}");
+    }
+    assert!(!output(&input).contains("--deskew"));
+    let refused = refusal(&[&input[..], &["--deskew", "--world-frame"]].concat());
+    assert!(refused.contains("--deskew") && refused.contains("--world-frame"), "{refused}");
+}
+
+/// The system may keep its temporary files in memory: a build has a disk at hand.
+#[cfg(feature = "ros")]
+#[test]
+fn packed_recordings_are_unpacked_beside_the_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    fs::create_dir(&bag).unwrap();
+    let plain = fs::read(repository("clouds/tests/data/ros/none.mcap")).unwrap();
+    fs::write(bag.join("a.mcap.zstd"), zstd::encode_all(plain.as_slice(), 3).unwrap()).unwrap();
+    // One whose folder is there, one whose folder is made, and one that is there itself.
+    let maps = ["map", "new/folder/map", "map"].map(|map| folder.path().join(map));
+    for (map, again) in maps.iter().zip([&[][..], &[], &["--append", "--again"]]) {
+        let build = ["build", text(&bag), "--topic", "/points", "-o", text(map)];
+        let how = if again.is_empty() { &["--resolution", "0.2"] } else { again };
+        let arguments = [&build, how].concat();
+        let built = voxtile(&arguments).env("TMPDIR", folder.path().join("gone")).output().unwrap();
+        assert!(built.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&built.stderr));
+    }
+}

@@ -173,6 +173,19 @@ fn unplaced(folder: &Path, names: &[&str]) {
     }
 }
 
+/// A caller of the library says what the command's arguments cannot.
+#[test]
+fn points_in_the_world_frame_are_not_deskewed() {
+    use voxtile::io::{ReadOptions, open_any_scans};
+    let folder = TempDir::new().unwrap();
+    unplaced(folder.path(), &["0.pcd"]);
+    let mut options = ReadOptions::default();
+    options.poses = Some("identity".into());
+    (options.clouds.is_deskewed, options.clouds.is_world_frame) = (true, true);
+    let error = message_of(open_any_scans(folder.path(), &options).map(drop));
+    assert!(error.contains("--deskew, --world-frame: points that are in the world frame already"), "{error}");
+}
+
 #[test]
 fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
     use voxtile::io::PoseSource;

@@ -5,6 +5,7 @@ use super::one::head_of;
 use super::options::OpenOptions;
 use crate::cloud::CloudSource;
 use crate::error::Result;
+use crate::inside::is_inside;
 use crate::lines::Lines;
 use crate::stamp;
 use std::path::{Path, PathBuf};
@@ -43,7 +44,13 @@ impl Frames for TumFrames {
             };
             let stamp_ns = stamp::of_seconds(stamp)
                 .ok_or_else(|| self.lines.error(format!("`{stamp:.40}` is no time stamp in seconds")))?;
-            let path = self.folder.join(file.trim());
+            let file = file.trim();
+            if !is_inside(Path::new(file)) {
+                let reason =
+                    format!("`{file:.80}` leads out of the folder; name images in it, as depth/1.png");
+                return Err(self.lines.error(reason));
+            }
+            let path = self.folder.join(file);
             let mut head = head_of(&path);
             head.stamp_ns = Some(stamp_ns);
             return Ok(Some(Frame { path, head }));

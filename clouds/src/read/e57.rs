@@ -4,7 +4,7 @@ use crate::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::error::{Error, Place, Result};
 use crate::guard::guarded;
 use crate::pose::RigidPose;
-use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordName, SphericalCoordinate};
+use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName, SphericalCoordinate};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -47,6 +47,15 @@ fn name_of(name: &RecordName) -> String {
         RecordName::Unknown { name, .. } => name.clone(),
         known => format!("{known:?}"),
     }
+}
+
+/// Whether any field of a point takes bits of the file. The library counts points by those bits: where there are none,
+/// a single packet would fill all memory with points.
+fn has_bits(scan: &PointCloud) -> bool {
+    scan.prototype.iter().any(|record| match record.data_type {
+        RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => min < max,
+        RecordDataType::Single { .. } | RecordDataType::Double { .. } => true,
+    })
 }
 
 fn pose(scan: &PointCloud) -> Option<RigidPose> {
@@ -102,6 +111,11 @@ impl CloudSource for E57 {
             let reason = format!("{reason} (after {done} of {} points)", scan.records);
             Error::format(path, Place::Record(done), reason)
         };
+        if scan.records > 0 && !has_bits(scan) {
+            let reason = "every field of its points has a minimum that is its maximum, so that points take no bytes \
+                          and cannot be counted; write the scan again with a wider range of x, y or z";
+            return Err(wrong(0, reason.into()));
+        }
         let mut points =
             guarded(|| self.reader.pointcloud_simple(scan)).map_err(|reason| wrong(0, reason))?;
         points.apply_pose(false);

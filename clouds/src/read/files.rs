@@ -1,7 +1,7 @@
 use super::one::Visit;
 use crate::cloud::{CloudHead, CloudSource};
-use crate::error::Result;
-use std::path::PathBuf;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
 
 /// Opens a file of a folder.
 pub(super) type OpenFile = Box<dyn Fn(&PathBuf) -> Result<Box<dyn CloudSource>> + Send>;
@@ -18,6 +18,8 @@ pub(super) struct Files {
     open: OpenFile,
     current: Option<(PathBuf, Box<dyn CloudSource>)>,
     crs: Option<String>,
+    /// Whether a file was opened, so that the coordinate system is known or known to be missing.
+    is_begun: bool,
     remarks: Vec<String>,
 }
 
@@ -32,6 +34,7 @@ impl Files {
             open,
             current: None,
             crs: None,
+            is_begun: false,
             remarks: Vec::new(),
         }
     }
@@ -47,20 +50,40 @@ impl Files {
     /// Keeps what is to be said of the file that ends.
     fn close(&mut self) {
         let Some((path, source)) = self.current.take() else { return };
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = name_of(&path);
         for remark in source.remarks() {
             self.remark(format!("{name}: {remark}"));
         }
-        match (&self.crs, source.crs()) {
-            (None, Some(crs)) => self.crs = Some(crs.to_owned()),
-            (Some(first), Some(crs)) if first != crs => {
-                self.remark(format!(
-                    "{name}: another coordinate reference system than that of the files before"
-                ));
-            }
-            _ => {}
-        }
     }
+
+    /// Takes a file only if its points are in the coordinate system of those before: no point of another is mapped.
+    fn check_crs(&mut self, path: &Path, crs: Option<&str>) -> Result<()> {
+        let is_first = !std::mem::replace(&mut self.is_begun, true);
+        let Some(crs) = crs else { return Ok(()) };
+        match &self.crs {
+            Some(first) if first != crs => {
+                let reason = format!(
+                    "its coordinates are in {crs:.80}, those of the files before it in {first:.80}; convert it \
+                     first, for instance with pdal, or map it on its own"
+                );
+                return Err(Error::argument(path.display().to_string(), reason));
+            }
+            Some(_) => return Ok(()),
+            None => self.crs = Some(crs.to_owned()),
+        }
+        if !is_first {
+            let name = name_of(path);
+            self.remark(format!(
+                "{name}: names the coordinate system {crs:.80}, the files before it name none; are their points in \
+                 it, and does the map name it (`voxtile info`)? Read this file first otherwise"
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 impl CloudSource for Files {
@@ -77,7 +100,7 @@ impl CloudSource for Files {
             if let Some((path, source)) = &mut self.current {
                 match source.next_cloud() {
                     Ok(Some(mut head)) => {
-                        let file = path.file_name().unwrap_or_default().to_string_lossy();
+                        let file = name_of(path);
                         if head.name != file {
                             head.name = format!("{file}/{}", head.name);
                         }
@@ -89,6 +112,7 @@ impl CloudSource for Files {
             }
             let Some(path) = self.paths.next() else { return Ok(None) };
             let source = (self.open)(&path)?;
+            self.check_crs(&path, source.crs())?;
             self.current = Some((path, source));
         }
     }
@@ -103,6 +127,6 @@ impl CloudSource for Files {
     }
 
     fn crs(&self) -> Option<&str> {
-        self.crs.as_deref().or_else(|| self.current.as_ref()?.1.crs())
+        self.crs.as_deref()
     }
 }

@@ -4,6 +4,7 @@ use super::open::open_file;
 use super::recording::{Message, Recording, Topic};
 use super::sequence::Sequence;
 use crate::error::{Error, Place, Result};
+use crate::inside::is_inside;
 use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -31,6 +32,16 @@ impl Bag2Folder {
     ///
     /// A folder without files of a recording; a file that cannot be read or is invalid.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_with(path, None)
+    }
+
+    /// As [`Bag2Folder::open`]. Compressed files are unpacked into a folder in `scratch`; `None` is the system's for
+    /// temporary files.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Bag2Folder::open`].
+    pub fn open_with(path: &Path, scratch: Option<&Path>) -> Result<Self> {
         let mut remarks = Vec::new();
         let metadata_path = path.join("metadata.yaml");
         let (metadata, files) = if metadata_path.is_file() {
@@ -61,15 +72,13 @@ impl Bag2Folder {
         }
         let mut unpacked = None;
         let mut recordings = Vec::new();
-        for file in &files {
+        for (number, file) in files.iter().enumerate() {
             if is_packed(file) {
                 let folder = match &mut unpacked {
                     Some(folder) => folder,
-                    none => {
-                        none.insert(tempfile::tempdir().map_err(|error| Error::io(path, "unpack", error))?)
-                    }
+                    none => none.insert(temporary_folder(scratch)?),
                 };
-                let (plain, damage) = unpack(file, folder.path())?;
+                let (plain, damage) = unpack(file, folder.path(), number)?;
                 // The name of the temporary file would tell nobody anything.
                 let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
                 let opened = open_file(&plain).map_err(|error| {
@@ -98,6 +107,11 @@ impl Bag2Folder {
     }
 }
 
+fn temporary_folder(scratch: Option<&Path>) -> Result<TempDir> {
+    let scratch = scratch.map_or_else(std::env::temp_dir, Path::to_owned);
+    tempfile::tempdir_in(&scratch).map_err(|error| Error::io(&scratch, "unpack a recording into", error))
+}
+
 /// By its name; one that the recorder did not close ends with `.bag.active`.
 fn is_bag1(file: &Path) -> bool {
     let name = file.to_string_lossy().to_lowercase();
@@ -108,17 +122,26 @@ fn is_packed(file: &Path) -> bool {
     file.extension().is_some_and(|extension| extension == "zstd" || extension == "zst")
 }
 
-/// A file that the metadata name: beside them, perhaps behind the name of the folder, perhaps compressed since.
+/// A file that the metadata name: beside them, perhaps behind the name of the folder, perhaps compressed since. Of one
+/// that leads out of the folder only the last part counts.
 fn find(folder: &Path, name: &str) -> Result<PathBuf> {
+    let is_inside = is_inside(Path::new(name));
+    let whole = is_inside.then(|| folder.join(name));
     let last = Path::new(name).file_name().map(|name| folder.join(name));
-    let candidates = [Some(folder.join(name)), last];
+    let candidates = [whole, last];
     let candidates = candidates.into_iter().flatten().flat_map(|path| {
         let packed = PathBuf::from(format!("{}.zstd", path.display()));
         [path, packed]
     });
     candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
-        let reason =
-            format!("metadata.yaml names {name}, which is not there; give the files that are there instead");
+        let reason = match is_inside {
+            true => format!(
+                "metadata.yaml names {name}, which is not there; give the files that are there instead"
+            ),
+            false => format!(
+                "metadata.yaml names {name}, which leads out of the folder and is not read; move the file into it"
+            ),
+        };
         Error::argument(folder.display().to_string(), reason)
     })
 }
@@ -139,9 +162,11 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off.
-fn unpack(file: &Path, folder: &Path) -> Result<(PathBuf, Option<String>)> {
-    let target = folder.join(file.file_stem().unwrap_or_default());
+/// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off. Files of other folders, or
+/// `a.mcap.zst` beside `a.mcap.zstd`, may have the same name without its end: the number of the file tells them apart.
+fn unpack(file: &Path, folder: &Path, number: usize) -> Result<(PathBuf, Option<String>)> {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let target = folder.join(format!("{number}_{stem}"));
     let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
     let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
     let mut decoder = zstd::stream::read::Decoder::new(BufReader::new(input))

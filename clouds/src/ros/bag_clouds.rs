@@ -2,13 +2,12 @@ use super::bag_options::BagOptions;
 use super::bag_poses::BagPoses;
 use super::bag_topic::{Chosen, choose_clouds};
 use super::cloud_message::CloudMessage;
-use super::messages::CameraInfo;
-use super::open::open_recording;
+use super::messages::{CameraInfo, Header};
+use super::open::open_recording_with;
 use super::recording::{Message, Recording, Topic};
 use super::wire::{Wire, WireError};
-use crate::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 use crate::error::{Error, Place, Result};
-use crate::pose::RigidPose;
 use std::path::PathBuf;
 
 /// The clouds of one topic of a recording, with the poses that the recording knows.
@@ -44,7 +43,7 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
         }
         error => error,
     };
-    let mut recording = open_recording(paths).map_err(name_it)?;
+    let mut recording = open_recording_with(paths, options.scratch.as_deref()).map_err(name_it)?;
     let chosen = choose_clouds(recording.as_mut(), options.topic.as_deref()).map_err(name_it)?;
     let poses = BagPoses::read(recording.as_mut(), options).map_err(name_it)?;
     let topic = recording.topics().get(chosen.index).cloned();
@@ -101,9 +100,19 @@ impl BagClouds {
         self.recording.topics()
     }
 
+    fn decode<'a>(&'a self, message: &'a Message, number: u64) -> Result<CloudMessage<'a>> {
+        let cloud = CloudMessage::decode(self.chosen.kind, self.wire, &message.data, self.camera.as_ref());
+        cloud.map_err(|error| self.wrong(number, &error))
+    }
+
     fn wrong(&self, number: u64, error: &WireError) -> Error {
         Error::format(&self.path, Place::Record(number), format!("topic {}: {error}", self.topic.name))
     }
+}
+
+/// When a cloud was taken: drivers without a clock leave its stamp at 0.
+fn stamp_of(header: &Header, message: &Message) -> i64 {
+    if header.stamp_ns == 0 { message.log_ns } else { header.stamp_ns }
 }
 
 impl CloudSource for BagClouds {
@@ -120,21 +129,21 @@ impl CloudSource for BagClouds {
         let Some(message) = self.recording.next_message()? else { return Ok(None) };
         let number = self.next;
         self.next += 1;
-        let cloud = CloudMessage::decode(self.chosen.kind, self.wire, &message.data, self.camera.as_ref());
-        let cloud = cloud.map_err(|error| self.wrong(number, &error))?;
+        let cloud = self.decode(&message, number)?;
         let header = cloud.header().clone();
-        // Drivers without a clock leave it at 0.
-        let stamp_ns = if header.stamp_ns == 0 { message.log_ns } else { header.stamp_ns };
+        let stamp_ns = stamp_of(&header, &message);
+        let (points, fields) = (cloud.points_claimed(), cloud.fields());
+        let (has_intensities, has_times) = (cloud.has_intensities(), cloud.has_times());
         self.without_stamp += u64::from(header.stamp_ns == 0);
         let head = CloudHead {
             name: number.to_string(),
             stamp_ns: Some(stamp_ns),
             world_from_sensor: self.poses.world_from_sensor(&header.frame_id, stamp_ns),
             frame: Some(header.frame_id),
-            points: Some(cloud.points_claimed()),
-            fields: cloud.fields(),
-            has_intensities: cloud.has_intensities(),
-            has_times: cloud.has_times(),
+            points: Some(points),
+            fields,
+            has_intensities,
+            has_times,
         };
         self.current = Some(message);
         self.frame.clone_from(&head.frame);
@@ -144,13 +153,16 @@ impl CloudSource for BagClouds {
     fn read_points(&mut self, visit: &mut dyn FnMut(CloudPoint) -> Result<()>) -> Result<()> {
         let Some(message) = self.current.take() else { return Ok(()) };
         let number = self.next.saturating_sub(1);
-        let cloud = CloudMessage::decode(self.chosen.kind, self.wire, &message.data, self.camera.as_ref());
-        let shortage = cloud.map_err(|error| self.wrong(number, &error))?.visit(visit)?;
+        let mut cloud = self.decode(&message, number)?;
+        let stamp_ns = stamp_of(cloud.header(), &message);
+        cloud.count_times_from(stamp_ns);
+        let shortage = cloud.visit(visit)?;
         shortage.map_or(Ok(()), |error| Err(self.wrong(number, &error)))
     }
 
-    fn pose_at(&mut self, stamp_ns: i64) -> Option<RigidPose> {
-        self.poses.find(self.frame.as_deref()?, stamp_ns).ok()
+    fn poses(&self) -> Option<PoseAt> {
+        let lookup = self.poses.lookup(self.frame.as_deref()?).ok()?;
+        Some(Box::new(move |stamp_ns| lookup.find(stamp_ns).ok()))
     }
 
     fn remarks(&self) -> Vec<String> {

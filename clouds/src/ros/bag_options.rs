@@ -1,3 +1,5 @@
+use std::path::PathBuf;
+
 /// Which clouds of a recording are read, and where their poses come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BagOptions {
@@ -12,6 +14,8 @@ pub struct BagOptions {
     pub poses: PoseSource,
     /// Between two poses further apart in time there is none.
     pub most_gap_ns: Option<i64>,
+    /// Folder that compressed files are unpacked into; the system's own for temporary files if `None`.
+    pub scratch: Option<PathBuf>,
 }
 
 /// Where the poses of the sensor come from.

@@ -1,20 +1,24 @@
 use super::bag_options::{BagOptions, PoseSource};
 use super::bag_topic::{choose_poses, kind_of};
 use super::messages::{MessageKind, StampedPose, decode_poses};
+use super::pose_lookup::PoseLookup;
+use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
 use super::transforms::{Transforms, WhyNot};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::pose::RigidPose;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Where the sensor was at the stamp of each cloud.
 #[derive(Debug)]
 pub(super) struct BagPoses {
     source: PoseSource,
-    transforms: Transforms,
+    /// Shared with those who look poses up while clouds are read.
+    transforms: Arc<Transforms>,
     fixed_frame: Option<String>,
-    /// Poses of a topic: the first says which frames they are of.
-    track: Vec<StampedPose>,
+    /// Poses of a topic, until they are among the transforms.
+    track: PoseTrack,
     /// Number of clouds without a pose, by reason.
     without: BTreeMap<String, u64>,
     remarks: Vec<String>,
@@ -28,16 +32,16 @@ impl BagPoses {
     pub(super) fn read(recording: &mut dyn Recording, options: &BagOptions) -> Result<Self> {
         let mut poses = Self {
             source: options.poses,
-            transforms: Transforms::default(),
+            transforms: Arc::default(),
             fixed_frame: options.fixed_frame.as_ref().map(|frame| frame.trim_start_matches('/').to_owned()),
-            track: Vec::new(),
+            track: PoseTrack::default(),
             without: BTreeMap::new(),
             remarks: Vec::new(),
         };
         if options.poses == PoseSource::None {
             return Ok(poses);
         }
-        poses.transforms.set_most_gap_ns(options.most_gap_ns);
+        Arc::make_mut(&mut poses.transforms).set_most_gap_ns(options.most_gap_ns);
         let topics = recording.topics().to_vec();
         let is_tf = |index: &usize| topics.get(*index).and_then(kind_of) == Some(MessageKind::Tf);
         let mut wanted: Vec<usize> = (0..topics.len()).filter(is_tf).collect();
@@ -47,7 +51,25 @@ impl BagPoses {
         };
         wanted.extend(odometry);
         poses.read_topics(recording, &topics, &wanted, odometry)?;
-        Ok(poses)
+        match odometry.and_then(|index| topics.get(index)) {
+            Some(topic) if poses.track.poses.is_empty() => Err(poses.without_track(topic)),
+            _ => Ok(poses),
+        }
+    }
+
+    /// Who asks for the poses of a topic does not want those of `/tf` in their place.
+    fn without_track(&self, topic: &Topic) -> Error {
+        let (messages, odd) = (topic.messages, self.track.odd);
+        let unusable = match odd {
+            0 => String::new(),
+            odd => format!("; {odd} are not valid, or their frames have no name"),
+        };
+        let bad = self.remarks.first().map(|bad| format!("; {bad}")).unwrap_or_default();
+        let reason = format!(
+            "none of its {messages} messages gives a pose that can be used{unusable}{bad}; choose another topic, \
+             leave the option out for /tf, or name a file with --poses"
+        );
+        Error::argument(format!("--odometry {}", topic.name), reason)
     }
 
     fn read_topics(
@@ -58,6 +80,7 @@ impl BagPoses {
         odometry: Option<usize>,
     ) -> Result<()> {
         let (mut bad, mut invalid) = (Vec::new(), 0_u64);
+        let transforms = Arc::make_mut(&mut self.transforms);
         recording.begin(wanted)?;
         loop {
             let message = match recording.next_message() {
@@ -75,18 +98,15 @@ impl BagPoses {
                 continue;
             };
             match decode_poses(kind, wire, &message.data) {
-                Ok(poses) if Some(message.topic) == odometry => self.track.extend(poses),
+                Ok(poses) if Some(message.topic) == odometry => {
+                    poses.into_iter().for_each(|pose| self.track.insert(pose));
+                }
                 Ok(poses) => {
                     let is_static = topic.name.ends_with("tf_static");
                     for StampedPose { header, child_frame, parent_from_child } in poses {
                         let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
-                        let is_taken = self.transforms.insert(
-                            parent,
-                            &child_frame,
-                            stamp_ns,
-                            parent_from_child,
-                            is_static,
-                        );
+                        let is_taken =
+                            transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static);
                         invalid += u64::from(!is_taken);
                     }
                 }
@@ -111,7 +131,7 @@ impl BagPoses {
     pub(super) fn world_from_sensor(&mut self, sensor_frame: &str, stamp_ns: i64) -> Option<RigidPose> {
         let found = match self.source {
             PoseSource::None => return None,
-            PoseSource::Odometry if !self.track.is_empty() => {
+            PoseSource::Odometry if !self.track.poses.is_empty() => {
                 self.settle_track(sensor_frame);
                 self.find(sensor_frame, stamp_ns)
             }
@@ -120,11 +140,12 @@ impl BagPoses {
         found.map_err(|why| *self.without.entry(why.to_string()).or_default() += 1).ok()
     }
 
-    pub(super) fn find(
-        &mut self,
-        sensor_frame: &str,
-        stamp_ns: i64,
-    ) -> std::result::Result<RigidPose, WhyNot> {
+    fn find(&self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
+        self.lookup(sensor_frame)?.find(stamp_ns)
+    }
+
+    /// Looks up where a sensor was at any time.
+    pub(super) fn lookup(&self, sensor_frame: &str) -> std::result::Result<PoseLookup, WhyNot> {
         let fixed = match &self.fixed_frame {
             Some(frame) => frame.clone(),
             None => self.fixed_frame_of(sensor_frame)?,
@@ -132,7 +153,7 @@ impl BagPoses {
         if fixed == sensor_frame {
             return Err(WhyNot::AlreadyFixed(fixed));
         }
-        self.transforms.lookup(&fixed, sensor_frame, stamp_ns)
+        Ok(PoseLookup::new(Arc::clone(&self.transforms), fixed, sensor_frame.to_owned()))
     }
 
     /// The default frame of the map, above the frame of a sensor.
@@ -155,24 +176,17 @@ impl BagPoses {
 
     /// Puts the poses of a topic among the transforms, in the place of those of the same frame.
     fn settle_track(&mut self, sensor_frame: &str) {
-        let track = std::mem::take(&mut self.track);
-        let Some(first) = track.first() else { return };
-        let parent = first.header.frame_id.clone();
-        let child =
-            if first.child_frame.is_empty() { self.base_of(sensor_frame) } else { first.child_frame.clone() };
-        self.transforms.detach(&child);
+        let PoseTrack { parent, child: named, poses, mut odd } = std::mem::take(&mut self.track);
+        let child = if named.is_empty() { self.base_of(sensor_frame) } else { named.clone() };
+        let transforms = Arc::make_mut(&mut self.transforms);
+        transforms.detach(&child);
         if self.fixed_frame.is_none() {
             // What is above the frame of the poses does not matter, and might lead back to its child.
-            self.transforms.detach(&parent);
+            transforms.detach(&parent);
             self.fixed_frame = Some(parent.clone());
         }
-        let mut odd = 0_u64;
-        for pose in &track {
-            let (own, stamp_ns) = (&pose.header.frame_id, pose.header.stamp_ns);
-            let is_same = *own == parent && (pose.child_frame.is_empty() || pose.child_frame == child);
-            let is_taken =
-                is_same && self.transforms.insert(&parent, &child, stamp_ns, pose.parent_from_child, false);
-            odd += u64::from(!is_taken);
+        for (stamp_ns, pose) in poses {
+            odd += u64::from(!transforms.insert(&parent, &child, stamp_ns, pose, false));
         }
         if odd > 0 {
             let remark = format!(
@@ -180,7 +194,7 @@ impl BagPoses {
             );
             self.remarks.push(remark);
         }
-        if first.child_frame.is_empty() {
+        if named.is_empty() {
             self.remarks.push(format!(
                 "the poses do not say of which frame they are; they are taken as those of {child}"
             ));

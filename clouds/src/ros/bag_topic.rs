@@ -64,11 +64,11 @@ pub(super) fn choose_clouds(recording: &mut dyn Recording, name: Option<&str>) -
 /// Finds the topic of poses.
 pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize> {
     if let Some(name) = name {
-        let index = named(topics, name, "--odometry-topic")?;
+        let index = named(topics, name, "--odometry")?;
         let topic = topics.get(index).filter(|topic| kind_of(topic).is_some_and(MessageKind::is_pose));
         return topic.map(|_| index).ok_or_else(|| {
             let reason = format!("its messages are no poses; topics: {}", list(topics.iter()));
-            Error::argument(format!("--odometry-topic {name}"), reason)
+            Error::argument(format!("--odometry {name}"), reason)
         });
     }
     let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
@@ -88,7 +88,7 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
         }
         _ => {
             let found = list(found.into_iter());
-            let reason = format!("several topics hold poses; choose one with --odometry-topic NAME: {found}");
+            let reason = format!("several topics hold poses; choose one with --odometry NAME: {found}");
             Err(Error::argument("recording", reason))
         }
     }

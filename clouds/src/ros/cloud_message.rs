@@ -36,6 +36,16 @@ impl<'a> CloudMessage<'a> {
         }
     }
 
+    /// Takes this as the stamp of the message: times of points are told from there on.
+    pub(super) fn count_times_from(&mut self, stamp_ns: i64) {
+        match self {
+            Self::PointCloud2(cloud) => cloud.header.stamp_ns = stamp_ns,
+            Self::Livox(cloud) => cloud.header.stamp_ns = stamp_ns,
+            // Their times are after the stamp, whichever it is.
+            Self::LaserScan(_) | Self::Depth(..) => {}
+        }
+    }
+
     pub(super) fn points_claimed(&self) -> u64 {
         match self {
             Self::PointCloud2(cloud) => cloud.points_claimed(),

@@ -278,7 +278,9 @@ impl ChunkFile for McapFile {
             contents.drain(..head.records.start);
             let (bytes, complaint) = decompress(&head.compression, contents, head.plain_bytes);
             let cut = (is_cut || head.is_cut).then(|| "the file ends in the midst of it".to_owned());
-            chunk = OpenChunk { bytes, messages: Vec::new(), complaint: cut.or(complaint) };
+            // What is missing explains a checksum that is wrong.
+            let complaint = cut.or(complaint).or_else(|| head.complaint(&bytes));
+            chunk = OpenChunk { bytes, messages: Vec::new(), complaint };
         }
         self.find_messages(&mut chunk, wanted);
         Ok(chunk)

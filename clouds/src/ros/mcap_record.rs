@@ -85,6 +85,8 @@ pub(super) fn message_head(contents: &[u8]) -> Option<(u16, i64)> {
 /// The start of a chunk.
 pub(super) struct ChunkHead {
     pub(super) plain_bytes: u64,
+    /// Of its records once they are unpacked; 0 if the recorder made none.
+    pub(super) crc: u32,
     pub(super) compression: String,
     /// Its compressed records, as many as are there.
     pub(super) records: Range<usize>,
@@ -96,17 +98,30 @@ impl ChunkHead {
         let mut pieces = Pieces::new(contents);
         pieces.take(16)?;
         let plain_bytes = pieces.u64()?;
-        pieces.u32()?;
+        let crc = pieces.u32()?;
         let compression = pieces.text()?;
         let claimed = pieces.u64()?;
         let there = (contents.len() - pieces.at) as u64;
         let count = usize::try_from(claimed.min(there)).ok()?;
         Some(Self {
             plain_bytes,
+            crc,
             compression,
             records: pieces.at..pieces.at + count,
             is_cut: claimed > there,
         })
+    }
+
+    /// What is wrong with its unpacked records by their checksum.
+    pub(super) fn complaint(&self, plain: &[u8]) -> Option<String> {
+        let found = crc32fast::hash(plain);
+        let reason = || {
+            let wanted = self.crc;
+            format!(
+                "its contents are damaged: their checksum is {found:08x}, that in its header {wanted:08x}"
+            )
+        };
+        (self.crc != 0 && found != self.crc).then(reason)
     }
 }
 

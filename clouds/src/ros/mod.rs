@@ -26,6 +26,8 @@ mod mcap_file;
 mod mcap_record;
 pub mod messages;
 mod open;
+mod pose_lookup;
+mod pose_track;
 mod recording;
 mod sequence;
 mod transforms;

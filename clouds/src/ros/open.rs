@@ -12,8 +12,13 @@ use std::path::{Path, PathBuf};
 ///
 /// No path; a file that cannot be read or is no recording.
 pub fn open_recording(paths: &[PathBuf]) -> Result<Box<dyn Recording>> {
+    open_recording_with(paths, None)
+}
+
+/// As [`open_recording`], with the folder that compressed files are unpacked into.
+pub(super) fn open_recording_with(paths: &[PathBuf], scratch: Option<&Path>) -> Result<Box<dyn Recording>> {
     let open = |path: &PathBuf| -> Result<Box<dyn Recording>> {
-        if path.is_dir() { Ok(Box::new(Bag2Folder::open(path)?)) } else { open_file(path) }
+        if path.is_dir() { Ok(Box::new(Bag2Folder::open_with(path, scratch)?)) } else { open_file(path) }
     };
     match paths {
         [] => Err(Error::argument("recording", "no file is given")),

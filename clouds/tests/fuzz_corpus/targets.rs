@@ -157,7 +157,9 @@ fn recording(data: &[u8], name: &str) -> bool {
             let options = BagOptions { poses, ..BagOptions::default() };
             if let Ok(mut clouds) = open_bag(&paths, &options) {
                 let stamp_ns = clouds.next_cloud().ok().flatten().and_then(|head| head.stamp_ns);
-                clouds.pose_at(stamp_ns.unwrap_or(0).saturating_add(1));
+                if let Some(pose_at) = clouds.poses() {
+                    pose_at(stamp_ns.unwrap_or(0).saturating_add(1));
+                }
                 while let Ok(Some(_)) = clouds.next_cloud() {
                     let _ = clouds.read_points(&mut |_| Ok(()));
                 }

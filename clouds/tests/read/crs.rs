@@ -1,5 +1,7 @@
 use crate::made::voxels::write_voxels;
 use std::fs;
+use std::path::Path;
+use voxtile_clouds::CloudSource;
 use voxtile_clouds::read::{OpenOptions, open};
 use voxtile_clouds::write::{VoxelFileFormat, WriteOptions};
 
@@ -61,4 +63,51 @@ fn what_is_no_number_of_a_system_is_refused() {
             voxtile_clouds::write::open_sink(VoxelFileFormat::Las, &head, &path, &options).err().unwrap();
         assert!(error.to_string().contains(crs), "{error}");
     }
+}
+
+/// A folder of files, each with its coordinate system.
+fn folder_of(folder: &Path, format: VoxelFileFormat, systems: &[Option<&str>]) -> Box<dyn CloudSource> {
+    for (number, crs) in systems.iter().enumerate() {
+        let path = folder.join(format!("{number}.{}", format.extension().unwrap()));
+        write_voxels(format, &path, *crs);
+    }
+    open(folder, &OpenOptions::default()).unwrap()
+}
+
+fn of_systems(source: &dyn CloudSource) -> Vec<String> {
+    source.remarks().into_iter().filter(|remark| remark.contains("coordinate system")).collect()
+}
+
+#[test]
+fn files_of_another_system_are_refused_before_their_points() {
+    for format in [VoxelFileFormat::Las, VoxelFileFormat::E57] {
+        let folder = tempfile::tempdir().unwrap();
+        let systems = [Some("EPSG:25832"), Some("EPSG:25833"), None, Some("EPSG:25832")];
+        let mut source = folder_of(folder.path(), format, &systems);
+        let (mut clouds, mut errors) = (0, Vec::new());
+        loop {
+            match source.next_cloud() {
+                Ok(Some(_)) => clouds += 1,
+                Ok(None) => break,
+                Err(error) => errors.push(error.to_string()),
+            }
+        }
+        assert_eq!((clouds, errors.len()), (3, 1), "{format:?}: {errors:?}");
+        let parts = ["/1.", "in EPSG:25833, those of the files before it in EPSG:25832"];
+        assert!(parts.iter().all(|part| errors[0].contains(part)), "{errors:?}");
+        assert_eq!((source.crs(), of_systems(&*source)), (Some("EPSG:25832"), vec![]));
+    }
+}
+
+#[test]
+fn a_system_that_later_files_name_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut source = folder_of(folder.path(), VoxelFileFormat::Las, &[None, Some("EPSG:25832")]);
+    assert!(source.next_cloud().unwrap().is_some());
+    assert_eq!((source.crs(), of_systems(&*source)), (None, vec![]));
+    assert!(source.next_cloud().unwrap().is_some());
+    assert_eq!(source.crs(), Some("EPSG:25832"));
+    let remarks = of_systems(&*source);
+    let told = "1.las: names the coordinate system EPSG:25832, the files before it name none";
+    assert!(remarks.len() == 1 && remarks[0].starts_with(told), "{remarks:?}");
 }

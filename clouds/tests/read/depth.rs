@@ -58,6 +58,26 @@ fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
     assert_eq!(depths, [(1.0, true), (13.107, true)]);
 }
 
+/// A list from elsewhere is not to open any file of the machine.
+#[test]
+fn images_out_of_the_folder_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = folder.path().join("set");
+    fs::create_dir(&inner).unwrap();
+    image(&folder.path().join("1.png"), 1, &[5000]);
+    let options = OpenOptions {
+        intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
+        format: Some(voxtile_clouds::read::Format::DepthTum),
+        ..Default::default()
+    };
+    for name in ["../1.png".to_owned(), folder.path().join("1.png").display().to_string()] {
+        fs::write(inner.join("depth.txt"), format!("# depth maps\n1305031453.374112 {name}\n")).unwrap();
+        let (error, points) = failure(&inner, &options);
+        assert!(error.contains("depth.txt, line 2") && error.contains("leads out of the folder"), "{error}");
+        assert_eq!(points, 0);
+    }
+}
+
 #[test]
 fn images_that_are_no_depths_are_errors() {
     let folder = tempfile::tempdir().unwrap();

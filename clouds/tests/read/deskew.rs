@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use voxtile_clouds::poses::{Found, Trajectory};
-use voxtile_clouds::{CloudPoint, CloudSource, Deskew, RigidPose};
+use voxtile_clouds::{CloudPoint, Deskew, RigidPose};
 
 /// When the sweep begins: the stamp of the cloud.
 const STAMP_NS: i64 = 1_700_000_000_250_000_000;
@@ -55,16 +55,17 @@ fn beside_planes_m(point: [f64; 3]) -> f64 {
 }
 
 /// How far the points are from the planes, at most.
-fn worst_m(points: &[CloudPoint], place: impl Fn(&CloudPoint) -> [f64; 3]) -> f64 {
+fn worst_m(points: &[CloudPoint], mut place: impl FnMut(&CloudPoint) -> [f64; 3]) -> f64 {
     let sensor = world_from_sensor(0.0);
     points.iter().map(|point| beside_planes_m(sensor.apply(place(point)))).fold(0.0, f64::max)
 }
 
 fn assert_deskews(points: &[CloudPoint], pose_at: impl FnMut(i64) -> Option<RigidPose>, of: &str) {
     assert_eq!(points.len(), POINTS, "{of}");
-    let deskew = Deskew::new(STAMP_NS, &world_from_sensor(0.0), pose_at);
+    let mut deskew = Deskew::new(STAMP_NS, &world_from_sensor(0.0), pose_at);
     let (skewed_m, deskewed_m) =
         (worst_m(points, |point| point.position_m), worst_m(points, |point| deskew.apply(point)));
+    assert_eq!(deskew.stayed(), 0, "{of}");
     assert!(skewed_m > 0.3, "{of}: without it, points are {skewed_m} m off at most");
     assert!(deskewed_m < 2e-5, "{of}: {deskewed_m} m off");
 }
@@ -152,11 +153,31 @@ fn times_of_every_column_of_text_take_points_to_the_planes() {
     }
 }
 
+/// A cloud may take a second, and poses may end before it does.
+#[test]
+fn points_far_from_the_stamp_move_and_those_without_a_pose_are_counted() {
+    let last_ns = STAMP_NS + 2_000_500_000;
+    let pose_at =
+        |at_ns: i64| (at_ns <= last_ns).then(|| world_from_sensor((at_ns - STAMP_NS) as f64 * 1e-9));
+    let mut deskew = Deskew::new(STAMP_NS, &world_from_sensor(0.0), pose_at);
+    let mut place = |time_s: f64| deskew.apply(&CloudPoint { time_s, ..CloudPoint::hit([3.0, 1.0, 0.0]) });
+    for time_s in [-5.0, -0.301, 0.4, 1.7, 2.0, 2.000_25] {
+        let wanted = world_from_sensor(time_s).apply([3.0, 1.0, 0.0]);
+        let found = place(time_s);
+        assert!((0..3).all(|k| (found[k] - wanted[k]).abs() < 1e-5), "{time_s} s: {found:?}, not {wanted:?}");
+    }
+    for time_s in [2.000_75, 9.0, 1e300, -1e300] {
+        assert_eq!(place(time_s), [3.0, 1.0, 0.0], "{time_s} s");
+    }
+    assert_eq!(deskew.stayed(), 3 + 1);
+}
+
 #[cfg(feature = "ros")]
 mod recordings {
     use super::*;
     use crate::made::bag1::{BagMessage, bag1};
     use crate::made::message::{F32, F64, Field, MessageWriter, U32};
+    use voxtile_clouds::CloudSource;
     use voxtile_clouds::ros::{BagOptions, open_bag};
 
     /// A sweep with the transforms around it, as a bag.
@@ -183,7 +204,8 @@ mod recordings {
             Ok(())
         });
         read.unwrap();
-        assert_deskews(&points, |at_ns| source.pose_at(at_ns), of);
+        let pose_at = source.poses().unwrap();
+        assert_deskews(&points, pose_at, of);
     }
 
     /// A field, and its bytes for so many nanoseconds after the stamp.
@@ -208,6 +230,26 @@ mod recordings {
             let cloud = MessageWriter::ros1().point_cloud2(STAMP_NS, "lidar", &fields, &points);
             assert_bag_deskews("sensor_msgs/PointCloud2", cloud, &format!("{field:?}"));
         }
+    }
+
+    /// Drivers without a clock leave the stamp of a cloud at 0; the times of its points may be those of another clock.
+    #[test]
+    fn times_since_1970_need_no_stamp_of_the_message() {
+        let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("timestamp", 12, F64)];
+        let point = |(ns, place): (u32, [f64; 3])| {
+            let place = place.map(|axis| (axis as f32).to_le_bytes());
+            let time = ((STAMP_NS + i64::from(ns)) as f64 * 1e-9).to_le_bytes();
+            [place.as_flattened(), &time].concat()
+        };
+        let points: Vec<Vec<u8>> = sweep().into_iter().map(point).collect();
+        let cloud = MessageWriter::ros1().point_cloud2(0, "lidar", &fields, &points);
+        assert_bag_deskews("sensor_msgs/PointCloud2", cloud, "points");
+        let head = MessageWriter::ros1().header(0, "lidar").number(STAMP_NS.to_le_bytes());
+        let head = head.u32(POINTS as u32).number([0, 0, 0, 0]).u32(POINTS as u32);
+        let message = sweep().into_iter().fold(head, |message, (ns, place)| {
+            message.u32(ns).f32s(&place.map(|axis| axis as f32)).number([9, 0, 0])
+        });
+        assert_bag_deskews("livox_ros_driver/CustomMsg", message.done(), "livox");
     }
 
     /// Its time base is the stamp, or lies before it where the driver stamps a cloud as it sends it.

@@ -1,5 +1,6 @@
-use crate::support::{clouds, fixture, wanted};
+use crate::support::{clouds, failure, fixture, wanted};
 use std::fs;
+use std::path::Path;
 use voxtile_clouds::read::{OpenOptions, open};
 
 /// Written by pye57 (libE57Format).
@@ -41,4 +42,17 @@ fn no_damage_makes_a_panic() {
             drop(crate::support::all(source.as_mut()));
         }
     }
+}
+
+/// The library would make points of it until there is no memory.
+#[test]
+fn points_that_take_no_bits_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("constant.e57");
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus/cloud_e57/without-bits");
+    // The first byte is for the target of the fuzzer.
+    fs::write(&path, &fs::read(corpus).unwrap()[1..]).unwrap();
+    let (error, points) = failure(&path, &OpenOptions::default());
+    assert!(error.contains("constant.e57, record 0: every field of its points has"), "{error}");
+    assert_eq!(points, 0);
 }

@@ -49,7 +49,7 @@ pub struct ReadArgs {
     #[arg(long)]
     pub world_frame: bool,
     /// Move each point to where it was at the time of its scan, by its own time stamp and the poses around
-    #[arg(long)]
+    #[arg(long, conflicts_with = "world_frame")]
     pub deskew: bool,
     /// Leave out points in this box, which the robot sees of itself, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]

@@ -9,8 +9,8 @@ pub struct LivoxCustom<'a> {
     pub header: Header,
     /// Number of points.
     pub count: usize,
-    /// From the stamp to where `offset_time` counts from.
-    base_after_stamp_s: f64,
+    /// Where `offset_time` counts from, in nanoseconds.
+    timebase_ns: u64,
     points: WireReader<'a>,
 }
 
@@ -29,22 +29,25 @@ impl<'a> LivoxCustom<'a> {
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         let header = Header::read(&mut reader)?;
-        // Mostly `timebase` repeats the stamp; some drivers stamp a cloud when they send it.
-        let base_ns = i128::from(reader.u64()?) - i128::from(header.stamp_ns);
-        let base_after_stamp_s =
-            if base_ns.unsigned_abs() <= MOST_BASE_NS { base_ns as f64 * 1e-9 } else { 0.0 };
+        let timebase_ns = reader.u64()?;
         // `point_num` repeats the length of the sequence.
         reader.u32()?;
         // `lidar_id` and `rsvd`.
         reader.bytes(4)?;
         let count = reader.sequence(POINT_BYTES)?;
-        Ok(Self { header, count, base_after_stamp_s, points: reader })
+        Ok(Self { header, count, timebase_ns, points: reader })
+    }
+
+    /// From the stamp to the time base. Mostly it repeats the stamp; some drivers stamp a cloud when they send it.
+    fn base_after_stamp_s(&self) -> f64 {
+        let base_ns = i128::from(self.timebase_ns) - i128::from(self.header.stamp_ns);
+        if base_ns.unsigned_abs() <= MOST_BASE_NS { base_ns as f64 * 1e-9 } else { 0.0 }
     }
 
     /// Its points, in order. A message that is cut off ends with an error.
     pub fn points(&self) -> impl Iterator<Item = Decoded<CloudPoint>> + '_ {
-        let mut reader = self.points.clone();
-        (0..self.count).map(move |_| point(&mut reader, self.base_after_stamp_s))
+        let (mut reader, base_s) = (self.points.clone(), self.base_after_stamp_s());
+        (0..self.count).map(move |_| point(&mut reader, base_s))
     }
 }
 
