@@ -14,8 +14,7 @@ use crate::command::watch::Watch;
 use crate::command::{INTERRUPTED, say};
 use crate::io::{PointRoom, ReadOptions, ScanMark, StoredScan};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
-use crate::scan::{PointBatch, ScanPoints, ScanReport, ScanTracer};
-use crate::space::Point;
+use crate::scan::{ScanPoints, ScanReport, ScanTracer};
 use crate::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use crate::{Error, MapConfig, MapPath, MemoryLimit};
 use std::path::Path;
@@ -186,7 +185,7 @@ impl Build<'_> {
             return self.mapper.insert_all(&scans, reports);
         }
         for Taken { scan, .. } in taken {
-            reports.push(insert_hits(self.mapper, scan)?);
+            reports.push(self.mapper.insert_hits(scan)?);
         }
         Ok(())
     }
@@ -228,29 +227,6 @@ fn check_when_behind(args: &BuildArgs) -> crate::Result<()> {
     let reason =
         "files wait until they are read: leave it out, or give the scans as they come, as - or a pipe";
     Err(Error::argument("--when-behind", reason))
-}
-
-/// Takes the points of a scan as hits alone, as one batch; those outside the map's region are left out.
-fn insert_hits(mapper: &mut OutOfCoreTileMapper, scan: &StoredScan) -> crate::Result<ScanReport> {
-    let (grid, region) = (mapper.config().grid, mapper.config().rays.region);
-    // A point without a tile is skipped and counted.
-    let is_inside = |point: Point| match (region, grid.tile_of(point)) {
-        (Some(region), Some(tile)) => region.contains(tile),
-        _ => true,
-    };
-    let (mut points, mut intensities) = (Vec::new(), Vec::new());
-    scan.for_each_chunk(0..scan.len(), &mut |chunk, of_chunk| {
-        for (number, &point) in chunk.iter().enumerate().filter(|(_, point)| is_inside(**point)) {
-            points.push(point);
-            intensities.extend(of_chunk.map(|intensities| intensities[number]));
-        }
-        true
-    })?;
-    let intensities = scan.has_intensities().then_some(&*intensities);
-    let is_occupied = vec![true; points.len()];
-    let batch = PointBatch { points: &points, intensities, is_occupied: &is_occupied };
-    let report = mapper.batch_update(&batch)?;
-    Ok(ScanReport { points: scan.len() as u64, ..report })
 }
 
 fn flush_if(

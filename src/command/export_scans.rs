@@ -77,9 +77,15 @@ fn write_pose(scan: &KeptScan, is_stamped: bool, out: &mut impl Write) -> io::Re
     let stamp_ns = scan.stamp_ns().filter(|_| is_stamped).unwrap_or_default();
     let [x, y, z] = scan.origin();
     let [qx, qy, qz, qw] = scan.world_from_sensor().map_or([0.0, 0.0, 0.0, 1.0], |pose| pose.quaternion());
-    let (whole, rest) = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+    let stamp = decimal_seconds(stamp_ns);
     // The shortest decimals that read back to the same bits.
-    writeln!(out, "{whole}.{rest:09} {x} {y} {z} {qx} {qy} {qz} {qw}")
+    writeln!(out, "{stamp} {x} {y} {z} {qx} {qy} {qz} {qw}")
+}
+
+/// Nanoseconds as seconds. The sign is of the whole number: -0.5 s have no whole second that could bear it.
+fn decimal_seconds(stamp_ns: i64) -> String {
+    let (sign, all) = (if stamp_ns < 0 { "-" } else { "" }, stamp_ns.unsigned_abs());
+    format!("{sign}{}.{:09}", all / 1_000_000_000, all % 1_000_000_000)
 }
 
 /// Writes the points as they were inserted: `float32` where that is all there is, else `float64`.
@@ -117,4 +123,24 @@ fn write_pcd(scan: &KeptScan, path: &Path) -> Result<()> {
         written.is_ok()
     })?;
     written.and_then(|()| out.flush()).map_err(cannot)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_before_zero_keep_their_distance() {
+        for (stamp_ns, text) in [
+            (-500_000_000, "-0.500000000"),
+            (-1, "-0.000000001"),
+            (-1_250_000_000, "-1.250000000"),
+            (-2_000_000_000, "-2.000000000"),
+            (0, "0.000000000"),
+            (1_600_000_000_000_000_001, "1600000000.000000001"),
+            (i64::MIN, "-9223372036.854775808"),
+        ] {
+            assert_eq!(decimal_seconds(stamp_ns), text);
+        }
+    }
 }

@@ -5,7 +5,9 @@ use super::{LiveReader, MapStatistics, MapView, Mapper, TileRef};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::{Error, Result};
 use crate::persistence::{new_map_id, new_metadata};
-use crate::scan::{Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop};
+use crate::scan::{
+    Overflow, PointBatch, ScanPoints, ScanReport, ScanTracer, ScanUpdates, Stop, updates_of_hits,
+};
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::store::{
@@ -327,6 +329,29 @@ impl OutOfCoreTileMapper {
         scan: &dyn ScanPoints,
         selection: Option<&TileSelection>,
     ) -> Result<(ScanReport, Vec<TileIndex>)> {
+        self.accept_within_limit(|config, tracer, overflow| {
+            tracer.trace_points(trace_rules(config, selection), scan, overflow)
+        })
+    }
+
+    /// Takes the points of a scan as hits alone, as one batch; those outside of the region of the rays are left out.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Mapper::batch_update`]; points that cannot be read; [`Error::Stopped`].
+    pub(crate) fn insert_hits(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
+        let (report, _) = self.accept_within_limit(|config, tracer, overflow| {
+            updates_of_hits(config, scan, tracer.stop(), overflow)
+        })?;
+        self.pager().note_batch();
+        Ok(report)
+    }
+
+    /// Makes the updates of a scan and accepts them. Those that exceed the memory limit go to files meanwhile.
+    fn accept_within_limit(
+        &mut self,
+        make: impl FnOnce(&MapConfig, &mut ScanTracer, Option<Overflow<'_>>) -> Result<ScanUpdates>,
+    ) -> Result<(ScanReport, Vec<TileIndex>)> {
         let plan = MemoryPlan::new(self.config.memory);
         let tiles = &self.tiles;
         let (disk, folder, max_tiles) = {
@@ -338,9 +363,9 @@ impl OutOfCoreTileMapper {
         let max_bytes = plan.updates_bytes;
         let overflow = Overflow { max_bytes, max_tiles, folder: &folder, make_scratch, spill };
         let overflow = (max_bytes < usize::MAX).then_some(overflow);
-        let traced = self.tracer.trace_points(trace_rules(&self.config, selection), scan, overflow);
-        let traced = traced.and_then(|updates| self.tracer.stop().check().map(|()| updates));
-        let inserted = traced.and_then(|updates| self.accept(updates, 0));
+        let made = make(&self.config, &mut self.tracer, overflow);
+        let made = made.and_then(|updates| self.tracer.stop().check().map(|()| updates));
+        let inserted = made.and_then(|updates| self.accept(updates, 0));
         if inserted.is_err() {
             self.pager().discard_staged();
         }
@@ -590,4 +615,51 @@ fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> R
         return Err(mismatch("occupancy threshold", found, wanted));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mapper::MapReader;
+    use crate::query::MapQueries;
+    use crate::scan::Scan;
+    use crate::space::TileBox;
+
+    /// A map of one scan of hits between two scans with rays.
+    fn map_of(folder: &Path, config: MapConfig, clouds: &[Scan]) -> OutOfCoreTileMapper {
+        let mut mapper = OutOfCoreTileMapper::create(folder, config).unwrap();
+        mapper.insert_scan(&clouds[0]).unwrap();
+        let report = mapper.insert_hits(&clouds[1]).unwrap();
+        assert_eq!((report.points, report.skipped.out_of_range), (20_000, 1));
+        mapper.insert_scan(&clouds[2]).unwrap();
+        mapper.flush().unwrap();
+        mapper
+    }
+
+    #[test]
+    fn hits_in_little_memory_are_those_of_one_batch() {
+        let cloud = |count: i32, shift: f64| {
+            let point = |k: i32| [7, 11, 13].map(|step| f64::from(k * step % 97) * 0.05 + shift);
+            let mut points: Vec<_> = (0..count).map(point).collect();
+            points[5] = [1e12; 3];
+            Scan { origin: [0.25; 3], points, intensities: None }
+        };
+        let clouds = [cloud(100, -1.0), cloud(20_000, -2.0), cloud(100, -1.5)];
+        let region = TileBox::of([TileIndex::new(-2, -2, -2), TileIndex::new(0, 1, 0)].into_iter());
+        let folder = tempfile::tempdir().unwrap();
+        for region in [None, region] {
+            let config = MapConfig::new(0.1, 1.6).unwrap().with_region(region);
+            let tight = config.clone().with_tight_memory_bytes(100_000);
+            let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
+            let expected = map_of(&whole, config, &clouds);
+            let found = map_of(&parts, tight, &clouds);
+            assert_eq!(found.digest().unwrap(), expected.digest().unwrap());
+            assert_eq!((found.scan_number(), expected.scan_number()), (3, 3));
+            drop((found, expected));
+            let scans = |folder: &Path| MapReader::open(folder, 4).unwrap().scans().unwrap();
+            assert_eq!(scans(&parts), scans(&whole));
+            assert_eq!(scans(&parts).iter().map(|scan| scan.number).collect::<Vec<_>>(), [1, 3]);
+            [whole, parts].iter().for_each(|folder| std::fs::remove_dir_all(folder).unwrap());
+        }
+    }
 }

@@ -28,6 +28,7 @@ mod world_scan;
 
 pub use coordinate::Coordinate;
 pub use point_batch::PointBatch;
+pub(crate) use point_batch::updates_of_hits;
 pub use pose::Pose;
 pub(crate) use ray::Advanced;
 pub use ray::{MAX_RAY_STEPS, RayWalk, no_return};

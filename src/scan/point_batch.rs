@@ -1,10 +1,12 @@
 use super::per_ray::OrderedCollector;
+use super::spill::{Overflow, ScanParts};
 use super::trace::check_intensities;
 use super::updates::MappedTiles;
-use super::{ScanReport, ScanUpdates};
+use super::{ScanPoints, ScanReport, ScanUpdates, Stop};
+use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
-use crate::space::{Grid, Point};
+use crate::space::{Grid, Point, TileBox};
 
 /// Observations of single points without rays, in the order in which they count.
 #[derive(Clone, Copy, Debug)]
@@ -30,24 +32,177 @@ impl PointBatch<'_> {
                 format!("{} for {} points; give one a point", self.is_occupied.len(), self.points.len());
             return Err(Error::argument("is_occupied", reason));
         }
-        let mut collector =
-            OrderedCollector::new(MappedTiles { grid, selection: None }, model.needs_intensity());
-        let mut report = ScanReport { points: self.points.len() as u64, ..ScanReport::default() };
+        let mut collector = BatchCollector::new(grid, model, self.points.len());
         for (number, (&point, &is_occupied)) in self.points.iter().zip(self.is_occupied).enumerate() {
             let intensity = self.intensities.map_or(0.0, |intensities| intensities[number]);
             let observation = if is_occupied { Observation::Hit(intensity) } else { Observation::Miss };
-            if model.needs_intensity() && intensity.is_nan() {
-                report.skipped.no_intensity += 1;
-            } else if !point.iter().all(|coordinate| coordinate.is_finite()) {
-                report.skipped.not_finite += 1;
-            } else if let Some(voxel) = grid.voxel_of(point) {
-                if model.is_evidence(observation) {
-                    collector.push(voxel, observation);
-                }
-            } else {
-                report.skipped.out_of_range += 1;
-            }
+            collector.take(point, intensity, observation);
         }
-        Ok(collector.into_updates(report))
+        Ok(collector.into_updates())
+    }
+}
+
+/// The updates of a batch that takes the points of a scan as hits, those outside of the region left out: the same as
+/// of [`PointBatch::updates`], but chunk by chunk. With `overflow`, updates that exceed the memory limit are spilled and
+/// the rest is returned.
+///
+/// # Errors
+///
+/// No intensities where the sensor model needs them, points that cannot be read, errors of the spill; a stop.
+pub(crate) fn updates_of_hits(
+    config: &MapConfig,
+    scan: &dyn ScanPoints,
+    stop: &Stop,
+    overflow: Option<Overflow<'_>>,
+) -> Result<ScanUpdates> {
+    let MapConfig { grid, sensor_model: model, rays, .. } = config;
+    if !scan.has_intensities() {
+        check_intensities(model, scan.len(), None)?;
+    }
+    let mut collector = BatchCollector::new(grid, model, scan.len());
+    let Some(mut overflow) = overflow else {
+        for_each_hit(scan, stop, |point, intensity| {
+            collector.take_within(rays.region, point, intensity);
+            true
+        })?;
+        return Ok(collector.into_updates());
+    };
+    let Overflow { max_bytes, max_tiles, make_scratch, .. } = overflow;
+    let mapped = MappedTiles { grid, selection: None };
+    let parts = ScanParts::new(mapped, stop, max_bytes / 4, max_tiles, make_scratch);
+    for_each_hit(scan, stop, |point, intensity| {
+        collector.take_within(rays.region, point, intensity);
+        if collector.updates.bytes() > max_bytes / 2 {
+            collector.updates.drain_to(&parts);
+        }
+        !parts.has_failed()
+    })?;
+    if parts.is_empty() {
+        return Ok(collector.into_updates());
+    }
+    collector.updates.drain_to(&parts);
+    parts.into_updates(collector.report, false, stop, &mut overflow)
+}
+
+/// Passes points with their intensities, 0 where there are none, until `take` returns false.
+fn for_each_hit(scan: &dyn ScanPoints, stop: &Stop, mut take: impl FnMut(Point, f32) -> bool) -> Result<()> {
+    scan.for_each_chunk(0..scan.len(), &mut |points, intensities| {
+        let intensity = |number: usize| intensities.map_or(0.0, |intensities| intensities[number]);
+        let goes_on = points.iter().enumerate().all(|(number, &point)| take(point, intensity(number)));
+        goes_on && !stop.is_set()
+    })?;
+    stop.check()
+}
+
+/// Takes the points of a batch one after the other.
+struct BatchCollector<'a> {
+    grid: &'a Grid,
+    model: &'a SensorModel,
+    updates: OrderedCollector<'a>,
+    report: ScanReport,
+}
+
+impl<'a> BatchCollector<'a> {
+    fn new(grid: &'a Grid, model: &'a SensorModel, points: usize) -> Self {
+        let mapped = MappedTiles { grid, selection: None };
+        let updates = OrderedCollector::new(mapped, model.needs_intensity());
+        Self { grid, model, updates, report: ScanReport { points: points as u64, ..ScanReport::default() } }
+    }
+
+    fn take(&mut self, point: Point, intensity: f32, observation: Observation) {
+        if self.model.needs_intensity() && intensity.is_nan() {
+            self.report.skipped.no_intensity += 1;
+        } else if !point.iter().all(|coordinate| coordinate.is_finite()) {
+            self.report.skipped.not_finite += 1;
+        } else if let Some(voxel) = self.grid.voxel_of(point) {
+            if self.model.is_evidence(observation) {
+                self.updates.push(voxel, observation);
+            }
+        } else {
+            self.report.skipped.out_of_range += 1;
+        }
+    }
+
+    /// Takes a hit unless it is outside of a region. A point without a tile is skipped and counted.
+    fn take_within(&mut self, region: Option<TileBox>, point: Point, intensity: f32) {
+        let is_outside =
+            region.zip(self.grid.tile_of(point)).is_some_and(|(region, tile)| !region.contains(tile));
+        if !is_outside {
+            self.take(point, intensity, Observation::Hit(intensity));
+        }
+    }
+
+    fn into_updates(self) -> ScanUpdates {
+        self.updates.into_updates(self.report)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::{PackedUpdates, Scan};
+    use crate::scratch::Scratch;
+    use crate::space::TileIndex;
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+    use std::path::Path;
+
+    /// The updates of each tile, packed, in order.
+    type ByTile = BTreeMap<TileIndex, PackedUpdates>;
+
+    fn add(tiles: Vec<(TileIndex, PackedUpdates)>, all: &mut ByTile) {
+        tiles.into_iter().for_each(|(tile, updates)| all.entry(tile).or_default().append(&updates));
+    }
+
+    /// Voxels of each tile's updates, one by one.
+    fn voxels(all: &ByTile) -> Vec<(TileIndex, Vec<u32>)> {
+        let of = |updates: &PackedUpdates| {
+            let lists = updates.iter().map(|list| match list {
+                crate::scan::TileUpdates::Ordered(list) => list.parts().0.to_vec(),
+                other => panic!("{other:?} is no list"),
+            });
+            lists.flatten().collect()
+        };
+        all.iter().map(|(tile, updates)| (*tile, of(updates))).collect()
+    }
+
+    #[test]
+    fn hits_that_exceed_the_limit_go_out_in_their_order() {
+        const MAX_BYTES: usize = 8 << 10;
+        let config = MapConfig::new(0.1, 1.6).unwrap();
+        let mut points: Vec<Point> =
+            (0..5000_i32).map(|k| [7, 11, 13].map(|step| f64::from(k * step % 97) * 0.05 - 2.0)).collect();
+        points[77] = [f64::NAN; 3];
+        points[4000] = [1e12; 3];
+        let scan = Scan { origin: [0.0; 3], points: points.clone(), intensities: None };
+        let is_occupied = vec![true; points.len()];
+        let batch = PointBatch { points: &points, intensities: None, is_occupied: &is_occupied };
+        let whole = batch.updates(&config.grid, &config.sensor_model).unwrap();
+        let mut expected = ByTile::new();
+        let packed = |updates: ScanUpdates| -> Vec<_> {
+            updates.tiles.iter().map(|(tile, updates)| (*tile, PackedUpdates::of(updates))).collect()
+        };
+        let report = whole.report;
+        add(packed(whole), &mut expected);
+
+        let (mut found, mut parts) = (ByTile::new(), 0);
+        let mut spill = |part: Vec<(TileIndex, PackedUpdates)>| {
+            parts += 1;
+            assert!(part.iter().map(|(_, updates)| updates.as_bytes().len()).sum::<usize>() < 2 * MAX_BYTES);
+            add(part, &mut found);
+            Ok(())
+        };
+        let make_scratch = || Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
+        let overflow = Overflow {
+            max_bytes: MAX_BYTES,
+            max_tiles: usize::MAX,
+            folder: Path::new("map"),
+            make_scratch: &make_scratch,
+            spill: &mut spill,
+        };
+        let rest = updates_of_hits(&config, &scan, &Stop::default(), Some(overflow)).unwrap();
+        assert_eq!((rest.report, parts > 1), (report, true));
+        add(packed(rest), &mut found);
+        assert_eq!(voxels(&found), voxels(&expected));
     }
 }

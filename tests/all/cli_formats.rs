@@ -208,6 +208,21 @@ fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
     assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
 }
 
+/// A `.yaml` or a world file beside the output would replace an output of that name.
+#[test]
+fn outputs_named_as_what_lies_beside_them_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let map = repository("map_tiles_example");
+    for (format, name, hint) in
+        [("nav2", "map.yaml", "map.pgm"), ("heightmap", "h.json", "h.png"), ("heightmap", "h.pgw", "h.png")]
+    {
+        let path = folder.path().join(name);
+        let told = refusal(&["export", &map, "-o", text(&path), "--format", format]);
+        assert!(told.contains(name) && told.contains(hint), "{told}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
 /// A set as it is handed around: clouds in `scans`, what belongs to them beside it.
 #[test]
 fn texts_beside_clouds_are_none() {

@@ -12,6 +12,9 @@ use std::path::PathBuf;
 /// A brick and a place in it.
 const RECORD_BYTES: usize = 15;
 
+/// The six indices of a face.
+const INDEX_BYTES: u64 = 24;
+
 /// Heights from low to high: red, green, blue.
 const COLOURS: [[f64; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
@@ -179,6 +182,7 @@ impl Mesh {
         let mut quads: Vec<Quad> = Vec::new();
         brick.quads(&mut |quad| quads.push(quad));
         for quad in quads {
+            self.check_room()?;
             self.bytes.clear();
             for corner in quad.corners {
                 let place: [i64; 3] = std::array::from_fn(|k| {
@@ -201,6 +205,12 @@ impl Mesh {
             self.surface.quads += 1;
         }
         Ok(())
+    }
+
+    /// Whether one more face fits: said before the scratch files hold more than any file can.
+    fn check_room(&self) -> Result<()> {
+        let bytes = 4 * self.surface.kind.bytes() as u64 + INDEX_BYTES;
+        if (self.surface.quads + 1) * bytes > u64::from(u32::MAX) { Err(too_large()) } else { Ok(()) }
     }
 
     /// Where a height is among those that are coloured: 0 is the first colour, 1 the last.
@@ -302,6 +312,33 @@ mod tests {
             }
         }
         faces
+    }
+
+    #[test]
+    fn a_mesh_that_no_file_can_hold_is_refused_while_it_grows() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut brick = Brick::new();
+        brick.insert([5, 6, 7]);
+        for (kind, most) in [(VertexKind::Short, 0xffff_ffff / 72), (VertexKind::Single, 0xffff_ffff / 88)] {
+            let surface = Surface {
+                quads: most - 6,
+                kind,
+                resolution_m: 0.5,
+                corner_m: [0.0; 3],
+                size: [1; 3],
+                least: [0; 3],
+                most: [1; 3],
+                crs: None,
+            };
+            let spool = || Spool::new(folder.path()).unwrap();
+            let (vertices, indices, bytes) = (spool(), spool(), Vec::new());
+            let mut mesh = Mesh { vertices, indices, bytes, colour_heights_m: None, surface };
+            mesh.add(&brick, [0; 3], [0; 3]).unwrap();
+            assert_eq!(mesh.surface.quads, most);
+            let error = mesh.add(&brick, [0; 3], [0; 3]).unwrap_err().to_string();
+            assert!(error.contains("4 GiB") && error.contains("choose a region"), "{error}");
+            assert_eq!(mesh.surface.quads, most);
+        }
     }
 
     #[test]

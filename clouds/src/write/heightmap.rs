@@ -21,7 +21,7 @@ pub(super) struct HeightmapSink {
 
 impl HeightmapSink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
-        let (world_file, scale_file) = (options.companion("pgw")?, options.companion("json")?);
+        let (world_file, scale_file) = (options.companion("pgw", "png")?, options.companion("json", "png")?);
         Ok(Self {
             out: OutFile::create(path)?,
             head: head.clone(),

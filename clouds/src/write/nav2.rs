@@ -17,7 +17,7 @@ pub(super) struct Nav2Sink {
 impl Nav2Sink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
         let map = FlatMap::new(head, options.heights_m()?);
-        let (yaml, image) = (options.companion("yaml")?, options.final_name()?.to_owned());
+        let (yaml, image) = (options.companion("yaml", "pgm")?, options.final_name()?.to_owned());
         Ok(Self { out: OutFile::create(path)?, resolution_m: head.resolution_m, yaml, image, map })
     }
 }

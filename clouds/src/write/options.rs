@@ -60,10 +60,19 @@ impl WriteOptions {
         })
     }
 
-    /// Where a file beside the output is written: its name is the final one with another end.
-    pub(super) fn companion(&self, extension: &str) -> Result<PathBuf> {
-        let name = Path::new(self.final_name()?).with_extension(extension);
-        Ok(self.companion_folder.join(name))
+    /// Where a file beside the output is written: its name is the final one with another end. `own` is the end that the
+    /// output itself should have.
+    pub(super) fn companion(&self, extension: &str, own: &str) -> Result<PathBuf> {
+        let name = self.final_name()?;
+        let beside = Path::new(name).with_extension(extension);
+        // Some disks take names that differ in case for one.
+        if beside.to_str().is_some_and(|beside| beside.eq_ignore_ascii_case(name)) {
+            let hint = self.final_path.with_extension(own);
+            let reason =
+                format!("a file beside the output has this name; name the output {}", hint.display());
+            return Err(Error::argument(self.final_path.display().to_string(), reason));
+        }
+        Ok(self.companion_folder.join(beside))
     }
 
     /// Heights that count, checked.
@@ -75,5 +84,30 @@ impl WriteOptions {
         }
         let reason = format!("heights from {least} to {most} m hold nothing; z_min must be below z_max");
         Err(Error::argument("z_min, z_max", reason))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::super::{VoxelFileFormat, open_sink};
+    use super::*;
+
+    #[test]
+    fn no_output_takes_the_name_of_what_belongs_beside_it() {
+        let rows = [row([0, 0, 0], 0.9)];
+        for (format, name, hint) in [
+            (VoxelFileFormat::Nav2Map, "map.yaml", "map.pgm"),
+            (VoxelFileFormat::Nav2Map, "map.YAML", "map.pgm"),
+            (VoxelFileFormat::Heightmap, "h.json", "h.png"),
+            (VoxelFileFormat::Heightmap, "h.Pgw", "h.png"),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join(name);
+            let opened = open_sink(format, &head_of(&rows), &path, &WriteOptions::beside(&path));
+            let error = opened.err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(error.contains(name) && error.contains(hint), "{name}: {error:?}");
+            assert!(!path.exists());
+        }
     }
 }
