@@ -321,6 +321,20 @@ impl MapConfig {
         Ok(self)
     }
 
+    /// The same for a map that is to be made: there is no coordinate reference system with control characters, which a
+    /// file or a terminal would take for something else. A map that has one keeps it.
+    pub(crate) fn validated_as_new(self) -> Result<Self> {
+        // Well-known text may have several lines.
+        let is_wrong = |c: &char| c.is_control() && !matches!(c, '\t' | '\n' | '\r');
+        if let Some(c) = self.crs.iter().flat_map(|crs| crs.chars()).find(is_wrong) {
+            let reason = format!(
+                "has the control character {c:?}; name it as plain text, EPSG:25832 or well-known text"
+            );
+            return Err(Error::argument("crs", reason));
+        }
+        self.validated()
+    }
+
     /// Log-odds from which a voxel counts as occupied.
     #[inline]
     pub fn occupied_log_odds(&self) -> f64 {

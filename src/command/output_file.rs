@@ -268,30 +268,74 @@ impl StagedOutput {
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// A name that something else has: then all of it is as it was. A disk that refuses.
     pub fn finish(self) -> Result<Vec<PathBuf>> {
         let own = self.path()?;
         let folder = folder_of(&self.target);
-        let list = std::fs::read_dir(self.folder()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+        let beside = self.beside_output(&own)?;
+        let name_of = |from: &Path| from.file_name().map_or(self.target.clone(), |name| folder.join(name));
+        let mut names: Vec<PathBuf> = beside.iter().map(|from| name_of(from)).collect();
+        // All before the first gets its name.
+        for (from, to) in beside.iter().zip(&names) {
+            check_staged(from, to)?;
+            self.check_beside(from, to)?;
+        }
+        names.push(name_of(&own));
+        check_staged(&own, &self.target)?;
+        for (from, to) in beside.iter().chain([&own]).zip(&names) {
+            take_name(from, to).map_err(|error| Error::io(to, "replace", error))?;
+        }
+        names.pop();
+        sync_folder(folder).map_err(|error| Error::io(&self.target, "make durable", error))?;
+        Ok(names)
+    }
+
+    /// What was written beside the output itself, in order.
+    fn beside_output(&self, own: &Path) -> Result<Vec<PathBuf>> {
+        let list = fs::read_dir(self.folder()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let list = list.map_err(|error| Error::io(self.folder(), "list", error))?;
         let mut beside: Vec<PathBuf> =
-            list.iter().map(|entry| entry.path()).filter(|path| *path != own).collect();
+            list.iter().map(fs::DirEntry::path).filter(|path| path != own).collect();
         beside.sort_unstable();
-        let mut named = Vec::new();
-        for from in beside.iter().chain([&own]) {
-            let to = from.file_name().map_or(self.target.clone(), |name| folder.join(name));
-            sync_all(from).map_err(|error| Error::io(from, "make durable", error))?;
-            check_staged_target(&to)?;
-            if from.is_dir() && to.is_dir() {
-                std::fs::remove_dir(&to).map_err(|error| Error::io(&to, "replace", error))?;
-            }
-            std::fs::rename(from, &to).map_err(|error| Error::io(&to, "replace", error))?;
-            named.push(to);
-        }
-        named.pop();
-        sync_folder(folder).map_err(|error| Error::io(&self.target, "make durable", error))?;
-        Ok(named)
+        Ok(beside)
     }
+
+    /// Nobody has named the files beside an output. One that is there belongs to an earlier output of this name, or
+    /// is what an export left that was killed, or is of somebody else.
+    fn check_beside(&self, from: &Path, to: &Path) -> Result<()> {
+        if self.target.exists() || !to.exists() || is_same(from, to)? {
+            return Ok(());
+        }
+        let hint =
+            "a file beside the output needs this name; move or remove what has it, or name another output";
+        Err(Error::AlreadyExists { path: to.to_owned(), hint })
+    }
+}
+
+/// Whether two files have the same content.
+fn is_same(a: &Path, b: &Path) -> Result<bool> {
+    let len = |path: &Path| {
+        fs::metadata(path).map(|metadata| metadata.len()).map_err(|error| Error::io(path, "look at", error))
+    };
+    let content = |path: &Path| fs::read(path).map_err(|error| Error::io(path, "read", error));
+    Ok(len(a)? == len(b)? && content(a)? == content(b)?)
+}
+
+/// Makes a file or folder durable that is about to get a name.
+fn check_staged(from: &Path, to: &Path) -> Result<()> {
+    sync_all(from).map_err(|error| Error::io(from, "make durable", error))?;
+    if to.is_dir() && !from.is_dir() {
+        let reason = "is a folder, and a file needs its name; name another output, or remove it first";
+        return Err(Error::argument(to.display().to_string(), reason));
+    }
+    check_staged_target(to)
+}
+
+fn take_name(from: &Path, to: &Path) -> io::Result<()> {
+    if from.is_dir() && to.is_dir() {
+        fs::remove_dir(to)?;
+    }
+    fs::rename(from, to)
 }
 
 /// A new file, a file that is replaced, or an empty folder.

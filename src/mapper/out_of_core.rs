@@ -68,7 +68,7 @@ impl OutOfCoreTileMapper {
     pub fn create_as(folder: impl Into<MapPath>, config: MapConfig, map_id: [u8; 16]) -> Result<Self> {
         let (disk, folder) = folder.into().into_parts();
         let folder = &*folder;
-        let config = config.validated()?;
+        let config = config.validated_as_new()?;
         let store = TileStore::create(disk, folder, new_metadata(&config, map_id, &[]), map_id)?;
         Ok(Self::new(config, store))
     }
@@ -634,6 +634,22 @@ mod tests {
         mapper.insert_scan(&clouds[2]).unwrap();
         mapper.flush().unwrap();
         mapper
+    }
+
+    #[test]
+    fn no_new_map_has_control_characters_in_its_coordinate_system() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = |crs: &str| MapConfig { crs: Some(crs.into()), ..MapConfig::new(0.1, 1.6).unwrap() };
+        for crs in ["EPSG:25832\0", "a\u{1b}[2Jb", "a\u{9b}b"] {
+            let refused = OutOfCoreTileMapper::create(folder.path().join("map"), config(crs)).unwrap_err();
+            assert!(refused.to_string().contains("control character"), "{refused}");
+            assert!(!folder.path().join("map").exists());
+            // As of a map that has it.
+            config(crs).validated().unwrap();
+        }
+        let wkt = "PROJCS[\"Gauß\",\r\n\tUNIT[\"metre\",1]]";
+        drop(OutOfCoreTileMapper::create(folder.path().join("map"), config(wkt)).unwrap());
+        assert_eq!(MapReader::config_of(&folder.path().join("map")).unwrap().crs.as_deref(), Some(wkt));
     }
 
     #[test]

@@ -223,6 +223,44 @@ fn outputs_named_as_what_lies_beside_them_are_refused() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
+/// Only the output was named: what has the name of a file beside it may be of another program.
+#[test]
+fn what_lies_beside_an_output_is_replaced_with_it_alone() {
+    let folder = TempDir::new().unwrap();
+    let map = repository("map_tiles_example");
+    let path = |name: &str| folder.path().join(name);
+    let names = || {
+        let names = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<String> = names.map(|name| name.into_string().unwrap()).collect();
+        names.sort_unstable();
+        names
+    };
+    fs::write(path("package.json"), "{}").unwrap();
+    let told = refusal(&["export", &map, "-o", text(&path("package.png"))]);
+    assert!(told.contains("package.json") && told.contains("move or remove"), "{told}");
+    assert_eq!(
+        (names(), fs::read(path("package.json")).unwrap()),
+        (vec!["package.json".into()], b"{}".to_vec())
+    );
+    // The last name is refused before the first is taken.
+    fs::create_dir(path("h.pgw")).unwrap();
+    let told = refusal(&["export", &map, "-o", text(&path("h.png"))]);
+    assert!(told.contains("h.pgw"), "{told}");
+    assert_eq!(names(), ["h.pgw", "package.json"]);
+    fs::remove_dir(path("h.pgw")).unwrap();
+
+    output(&["export", &map, "-o", text(&path("h.png"))]);
+    let written = fs::read(path("h.json")).unwrap();
+    // As a killed export leaves it.
+    fs::remove_file(path("h.png")).unwrap();
+    output(&["export", &map, "-o", text(&path("h.png"))]);
+    // Of an earlier output.
+    fs::write(path("h.json"), "{}").unwrap();
+    output(&["export", &map, "-o", text(&path("h.png"))]);
+    assert_eq!(fs::read(path("h.json")).unwrap(), written);
+    assert_eq!(names(), ["h.json", "h.pgw", "h.png", "package.json"]);
+}
+
 /// A set as it is handed around: clouds in `scans`, what belongs to them beside it.
 #[test]
 fn texts_beside_clouds_are_none() {

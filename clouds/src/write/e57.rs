@@ -24,7 +24,8 @@ pub(super) struct E57Sink {
 impl E57Sink {
     pub(super) fn create(path: &Path, options: &WriteOptions) -> Result<Self> {
         let points = Spool::new(&options.scratch_folder)?;
-        Ok(Self { out: OutFile::create(path)?, points, crs: options.crs.clone() })
+        let crs = options.crs.as_deref().map(as_cdata).transpose()?;
+        Ok(Self { out: OutFile::create(path)?, points, crs })
     }
 }
 
@@ -68,6 +69,18 @@ impl VoxelSink for E57Sink {
     }
 }
 
+/// A coordinate system as the library may put it between `<![CDATA[` and `]]>`: an end within the text is divided among
+/// two such sections, which readers join.
+fn as_cdata(crs: &str) -> Result<String> {
+    let is_xml = |c: char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
+    if let Some(c) = crs.chars().find(|c| !is_xml(*c)) {
+        let reason =
+            format!("has the character {c:?}, which no E57 file can hold; export .las, .laz or .ply");
+        return Err(Error::argument("coordinate reference system", reason));
+    }
+    Ok(crs.replace("]]>", "]]]]><![CDATA[>"))
+}
+
 /// A name for a file or a cloud, as the format wants one: unlike in one file, and the same for the same voxels.
 fn guid(bytes: u64, number: u16) -> String {
     format!("{{766f7874-696c-{number:04x}-8000-{:012x}}}", bytes & 0xffff_ffff_ffff)
@@ -78,6 +91,27 @@ mod tests {
     use super::super::testing::row;
     use super::*;
     use ::e57::{CartesianCoordinate, E57Reader};
+
+    fn crs_read_back(crs: &str) -> Result<Option<String>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.e57");
+        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
+        let mut sink = Box::new(E57Sink::create(&path, &options)?);
+        sink.put(&row([1, 2, 3], 0.75)).unwrap();
+        sink.finish().unwrap();
+        Ok(E57Reader::from_file(&path).unwrap().coordinate_metadata().map(str::to_owned))
+    }
+
+    #[test]
+    fn every_coordinate_system_is_readable_or_refused() {
+        for crs in ["EPSG:25832", "PROJCS[\"a & b <c>\",\n\tUNIT[\"metre\",1]]", "a]]>b]]]>c]]", "]]>"] {
+            assert_eq!(crs_read_back(crs).unwrap().as_deref(), Some(crs));
+        }
+        for crs in ["EPSG:25832\0", "a\u{1b}[2J", "\u{ffff}"] {
+            let error = crs_read_back(crs).unwrap_err().to_string();
+            assert!(error.contains("E57") && error.contains(".laz"), "{error}");
+        }
+    }
 
     #[test]
     fn points_come_back() {
