@@ -1,4 +1,5 @@
 use crate::args::{Args, seconds};
+use crate::inbox::Message;
 use crate::json;
 use crate::link::{Link, answers_key, packets_key, parse_key};
 use std::path::Path;
@@ -11,6 +12,9 @@ use voxtile::{InMemoryMapper, MapConfig, MapReader, Mapper, Scan};
 
 /// How often there may be something to send.
 const STEP: Duration = Duration::from_millis(20);
+
+/// Most messages that are answered in between, however fast they come.
+const MESSAGES: usize = 256;
 
 pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
     let watch = MapWatch::new(args.threshold)?;
@@ -51,7 +55,7 @@ pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> 
             is_said = true;
         }
         let deadline = now + STEP;
-        while let Some(message) = link.next(deadline.saturating_sub(begin.elapsed())) {
+        for message in some(|| link.next(deadline.saturating_sub(begin.elapsed()))) {
             if let Some((_, _, Some(receiver))) = parse_key(&message.key) {
                 // Whatever is no ask is not answered.
                 let answers = sender.answer(receiver, &message.bytes, begin.elapsed()).unwrap_or_default();
@@ -66,6 +70,11 @@ pub fn run(args: &Args, source: &Path, stop: &AtomicBool) -> anyhow::Result<()> 
     }
     link.close();
     Ok(())
+}
+
+/// The next messages, as many as are answered before it is looked whether a frame is due.
+fn some(next: impl FnMut() -> Option<Message>) -> impl Iterator<Item = Message> {
+    std::iter::from_fn(next).take(MESSAGES)
 }
 
 /// Where voxels come from.
@@ -155,4 +164,16 @@ pub fn random_number() -> u64 {
     hasher.write_u128(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_nanos()));
     hasher.write_u32(std::process::id());
     hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_without_end_keep_nobody_from_sending() {
+        let message = || Some(Message { key: String::new(), bytes: Vec::new() });
+        assert_eq!(some(message).count(), MESSAGES);
+        assert_eq!(some(|| None).count(), 0);
+    }
 }
