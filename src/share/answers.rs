@@ -9,6 +9,8 @@ use std::time::Duration;
 const MAX_SINGLE_TILES: usize = 1024;
 /// Digests for a range of more tiles.
 const GROUPS: usize = 64;
+/// So many tiles that digests are made of count as one byte more: a short answer may be about very many.
+const TILES_PER_BYTE: usize = 4;
 
 impl Sender {
     /// Answers a receiver's request.
@@ -58,6 +60,7 @@ impl Sender {
     fn digests(&mut self, range: SetRange) -> Vec<Vec<u8>> {
         let (mut first, last) = (range.first.tile, range.last.tile);
         let tiles = self.sent.tiles_between(first, last);
+        self.token_bucket.spend((tiles.len() / TILES_PER_BYTE) as u64);
         let group = if tiles.len() <= MAX_SINGLE_TILES { 1 } else { tiles.len().div_ceil(GROUPS) };
         let mut entries = Vec::new();
         let mut begin = first;

@@ -29,7 +29,7 @@ pub struct Receiver {
     unexplained_since: Option<Duration>,
     request_missing_at: Duration,
     /// The layer was equal to the sender's set as of this packet.
-    equal_as_of: Option<u64>,
+    pub(super) equal_as_of: Option<u64>,
     pub(super) is_over_limit: bool,
     /// A status to be compared with the layer, and the earliest time for that.
     to_compare: Option<Status>,

@@ -33,7 +33,11 @@ impl Receiver {
         let for_layer = bytes.saturating_sub(self.bytes_beside_the_layer());
         let cut = self.layer.as_mut().map_or(0, |layer| layer.cut_to_bytes(for_layer));
         self.counts.cut_voxels += cut;
-        self.is_over_limit |= cut > 0;
+        if cut > 0 {
+            self.is_over_limit = true;
+            // It was equal before.
+            self.equal_as_of = None;
+        }
     }
 
     fn bytes_beside_the_layer(&self) -> usize {
@@ -43,5 +47,34 @@ impl Receiver {
             .as_ref()
             .map_or(0, |_| AntiEntropy::MAX_BYTES + Stream::max_bytes(self.version_bytes));
         size_of::<Self>() + remembered
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::share::{ReceiverConfig, Sender, SenderConfig};
+    use crate::space::Grid;
+    use std::time::Duration;
+
+    #[test]
+    fn a_layer_that_was_cut_is_not_equal_any_more() {
+        let mut sender = Sender::new(Grid::new(0.1, 10.0).unwrap(), 1, SenderConfig::default()).unwrap();
+        let mut receiver = Receiver::new(ReceiverConfig::default());
+        (0..100).for_each(|k| sender.put([8 * k, 0, 0], true));
+        for now in (1..10).map(Duration::from_secs) {
+            let requests = receiver.poll(now);
+            let answers = requests.iter().flat_map(|request| sender.answer(7, request, now).unwrap());
+            let packets: Vec<_> = answers.collect();
+            for packet in sender.poll(now).iter().chain(&packets) {
+                receiver.take(&packet.bytes, now).unwrap();
+            }
+        }
+        assert!(receiver.is_converged());
+        receiver.cut_to_bytes(receiver.memory_bytes());
+        assert!(receiver.is_converged(), "nothing was cut");
+        receiver.cut_to_bytes(receiver.memory_bytes() - 10_000);
+        assert!(receiver.counts().cut_voxels > 0 && receiver.layer().is_some_and(|layer| !layer.is_empty()));
+        assert!(!receiver.is_converged() && receiver.equal_as_of().is_none());
     }
 }

@@ -13,6 +13,8 @@ pub struct VoxelSet {
     /// Bricks of all tiles.
     pub(super) bricks: usize,
     len: u64,
+    /// `None` after a change.
+    digest: Option<blake3::Hash>,
 }
 
 /// The voxels of a tile, by brick. Never empty.
@@ -32,7 +34,7 @@ const CODES_AT_A_TIME: usize = 16 << 10;
 impl VoxelSet {
     /// An empty set of voxels of a grid.
     pub fn new(grid: Grid) -> Self {
-        Self { grid, tiles: BTreeMap::new(), bricks: 0, len: 0 }
+        Self { grid, tiles: BTreeMap::new(), bricks: 0, len: 0, digest: None }
     }
 
     /// The grid of the voxels and tiles.
@@ -119,6 +121,7 @@ impl VoxelSet {
         self.bricks = self.bricks + usize::from(after > 0) - usize::from(before > 0);
         of_tile.len = of_tile.len + after - before;
         of_tile.digest = None;
+        self.digest = None;
         self.len = self.len + after - before;
         if of_tile.bricks.is_empty() {
             self.tiles.remove(&tile);
@@ -180,14 +183,17 @@ impl VoxelSet {
     }
 
     /// BLAKE3 over "voxtile-set-1", the bits of resolution and tile size, and each tile's index and digest, in order:
-    /// equal for equal sets.
+    /// equal for equal sets. It is kept until the set changes: a sender tells it to anyone who asks.
     pub fn digest(&mut self) -> blake3::Hash {
+        if let Some(digest) = self.digest {
+            return digest;
+        }
         let mut hasher = blake3::Hasher::new();
         hasher.update(LABEL);
         hasher.update(&self.grid.resolution_m().to_bits().to_le_bytes());
         hasher.update(&self.grid.tile_size_m().to_bits().to_le_bytes());
         self.add_tiles(&mut hasher, SetRange::ALL.first.tile, SetRange::ALL.last.tile);
-        hasher.finalize()
+        *self.digest.insert(hasher.finalize())
     }
 
     /// The number of voxels of some tiles, and the first eight bytes of BLAKE3 over these tiles' indices and digests.
@@ -272,4 +278,30 @@ impl TileVoxels {
 
 pub(super) fn position_of(grid: &Grid, voxel: VoxelIndex) -> SetPosition {
     SetPosition { tile: grid.tile_of_voxel(voxel), code: VoxelKey::from_index(voxel).morton().0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_digest_is_computed_once_for_each_change() {
+        let mut set = VoxelSet::new(Grid::new(0.1, 1.0).unwrap());
+        let empty = set.digest();
+        for k in 0..3 {
+            assert!(set.put([100 * k, 0, 0], true));
+            let digest = set.digest();
+            assert_ne!(digest, empty);
+            // Whatever is kept is told, and nothing is added up anew.
+            let kept = blake3::hash(b"kept");
+            set.digest = Some(kept);
+            assert_eq!(set.digest(), kept);
+            assert!(!set.put([100 * k, 0, 0], true), "no change");
+            assert_eq!(set.digest(), kept);
+            assert!(set.put([7, 7, 7], true) && set.put([7, 7, 7], false));
+            assert_eq!(set.digest(), digest);
+        }
+        assert_eq!(set.cut_to_bytes(0), 3);
+        assert_eq!(set.digest(), empty);
+    }
 }

@@ -71,8 +71,10 @@ impl PagedTiles {
     /// Why it has failed.
     pub(in crate::mapper) fn end_flush(&self) -> Result<()> {
         while self.flusher.wait() {}
-        let mut contents = self.contents.lock();
-        contents.take_flush_error().map_or(Ok(()), Err)
+        let mut pager = self.pager();
+        // A thread that panicked has not said that it failed.
+        pager.end_flight();
+        pager.contents.take_flush_error().map_or(Ok(()), Err)
     }
 
     /// What readers share with the mapper.
@@ -85,5 +87,31 @@ impl Drop for PagedTiles {
     /// What was begun is committed, and the map is free for another writer.
     fn drop(&mut self) {
         while self.flusher.wait() {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::flight::Flight;
+    use super::*;
+    use crate::persistence::{new_map_id, new_metadata};
+    use crate::store::FsDisk;
+
+    #[test]
+    fn a_flush_whose_thread_is_gone_has_failed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (config, map_id) = (MapConfig::new(0.1, 1.0).unwrap(), new_map_id());
+        let metadata = new_metadata(&config, map_id, &[]);
+        let store =
+            TileStore::create(Arc::new(FsDisk), &folder.path().join("map"), metadata, map_id).unwrap();
+        let tiles = PagedTiles::new(config, store);
+        assert!(tiles.end_flush().is_ok());
+        // What a thread that panics leaves behind.
+        tiles.contents.lock().flight = Some(Flight::default());
+        let error = tiles.end_flush().unwrap_err().to_string();
+        assert!(error.contains("flush"), "{error}");
+        assert!(tiles.end_flush().is_ok(), "told once");
+        tiles.begin_flush().unwrap();
+        assert!(tiles.end_flush().is_ok());
     }
 }

@@ -1,6 +1,6 @@
 use std::time::Duration;
-use voxtile::share::codec::{Header, Packet, Status, Update};
-use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig};
+use voxtile::share::codec::{Header, Packet, Request, Status, Update};
+use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig, SetRange};
 use voxtile::space::{Grid, VoxelBox};
 
 fn grid() -> Grid {
@@ -115,10 +115,7 @@ fn asks_beyond_the_allowance_are_not_answered() {
     let mut pair = Pair::new(ReceiverConfig::default());
     (0..20_000).for_each(|n| pair.sender.put([n * 7 % 1000, n * 13 % 500, n / 100], true));
     pair.run(10);
-    let ask = voxtile::share::codec::Request::Content {
-        epoch: 77,
-        ranges: vec![voxtile::share::SetRange::ALL; 60],
-    };
+    let ask = Request::Content { epoch: 77, ranges: vec![SetRange::ALL; 60] };
     let now = pair.now;
     let answered: usize = (0..1000)
         .flat_map(|_| pair.sender.answer(2, &ask.encode(), now).unwrap())
@@ -127,4 +124,48 @@ fn asks_beyond_the_allowance_are_not_answered() {
     // A second's worth, and the answer that went over it.
     assert!(answered <= (256 << 10) + 16 * 1200, "{answered} bytes at once");
     assert!(pair.sender.counts().refused_asks > 900);
+}
+
+/// Every tenth of a millisecond, or with a pause: what is answered is what the allowance is, no less and no more.
+#[test]
+fn a_flood_of_requests_is_answered_at_the_allowed_rate() {
+    const PER_SECOND: u64 = 256 << 10;
+    const ANSWER: u64 = 16 * 1200;
+    for interval_us in [100, 2000] {
+        let mut sender = Sender::new(grid(), 77, SenderConfig::default()).unwrap();
+        (0..20_000).for_each(|n| sender.put([n * 7 % 1000, n * 13 % 500, n / 100], true));
+        sender.flush(Duration::ZERO);
+        let ask = Request::Content { epoch: 77, ranges: vec![SetRange::ALL; 60] }.encode();
+        let mut bytes = 0;
+        for n in 0..2_000_000 / interval_us {
+            let now = Duration::from_secs(10) + Duration::from_micros(n * interval_us);
+            bytes += sender
+                .answer(2, &ask, now)
+                .unwrap()
+                .iter()
+                .map(|packet| packet.bytes.len() as u64)
+                .sum::<u64>();
+        }
+        // The bucket was full, and two seconds follow.
+        let range = 3 * PER_SECOND - ANSWER..=3 * PER_SECOND + ANSWER;
+        assert!(range.contains(&bytes), "{bytes} bytes, one request per {interval_us} us");
+    }
+}
+
+/// Digests of all tiles are a short answer that takes long.
+#[test]
+fn digests_of_very_many_tiles_are_answered_less_often() {
+    let answered = |tiles: i32| {
+        let mut sender = Sender::new(grid(), 77, SenderConfig::default()).unwrap();
+        (0..tiles).for_each(|n| sender.put([n % 200 * 100, n / 200 * 100, 0], true));
+        sender.flush(Duration::ZERO);
+        assert_eq!(sender.sent().tile_count(), tiles as usize);
+        let ask = Request::Digests { epoch: 77, range: SetRange::ALL }.encode();
+        let now = Duration::from_secs(10);
+        (0..1000).filter(|_| !sender.answer(2, &ask, now).unwrap().is_empty()).count()
+    };
+    let (few, many) = (answered(2000), answered(40_000));
+    assert!(few > 100, "{few}");
+    // 10 kB each, beside what is sent.
+    assert!((15..=27).contains(&many), "{many}");
 }
