@@ -500,6 +500,8 @@ fn packed_recordings_are_unpacked_beside_the_map() {
     fs::create_dir(&bag).unwrap();
     let plain = fs::read(repository("clouds/tests/data/ros/none.mcap")).unwrap();
     fs::write(bag.join("a.mcap.zstd"), zstd::encode_all(plain.as_slice(), 3).unwrap()).unwrap();
+    let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n  - a.mcap.zstd\n";
+    fs::write(bag.join("metadata.yaml"), metadata).unwrap();
     // One whose folder is there, one whose folder is made, and one that is there itself.
     let maps = ["map", "new/folder/map", "map"].map(|map| folder.path().join(map));
     for (map, again) in maps.iter().zip([&[][..], &[], &["--append", "--again"]]) {
