@@ -649,7 +649,7 @@ mod tests {
         }
         let wkt = "PROJCS[\"Gauß\",\r\n\tUNIT[\"metre\",1]]";
         drop(OutOfCoreTileMapper::create(folder.path().join("map"), config(wkt)).unwrap());
-        assert_eq!(MapReader::config_of(&folder.path().join("map")).unwrap().crs.as_deref(), Some(wkt));
+        assert_eq!(MapReader::config_of(folder.path().join("map")).unwrap().crs.as_deref(), Some(wkt));
     }
 
     #[test]
