@@ -339,7 +339,7 @@ impl OutOfCoreTileMapper {
     /// # Errors
     ///
     /// As for [`Mapper::batch_update`]; points that cannot be read; [`Error::Stopped`].
-    pub(crate) fn insert_hits(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
+    pub fn insert_hits(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
         let (report, _) = self.accept_within_limit(|config, tracer, overflow| {
             updates_of_hits(config, scan, tracer.stop(), overflow)
         })?;
