@@ -214,7 +214,8 @@ fn check_no_rays(args: &BuildArgs, config: &MapConfig) -> crate::Result<()> {
     if !(args.no_rays && config.keeps_scans) {
         return Ok(());
     }
-    let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build another map";
+    let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build \
+                  another map";
     Err(Error::argument("--no-rays, --keep-scans", reason))
 }
 
@@ -254,7 +255,8 @@ fn flush_if(
 fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
     let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
     anyhow::Error::new(error).context(format!(
-        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command with --resume goes on from there",
+        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command with --resume \
+         goes on from there",
         folder.display()
     ))
 }
@@ -354,7 +356,8 @@ fn check_crs(args: &BuildArgs, found: Option<&String>, own: Option<&String>) -> 
     match (found, own) {
         (Some(found), Some(own)) if found != own => {
             let reason = format!(
-                "its coordinates are in {found:.80}, those of the map in {own:.80}; convert them first, for instance with pdal"
+                "its coordinates are in {found:.80}, those of the map in {own:.80}; convert them first, for \
+                 instance with pdal"
             );
             Err(Error::argument(args.scans.display().to_string(), reason))
         }
@@ -364,14 +367,14 @@ fn check_crs(args: &BuildArgs, found: Option<&String>, own: Option<&String>) -> 
 
 fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
     let reason = format!(
-        "the map has {scans} scans of an input that begins as this one does ({name}); --resume takes what came since, and \
-         --append --again adds all of them once more"
+        "the map has {scans} scans of an input that begins as this one does ({name}); --resume takes what came since, \
+         and --append --again adds all of them once more"
     );
     Error::argument(args.scans.display().to_string(), reason).into()
 }
 
-/// For temporary files: the map's folder or, where that is still to be made, the nearest folder around it. The system may
-/// keep its own in memory.
+/// For temporary files: the map's folder or, where that is still to be made, the nearest folder around it. The system
+/// may keep its own in memory.
 fn folder_beside(args: &BuildArgs) -> &Path {
     args.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
 }
@@ -418,9 +421,9 @@ fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
     let range_m = config.rays.max_range_m?;
     (cut_at_max_range > 0 && cut_at_max_range + skipped == points).then(|| {
         format!(
-            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise --max-range; are the points \
-             in metres? Points that are in the world frame already, far from 0 0 0, need --world-frame with poses, \
-             --sensor-origin or --no-rays"
+            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise --max-range; are \
+             the points in metres? Points that are in the world frame already, far from 0 0 0, need --world-frame \
+             with poses, --sensor-origin or --no-rays"
         )
     })
 }

@@ -183,7 +183,7 @@ impl LocalMap {
     }
 
     /// The voxel of a point, if it can be in the map.
-    pub(super) fn voxel_of(&self, point: Point) -> Option<VoxelIndex> {
+    pub(crate) fn voxel_of(&self, point: Point) -> Option<VoxelIndex> {
         let voxel = self.grid.voxel_of(point)?;
         voxel.iter().all(|k| (-MAX_INDEX..=MAX_INDEX).contains(k)).then_some(voxel)
     }

@@ -1,9 +1,11 @@
+use super::local_rays::LocalRays;
+use super::scan_tiles::tiles_of_scan;
 use super::sender::Sender;
 use crate::error::{Error, Result};
 use crate::local::{LocalMap, LocalReport, LocalState, LocalView};
 use crate::mapper::MapView;
 use crate::maths::logit;
-use crate::scan::{RayWalk, Scan};
+use crate::scan::Scan;
 use crate::space::{BrickMask, Grid, TileIndex, VoxelIndex};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
@@ -44,16 +46,11 @@ impl MapWatch {
     /// As for [`MapWatch::take_all`].
     pub fn take_scan(&self, view: &impl MapView, scan: &Scan, sender: &mut Sender) -> Result<()> {
         check_grid(&view.config().grid, sender)?;
-        let Some([first, last]) = tiles_around(view.config().grid, view.config().rays.max_range_m, scan)
-        else {
-            return Ok(());
-        };
-        let is_near = |tile: &TileIndex| {
-            (0..3).all(|k| (first.to_array()[k]..=last.to_array()[k]).contains(&tile.to_array()[k]))
-        };
+        let config = view.config();
+        let Some(near) = tiles_of_scan(scan, &config.grid, &config.rays) else { return Ok(()) };
         view.tile_indices()
             .into_iter()
-            .filter(is_near)
+            .filter(|tile| near.contains(*tile))
             .try_for_each(|tile| self.take_tile(view, tile, sender))
     }
 
@@ -78,23 +75,6 @@ fn check_grid(grid: &Grid, sender: &Sender) -> Result<()> {
     Err(Error::argument("grid", reason))
 }
 
-/// The lowest and the highest tile that a scan may reach.
-fn tiles_around(grid: Grid, max_range_m: Option<f64>, scan: &Scan) -> Option<[TileIndex; 2]> {
-    let range = max_range_m.unwrap_or(f64::INFINITY);
-    let origin = scan.origin;
-    grid.voxel_of(origin)?;
-    let (mut low, mut high) = (origin, origin);
-    for point in scan.points.iter().filter(|point| grid.voxel_of(**point).is_some()) {
-        for k in 0..3 {
-            // One voxel more: rays cut at the max range are rounded.
-            let reach = range + grid.resolution_m();
-            low[k] = low[k].min(point[k].max(origin[k] - reach));
-            high[k] = high[k].max(point[k].min(origin[k] + reach));
-        }
-    }
-    Some([grid.tile_of(low)?, grid.tile_of(high)?])
-}
-
 /// Passes a local map's occupied voxels to a sender. A voxel that leaves the map by age stays in the set; one that rays
 /// found free leaves the set.
 #[derive(Clone, Debug)]
@@ -108,7 +88,7 @@ impl LocalWatch {
         Self { seen: None }
     }
 
-    /// Passes the changes of a scan that the map has just taken.
+    /// Passes the changes of a scan that the map has just taken, before its parameters are set anew.
     ///
     /// # Errors
     ///
@@ -143,7 +123,7 @@ impl LocalWatch {
             }
         }
         if report.forgotten > 0 && !left.is_empty() {
-            left = passed_by_rays(sender.grid(), scan, left);
+            left = LocalRays::new(map, scan, sender.grid()).passed(left);
         }
         left.into_iter().for_each(|voxel| sender.put(voxel, false));
         Ok(())
@@ -154,27 +134,4 @@ impl Default for LocalWatch {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// The voxels of a set that rays of a scan pass; no ray passes voxels that left by age.
-fn passed_by_rays(grid: &Grid, scan: &Scan, mut wanted: FxHashSet<VoxelIndex>) -> FxHashSet<VoxelIndex> {
-    let mut found = FxHashSet::default();
-    let Some(start) = grid.voxel_of(scan.origin) else { return found };
-    let origin = grid.to_voxel_units(scan.origin);
-    for &point in &scan.points {
-        let Some(last) = grid.voxel_of(point) else { continue };
-        let walk = RayWalk::between(origin, start, grid.to_voxel_units(point), last);
-        if walk.steps() > crate::scan::MAX_RAY_STEPS {
-            continue;
-        }
-        walk.for_each_before_end(|voxel| {
-            if wanted.remove(&voxel) {
-                found.insert(voxel);
-            }
-        });
-        if wanted.is_empty() {
-            break;
-        }
-    }
-    found
 }

@@ -50,8 +50,8 @@ const LAYERS: [(&str, &[&str]); 26] = [
     ("io", &["error", "maths", "scan", "space"]),
     // Voxels of an archive by the interface of mappers and queries alone.
     ("local", &["error", "mapper", "maths", "query", "scan", "sensor", "space"]),
-    // No transport, file or clock.
-    ("share", &["error", "local", "mapper", "maths", "query", "scan", "space"]),
+    // No transport, file or clock; of the configuration which rays a map takes.
+    ("share", &["config", "error", "local", "mapper", "maths", "query", "scan", "space"]),
     // Whole maps on disk, tile by tile.
     (
         "operations",

@@ -4,10 +4,11 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::reference_local::states_of;
 use voxtile::local::{LocalMap, LocalParameters, LocalState};
 use voxtile::query::{Shape, United, UnknownAs};
+use voxtile::scan::no_return;
 use voxtile::share::{
     LocalWatch, MapWatch, Sender, SenderConfig, VoxelSet, merge_layer, read_layer, write_layer,
 };
-use voxtile::space::VoxelIndex;
+use voxtile::space::{Grid, VoxelIndex};
 use voxtile::{InMemoryMapper, MapConfig, MapQueries, MapView, Mapper, Queries, Scan};
 
 fn config() -> MapConfig {
@@ -49,6 +50,82 @@ fn what_a_watch_tells_is_what_is_occupied_after_every_scan() {
     let mut other = Sender::new(MapConfig::new(0.2, 1.0).unwrap().grid, 1, SenderConfig::default()).unwrap();
     let map = InMemoryMapper::new(config()).unwrap();
     assert!(MapWatch::new(0.5).unwrap().take_all(&map, &mut other).is_err());
+}
+
+/// A voxel that is seen once, and rays far beyond it until it is free.
+#[test]
+fn what_rays_without_a_return_have_cleared_leaves_the_set() {
+    let origin = [0.05; 3];
+    let ahead = [[1.0, 0.0, 0.0], [-1.0, -1.0, 0.5]];
+    let is_no_return = |k: usize| no_return(origin, ahead[k]).unwrap();
+    let farthest = |k: usize| ahead[k].map(|d| d * f64::from(f32::MAX));
+    for (max_m, no_return_m) in [(None, Some(8.0)), (Some(8.0), None), (Some(8.0), Some(7.0))] {
+        for (k, beyond) in [0, 1].into_iter().flat_map(|k| [(k, is_no_return(k)), (k, farthest(k))]) {
+            let config =
+                MapConfig::new(0.1, 1.0).unwrap().with_range(0.0, max_m).with_no_return_range(no_return_m);
+            let mut map = InMemoryMapper::new(config).unwrap();
+            let (mut sender, watch) = (sender(), MapWatch::new(0.5).unwrap());
+            let seen: [f64; 3] = std::array::from_fn(|axis| origin[axis] + 4.0 * ahead[k][axis]);
+            // Rays of points beyond the no-return range that are returns are as long as they are.
+            let near = [[0.45, 0.05, 0.05], [0.05, 12.05, 0.05]];
+            let mut take = |far: [f64; 3]| {
+                let scan = Scan { origin, points: [near.to_vec(), vec![far]].concat(), intensities: None };
+                map.insert_scan(&scan).unwrap();
+                watch.take_scan(&map, &scan, &mut sender).unwrap();
+                let now = occupied(&map, 0.5);
+                assert!(sent(&mut sender) == now, "{max_m:?} {no_return_m:?} {far:?}");
+                now
+            };
+            let before = take(seen);
+            let after = (0..4).map(|_| take(beyond)).last().unwrap();
+            assert_eq!(before.difference(&after).count(), 1, "the voxel is free in the end");
+        }
+    }
+}
+
+/// Voxels that leave by age, while rays of points that the map skips pass them.
+#[test]
+fn rays_that_a_local_map_does_not_cast_clear_nothing_of_what_is_shared() {
+    // The map skips voxels near the end of all indices.
+    let end = (f64::from(i32::MAX) - 4100.5) * 0.1;
+    let cases = [
+        ("beyond the input range", [0.05; 3], [8.05, 0.05, 0.05], [12.05, 0.05, 0.05], "beyond"),
+        ("too near", [0.05; 3], [0.45, 0.05, 0.05], [0.85, 0.05, 0.05], "near"),
+        ("out of range", [end, 0.05, 0.05], [end + 0.3, 0.05, 0.05], [end + 0.8, 0.05, 0.05], "range"),
+        ("cast", [0.05; 3], [3.05, 0.05, 0.05], [6.05, 0.05, 0.05], "none"),
+    ];
+    for (name, origin, seen, past, skipped) in cases {
+        let parameters = LocalParameters::local_mapping().with_ranges(10.0, 1.0).with_max_voxels(20);
+        let mut map = LocalMap::new(0.1, parameters).unwrap();
+        let (mut watch, mut sender) = (LocalWatch::new(), sender());
+        let mut take = |map: &mut LocalMap, points: Vec<[f64; 3]>| {
+            let scan = Scan { origin, points, intensities: None };
+            let report = map.insert_scan(&scan).unwrap();
+            watch.take_scan(map, &report, &scan, &mut sender).unwrap();
+            (report, sent(&mut sender))
+        };
+        let voxel = Grid::new(0.1, 1.0).unwrap().voxel_of(seen).unwrap();
+        let (_, shared) = take(&mut map, vec![seen]);
+        assert!(shared.contains(&voxel), "{name}");
+        let mut later = *map.parameters();
+        later.min_input_range_m = 1.0;
+        map.set_parameters(later).unwrap();
+        // As many new voxels as the map holds, away from those rays.
+        let others =
+            (0..20).map(|k| std::array::from_fn(|axis| origin[axis] + [-2.0, 2.0, 0.1 * f64::from(k)][axis]));
+        let points: Vec<_> = others.chain([past; 4]).collect();
+        let (report, shared) = take(&mut map, points);
+        let counts = (report.beyond_input_range, report.skipped.too_near, report.skipped.out_of_range);
+        let expected = match skipped {
+            "beyond" => (4, 0, 0),
+            "near" => (0, 4, 0),
+            "range" => (0, 0, 4),
+            _ => (0, 0, 0),
+        };
+        assert_eq!(counts, expected, "{name}");
+        assert!(report.forgotten > 0 && map.view().state(voxel) != LocalState::Occupied, "{name}");
+        assert_eq!(shared.contains(&voxel), skipped != "none", "{name}");
+    }
 }
 
 #[test]
