@@ -40,10 +40,11 @@ pub fn with_keywords(text: &str) -> String {
 
 fn with_details(py: Python<'_>, error: Option<&Error>, message: String) -> PyErr {
     let tile = error.and_then(Error::tile).map(|tile| (tile.x, tile.y, tile.z));
-    let (mut offset, mut line) = (None, None);
+    let (mut offset, mut line, mut record) = (None, None, None);
     match error.and_then(Error::place) {
+        Some((voxtile::Place::Offset, at)) => offset = Some(at),
         Some((voxtile::Place::Line, at)) => line = Some(at),
-        Some((_, at)) => offset = Some(at),
+        Some((voxtile::Place::Record, at)) => record = Some(at),
         None => {}
     }
     let details = PyDict::new(py);
@@ -51,7 +52,8 @@ fn with_details(py: Python<'_>, error: Option<&Error>, message: String) -> PyErr
         .set_item("path", error.and_then(Error::path))
         .and_then(|()| details.set_item("tile", tile))
         .and_then(|()| details.set_item("offset", offset))
-        .and_then(|()| details.set_item("line", line));
+        .and_then(|()| details.set_item("line", line))
+        .and_then(|()| details.set_item("record", record));
     filled
         .and_then(|()| raised(py, error.map_or("other", Error::kind), message, &details))
         .unwrap_or_else(|error| error)

@@ -33,6 +33,8 @@ struct Failure<'a> {
     offset: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     line: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    record: Option<u64>,
 }
 
 impl JsonTo {
@@ -101,6 +103,7 @@ impl<'a> Failure<'a> {
             tile: error.and_then(Error::tile).map(|tile| tile.to_array()),
             offset: at(Place::Offset),
             line: at(Place::Line),
+            record: at(Place::Record),
         }
     }
 }

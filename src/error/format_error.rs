@@ -9,7 +9,7 @@ use std::path::Path;
 pub struct FormatError {
     /// What `at` counts.
     pub place: Place,
-    /// Byte offset or line number (from 1).
+    /// Byte offset, line number (from 1) or record number (from 0).
     pub at: u64,
     /// What is wrong there, and what is right.
     pub reason: String,
@@ -22,6 +22,8 @@ pub enum Place {
     Offset,
     /// Lines, the first being 1.
     Line,
+    /// Records, points or messages, the first being 0.
+    Record,
 }
 
 impl fmt::Display for Place {
@@ -29,6 +31,7 @@ impl fmt::Display for Place {
         f.write_str(match self {
             Self::Offset => "offset",
             Self::Line => "line",
+            Self::Record => "record",
         })
     }
 }
@@ -42,6 +45,11 @@ impl FormatError {
     /// Something wrong in a line, the first being 1.
     pub fn at_line(line: u64, reason: impl Into<String>) -> Self {
         Self { place: Place::Line, at: line, reason: reason.into() }
+    }
+
+    /// Something wrong in a record, the first being 0.
+    pub fn at_record(record: u64, reason: impl Into<String>) -> Self {
+        Self { place: Place::Record, at: record, reason: reason.into() }
     }
 
     /// The error of a file that was given to be read.

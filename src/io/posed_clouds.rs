@@ -266,7 +266,7 @@ impl From<voxtile_clouds::Error> for Error {
                 let error = match place {
                     Place::Byte(offset) => FormatError::at_offset(offset, reason),
                     Place::Line(line) => FormatError::at_line(line, reason),
-                    Place::Record(record) => FormatError::at_offset(0, format!("record {record}: {reason}")),
+                    Place::Record(record) => FormatError::at_record(record, reason),
                 };
                 error.in_input(&path)
             }

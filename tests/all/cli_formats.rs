@@ -467,6 +467,33 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
 }
 
+/// One that was cut off: LAS keeps what it has, and PLY is a bad cloud. Both say where.
+#[test]
+fn clouds_that_were_cut_off_say_where() {
+    let folder = tempfile::tempdir().unwrap();
+    let inputs = make_inputs(folder.path());
+    let path = |name: &str| folder.path().join(name);
+    output(&["build", text(&inputs[2]), "-o", text(&path("map")), "--resolution", "0.2"]);
+    for name in ["voxels.las", "voxels.ply"] {
+        let file = path(name);
+        output(&["export", text(&path("map")), "-o", text(&file)]);
+        let bytes = fs::read(&file).unwrap();
+        fs::write(&file, &bytes[..bytes.len() - 100]).unwrap();
+        let run = voxtile(&["scans", text(&file), "--json"]).assert().failure().code(1);
+        let told: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        let error = &told["error"];
+        assert_eq!((&error["kind"], error["path"].as_str()), (&"malformed".into(), Some(text(&file))));
+        let (expected, other) =
+            if name.ends_with("las") { ("record", "offset") } else { ("offset", "record") };
+        assert!(error[expected].as_u64() > Some(0) && error[other].is_null(), "{error}");
+        let map = path(&format!("{name}.map"));
+        let build = ["build", text(&file), "-o", text(&map), "--no-rays", "--skip-bad", "--json"];
+        let told: serde_json::Value = serde_json::from_str(&output(&build)).unwrap();
+        let points = told["points"].as_u64();
+        assert_eq!(points, if name.ends_with("las") { error["record"].as_u64() } else { Some(0) }, "{told}");
+    }
+}
+
 /// Points that stay where they are, and clouds that know no times, are not passed over in silence.
 #[test]
 fn what_deskewing_does_not_move_is_told() {
@@ -510,5 +537,26 @@ fn packed_recordings_are_unpacked_beside_the_map() {
         let arguments = [&build, how].concat();
         let built = voxtile(&arguments).env("TMPDIR", folder.path().join("gone")).output().unwrap();
         assert!(built.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&built.stderr));
+    }
+}
+
+/// A day in parts of a minute is more files than a process may have open.
+#[cfg(all(feature = "ros", unix))]
+#[test]
+fn a_recording_may_have_more_parts_than_files_may_be_open() {
+    for extension in ["mcap", "bag"] {
+        let folder = tempfile::tempdir().unwrap();
+        let part = repository(&format!("clouds/tests/data/ros/none.{extension}"));
+        for number in 0..60 {
+            fs::copy(&part, folder.path().join(format!("{number}.{extension}"))).unwrap();
+        }
+        let mut limited = Command::new("sh");
+        limited
+            .args(["-c", "ulimit -n 40 && exec \"$@\"", "sh"])
+            .arg(assert_cmd::cargo::cargo_bin("voxtile"));
+        let told = limited.args(["scans", text(folder.path()), "--topic", "/points"]).output().unwrap();
+        let said = String::from_utf8_lossy(&told.stdout);
+        assert!(told.status.success(), "{extension}: {}", String::from_utf8_lossy(&told.stderr));
+        assert!(said.contains("240"), "{extension}: 4 scans a part: {said}");
     }
 }

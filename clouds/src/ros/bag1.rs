@@ -253,6 +253,10 @@ impl Recording for Bag1 {
         self.next_in_order()
     }
 
+    fn close_files(&mut self) {
+        self.file.close();
+    }
+
     fn remarks(&self) -> Vec<String> {
         self.remarks.iter().cloned().chain(self.order.remark(self.file.path())).collect()
     }

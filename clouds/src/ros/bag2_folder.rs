@@ -71,7 +71,7 @@ impl Bag2Folder {
             return Err(Error::format(&metadata_path, Place::Byte(0), reason));
         }
         let mut unpacked = None;
-        let mut recordings = Vec::new();
+        let mut recordings = Sequence::default();
         for (number, file) in files.iter().enumerate() {
             if is_packed(file) {
                 let folder = match &mut unpacked {
@@ -99,7 +99,7 @@ impl Bag2Folder {
         }
         Ok(Self {
             path: path.to_owned(),
-            files: Sequence::new(recordings),
+            files: recordings,
             has_compressed_messages: metadata.compression_mode.eq_ignore_ascii_case("message"),
             remarks,
             _unpacked: unpacked,
@@ -209,6 +209,10 @@ impl Recording for Bag2Folder {
             message.data = data;
         }
         Ok(Some(message))
+    }
+
+    fn close_files(&mut self) {
+        self.files.close_files();
     }
 
     fn remarks(&self) -> Vec<String> {

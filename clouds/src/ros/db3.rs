@@ -10,14 +10,20 @@ use std::path::{Path, PathBuf};
 /// Messages come in order of the time at which they were recorded. Memory holds 24 bytes for each of them.
 #[derive(Debug)]
 pub struct Db3 {
-    path: PathBuf,
-    database: Connection,
+    database: Database,
     topics: TopicList,
     /// The topic of a number in the file.
     numbers: HashMap<i64, usize>,
     places: Vec<RowPlace>,
     next: usize,
     remarks: Vec<String>,
+}
+
+#[derive(Debug)]
+struct Database {
+    path: PathBuf,
+    /// `None` while it is closed.
+    connection: Option<Connection>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -36,11 +42,8 @@ impl Db3 {
     pub fn open(path: &Path) -> Result<Self> {
         // SQLite would say the same of a file that is missing and of one that is no database.
         std::fs::File::open(path).map_err(|error| Error::io(path, "read", error))?;
-        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let database = Connection::open_with_flags(path, flags).map_err(|error| wrong(path, 0, &error))?;
         let mut db3 = Self {
-            path: path.to_owned(),
-            database,
+            database: Database { path: path.to_owned(), connection: None },
             topics: TopicList::default(),
             numbers: HashMap::new(),
             places: Vec::new(),
@@ -55,8 +58,10 @@ impl Db3 {
     }
 
     fn read_topics(&mut self) -> rusqlite::Result<()> {
-        let mut statement =
-            self.database.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")?;
+        let mut statement = self
+            .database
+            .open()?
+            .prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")?;
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {
             let (name, type_name, encoding): (String, String, String) =
@@ -73,7 +78,7 @@ impl Db3 {
 
     fn count(&mut self) -> rusqlite::Result<()> {
         let mut statement =
-            self.database.prepare("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")?;
+            self.database.open()?.prepare("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")?;
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {
             let (number, count): (i64, i64) = (row.get(0)?, row.get(1)?);
@@ -86,7 +91,10 @@ impl Db3 {
 
     /// Finds the rows of topics; those before an error stay.
     fn find_rows(&mut self, topics: &[usize]) -> rusqlite::Result<()> {
-        let mut statement = self.database.prepare("SELECT id, topic_id, timestamp FROM messages")?;
+        if topics.is_empty() {
+            return Ok(());
+        }
+        let mut statement = self.database.open()?.prepare("SELECT id, topic_id, timestamp FROM messages")?;
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {
             let (id, number, log_ns): (i64, i64, i64) = (row.get(0)?, row.get(1)?, row.get(2)?);
@@ -95,6 +103,19 @@ impl Db3 {
             }
         }
         Ok(())
+    }
+}
+
+impl Database {
+    fn open(&mut self) -> rusqlite::Result<&Connection> {
+        let connection = match self.connection.take() {
+            Some(connection) => connection,
+            None => {
+                let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+                Connection::open_with_flags(&self.path, flags)?
+            }
+        };
+        Ok(self.connection.insert(connection))
     }
 }
 
@@ -113,7 +134,7 @@ impl Recording for Db3 {
         let found = self.find_rows(topics);
         self.places.sort_unstable();
         if let Err(error) = found {
-            let (path, found) = (self.path.display(), self.places.len());
+            let (path, found) = (self.database.path.display(), self.places.len());
             let remark = format!("{path} is damaged ({error}): {found} messages were found before that");
             if !self.remarks.contains(&remark) {
                 self.remarks.push(remark);
@@ -127,10 +148,16 @@ impl Recording for Db3 {
         self.next += 1;
         let data = self
             .database
-            .prepare_cached("SELECT data FROM messages WHERE id = ?1")
+            .open()
+            .and_then(|database| database.prepare_cached("SELECT data FROM messages WHERE id = ?1"))
             .and_then(|mut statement| statement.query_row([id], |row| row.get(0)));
-        let data = data.map_err(|error| wrong(&self.path, u64::try_from(id).unwrap_or(0), &error))?;
+        let data =
+            data.map_err(|error| wrong(&self.database.path, u64::try_from(id).unwrap_or(0), &error))?;
         Ok(Some(Message { topic, log_ns, data }))
+    }
+
+    fn close_files(&mut self) {
+        self.database.connection = None;
     }
 
     fn remarks(&self) -> Vec<String> {

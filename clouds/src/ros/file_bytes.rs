@@ -1,26 +1,38 @@
 use crate::error::{Error, Result};
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// A file that is read here and there.
 #[derive(Debug)]
 pub(super) struct FileBytes {
     path: PathBuf,
-    input: BufReader<File>,
-    at: u64,
+    /// `None` while it is closed.
+    input: Option<Input>,
     pub(super) len: u64,
+}
+
+/// An open file, and where in it reading goes on.
+#[derive(Debug)]
+struct Input {
+    bytes: BufReader<File>,
+    at: u64,
 }
 
 impl FileBytes {
     pub(super) fn open(path: &Path) -> Result<Self> {
         let open = || {
-            let file = File::open(path)?;
-            let len = file.metadata()?.len();
-            Ok((BufReader::with_capacity(1 << 16, file), len))
+            let input = Input::open(path)?;
+            let len = input.bytes.get_ref().metadata()?.len();
+            Ok((input, len))
         };
         let (input, len) = open().map_err(|error| Error::io(path, "read", error))?;
-        Ok(Self { path: path.to_owned(), input, at: 0, len })
+        Ok(Self { path: path.to_owned(), input: Some(input), len })
+    }
+
+    /// Closes the file until something is read again.
+    pub(super) fn close(&mut self) {
+        self.input = None;
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -33,25 +45,28 @@ impl FileBytes {
         if there == 0 {
             return Ok(Vec::new());
         }
-        let mut read = || {
-            match i64::try_from(i128::from(offset) - i128::from(self.at)) {
-                // Keeps what is buffered already.
-                Ok(ahead) => self.input.seek_relative(ahead)?,
-                Err(_) => drop(self.input.seek(SeekFrom::Start(offset))?),
-            }
-            let mut taken = Vec::new();
-            (&mut self.input).take(there).read_to_end(&mut taken)?;
-            Ok(taken)
-        };
-        let taken = match read() {
-            Ok(taken) => taken,
-            Err(error) => {
-                // Where the file is now is not known.
-                self.at = 0;
-                drop(self.input.seek(SeekFrom::Start(0)));
-                return Err(Error::io(&self.path, "read", error));
-            }
-        };
+        let input = self.input.take().map_or_else(|| Input::open(&self.path), Ok);
+        // After an error, where the file is now is not known: it is opened again.
+        let read = input.and_then(|mut input| Ok((input.read_at(offset, there)?, input)));
+        let (taken, input) = read.map_err(|error| Error::io(&self.path, "read", error))?;
+        self.input = Some(input);
+        Ok(taken)
+    }
+}
+
+impl Input {
+    fn open(path: &Path) -> io::Result<Self> {
+        Ok(Self { bytes: BufReader::with_capacity(1 << 16, File::open(path)?), at: 0 })
+    }
+
+    fn read_at(&mut self, offset: u64, bytes: u64) -> io::Result<Vec<u8>> {
+        match i64::try_from(i128::from(offset) - i128::from(self.at)) {
+            // Keeps what is buffered already.
+            Ok(ahead) => self.bytes.seek_relative(ahead)?,
+            Err(_) => drop(self.bytes.seek(SeekFrom::Start(offset))?),
+        }
+        let mut taken = Vec::new();
+        (&mut self.bytes).take(bytes).read_to_end(&mut taken)?;
         self.at = offset.saturating_add(taken.len() as u64);
         Ok(taken)
     }

@@ -306,6 +306,10 @@ impl Recording for McapFile {
         self.next_in_order()
     }
 
+    fn close_files(&mut self) {
+        self.file.close();
+    }
+
     fn remarks(&self) -> Vec<String> {
         self.remarks.iter().cloned().chain(self.order.remark(self.file.path())).collect()
     }

@@ -23,7 +23,11 @@ pub(super) fn open_recording_with(paths: &[PathBuf], scratch: Option<&Path>) -> 
     match paths {
         [] => Err(Error::argument("recording", "no file is given")),
         [path] => open(path),
-        paths => Ok(Box::new(Sequence::new(paths.iter().map(open).collect::<Result<_>>()?))),
+        paths => {
+            let mut parts = Sequence::default();
+            paths.iter().try_for_each(|path| open(path).map(|part| parts.push(part)))?;
+            Ok(Box::new(parts))
+        }
     }
 }
 

@@ -47,6 +47,9 @@ pub trait Recording: Send {
     /// A file that cannot be read or is invalid. The call after that goes on behind the bad part.
     fn next_message(&mut self) -> Result<Option<Message>>;
 
+    /// Closes files until they are read again: a process may have fewer files open than a bag has parts.
+    fn close_files(&mut self);
+
     /// What a person should know: parts that were cut off, an index that is missing.
     fn remarks(&self) -> Vec<String> {
         Vec::new()

@@ -2,6 +2,9 @@ use super::recording::{Message, Recording, Topic, TopicList};
 use crate::error::Result;
 
 /// Recordings one after the other, as one: the parts of a split bag.
+///
+/// One part at a time has its files open.
+#[derive(Default)]
 pub struct Sequence {
     parts: Vec<Part>,
     topics: TopicList,
@@ -17,20 +20,16 @@ struct Part {
 }
 
 impl Sequence {
-    /// Puts recordings together, in the order in which they are given.
-    pub fn new(recordings: Vec<Box<dyn Recording>>) -> Self {
-        let mut topics = TopicList::default();
-        let parts = recordings.into_iter().map(|recording| {
-            let known = recording.topics().iter().map(|topic| {
-                let index = topics.index(&topic.name, &topic.type_name, topic.wire);
-                topics.count(index, topic.messages);
-                index
-            });
-            let known = known.collect();
-            Part { recording, topics: known }
+    /// Appends what was recorded next.
+    pub fn push(&mut self, mut recording: Box<dyn Recording>) {
+        recording.close_files();
+        let topics = recording.topics().iter().map(|topic| {
+            let index = self.topics.index(&topic.name, &topic.type_name, topic.wire);
+            self.topics.count(index, topic.messages);
+            index
         });
-        let parts = parts.collect();
-        Self { parts, topics, wanted: Vec::new(), at: 0, has_begun: false }
+        let topics = topics.collect();
+        self.parts.push(Part { recording, topics });
     }
 }
 
@@ -62,6 +61,7 @@ impl Recording for Sequence {
             let Some(message) = part.recording.next_message()? else {
                 // Chunks that are in memory are not needed any more.
                 part.recording.begin(&[])?;
+                part.recording.close_files();
                 self.at += 1;
                 self.has_begun = false;
                 continue;
@@ -72,6 +72,10 @@ impl Recording for Sequence {
             }
         }
         Ok(None)
+    }
+
+    fn close_files(&mut self) {
+        self.parts.iter_mut().for_each(|part| part.recording.close_files());
     }
 
     fn remarks(&self) -> Vec<String> {

@@ -41,7 +41,11 @@ pub fn failure(error: &anyhow::Error) -> Value {
         told.insert("tile".to_owned(), json!(tile.to_array()));
     }
     if let Some((place, at)) = known.and_then(Error::place) {
-        let name = if place == Place::Line { "line" } else { "offset" };
+        let name = match place {
+            Place::Offset => "offset",
+            Place::Line => "line",
+            Place::Record => "record",
+        };
         told.insert(name.to_owned(), at.into());
     }
     json!({ "error": told })

@@ -8,7 +8,7 @@ from pathlib import Path
 class VoxtileError(Exception):
     """What every other is. The message names path, tile, offset or argument, and says what to do.
 
-    ``path``, ``tile``, ``offset`` (in bytes) and ``line`` are ``None`` where the error is not about one.
+    ``path``, ``tile``, ``offset`` (in bytes), ``line`` and ``record`` are ``None`` where the error is not about one.
     """
 
     kind = "other"
@@ -21,12 +21,14 @@ class VoxtileError(Exception):
         tile: tuple[int, int, int] | None = None,
         offset: int | None = None,
         line: int | None = None,
+        record: int | None = None,
     ) -> None:
         super().__init__(message)
         self.path = None if path is None else Path(path)
         self.tile = tile
         self.offset = offset
         self.line = line
+        self.record = record
 
 
 class ArgumentError(VoxtileError, ValueError):
@@ -155,6 +157,8 @@ def of_kind(
     tile: tuple[int, int, int] | None = None,
     offset: int | None = None,
     line: int | None = None,
+    record: int | None = None,
 ) -> VoxtileError:
     """The exception of a kind: the words of ``docs/json.md``, and those of this module's classes."""
-    return _BY_KIND.get(kind, VoxtileError)(message, path=path, tile=tile, offset=offset, line=line)
+    kind_of_error = _BY_KIND.get(kind, VoxtileError)
+    return kind_of_error(message, path=path, tile=tile, offset=offset, line=line, record=record)
