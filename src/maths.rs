@@ -8,6 +8,13 @@ pub fn logit(probability: f64) -> f64 {
     libm::log(probability / (1.0 - probability))
 }
 
+/// The least log-odds that count as a probability: those of it in double or in single precision, whichever is less.
+/// OctoMap's files have the second.
+pub fn least_logit(probability: f64) -> f64 {
+    let exact = logit(probability);
+    exact.min(f64::from(exact as f32))
+}
+
 /// Probability of log-odds: `1 / (1 + e^-L)`.
 pub fn sigmoid(log_odds: f64) -> f64 {
     1.0 / (1.0 + libm::exp(-log_odds))

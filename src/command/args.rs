@@ -90,9 +90,9 @@ pub enum Command {
     Diff(DiffArgs),
     /// Make a map again what it was when a snapshot was made, in place
     Revert(RevertArgs),
-    /// Make one map of several
+    /// Make one map of several, without their snapshots and kept scans
     Merge(MergeArgs),
-    /// Make a map of a part of another
+    /// Make a map of a part of another, without its snapshots and kept scans
     Crop(CropArgs),
     /// Make a part of a map unknown, in place
     Clear(ClearArgs),
@@ -106,7 +106,7 @@ pub enum Command {
     /// Take all points in a box out of the scans that a map keeps, and map again what their rays touched, in place
     RemovePoints(RemovePointsArgs),
     /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit, and
-    /// snapshots are not taken along
+    /// snapshots and kept scans are not taken along
     Convert(ConvertArgs),
     /// Copy a map into a bucket of an object store; only what has changed since the last push is sent
     #[cfg(feature = "bucket")]

@@ -2,7 +2,7 @@ use crate::command::args::BuildArgs;
 use crate::command::build_config::{config_to_create, config_to_go_on};
 use crate::command::failure::JsonTo;
 use crate::command::flush_schedule::FlushSchedule;
-use crate::command::intake::{Intake, Next, Taken};
+use crate::command::intake::{Intake, Next, RayNeeds, Taken};
 use crate::command::map_at::whole_map;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
@@ -12,9 +12,9 @@ use crate::command::stop_signal;
 use crate::command::summary::Summary;
 use crate::command::watch::Watch;
 use crate::command::{INTERRUPTED, say};
-use crate::io::{PointRoom, ReadOptions, ScanMark, StoredScan};
+use crate::io::{PointRoom, ReadOptions, ScanMark};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
-use crate::scan::{ScanPoints, ScanReport, ScanTracer};
+use crate::scan::{ScanPoints, ScanReport};
 use crate::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use crate::{Error, MapConfig, MapPath, MemoryLimit};
 use std::path::Path;
@@ -54,9 +54,10 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
         if args.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
     let room = room(args, &config);
     let most_together = most_together(args, &config);
-    let opened = ScanReader::open(args.scans.clone(), options_of(args)?, room, mark, stop.clone())?;
+    let opened = ScanReader::open(args.scans.clone(), options_of(args, &config)?, room, mark, stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
-    let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad);
+    let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
+    let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad, (!args.no_rays).then_some(needs));
     let mut mapper = match exists {
         true => Some(OutOfCoreTileMapper::open(place_of_map(args), config.clone())?),
         false => None,
@@ -73,7 +74,6 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
         none => {
             // A first scan that cannot be mapped should not leave an empty map behind.
             intake.check_first()?;
-            check(intake.first(), &config)?;
             let mut config = config;
             config.crs = crs;
             whole_map(&args.output)?;
@@ -118,7 +118,8 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     remarks.iter().for_each(|remark| log::warn!("{remark}"));
     match (outcome, flushed) {
         (Err(error), Ok(())) => {
-            return Err(error.context(format!("after {scans} scans, which are in the map")));
+            let all = resumed_after + scans;
+            return Err(error.context(format!("after {all} scans, which are in the map")));
         }
         (Err(error), Err(flush_error)) => return Err(error.context(format!("{flush_error:#}; before that"))),
         (Ok(()), flushed) => flushed?,
@@ -198,10 +199,10 @@ impl Build<'_> {
 }
 
 /// How the input is read; without rays no poses are needed.
-fn options_of(args: &BuildArgs) -> crate::Result<ReadOptions> {
+fn options_of(args: &BuildArgs, config: &MapConfig) -> crate::Result<ReadOptions> {
     let mut options = read_options(&args.read)?;
     options.open.scratch = Some(folder_beside(args).to_owned());
-    options.clouds.has_no_returns = args.clear_no_return.is_some();
+    options.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
     if args.no_rays && options.poses.is_none() {
         options.clouds.may_lack_poses = true;
         options.clouds.are_poses_needed = false;
@@ -316,7 +317,7 @@ fn begin(
             if !intake.pass_over(&content)? {
                 return Ok(None);
             }
-            mapper.check_rays()?;
+            check_begun(args, &inputs[at], mapper)?;
             if at + 1 < inputs.len() {
                 // Other inputs came between.
                 mapper.begin_input(inputs[at].clone())?;
@@ -335,7 +336,7 @@ fn begin(
             if !args.resume {
                 return Err(taken_before(args, name, done));
             }
-            mapper.check_rays()?;
+            check_begun(args, last, mapper)?;
             return Ok(intake.pass(done)?.then_some(done));
         }
     }
@@ -347,8 +348,22 @@ fn begin(
         return Err(Error::Mismatch { path, what, found, wanted }.into());
     }
     let content = args.piece_of.is_none().then(|| intake.content());
-    mapper.begin_input(InputRecord { content, ..InputRecord::from(name) })?;
+    let (rays, is_hits_alone) = (Some(mapper.config().rays), Some(args.no_rays));
+    mapper.begin_input(InputRecord { content, rays, is_hits_alone, ..InputRecord::from(name) })?;
     Ok(Some(0))
+}
+
+/// An input goes on as it was begun.
+fn check_begun(args: &BuildArgs, input: &InputRecord, mapper: &OutOfCoreTileMapper) -> crate::Result<()> {
+    match input.is_hits_alone {
+        Some(begun) if begun != args.no_rays => {
+            let how = |is_hits_alone| if is_hits_alone { "points alone (--no-rays)" } else { "rays" };
+            let (found, wanted) = (how(begun).to_owned(), how(args.no_rays).to_owned());
+            let what = "been built of this input with";
+            Err(Error::Mismatch { path: args.output.clone(), what, found, wanted })
+        }
+        _ => mapper.check_rays(input),
+    }
 }
 
 /// Points of another coordinate reference system are elsewhere.
@@ -407,11 +422,6 @@ fn most_together(args: &BuildArgs, config: &MapConfig) -> usize {
         _ => usize::MAX,
     };
     if args.no_rays { 1 } else { rayon::current_num_threads().min(room.saturating_sub(1) / 2).max(1) }
-}
-
-fn check(scan: Option<&StoredScan>, config: &MapConfig) -> crate::Result<()> {
-    let Some(scan) = scan else { return Ok(()) };
-    ScanTracer::check(&config.grid, &config.sensor_model, scan)
 }
 
 /// Free space alone is rarely what was wanted.

@@ -1,6 +1,7 @@
 use crate::command::args::{BuildArgs, InsertName, ModelName};
 use crate::command::octree_choice::octree_config;
 use crate::command::region_tiles::tiles_of;
+use crate::command::scan_input::name_of_path;
 use crate::mapper::{MapReader, MapView};
 use crate::sensor::{Iwlo, LogOdds, SensorModel};
 use crate::space::{Grid, GridError};
@@ -24,7 +25,8 @@ pub fn config_to_create(args: &BuildArgs) -> anyhow::Result<MapConfig> {
 
 /// The map's own parameters, and those that were typed, which must be the same.
 pub fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
-    let mut config = MapReader::open(&args.output, 1)?.config().clone();
+    let map = MapReader::open(&args.output, 1)?;
+    let mut config = map.config().clone();
     if args.resolution.is_some() || args.tile_size.is_some() {
         let resolution_m = args.resolution.unwrap_or(config.grid.resolution_m());
         let tile_size_m = args.tile_size.unwrap_or(config.grid.tile_size_m());
@@ -32,8 +34,17 @@ pub fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
     }
     check_storage(args, config.storage)?;
     check_threshold(args, config.occupancy_threshold)?;
-    let begun = args.resume.then_some(config.rays);
+    let begun = args.resume.then(|| rays_begun(args, &map));
     Ok(for_this_run(args, config, begun)?.validated()?)
+}
+
+/// What counts of the rays of the input that is to go on: another one may have come behind it. Which input it is shows
+/// when it is read; by then this is compared with what it was begun with.
+fn rays_begun(args: &BuildArgs, map: &MapReader) -> RayConfig {
+    let name = name_of_path(&args.scans);
+    let inputs = map.metadata().ext.as_ref().map_or(&[][..], |ext| &ext.inputs);
+    let input = inputs.iter().rfind(|input| input.name == name).or(inputs.last());
+    input.and_then(|input| input.rays).unwrap_or(map.config().rays)
 }
 
 /// Names the option that makes a tile fit its voxels.

@@ -3,6 +3,7 @@ use crate::command::json;
 use crate::command::map_at::{read_map, whole_map};
 use crate::command::memory;
 use crate::command::progress::Progress;
+use crate::command::written::warn_of_scans_left;
 use crate::mapper::{MapReader, MapView};
 use crate::operations::{WrittenMap, convert};
 use crate::{Result, Storage};
@@ -22,6 +23,7 @@ struct Conversion<'a> {
     tiles: u64,
     voxels: u64,
     occupied: u64,
+    warnings: Vec<String>,
     seconds: f64,
     peak_rss_bytes: Option<u64>,
 }
@@ -70,7 +72,8 @@ impl<'a> Conversion<'a> {
         };
         let WrittenMap { tiles, voxels, occupied, .. } = *written;
         let (scan_number, seconds, peak_rss_bytes) = (reader.scan_number(), 0.0, None);
-        Ok(Self { from, to, scan_number, tiles, voxels, occupied, seconds, peak_rss_bytes })
+        let warnings = warn_of_scans_left([reader]);
+        Ok(Self { from, to, scan_number, tiles, voxels, occupied, warnings, seconds, peak_rss_bytes })
     }
 
     fn print(&self, out: &mut impl Write) -> std::io::Result<()> {

@@ -4,7 +4,7 @@ use crate::command::map_at::{read_map, whole_map};
 use crate::command::memory;
 use crate::command::part::part_of;
 use crate::command::progress::Progress;
-use crate::command::written::print_written;
+use crate::command::written::{print_written, warn_of_scans_left};
 use crate::operations::{WrittenMap, crop};
 use serde::Serialize;
 use std::path::Path;
@@ -16,18 +16,22 @@ struct Summary<'a> {
     map: &'a Path,
     #[serde(flatten)]
     written: WrittenMap,
+    warnings: Vec<String>,
     peak_rss_bytes: Option<u64>,
 }
 
 pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let (part, output) = (part_of(&args.part)?, whole_map(&args.output)?);
-    let written =
-        read_map(&args.map, |map| Ok(crop(map, &part, output, |done, all| progress.set(done, all))?))?;
+    let (written, warnings) = read_map(&args.map, |map| {
+        let written = crop(map, &part, output, |done, all| progress.set(done, all))?;
+        Ok((written, warn_of_scans_left([map])))
+    })?;
     drop(progress);
     let mut out = std::io::stdout().lock();
     if args.json {
-        let summary = Summary { map: &args.output, written, peak_rss_bytes: memory::peak_bytes() };
+        let peak_rss_bytes = memory::peak_bytes();
+        let summary = Summary { map: &args.output, written, warnings, peak_rss_bytes };
         json::print(&summary, &mut out)?;
     } else {
         print_written(&args.output, &written, &mut out)?;

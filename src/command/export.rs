@@ -9,12 +9,12 @@ use crate::command::memory;
 use crate::command::octree_file;
 use crate::command::output_file::{OutputFile, is_standard_output, scratch_for};
 use crate::command::part::region_of;
+use crate::command::stop_signal;
 use crate::command::watch::Watch;
 use crate::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use crate::mapper::{MapReader, MapView, OctreeMap, Stoppable};
 use crate::octree::{OctreeFormat, write_bt, write_ot};
 use crate::query::OctreeExport;
-use crate::scan::Stop;
 use crate::sensor::Probabilities;
 use crate::space::{Aabb, Grid, TileIndex, VoxelBox};
 use crate::{Error, MapQueries};
@@ -50,7 +50,7 @@ struct Written {
 
 /// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
-    let exported = export(args, &Watch::at_terminal(Stop::default()))?;
+    let exported = export(args, &Watch::at_terminal(stop_signal::catch_unfinished()?))?;
     if args.scans.is_some() || !is_standard_output(&args.output) {
         exported.print(args.json, &mut io::stdout().lock())?;
     } else if args.json || !is_quiet {
@@ -238,7 +238,7 @@ impl<'a> Export<'a> {
     fn octree_file(&self) -> anyhow::Result<Written> {
         let file = octree_file::read(&self.args.map)?;
         // The tile size has no meaning here; two voxels always make a grid.
-        let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m)?;
+        let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m).map_err(Error::from)?;
         let format = match self.format {
             ExportFormat::Voxels(format) => format,
             ExportFormat::Foreign(_) => unreachable!("written before"),

@@ -7,7 +7,7 @@ use crate::command::memory;
 use crate::command::output_file::{StagedOutput, is_standard_output};
 use crate::command::watch::Watch;
 use crate::mapper::{MapView, Stoppable};
-use crate::maths::logit;
+use crate::maths::least_logit;
 use crate::space::Aabb;
 use crate::tile::Voxel;
 use crate::{Error, Result};
@@ -76,7 +76,7 @@ pub fn export(
 pub fn log_odds_of(args: &ExportArgs, default: WhatName, threshold: f64) -> [f64; 2] {
     match (args.min_probability, args.what.unwrap_or(default)) {
         (Some(probability), _) if probability <= 0.0 => [f64::NEG_INFINITY, f64::INFINITY],
-        (Some(probability), _) => [logit(probability), f64::INFINITY],
+        (Some(probability), _) => [least_logit(probability), f64::INFINITY],
         (None, WhatName::Occupied) => [threshold, f64::INFINITY],
         (None, WhatName::Free) => [f64::NEG_INFINITY, threshold],
         (None, WhatName::All) => [f64::NEG_INFINITY, f64::INFINITY],

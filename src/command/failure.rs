@@ -1,7 +1,7 @@
 use crate::command::args::Command;
 use crate::command::json;
 use crate::command::output_file::is_standard_output;
-use crate::command::say;
+use crate::command::{INTERRUPTED, say};
 use crate::{Error, Place};
 use serde::Serialize;
 use std::io;
@@ -125,6 +125,7 @@ fn exit_code_of(error: Option<&Error>) -> ExitCode {
             | Error::AlreadyExists { .. }
             | Error::Mismatch { .. },
         ) => ExitCode::from(2),
+        Some(Error::Stopped) => ExitCode::from(INTERRUPTED),
         _ => ExitCode::FAILURE,
     }
 }

@@ -1,10 +1,13 @@
-use crate::Error;
 use crate::command::scan_queue::ScanQueue;
 use crate::command::scan_reader::{Read, ReadScan, ScanReader};
+use crate::error::{Error, FormatError};
 use crate::io::{ScanChain, ScanMark, StoredScan};
+use crate::scan::{ScanPoints, ScanTracer};
+use crate::sensor::SensorModel;
+use crate::space::Grid;
 use crate::store::InputContent;
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Scans among which the first with points is looked for: it tells which input this is.
 const LEAD: usize = 16;
@@ -23,10 +26,18 @@ pub struct Intake {
     begins_with: Option<String>,
     skipped: Vec<u64>,
     skips_bad: bool,
+    /// What a scan with rays needs. `None` for points alone.
+    rays: Option<RayNeeds>,
     /// Why scans were skipped by this process.
     pub unread: Vec<String>,
     /// How many scans were left out because they came faster than they could be mapped.
     pub left_out: u64,
+}
+
+/// What a map needs of scans whose rays it takes.
+pub struct RayNeeds {
+    pub grid: Grid,
+    pub sensor_model: SensorModel,
 }
 
 /// What came of asking for scans to map.
@@ -43,11 +54,11 @@ pub struct Taken {
 }
 
 impl Intake {
-    pub fn new(reader: ScanReader, scans: PathBuf, skips_bad: bool) -> Self {
+    pub fn new(reader: ScanReader, scans: PathBuf, skips_bad: bool, rays: Option<RayNeeds>) -> Self {
         let (lead, chain) = (VecDeque::new(), ScanChain::default());
         let (skipped, unread, left_out) = Default::default();
         let (behind, begins_with) = (None, None);
-        Self { reader, scans, lead, behind, chain, begins_with, skipped, skips_bad, unread, left_out }
+        Self { reader, scans, lead, behind, chain, begins_with, skipped, skips_bad, rays, unread, left_out }
     }
 
     /// See [`ScanReader::read_ahead`].
@@ -75,21 +86,40 @@ impl Intake {
     }
 
     /// The first scan of what has been read, if there is any.
-    pub fn first(&self) -> Option<&StoredScan> {
+    fn first(&self) -> Option<&StoredScan> {
         self.lead.iter().find_map(|read| match read {
             Read::Scan(ReadScan { scan, .. }) => Some(scan),
             _ => None,
         })
     }
 
-    /// The error of a first scan that cannot be read, where it is not to be skipped.
+    /// The error of a first scan that cannot be mapped, where it is not to be skipped.
     pub fn check_first(&mut self) -> anyhow::Result<()> {
-        match self.lead.pop_front() {
+        if let (Some(needs), Some(scan)) = (&self.rays, self.first())
+            && needs.sensor_model.needs_intensity()
+            && !scan.has_intensities()
+        {
+            // If the first has none, none has.
+            needs.check_fields(scan)?;
+        }
+        match self.lead.pop_front().map(|first| self.judged(first)) {
             Some(Read::Unread(error)) if !self.skips_bad => Err(error.into()),
             first => {
                 first.into_iter().for_each(|first| self.lead.push_front(first));
                 Ok(())
             }
+        }
+    }
+
+    /// A scan that cannot be mapped is as one that cannot be read.
+    fn judged(&self, read: Read) -> Read {
+        let Some(needs) = &self.rays else { return read };
+        match read {
+            Read::Scan(scan) => match needs.check(&scan.scan, self.chain.scans(), &self.scans) {
+                Ok(()) => Read::Scan(scan),
+                Err(error) => Read::Unread(error),
+            },
+            other => other,
         }
     }
 
@@ -231,14 +261,16 @@ impl Intake {
     }
 
     fn read(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Read> {
-        match self.read_before() {
-            Some(read) => Ok(read?),
-            None => self.reader.next(idle),
-        }
+        let read = match self.read_before() {
+            Some(read) => read?,
+            None => self.reader.next(idle)?,
+        };
+        Ok(self.judged(read))
     }
 
     fn read_at_hand(&mut self) -> Option<crate::Result<Read>> {
-        self.read_before().or_else(|| self.reader.next_at_hand())
+        let read = self.read_before().or_else(|| self.reader.next_at_hand())?;
+        Some(read.map(|read| self.judged(read)))
     }
 
     /// What was read before and not taken.
@@ -248,5 +280,25 @@ impl Intake {
 
     fn wrong(&self, reason: String) -> anyhow::Error {
         Error::argument(self.scans.display().to_string(), reason).into()
+    }
+}
+
+impl RayNeeds {
+    /// Whether a scan, the one of this number of an input, can be mapped.
+    fn check(&self, scan: &StoredScan, number: u64, input: &Path) -> crate::Result<()> {
+        let origin = scan.origin();
+        if self.grid.voxel_of(origin).is_none() {
+            let StoredScan { name, .. } = scan;
+            let reason = format!(
+                "the sensor of scan {name} is at {origin:?} m, which is not finite or too far away for a voxel index: \
+                 mend its pose, or leave the scan out with --skip-bad"
+            );
+            return Err(FormatError::at_record(number, reason).in_input(input));
+        }
+        self.check_fields(scan)
+    }
+
+    fn check_fields(&self, scan: &StoredScan) -> crate::Result<()> {
+        ScanTracer::check(&self.grid, &self.sensor_model, scan)
     }
 }

@@ -21,12 +21,9 @@ pub struct MapAt {
 impl MapAt {
     /// `MAP`, or `MAP@SNAPSHOT` where nothing has that as its own name.
     pub fn of(path: &Path) -> Result<Self> {
-        let text = path.to_str().filter(|_| std::fs::symlink_metadata(path).is_err());
-        match text.and_then(|text| text.rsplit_once('@')) {
-            Some((map, name)) if !name.contains(std::path::is_separator) => {
-                Ok(Self { map: map.into(), snapshot: Some(SnapshotName::new(name)?) })
-            }
-            _ => Ok(Self { map: path.to_owned(), snapshot: None }),
+        match named_snapshot(path) {
+            Some((map, name)) => Ok(Self { map: map.to_owned(), snapshot: Some(SnapshotName::new(name)?) }),
+            None => Ok(Self { map: path.to_owned(), snapshot: None }),
         }
     }
 
@@ -35,11 +32,23 @@ impl MapAt {
             let reason = "is a file of OctoMap, which this command does not take; make a map of it with `voxtile import`";
             return Err(Error::argument(self.map.display().to_string(), reason));
         }
+        if self.map.is_file() {
+            let reason =
+                "is a file, and none of OctoMap; a map is a folder, which `voxtile build` or `import` makes";
+            return Err(Error::argument(self.map.display().to_string(), reason));
+        }
         match &self.snapshot {
             Some(name) => MapReader::open_snapshot(place_of(&self.map)?, name, CACHE_TILES),
             None => MapReader::open(place_of(&self.map)?, CACHE_TILES),
         }
     }
+}
+
+/// The two parts of `MAP@SNAPSHOT`, where nothing has that as its own name.
+fn named_snapshot(path: &Path) -> Option<(&Path, &str)> {
+    let text = path.to_str().filter(|_| std::fs::symlink_metadata(path).is_err())?;
+    let (map, name) = text.rsplit_once('@')?;
+    (!name.contains(std::path::is_separator)).then_some((Path::new(map), name))
 }
 
 /// What can be read.
@@ -117,8 +126,9 @@ impl MapView for AnyMap {
 /// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` where there is a map at `MAP`, and for a URL.
 pub fn whole_map(path: &Path) -> Result<&Path> {
     check_is_folder(path)?;
-    let MapAt { map, snapshot } = MapAt::of(path)?;
-    if snapshot.is_some() && map.join("metadata.json").exists() {
+    if let Some((map, _)) = named_snapshot(path)
+        && map.join("metadata.json").exists()
+    {
         let reason = format!(
             "names a snapshot, which can be read and not changed; name the map {}, or make a map of the snapshot with `voxtile \
              convert`",

@@ -3,7 +3,7 @@ use crate::command::json;
 use crate::command::map_at::{read_all_maps, whole_map};
 use crate::command::memory;
 use crate::command::progress::Progress;
-use crate::command::written::print_written;
+use crate::command::written::{print_written, warn_of_scans_left};
 use crate::operations::{Merged, merge};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -24,13 +24,14 @@ struct Summary<'a> {
 pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let prefer = args.prefer.map(Into::into);
-    let merged = read_all_maps(&args.maps, |maps| {
-        Ok(merge(maps, whole_map(&args.output)?, prefer, |done, all| progress.set(done, all))?)
+    let (merged, mut warnings) = read_all_maps(&args.maps, |maps| {
+        let merged = merge(maps, whole_map(&args.output)?, prefer, |done, all| progress.set(done, all))?;
+        Ok((merged, warn_of_scans_left(maps)))
     })?;
     drop(progress);
-    let warnings = warnings_of(&args.maps, &merged);
-    for warning in &warnings {
+    for warning in warnings_of(&args.maps, &merged) {
         log::warn!("{warning}");
+        warnings.push(warning);
     }
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -134,9 +134,11 @@ fn config_of(args: &RemapArgs, own: &MapConfig, memory_bytes: usize) -> anyhow::
         args.resolution.unwrap_or(own.grid.resolution_m()),
         args.tile_size.unwrap_or(own.grid.tile_size_m()),
     );
-    let grid = Grid::new(resolution_m, tile_size_m)?;
+    let grid = Grid::new(resolution_m, tile_size_m).map_err(Error::from)?;
     let mut config = MapConfig { grid, ..own.clone() }.with_kept_scans(args.keep_scans);
-    config.memory = MemoryLimit::Bytes(memory_bytes.max(MemoryLimit::least_bytes(&grid)));
+    // What was asked for is kept to, or refused.
+    let least = if args.rework.memory.is_some() { 0 } else { MemoryLimit::least_bytes(&grid) };
+    config.memory = MemoryLimit::Bytes(memory_bytes.max(least));
     if let Some(storage) = args.storage {
         config.storage = storage.into();
     }

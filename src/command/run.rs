@@ -25,7 +25,7 @@ pub fn main() -> ExitCode {
 /// The command with `arguments`, the program's name first. It ends the process where they make no sense or ask for
 /// help, and it expects a process of its own: it sets up logging, threads and signals.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = Cli::parse_from(arguments);
+    let cli = Cli::parse_from(with_plain_numbers(arguments));
     // The command line before the environment, where it says something.
     let mut log = env_logger::Builder::new();
     log.filter_level(cli.log_level()).format_timestamp(None);
@@ -85,6 +85,31 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Man(args) => man::run(&args),
     };
     outcome.unwrap_or_else(|error| json_to.tell(&error))
+}
+
+/// Negative numbers as programs print them (`-1e-05`, `-.5`, `-inf`), which would be taken for options.
+fn with_plain_numbers(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let mut are_options_over = false;
+    let plain = |argument: OsString| {
+        are_options_over |= argument == "--";
+        match argument.to_str().filter(|_| !are_options_over).and_then(plain_number) {
+            Some(plain) => plain.into(),
+            None => argument,
+        }
+    };
+    arguments.into_iter().map(plain).collect()
+}
+
+/// A negative number in digits alone, if it is one in another form.
+fn plain_number(text: &str) -> Option<String> {
+    let digits = text.strip_prefix('-')?;
+    if digits.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    match text.parse::<f64>().ok()? {
+        f64::NEG_INFINITY => Some("-1e999".to_owned()),
+        number => Some(number.to_string()),
+    }
 }
 
 /// Whether the command maps within a limit of bytes.

@@ -40,6 +40,11 @@ pub fn name_of(scans: &Path, source: &dyn ScanSource) -> String {
     if is_standard_input(scans) {
         return source.fingerprint().unwrap_or_else(|_| "standard input".to_owned());
     }
+    name_of_path(scans)
+}
+
+/// The same of a path.
+pub fn name_of_path(scans: &Path) -> String {
     let path = scans.canonicalize().unwrap_or_else(|_| scans.to_owned());
     let part = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
     let last = part(&path).unwrap_or_else(|| scans.display().to_string());

@@ -1,22 +1,20 @@
 use crate::command::args::SnapshotArgs;
 use crate::command::json;
 use crate::command::map_at::whole_map;
-use crate::operations::{SnapshotInfo, delete_snapshot, snapshot, snapshots};
+use crate::operations::{SnapshotInfo, delete_snapshot, new_snapshot, snapshot, snapshots};
 use std::io::Write;
 use std::process::ExitCode;
 
 pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
-    let find = || -> crate::Result<Option<SnapshotInfo>> {
-        Ok(snapshots(&args.map)?.into_iter().find(|info| info.name == args.name.as_str()))
-    };
     let info = if args.delete {
         // What it was, before it is gone.
-        let info = find()?;
+        let info = snapshots(&args.map)?.into_iter().find(|info| info.name == args.name.as_str());
         delete_snapshot(whole_map(&args.map)?, &args.name)?;
         info
     } else {
         snapshot(whole_map(&args.map)?, &args.name)?;
-        find()?
+        // It is there, whatever becomes of this.
+        new_snapshot(&args.map, &args.name).inspect_err(|error| log::warn!("{error:#}")).ok()
     };
     let mut out = std::io::stdout().lock();
     if args.json {
@@ -24,6 +22,8 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
         json::print(&answer, &mut out)?;
     } else if args.delete {
         writeln!(out, "deleted   {}", args.name)?;
+    } else if info.is_none() {
+        writeln!(out, "kept      {}", args.name)?;
     } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {
         writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles")?;
     }

@@ -30,6 +30,14 @@ pub fn catch_undone() -> anyhow::Result<Stop> {
     catch_saying("stopping: the map stays as it was", "ended at once: the map is as it was")
 }
 
+/// The same for a file or folder that is made beside its place, and takes it at the end.
+pub fn catch_unfinished() -> anyhow::Result<Stop> {
+    catch_saying(
+        "stopping: the output stays as it was",
+        "ended at once: the output is as it was; a temporary file or folder beside it may stay",
+    )
+}
+
 /// The same for work that only reads. Where that is the files of a folder, nothing is to be removed in the end, and
 /// signals do what they always do.
 pub fn catch_if_fetched(scans: &Path) -> anyhow::Result<Stop> {

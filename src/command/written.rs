@@ -1,7 +1,22 @@
+use crate::mapper::MapReader;
 use crate::operations::WrittenMap;
 use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
 use std::path::Path;
+
+/// Warns, and returns the warnings, of maps that keep scans: a new map that is made of their tiles gets none.
+pub fn warn_of_scans_left<'a>(maps: impl IntoIterator<Item = &'a MapReader>) -> Vec<String> {
+    let keep_scans = maps.into_iter().filter(|map| map.keeps_scans());
+    let warning = |map: &MapReader| {
+        let warning = format!(
+            "{} keeps its scans, and the new map gets none of them: it cannot be remapped, and no scan removed from it",
+            map.folder().display()
+        );
+        log::warn!("{warning}");
+        warning
+    };
+    keep_scans.map(warning).collect()
+}
 
 /// Says for a person what a new map is.
 pub fn print_written(map: &Path, written: &WrittenMap, out: &mut impl Write) -> std::io::Result<()> {

@@ -4,8 +4,10 @@ use crate::error::{Error, Result};
 use crate::octree::{Leaf, Octree, OctreeFile, OctreeFormat};
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickCode, MortonCode, TileBox, TileIndex, VoxelBox, VoxelIndex};
+use crate::store::{Disk, FsDisk};
 use crate::tile::{Table, Tile};
 use lru::LruCache;
+use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -44,24 +46,25 @@ pub struct OctreeMap {
 
 /// Edge of the tiles that a file is cut into, about.
 const TILE_SIZE_M: f64 = 10.0;
-/// Most voxels of a tile that is asked: 150 MB.
-const MOST_TILE_VOXELS: u64 = 1 << 26;
+/// Most voxels along an edge of these: all of a tile take 150 MB.
+const MOST_TILE_EDGE: f64 = 400.0;
 /// Tiles in memory.
 const CACHE_TILES: NonZeroUsize = NonZeroUsize::new(32).expect("more than none");
 /// Bytes of these, but for the last one.
 const CACHE_BYTES: usize = 128 << 20;
 /// Most tiles that the leaves of a file may stand for: one of twenty bytes can stand for 2^48 voxels.
-const MOST_TILES: u64 = 1 << 22;
+const MOST_TILES: u64 = 1 << 23;
 /// Depth of bricks in OctoMap's tree.
 const BRICK_DEPTH: u8 = 13;
 /// The first voxel of OctoMap's space.
 const FIRST_VOXEL: VoxelIndex = [-32768; 3];
 
 impl OctreeMap {
-    /// Whether a path names a file of OctoMap, by its extension.
+    /// Whether a path names a file of OctoMap: by how it begins or, for files without a header, by its extension.
     pub fn is_named_by(path: &Path) -> bool {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        path.is_file() && ["bt", "ot"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+        let is_named = || ["bt", "ot"].iter().any(|known| extension.eq_ignore_ascii_case(known));
+        path.is_file() && (is_named() || begins_as_octree(path))
     }
 
     /// The map of a file that is in memory.
@@ -71,7 +74,7 @@ impl OctreeMap {
     /// Leaves that stand for more tiles than can be listed, a resolution that no map can have.
     pub fn of(file: OctreeFile) -> Result<Self> {
         let OctreeFile { tree, resolution_m, id, format, .. } = file;
-        let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, 1024.0);
+        let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, MOST_TILE_EDGE);
         let config = MapConfig::new(resolution_m, edge * resolution_m)?;
         let tiles = tiles_of(&config, &tree)?;
         Ok(Self { config, tree, format, id, tiles, cache: Mutex::default() })
@@ -93,11 +96,7 @@ impl OctreeMap {
     }
 
     /// Makes the table of a tile.
-    ///
-    /// # Errors
-    ///
-    /// More voxels than so many.
-    pub(crate) fn table_of(&self, index: TileIndex, most_voxels: u64) -> Result<Table> {
+    pub(crate) fn table_of(&self, index: TileIndex) -> Table {
         let end = FIRST_VOXEL.map(|first| -first);
         let voxels = self.config.grid.voxels_of_tile(index);
         let voxels = voxels.intersection(&VoxelBox { min: FIRST_VOXEL, end });
@@ -117,19 +116,13 @@ impl OctreeMap {
                         table.insert(BrickCode::of_voxel([x, y, z]), &known);
                     }
                 }
-                if table.len() as u64 > most_voxels {
-                    let what = "number of voxels that the file stands for in one tile";
-                    let hint = "such a file is made by pruning large cubes; import it with `voxtile import`";
-                    return Err(Error::TooLarge { what, size: table.len() as u64, limit: most_voxels, hint });
-                }
             }
         }
-        Ok(table)
+        table
     }
 
-    fn make_tile(&self, index: TileIndex) -> Result<Arc<Tile>> {
-        let table = self.table_of(index, MOST_TILE_VOXELS)?;
-        Ok(Arc::new(Tile::uncached(&self.config.grid, index, table)))
+    fn make_tile(&self, index: TileIndex) -> Arc<Tile> {
+        Arc::new(Tile::uncached(&self.config.grid, index, self.table_of(index)))
     }
 
     /// Collects the known voxels of a brick that lie in a box: place and evidence, in Morton order.
@@ -150,6 +143,15 @@ impl OctreeMap {
     fn has(&self, index: TileIndex) -> bool {
         self.tiles.binary_search(&index).is_ok()
     }
+}
+
+/// Whether a file can be read and begins as OctoMap's do.
+fn begins_as_octree(path: &Path) -> bool {
+    /// More than the first line has that counts.
+    const FIRST_BYTES: u64 = 64;
+    let mut first = Vec::new();
+    let read = FsDisk.open(path).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut first));
+    read.is_ok() && OctreeFormat::of_first_bytes(&first).is_some()
 }
 
 /// The tiles that were made last.
@@ -247,14 +249,14 @@ impl MapView for OctreeMap {
             return Ok(Some(TileRef::shared(tile.clone())));
         }
         // Other threads find theirs meanwhile.
-        let tile = self.make_tile(index)?;
+        let tile = self.make_tile(index);
         cache().put(index, &tile);
         Ok(Some(TileRef::shared(tile)))
     }
 
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
         match self.has(index) {
-            true => Ok(Some(TileRef::shared(self.make_tile(index)?))),
+            true => Ok(Some(TileRef::shared(self.make_tile(index)))),
             false => Ok(None),
         }
     }

@@ -125,7 +125,7 @@ impl OutOfCoreTileMapper {
         let found = match last {
             Some(input) if input.content.is_none() && input.name == name => {
                 let done = scan_number - input.first_scan.min(scan_number);
-                self.check_rays()?;
+                self.check_rays(&input)?;
                 return Ok(done);
             }
             Some(input) => input.name,
@@ -152,13 +152,19 @@ impl OutOfCoreTileMapper {
         }
     }
 
-    /// What was begun with some ranges and insert mode goes on with them.
+    /// An input that was begun with some ranges and insert mode goes on with them.
     ///
     /// # Errors
     ///
-    /// [`Error::Mismatch`] if the map was last built with others.
-    pub fn check_rays(&self) -> Result<()> {
-        check_rays(self.pager().store(), &self.config.rays)
+    /// [`Error::Mismatch`] if the map took its scans with others: those that the record names or, if it names none, those
+    /// of the last flush.
+    pub fn check_rays(&self, input: &InputRecord) -> Result<()> {
+        let pager = self.pager();
+        let of_flush = pager.store().metadata().ext.as_ref().map(|ext| ext.rays);
+        match input.rays.or(of_flush) {
+            Some(begun) => check_rays(pager.store().folder(), &begun, &self.config.rays),
+            None => Ok(()),
+        }
     }
 
     /// Lets a scan that is being inserted be given up: [`Mapper::insert_points`] then ends with [`Error::Stopped`].
@@ -559,10 +565,9 @@ fn kept_record(
     }
 }
 
-fn check_rays(store: &TileStore, rays: &RayConfig) -> Result<()> {
-    let Some(ext) = &store.metadata().ext else { return Ok(()) };
+fn check_rays(folder: &Path, begun: &RayConfig, rays: &RayConfig) -> Result<()> {
     let mismatch = |what, found: String, wanted: String| {
-        Err(Error::Mismatch { path: store.folder().to_owned(), what, found, wanted })
+        Err(Error::Mismatch { path: folder.to_owned(), what, found, wanted })
     };
     let range = |rays: &RayConfig| {
         let max = rays.max_range_m.map_or("no limit".to_owned(), |max| format!("{max} m"));
@@ -570,20 +575,20 @@ fn check_rays(store: &TileStore, rays: &RayConfig) -> Result<()> {
             rays.no_return_range_m.map_or(String::new(), |range| format!(", {range} m without a return"));
         format!("{} m to {max}{nothing}", rays.min_range_m)
     };
-    if range(&ext.rays) != range(rays) {
-        return mismatch("been built with ranges of", range(&ext.rays), range(rays));
+    if range(begun) != range(rays) {
+        return mismatch("been built with ranges of", range(begun), range(rays));
     }
-    if ext.rays.region != rays.region {
+    if begun.region != rays.region {
         let region = |rays: &RayConfig| {
             rays.region.map_or("all of space".to_owned(), |tiles| {
                 format!("tiles {} to {}", tiles.min(), tiles.max())
             })
         };
-        return mismatch("been built of", region(&ext.rays), region(rays));
+        return mismatch("been built of", region(begun), region(rays));
     }
-    if ext.rays.insert_mode != rays.insert_mode {
+    if begun.insert_mode != rays.insert_mode {
         let mode = |rays: &RayConfig| rays.insert_mode.to_string();
-        return mismatch("been built with insert mode", mode(&ext.rays), mode(rays));
+        return mismatch("been built with insert mode", mode(begun), mode(rays));
     }
     Ok(())
 }

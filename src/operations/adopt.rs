@@ -1,5 +1,5 @@
 use super::map_editor::{MapEditor, edit};
-use super::merge::{check_grid, check_model, have_no_common_tile};
+use super::merge::{check_grid, check_model, common_crs, have_no_common_tile};
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::sensor::Evidence;
@@ -48,6 +48,7 @@ pub fn adopt(
         check_grid(part, &before)?;
         check_model(part, &before)?;
     }
+    common_crs(parts.iter().chain([&before]))?;
     if before.keeps_scans() {
         let reason = "the map keeps its scans, and the tiles of parts come without theirs; use `voxtile build --append`";
         return Err(Error::argument(map.display().to_string(), reason));

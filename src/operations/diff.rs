@@ -1,3 +1,4 @@
+use super::merge::common_crs;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
@@ -75,7 +76,7 @@ pub enum TileChange {
 ///
 /// # Errors
 ///
-/// [`Error::Mismatch`] if resolution or tile size differ; a tile that cannot be read.
+/// [`Error::Mismatch`] if resolution, tile size or coordinate reference system differ; a tile that cannot be read.
 pub fn diff(
     first: &MapReader,
     second: &MapReader,
@@ -83,6 +84,7 @@ pub fn diff(
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Diff> {
     check_grids(first, second)?;
+    common_crs([first, second])?;
     let mut tiles = first.tile_indices();
     tiles.extend(second.tile_indices());
     tiles.sort_unstable();

@@ -22,7 +22,7 @@ pub fn import(
     let tiles = map.tile_indices();
     for (done, &tile) in (0..).zip(&tiles) {
         progress(done, tiles.len() as u64);
-        writer.put(tile, &map.table_of(tile, u64::MAX)?)?;
+        writer.put(tile, &map.table_of(tile))?;
     }
     progress(tiles.len() as u64, tiles.len() as u64);
     writer.finish()

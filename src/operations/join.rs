@@ -1,5 +1,5 @@
 use super::map_writer::WrittenMap;
-use super::merge::{begin, check_crs, check_grid, check_model};
+use super::merge::{begin, check_grid, check_model, with_crs_of};
 use super::regions::Regions;
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
@@ -33,14 +33,15 @@ pub fn join(
         let reason = "of the original format, and no piece of a map to come";
         return Err(Error::argument(first.folder().display().to_string(), reason));
     };
-    let (mut config, mut regions, mut all) = (first.config().clone(), Regions::of(&first), 0);
+    let (mut config, mut regions, mut all) = (first.config().clone(), Regions::of(&first)?, 0);
     for piece in pieces {
         let piece = open(piece)?;
         check_goes_with(&piece, &first)?;
+        config.crs = with_crs_of(config.crs, &piece)?;
         if piece.config().rays.region != first.config().rays.region {
             config.rays.region = None;
         }
-        regions.add(&piece);
+        regions.add(&piece)?;
         all += piece.tile_indices().len() as u64;
     }
     let mut writer = begin(&first, output.as_ref(), config, regions.one_build(), map_id)?;
@@ -55,7 +56,6 @@ pub fn join(
 
 fn check_goes_with(piece: &MapReader, first: &MapReader) -> Result<()> {
     check_grid(piece, first)?;
-    check_crs(piece, first)?;
     check_model(piece, first)?;
     let [found, wanted] = [piece, first].map(|map| map.map_id().map(|id| hex(&id)).unwrap_or_default());
     let [storage, wanted_storage] = [piece, first].map(|map| map.config().storage);

@@ -60,24 +60,10 @@ pub fn merge(
     if maps.iter().any(|map| map.config().rays.region != config.rays.region) {
         config.rays.region = None;
     }
-    for map in maps {
-        check_grid(map, first)?;
-        check_crs(map, first)?;
-        if prefer.is_none() {
-            check_model(map, first)?;
-        }
-    }
-    // With no tile in common there is nothing to prefer, as with maps of regions.
-    let without_choice = || have_no_common_tile(maps).then_some(MergeRule::Take(Prefer::First));
-    let Some(rule) = MergeRule::of(&config, prefer).or_else(without_choice) else {
-        let reason = format!(
-            "the maps' sensor model is {}, whose evidence does not add up: say which map's voxels to take with --prefer \
-             first, last or more-observed",
-            config.sensor_model.name()
-        );
-        return Err(Error::argument("maps", reason));
-    };
-    let one_build = OneBuild::of(maps);
+    maps.iter().try_for_each(|map| check_grid(map, first))?;
+    config.crs = common_crs(maps)?;
+    let rule = rule_for(maps, first, prefer)?;
+    let one_build = OneBuild::of(maps)?;
     let mut writer = begin(first, output.as_ref(), config, one_build, new_map_id())?;
     let tiles: BTreeSet<TileIndex> = maps.iter().flat_map(MapView::tile_indices).collect();
     let mut merge = TableMerge::new(rule);
@@ -97,6 +83,30 @@ pub fn merge(
     })
 }
 
+/// What becomes of voxels that several maps know. With no tile in common there is nothing to prefer, as with maps of
+/// regions.
+fn rule_for(maps: &[MapReader], first: &MapReader, prefer: Option<Prefer>) -> Result<MergeRule> {
+    let model = &first.config().sensor_model;
+    let checked = match prefer {
+        Some(_) => Ok(()),
+        None => maps.iter().try_for_each(|map| check_model(map, first)),
+    };
+    let rule = checked.and_then(|()| {
+        MergeRule::of(first.config(), prefer).ok_or_else(|| {
+            let reason = format!(
+                "the maps' sensor model is {}, whose evidence does not add up: say which map's voxels to take with \
+                 --prefer first, last or more-observed",
+                model.name()
+            );
+            Error::argument("maps", reason)
+        })
+    });
+    rule.or_else(|error| match have_no_common_tile(maps) {
+        true => Ok(MergeRule::Take(Prefer::First)),
+        false => Err(error),
+    })
+}
+
 /// Begins the map of several, of which `first` is one: without scans, or as one build of all would have made it.
 pub(super) fn begin(
     first: &MapReader,
@@ -110,7 +120,9 @@ pub(super) fn begin(
     };
     config.rays.region = build.region;
     let part = first.metadata().ext.as_ref();
-    let mut metadata = new_metadata(&config, map_id, part.map_or(&[], |ext| &ext.inputs));
+    let inputs = part.map_or(Vec::new(), |ext| ext.inputs.clone());
+    let inputs: Vec<_> = inputs.into_iter().map(|input| input.with_region(build.region)).collect();
+    let mut metadata = new_metadata(&config, map_id, &inputs);
     if let (Some(ext), Some(part)) = (&mut metadata.ext, part) {
         (ext.scan_number, ext.decayed_scan) = (part.scan_number, part.decayed_scan);
     }
@@ -125,16 +137,21 @@ pub(super) fn have_no_common_tile(maps: &[MapReader]) -> bool {
     maps.iter().flat_map(MapView::tile_indices).all(|tile| seen.insert(tile))
 }
 
-/// What is in one place in one system is elsewhere in another. A map that names none goes with any.
-pub(super) fn check_crs(map: &MapReader, first: &MapReader) -> Result<()> {
-    match (&map.config().crs, &first.config().crs) {
-        (Some(found), Some(wanted)) if found != wanted => {
-            let found = format!("{found:.80}");
-            let wanted = format!("{wanted:.80}");
+/// The coordinate reference system of maps, if one names it. What is in one place in one system is elsewhere in another;
+/// a map that names none goes with any.
+pub(super) fn common_crs<'a>(maps: impl IntoIterator<Item = &'a MapReader>) -> Result<Option<String>> {
+    maps.into_iter().try_fold(None, |common, map| with_crs_of(common, map))
+}
+
+/// The coordinate reference system of some maps, and of one more.
+pub(super) fn with_crs_of(common: Option<String>, map: &MapReader) -> Result<Option<String>> {
+    match (common, &map.config().crs) {
+        (Some(wanted), Some(found)) if *found != wanted => {
+            let (found, wanted) = (format!("{found:.80}"), format!("{wanted:.80}"));
             let what = "the coordinate reference system";
             Err(Error::Mismatch { path: map.folder().to_owned(), what, found, wanted })
         }
-        _ => Ok(()),
+        (common, found) => Ok(common.or_else(|| found.clone())),
     }
 }
 

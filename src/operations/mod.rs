@@ -58,4 +58,4 @@ pub use remapping::{
     ScansRemoved, map_anew, remap, remove_points, remove_scans,
 };
 pub use revert::{Reverted, revert};
-pub use snapshot::{SnapshotInfo, delete_snapshot, snapshot, snapshots};
+pub use snapshot::{SnapshotInfo, delete_snapshot, new_snapshot, snapshot, snapshots};

@@ -1,8 +1,9 @@
 //! Maps of the same scans, each of a region of its own: parts of one build.
 
+use crate::error::Result;
 use crate::mapper::{MapReader, MapView};
 use crate::space::{Grid, LAST_VOXEL_INDEX, TileBox};
-use crate::store::Extension;
+use crate::store::{Extension, InputContent, ScanRecord};
 
 /// What maps are parts of: one build with this region, `None` for all of space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,39 +14,54 @@ pub(super) struct OneBuild {
 impl OneBuild {
     /// The build that these maps are parts of, if they are: the same scans of the same inputs in the same way, in boxes
     /// of tiles that have none in common and are together a box.
-    pub(super) fn of(maps: &[MapReader]) -> Option<Self> {
-        let mut regions = Regions::of(maps.first()?);
-        maps.iter().for_each(|map| regions.add(map));
-        regions.one_build()
+    ///
+    /// # Errors
+    ///
+    /// A list of scans that cannot be read or is damaged.
+    pub(super) fn of(maps: &[MapReader]) -> Result<Option<Self>> {
+        let Some(first) = maps.first() else { return Ok(None) };
+        let mut regions = Regions::of(first)?;
+        maps.iter().try_for_each(|map| regions.add(map))?;
+        Ok(regions.one_build())
     }
 }
 
 /// The regions of maps that are looked at one after the other, for [`OneBuild`].
 #[derive(Debug)]
 pub(super) struct Regions {
-    /// What the first map says of its scans. `None` once a map has no part in their build.
-    scans: Option<Extension>,
+    /// What the first map says of its scans, and their list. `None` once a map has no part in their build.
+    scans: Option<(Extension, Vec<ScanRecord>)>,
     grid: Grid,
     regions: Vec<TileBox>,
 }
 
 impl Regions {
     /// None yet; those of parts of the build that `first` is a part of can be added, `first` too.
-    pub(super) fn of(first: &MapReader) -> Self {
-        let scans = first.metadata().ext.clone();
-        let is_known = |scans: &Extension| {
-            !scans.inputs.is_empty() && scans.inputs.iter().all(|input| input.content.is_some())
+    ///
+    /// # Errors
+    ///
+    /// A list of scans that cannot be read or is damaged.
+    pub(super) fn of(first: &MapReader) -> Result<Self> {
+        let scans = first.metadata().ext.clone().filter(|ext| !ext.inputs.is_empty() && are_known(ext));
+        let scans = match scans {
+            Some(ext) => Some((ext, first.scans()?)),
+            None => None,
         };
-        Self { scans: scans.filter(is_known), grid: first.config().grid, regions: Vec::new() }
+        Ok(Self { scans, grid: first.config().grid, regions: Vec::new() })
     }
 
-    pub(super) fn add(&mut self, map: &MapReader) {
-        let ext = map.metadata().ext.as_ref();
-        let has_these = |scans: &Extension| ext.is_some_and(|ext| are_same_scans(ext, scans));
-        match own_region(map).filter(|_| self.scans.as_ref().is_some_and(has_these)) {
-            Some(region) => self.regions.push(region),
-            None => self.scans = None,
+    /// # Errors
+    ///
+    /// As for [`Regions::of`].
+    pub(super) fn add(&mut self, map: &MapReader) -> Result<()> {
+        let Some((ext, list)) = &self.scans else { return Ok(()) };
+        let are_same = map.metadata().ext.as_ref().is_some_and(|other| are_same_scans(other, ext));
+        // Their list tells of scans that were taken out of one of the maps since.
+        match own_region(map).filter(|_| are_same) {
+            Some(region) if map.scans()? == *list => self.regions.push(region),
+            _ => self.scans = None,
         }
+        Ok(())
     }
 
     pub(super) fn one_build(self) -> Option<OneBuild> {
@@ -61,10 +77,17 @@ fn own_region(map: &MapReader) -> Option<TileBox> {
     map.tile_indices().into_iter().all(|tile| region.contains(tile)).then_some(region)
 }
 
+/// Whether it is known where the scans came from and with which poses; maps that were mapped again have others.
+fn are_known(scans: &Extension) -> bool {
+    let is_known = |content: &InputContent| !content.pose_chain.is_empty();
+    scans.inputs.iter().all(|input| input.content.as_ref().is_some_and(is_known))
+}
+
 fn are_same_scans(a: &Extension, b: &Extension) -> bool {
     let rays = |ext: &Extension| crate::config::RayConfig { region: None, ..ext.rays };
+    let inputs = |ext: &Extension| ext.inputs.clone().into_iter().map(|input| input.with_region(None));
     rays(a) == rays(b)
-        && a.inputs == b.inputs
+        && inputs(a).eq(inputs(b))
         && a.scan_number == b.scan_number
         && a.decayed_scan == b.decayed_scan
         && a.sensor_model == b.sensor_model

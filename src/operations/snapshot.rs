@@ -4,6 +4,8 @@ use crate::space::TileIndex;
 use crate::store::{Layout, MapPath, Snapshot, SnapshotName, TileStore};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
+use std::collections::BTreeSet;
+use std::collections::hash_map::Entry;
 
 /// A snapshot of a map: the map as of a flush, under a name.
 ///
@@ -87,13 +89,24 @@ pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
             Err(error) => return Err(error),
         }
     }
-    for (_, owner) in owners.0 {
+    for (_, owner) in owners.owners {
         if let Owner::One { snapshot, bytes } = owner {
             infos[snapshot].own_bytes += bytes;
         }
     }
     infos.sort_by(|a, b| (a.flush_number, &a.name).cmp(&(b.flush_number, &b.name)));
     Ok(infos)
+}
+
+/// A snapshot that was just made: nothing has changed since, and no other is looked at.
+///
+/// # Errors
+///
+/// No map there, none of this name, damage, or a disk that refuses.
+pub fn new_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<SnapshotInfo> {
+    let (disk, folder) = folder.into().into_parts();
+    let store = TileStore::open_read_only(disk, &folder)?;
+    Ok(SnapshotInfo::of(&store.snapshot(name)?))
 }
 
 /// Whether a map has room for a snapshot of this name, without making it.
@@ -109,7 +122,11 @@ pub(super) fn check_is_free(store: &TileStore, name: &SnapshotName) -> Result<()
 
 /// Who sees each of the kept tables.
 #[derive(Default)]
-struct Owners(FxHashMap<(TileIndex, u64), Owner>);
+struct Owners {
+    owners: FxHashMap<(TileIndex, u64), Owner>,
+    /// The flushes as of which tables of a tile are kept: snapshots have many tiles in common.
+    kept: FxHashMap<TileIndex, BTreeSet<u64>>,
+}
 
 enum Owner {
     One { snapshot: usize, bytes: u64 },
@@ -122,10 +139,16 @@ impl Owners {
             if store.version(tile) == Some(version) {
                 continue; // It is the present one, under whatever names.
             }
-            let kept = store.kept_tables(tile)?;
+            let kept = match self.kept.entry(tile) {
+                Entry::Occupied(kept) => kept.into_mut(),
+                Entry::Vacant(none) => none.insert(store.kept_tables(tile)?),
+            };
             let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
             let one = Owner::One { snapshot: number, bytes: version.table.bytes };
-            self.0.entry((tile, flush_number)).and_modify(|owner| *owner = Owner::Several).or_insert(one);
+            self.owners
+                .entry((tile, flush_number))
+                .and_modify(|owner| *owner = Owner::Several)
+                .or_insert(one);
         }
         Ok(())
     }

@@ -3,7 +3,7 @@ use super::sifted_tiles::for_each_from;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
-use crate::maths::logit;
+use crate::maths::least_logit;
 use crate::space::{
     Aabb, BRICK_EDGE, BrickCode, BrickMask, Grid, TileBox, TileIndex, VoxelBox, VoxelIndex, mask_of_box,
 };
@@ -88,7 +88,7 @@ fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
         None => config.occupied_log_odds(),
         Some(probability) if probability <= 0.0 => f64::NEG_INFINITY,
         Some(probability) if probability >= 1.0 => f64::INFINITY,
-        Some(probability) => logit(probability),
+        Some(probability) => least_logit(probability),
     }
 }
 

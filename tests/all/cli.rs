@@ -567,3 +567,66 @@ fn a_map_is_built_small_converted_and_gone_on_with() {
     assert!(message.contains("stored as compact"), "{message}");
     output(&[&again[..], &["compact"]].concat());
 }
+
+/// Numbers as programs print them are no options.
+#[test]
+fn negative_numbers_may_have_any_form() {
+    let folder = TempDir::new().unwrap();
+    let (scans, map) = built(&folder);
+    let (map, new) = (text(&map), |name: &str| text(&folder.path().join(name)).to_owned());
+    let box_m = ["--region", "-1e+2", "-.5", "-inf", "1e2", "inf", "+inf"];
+    for number in ["-1e-05", "-.5e-4", "-0.00001", "-1E-5"] {
+        assert_eq!(json(&["query", map, "4.05", number, "0.55", "--json"])["state"], "occupied", "{number}");
+        output(&["raycast", map, "--origin", number, "0", "0.6", "--direction", "1", number, "0"]);
+        output(&["picture", map, "-o", &new("a.png"), "--slice", number]);
+    }
+    output(&[&["crop", map, "-o", &new("cropped")], &box_m[..]].concat());
+    output(&[&["export", map, "-o", &new("a.csv")], &box_m[..]].concat());
+    output(&[&["clear", &new("cropped")], &box_m[..]].concat());
+    let extrinsic = ["--extrinsic", "0", "0", "0", "0", "0", "-1e-17", "1"];
+    output(&[&["build", text(&scans), "-o", &new("turned")], &extrinsic[..]].concat());
+    assert_eq!(output(&["digest", &new("turned")]), output(&["digest", map]));
+    // What stands behind -- is a name, and what is no number is as it was.
+    let (code, stderr) = failure(&["info", "--", "-1e5"]);
+    assert!(code == 1 && stderr.contains("-1e5: no map"), "{stderr}");
+    voxtile(&["query", map, "-x", "0", "0"]).assert().code(2);
+}
+
+#[test]
+fn files_are_known_by_what_they_hold() {
+    let folder = TempDir::new().unwrap();
+    let (_, map) = built(&folder);
+    let [ot, renamed, ply] = ["a.ot", "map.octomap", "a.ply"].map(|name| folder.path().join(name));
+    output(&["export", text(&map), "-o", text(&ot)]);
+    output(&["export", text(&map), "-o", text(&ply)]);
+    fs::copy(&ot, &renamed).unwrap();
+    assert_eq!(output(&["digest", text(&renamed)]), output(&["digest", text(&ot)]));
+    assert_eq!(output(&["info", text(&renamed)]), output(&["info", text(&ot)]));
+    for command in ["info", "digest"] {
+        let (code, stderr) = failure(&[command, text(&ply)]);
+        assert!(code == 2 && stderr.contains("is a file, and none of OctoMap"), "{stderr}");
+    }
+}
+
+/// OctoMap's files have single precision: a voxel of exactly one hit is of the probability of a hit there, too.
+#[test]
+fn every_format_has_the_same_voxels_of_a_probability() {
+    let folder = TempDir::new().unwrap();
+    let (_, map) = built(&folder);
+    let path = |name: &str| text(&folder.path().join(name)).to_owned();
+    let (ot, imported) = (path("a.ot"), path("imported"));
+    output(&["export", text(&map), "-o", &ot]);
+    output(&["import", &ot, "-o", &imported]);
+    for probability in ["0.7", "0.4", "0.1192", "0.971"] {
+        let count = |from: &str, to: &str| {
+            let to = path(to);
+            json(&["export", from, "-o", &to, "--min-probability", probability, "--json"])["voxels"].clone()
+        };
+        let expected = count(text(&map), "map.csv");
+        for from in [&ot, &imported] {
+            for to in ["a.csv", "a.xyz", "a.npz"] {
+                assert_eq!(count(from, to), expected, "{probability}, {from}, {to}");
+            }
+        }
+    }
+}

@@ -560,3 +560,40 @@ fn a_recording_may_have_more_parts_than_files_may_be_open() {
         assert!(said.contains("240"), "{extension}: 4 scans a part: {said}");
     }
 }
+
+/// Pixels without depth are rays without a return, also when the range comes from the map.
+#[test]
+fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let depth = path("depth");
+    fs::create_dir(&depth).unwrap();
+    let add = |number: usize| {
+        let file = fs::File::create(depth.join(format!("{number}.png"))).unwrap();
+        let mut encoder = png::Encoder::new(file, 4, 2);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let depths = [2000_u16, 0, 2000, 0, 0, 2000, 0, 1000];
+        let bytes: Vec<u8> = depths.iter().flat_map(|depth| depth.to_be_bytes()).collect();
+        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        let rows: Vec<String> = (0..=number).map(|k| format!("1 0 0 {k} 0 1 0 0 0 0 1 0\n")).collect();
+        fs::write(path("poses.txt"), rows.concat()).unwrap();
+    };
+    fs::write(path("camera.txt"), "4 4 2 1\n").unwrap();
+    let build = |map: &Path, how: &[&str]| {
+        let poses = path("poses.txt");
+        let camera = path("camera.txt");
+        let input = ["build", text(&depth), "--poses", text(&poses), "--intrinsics", text(&camera)];
+        output(&[&input[..], &["-o", text(map), "--json"], how].concat())
+    };
+    (0..2).for_each(add);
+    build(&path("map"), &["--clear-no-return", "3"]);
+    add(2);
+    let told: serde_json::Value = serde_json::from_str(&build(&path("map"), &["--resume"])).unwrap();
+    assert_eq!((&told["resumed_after"], &told["scans"]), (&2.into(), &1.into()), "{told}");
+    build(&path("whole"), &["--clear-no-return", "3"]);
+    build(&path("without"), &[]);
+    let digest = |name: &str| output(&["digest", text(&path(name))]);
+    assert_eq!(digest("map"), digest("whole"));
+    assert_ne!(digest("whole"), digest("without"));
+}

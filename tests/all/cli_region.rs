@@ -131,3 +131,44 @@ fn a_region_without_a_tile_is_refused() {
     }
     voxtile(&build(&scans, text(&map), &["--region", "0", "0"])).assert().code(2);
 }
+
+/// Parts of one build are maps like any others once scans were taken out of one, or once they were mapped again: their
+/// poses may have the same positions.
+#[test]
+fn parts_that_were_changed_are_no_parts_of_one_build() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let path = |name: &str| text(&folder.path().join(name)).to_owned();
+    let poses = std::fs::read_to_string(scans.join("poses_kitti.txt")).unwrap();
+    let turned: Vec<String> = poses
+        .lines()
+        .map(|row| {
+            let row: Vec<&str> = row.split_whitespace().collect();
+            format!("0 -1 0 {} 1 0 0 {} 0 0 1 {}", row[3], row[7], row[11])
+        })
+        .collect();
+    let turned_poses = path("turned.txt");
+    std::fs::write(&turned_poses, turned.join("\n") + "\n").unwrap();
+    let change: [&dyn Fn(&str, &str); 2] =
+        [&|one, _| drop(output(&["remove-scans", one, "--scans", "2"])), &|one, other| {
+            output(&["remap", one, "--poses", text(&scans.join("poses_kitti.txt"))]);
+            output(&["remap", other, "--poses", &turned_poses]);
+        }];
+    for (number, change) in change.into_iter().enumerate() {
+        let parts = ["south_east", "north_east"].map(|name| path(&format!("{name}_{number}")));
+        for (part, region) in parts.iter().zip([SOUTH_EAST, NORTH_EAST]) {
+            output(&build(&scans, part, &[&region[..], &["--keep-scans"]].concat()));
+        }
+        let merged = |name: &str| {
+            let merged = path(&format!("{name}_{number}"));
+            json(&["merge", &parts[0], &parts[1], "-o", &merged, "--json"])
+        };
+        let before = merged("before");
+        assert_eq!(before["is_one_build"], true);
+        // That is said: nobody throws the parts away without knowing.
+        let warnings = before["warnings"].as_array().unwrap();
+        assert!(warnings.len() == 2 && warnings[0].as_str().unwrap().contains("keeps its scans"), "{before}");
+        change(&parts[0], &parts[1]);
+        assert_eq!(merged("after")["is_one_build"], false, "{number}");
+    }
+}

@@ -313,3 +313,83 @@ fn a_build_that_begins_with_resume_is_the_build_without() {
     output(&["build", text(&cloud), "-o", text(&resumed), "--resume"]);
     assert_eq!(output(&["digest", text(&plain)]), output(&["digest", text(&resumed)]));
 }
+
+/// A pose from where no ray can begin is as a scan that cannot be read: the build ends there, or goes past it.
+#[test]
+fn a_scan_with_a_pose_too_far_away_can_be_skipped() {
+    let folder = TempDir::new().unwrap();
+    let [a, good, map, whole] = ["a", "good", "map", "whole"].map(|name| folder.path().join(name));
+    numbered(&a, 1, 0..5);
+    numbered(&good, 1, 0..5);
+    for (bad, number) in [("scan0.pcd", 0), ("scan3.pcd", 3)] {
+        let text = fs::read_to_string(a.join(bad)).unwrap();
+        let pose = format!("VIEWPOINT {number} ");
+        assert!(text.contains(&pose), "{text}");
+        fs::write(a.join(bad), text.replacen(&pose, "VIEWPOINT 1e12 ", 1)).unwrap();
+        fs::remove_file(good.join(bad)).unwrap();
+    }
+    let map = text(&map);
+    let (code, stderr) = failure(&["build", text(&a), "-o", map]);
+    assert!(code == 1 && stderr.contains("record 0: ") && !Path::new(map).exists(), "{stderr}");
+    fs::rename(a.join("scan0.pcd"), folder.path().join("scan0.pcd")).unwrap();
+    let (code, stderr) = failure(&["build", text(&a), "-o", map]);
+    assert!(code == 1 && stderr.contains("scan3.pcd") && stderr.contains("after 2 scans"), "{stderr}");
+    let (code, stderr) = failure(&["build", text(&a), "-o", map, "--resume"]);
+    assert!(code == 1 && stderr.contains("record 2: ") && stderr.contains("after 2 scans"), "{stderr}");
+    let went_on = json(&["build", text(&a), "-o", map, "--resume", "--skip-bad", "--json"]);
+    assert_eq!((&went_on["scans"], &went_on["resumed_after"]), (&1.into(), &2.into()));
+    output(&["build", text(&good), "-o", text(&whole)]);
+    assert_eq!(digest(map), digest(text(&whole)));
+    // The first one, too; and points alone need no place to begin from.
+    fs::rename(folder.path().join("scan0.pcd"), a.join("scan0.pcd")).unwrap();
+    let other = folder.path().join("other");
+    output(&["build", text(&a), "-o", text(&other), "--skip-bad"]);
+    assert_eq!(digest(text(&other)), digest(map));
+    let points = folder.path().join("points");
+    assert_eq!(json(&["build", text(&a), "-o", text(&points), "--no-rays", "--json"])["scans"], 5);
+}
+
+/// Another input may have come behind it, with other ranges.
+#[test]
+fn an_input_goes_on_as_it_was_begun() {
+    let folder = TempDir::new().unwrap();
+    let [a, b, map] = ["a", "b", "map"].map(|name| folder.path().join(name));
+    numbered(&a, 1, 0..3);
+    numbered(&b, 2, 0..2);
+    let map = text(&map);
+    let build =
+        |input: &Path, how: &[&str]| json(&[&["build", text(input), "-o", map, "--json"], how].concat());
+    build(&a, &["--max-range", "50"]);
+    assert_eq!(build(&b, &["--append", "--max-range", "1"])["hits"], 0);
+    numbered(&a, 1, 3..4);
+    let resumed = build(&a, &["--resume"]);
+    assert_eq!((&resumed["resumed_after"], &resumed["cut_at_max_range"]), (&3.into(), &0.into()));
+    assert!(resumed["hits"].as_u64() > Some(0), "{resumed}");
+    numbered(&a, 1, 4..5);
+    let (code, stderr) = failure(&["build", text(&a), "-o", map, "--resume", "--max-range", "1"]);
+    assert!(code == 2 && stderr.contains("ranges of 0 m to 50 m, not 0 m to 1 m"), "{stderr}");
+    assert_eq!(build(&a, &["--resume", "--max-range", "50"])["scans"], 1);
+    // The other one goes on with its own, by itself, too.
+    numbered(&b, 2, 2..3);
+    let resumed = build(&b, &["--resume"]);
+    assert_eq!((&resumed["resumed_after"], &resumed["hits"]), (&2.into(), &0.into()));
+}
+
+#[test]
+fn points_alone_and_rays_of_one_input_do_not_mix() {
+    for begun_alone in [true, false] {
+        let folder = TempDir::new().unwrap();
+        let [a, map] = ["a", "map"].map(|name| folder.path().join(name));
+        numbered(&a, 1, 0..2);
+        let alone = |is_alone: bool| if is_alone { &["--no-rays"][..] } else { &[] };
+        let build = ["build", text(&a), "-o", text(&map)];
+        output(&[&build[..], alone(begun_alone)].concat());
+        numbered(&a, 1, 2..3);
+        let before = digest(text(&map));
+        let (code, stderr) = failure(&[&build[..], &["--resume"], alone(!begun_alone)].concat());
+        assert!(code == 2 && stderr.contains("points alone (--no-rays)"), "{stderr}");
+        assert_eq!(digest(text(&map)), before);
+        output(&[&build[..], &["--resume"], alone(begun_alone)].concat());
+        assert_ne!(digest(text(&map)), before);
+    }
+}

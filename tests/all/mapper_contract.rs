@@ -338,3 +338,24 @@ fn keys_on_disk_are_octomaps_and_in_morton_order() {
         previous = Some(code);
     }
 }
+
+/// The lowest tile is cut at the lowest index, and the next one begins where it ends.
+#[test]
+fn points_at_the_end_of_all_indices_are_in_their_own_tiles() {
+    let config = MapConfig::new(0.1, 10.0).unwrap();
+    let lowest = f64::from(i32::MIN) * 0.1;
+    let mut points = vec![[lowest + 0.05, 5.05, 5.05], [lowest + 5.8, 5.05, 5.05]];
+    for _ in 0..2 {
+        let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
+        mapper
+            .batch_update(&PointBatch { points: &points, intensities: None, is_occupied: &[true; 2] })
+            .unwrap();
+        assert_eq!(mapper.tile_indices().len(), 2);
+        for &point in &points {
+            let voxel = mapper.voxel_at(point).unwrap().unwrap();
+            assert_eq!(voxel.evidence.observation_count, 1);
+        }
+        assert_eq!(mapper.all_occupied_voxels(None).unwrap().len(), 2);
+        points.reverse();
+    }
+}

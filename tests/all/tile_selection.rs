@@ -5,6 +5,7 @@ use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use voxtile::query::MapQueries;
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::simulation::Survey;
+use voxtile::store::InputRecord;
 use voxtile::{
     Aabb, Error, InMemoryMapper, InsertMode, MapConfig, MapOptions, MapPath, MapReader, MapView, Mapper,
     OutOfCoreTileMapper, TileBox, TileIndex, TileSelection,
@@ -160,7 +161,7 @@ fn a_map_of_a_region_knows_it_and_goes_on_with_no_other() {
     assert!(voxels_of(&found) == inside);
 
     let mut mapper = OutOfCoreTileMapper::open(path(), config.clone()).unwrap();
-    mapper.check_rays().unwrap();
+    mapper.check_rays(&InputRecord::default()).unwrap();
     // A selection counts within the region.
     let tiles = [TileIndex::new(0, 0, 0), TileIndex::new(-1, 0, 0)].into_iter().collect();
     mapper.insert_points_in(&scan, &tiles).unwrap();
@@ -170,7 +171,7 @@ fn a_map_of_a_region_knows_it_and_goes_on_with_no_other() {
     drop(mapper);
     for other in [None, Some(TileBox::new([0, -1, -1].into(), [1, 0, 1].into()))] {
         let mapper = OutOfCoreTileMapper::open(path(), config.clone().with_region(other)).unwrap();
-        let refused = mapper.check_rays().unwrap_err();
+        let refused = mapper.check_rays(&InputRecord::default()).unwrap_err();
         assert!(matches!(refused, Error::Mismatch { .. }));
         assert!(refused.to_string().contains("tiles (0, -1, -1) to (1, 0, 0)"), "{refused}");
     }

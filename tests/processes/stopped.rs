@@ -156,3 +156,43 @@ fn a_signal_to_share_ends_the_program_that_shares() {
     said.read_to_string(&mut line).unwrap();
     assert_eq!(line, "ended\n");
 }
+
+#[test]
+fn an_export_that_is_stopped_leaves_nothing_beside_the_output() {
+    let (folder, _) = folder_for_maps();
+    let (demo, out) = (folder.path().join("demo"), folder.path().join("out"));
+    let made = voxtile().args(["demo", "--length", "60", "--out"]).arg(&demo).output().unwrap();
+    assert!(made.status.success());
+    std::fs::create_dir(&out).unwrap();
+    for name in ["a.ply", "a.npz", "a.bt"] {
+        let file = out.join(name);
+        std::fs::write(&file, "as it was").unwrap();
+        let mut stopped = 0;
+        loop {
+            let mut export = voxtile();
+            export.arg("export").arg(demo.join("map_tiles")).arg("-o").arg(&file).stderr(Stdio::piped());
+            if name != "a.bt" {
+                export.args(["--what", "all"]);
+            }
+            let mut child = export.stdout(Stdio::null()).spawn().unwrap();
+            wait_until("signals are caught", || {
+                signals_are_caught(child.id()) || child.try_wait().unwrap().is_some()
+            });
+            sleep(Duration::from_millis(20 * stopped));
+            signal(&child, "INT");
+            let output = child.wait_with_output().unwrap();
+            let left: Vec<_> = std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();
+            let message = String::from_utf8_lossy(&output.stderr);
+            if output.status.success() {
+                break;
+            }
+            assert_eq!(output.status.code(), Some(130), "{message}");
+            assert!(message.contains("stopping: the output stays as it was"), "{message}");
+            assert_eq!(left, [file.clone()]);
+            assert_eq!(std::fs::read_to_string(&file).unwrap(), "as it was");
+            stopped += 1;
+        }
+        assert!(stopped > 0, "{name}: the export was faster than the signal");
+        std::fs::remove_file(&file).unwrap();
+    }
+}

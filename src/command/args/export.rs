@@ -10,7 +10,7 @@ pub struct ExportArgs {
     pub map: PathBuf,
     /// File to write; its extension says what: .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet .mcap hold
     /// voxels, .glb their surface, .pgm a flat map of nav2, .png heights, .bt .ot the whole octree. - is standard
-    /// output
+    /// output (.ply .pcd .csv .bt .ot)
     #[arg(
         short = 'o',
         long = "output",

@@ -31,6 +31,11 @@ impl OctreeFormat {
             Self::Ot => "# Octomap OcTree file",
         }
     }
+
+    /// The format of a file with a text header, by how it begins.
+    pub(crate) fn of_first_bytes(bytes: &[u8]) -> Option<Self> {
+        [Self::Bt, Self::Ot].into_iter().find(|format| bytes.starts_with(format.magic().as_bytes()))
+    }
 }
 
 /// Writes the header that OctoMap writes for an `OcTree`.
@@ -59,12 +64,9 @@ pub(super) fn read_header(input: &mut Input<impl BufRead>) -> Result<Header, Dec
     while let Some(byte) = next_header_byte(input)?.filter(|&byte| byte != b'\n') {
         first_line.push(byte);
     }
-    let format = [OctreeFormat::Bt, OctreeFormat::Ot]
-        .into_iter()
-        .find(|format| first_line.starts_with(format.magic().as_bytes()))
-        .ok_or_else(|| {
-            FormatError::at_offset(0, "the first line is not that of an OctoMap .bt or .ot file")
-        })?;
+    let format = OctreeFormat::of_first_bytes(&first_line).ok_or_else(|| {
+        FormatError::at_offset(0, "the first line is not that of an OctoMap .bt or .ot file")
+    })?;
     read_fields(input, format)
 }
 

@@ -10,11 +10,16 @@ pub(crate) struct FarRuns {
     /// The tile that the present ray is in, and its updates there.
     tile: Option<TileIndex>,
     bricks: Vec<BrickOfRay>,
+    /// How many these are; they do not count as bytes.
+    pending: usize,
     hits: u64,
     misses: u64,
     done: Vec<Done>,
     bytes: usize,
 }
+
+/// Most updates that are not packed yet: half a megabyte at most.
+const MOST_PENDING: usize = 4096;
 
 #[derive(Clone, Debug)]
 struct BrickOfRay {
@@ -27,7 +32,8 @@ type Done = (TileIndex, PackedUpdates, (u64, u64));
 
 impl FarRuns {
     pub(crate) fn new(grid: Grid) -> Self {
-        Self { grid, tile: None, bricks: Vec::new(), hits: 0, misses: 0, done: Vec::new(), bytes: 0 }
+        let (bricks, done) = Default::default();
+        Self { grid, tile: None, bricks, pending: 0, hits: 0, misses: 0, done, bytes: 0 }
     }
 
     /// A ray passes a voxel.
@@ -47,10 +53,12 @@ impl FarRuns {
 
     fn push(&mut self, voxel: VoxelIndex, run: Run) {
         let tile = self.grid.tile_of_voxel(voxel);
-        if self.tile != Some(tile) {
+        // Rays that are cut may be in one tile for as long as there are any.
+        if self.tile != Some(tile) || self.pending == MOST_PENDING {
             self.end_tile();
             self.tile = Some(tile);
         }
+        self.pending += 1;
         let index = voxel.map(|k| k.div_euclid(BRICK_EDGE));
         match self.bricks.last_mut() {
             Some(brick) if brick.index == index => brick.runs.push(run),
@@ -60,6 +68,7 @@ impl FarRuns {
 
     fn end_tile(&mut self) {
         let Some(tile) = self.tile.take() else { return };
+        self.pending = 0;
         // Stable: a voxel's runs stay in order.
         self.bricks.sort_by_key(|brick| brick_code(brick.index));
         let mut all = TileRuns::default();
@@ -85,5 +94,25 @@ impl FarRuns {
     /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_that_are_cut_in_one_tile_are_packed_on_the_way() {
+        let mut far = FarRuns::new(Grid::new(0.1, 10.0).unwrap());
+        let rays = 40 * MOST_PENDING / 100;
+        for _ in 0..rays {
+            (0..100).for_each(|x| far.pass([x, 7, 7]));
+            assert!(far.pending <= MOST_PENDING);
+        }
+        assert!(far.bytes() > 0);
+        let parts: Vec<_> = far.take().collect();
+        assert!(parts.len() > 30 && far.bytes() == 0);
+        let misses: u64 = parts.iter().map(|(_, _, (_, misses))| misses).sum();
+        assert_eq!(misses, 100 * rays as u64);
     }
 }

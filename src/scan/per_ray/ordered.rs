@@ -2,14 +2,14 @@ use crate::scan::ScanReport;
 use crate::scan::spill::ScanParts;
 use crate::scan::updates::{MappedTiles, OrderedUpdates, ScanUpdates, TileUpdates, in_order_of_tiles};
 use crate::sensor::Observation;
-use crate::space::{TileIndex, VoxelIndex};
+use crate::space::{TileIndex, VoxelBox, VoxelIndex};
 use rustc_hash::FxHashMap;
 
 /// Collects updates of voxels in the order in which they count, one list per tile.
 pub(crate) struct OrderedCollector<'a> {
     mapped: MappedTiles<'a>,
     keep_intensities: bool,
-    lists: Vec<(TileIndex, VoxelIndex, OrderedUpdates)>,
+    lists: Vec<(TileIndex, VoxelBox, OrderedUpdates)>,
     slots: FxHashMap<TileIndex, usize>,
     /// The slot of the last update: rays mostly stay in a tile.
     latest: usize,
@@ -30,13 +30,11 @@ impl<'a> OrderedCollector<'a> {
 
     pub(crate) fn push(&mut self, voxel: VoxelIndex, observation: Observation) {
         let offset_in =
-            |min: VoxelIndex| -> VoxelIndex { std::array::from_fn(|k| voxel[k].wrapping_sub(min[k])) };
-        let edge = self.mapped.grid.voxels_per_tile_edge();
-        let in_latest = |(_, min, _): &&mut (_, VoxelIndex, _)| {
-            (0..3).all(|k| min[k] <= voxel[k] && i64::from(voxel[k]) - i64::from(min[k]) < i64::from(edge))
-        };
-        if let Some((_, min, updates)) = self.lists.get_mut(self.latest).filter(in_latest) {
-            updates.push(offset_in(*min), observation, self.keep_intensities);
+            |tile: &VoxelBox| -> VoxelIndex { std::array::from_fn(|k| voxel[k].wrapping_sub(tile.min[k])) };
+        // The tiles at the end of all indices are cut.
+        let in_latest = |(_, tile, _): &&mut (_, VoxelBox, _)| tile.contains(voxel);
+        if let Some((_, tile, updates)) = self.lists.get_mut(self.latest).filter(in_latest) {
+            updates.push(offset_in(tile), observation, self.keep_intensities);
             return self.count(observation);
         }
         let tile = self.mapped.grid.tile_of_voxel(voxel);
@@ -44,12 +42,12 @@ impl<'a> OrderedCollector<'a> {
             return;
         }
         self.latest = *self.slots.entry(tile).or_insert_with(|| {
-            let min = self.mapped.grid.voxels_of_tile(tile).min;
-            self.lists.push((tile, min, OrderedUpdates::default()));
+            let voxels = self.mapped.grid.voxels_of_tile(tile);
+            self.lists.push((tile, voxels, OrderedUpdates::default()));
             self.lists.len() - 1
         });
-        let (_, min, updates) = &mut self.lists[self.latest];
-        updates.push(offset_in(*min), observation, self.keep_intensities);
+        let (_, voxels, updates) = &mut self.lists[self.latest];
+        updates.push(offset_in(voxels), observation, self.keep_intensities);
         self.count(observation);
     }
 

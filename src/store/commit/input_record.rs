@@ -1,3 +1,5 @@
+use crate::config::RayConfig;
+use crate::space::TileBox;
 use crate::store::tiles::tile_version::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
@@ -5,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) const MOST_INPUTS: usize = 1000;
 
 /// What a map was built from in one go: an input, or what came of an input since the map last took scans of it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct InputRecord {
     /// What its builder calls it. Without [`InputRecord::content`] this alone tells it from others.
     pub name: String,
@@ -14,6 +16,12 @@ pub struct InputRecord {
     /// What was taken so far of the input, from its beginning; `None` where the builder does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub content: Option<InputContent>,
+    /// What counts of its rays; `None` where the builder does not say, as for maps of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rays: Option<RayConfig>,
+    /// Whether its points were taken without rays; `None` as for `rays`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub is_hits_alone: Option<bool>,
 }
 
 /// The scans of an input that a map has taken, from the input's beginning: how many, and what tells them from others.
@@ -37,6 +45,12 @@ pub struct InputContent {
 }
 
 impl InputRecord {
+    /// The same of another region, for a map of several.
+    pub(crate) fn with_region(mut self, region: Option<TileBox>) -> Self {
+        self.rays = self.rays.map(|rays| RayConfig { region, ..rays });
+        self
+    }
+
     /// Whether all numbers are small enough to be true.
     pub(in crate::store) fn is_sound(&self) -> bool {
         let content = self.content.as_ref();

@@ -125,7 +125,7 @@ impl ReadExtension {
     fn into_extension(self) -> Extension {
         let Self { mut ext, input_fingerprint, input_first_scan: first_scan } = self;
         if let Some(name) = input_fingerprint {
-            ext.inputs.push(InputRecord { name, first_scan, content: None });
+            ext.inputs.push(InputRecord { first_scan, ..InputRecord::from(name) });
         }
         ext
     }
@@ -310,7 +310,11 @@ mod tests {
             skipped: vec![3, 7],
         };
         let ext = written.ext.as_mut().unwrap();
-        ext.inputs.push(InputRecord { name: "a \"b\"".into(), first_scan: 60, content: Some(content) });
+        ext.inputs.push(InputRecord {
+            first_scan: 60,
+            content: Some(content),
+            ..InputRecord::from("a \"b\"")
+        });
         assert_eq!(Metadata::from_text(&written.to_text()), Ok(written.clone()));
         written.ext.as_mut().unwrap().inputs[1].first_scan = u64::MAX;
         assert!(Metadata::from_text(&written.to_text()).is_err());

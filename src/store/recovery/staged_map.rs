@@ -56,7 +56,13 @@ impl<W> StagedMap<W> {
         check_is_free(&*disk, folder)?;
         let unfinished = staging_folder(folder)?;
         remove_unfinished(&*disk, &unfinished)?;
-        let writer = create(&unfinished)?;
+        let writer = create(&unfinished).inspect_err(|_| {
+            // What it has begun, unless somebody else makes that map now.
+            if remove_unfinished(&*disk, &unfinished).is_ok() {
+                let _ = disk.remove_file(&Layout::new(&unfinished).lock());
+                let _ = disk.remove_folder(&unfinished);
+            }
+        })?;
         Ok(Self { disk, folder: folder.to_owned(), writer: Some(writer) })
     }
 

@@ -194,6 +194,11 @@ fn check_from(start: &FaultyDisk, name: &str, work: Work) {
         disk.set_fault(fault);
         let returned = work(&disk).is_ok();
         let what = format!("{fault:?}");
+        if let (false, Fault::IsFull(_) | Fault::Fails(_)) = (returned, fault) {
+            let is_unfinished = |path: &PathBuf| path.to_string_lossy().contains("out.unfinished");
+            let left: Vec<_> = disk.files().into_keys().filter(is_unfinished).collect();
+            assert!(left.is_empty(), "{what}: {left:?}");
+        }
         if let (false, Fault::IsFull(_), true) = (returned, fault, is_own) {
             // What was written in vain gives its room back.
             let is_tile = |path: &PathBuf| path.to_string_lossy().contains("tile_");

@@ -185,3 +185,56 @@ fn a_damaged_tile_is_named_and_there_is_no_map() {
     assert!(matches!(&error, Error::Damaged { path, .. } if *path == table), "{error:#}");
     assert!(disk.files().keys().all(|path| path.starts_with(&maps[0]) || path.starts_with(&maps[1])));
 }
+
+/// The system is that of whichever map names one, and two that name others do not go together, whichever come first.
+#[test]
+fn a_merge_has_the_coordinate_reference_system_that_one_of_the_maps_names() {
+    let systems = [None, Some("EPSG:25832"), Some("EPSG:25833")];
+    let disk = disk();
+    for (k, crs) in systems.into_iter().enumerate() {
+        let mut random = Random(k as u64);
+        let mut config = MapConfig::new(0.1, 1.0).unwrap();
+        config.crs = crs.map(str::to_owned);
+        write_map(&disk, &path(&format!("map {k}")), &config, &random_voxels(&mut random, 20));
+    }
+    let crs_of = |maps: &[usize]| {
+        let disk = disk.copy();
+        let maps: Vec<PathBuf> = maps.iter().map(|k| path(&format!("map {k}"))).collect();
+        merge(&disk, &maps, None).map(|_| open(&disk, &path("merged")).unwrap().config().crs.clone())
+    };
+    for maps in [[0, 1], [1, 0]] {
+        assert_eq!(crs_of(&maps).unwrap().as_deref(), systems[1]);
+    }
+    for maps in [&[0, 1, 2][..], &[1, 0, 2], &[1, 2]] {
+        assert!(matches!(crs_of(maps), Err(Error::Mismatch { .. })), "{maps:?}");
+    }
+    let [one, other] = [1, 2].map(|k| open(&disk, &path(&format!("map {k}"))).unwrap());
+    let found = voxtile::operations::diff(&one, &other, |_| {}, |_, _| {});
+    assert!(matches!(found, Err(Error::Mismatch { .. })));
+}
+
+#[test]
+fn maps_without_a_common_tile_need_no_preference_whatever_their_model() {
+    let (disk, mut random) = (disk(), Random(3));
+    let grid = MapConfig::new(0.1, 1.0).unwrap();
+    let strict = LogOdds::from_probabilities(0.6, 0.45, 0.2, 0.9).unwrap();
+    let models = [SensorModel::default(), SensorModel::LogOdds(strict), SensorModel::Iwlo(Iwlo::default())];
+    let all: Vec<Voxels> = (0..3)
+        .map(|k| {
+            let voxels = random_voxels(&mut random, 20).into_iter();
+            voxels.map(|([x, y, z], evidence)| ([x + 1000 * k, y, z], evidence)).collect()
+        })
+        .collect();
+    let paths: Vec<PathBuf> = (0..3).map(|k| path(&format!("map {k}"))).collect();
+    for ((to, voxels), model) in paths.iter().zip(&all).zip(models) {
+        write_map(&disk, to, &grid.clone().with_sensor_model(model), voxels);
+    }
+    for first in 0..3 {
+        let disk = disk.copy();
+        let mut maps = paths.clone();
+        maps.rotate_left(first);
+        merge(&disk, &maps, None).unwrap();
+        let expected: Voxels = all.iter().flatten().map(|(voxel, evidence)| (*voxel, *evidence)).collect();
+        assert!(read_map(&disk, &path("merged")) == expected, "{first}");
+    }
+}

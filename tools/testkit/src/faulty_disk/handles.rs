@@ -1,0 +1,146 @@
+use super::disk::FaultyDisk;
+use super::names::{Entry, Inode};
+use super::operation::{Kind, Verdict};
+use super::state::medium_error;
+use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
+use std::path::PathBuf;
+use voxtile::store::{DiskLock, DiskRead, DiskWrite, ReaderWatch};
+
+/// A file that is read, as it was when it was opened.
+pub(super) struct Reader {
+    pub(super) disk: FaultyDisk,
+    pub(super) path: PathBuf,
+    pub(super) bytes: Vec<u8>,
+    pub(super) at: usize,
+    pub(super) shared: Option<Inode>,
+}
+
+impl Read for Reader {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut state = self.disk.state();
+        state.attempt(Kind::Reads, &self.path)?;
+        if state.unreadable.contains(&self.path) {
+            return Err(medium_error());
+        }
+        drop(state);
+        let count = (&self.bytes[self.at..]).read(buffer)?;
+        self.at += count;
+        Ok(count)
+    }
+}
+
+impl DiskRead for Reader {
+    fn file_bytes(&self) -> u64 {
+        self.bytes.len() as u64
+    }
+}
+
+impl Drop for Reader {
+    fn drop(&mut self) {
+        if let Some(inode) = self.shared {
+            self.disk.state().content(inode).readers -= 1;
+        }
+    }
+}
+
+/// A file that is written.
+pub(super) struct Writer {
+    pub(super) disk: FaultyDisk,
+    pub(super) path: PathBuf,
+    pub(super) inode: Inode,
+}
+
+impl Write for Writer {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let mut state = self.disk.state();
+        let verdict = state.operation(Kind::NeedsRoom, &self.path);
+        let content = state.content(self.inode);
+        // What is written anew is to be synced anew.
+        content.lost = false;
+        match verdict {
+            Verdict::Goes => {
+                content.seen.extend_from_slice(buffer);
+                Ok(buffer.len())
+            }
+            Verdict::Fails(error) => {
+                content.seen.extend_from_slice(&buffer[..buffer.len() / 2]);
+                Err(error)
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl DiskWrite for Writer {
+    fn sync(&mut self) -> io::Result<()> {
+        self.disk.state().sync(self.inode, &self.path)
+    }
+}
+
+/// Tells whether a file has readers.
+pub(super) struct Watch {
+    pub(super) disk: FaultyDisk,
+    pub(super) inode: Inode,
+}
+
+impl ReaderWatch for Watch {
+    fn has_readers(&self) -> bool {
+        self.disk.state().content(self.inode).readers > 0
+    }
+}
+
+/// A lock, until it is dropped.
+pub(super) struct Locked {
+    pub(super) disk: FaultyDisk,
+    pub(super) inode: Inode,
+    pub(super) path: PathBuf,
+}
+
+impl DiskLock for Locked {
+    fn is_in_place(&self) -> io::Result<bool> {
+        let mut state = self.disk.state();
+        state.attempt(Kind::Reads, &self.path)?;
+        // An unfinished map that has got its name has taken the file along.
+        Ok(state.names.get(&self.path) == Some(&Entry::File(self.inode)))
+    }
+}
+
+impl Drop for Locked {
+    fn drop(&mut self) {
+        self.disk.state().content(self.inode).locked = false;
+    }
+}
+
+/// A file without a name: no crash leaves anything of it.
+pub(super) struct ScratchFile {
+    pub(super) disk: FaultyDisk,
+    pub(super) folder: PathBuf,
+    pub(super) content: Cursor<Vec<u8>>,
+}
+
+impl Read for ScratchFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.disk.state().attempt(Kind::Reads, &self.folder)?;
+        self.content.read(buffer)
+    }
+}
+
+impl Write for ScratchFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.disk.state().attempt(Kind::NeedsRoom, &self.folder)?;
+        self.content.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for ScratchFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.content.seek(to)
+    }
+}

@@ -1,0 +1,78 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The number of a file, whatever its names.
+pub(super) type Inode = usize;
+
+/// What has a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Entry {
+    Folder,
+    File(Inode),
+}
+
+/// All files and folders.
+pub(super) type Names = BTreeMap<PathBuf, Entry>;
+
+/// A change of names, on its way to the medium.
+#[derive(Clone, Debug)]
+pub(super) enum NameChange {
+    Put(PathBuf, Entry),
+    Remove(PathBuf),
+    /// And with it the files that were in it on the medium or on the way there: another folder may get its name.
+    RemoveFolder(PathBuf, Vec<Inode>),
+    Rename(PathBuf, PathBuf),
+}
+
+impl NameChange {
+    /// A folder around the names has got another name.
+    pub(super) fn follow(&mut self, from: &Path, to: &Path) {
+        let follow = |name: &mut PathBuf| {
+            if let Ok(rest) = name.strip_prefix(from)
+                && rest != Path::new("")
+            {
+                *name = to.join(rest);
+            }
+        };
+        match self {
+            Self::Put(name, _) | Self::Remove(name) | Self::RemoveFolder(name, _) => follow(name),
+            Self::Rename(old, new) => {
+                follow(old);
+                follow(new);
+            }
+        }
+    }
+
+    /// Makes the change.
+    pub(super) fn apply(&self, names: &mut Names) {
+        match self {
+            Self::Put(path, entry) => {
+                names.insert(path.clone(), *entry);
+            }
+            Self::Remove(path) => {
+                names.remove(path);
+            }
+            Self::RemoveFolder(path, gone) => {
+                names.remove(path);
+                names.retain(|name, entry| !is_one_of(name, entry, path, gone));
+            }
+            Self::Rename(from, to) => {
+                let moved: Vec<_> = names.keys().filter(|path| path.starts_with(from)).cloned().collect();
+                for path in moved {
+                    let entry = names.remove(&path).expect("a name from the list");
+                    let rest = path.strip_prefix(from).expect("a name below");
+                    names.insert(if rest.as_os_str().is_empty() { to.clone() } else { to.join(rest) }, entry);
+                }
+            }
+        }
+    }
+
+    /// Whether it puts one of these files below a folder.
+    pub(super) fn puts_one_of(&self, folder: &Path, files: &[Inode]) -> bool {
+        matches!(self, Self::Put(name, entry) if is_one_of(name, entry, folder, files))
+    }
+}
+
+fn is_one_of(name: &Path, entry: &Entry, folder: &Path, files: &[Inode]) -> bool {
+    name.starts_with(folder) && matches!(entry, Entry::File(inode) if files.contains(inode))
+}

@@ -1,0 +1,137 @@
+use super::content::Content;
+use super::fault::Fault;
+use super::names::{Entry, Inode, NameChange, Names};
+use super::operation::{Kind, Verdict};
+use std::collections::{BTreeSet, HashMap};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What is on the disk, and what it does next.
+#[derive(Debug)]
+pub(super) struct State {
+    pub(super) contents: HashMap<Inode, Content>,
+    pub(super) names: Names,
+    pub(super) names_on_medium: Names,
+    pub(super) unsynced_names: Vec<NameChange>,
+    pub(super) next_inode: Inode,
+    pub(super) fault: Fault,
+    /// Whether that was one that stays.
+    pub(super) stays: bool,
+    pub(super) operations: u64,
+    pub(super) changes: u64,
+    pub(super) has_room: bool,
+    pub(super) has_links: bool,
+    pub(super) crashed: bool,
+    /// Files and folders that every operation fails on.
+    pub(super) broken: BTreeSet<PathBuf>,
+    /// Files whose content cannot be read.
+    pub(super) unreadable: BTreeSet<PathBuf>,
+}
+
+impl State {
+    pub(super) fn new_inode(&mut self) -> Inode {
+        self.next_inode += 1;
+        self.next_inode - 1
+    }
+
+    pub(super) fn operation(&mut self, kind: Kind, path: &Path) -> Verdict {
+        let number = self.operations;
+        let change = self.changes;
+        self.operations += 1;
+        self.changes += u64::from(kind != Kind::Reads);
+        let error = |kind: io::ErrorKind| Verdict::Fails(kind.into());
+        match self.fault {
+            _ if self.crashed => Verdict::Fails(io::Error::other("the power is off, or the process dead")),
+            Fault::Crashes(at) if change == at && kind != Kind::Reads => {
+                self.crashed = true;
+                Verdict::Fails(io::Error::other("the power is off"))
+            }
+            _ if self.broken.contains(path) => Verdict::Fails(medium_error()),
+            Fault::Breaks(at) if number == at => {
+                self.broken.insert(path.to_owned());
+                Verdict::Fails(medium_error())
+            }
+            Fault::Fails(at) if number == at => Verdict::Fails(io::Error::other("input/output error")),
+            Fault::LosesSync(at) if change == at && kind != Kind::Reads => {
+                Verdict::Fails(io::Error::other("input/output error"))
+            }
+            Fault::LosesSyncAndDies(at) if change == at && kind != Kind::Reads => {
+                self.crashed = true;
+                Verdict::Fails(io::Error::other("input/output error"))
+            }
+            Fault::IsFull(at) if change >= at && kind == Kind::NeedsRoom => {
+                self.has_room = false;
+                error(io::ErrorKind::StorageFull)
+            }
+            Fault::IsReadOnly(at) if change >= at && kind != Kind::Reads => {
+                self.has_room = false;
+                error(io::ErrorKind::ReadOnlyFilesystem)
+            }
+            _ => Verdict::Goes,
+        }
+    }
+
+    pub(super) fn attempt(&mut self, kind: Kind, path: &Path) -> io::Result<()> {
+        match self.operation(kind, path) {
+            Verdict::Goes => Ok(()),
+            Verdict::Fails(error) => Err(error),
+        }
+    }
+
+    pub(super) fn file(&self, path: &Path) -> io::Result<Inode> {
+        match self.names.get(path) {
+            Some(Entry::File(inode)) => Ok(*inode),
+            Some(Entry::Folder) => Err(io::ErrorKind::InvalidInput.into()),
+            None => Err(io::ErrorKind::NotFound.into()),
+        }
+    }
+
+    pub(super) fn content(&mut self, inode: Inode) -> &mut Content {
+        self.contents.get_mut(&inode).expect("contents outlive their names")
+    }
+
+    pub(super) fn change_name(&mut self, change: NameChange) {
+        change.apply(&mut self.names);
+        self.unsynced_names.push(change);
+    }
+
+    /// The file, made if missing.
+    pub(super) fn file_or_new(&mut self, path: &Path) -> io::Result<Inode> {
+        match self.file(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let folder = path.parent().and_then(|folder| self.names.get(folder));
+                if folder != Some(&Entry::Folder) {
+                    return Err(io::ErrorKind::NotFound.into());
+                }
+                let inode = self.new_inode();
+                self.contents.insert(inode, Content::default());
+                self.change_name(NameChange::Put(path.to_owned(), Entry::File(inode)));
+                Ok(inode)
+            }
+            found => found,
+        }
+    }
+
+    pub(super) fn sync(&mut self, inode: Inode, path: &Path) -> io::Result<()> {
+        let loses =
+            matches!(self.fault, Fault::LosesSync(at) | Fault::LosesSyncAndDies(at) if at == self.changes);
+        match self.operation(Kind::Changes, path) {
+            Verdict::Goes => {
+                let content = self.content(inode);
+                if !content.lost {
+                    content.on_medium = content.seen.clone();
+                }
+                Ok(())
+            }
+            Verdict::Fails(error) => {
+                self.content(inode).lost |= loses;
+                Err(error)
+            }
+        }
+    }
+}
+
+/// EIO.
+pub(super) fn medium_error() -> io::Error {
+    io::Error::from_raw_os_error(5)
+}
