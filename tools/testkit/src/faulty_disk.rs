@@ -116,6 +116,8 @@ struct State {
     broken: BTreeSet<PathBuf>,
     /// Files whose content cannot be read.
     unreadable: BTreeSet<PathBuf>,
+    /// How often each file was opened to be read from its beginning.
+    opened: BTreeMap<PathBuf, u64>,
 }
 
 impl FaultyDisk {
@@ -142,6 +144,7 @@ impl FaultyDisk {
             crashed: false,
             broken: BTreeSet::new(),
             unreadable: BTreeSet::new(),
+            opened: BTreeMap::new(),
         };
         Self { state: Arc::new(Mutex::new(state)) }
     }
@@ -159,6 +162,11 @@ impl FaultyDisk {
     /// Number of operations so far that change something.
     pub fn changes(&self) -> u64 {
         self.state().changes
+    }
+
+    /// How often a file was opened to be read from its beginning.
+    pub fn times_opened(&self, path: &Path) -> u64 {
+        self.state().opened.get(path).copied().unwrap_or_default()
     }
 
     /// Whether the power has gone.
@@ -612,13 +620,26 @@ impl Seek for ScratchFile {
     }
 }
 
-impl Disk for FaultyDisk {
-    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+impl FaultyDisk {
+    fn open_file(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         let mut state = self.state();
         state.attempt(Kind::Reads, path)?;
         let inode = state.file(path)?;
         let bytes = state.content(inode).seen.clone();
         Ok(Box::new(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: None }))
+    }
+}
+
+impl Disk for FaultyDisk {
+    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        *self.state().opened.entry(path.to_owned()).or_default() += 1;
+        self.open_file(path)
+    }
+
+    fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        let mut input = self.open_file(path)?;
+        io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
+        Ok(input)
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
