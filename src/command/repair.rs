@@ -52,6 +52,13 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
                 (HumanCount(repair.snapshots_lost), HumanCount(repair.snapshot_tiles_lost));
             writeln!(out, "snapshots: {snapshots} could not stay; others lost {tiles} tiles")?;
         }
+        if repair.inputs_forgotten > 0 {
+            let inputs = HumanCount(repair.inputs_forgotten);
+            writeln!(
+                out,
+                "inputs: {inputs} forgotten; nothing tells how many of their scans are in the map"
+            )?;
+        }
         if repair.left > 0 {
             let left = HumanCount(repair.left);
             writeln!(

@@ -11,6 +11,7 @@ use crate::store::{
 };
 use crate::tile::format::{Trailer, read_compact_front, read_trailer};
 use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A map's index, put together again.
@@ -18,12 +19,23 @@ pub(super) struct Index {
     pub map_id: [u8; 16],
     pub metadata: Metadata,
     pub commits: Commits,
-    /// Tiles whose table is whole only under the name that waits for a commit.
-    pub waiting: Vec<TileIndex>,
+    /// Tiles whose table is the one under the name that waits for a commit, and what it takes the place of.
+    pub waiting: BTreeMap<TileIndex, Replaced>,
     /// Tiles whose table cannot be used.
     pub damaged: Vec<(TileIndex, Error)>,
     /// Whether the tiles may be of different flushes, because no log says what belongs together.
     pub is_from_tiles: bool,
+    /// How many inputs the map no longer knows, because nothing tells whether all their scans are in its tiles.
+    pub inputs_forgotten: u64,
+}
+
+/// The table in place of which another one waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Replaced {
+    /// Whole, and of an earlier flush.
+    Older,
+    /// Damaged or missing.
+    Unusable,
 }
 
 /// Puts the index together. `None` for a map of the original format, which has none.
@@ -37,11 +49,12 @@ pub(super) fn index_of(
     remains: &Salvage,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Option<Index>> {
-    if let Some((map_id, mut metadata)) = told_by_log(remains) {
+    if let Some((map_id, mut metadata)) = told_by_log(disk, layout, remains)? {
         forget_scan_records(&mut metadata);
         let commits = remains.commits.clone();
-        let (waiting, damaged) = Default::default();
-        return Ok(Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles: false }));
+        let (waiting, damaged, is_from_tiles, inputs_forgotten) = Default::default();
+        let index = Index { map_id, metadata, commits, waiting, damaged, is_from_tiles, inputs_forgotten };
+        return Ok(Some(index));
     }
     if let Ok(metadata) = &remains.metadata
         && metadata.ext.is_none()
@@ -59,17 +72,40 @@ fn forget_scan_records(metadata: &mut Metadata) {
 }
 
 /// Id and metadata of a log that leads to the last flush.
-fn told_by_log(remains: &Salvage) -> Option<([u8; 16], Metadata)> {
-    let map_id = remains.log_map_id?;
-    let logged = remains.commits.metadata.clone().filter(|metadata| metadata.ext.is_some())?;
-    let is_last = match &remains.metadata {
-        Ok(Metadata { ext: Some(ext), .. }) => {
-            ext.map_id == hex(&map_id) && ext.flush_number <= remains.commits.flush_number
-        }
-        // What is torn off may be a flush that never happened, or one that did.
-        _ => remains.commits.torn.is_none(),
+fn told_by_log(disk: &dyn Disk, layout: &Layout, remains: &Salvage) -> Result<Option<([u8; 16], Metadata)>> {
+    let (Some(map_id), Some(logged)) = (remains.log_map_id, &remains.commits.metadata) else {
+        return Ok(None);
     };
-    is_last.then_some((map_id, logged))
+    let Some(logged_id) = id_of(logged) else { return Ok(None) };
+    // What is torn off may be a flush that never happened, or one that did.
+    let is_whole = remains.commits.torn.is_none();
+    let is_last = match &remains.metadata {
+        Ok(Metadata { ext: Some(ext), .. }) if ext.map_id == hex(&map_id) => {
+            ext.flush_number <= remains.commits.flush_number
+        }
+        // One of the two files is of another map. The tiles tell which.
+        Ok(Metadata { ext: Some(_), .. }) => {
+            is_whole && logged_id == map_id && {
+                let trailers = Trailers::of(disk, layout, &tiles_of(disk, layout)?);
+                trailers.most().is_some_and(|trailer| trailer.map_id == map_id)
+            }
+        }
+        _ => is_whole,
+    };
+    Ok(is_last.then(|| (map_id, logged.clone())))
+}
+
+/// The id in some metadata; `None` in that of the original format.
+fn id_of(metadata: &Metadata) -> Option<[u8; 16]> {
+    id_from_hex(&metadata.ext.as_ref()?.map_id)
+}
+
+/// The tiles that have a folder, in order.
+fn tiles_of(disk: &dyn Disk, layout: &Layout) -> Result<Vec<TileIndex>> {
+    let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
+    let mut tiles: Vec<_> = names.iter().filter_map(|name| tile_of_folder(name)).collect();
+    tiles.sort_unstable();
+    Ok(tiles)
 }
 
 fn index_from_tiles(
@@ -78,35 +114,42 @@ fn index_from_tiles(
     remains: &Salvage,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Index> {
-    let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
-    let mut tiles: Vec<_> = names.iter().filter_map(|name| tile_of_folder(name)).collect();
-    tiles.sort_unstable();
-    let trailers = Trailers::of(disk, layout, &tiles)?;
-    let written = remains.metadata.as_ref().ok();
+    let tiles = tiles_of(disk, layout)?;
+    let trailers = Trailers::of(disk, layout, &tiles);
     let (map_id, mut metadata) = identity(layout, remains, &trailers)?;
     forget_scan_records(&mut metadata);
     let config = crate::persistence::config_from(&metadata, &layout.metadata())?;
+    // What the files of another map count is nothing to this one.
+    let written = remains.metadata.as_ref().ok().filter(|metadata| id_of(metadata) == Some(map_id));
+    let logged_id = remains.log_map_id.or_else(|| id_of(remains.commits.metadata.as_ref()?));
+    let logged = Some(&remains.commits).filter(|_| logged_id.is_none_or(|id| id == map_id));
+    let (logged_flush, logged_scan) =
+        logged.map_or((0, 0), |commits| (commits.flush_number, commits.scan_number));
     let known_scan = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.scan_number);
     let written_flush = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.flush_number);
     let known_flush = last_known_flush(disk, layout, map_id, &tiles);
+    // A tile of an earlier flush looks like one that the last scans did not touch. So nothing tells how many scans of
+    // an input are in the tiles, and it cannot be gone on with.
+    let inputs = metadata.ext.as_mut().map(|ext| std::mem::take(&mut ext.inputs)).unwrap_or_default();
     let mut index = Index {
         map_id,
         metadata,
         commits: Commits {
-            flush_number: known_flush.max(written_flush.unwrap_or(0)).max(remains.commits.flush_number) + 1,
-            scan_number: known_scan.unwrap_or(0).max(remains.commits.scan_number),
+            flush_number: known_flush.max(written_flush.unwrap_or(0)).max(logged_flush) + 1,
+            scan_number: known_scan.unwrap_or(0).max(logged_scan),
             ..Commits::default()
         },
-        waiting: Vec::new(),
+        waiting: BTreeMap::new(),
         damaged: Vec::new(),
         is_from_tiles: true,
+        inputs_forgotten: inputs.len() as u64,
     };
     index.join_snapshots(disk, layout, written);
     for (done, &tile) in (1..).zip(&tiles) {
         index.add(disk, layout, &config, tile, known_scan)?;
         progress(done, tiles.len() as u64);
     }
-    let files = [written, remains.commits.metadata.as_ref()];
+    let files = [written, logged.and_then(|commits| commits.metadata.as_ref())];
     if files.into_iter().flatten().all(|metadata| metadata.ext.is_none())
         && let Some(ext) = &mut index.metadata.ext
     {
@@ -143,10 +186,17 @@ impl Index {
         let read = |file: &Path| read_alone(disk, file, layout.storage(), &config.grid, self.map_id, tile);
         let (current, next) = (layout.current(tile, TileFile::Table), layout.next(tile, TileFile::Table));
         let table = match (read(&current)?, read(&next)?) {
+            // Written before the last flush that is known of, so it was part of it, and was to take the place of the
+            // other.
+            (Some(Ok(table)), Some(Ok(next)))
+                if scan_number_of(&table) < scan_number_of(&next) && scan_number_of(&next) <= known_scan =>
+            {
+                self.waiting.insert(tile, Replaced::Older);
+                next
+            }
             (Some(Ok(table)), _) => table,
-            // Written before the last flush that is known of, so it was part of it.
             (_, Some(Ok(table))) if scan_number_of(&table) <= known_scan => {
-                self.waiting.push(tile);
+                self.waiting.insert(tile, Replaced::Unusable);
                 table
             }
             (Some(Err(error)), _) => {
@@ -167,12 +217,6 @@ impl Index {
             }
         };
         let version = version_of(&table, config);
-        if known_scan.is_none_or(|known| version.scan_number > known) {
-            // Nothing tells how many scans the tiles have in common: an input cannot be gone on with.
-            if let Some(ext) = &mut self.metadata.ext {
-                ext.inputs.clear();
-            }
-        }
         self.commits.scan_number = self.commits.scan_number.max(version.scan_number);
         self.commits.tiles.insert(tile, version);
         Ok(())
@@ -235,21 +279,28 @@ struct Trailers {
 }
 
 impl Trailers {
-    fn of(disk: &dyn Disk, layout: &Layout, tiles: &[TileIndex]) -> Result<Self> {
+    fn of(disk: &dyn Disk, layout: &Layout, tiles: &[TileIndex]) -> Self {
         let mut by_map: FxHashMap<_, (Trailer, u64)> = FxHashMap::default();
-        for &tile in tiles {
-            let path = layout.current(tile, TileFile::Table);
-            let Ok(mut input) = disk.open(&path) else { continue };
+        let read = |path: &Path| {
+            let mut input = disk.open(path).ok()?;
             let bytes = input.file_bytes();
-            let trailer = match layout.storage() {
-                Storage::OctoMap => read_trailer(&mut input, bytes),
-                Storage::Compact => read_compact_front(&mut input, bytes).map(Some),
-            };
-            if let Ok(Some(trailer)) = trailer {
+            match layout.storage() {
+                Storage::OctoMap => read_trailer(&mut input, bytes).ok()?,
+                Storage::Compact => read_compact_front(&mut input, bytes).ok(),
+            }
+        };
+        for &tile in tiles {
+            let paths = [layout.current(tile, TileFile::Table), layout.next(tile, TileFile::Table)];
+            if let Some(trailer) = paths.iter().find_map(|path| read(path)) {
                 by_map.entry(trailer.map_id).or_insert((trailer, 0)).1 += 1;
             }
         }
-        Ok(Self { by_map })
+        Self { by_map }
+    }
+
+    /// Whether no tile is of a map, and some are of others.
+    fn are_of_others(&self, map_id: [u8; 16]) -> bool {
+        !self.by_map.is_empty() && !self.by_map.contains_key(&map_id)
     }
 
     /// The map that most tiles belong to.
@@ -263,15 +314,17 @@ impl Trailers {
 fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<([u8; 16], Metadata)> {
     let written = remains.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
     let logged = remains.commits.metadata.as_ref().filter(|metadata| metadata.ext.is_some());
-    let id_of = |metadata: &Metadata| metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id));
     let of_tiles = trailers.most();
     // Where the two files contradict each other, the tiles decide.
     let candidates =
         [written, logged].into_iter().flatten().filter_map(|metadata| Some((id_of(metadata)?, metadata)));
     let mut candidates: Vec<_> = candidates.collect();
     candidates.sort_by_key(|(id, _)| of_tiles.is_some_and(|trailer| trailer.map_id != *id));
-    if let Some((id, metadata)) = candidates.first() {
-        return Ok((*id, (*metadata).clone()));
+    match &candidates[..] {
+        // A single file that no tile belongs to is that of another map.
+        [(id, _)] if trailers.are_of_others(*id) => {}
+        [(id, metadata), ..] => return Ok((*id, (*metadata).clone())),
+        [] => {}
     }
     let Some(trailer) = of_tiles else {
         let reason = "neither metadata.json nor commits.log nor a tile with a trailer tells what the map is; \

@@ -1,6 +1,6 @@
 use super::finding::Finding;
 use super::kept_scans::whole_entries;
-use super::rebuild::{self, Index};
+use super::rebuild::{self, Index, Replaced};
 use super::tile_check::{check_tile, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
@@ -8,10 +8,12 @@ use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, Layout, MapPath, Quarantine, Salvage, TileFile, TileStore, WriterLock, check_scans, hex,
+    Commits, Disk, EntryKind, Layout, MapPath, Quarantine, Salvage, Snapshot, TileFile, TileStore,
+    WriterLock, check_scans, hex,
 };
 use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,7 +45,7 @@ pub enum ActionKind {
     /// Removed, because the log proves that it was never committed or has been replaced.
     Removed,
     /// No longer named by the log, because its files are missing; or by a snapshot, because they are missing or
-    /// damaged.
+    /// damaged. Of `metadata.json`: the inputs.
     Forgotten,
     /// Nothing: the medium refused.
     Left,
@@ -63,6 +65,8 @@ pub struct Repair {
     pub scans_lost: u64,
     /// Tiles that are no longer part of the map: their space is unknown again.
     pub tiles_lost: u64,
+    /// Inputs that the map no longer knows, because nothing tells whether all their scans are in its tiles.
+    pub inputs_forgotten: u64,
     /// Damage that is still there, because the medium refused.
     pub left: u64,
     /// Number of things done; 0 if the map was whole.
@@ -72,7 +76,8 @@ pub struct Repair {
 impl Repair {
     /// Whether all that the map and its snapshots held is there, and nothing is damaged any more.
     pub fn is_complete(&self) -> bool {
-        self.tiles_lost + self.scans_lost + self.snapshot_tiles_lost + self.snapshots_lost + self.left == 0
+        let lost = self.tiles_lost + self.scans_lost + self.snapshot_tiles_lost + self.snapshots_lost;
+        lost + self.inputs_forgotten + self.left == 0
     }
 }
 
@@ -225,7 +230,9 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         let remains = Salvage::read(self.disk, &self.layout)?;
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
-        let Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles }) = index else {
+        let Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles, inputs_forgotten }) =
+            index
+        else {
             // Of the original format, but with a log that cannot be read: the log is no part of it.
             return self.quarantine(&self.layout.commit_log(), "metadata.json is of the original format");
         };
@@ -234,7 +241,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             self.counts.tiles_lost += 1;
         }
         if is_from_tiles {
-            self.settle_waiting(&commits.tiles.tiles().collect::<Vec<_>>(), &waiting)?;
+            self.settle_waiting(&commits, &waiting)?;
         }
         let paths = [self.layout.commit_log(), self.layout.metadata()];
         if is_from_tiles {
@@ -261,27 +268,48 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             &paths[1],
             format!("and commits.log, with {tiles} tiles, from {source}"),
         );
+        if inputs_forgotten > 0 {
+            self.counts.inputs_forgotten += inputs_forgotten;
+            let reason = format!(
+                "what the map was built from ({inputs_forgotten} inputs): nothing tells whether all their scans are in \
+                 the tiles"
+            );
+            self.note(ActionKind::Forgotten, &paths[1], reason);
+        }
         Ok(())
     }
 
     /// Without a log nothing proves that a `*.next` was never committed: those that are no part of the map now are kept
     /// in quarantine.
-    fn settle_waiting(&mut self, tiles: &[TileIndex], waiting: &[TileIndex]) -> Result<()> {
-        let mut tiles = tiles.to_vec();
+    fn settle_waiting(&mut self, commits: &Commits, waiting: &BTreeMap<TileIndex, Replaced>) -> Result<()> {
+        let mut tiles: Vec<_> = commits.tiles.tiles().collect();
         tiles.sort_unstable();
+        // What they see is known once the map opens again.
+        let has_snapshots = Snapshot::list(self.disk, &self.layout).is_ok_and(|names| !names.is_empty());
         for tile in tiles {
-            let is_waiting = waiting.contains(&tile);
+            let kept = self.layout.kept(tile, commits.flush_number.saturating_sub(1));
             for &file in self.layout.files() {
                 let (next, current) = (self.layout.next(tile, file), self.layout.current(tile, file));
                 if self.kind(&next)?.is_none() {
                     continue;
                 }
-                if !is_waiting {
+                let Some(replaced) = waiting.get(&tile) else {
                     self.quarantine(&next, "nothing tells whether it was committed")?;
                     continue;
-                }
-                if self.kind(&current)?.is_some() {
-                    self.quarantine(&current, "damaged; the version that waited for its name is whole")?;
+                };
+                let why = match replaced {
+                    Replaced::Older => "of an earlier flush than the version that waited for its name",
+                    Replaced::Unusable => "damaged; the version that waited for its name is whole",
+                };
+                let is_seen = has_snapshots && file == TileFile::Table && *replaced == Replaced::Older;
+                if is_seen && self.kind(&kept)?.is_none() {
+                    // As the flush would have kept it, had it got that far.
+                    self.quarantine_copy(&current, why)?;
+                    self.disk
+                        .rename(&current, &kept)
+                        .map_err(|error| Error::io(&current, "rename", error))?;
+                } else if self.kind(&current)?.is_some() {
+                    self.quarantine(&current, why)?;
                 }
                 self.disk.rename(&next, &current).map_err(|error| Error::io(&next, "rename", error))?;
                 self.note(ActionKind::Renamed, &next, "whole, and of the last flush or one before");

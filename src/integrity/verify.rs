@@ -8,8 +8,8 @@ use crate::error::{Error, FormatError, Result};
 use crate::persistence::config_from;
 use crate::space::TileIndex;
 use crate::store::{
-    Disk, EntryKind, KEPT_SCANS, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage,
-    SnapshotList, SnapshotName, TileFile, TileStore, TileVersion, check_scans, read_log, tile_of_folder,
+    Commits, Disk, EntryKind, KEPT_SCANS, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage,
+    SnapshotList, SnapshotName, TileFile, TileStore, check_scans, read_log, tile_of_folder,
 };
 use rustc_hash::FxHashSet;
 use serde::Serialize;
@@ -50,7 +50,8 @@ impl Verification {
 
 /// Checks every file of a map, beside a writer too. Takes no lock and writes nothing.
 ///
-/// `found` is told each finding, `progress` the tiles done and all. Memory: the list of tiles, and one tile.
+/// `found` is told each finding, `progress` the tiles done and all. Memory: the list of tiles, where there is damage a
+/// second one, and one tile.
 ///
 /// # Errors
 ///
@@ -113,6 +114,7 @@ pub fn verify_scope(
         progress,
         counts: Verification::default(),
         told: BTreeSet::new(),
+        now: None,
     };
     let store = match TileStore::open_read_only(disk.clone(), folder) {
         Ok(store) => Some(store),
@@ -148,7 +150,16 @@ struct Verifier<'a, F, P> {
     listed: Option<SnapshotList>,
     /// Tiles that are no longer in the list of tiles because they are damaged, which has been told.
     told: BTreeSet<TileIndex>,
+    /// What the log said when it was last read beside the store, if it could be, and how it ended then.
+    now: Option<(LogEnd, Option<Commits>)>,
 }
+
+/// Length of a log, and its last bytes. The checksum of the last record is among them, so that no two states of a log
+/// have the same.
+type LogEnd = (u64, Vec<u8>);
+
+/// How many bytes of its end tell that a log is the same.
+const LOG_END_BYTES: usize = 64;
 
 impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     fn report(&mut self, finding: Finding) {
@@ -242,8 +253,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     /// Whether a writer has flushed a tile since the store was opened. It keeps tables for readers, not octrees; and a
     /// writer that was started since has not seen this reader.
-    fn has_changed_since(&self, store: &TileStore, tile: TileIndex) -> bool {
-        let now = self.version_now(tile);
+    fn has_changed_since(&mut self, store: &TileStore, tile: TileIndex) -> bool {
+        let now = self.commits_now().and_then(|now| now.tiles.get(tile));
         now.is_some() && now != store.version(tile)
     }
 
@@ -312,8 +323,14 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     }
 
     fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
-        if self.kind(folder)? != Some(EntryKind::Folder) {
-            return Ok(()); // Told already.
+        match self.kind(folder)? {
+            Some(EntryKind::Folder) => {}
+            // If the log lists snapshots, or lists nothing at all, that has been told.
+            Some(_) if self.listed.as_ref().is_some_and(SnapshotList::is_empty) => {
+                self.damage(folder, None, "something else has the name of the folder of snapshots");
+                return Ok(());
+            }
+            _ => return Ok(()),
         }
         for name in self.list(folder)? {
             let path = folder.join(&name);
@@ -398,21 +415,35 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             return Ok(());
         }
         // A writer may have added it, or begun to remove it, since the log was read.
-        let now = read_log(self.disk, &self.layout).ok().flatten().map(|(_, commits)| commits);
-        if now.as_ref().is_some_and(|now| now.last_removed.contains(&tile)) {
+        let now = self.commits_now();
+        let is_named = now.is_some_and(|now| now.tiles.contains(tile));
+        if now.is_some_and(|now| now.last_removed.contains(&tile)) {
             let reason = "taken out of the map; its files go when the map is next opened for writing";
             self.report(Finding::note(folder, Some(tile), reason));
-        } else if now.is_none_or(|now| !now.tiles.contains(tile)) {
+        } else if !is_named {
             let path = self.layout.current(tile, TileFile::Table);
             self.damage(&path, Some(tile), "commits.log does not name this tile");
         }
         Ok(())
     }
 
-    /// What the log says of a tile now.
-    fn version_now(&self, tile: TileIndex) -> Option<TileVersion> {
-        let (_, commits) = read_log(self.disk, &self.layout).ok()??;
-        commits.tiles.get(tile)
+    /// What the log says now. It is read again only once it has changed: a map of many tiles may miss many.
+    fn commits_now(&mut self) -> Option<&Commits> {
+        let end = self.log_end()?;
+        if self.now.as_ref().is_none_or(|(of, _)| *of != end) {
+            // The end was looked at before, so what a writer appends meanwhile is seen as a change the next time.
+            let commits = read_log(self.disk, &self.layout).ok().flatten().map(|(_, commits)| commits);
+            self.now = Some((end, commits));
+        }
+        self.now.as_ref()?.1.as_ref()
+    }
+
+    /// How the log ends now; `None` if there is none or nobody can tell.
+    fn log_end(&self) -> Option<LogEnd> {
+        let path = self.layout.commit_log();
+        let Ok(Some(EntryKind::File(bytes))) = self.disk.kind(&path) else { return None };
+        let offset = bytes.saturating_sub(LOG_END_BYTES as u64);
+        Some((bytes, self.disk.read_at(&path, offset, LOG_END_BYTES).ok()?))
     }
 
     /// What has a name; nothing, and a finding, where the medium does not tell.

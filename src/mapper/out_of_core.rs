@@ -102,13 +102,15 @@ impl OutOfCoreTileMapper {
     }
 
     /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
-    /// from here. Flushes, so that [`OutOfCoreTileMapper::resume_input`] knows it from now on.
+    /// from here. Flushes, so that [`OutOfCoreTileMapper::resume_input`] knows it from now on. Of its name a map keeps
+    /// 255 bytes.
     ///
     /// # Errors
     ///
     /// As for [`Mapper::flush`].
     pub fn begin_input(&mut self, input: impl Into<InputRecord>) -> Result<()> {
-        let input = InputRecord { first_scan: self.scan_number(), ..input.into() };
+        let mut input = InputRecord { first_scan: self.scan_number(), ..input.into() };
+        input.cut_name();
         self.pager().begin_input(input)
     }
 
@@ -123,7 +125,7 @@ impl OutOfCoreTileMapper {
         let scan_number = self.scan_number();
         let last = self.pager().inputs().last().cloned();
         let found = match last {
-            Some(input) if input.content.is_none() && input.name == name => {
+            Some(input) if input.content.is_none() && input.is_named(name) => {
                 let done = scan_number - input.first_scan.min(scan_number);
                 self.check_rays(&input)?;
                 return Ok(done);

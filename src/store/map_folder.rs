@@ -68,6 +68,15 @@ pub(super) fn replace<T>(
     replaced().map_err(|error| Error::io(path, "replace", error))
 }
 
+/// Removes the folder of a tile that is no part of the map. It stays if somebody else's files are in it, perhaps under
+/// names that no list shows; what was taken out of it is durable then.
+pub(super) fn remove_unless_used(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
+    match disk.remove_folder(folder) {
+        Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => disk.sync_folder(folder),
+        removed => removed,
+    }
+}
+
 /// Writes a text to a file, synced.
 pub(super) fn write_text(disk: &dyn Disk, path: &Path, text: &str) -> io::Result<()> {
     let mut out = disk.create(path)?;
@@ -97,8 +106,8 @@ pub(super) fn read_metadata_shared(
 }
 
 fn metadata_from(input: &mut dyn DiskRead, path: &Path) -> Result<Metadata> {
-    // Ours has a few hundred bytes.
-    const LIMIT: u64 = 1 << 20;
+    // Ours has less than a mebibyte. Earlier versions wrote more for many inputs with long names.
+    const LIMIT: u64 = 64 << 20;
     if input.file_bytes() > LIMIT {
         return Err(FormatError::at_offset(LIMIT, "too long for a map's metadata").in_map(path, None));
     }

@@ -5,7 +5,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::{Finding, Repair, Severity, Verification, verify};
 use voxtile::space::TileIndex;
-use voxtile::store::{TileFile, tile_of_folder};
+use voxtile::store::{TileFile, TileStore, tile_of_folder};
 use voxtile::{Error, MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 type Digests = BTreeMap<TileIndex, Vec<(u64, i32)>>;
@@ -484,6 +484,159 @@ fn repair_without_a_log(storage: Storage) {
         crashes += 1;
     }
     assert!(crashes > 15);
+}
+
+/// Whether a map can be gone on with from the input that it was built from.
+fn can_be_resumed(disk: &FaultyDisk) -> bool {
+    let config = MapReader::config_of(MapPath::on(disk.shared(), map())).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config).unwrap();
+    match mapper.resume_input("random scans") {
+        Err(Error::Mismatch { .. }) => false,
+        resumed => resumed.is_ok(),
+    }
+}
+
+/// The flush is committed and named by `metadata.json`, some of its tables have their names, and the log is damaged.
+#[test]
+fn a_repair_without_a_log_completes_the_last_commit_and_forgets_the_input() {
+    for storage in STORAGES {
+        let log = Path::new("/map/commits.log");
+        let mut crashes = 0;
+        for at in 0.. {
+            let disk = small_map(storage);
+            let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
+            for seed in [1, 5, 6] {
+                mapper.insert_scan(&scan(seed)).unwrap();
+            }
+            disk.set_fault(Fault::Crashes(at));
+            let _ = mapper.flush();
+            if !disk.has_crashed() {
+                break;
+            }
+            let left = disk.after_crash(Unsynced::Kept);
+            let files = left.files();
+            if !String::from_utf8_lossy(&files[Path::new("/map/metadata.json")])
+                .contains("\"scan_number\": 5")
+            {
+                continue;
+            }
+            let committed = contents(&left).unwrap();
+            let mut damaged = files[log].clone();
+            let middle = damaged.len() / 2;
+            damaged[middle] ^= 1;
+            left.put(log, &damaged);
+            let repaired = repair(&left).unwrap();
+            assert_eq!(contents(&left).unwrap(), committed, "crash at {at}, {storage}: {repaired:?}");
+            assert_eq!((repaired.tiles_lost, repaired.inputs_forgotten), (0, 1), "crash at {at}, {storage}");
+            assert!(!repaired.is_complete());
+            assert!(findings(&left).0.is_whole(), "crash at {at}, {storage}");
+            assert!(!can_be_resumed(&left), "crash at {at}, {storage}");
+            assert_eq!(repair(&left).unwrap().actions, 0);
+            crashes += 1;
+        }
+        assert!(crashes > 5, "{crashes}");
+    }
+}
+
+/// As a copy may be that was taken while the map was written: log and one tile are of an earlier flush.
+#[test]
+fn a_map_put_together_from_tiles_of_two_flushes_is_not_gone_on_with() {
+    for storage in STORAGES {
+        let earlier = small_map(storage);
+        let disk = earlier.copy();
+        let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
+        for seed in [1, 5, 6] {
+            mapper.insert_scan(&scan(seed)).unwrap();
+        }
+        mapper.flush().unwrap();
+        drop(mapper);
+        assert!(can_be_resumed(&disk));
+        let (before, after) = (earlier.files(), disk.files());
+        let table =
+            before.keys().find(|path| path.ends_with(table_name(storage)) && before[*path] != after[*path]);
+        let tile = table.unwrap().parent().unwrap();
+        for (path, bytes) in before.iter().filter(|(path, _)| path.starts_with(tile)) {
+            disk.put(path, bytes);
+        }
+        let log = Path::new("/map/commits.log");
+        disk.put(log, &before[log]);
+        let repaired = repair(&disk).unwrap();
+        assert_eq!((repaired.tiles_lost, repaired.inputs_forgotten), (0, 1), "{storage}");
+        assert!(!can_be_resumed(&disk), "{storage}");
+    }
+}
+
+#[test]
+fn metadata_of_another_map_takes_nothing_from_this_one() {
+    for storage in STORAGES {
+        let whole = small_map(storage);
+        let other = small_map(storage);
+        let mut mapper = OutOfCoreTileMapper::open(MapPath::on(other.shared(), map()), config()).unwrap();
+        for seed in [1, 5, 6] {
+            mapper.insert_scan(&scan(seed)).unwrap();
+            mapper.flush().unwrap();
+        }
+        drop(mapper);
+        let (log, metadata) = (Path::new("/map/commits.log"), Path::new("/map/metadata.json"));
+        let (before, files) = (contents(&whole).unwrap(), whole.files());
+        let with_others = || {
+            let disk = whole.copy();
+            disk.put(metadata, &other.files()[metadata]);
+            disk
+        };
+        let index = |disk: &FaultyDisk| {
+            let store = TileStore::open_read_only(disk.shared(), map()).unwrap();
+            let inputs = store.metadata().ext.as_ref().unwrap().inputs.clone();
+            (store.map_id(), store.commits().scan_number, store.commits().flush_number, inputs)
+        };
+        let disk = with_others();
+        assert!(repair(&disk).unwrap().is_complete());
+        assert_eq!((index(&disk), contents(&disk).unwrap()), (index(&whole), before.clone()), "{storage}");
+        assert!(can_be_resumed(&disk), "{storage}");
+        // Without a log that can be read, the tiles tell which map it is and how many scans it has.
+        let mut cut = files[log].clone();
+        cut.pop();
+        for damaged in [None, Some(cut), Some(vec![0; 100])] {
+            let disk = with_others();
+            match &damaged {
+                None => disk.take(log),
+                Some(bytes) => disk.put(log, bytes),
+            }
+            let repaired = repair(&disk).unwrap();
+            let what = format!("{storage}, {:?} bytes", damaged.map(|bytes| bytes.len()));
+            assert_eq!((repaired.tiles_lost, contents(&disk).unwrap()), (0, before.clone()), "{what}");
+            let (map_id, scan_number, ..) = index(&disk);
+            assert_eq!((map_id, scan_number), (index(&whole).0, 2), "{what}");
+            assert!(findings(&disk).0.is_whole(), "{what}");
+        }
+    }
+}
+
+#[test]
+fn verify_reads_a_log_that_stays_the_same_once_however_many_tiles_are_damaged() {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config()).unwrap();
+    for seed in 0..10 {
+        let origin = [10.0 * seed as f64 + 0.5, 0.5, 1.0];
+        mapper.insert_scan(&random_scan(&mut Random(seed), origin, 2)).unwrap();
+    }
+    mapper.flush().unwrap();
+    drop(mapper);
+    let disk = disk.copy();
+    let files = disk.files();
+    let tables = || files.iter().filter(|(path, _)| path.ends_with(table_name(Storage::OctoMap)));
+    for (number, (path, bytes)) in tables().enumerate() {
+        disk.take(path);
+        let stray = map().join(format!("tile_0_{}_7", 50 + number));
+        disk.shared().create_folder(&stray).unwrap();
+        disk.put(&stray.join(path.file_name().unwrap()), bytes);
+    }
+    let (verification, found) = findings(&disk);
+    let tiles = tables().count() as u64;
+    assert!(tiles > 10);
+    assert_eq!((verification.tiles, verification.damage), (tiles, 2 * tiles), "{found:?}");
+    let opened = disk.times_opened(Path::new("/map/commits.log"));
+    assert!(opened <= 2, "{opened} times for {tiles} tiles");
 }
 
 #[test]

@@ -3,7 +3,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
-use testkit::faulty_disk::{Fault, FaultyDisk};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
@@ -406,6 +406,65 @@ fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
     assert_eq!(digest_of(&disk, &map, Some("first")).unwrap(), digests[0]);
     revert(MapPath::on(disk.shared(), &map), &name("first"), None, |_, _| ()).unwrap();
     assert_eq!(digest_of(&disk, &map, None).unwrap(), digests[0], "the tile is back");
+}
+
+/// A flush is committed and named by `metadata.json`, its tables wait for their names, and the log is lost.
+#[test]
+fn a_repair_that_completes_a_commit_without_a_log_takes_nothing_from_snapshots() {
+    for storage in [Storage::OctoMap, Storage::Compact] {
+        let (whole, map, digests) = small(storage);
+        snapshot(MapPath::on(whole.shared(), &map), &name("third")).unwrap();
+        let mut crashes = 0;
+        for at in 0.. {
+            let disk = whole.copy();
+            let mut mapper =
+                OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &map), config(storage)).unwrap();
+            mapper.insert_scan(&scan(28)).unwrap();
+            mapper.insert_scan(&scan(29)).unwrap();
+            disk.set_fault(Fault::Crashes(at));
+            let _ = mapper.flush();
+            drop(mapper);
+            if !disk.has_crashed() {
+                break;
+            }
+            let left = disk.after_crash(Unsynced::Kept);
+            let metadata = left.files()[&map.join("metadata.json")].clone();
+            if !String::from_utf8_lossy(&metadata).contains("\"scan_number\": 8") {
+                continue;
+            }
+            let what = format!("crash at {at}, {storage}");
+            let now = digest_of(&left, &map, None).unwrap();
+            left.take(&map.join("commits.log"));
+            repair(MapPath::on(left.shared(), &map), |_| (), |_, _| ()).unwrap();
+            assert_eq!(digest_of(&left, &map, None).unwrap(), now, "{what}");
+            for (of, digest) in ["first", "second", "third"].into_iter().zip(&digests) {
+                assert_eq!(digest_of(&left, &map, Some(of)).unwrap(), *digest, "{what}: {of}");
+            }
+            let verified = verify(MapPath::on(left.shared(), &map), |_| (), |_, _| ()).unwrap();
+            assert!(verified.is_whole(), "{what}");
+            crashes += 1;
+        }
+        assert!(crashes > 5, "{crashes}");
+    }
+}
+
+#[test]
+fn something_else_in_place_of_the_folder_of_snapshots_is_damage_also_where_the_map_has_none() {
+    let (disk, map, digests) = small(Storage::OctoMap);
+    for of in ["first", "second"] {
+        delete_snapshot(MapPath::on(disk.shared(), &map), &name(of)).unwrap();
+    }
+    let folder = map.join("snapshots");
+    disk.take(&folder);
+    disk.put(&folder, b"no folder");
+    let mut found = Vec::new();
+    let mut tell =
+        |finding: &voxtile::integrity::Finding| found.push((finding.severity, finding.path.clone()));
+    verify(MapPath::on(disk.shared(), &map), &mut tell, |_, _| ()).unwrap();
+    assert_eq!(found, [(Severity::Damage, folder)]);
+    repair(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap();
+    assert!(verify(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap().is_whole());
+    assert_eq!(digest_of(&disk, &map, None).unwrap(), digests[2]);
 }
 
 /// The naive difference of two maps, voxel by voxel.

@@ -8,6 +8,7 @@ use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::verify;
 use voxtile::simulation::{City, Drive, Lidar, Survey};
 use voxtile::space::TileIndex;
+use voxtile::store::{InputContent, InputRecord, TileStore};
 use voxtile::{Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper};
 
 fn config() -> MapConfig {
@@ -362,6 +363,91 @@ fn a_map_of_the_seeds_own_format_opens_and_is_adopted_on_the_first_write() {
     let reader = MapReader::open(&path, 4).unwrap();
     assert!(reader.is_verified());
     assert_eq!(voxels_of(&reader), voxels_of(&mapper));
+}
+
+#[test]
+fn inputs_with_long_names_and_many_skipped_scans_leave_a_map_that_opens() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("map");
+    let mut mapper =
+        OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config()).unwrap();
+    let long = |number: u64| format!("{number} {}", "\u{e9}".repeat(2000));
+    let content = InputContent { scans: 5000, skipped: (4000..5000).collect(), ..InputContent::default() };
+    let mut begin = |number, content: Option<&InputContent>| {
+        let record = InputRecord { content: content.cloned(), ..InputRecord::from(long(number)) };
+        mapper.begin_input(record).unwrap();
+        mapper.insert_scan(&random_scan(&mut Random(number), [0.0; 3], 2)).unwrap();
+    };
+    for number in 0..60 {
+        begin(number, Some(&content));
+    }
+    begin(60, None);
+    mapper.flush().unwrap();
+    drop(mapper);
+    // As much as earlier versions read.
+    assert!(fs::metadata(path.join("metadata.json")).unwrap().len() < 1 << 20);
+    let mut mapper = open(&path).unwrap();
+    let inputs = mapper.inputs();
+    assert!((20..60).contains(&inputs.len()), "{}", inputs.len());
+    assert!(inputs.iter().all(|input| (250..=255).contains(&input.name.len())));
+    let firsts: Vec<u64> = inputs.iter().map(|input| input.first_scan).collect();
+    assert_eq!(firsts, (61 - inputs.len() as u64..61).collect::<Vec<_>>(), "the latest");
+    assert_eq!(mapper.resume_input(&long(60)).unwrap(), 1);
+    assert!(verify(&path, |_| (), |_, _| ()).unwrap().is_whole());
+}
+
+#[test]
+fn a_map_whose_metadata_has_grown_beyond_a_mebibyte_opens_and_its_next_flush_cuts_it() {
+    let folder = TempDir::new().unwrap();
+    let path = map(&folder);
+    let file = path.join("metadata.json");
+    let mut metadata = TileStore::open_read_only(UnsyncedDisk::shared(), &path).unwrap().metadata().clone();
+    let inputs = (0..300).map(|number| InputRecord::from(format!("{number} {}", "x".repeat(4096))));
+    metadata.ext.as_mut().unwrap().inputs = inputs.collect();
+    fs::write(&file, metadata.to_text()).unwrap();
+    assert!(fs::metadata(&file).unwrap().len() > 1 << 20);
+    assert!(verify(&path, |_| (), |_, _| ()).unwrap().is_whole());
+    let mut mapper = open(&path).unwrap();
+    mapper.insert_scan(&random_scan(&mut Random(3), [0.0; 3], 30)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    assert!(fs::metadata(&file).unwrap().len() < 1 << 20);
+    let inputs = open(&path).unwrap().inputs();
+    assert!((100..300).contains(&inputs.len()) && inputs.last().unwrap().name.starts_with("299 x"));
+}
+
+/// What a file manager leaves, and a name that no list of names shows.
+#[test]
+#[cfg(target_os = "linux")]
+fn somebody_elses_file_in_the_folder_of_a_removed_tile_stops_nobody() {
+    use std::os::unix::ffi::OsStrExt;
+    let tile = TileIndex::new(0, 0, 0);
+    for name in [&b".DS_Store"[..], b"na\xefve"] {
+        let folder = TempDir::new().unwrap();
+        let path = map(&folder);
+        let stray = path.join("tile_0_0_0").join(std::ffi::OsStr::from_bytes(name));
+        fs::write(&stray, "a stranger's").unwrap();
+        let mut store = TileStore::open(UnsyncedDisk::shared(), &path).unwrap();
+        store.remove(tile).unwrap();
+        store.commit(store.metadata().clone(), store.commits().scan_number).unwrap();
+        drop(store);
+        // The first opening ends the removal, the later ones look at what is left.
+        for seed in 60..63 {
+            let mut mapper = open(&path).unwrap();
+            mapper.insert_scan(&random_scan(&mut Random(seed), [100.0, 0.0, 0.0], 10)).unwrap();
+            mapper.flush().unwrap();
+        }
+        assert!(verify(&path, |_| (), |_, _| ()).unwrap().is_whole());
+        assert!(voxtile::integrity::repair(&path, |_| (), |_, _| ()).unwrap().is_complete());
+        let mut mapper = open(&path).unwrap();
+        assert!(mapper.tile(tile).unwrap().is_none());
+        mapper.insert_scan(&random_scan(&mut Random(3), [0.0; 3], 30)).unwrap();
+        mapper.flush().unwrap();
+        assert!(mapper.tile(tile).unwrap().is_some());
+        drop(mapper);
+        assert!(verify(&path, |_| (), |_, _| ()).unwrap().is_whole());
+        assert_eq!(fs::read(&stray).unwrap(), b"a stranger's");
+    }
 }
 
 #[test]

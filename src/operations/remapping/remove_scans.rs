@@ -167,7 +167,7 @@ fn inputs_of(reader: &MapReader) -> &[InputRecord] {
 /// The numbers of the scans of an input, first and last; the map may have gone back to it later.
 fn ranges_of(name: &str, inputs: &[InputRecord], scan_number: u64) -> Vec<(u64, u64)> {
     let ends = inputs.iter().skip(1).map(|next| next.first_scan).chain([scan_number]);
-    let of_inputs = inputs.iter().zip(ends).filter(|(input, _)| input.name == name);
+    let of_inputs = inputs.iter().zip(ends).filter(|(input, _)| input.is_named(name));
     of_inputs.map(|(input, end)| (input.first_scan + 1, end)).collect()
 }
 

@@ -3,6 +3,7 @@ use crate::space::{TileIndex, TileTable};
 use crate::store::disk::EntryKind;
 use crate::store::layout::TileFile;
 use crate::store::map_files::MapFiles;
+use crate::store::map_folder;
 use crate::store::recovery::quarantine::Quarantine;
 use crate::store::snapshots::kept_tables::KeptTables;
 use crate::store::snapshots::snapshot_name::SnapshotName;
@@ -235,7 +236,8 @@ fn remove_tile_files(files: &MapFiles, tile: TileIndex) -> Result<()> {
     let disk = files.disk();
     let names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;
     match names.is_empty() {
-        true => disk.remove_folder(&folder).map_err(|error| Error::io(&folder, "remove", error)),
+        true => map_folder::remove_unless_used(&**disk, &folder)
+            .map_err(|error| Error::io(&folder, "remove", error)),
         false => files.sync_folder(&folder),
     }
 }

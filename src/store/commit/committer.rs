@@ -1,6 +1,7 @@
 use super::commit_log::CommitLog;
 use super::commit_record::{Flush, whole_map_bytes};
 use super::commits::Commits;
+use super::input_record::forget_earliest;
 use super::metadata::{Bounds, Metadata};
 use crate::error::{Error, Result};
 use crate::store::WriterLock;
@@ -109,7 +110,8 @@ impl Committer {
         self.is_list_logged = false;
     }
 
-    /// Metadata with what the store knows better than its callers: bounds, numbers, storage and snapshots.
+    /// Metadata with what the store knows better than its callers: bounds, numbers, storage and snapshots; and with no
+    /// more inputs than there is room for.
     pub(in crate::store) fn fill_in(
         &self,
         mut metadata: Metadata,
@@ -121,6 +123,7 @@ impl Committer {
         if let Some(ext) = &mut metadata.ext {
             ext.storage = files.layout().storage();
             ext.snapshots = self.listed.clone();
+            forget_earliest(&mut ext.inputs);
             ext.empty = metadata.bounds.is_none();
             (ext.flush_number, ext.scan_number) = (flush_number, scan_number);
         }

@@ -6,6 +6,16 @@ use serde::{Deserialize, Serialize};
 /// Most inputs that a map remembers; of more it forgets the earliest.
 pub(crate) const MOST_INPUTS: usize = 1000;
 
+/// Most bytes of the name of an input; of a longer one the beginning is kept.
+const MOST_NAME_BYTES: usize = 255;
+
+/// Most bytes of `metadata.json` for all inputs; of more the earliest are forgotten. With the longest list of snapshots
+/// beside them the file stays below a mebibyte, which is as much as earlier versions read.
+const MOST_TEXT_BYTES: usize = 600 << 10;
+
+/// Columns by which `metadata.json` indents an input.
+const INDENT: usize = 6;
+
 /// What a map was built from in one go: an input, or what came of an input since the map last took scans of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct InputRecord {
@@ -51,11 +61,45 @@ impl InputRecord {
         self
     }
 
+    /// Whether the input goes by this name in a map, which may have only the beginning of it.
+    pub(crate) fn is_named(&self, name: &str) -> bool {
+        self.name == name || self.name == beginning_of(name)
+    }
+
+    /// Cuts a name that is too long for a map.
+    pub(crate) fn cut_name(&mut self) {
+        self.name.truncate(beginning_of(&self.name).len());
+    }
+
+    /// Bytes of the input in `metadata.json`.
+    fn text_bytes(&self) -> usize {
+        let text = serde_json::to_string_pretty(self).expect("plain data of strings and numbers");
+        text.len() + INDENT * text.lines().count() + ",\n".len()
+    }
+
     /// Whether all numbers are small enough to be true.
     pub(in crate::store) fn is_sound(&self) -> bool {
         let content = self.content.as_ref();
         self.first_scan <= MAX_NUMBER && content.is_none_or(|content| content.scans <= MAX_NUMBER)
     }
+}
+
+/// Forgets the earliest inputs that a map has no room for. Without that its metadata would grow with every input until
+/// nobody reads it any more.
+pub(in crate::store) fn forget_earliest(inputs: &mut Vec<InputRecord>) {
+    let mut left_bytes = Some(MOST_TEXT_BYTES);
+    let fits = |input: &&InputRecord| {
+        left_bytes = left_bytes.and_then(|left| left.checked_sub(input.text_bytes()));
+        left_bytes.is_some()
+    };
+    let kept = inputs.iter().rev().take(MOST_INPUTS).take_while(fits).count();
+    inputs.drain(..inputs.len() - kept);
+}
+
+/// As much of a name as a map keeps.
+fn beginning_of(name: &str) -> &str {
+    let mut ends = (0..=name.len().min(MOST_NAME_BYTES)).rev();
+    ends.find_map(|end| name.get(..end)).unwrap_or_default()
 }
 
 impl<N: Into<String>> From<N> for InputRecord {

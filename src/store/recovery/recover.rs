@@ -3,6 +3,7 @@ use crate::space::{TileIndex, TileTable};
 use crate::store::commit::commits::Commits;
 use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::{Layout, REPLACEMENT, SPILL, tile_of_folder};
+use crate::store::map_folder;
 use crate::store::snapshots::seen_tables::{KeptFlushes, SeenTables};
 use crate::store::snapshots::snapshot_file::Snapshot;
 use crate::store::snapshots::snapshot_list::SnapshotList;
@@ -85,7 +86,7 @@ pub(in crate::store) fn recover(
     remove_unseen(disk, layout, &kept, &mut leftovers)?;
     for tile in empty_folders.into_iter().filter(|tile| !leftovers.snapshots.pinned().contains_key(tile)) {
         let path = layout.tile_folder(tile);
-        tolerate(disk.remove_folder(&path), &path, "remove")?;
+        tolerate(map_folder::remove_unless_used(disk, &path), &path, "remove")?;
     }
     Ok(leftovers)
 }
@@ -222,8 +223,13 @@ fn look_at_tile(
     }
     let is_kept = |name: &mut String| layout.flush_of_kept(name).is_some();
     let kept = names.extract_if(.., is_kept).filter_map(|name| layout.flush_of_kept(&name)).collect();
+    // Somebody else's files make no tile: what a file manager leaves in a folder keeps no scan out of it.
+    let is_of_tile = |name: &String| {
+        let storage = layout.storage();
+        layout.files().iter().any(|file| [file.name(storage), file.next_name(storage)].contains(&&**name))
+    };
     let state = match version {
-        _ if names.is_empty() => State::Empty,
+        _ if !names.iter().any(is_of_tile) => State::Empty,
         None => State::Orphan,
         Some(_) if unrenamed => State::Unrenamed,
         Some(_) => State::Whole,

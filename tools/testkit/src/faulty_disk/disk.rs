@@ -41,6 +41,7 @@ impl FaultyDisk {
             crashed: false,
             broken: BTreeSet::new(),
             unreadable: BTreeSet::new(),
+            opened: BTreeMap::new(),
         };
         Self { state: Arc::new(Mutex::new(state)) }
     }
@@ -58,6 +59,11 @@ impl FaultyDisk {
     /// Number of operations so far that change something.
     pub fn changes(&self) -> u64 {
         self.state().changes
+    }
+
+    /// How often a file was opened to be read from its beginning.
+    pub fn times_opened(&self, path: &Path) -> u64 {
+        self.state().opened.get(path).copied().unwrap_or_default()
     }
 
     /// Whether the power has gone.

@@ -2,17 +2,30 @@ use super::disk::FaultyDisk;
 use super::handles::{Locked, Reader, ScratchFile, Watch, Writer};
 use super::names::{Entry, NameChange};
 use super::operation::Kind;
-use std::io::{self, Cursor};
+use std::io::{self, Cursor, Read};
 use std::path::Path;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 
-impl Disk for FaultyDisk {
-    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+impl FaultyDisk {
+    fn open_file(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         let mut state = self.state();
         state.attempt(Kind::Reads, path)?;
         let inode = state.file(path)?;
         let bytes = state.content(inode).seen.clone();
         Ok(Box::new(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: None }))
+    }
+}
+
+impl Disk for FaultyDisk {
+    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        *self.state().opened.entry(path.to_owned()).or_default() += 1;
+        self.open_file(path)
+    }
+
+    fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        let mut input = self.open_file(path)?;
+        io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
+        Ok(input)
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {

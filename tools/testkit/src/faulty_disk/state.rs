@@ -2,7 +2,7 @@ use super::content::Content;
 use super::fault::Fault;
 use super::names::{Entry, Inode, NameChange, Names};
 use super::operation::{Kind, Verdict};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +26,8 @@ pub(super) struct State {
     pub(super) broken: BTreeSet<PathBuf>,
     /// Files whose content cannot be read.
     pub(super) unreadable: BTreeSet<PathBuf>,
+    /// How often each file was opened to be read from its beginning.
+    pub(super) opened: BTreeMap<PathBuf, u64>,
 }
 
 impl State {
