@@ -43,7 +43,7 @@ pub fn config_to_go_on(args: &BuildArgs) -> anyhow::Result<MapConfig> {
 fn rays_begun(args: &BuildArgs, map: &MapReader) -> RayConfig {
     let name = name_of_path(&args.scans);
     let inputs = map.metadata().ext.as_ref().map_or(&[][..], |ext| &ext.inputs);
-    let input = inputs.iter().rfind(|input| input.name == name).or(inputs.last());
+    let input = inputs.iter().rfind(|input| input.is_named(&name)).or(inputs.last());
     input.and_then(|input| input.rays).unwrap_or(map.config().rays)
 }
 
