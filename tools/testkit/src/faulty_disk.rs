@@ -1,6 +1,7 @@
 use crate::random_scans::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
@@ -114,8 +115,8 @@ struct State {
     crashed: bool,
     /// Files and folders that every operation fails on.
     broken: BTreeSet<PathBuf>,
-    /// Files whose content cannot be read.
-    unreadable: BTreeSet<PathBuf>,
+    /// Files of whose content some bytes cannot be read.
+    unreadable: BTreeMap<PathBuf, Range<usize>>,
 }
 
 impl FaultyDisk {
@@ -141,7 +142,7 @@ impl FaultyDisk {
             has_links: true,
             crashed: false,
             broken: BTreeSet::new(),
-            unreadable: BTreeSet::new(),
+            unreadable: BTreeMap::new(),
         };
         Self { state: Arc::new(Mutex::new(state)) }
     }
@@ -186,7 +187,12 @@ impl FaultyDisk {
 
     /// Makes the content of a file one that cannot be read; it can be renamed, replaced and removed.
     pub fn make_unreadable(&self, path: &Path) {
-        self.state().unreadable.insert(path.to_owned());
+        self.make_bytes_unreadable(path, 0..usize::MAX);
+    }
+
+    /// Does so with some bytes of a file: a bad sector.
+    pub fn make_bytes_unreadable(&self, path: &Path, bytes: Range<usize>) {
+        self.state().unreadable.insert(path.to_owned(), bytes);
     }
 
     /// The file or folder that [`Fault::Breaks`] has hit.
@@ -297,6 +303,14 @@ impl FaultyDisk {
         let mut state = self.state();
         state.names.retain(|name, _| !name.starts_with(path));
         state.names_on_medium.retain(|name, _| !name.starts_with(path));
+    }
+
+    fn reader(&self, path: &Path) -> io::Result<Reader> {
+        let mut state = self.state();
+        state.attempt(Kind::Reads, path)?;
+        let inode = state.file(path)?;
+        let bytes = state.content(inode).seen.clone();
+        Ok(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: None })
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -515,11 +529,13 @@ impl Read for Reader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let mut state = self.disk.state();
         state.attempt(Kind::Reads, &self.path)?;
-        if state.unreadable.contains(&self.path) {
+        let bad = state.unreadable.get(&self.path).cloned().unwrap_or_default();
+        drop(state);
+        if bad.contains(&self.at) {
             return Err(medium_error());
         }
-        drop(state);
-        let count = (&self.bytes[self.at..]).read(buffer)?;
+        let end = if self.at < bad.start { bad.start.min(self.bytes.len()) } else { self.bytes.len() };
+        let count = (&self.bytes[self.at..end]).read(buffer)?;
         self.at += count;
         Ok(count)
     }
@@ -614,11 +630,19 @@ impl Seek for ScratchFile {
 
 impl Disk for FaultyDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
-        let mut state = self.state();
-        state.attempt(Kind::Reads, path)?;
-        let inode = state.file(path)?;
-        let bytes = state.content(inode).seen.clone();
-        Ok(Box::new(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: None }))
+        Ok(Box::new(self.reader(path)?))
+    }
+
+    fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        let has_bad_bytes = self.state().unreadable.contains_key(path);
+        let mut input = self.reader(path)?;
+        if has_bad_bytes {
+            // What lies before is passed over.
+            input.at = input.bytes.len().min(offset as usize);
+        } else {
+            io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
+        }
+        Ok(Box::new(input))
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
@@ -713,8 +737,8 @@ impl Disk for FaultyDisk {
             _ => return Err(io::ErrorKind::AlreadyExists.into()),
         }
         state.unreadable.remove(to);
-        if state.unreadable.remove(from) {
-            state.unreadable.insert(to.to_owned());
+        if let Some(bytes) = state.unreadable.remove(from) {
+            state.unreadable.insert(to.to_owned(), bytes);
         }
         if entry == Entry::Folder {
             // What is on its way to the medium in a folder is so under the folder's new name.
