@@ -1,6 +1,9 @@
 use super::finding::Finding;
 use crate::error::{Error, Result};
-use crate::store::{CatalogEntry, Disk, KeptRecords, Layout, ScanRecord, TileStore, check_points};
+use crate::store::{
+    CatalogEntry, Disk, KeptAsOf, Layout, Salvaged, ScanRecord, TileStore, check_points, salvage_entries,
+};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Reads every scan that a map keeps; returns what is damaged.
@@ -32,8 +35,19 @@ pub(super) fn check_kept_scans(disk: &Arc<dyn Disk>, store: &TileStore) -> Resul
     }
 }
 
+/// What is whole of the scans that a map keeps.
+#[derive(Debug, Default)]
+pub(super) struct WholeEntries {
+    /// What is not.
+    pub damage: Vec<Error>,
+    /// How many scans the map can no longer be mapped from for it.
+    pub scans_lost: u64,
+    /// The segments that the others are in.
+    pub segments: BTreeSet<u64>,
+}
+
 /// Passes on the entries of the catalog as it should be, where any of it is damaged: a scan with damaged points is one
-/// whose points are not kept. Returns what is damaged.
+/// whose points are not kept, and one whose record is damaged an unknown one.
 ///
 /// # Errors
 ///
@@ -41,44 +55,33 @@ pub(super) fn check_kept_scans(disk: &Arc<dyn Disk>, store: &TileStore) -> Resul
 pub(super) fn whole_entries(
     disk: &dyn Disk,
     layout: &Layout,
-    records: Result<KeptRecords>,
-    scan_number: u64,
+    as_of: KeptAsOf,
     mut put: impl FnMut(&CatalogEntry) -> Result<()>,
-) -> Result<Vec<Error>> {
-    let (mut damage, mut last) = (Vec::new(), 0);
-    let mut records = match records {
-        Ok(records) => Some(records),
-        Err(error) => {
-            damage.push(only_damage(error)?);
-            None
-        }
-    };
-    while let Some(open) = &mut records {
-        let entry = match open.next_entry() {
-            Ok(Some(entry)) => entry,
-            Ok(None) => break,
-            Err(error) => {
-                damage.push(only_damage(error)?);
-                break;
+) -> Result<WholeEntries> {
+    let mut whole = WholeEntries::default();
+    let damage = salvage_entries(disk, layout, as_of, &mut |entry| {
+        let entry = match entry {
+            Salvaged::Lost(entry) => {
+                whole.scans_lost += entry.numbers().map_or(0, |(first, last)| last - first + 1);
+                entry
             }
-        };
-        last = entry.numbers().map_or(last, |(_, last)| last);
-        match &entry {
-            CatalogEntry::Kept(scan) => match check_points(disk, layout, scan) {
-                Ok(()) => put(&entry)?,
+            Salvaged::Whole(CatalogEntry::Kept(scan)) => match check_points(disk, layout, &scan) {
+                Ok(()) => {
+                    whole.segments.insert(scan.place.segment);
+                    CatalogEntry::Kept(scan)
+                }
                 Err(error) => {
-                    damage.push(only_damage(error)?);
-                    let listed = ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m());
-                    put(&CatalogEntry::Listed(listed))?;
+                    whole.damage.push(only_damage(error)?);
+                    whole.scans_lost += 1;
+                    CatalogEntry::Listed(ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m()))
                 }
             },
-            entry => put(entry)?,
-        }
-    }
-    if last < scan_number {
-        put(&CatalogEntry::Unlisted(last + 1, scan_number))?;
-    }
-    Ok(damage)
+            Salvaged::Whole(entry) => entry,
+        };
+        put(&entry)
+    })?;
+    whole.damage.extend(damage);
+    Ok(whole)
 }
 
 /// The error, if it is about a file by itself.

@@ -3,7 +3,8 @@
 //! ```text
 //! verify  metadata.json, commits.log, then tile by tile: table, octree; then snapshots  -> findings
 //! repair  index (metadata.json, commits.log) from whatever is left      -> actions
-//!         tile by tile: octree from its table, damaged tiles to quarantine/
+//!         lists of scans: what can be read of them goes on
+//!         tile by tile: octree from its table, table from a kept one, damaged tiles to quarantine/
 //! ```
 //!
 //! Both need memory for the list of tiles and one tile. What is promised is in `docs/durability.md`.
@@ -12,6 +13,7 @@ mod finding;
 mod kept_scans;
 mod rebuild;
 mod repair;
+mod repair_kept_scans;
 mod repair_snapshots;
 mod snapshots;
 mod tile_check;

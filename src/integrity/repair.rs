@@ -1,7 +1,6 @@
 use super::finding::Finding;
-use super::kept_scans::whole_entries;
 use super::rebuild::{self, Index, Replaced};
-use super::tile_check::{check_tile, write_octree};
+use super::tile_check::{check_tile, checksum_of, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::persistence::TileSaver;
@@ -16,7 +15,6 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// One thing that a repair did.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -61,7 +59,7 @@ pub struct Repair {
     pub snapshot_tiles_lost: u64,
     /// Snapshots that the map no longer has.
     pub snapshots_lost: u64,
-    /// Damages among the scans that the map keeps: it cannot be mapped again from them.
+    /// Scans that the map kept and whose record or points are damaged: it cannot be mapped again from them.
     pub scans_lost: u64,
     /// Tiles that are no longer part of the map: their space is unknown again.
     pub tiles_lost: u64,
@@ -109,7 +107,7 @@ pub fn repair(
     let config = config_from(store.metadata(), &store.layout().metadata())?;
     repairer.layout = store.layout().clone();
     repairer.repair_scans(&mut store)?;
-    repairer.repair_kept_scans(&disk, &mut store)?;
+    repairer.repair_kept_scans(&mut store)?;
     repairer.repair_tiles(&mut store, &config)?;
     Ok(repairer.counts)
 }
@@ -173,55 +171,34 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
     }
 
-    /// Lists scans whose points are damaged as scans without points, so that the map can be mapped on.
-    fn repair_kept_scans(&mut self, disk: &Arc<dyn Disk>, store: &mut TileStore) -> Result<()> {
-        if !store.keeps_scans() {
-            return Ok(());
-        }
-        let (layout, scan_number) = (store.layout().clone(), store.commits().scan_number);
-        let damage = whole_entries(&**disk, &layout, store.kept_records(), scan_number, |_| Ok(()))?;
-        if damage.is_empty() {
-            return Ok(());
-        }
-        for error in &damage {
-            if let Some(path) = error.path()
-                && self.kind(path)?.is_some()
-            {
-                self.quarantine_copy(path, &format!("{error:#}"))?;
-            }
-        }
-        let records = store.kept_records();
-        store.begin_catalog()?;
-        whole_entries(&**disk, &layout, records, scan_number, |entry| store.put_entry(entry))?;
-        store.commit(store.metadata().clone(), scan_number)?;
-        self.counts.scans_lost += damage.len() as u64;
-        let folder = self.layout.kept_scans();
-        let reason =
-            "what is damaged is no longer among the kept scans, so that the map cannot be mapped again";
-        self.note(ActionKind::Forgotten, &folder, reason);
-        Ok(())
-    }
-
     /// Keeps what is whole of the list of scans, from its beginning.
     fn repair_scans(&mut self, store: &mut TileStore) -> Result<()> {
         let path = self.layout.scans();
         let flush_number = store.commits().flush_number;
         let records = store.listed_records();
-        match check_scans(self.disk, &self.layout, flush_number, records) {
-            Ok(()) => Ok(()),
-            Err(Error::Damaged { cause, .. }) => {
-                if let Some(to) = store.settle_scans()? {
-                    self.note(ActionKind::Quarantined, &path, format!("{cause}; kept as {}", to.display()));
-                }
-                self.note(ActionKind::Derived, &path, "cut where the damage begins");
-                Ok(())
-            }
-            Err(error) if Finding::is_of_file(&error) => {
-                self.quarantine(&path, &format!("{error:#}"))?;
-                store.settle_scans().map(drop)
-            }
-            Err(error) => Err(error),
+        let damage = match check_scans(self.disk, &self.layout, flush_number, records) {
+            Ok(()) => return Ok(()),
+            Err(error) if matches!(error, Error::Damaged { .. }) || Finding::is_of_file(&error) => error,
+            Err(error) => return Err(error),
+        };
+        let settled = match &damage {
+            Error::Damaged { .. } => store.settle_scans(),
+            // Cut where it is, it could be unreadable still.
+            _ => store.rewrite_scans(),
+        };
+        let quarantined = match settled {
+            Err(error) if Finding::is_of_file(&error) => store.rewrite_scans()?,
+            settled => settled?,
+        };
+        if let Some(to) = quarantined {
+            let reason = match &damage {
+                Error::Damaged { cause, .. } => format!("{cause}; kept as {}", to.display()),
+                error => format!("{error:#}; kept as {}", to.display()),
+            };
+            self.note(ActionKind::Quarantined, &path, reason);
         }
+        self.note(ActionKind::Derived, &path, "cut where the damage begins");
+        Ok(())
     }
 
     /// Writes `commits.log` and `metadata.json` anew from what is left of them and from the tiles.
@@ -372,6 +349,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             // Not for what passes.
             check = check_tile(self.disk, store, config, tile)?;
         }
+        if let Err(error) = &check.table
+            && self.restore_table(store, tile, &format!("{error:#}"))?
+        {
+            check = check_tile(self.disk, store, config, tile)?;
+        }
         let table = match check.table {
             Ok(table) => table,
             Err(error) => {
@@ -409,6 +391,28 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         self.note(ActionKind::Derived, &path, "from the tile's table");
         Ok(true)
+    }
+
+    /// Puts a kept table in place of a damaged one, where it is the very version that the log names: a revert leaves a
+    /// tile with both. False if there is none.
+    fn restore_table(&mut self, store: &mut TileStore, tile: TileIndex, why: &str) -> Result<bool> {
+        let Some(version) = store.version(tile) else { return Ok(false) };
+        // What cannot be listed or read is not there.
+        for flush_number in store.kept_tables(tile).unwrap_or_default() {
+            let (kept, current) =
+                (self.layout.kept(tile, flush_number), self.layout.current(tile, TileFile::Table));
+            if !matches!(checksum_of(self.disk, &kept), Ok(Some(found)) if found == version.table) {
+                continue;
+            }
+            if self.kind(&current)?.is_some() {
+                self.quarantine(&current, why)?;
+            }
+            store.put_kept_in_place(tile, &kept)?;
+            let reason = format!("from {}, which has the same bytes", kept.display());
+            self.note(ActionKind::Derived, &current, reason);
+            return Ok(true);
+        }
+        Ok(false)
     }
 }
 

@@ -39,6 +39,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         for snapshot in &mut snapshots {
             self.repair_snapshot(store, config, snapshot, &mut whole)?;
         }
+        // Before the log forgets them: from then on a writer removes what none of the others needs.
+        self.quarantine_unneeded_scans(store, &snapshots)?;
         if gone.is_empty() {
             return Ok(());
         }

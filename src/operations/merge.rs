@@ -140,7 +140,7 @@ pub(super) fn have_no_common_tile(maps: &[MapReader]) -> bool {
 /// The coordinate reference system of maps, if one names it. What is in one place in one system is elsewhere in another;
 /// a map that names none goes with any.
 pub(super) fn common_crs<'a>(maps: impl IntoIterator<Item = &'a MapReader>) -> Result<Option<String>> {
-    maps.into_iter().try_fold(None, |common, map| with_crs_of(common, map))
+    maps.into_iter().try_fold(None, with_crs_of)
 }
 
 /// The coordinate reference system of some maps, and of one more.

@@ -89,6 +89,11 @@ impl Layout {
         self.folder.join("scans.bin")
     }
 
+    /// What is to take the place of a damaged `scans.bin`.
+    pub(super) fn scans_next(&self) -> PathBuf {
+        self.folder.join("scans.bin.next")
+    }
+
     /// The folder of the scans that the map keeps.
     pub fn kept_scans(&self) -> PathBuf {
         self.folder.join(KEPT_SCANS)

@@ -56,7 +56,9 @@ pub use recovery::salvage::Salvage;
 pub use recovery::side_folder::SideFolder;
 pub use recovery::staged_map::{StagedMap, staging_folder};
 pub use scans::{CatalogEntry, KeptFrame, KeptRecord, ScanRecord, SegmentPlace};
-pub(crate) use scans::{KeptRecords, SegmentScan, check_points, check_scans, read_scans};
+pub(crate) use scans::{
+    KeptAsOf, KeptRecords, Salvaged, SegmentScan, check_points, check_scans, read_scans, salvage_entries,
+};
 pub use snapshots::snapshot_file::Snapshot;
 pub use snapshots::snapshot_list::SnapshotList;
 pub use snapshots::snapshot_name::SnapshotName;

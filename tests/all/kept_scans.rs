@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use voxtile::integrity::{repair, verify};
+use voxtile::integrity::{Repair, repair, verify};
 use voxtile::mapper::KeptScan;
+use voxtile::operations::{delete_snapshot, snapshot};
 use voxtile::scan::ScanPoints;
-use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, TileStore};
+use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, SnapshotName, TileStore};
 use voxtile::{
     Error, MapConfig, MapPath, MapReader, Mapper, OutOfCoreTileMapper, RayConfig, Result, ScanRef,
 };
@@ -35,8 +36,12 @@ fn insert(mapper: &mut OutOfCoreTileMapper, name: u64) -> Result<()> {
 
 /// A map whose catalog has a scan in each of four flushes, each in a segment of its own.
 fn a_map() -> FaultyDisk {
+    a_map_of(4)
+}
+
+fn a_map_of(scans: u64) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
-    for name in 1..=4 {
+    for name in 1..=scans {
         let mut mapper = match name {
             1 => OutOfCoreTileMapper::create(at(&disk), config()),
             _ => OutOfCoreTileMapper::open(at(&disk), config()),
@@ -215,4 +220,177 @@ fn a_copy_that_fails_halfway_moves_no_later_scan() {
         }
     }
     assert!(failed > 0);
+}
+
+/// A map with scans of one flush in one segment, and where that is.
+fn one_segment(scans: u64) -> (FaultyDisk, PathBuf) {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
+    (1..=scans).for_each(|name| insert(&mut mapper, name).unwrap());
+    mapper.flush().unwrap();
+    (disk.copy(), map().join("kept_scans/segment.1"))
+}
+
+/// Where the catalog is, and how long it is.
+fn catalog_of(disk: &FaultyDisk) -> (PathBuf, usize) {
+    let files = kept_files(disk).into_iter();
+    let mut catalogs = files.filter(|(path, _)| path.to_string_lossy().contains("kept_scans/catalog"));
+    let (path, bytes) = catalogs.next().unwrap();
+    assert!(catalogs.next().is_none());
+    (path, bytes.len())
+}
+
+fn flip(disk: &FaultyDisk, path: &Path, offset: usize) {
+    let mut bytes = disk.files()[path].clone();
+    bytes[offset] ^= 1 << (offset % 8);
+    disk.put(path, &bytes);
+}
+
+fn repaired(disk: &FaultyDisk, what: &str) -> Repair {
+    let repaired = repair(at(disk), |_| (), |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error:#}"));
+    assert!(verify(at(disk), |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
+    repaired
+}
+
+/// The names of the scans whose points the map keeps.
+fn kept_names(disk: &FaultyDisk) -> Vec<u64> {
+    kept_points(disk).unwrap().iter().map(|points| points[0][0] as u64).collect()
+}
+
+/// Two writers, each of which removes what nothing needs.
+fn go_on(disk: &FaultyDisk) {
+    for name in [8, 9] {
+        let mut mapper = OutOfCoreTileMapper::open(at(disk), config()).unwrap();
+        insert(&mut mapper, name).and_then(|()| mapper.flush()).unwrap();
+    }
+}
+
+/// Whether each of these files is there yet, under whatever name.
+fn has_all(disk: &FaultyDisk, files: &BTreeMap<PathBuf, Vec<u8>>) -> bool {
+    let left = disk.files();
+    files.values().all(|bytes| left.values().any(|kept| kept == bytes))
+}
+
+fn in_quarantine(disk: &FaultyDisk, name: &str) -> usize {
+    let quarantine = map().join("quarantine");
+    let is_of = |path: &&PathBuf| path.starts_with(&quarantine) && path.to_string_lossy().contains(name);
+    disk.files().keys().filter(is_of).count()
+}
+
+#[test]
+fn a_flipped_bit_in_a_catalog_costs_one_scan_at_most_and_no_file() {
+    let whole = a_map();
+    let (catalog, bytes) = catalog_of(&whole);
+    let mut lost = 0;
+    for offset in 0..bytes {
+        let disk = whole.copy();
+        flip(&disk, &catalog, offset);
+        let (files, what) = (kept_files(&disk), format!("a byte at {offset}"));
+        let repaired = repaired(&disk, &what);
+        let names = kept_names(&disk);
+        assert_eq!(names.len() as u64 + repaired.scans_lost, 4, "{what}: {names:?}");
+        assert!(repaired.scans_lost <= 1 && repaired.actions > 0, "{what}: {repaired:?}");
+        lost += repaired.scans_lost;
+        go_on(&disk);
+        assert!(has_all(&disk, &files), "{what}");
+        assert_eq!(kept_names(&disk), [&names[..], &[8, 9]].concat(), "{what}");
+    }
+    assert!(lost as usize > bytes * 9 / 10, "{lost} of {bytes}");
+}
+
+#[test]
+fn what_only_a_lost_record_named_stays_when_a_snapshot_of_it_goes() {
+    let disk = a_map_of(3);
+    let name = SnapshotName::new("s").unwrap();
+    snapshot(at(&disk), &name).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
+    insert(&mut mapper, 4).and_then(|()| mapper.flush()).unwrap();
+    drop(mapper);
+    flip(&disk, &catalog_of(&disk).0, 60);
+    let files = kept_files(&disk);
+    assert_eq!(repaired(&disk, "").scans_lost, 1);
+    go_on(&disk);
+    delete_snapshot(at(&disk), &name).unwrap();
+    go_on(&disk);
+    assert!(has_all(&disk, &files));
+    assert_eq!(kept_names(&disk), [2, 3, 4, 8, 9, 8, 9]);
+}
+
+#[test]
+fn a_bad_sector_of_a_segment_costs_the_scan_in_it() {
+    let (disk, segment) = one_segment(4);
+    let second = one_segment(1).0.files()[&segment].len();
+    disk.make_bytes_unreadable(&segment, second + 8..second + 9);
+    let files = kept_files(&disk);
+    assert_eq!(repaired(&disk, "").scans_lost, 1);
+    assert_eq!(kept_names(&disk), [1, 3, 4]);
+    go_on(&disk);
+    assert!(has_all(&disk, &files) && disk.files().contains_key(&segment));
+    assert_eq!(in_quarantine(&disk, "segment"), 0);
+}
+
+#[test]
+fn a_segment_goes_to_quarantine_once_and_only_if_no_scan_needs_it() {
+    let ends: Vec<_> = (0..=4).map(|scans| if scans == 0 { 0 } else { segment_bytes(scans) }).collect();
+    for damaged in [vec![0, 1, 3], vec![0, 1, 2, 3]] {
+        let (disk, segment) = one_segment(4);
+        damaged.iter().for_each(|&scan: &usize| flip(&disk, &segment, ends[scan] + 9));
+        let files = kept_files(&disk);
+        assert_eq!(repaired(&disk, "").scans_lost, damaged.len() as u64);
+        assert_eq!(kept_names(&disk).len(), 4 - damaged.len());
+        go_on(&disk);
+        assert!(has_all(&disk, &files));
+        assert_eq!(in_quarantine(&disk, "segment"), usize::from(damaged.len() == 4));
+    }
+}
+
+fn segment_bytes(scans: u64) -> usize {
+    let (disk, segment) = one_segment(scans);
+    disk.files()[&segment].len()
+}
+
+#[test]
+fn a_bad_sector_of_a_catalog_leaves_the_scans_before_it() {
+    for disk in [a_map(), a_map().without_links()] {
+        let (catalog, _) = catalog_of(&disk);
+        let (_, two) = catalog_of(&a_map_of(2));
+        disk.make_bytes_unreadable(&catalog, two + 20..two + 21);
+        let files = kept_files(&disk);
+        assert_eq!(repaired(&disk, "").scans_lost, 2);
+        assert_eq!(kept_names(&disk), [1, 2]);
+        go_on(&disk);
+        assert!(has_all(&disk, &files));
+        assert_eq!(kept_names(&disk), [1, 2, 8, 9]);
+    }
+}
+
+#[test]
+fn a_repair_of_kept_scans_that_the_power_ends_loses_no_file() {
+    let damaged = a_map();
+    let (catalog, _) = catalog_of(&damaged);
+    let (_, one) = catalog_of(&a_map_of(1));
+    flip(&damaged, &catalog, one + 60);
+    flip(&damaged, &map().join("kept_scans/segment.3"), 9);
+    let files = kept_files(&damaged);
+    let mut crashes = 0;
+    for change in 0.. {
+        let disk = damaged.copy();
+        disk.set_fault(Fault::Crashes(change));
+        let _ = repair(at(&disk), |_| (), |_, _| ());
+        if !disk.has_crashed() {
+            break;
+        }
+        crashes += 1;
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(change)] {
+            let (disk, what) = (disk.after_crash(unsynced), format!("change {change}, {unsynced:?}"));
+            // A writer that comes in between removes none, either.
+            drop(TileStore::open(disk.shared(), map()).unwrap());
+            assert!(has_all(&disk, &files), "{what}");
+            repaired(&disk, &what);
+            assert_eq!(kept_names(&disk), [1, 4], "{what}");
+            go_on(&disk);
+            assert!(has_all(&disk, &files), "{what}");
+        }
+    }
+    assert!(crashes > 10, "{crashes}");
 }

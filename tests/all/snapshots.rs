@@ -9,7 +9,7 @@ use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::{Severity, repair, verify};
 use voxtile::operations::{Diff, TileChange, TileDiff, delete_snapshot, diff, revert, snapshot, snapshots};
-use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileStore};
+use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileFile, TileStore};
 use voxtile::{
     Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage,
 };
@@ -185,6 +185,74 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
             }
             let kept = disk.files().into_keys().filter(|path| path.to_string_lossy().contains(".flush"));
             assert_eq!(kept.count(), 0, "nobody sees any kept table");
+        }
+    }
+}
+
+/// A revert leaves the same bytes in place and kept, under two names of one file or as two files.
+#[test]
+fn a_kept_table_takes_the_place_of_a_damaged_one_with_the_same_bytes() {
+    for storage in [Storage::OctoMap, Storage::Compact] {
+        for disk in [small(storage).0, small(storage).0.without_links()] {
+            let (_, map, digests) = small(storage);
+            revert(MapPath::on(disk.shared(), &map), &name("first"), None, |_, _| ()).unwrap();
+            let (whole, table) = (disk.copy(), TileFile::Table.name(storage));
+            let files = whole.files();
+            let is_twice = |path: &Path, bytes: &[u8]| {
+                let is_same = |(beside, kept): (&PathBuf, &Vec<u8>)| {
+                    beside.parent() == path.parent() && beside != path && kept == bytes
+                };
+                path.ends_with(table) && files.iter().any(is_same)
+            };
+            let tables: Vec<_> = files.iter().filter(|(path, bytes)| is_twice(path, bytes)).collect();
+            assert!(!tables.is_empty());
+            for (path, bytes) in tables {
+                check_restored(&whole, &map, (path, bytes), &digests, storage);
+            }
+        }
+    }
+}
+
+fn check_restored(
+    whole: &FaultyDisk,
+    map: &Path,
+    (path, bytes): (&PathBuf, &Vec<u8>),
+    digests: &[String],
+    storage: Storage,
+) {
+    let mut bad = bytes.clone();
+    bad[bytes.len() / 2] ^= 4;
+    let damaged = || {
+        let disk = whole.copy();
+        disk.put(path, &bad);
+        disk
+    };
+    let repaired = |disk: &FaultyDisk| repair(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap();
+    let check = |disk: &FaultyDisk, what: &str| {
+        let what = format!("{}, {storage}, {what}", path.display());
+        let kept = |(place, kept): (PathBuf, Vec<u8>)| place.starts_with("/map/quarantine") && kept == bad;
+        assert_eq!(disk.files()[path], *bytes, "{what}");
+        assert!(disk.files().into_iter().any(kept), "{what}");
+        assert!(verify(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
+        for (of, digest) in [(None, 0), (Some("first"), 0), (Some("second"), 1)] {
+            assert_eq!(digest_of(disk, map, of).unwrap(), digests[digest], "{what}, {of:?}");
+        }
+    };
+    let disk = damaged();
+    let repair_of_all = repaired(&disk);
+    assert!(repair_of_all.is_complete() && repair_of_all.actions > 0, "{}", path.display());
+    check(&disk, "at once");
+    for change in 0.. {
+        let disk = damaged();
+        disk.set_fault(Fault::Crashes(change));
+        let _ = repair(MapPath::on(disk.shared(), map), |_| (), |_, _| ());
+        if !disk.has_crashed() {
+            break;
+        }
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept] {
+            let disk = disk.after_crash(unsynced);
+            repaired(&disk);
+            check(&disk, &format!("after change {change}, {unsynced:?}"));
         }
     }
 }

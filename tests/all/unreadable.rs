@@ -148,3 +148,30 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
         }
     }
 }
+
+/// What can be read of a list of scans before a bad sector stays the list.
+#[test]
+fn a_bad_sector_of_the_list_of_scans_leaves_those_before_it() {
+    let path = map().join("scans.bin");
+    for storage in [Storage::OctoMap, Storage::Compact] {
+        for disk in [small(storage), small(storage).without_links()] {
+            let (before, list) = (digests(&disk).unwrap(), disk.files()[&path].clone());
+            // A header of 16 bytes, and records of 64.
+            disk.make_bytes_unreadable(&path, 16 + 2 * 64 + 5..16 + 2 * 64 + 6);
+            assert!(damaged(&disk, "before").contains(&path));
+            repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
+            assert_eq!(damaged(&disk, "after"), BTreeSet::new());
+            let numbers = || {
+                let reader = MapReader::open(MapPath::on(disk.shared(), map()), 2).unwrap();
+                reader.scans().unwrap().iter().map(|scan| scan.number).collect::<Vec<_>>()
+            };
+            assert_eq!(numbers(), [1, 2]);
+            assert_eq!(digests(&disk).unwrap(), before);
+            let is_kept =
+                |(path, bytes): (PathBuf, Vec<u8>)| path.starts_with("/map/quarantine") && bytes == list;
+            assert!(disk.files().into_iter().any(is_kept));
+            go_on(&disk, storage).unwrap();
+            assert_eq!(numbers(), [1, 2, 5]);
+        }
+    }
+}

@@ -39,12 +39,49 @@ impl<'a> Quarantine<'a> {
     ///
     /// A disk that refuses.
     pub fn take_copy(&self, path: &Path) -> Result<Option<PathBuf>> {
+        match self.copy(path) {
+            Err(error) if is_of_file(&error) => self.take(path).map(Some),
+            copied => copied,
+        }
+    }
+
+    /// Copies a file whose readable rest is still needed where it is; one that cannot be read gets another name here,
+    /// too. Returns where to; `None` if there is no file, or neither can be done: then it is to be taken once it is no
+    /// longer needed.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn keep(&self, path: &Path) -> Result<Option<PathBuf>> {
+        match self.copy(path) {
+            Err(error) if is_of_file(&error) => self.link(path),
+            copied => copied,
+        }
+    }
+
+    /// Gives a file another name here; returns which. `None` where a file has one name only.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn link(&self, path: &Path) -> Result<Option<PathBuf>> {
+        let to = self.place_for(path)?;
+        if self.disk.link(path, &to).is_err() {
+            return Ok(None);
+        }
+        self.sync(&self.layout.quarantine())?;
+        Ok(Some(to))
+    }
+
+    /// Copies a file; returns where to, `None` if there is no file.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses, among other things to give the file back.
+    pub fn copy(&self, path: &Path) -> Result<Option<PathBuf>> {
         let mut input = match self.disk.open(path) {
             Ok(input) => input,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) if error.kind() == io::ErrorKind::InvalidInput || is_of_medium(&error) => {
-                return self.take(path).map(Some);
-            }
             Err(error) => return Err(Error::io(path, "open", error)),
         };
         let to = self.place_for(path)?;
@@ -53,12 +90,9 @@ impl<'a> Quarantine<'a> {
             io::copy(&mut input, &mut out)?;
             out.sync()
         };
-        match copied() {
-            Err(error) if is_of_medium(&error) => {
-                let _ = self.disk.remove_file(&to);
-                return self.take(path).map(Some);
-            }
-            copied => copied.map_err(|error| Error::io(path, "copy to quarantine", error))?,
+        if let Err(error) = copied() {
+            let _ = self.disk.remove_file(&to);
+            return Err(Error::io(path, "copy to quarantine", error));
         }
         self.sync(&self.layout.quarantine())?;
         Ok(Some(to))
@@ -92,4 +126,9 @@ impl<'a> Quarantine<'a> {
     fn sync(&self, folder: &Path) -> Result<()> {
         self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
     }
+}
+
+/// Whether an error is about a file by itself: it cannot be read, or is none.
+fn is_of_file(error: &Error) -> bool {
+    matches!(error, Error::Io { cause, .. } if is_of_medium(cause) || cause.kind() == io::ErrorKind::InvalidInput)
 }

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 const HEADER_BYTES: u64 = 16;
 /// Magic, version, zeros.
-const HEADER: [u8; 16] = *b"VXTKEPT\0\x01\0\0\0\0\0\0\0";
+pub(super) const HEADER: [u8; 16] = *b"VXTKEPT\0\x01\0\0\0\0\0\0\0";
 /// Length, its complement and checksum of a record.
-const FRAME_BYTES: u64 = 12;
+pub(super) const FRAME_BYTES: u64 = 12;
 
 /// Reads a catalog in order, up to a flush.
 #[derive(Debug)]
@@ -227,10 +227,10 @@ pub(in crate::store) fn generation_of(
 
 /// A flush of a map that keeps its scans.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::store) struct KeptAsOf {
+pub(crate) struct KeptAsOf {
     pub(in crate::store) flush_number: u64,
     /// Number of its last scan.
-    pub(in crate::store) scan_number: u64,
+    pub(crate) scan_number: u64,
 }
 
 /// The kept scans of a map as of a flush, in order, without their points.

@@ -2,12 +2,17 @@
 
 use super::catalog::{KeptAsOf, KeptRecords, generation_of};
 use super::catalog_entry::{CatalogEntry, SegmentPlace};
+use super::catalog_salvage::{Salvaged, salvage_entries};
 use super::scan_keeper::{Catalog, remove_unneeded};
 use super::scan_list::read_scans;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::space::Point;
+use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
+use crate::store::snapshots::snapshot_file::Snapshot;
 use crate::store::tile_store::TileStore;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 impl TileStore {
     /// Whether the map keeps its scans.
@@ -113,7 +118,8 @@ impl TileStore {
         self.keeper.write(files, last_commit, before)
     }
 
-    fn last_commit(&self) -> KeptAsOf {
+    /// The last commit, as far as kept scans go.
+    pub(crate) fn last_commit(&self) -> KeptAsOf {
         let commits = self.versions.commits();
         KeptAsOf { flush_number: commits.flush_number, scan_number: commits.scan_number }
     }
@@ -135,6 +141,62 @@ impl TileStore {
         }
     }
 
+    /// The file of the catalog of the last commit, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub(crate) fn catalog_path(&self) -> Result<Option<PathBuf>> {
+        let generation = self.catalog_generation()?;
+        Ok(generation.map(|generation| self.layout().catalog(generation)))
+    }
+
+    /// The segments and catalogs that neither the map nor one of its snapshots needs, as far as their catalogs can be
+    /// read; the map needs these segments, or if none are given, those of its catalog.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses more than single files.
+    pub(crate) fn unneeded_scan_files(
+        &self,
+        snapshots: &[Snapshot],
+        segments: Option<&BTreeSet<u64>>,
+    ) -> Result<Vec<PathBuf>> {
+        let (disk, layout, last_commit) = (&**self.disk(), self.layout(), self.last_commit());
+        let folder = layout.kept_scans();
+        if disk.kind_at(&folder)?.is_none() {
+            return Ok(Vec::new());
+        }
+        let mut flushes: Vec<_> = snapshots.iter().filter_map(kept_as_of).collect();
+        let mut needed = segments.cloned().unwrap_or_default();
+        if segments.is_none() {
+            flushes.push(last_commit);
+        }
+        let mut generations = BTreeSet::new();
+        generations.extend(generation_of(disk, layout, last_commit.flush_number)?);
+        for as_of in flushes {
+            generations.extend(generation_of(disk, layout, as_of.flush_number)?);
+            salvage_entries(disk, layout, as_of, &mut |entry| {
+                if let Salvaged::Whole(CatalogEntry::Kept(scan)) = entry {
+                    needed.insert(scan.place.segment);
+                }
+                Ok(())
+            })?;
+        }
+        let mut names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;
+        names.sort_unstable();
+        names.retain(|name| match (Layout::generation_of(name), Layout::segment_of(name)) {
+            // A later one is being written.
+            (Some(generation), _) => {
+                generation <= last_commit.flush_number && !generations.contains(&generation)
+            }
+            (_, Some(segment)) => !needed.contains(&segment) && !self.keeper.is_writing(segment),
+            // Not voxtile's.
+            _ => false,
+        });
+        Ok(names.iter().map(|name| folder.join(name)).collect())
+    }
+
     /// Removes what neither the map nor a snapshot needs of kept scans.
     pub fn release_scans(&mut self) {
         self.remove_unneeded_scans();
@@ -153,6 +215,13 @@ impl TileStore {
         }
         Ok(())
     }
+}
+
+/// The flush of a snapshot, if it keeps its scans.
+fn kept_as_of(snapshot: &Snapshot) -> Option<KeptAsOf> {
+    let keeps_scans = snapshot.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
+    let (flush_number, scan_number) = (snapshot.commits.flush_number, snapshot.commits.scan_number);
+    keeps_scans.then_some(KeptAsOf { flush_number, scan_number })
 }
 
 /// What a map had before its scans were kept: its list of scans, and what is not in it.

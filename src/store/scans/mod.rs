@@ -11,6 +11,7 @@
 
 mod catalog;
 mod catalog_entry;
+mod catalog_salvage;
 mod codec;
 mod kept_scan_store;
 mod scan_keeper;
@@ -18,9 +19,9 @@ mod scan_list;
 mod scan_record;
 mod segment;
 
-pub(in crate::store) use catalog::KeptAsOf;
-pub(crate) use catalog::KeptRecords;
+pub(crate) use catalog::{KeptAsOf, KeptRecords};
 pub use catalog_entry::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace};
+pub(crate) use catalog_salvage::{Salvaged, salvage_entries};
 pub(super) use scan_keeper::ScanKeeper;
 pub(crate) use scan_keeper::check_points;
 pub(super) use scan_list::ScanList;

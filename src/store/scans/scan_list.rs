@@ -1,9 +1,10 @@
 use super::scan_record::{Entry, RECORD_BYTES, ScanRecord};
-use crate::error::{DecodeError, Error, FormatError, Result};
+use crate::error::{DecodeError, Error, FormatError, Result, is_of_medium};
 use crate::store::disk::Disk;
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
 use crate::store::recovery::quarantine::Quarantine;
+use crate::store::tile_store::TileStore;
 use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -120,6 +121,47 @@ impl ScanList {
         Ok(Extent { records: before.records + pending.len() as u64 })
     }
 
+    /// Writes what can be read of the file, from its beginning, to one that takes its place; the file itself goes to
+    /// quarantine. Returns what is in the list now, and where the file is.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    fn rewrite(&mut self, files: &MapFiles, committed: u64) -> Result<(Extent, Option<PathBuf>)> {
+        let (disk, layout) = (&**files.disk(), files.layout());
+        let (path, next, mut found) = (layout.scans(), layout.scans_next(), Extent::default());
+        match for_each_record(disk, layout, committed, &mut |_, _| found.records += 1) {
+            Err(DecodeError::Io(error))
+                if !is_of_medium(&error) && error.kind() != io::ErrorKind::InvalidInput =>
+            {
+                return Err(Error::io(&path, "read", error));
+            }
+            _ => {}
+        }
+        let copy = || {
+            let mut out = disk.create(&next)?;
+            io::copy(&mut disk.open(&path)?.take(found.bytes()), &mut out)?;
+            out.sync()
+        };
+        let quarantine = Quarantine::new(disk, layout);
+        let mut quarantined = None;
+        if found.records > 0 {
+            copy().map_err(|error| Error::io(&next, "write", error))?;
+            files.sync_map_folder()?;
+            // With another name it stays in place until the other takes its own.
+            quarantined = quarantine.link(&path)?;
+        }
+        if quarantined.is_none() && files.kind(&path)?.is_some() {
+            quarantined = Some(quarantine.take(&path)?);
+        }
+        if found.records > 0 {
+            files.rename(&next, &path)?;
+        }
+        files.sync_map_folder()?;
+        (self.committed, self.has_excess) = (Some(found), false);
+        Ok((found, quarantined))
+    }
+
     /// Where the file is as it was before damage was cut off, if it was.
     pub(in crate::store) fn quarantined(&self) -> Option<&Path> {
         self.quarantined.as_deref()
@@ -129,6 +171,21 @@ impl ScanList {
     pub(in crate::store) fn commit(&mut self, written: Extent, count: usize) {
         (self.committed, self.has_excess) = (Some(written), false);
         self.pending = self.pending.split_off(count.min(self.pending.len()));
+    }
+}
+
+impl TileStore {
+    /// Writes what can be read of the list of scans, from its beginning, to a file that takes the place of one that the
+    /// medium does not give back; returns where that is.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub(crate) fn rewrite_scans(&mut self) -> Result<Option<PathBuf>> {
+        let (list, quarantined) = self.scans.rewrite(&self.files, self.versions.commits().flush_number)?;
+        self.committer.set_scan_records(list.records);
+        self.write_metadata()?;
+        Ok(quarantined)
     }
 }
 
@@ -145,7 +202,8 @@ fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u6
         Err(DecodeError::Io(error)) => return Err(Error::io(&path, "read", error)),
         Err(DecodeError::Format(error)) => error.to_string(),
     };
-    let quarantined = Quarantine::new(disk, layout).take_copy(&path)?;
+    // Not moved where it cannot be copied: what is whole of it stays in place.
+    let quarantined = Quarantine::new(disk, layout).copy(&path)?;
     log::warn!(
         "{}: {damage}; the list goes on behind record {}{}",
         path.display(),

@@ -260,6 +260,20 @@ impl TileStore {
         Ok(())
     }
 
+    /// Puts a table that is kept under another name, and is the one that the log names, in place.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn put_kept_in_place(&mut self, tile: TileIndex, table: &Path) -> Result<()> {
+        self.link_next(tile, table)?;
+        let layout = self.layout();
+        let (next, current) = (layout.next(tile, TileFile::Table), layout.current(tile, TileFile::Table));
+        self.disk().sync_file(&next).map_err(|error| Error::io(&next, "sync", error))?;
+        self.files.rename(&next, &current)?;
+        self.files.sync_folder(&layout.tile_folder(tile))
+    }
+
     /// Makes a table of the tile that is whole under another name its next version: the same file where the file system
     /// has hard links, else a copy.
     ///

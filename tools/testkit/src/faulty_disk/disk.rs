@@ -4,6 +4,7 @@ use super::names::{Entry, Inode, Names};
 use super::state::State;
 use crate::random_scans::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use voxtile::store::Disk;
@@ -40,7 +41,7 @@ impl FaultyDisk {
             has_links: true,
             crashed: false,
             broken: BTreeSet::new(),
-            unreadable: BTreeSet::new(),
+            unreadable: BTreeMap::new(),
             opened: BTreeMap::new(),
         };
         Self { state: Arc::new(Mutex::new(state)) }
@@ -91,7 +92,12 @@ impl FaultyDisk {
 
     /// Makes the content of a file one that cannot be read; it can be renamed, replaced and removed.
     pub fn make_unreadable(&self, path: &Path) {
-        self.state().unreadable.insert(path.to_owned());
+        self.make_bytes_unreadable(path, 0..usize::MAX);
+    }
+
+    /// Does so with some bytes of a file: a bad sector.
+    pub fn make_bytes_unreadable(&self, path: &Path, bytes: Range<usize>) {
+        self.state().unreadable.insert(path.to_owned(), bytes);
     }
 
     /// The file or folder that [`Fault::Breaks`] has hit.

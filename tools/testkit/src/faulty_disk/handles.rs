@@ -19,11 +19,13 @@ impl Read for Reader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let mut state = self.disk.state();
         state.attempt(Kind::Reads, &self.path)?;
-        if state.unreadable.contains(&self.path) {
+        let bad = state.unreadable.get(&self.path).cloned().unwrap_or_default();
+        drop(state);
+        if bad.contains(&self.at) {
             return Err(medium_error());
         }
-        drop(state);
-        let count = (&self.bytes[self.at..]).read(buffer)?;
+        let end = if self.at < bad.start { bad.start.min(self.bytes.len()) } else { self.bytes.len() };
+        let count = (&self.bytes[self.at..end]).read(buffer)?;
         self.at += count;
         Ok(count)
     }

@@ -7,25 +7,31 @@ use std::path::Path;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 
 impl FaultyDisk {
-    fn open_file(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+    fn reader(&self, path: &Path) -> io::Result<Reader> {
         let mut state = self.state();
         state.attempt(Kind::Reads, path)?;
         let inode = state.file(path)?;
         let bytes = state.content(inode).seen.clone();
-        Ok(Box::new(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: None }))
+        Ok(Reader { disk: self.clone(), path: path.to_owned(), bytes, at: 0, shared: None })
     }
 }
 
 impl Disk for FaultyDisk {
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         *self.state().opened.entry(path.to_owned()).or_default() += 1;
-        self.open_file(path)
+        Ok(Box::new(self.reader(path)?))
     }
 
     fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
-        let mut input = self.open_file(path)?;
-        io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
-        Ok(input)
+        let has_bad_bytes = self.state().unreadable.contains_key(path);
+        let mut input = self.reader(path)?;
+        if has_bad_bytes {
+            // What lies before is passed over.
+            input.at = input.bytes.len().min(offset as usize);
+        } else {
+            io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
+        }
+        Ok(Box::new(input))
     }
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
@@ -118,8 +124,8 @@ impl Disk for FaultyDisk {
             _ => return Err(io::ErrorKind::AlreadyExists.into()),
         }
         state.unreadable.remove(to);
-        if state.unreadable.remove(from) {
-            state.unreadable.insert(to.to_owned());
+        if let Some(bytes) = state.unreadable.remove(from) {
+            state.unreadable.insert(to.to_owned(), bytes);
         }
         if entry == Entry::Folder {
             // What is on its way to the medium in a folder is so under the folder's new name.

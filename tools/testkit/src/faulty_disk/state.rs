@@ -4,6 +4,7 @@ use super::names::{Entry, Inode, NameChange, Names};
 use super::operation::{Kind, Verdict};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// What is on the disk, and what it does next.
@@ -24,8 +25,8 @@ pub(super) struct State {
     pub(super) crashed: bool,
     /// Files and folders that every operation fails on.
     pub(super) broken: BTreeSet<PathBuf>,
-    /// Files whose content cannot be read.
-    pub(super) unreadable: BTreeSet<PathBuf>,
+    /// Files of whose content some bytes cannot be read.
+    pub(super) unreadable: BTreeMap<PathBuf, Range<usize>>,
     /// How often each file was opened to be read from its beginning.
     pub(super) opened: BTreeMap<PathBuf, u64>,
 }

@@ -1,0 +1,260 @@
+//! What can still be read of a catalog that is damaged.
+
+use super::catalog::{FRAME_BYTES, HEADER, KeptAsOf, generation_of};
+use super::catalog_entry::CatalogEntry;
+use crate::error::{Error, FormatError, Result, is_of_medium};
+use crate::store::disk::{Disk, DiskRead};
+use crate::store::layout::Layout;
+use std::io::{self, BufReader, Read};
+use std::path::PathBuf;
+
+/// How far behind a record of no possible length the next one is looked for: no record is as long.
+const SEARCHED_BYTES: u64 = 16 << 20;
+
+/// An entry of a catalog that is damaged.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Salvaged {
+    /// One that is whole.
+    Whole(CatalogEntry),
+    /// What stands for those that are not.
+    Lost(CatalogEntry),
+}
+
+/// Passes on what can be read of the catalog as of a flush, in order. Records that are damaged are passed over, and
+/// where scans are missing for it, their numbers are passed on as those of unknown scans: numbers follow each other
+/// without a gap up to that of the flush. Returns what is damaged.
+///
+/// # Errors
+///
+/// A disk that refuses more than the catalog; errors of `put`.
+pub(crate) fn salvage_entries(
+    disk: &dyn Disk,
+    layout: &Layout,
+    as_of: KeptAsOf,
+    put: &mut dyn FnMut(Salvaged) -> Result<()>,
+) -> Result<Vec<Error>> {
+    let KeptAsOf { flush_number, scan_number } = as_of;
+    let Some(generation) = generation_of(disk, layout, flush_number)? else {
+        if scan_number == 0 {
+            return Ok(Vec::new());
+        }
+        put(Salvaged::Lost(CatalogEntry::Unlisted(1, scan_number)))?;
+        let reason = "the catalog of its kept scans is missing";
+        return Ok(vec![FormatError::at_offset(0, reason).in_map(&layout.kept_scans(), None)]);
+    };
+    let path = layout.catalog(generation);
+    let mut salvage =
+        Salvage { disk, path, as_of, last: 0, doubtful: None, has_hole: false, damage: Vec::new() };
+    salvage.read(put)?;
+    salvage.end(put)?;
+    Ok(salvage.damage)
+}
+
+struct Salvage<'a> {
+    disk: &'a dyn Disk,
+    path: PathBuf,
+    as_of: KeptAsOf,
+    /// Number of the last scan so far.
+    last: u64,
+    /// A damaged record that may be of a flush that did not come to its commit: whether a committed one follows tells.
+    doubtful: Option<Error>,
+    /// Whether something is missing before the next entry.
+    has_hole: bool,
+    damage: Vec<Error>,
+}
+
+/// What is found where a record begins.
+enum Found {
+    /// A record, the flush that commits it, and where the next one begins.
+    Record(CatalogEntry, u64, u64),
+    /// Damage, the number of the flush by what is left of it, and where the next record begins if its length tells.
+    Damage(&'static str, u64, Option<u64>),
+    End,
+}
+
+impl Salvage<'_> {
+    fn read(&mut self, put: &mut dyn FnMut(Salvaged) -> Result<()>) -> Result<()> {
+        let mut at = HEADER.len() as u64;
+        let Some(mut input) = self.begin()? else { return Ok(()) };
+        loop {
+            let found = find_record(&mut input, at);
+            match self.unless_unreadable(found, "read")?.unwrap_or(Found::End) {
+                Found::Record(entry, flush_number, next) if flush_number <= self.as_of.flush_number => {
+                    self.take(at, entry, put)?;
+                    at = next;
+                }
+                Found::Record(..) | Found::End => return Ok(()),
+                Found::Damage(reason, flush_number, next) => {
+                    let error = self.wrong(at, reason);
+                    if flush_number == 0 || flush_number > self.as_of.flush_number {
+                        self.doubtful.get_or_insert(error);
+                    } else {
+                        self.damage.push(error);
+                        self.has_hole = true;
+                    }
+                    if let Some(next) = next {
+                        at = next;
+                        continue;
+                    }
+                    let Some(next) = self.look_for_record(at + 1)? else { return Ok(()) };
+                    let reopened = self.disk.open_at(&self.path, next).map(BufReader::new);
+                    let Some(reopened) = self.unless_unreadable(reopened, "open")? else { return Ok(()) };
+                    (input, at) = (reopened, next);
+                }
+            }
+        }
+    }
+
+    /// Opens the catalog behind its header, which says nothing that its name does not say.
+    fn begin(&mut self) -> Result<Option<BufReader<Box<dyn DiskRead>>>> {
+        let opened = self.disk.open(&self.path).map(BufReader::new);
+        let Some(mut input) = self.unless_unreadable(opened, "open")? else { return Ok(None) };
+        let mut header = [0; HEADER.len()];
+        let is_there = read_whole(&mut input, &mut header);
+        let Some(is_there) = self.unless_unreadable(is_there, "read")? else { return Ok(None) };
+        if !is_there || header != HEADER {
+            self.damage.push(self.wrong(0, "not a catalog of kept scans"));
+        }
+        Ok(is_there.then_some(input))
+    }
+
+    /// Passes an entry on that is whole, behind what stands for those that are missing before it.
+    fn take(
+        &mut self,
+        at: u64,
+        entry: CatalogEntry,
+        put: &mut dyn FnMut(Salvaged) -> Result<()>,
+    ) -> Result<()> {
+        if let Some(error) = self.doubtful.take() {
+            self.damage.push(error);
+            self.has_hole = true;
+        }
+        if let Some((first, last)) = entry.numbers() {
+            let is_possible = first > self.last && last >= first && last <= self.as_of.scan_number;
+            if !is_possible || first > self.last + 1 && !self.has_hole {
+                self.damage.push(self.wrong(at, "its scans are not in order"));
+            }
+            if !is_possible {
+                return Ok(());
+            }
+            if first > self.last + 1 {
+                put(Salvaged::Lost(CatalogEntry::Unlisted(self.last + 1, first - 1)))?;
+            } else if self.has_hole {
+                put(Salvaged::Lost(lost_operation()))?;
+            }
+            (self.last, self.has_hole) = (last, false);
+        }
+        put(Salvaged::Whole(entry))
+    }
+
+    /// After what can be read: passes on what stands for the rest.
+    fn end(&mut self, put: &mut dyn FnMut(Salvaged) -> Result<()>) -> Result<()> {
+        let (last, scan_number) = (self.last, self.as_of.scan_number);
+        if last < scan_number {
+            if !self.has_hole {
+                let doubtful = self.doubtful.take();
+                let reason = format!("it ends with scan {last}, the map with scan {scan_number}");
+                let error = doubtful.unwrap_or_else(|| self.wrong(0, &reason));
+                self.damage.push(error);
+            }
+            put(Salvaged::Lost(CatalogEntry::Unlisted(last + 1, scan_number)))
+        } else if self.has_hole {
+            put(Salvaged::Lost(lost_operation()))
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Looks for the next whole record behind damage.
+    fn look_for_record(&mut self, from: u64) -> Result<Option<u64>> {
+        let mut bytes = Vec::new();
+        let read = self
+            .disk
+            .open_at(&self.path, from)
+            .and_then(|input| input.take(SEARCHED_BYTES).read_to_end(&mut bytes));
+        // What comes before that is searched all the same.
+        self.unless_unreadable(read, "read")?;
+        let is_record = |at: &usize| bytes.get(*at..).is_some_and(begins_with_record);
+        Ok((0..bytes.len()).find(is_record).map(|at| from + at as u64))
+    }
+
+    /// What was read; where the medium does not give it back, that is damage.
+    fn unless_unreadable<T>(&mut self, read: io::Result<T>, action: &'static str) -> Result<Option<T>> {
+        match read {
+            Ok(read) => Ok(Some(read)),
+            Err(error) => {
+                let is_of_file = is_of_medium(&error) || error.kind() == io::ErrorKind::InvalidInput;
+                let error = Error::io(&self.path, action, error);
+                if !is_of_file {
+                    return Err(error);
+                }
+                self.damage.push(error);
+                self.has_hole = true;
+                Ok(None)
+            }
+        }
+    }
+
+    fn wrong(&self, at: u64, reason: &str) -> Error {
+        FormatError::at_offset(at, reason).in_map(&self.path, None)
+    }
+}
+
+/// What stands for a damaged record that no scan is missing for.
+fn lost_operation() -> CatalogEntry {
+    CatalogEntry::Operation("one whose record was damaged".to_owned())
+}
+
+/// Reads what begins at an offset, which the input has come to.
+fn find_record(input: &mut BufReader<Box<dyn DiskRead>>, at: u64) -> io::Result<Found> {
+    let left = input.get_ref().file_bytes().saturating_sub(at);
+    let mut lengths = [0; 8];
+    if left < FRAME_BYTES || !read_whole(input, &mut lengths)? {
+        return Ok(Found::End);
+    }
+    let length = length_of(lengths).filter(|&length| u64::from(length) <= left - FRAME_BYTES);
+    // As far as the number of its flush, where nothing tells how long it is.
+    let bytes = length.map_or(size_of::<u64>().min((left - FRAME_BYTES) as usize), |length| length as usize);
+    let (mut payload, mut checksum) = (vec![0; bytes], [0; 4]);
+    if !read_whole(input, &mut payload)? || !read_whole(input, &mut checksum)? {
+        return Ok(Found::End);
+    }
+    let flush_number = payload.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    let Some(length) = length else {
+        return Ok(Found::Damage("a record of no possible length", flush_number, None));
+    };
+    let next = at + FRAME_BYTES + u64::from(length);
+    if crc32fast::hash(&payload) != u32::from_le_bytes(checksum) {
+        let reason = "the checksum of a record does not match";
+        return Ok(Found::Damage(reason, flush_number, Some(next)));
+    }
+    Ok(match CatalogEntry::read(&payload) {
+        Some((flush_number, entry)) => Found::Record(entry, flush_number, next),
+        None => Found::Damage("a record of a newer version", flush_number, Some(next)),
+    })
+}
+
+fn begins_with_record(bytes: &[u8]) -> bool {
+    let whole = || {
+        let (lengths, rest) = bytes.split_first_chunk()?;
+        let (payload, rest) = rest.split_at_checked(length_of(*lengths)? as usize)?;
+        let checksum = u32::from_le_bytes(*rest.first_chunk()?);
+        (crc32fast::hash(payload) == checksum && CatalogEntry::read(payload).is_some()).then_some(())
+    };
+    whole().is_some()
+}
+
+/// The length of a record, if its complement agrees.
+fn length_of(lengths: [u8; 8]) -> Option<u32> {
+    let [a, b, c, d, complement @ ..] = lengths;
+    let length = u32::from_le_bytes([a, b, c, d]);
+    (length == !u32::from_le_bytes(complement)).then_some(length)
+}
+
+/// Fills a buffer; false at the end of the file.
+fn read_whole(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
+    match input.read_exact(buffer) {
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        result => result.map(|()| true),
+    }
+}
