@@ -325,11 +325,11 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
         match self.kind(folder)? {
             Some(EntryKind::Folder) => {}
-            // If the log lists snapshots, or lists nothing at all, that has been told.
             Some(_) if self.listed.as_ref().is_some_and(SnapshotList::is_empty) => {
                 self.damage(folder, None, "something else has the name of the folder of snapshots");
                 return Ok(());
             }
+            // Where the log lists snapshots, or nobody knows whether it does, that has been told.
             _ => return Ok(()),
         }
         for name in self.list(folder)? {

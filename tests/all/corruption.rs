@@ -453,6 +453,19 @@ fn a_repair_without_a_log_loses_no_version_of_a_table() {
     STORAGES.into_iter().for_each(repair_without_a_log);
 }
 
+/// What is left of a map if the process dies at a change of a flush; `None` if the flush has fewer.
+fn after_a_crash_in_a_flush(storage: Storage, at: u64) -> Option<FaultyDisk> {
+    let disk = small_map(storage);
+    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
+    // Tiles that are there, and new ones.
+    for seed in [1, 5, 6] {
+        mapper.insert_scan(&scan(seed)).unwrap();
+    }
+    disk.set_fault(Fault::Crashes(at));
+    let _ = mapper.flush();
+    disk.has_crashed().then(|| disk.after_crash(Unsynced::Kept))
+}
+
 fn repair_without_a_log(storage: Storage) {
     let tables = |disk: &FaultyDisk| -> BTreeSet<Vec<u8>> {
         let files = disk.files().into_iter();
@@ -463,18 +476,7 @@ fn repair_without_a_log(storage: Storage) {
     };
     let mut crashes = 0;
     for at in 0.. {
-        let disk = small_map(storage);
-        let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
-        // Tiles that are there, and new ones.
-        for seed in [1, 5, 6] {
-            mapper.insert_scan(&scan(seed)).unwrap();
-        }
-        disk.set_fault(Fault::Crashes(at));
-        let _ = mapper.flush();
-        if !disk.has_crashed() {
-            break;
-        }
-        let left = disk.after_crash(Unsynced::Kept);
+        let Some(left) = after_a_crash_in_a_flush(storage, at) else { break };
         left.take(Path::new("/map/commits.log"));
         let before: BTreeSet<_> = tables(&left);
         let repaired = repair(&left).unwrap();
@@ -503,17 +505,7 @@ fn a_repair_without_a_log_completes_the_last_commit_and_forgets_the_input() {
         let log = Path::new("/map/commits.log");
         let mut crashes = 0;
         for at in 0.. {
-            let disk = small_map(storage);
-            let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
-            for seed in [1, 5, 6] {
-                mapper.insert_scan(&scan(seed)).unwrap();
-            }
-            disk.set_fault(Fault::Crashes(at));
-            let _ = mapper.flush();
-            if !disk.has_crashed() {
-                break;
-            }
-            let left = disk.after_crash(Unsynced::Kept);
+            let Some(left) = after_a_crash_in_a_flush(storage, at) else { break };
             let files = left.files();
             if !String::from_utf8_lossy(&files[Path::new("/map/metadata.json")])
                 .contains("\"scan_number\": 5")
