@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
-use tempfile::TempDir;
+use testkit::memory_folder::memory_folder;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
@@ -93,7 +93,7 @@ fn ask(reader: &LiveReader, naive: &[Voxels], is_over: &AtomicBool, seed: u64) -
 }
 
 fn beside_each_other(seed: u64, config: &MapConfig) -> (u64, u64) {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let path = folder.path().join("map");
     let scans = scans(seed);
     let naive = naive_maps(config, &scans);
@@ -154,7 +154,7 @@ fn readers_beside_the_mapper_see_whole_scans() {
 
 #[test]
 fn a_view_that_holds_too_much_expires_and_the_next_does_not() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap().with_tight_memory_bytes(40_000);
     let disk = UnsyncedDisk::shared();
     let mut mapper =
@@ -205,7 +205,7 @@ fn answers_during(reader: &LiveReader, work: impl FnOnce() + Send) -> u64 {
 
 #[test]
 fn a_reader_waits_for_no_flush() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap();
     let disk = UnsyncedDisk::taking(Duration::from_millis(150));
     let mut mapper =
@@ -219,7 +219,7 @@ fn a_reader_waits_for_no_flush() {
 
 #[test]
 fn a_reader_waits_for_no_disk_read_of_the_mapper() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap();
     let path = folder.path().join("map");
     let mut mapper = OutOfCoreTileMapper::create(&path, config.clone()).unwrap();

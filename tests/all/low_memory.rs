@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 use std::time::Duration;
-use tempfile::TempDir;
+use testkit::memory_folder::memory_folder;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::simulation::Survey;
 use voxtile::{
@@ -21,7 +21,7 @@ fn scans(count: usize) -> Vec<Scan> {
 
 #[test]
 fn tiles_ahead_are_fetched_before_they_are_needed() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let path = folder.path().join("map");
     let config = config().with_memory_bytes(64 << 20);
     let scans = scans(30);
@@ -49,7 +49,7 @@ fn tiles_ahead_are_fetched_before_they_are_needed() {
 /// What an operator sees: everything is counted, and adds up.
 #[test]
 fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let scans = scans(60);
     let mut expected = InMemoryMapper::new(config()).unwrap();
     const BYTES: usize = 900_000;
@@ -89,7 +89,7 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
 /// in memory, and tiles would be read and written again for them, the more of them the longer the way.
 #[test]
 fn tiles_that_are_left_behind_take_their_updates_with_them() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap().with_range(0.0, 20.0);
     let scans: Vec<Scan> = Survey::tour(3, 1_000).take(240).collect();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
@@ -116,7 +116,7 @@ fn tiles_that_are_left_behind_take_their_updates_with_them() {
 fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
     let scans = scans(12);
     for bytes in [100_000, 300_000] {
-        let folder = TempDir::new().unwrap();
+        let folder = memory_folder();
         let path = folder.path().join("map");
         let tight = config().with_tight_memory_bytes(bytes);
         let disk = UnsyncedDisk::slow_beside(Duration::from_millis(3));
@@ -138,7 +138,7 @@ fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
 /// counts all the same, for queries as for the map.
 #[test]
 fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = MapConfig::new(0.1, 6.4).unwrap().with_range(0.0, 20.0);
     let scans: Vec<Scan> = (0..3).flat_map(|_| scans(20)).collect();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
@@ -175,7 +175,7 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
 #[test]
 fn a_flush_that_stands_still_stops_no_scan() {
     const BYTES: usize = 6_000_000;
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let path = folder.path().join("map");
     let scans = scans(60);
     let mut expected = InMemoryMapper::new(config()).unwrap();
@@ -219,7 +219,7 @@ fn a_flush_that_stands_still_stops_no_scan() {
 
 #[test]
 fn tables_that_are_kept_for_a_reader_count_as_memory() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let index_bytes = |name: &str, is_read: bool| {
         let map = folder.path().join(name);
         let mut mapper =

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use tempfile::TempDir;
+use testkit::memory_folder::memory_folder;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
@@ -73,7 +73,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             (10_000, 0, Compact),
         ];
         for (cache_tiles, write_buffer_bytes, storage) in kinds {
-            let folder = TempDir::new().unwrap();
+            let folder = memory_folder();
             let config =
                 config.clone().with_cache_tiles(cache_tiles).with_write_buffer_bytes(write_buffer_bytes);
             let config = config.with_storage(storage);
@@ -273,7 +273,7 @@ fn an_echo_without_weight_is_no_evidence_for_its_voxel() {
 
 #[test]
 fn dirty_tiles_and_saved_tiles_are_told() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = config().with_cache_tiles(2);
     let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
     let points: Vec<_> = (0..5).map(|k| [1.6 * f64::from(k) + 0.6, 0.6, 0.6]).collect();
@@ -297,7 +297,7 @@ fn dirty_tiles_and_saved_tiles_are_told() {
 
 #[test]
 fn tiles_in_use_stay_and_others_leave() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = config().with_cache_tiles(2);
     let mut mapper =
         OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), folder.path().join("map")), config)
@@ -319,7 +319,7 @@ fn tiles_in_use_stay_and_others_leave() {
 
 #[test]
 fn keys_on_disk_are_octomaps_and_in_morton_order() {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config()).unwrap();
     mapper.insert_scan(&random_scan(&mut Random(3), [0.6; 3], 50)).unwrap();
     mapper.flush().unwrap();

@@ -1,4 +1,4 @@
-use tempfile::TempDir;
+use testkit::memory_folder::memory_folder;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
@@ -10,7 +10,7 @@ use voxtile::{
 
 /// One random life of a map beside the naive one, which is set back to the last flush where the map crashes.
 fn live(seed: u64, config: &MapConfig) {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let path = folder.path().join("map");
     let mut random = Random(seed);
     let mut mapper =

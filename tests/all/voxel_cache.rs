@@ -1,5 +1,5 @@
 use std::collections::{BTreeMap, BTreeSet};
-use tempfile::TempDir;
+use testkit::memory_folder::memory_folder;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
@@ -80,7 +80,7 @@ fn every_mode_gives_the_naive_map_and_its_maxima_whatever_the_threads_and_the_ma
                 drive(&mut in_memory, &mut reference, 3);
                 assert_eq!(voxels_of(&in_memory), reference.voxels, "{mode:?}");
 
-                let folder = TempDir::new().unwrap();
+                let folder = memory_folder();
                 let path = folder.path().join("map");
                 let config = config.clone().with_cache_tiles(3).with_write_buffer_bytes(3000);
                 let mut reference = ReferenceMap::new(&config);
@@ -127,7 +127,7 @@ fn the_map_of_a_street_is_the_same_with_any_octree() {
 
 /// One random life of a map with little room, beside the naive one.
 fn live(seed: u64, mode: VoxelCacheMode) {
-    let folder = TempDir::new().unwrap();
+    let folder = memory_folder();
     let path = folder.path().join("map");
     let insert_mode = [InsertMode::PerScan, InsertMode::PerRay][seed as usize % 2];
     let config = config()

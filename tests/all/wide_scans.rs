@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::memory_folder::memory_folder;
 use testkit::random_scans::{Random, random_scan};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::{
@@ -142,7 +143,7 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
 /// as a whole, and is no reason to refuse the next one.
 #[test]
 fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on() {
-    let folder = tempfile::TempDir::new().unwrap();
+    let folder = memory_folder();
     let config = MapConfig::new(0.1, 0.2).unwrap();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
     let bytes = MemoryLimit::least_bytes(&config.grid);

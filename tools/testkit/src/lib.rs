@@ -2,12 +2,15 @@
 //!
 //! - what a clever part must equal: [`reference_map`], [`reference_local`];
 //! - what goes wrong: [`faulty_disk`], [`lossy_link`];
-//! - what they work on: [`random_scans`], [`unsynced_disk`], [`planner`].
+//! - what they work on: [`random_scans`], [`unsynced_disk`], [`memory_folder`],
+//!   [`planner`].
 
 #[allow(missing_docs)]
 pub mod faulty_disk;
 #[allow(missing_docs)]
 pub mod lossy_link;
+#[allow(missing_docs)]
+pub mod memory_folder;
 #[allow(missing_docs)]
 pub mod planner;
 #[allow(missing_docs)]
