@@ -1,14 +1,15 @@
 use super::pcd_clouds::PcdClouds;
 use super::pcd_folder::{PcdFolder, pcd_files_of};
-use super::pose_source::{IDENTITY, pose_file_for};
+use super::pose_source::{IDENTITY, is_placed, pose_file_for};
 use super::posed_clouds::{CloudPoses, PosedClouds};
-use super::poses::read_poses;
+use super::poses::Poses;
 use super::read_options::ReadOptions;
 use super::source::{ScanSource, open_scans};
 use crate::error::{Error, Result};
+use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
 use voxtile_clouds::poses::Trajectory;
-use voxtile_clouds::read::{self, Format};
+use voxtile_clouds::read::{self, Format, FromOrigin};
 use voxtile_clouds::{CloudSource, stamp_of_name};
 
 /// Opens scans of any known format: what [`open_scans`] takes, point clouds and recordings of other programs. What the
@@ -46,9 +47,11 @@ fn open_all(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
             read::open(path, &open)?
         }
     };
-    let has_own =
-        matches!(format, Format::Bag1 | Format::Mcap | Format::Db3 | Format::Bag2Folder | Format::E57)
-            || options.open.sensor_origin_m.is_some();
+    let has_own = match format {
+        Format::Bag1 | Format::Mcap | Format::Db3 | Format::Bag2Folder | Format::E57 => true,
+        Format::DepthImages => has_pose_beside_an_image(path),
+        _ => false,
+    } || options.open.sensor_origin_m.is_some();
     let poses = poses_for(path, options, has_own, source.len_hint())?;
     Ok(Box::new(PosedClouds::new(source, path, poses, options.clouds.clone())?))
 }
@@ -78,25 +81,56 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<(PathBuf, Format)> {
     }
 }
 
+/// Whether depth images have files with their poses, as those of 7-Scenes have.
+fn has_pose_beside_an_image(folder: &Path) -> bool {
+    let is_pose = |entry: DirEntry| entry.file_name().to_string_lossy().ends_with(".pose.txt");
+    fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(is_pose))
+}
+
 fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     let files = if path.is_dir() { pcd_files_of(path)? } else { vec![path.to_owned()] };
-    let poses = options.poses.as_deref();
-    // A line a file, as ever, unless the names of all files are time stamps.
-    let are_by_line = poses.is_none_or(|poses| {
-        poses == Path::new(IDENTITY)
-            || files.iter().any(|file| stamp_of_name(file).is_none())
-            || read_poses(poses).is_ok_and(|poses| poses.len() == files.len())
-    });
-    if are_by_line && options.calib.is_none() && options.clouds.is_plain() {
+    let count = files.len() as u64;
+    let origin_m = options.open.sensor_origin_m;
+    let pose_file = match options.poses.as_deref() {
+        Some(poses) => Some(poses).filter(|poses| *poses != Path::new(IDENTITY)).map(Path::to_owned),
+        // A pose file beside a single PCD file belongs to its whole folder.
+        None => path.is_dir().then(|| pose_file_for(path)).flatten(),
+    };
+    let are_named = options.poses.is_some() || pose_file.is_some();
+    let have_own = !are_named && (count == 1 || files.iter().any(|file| is_placed(file)));
+    let are_missing = !are_named && !have_own && options.clouds.may_lack_poses;
+    let is_plain = options.calib.is_none() && options.clouds.is_plain() && origin_m.is_none();
+    let are_by_line = pose_file.as_deref().is_none_or(|poses| are_line_by_line(poses, &files));
+    if is_plain && are_by_line && !are_missing {
+        let poses = options.poses.as_deref();
         return match path.is_dir() {
             true => Ok(Box::new(PcdFolder::open(path, poses)?)),
             false => Ok(Box::new(PcdFolder::open_file(path, poses)?)),
         };
     }
-    let count = files.len() as u64;
-    let poses = poses_for(path, options, count == 1, Some(count))?;
-    let clouds = Box::new(PcdClouds::new(files, options.open.scratch.as_deref()));
+    let poses = poses_for(path, options, have_own || origin_m.is_some(), Some(count))?;
+    let clouds = Box::new(PcdClouds::new(files, options.open.scratch.as_deref(), origin_m.is_none()));
+    let clouds: Box<dyn CloudSource> = match origin_m {
+        Some(origin_m) => Box::new(FromOrigin::new(clouds, origin_m)?),
+        None => clouds,
+    };
     Ok(Box::new(PosedClouds::new(clouds, path, poses, options.clouds.clone())?))
+}
+
+/// Whether the lines of a file of poses are those of the files, one by one. They are not where stamps tell otherwise, and
+/// where the file is of a form that only [`Trajectory`] reads.
+fn are_line_by_line(poses: &Path, files: &[PathBuf]) -> bool {
+    let trajectory = Trajectory::read(poses, None);
+    let Ok(lines) = Poses::read(poses) else {
+        // What is wrong with a file that is no text of poses, is told line by line.
+        return trajectory.is_err();
+    };
+    let names: Option<Vec<i64>> = files.iter().map(|file| stamp_of_name(file)).collect();
+    let span_ns = trajectory.ok().and_then(|trajectory| trajectory.span_ns());
+    let (Some(names), Some([first_ns, last_ns])) = (names, span_ns) else { return true };
+    // Clocks of which neither knows the other tell nothing.
+    let are_apart = !names.iter().any(|name| (first_ns..=last_ns).contains(name));
+    lines.len() == files.len() && (are_apart || lines.have_stamps(&names))
 }
 
 /// Where the poses of an input come from; some formats bring their own.

@@ -1,5 +1,6 @@
 use super::file_order::name_of;
 use super::pcd::read_pcd_file;
+use super::pcd_viewpoint::viewpoint_of_file;
 use super::point_store::{PointRoom, PointStore};
 use std::path::{Path, PathBuf};
 use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose, stamp_of_name};
@@ -7,6 +8,8 @@ use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose, stamp_of_nam
 /// PCD files as clouds, for poses and options that [`PcdFolder`](super::pcd_folder::PcdFolder) does not know.
 pub(super) struct PcdClouds {
     files: Vec<PathBuf>,
+    /// Whether a `VIEWPOINT` at the origin is where the file was taken.
+    takes_identity: bool,
     next: usize,
     points: PointStore,
 }
@@ -16,10 +19,10 @@ const ROOM_BYTES: usize = 64 << 20;
 
 impl PcdClouds {
     /// Points beyond the room go to a file in `scratch`; `None` is the system's folder for temporary files.
-    pub(super) fn new(files: Vec<PathBuf>, scratch: Option<&Path>) -> Self {
+    pub(super) fn new(files: Vec<PathBuf>, scratch: Option<&Path>, takes_identity: bool) -> Self {
         let folder = scratch.map_or_else(std::env::temp_dir, Path::to_owned);
         let points = PointStore::new(PointRoom::new(ROOM_BYTES, &folder));
-        Self { files, next: 0, points }
+        Self { files, takes_identity, next: 0, points }
     }
 }
 
@@ -42,8 +45,14 @@ impl CloudSource for PcdClouds {
         head.stamp_ns = stamp_of_name(path);
         head.points = Some(self.points.len() as u64);
         head.has_intensities = self.points.has_intensities();
+        let told = viewpoint_of_file(path);
+        let is_pose = match self.takes_identity {
+            // One file alone need not tell.
+            true => told.is_some() || self.files.len() == 1,
+            false => told.is_some_and(|told| !told.is_identity()),
+        };
         let pose = RigidPose { position_m: viewpoint.position_m(), quaternion: viewpoint.quaternion() };
-        head.world_from_sensor = Some(pose);
+        head.world_from_sensor = is_pose.then_some(pose);
         Ok(Some(head))
     }
 

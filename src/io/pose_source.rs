@@ -64,15 +64,18 @@ pub(super) fn poses_of(
         poses.check(&path, files)?;
         return Ok((PoseSource::File(path), Some(poses.into_poses())));
     }
-    let is_placed =
-        |path: &PathBuf| viewpoint_of_file(path).is_some_and(|viewpoint| !viewpoint.is_identity());
-    if files.iter().any(is_placed) {
+    if files.iter().any(|path| is_placed(path)) {
         return Ok((PoseSource::Viewpoint, None));
     }
     if files.len() > 1 {
         return Err(no_poses(files, folder));
     }
     Ok((PoseSource::Identity, None))
+}
+
+/// Whether the `VIEWPOINT` of a PCD file tells where it was taken: writers without a pose write the identity.
+pub(super) fn is_placed(path: &Path) -> bool {
+    viewpoint_of_file(path).is_some_and(|viewpoint| !viewpoint.is_identity())
 }
 
 fn no_poses(files: &[PathBuf], folder: Option<&Path>) -> Error {

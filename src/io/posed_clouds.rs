@@ -130,7 +130,7 @@ impl PosedClouds {
                 Err("neither the input has poses nor a file of them was named".to_owned())
             }
             (CloudPoses::Source, _) => {
-                head.world_from_sensor.ok_or_else(|| "the recording has none at its time".to_owned())
+                head.world_from_sensor.ok_or_else(|| "the input has none for it".to_owned())
             }
             (CloudPoses::File(_, trajectory), Some(stamp_ns)) if trajectory.span_ns().is_some() => {
                 match trajectory.at(stamp_ns, tolerance_ns) {
@@ -317,11 +317,15 @@ impl ScanSource for PosedClouds {
         self.is_at_end = true;
         if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {
             // A map of nothing would be no answer.
+            let mut why = self.why_without_pose();
+            if matches!(self.poses, CloudPoses::Source) {
+                // The source knows what its own poses lack.
+                why = self.source.remarks().into_iter().fold(why, |why, remark| why + "; " + &remark);
+            }
             let reason = format!(
-                "none of its {} clouds has a pose ({}); name a file of poses with --poses FILE, or map points alone \
+                "none of its {} clouds has a pose ({why}); name a file of poses with --poses FILE, or map points alone \
                      with --no-rays",
-                self.without_pose,
-                self.why_without_pose()
+                self.without_pose
             );
             return Err(Error::argument(self.path.display().to_string(), reason));
         }
@@ -345,7 +349,8 @@ impl ScanSource for PosedClouds {
     }
 
     fn pass_unread(&mut self) -> bool {
-        true
+        // Behind the end there is no scan that could be passed.
+        !self.is_at_end
     }
 
     fn pose_source(&self) -> PoseSource {

@@ -26,6 +26,9 @@ mod cli_log;
 /// Pictures, in files and for terminals, and reports.
 #[cfg(feature = "cli")]
 mod cli_pictures;
+/// Poses that come with files, beside them or by options.
+#[cfg(feature = "cli")]
+mod cli_poses;
 /// Maps of a region from the command line.
 #[cfg(feature = "cli")]
 mod cli_region;

@@ -1,10 +1,10 @@
 use super::one::Visit;
 use crate::cloud::{CloudHead, CloudSource};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::pose::RigidPose;
 
 /// Clouds that are registered already, seen from where the sensor was.
-pub(super) struct FromOrigin {
+pub struct FromOrigin {
     source: Box<dyn CloudSource>,
     origin_m: [f64; 3],
     /// A cloud that knows its own pose keeps it.
@@ -12,8 +12,16 @@ pub(super) struct FromOrigin {
 }
 
 impl FromOrigin {
-    pub(super) fn new(source: Box<dyn CloudSource>, origin_m: [f64; 3]) -> Self {
-        Self { source, origin_m, is_posed: false }
+    /// Points in the frame of the file, in metres, and where the sensor stood in it.
+    ///
+    /// # Errors
+    ///
+    /// An origin that is not finite.
+    pub fn new(source: Box<dyn CloudSource>, origin_m: [f64; 3]) -> Result<Self> {
+        if !origin_m.iter().all(|axis| axis.is_finite()) {
+            return Err(Error::argument("sensor origin", "must be three finite numbers in metres"));
+        }
+        Ok(Self { source, origin_m, is_posed: false })
     }
 }
 

@@ -43,6 +43,7 @@ mod text_line;
 mod wkt;
 
 pub use format::Format;
+pub use from_origin::FromOrigin;
 pub use intrinsics::Intrinsics;
 pub use open::open;
 pub use options::OpenOptions;

@@ -27,7 +27,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> 
     let source =
         if path.is_dir() { open_folder(path, format, options)? } else { open_file(path, format, options)? };
     Ok(match options.sensor_origin_m {
-        Some(origin_m) => Box::new(FromOrigin::new(source, origin_m)),
+        Some(origin_m) => Box::new(FromOrigin::new(source, origin_m)?),
         None => source,
     })
 }
@@ -38,9 +38,6 @@ fn check(options: &OpenOptions) -> Result<()> {
             "scan period",
             "must be seconds from 0 on; 0 leaves a file in one cloud",
         ));
-    }
-    if options.sensor_origin_m.is_some_and(|origin| !origin.iter().all(|axis| axis.is_finite())) {
-        return Err(Error::argument("sensor origin", "must be three finite numbers in metres"));
     }
     if options.depth_scale.is_some_and(|scale| !(scale > 0.0 && scale.is_finite())) {
         return Err(Error::argument("depth scale", "must be above 0: the units of a depth image in a metre"));

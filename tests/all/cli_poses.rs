@@ -1,0 +1,180 @@
+//! Poses that come with files, beside them or by options, by the command.
+
+use assert_cmd::Command;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn voxtile(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("voxtile").unwrap();
+    command.args(arguments);
+    command
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn refusal(arguments: &[&str]) -> String {
+    let output = voxtile(arguments).output().unwrap();
+    assert!(!output.status.success(), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// Where the scans of an input were taken, along x, after it was mapped.
+fn origins_m(folder: &TempDir, input: &Path, options: &[&str]) -> Vec<f64> {
+    let map = folder.path().join("map");
+    let built = voxtile(&[&["build", text(input), "-o", text(&map)], options].concat()).output().unwrap();
+    assert!(built.status.success(), "{options:?}: {}", String::from_utf8_lossy(&built.stderr));
+    let told = voxtile(&["scans", text(&map), "--each", "--json"]).output().unwrap().stdout;
+    fs::remove_dir_all(&map).unwrap();
+    let scans = std::str::from_utf8(&told).unwrap().lines();
+    let scans = scans.map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
+}
+
+/// PCD files of one point, each with its name and the x of its `VIEWPOINT`.
+fn pcd_files(folder: &Path, files: &[(&str, f64)]) -> PathBuf {
+    let scans = folder.join("scans");
+    fs::create_dir(&scans).unwrap();
+    for (name, x_m) in files {
+        let head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n";
+        let text = format!("{head}VIEWPOINT {x_m} 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n4 0 0\n");
+        fs::write(scans.join(format!("{name}.pcd")), text).unwrap();
+    }
+    scans
+}
+
+#[test]
+fn depth_images_of_7_scenes_have_the_poses_beside_them() {
+    let folder = TempDir::new().unwrap();
+    let scans = folder.path().join("seq-01");
+    fs::create_dir(&scans).unwrap();
+    fs::write(scans.join("camera-intrinsics.txt"), "100 0 1\n0 100 1\n0 0 1\n").unwrap();
+    for number in 0..3 {
+        let file = File::create(scans.join(format!("frame-00000{number}.depth.png"))).unwrap();
+        let mut encoder = png::Encoder::new(file, 2, 2);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        encoder.write_header().unwrap().write_image_data(&1000_u16.to_be_bytes().repeat(4)).unwrap();
+        let pose = format!("1 0 0 {number}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+        fs::write(scans.join(format!("frame-00000{number}.pose.txt")), pose).unwrap();
+    }
+    assert_eq!(origins_m(&folder, &scans, &[]), [0.0, 1.0, 2.0]);
+    // One image, too.
+    for number in [0, 2] {
+        fs::remove_file(scans.join(format!("frame-00000{number}.depth.png"))).unwrap();
+    }
+    assert_eq!(origins_m(&folder, &scans, &[]), [1.0]);
+    for number in 0..3 {
+        fs::remove_file(scans.join(format!("frame-00000{number}.pose.txt"))).unwrap();
+    }
+    assert_eq!(origins_m(&folder, &scans, &[]), [0.0]);
+}
+
+/// As many poses as files, which begin later: a file takes the pose at its time, not that of its number.
+#[test]
+fn pcd_files_with_stamps_take_poses_by_time() {
+    let folder = TempDir::new().unwrap();
+    let names: Vec<String> = (0..4).map(|k| format!("1700000000.{k}")).collect();
+    let files: Vec<(&str, f64)> = names.iter().map(|name| (&**name, 0.0)).collect();
+    let scans = pcd_files(folder.path(), &files);
+    let poses = |first: i32| -> String {
+        (first..first + 4)
+            .map(|k| format!("{}.{} {k} 0 0 0 0 0 1\n", 1_700_000_000 + k / 10, k % 10))
+            .collect()
+    };
+    let file = folder.path().join("slam.txt");
+    fs::write(&file, poses(2)).unwrap();
+    assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [2.0, 3.0]);
+    fs::write(&file, poses(0)).unwrap();
+    assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [0.0, 1.0, 2.0, 3.0]);
+    // More poses than files, beside them.
+    fs::write(folder.path().join("poses_tum.txt"), poses(0) + &poses(4)).unwrap();
+    assert_eq!(origins_m(&folder, &scans, &[]), [0.0, 1.0, 2.0, 3.0]);
+    // Clocks that know nothing of each other.
+    fs::write(&file, "5 7 0 0 0 0 0 1\n6 8 0 0 0 0 0 1\n7 9 0 0 0 0 0 1\n8 10 0 0 0 0 0 1\n").unwrap();
+    assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [7.0, 8.0, 9.0, 10.0]);
+}
+
+#[test]
+fn pcd_files_take_every_form_of_poses() {
+    let folder = TempDir::new().unwrap();
+    let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 0.0)]);
+    let file = folder.path().join("poses.csv");
+    let option = ["--poses", text(&file)];
+    for text in [
+        "timestamp,x,y,z,qx,qy,qz,qw\n1,5,0,0,0,0,0,1\n2,6,0,0,0,0,0,1\n",
+        "\u{feff}# of an editor on Windows\r\n1 5 0 0 0 0 0 1\r\n2 6 0 0 0 0 0 1\r\n",
+        "\u{feff}1 5 0 0 0 0 0 1\n2 6 0 0 0 0 0 1\n",
+        "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 0 0 6\n0 1 0 0\n0 0 1 0\n0 0 0 1\n",
+    ] {
+        fs::write(&file, text).unwrap();
+        assert_eq!(origins_m(&folder, &scans, &option), [5.0, 6.0], "{text}");
+    }
+    fs::write(&file, "1 5 0 0 0 0 0 1\n2 six 0 0 0 0 0 1\n").unwrap();
+    let map = folder.path().join("map");
+    let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
+    assert!(told.contains("line 2") && told.contains("`six` is not a number"), "{told}");
+}
+
+#[test]
+fn a_viewpoint_is_the_pose_whatever_else_is_said() {
+    let folder = TempDir::new().unwrap();
+    let scans = pcd_files(folder.path(), &[("0", 3.0), ("1", 5.0)]);
+    assert_eq!(origins_m(&folder, &scans, &[]), [3.0, 5.0]);
+    assert_eq!(origins_m(&folder, &scans, &["--world-frame"]), [3.0, 5.0]);
+    assert_eq!(origins_m(&folder, &scans, &["--extrinsic", "1", "0", "0", "0", "0", "0", "1"]), [4.0, 6.0]);
+}
+
+#[test]
+fn pcd_files_are_seen_from_where_the_sensor_stood() {
+    let folder = TempDir::new().unwrap();
+    let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 0.0)]);
+    let map = folder.path().join("map");
+    assert_eq!(origins_m(&folder, &scans, &["--sensor-origin", "2", "0", "0"]), [2.0, 2.0]);
+    let alone = scans.join("0.pcd");
+    let options = ["--sensor-origin", "2", "0", "0", "--resolution", "0.5"];
+    assert!(
+        voxtile(&[&["build", text(&alone), "-o", text(&map)], &options[..]].concat())
+            .output()
+            .unwrap()
+            .status
+            .success()
+    );
+    // The point stays where it is, and the ray begins at the sensor.
+    let state = |x: &str| {
+        let told = voxtile(&["query", text(&map), x, "0", "0", "--json"]).output().unwrap().stdout;
+        serde_json::from_slice::<serde_json::Value>(&told).unwrap()["state"].clone()
+    };
+    assert_eq!([state("4.1"), state("3.1"), state("1.1")], ["occupied", "free", "unknown"]);
+}
+
+#[test]
+fn pcd_files_without_poses_are_listed_and_mapped_without_rays() {
+    let folder = TempDir::new().unwrap();
+    let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 0.0)]);
+    let map = folder.path().join("map");
+    let told = refusal(&["build", text(&scans), "-o", text(&map)]);
+    assert!(told.contains("2 scans and no poses"), "{told}");
+    assert_eq!(origins_m(&folder, &scans, &["--no-rays"]).len(), 2);
+    let told = voxtile(&["scans", text(&scans)]).output().unwrap();
+    assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
+}
+
+/// The reason is told once, and no empty map is left.
+#[test]
+fn an_input_without_any_pose_makes_no_map_of_bad_scans() {
+    let folder = TempDir::new().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for stamp in ["1600000000.0", "1600000001.0"] {
+        fs::write(scans.join(format!("{stamp}.xyz")), "4 0 0\n4 1 0\n").unwrap();
+    }
+    let poses = folder.path().join("poses.txt");
+    fs::write(&poses, "1284035200 0 0 1 0 0 0 1\n1284035210 0 0 1 0 0 0 1\n").unwrap();
+    let map = folder.path().join("map");
+    let told = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
+    assert_eq!(told.matches("none of its 2 clouds has a pose").count(), 1, "{told}");
+    assert!(!map.exists());
+}
