@@ -299,7 +299,7 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
         assert!(told.contains(part), "{told}");
     }
     // One is enough.
-    fs::write(&poses, "1599999999 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
+    fs::write(&poses, "1599999999.5 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("other");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
     let told = output(&["scans", text(&scans), "--poses", text(&poses)]);
@@ -330,6 +330,28 @@ fn poses_by_number_stay_with_their_clouds() {
 
     // The scans of a folder of E57 are not counted before they are read.
     let several = folder.path().join("several");
+/// The poses of texts lie among them under any name.
+#[test]
+fn a_file_of_poses_is_no_cloud() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for number in 0..2 {
+        fs::write(scans.join(format!("{number}.txt")), "4 0 0\n").unwrap();
+    }
+    let poses = scans.join("optimized.txt");
+    fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n").unwrap();
+    for format in [&[][..], &["--format", "xyz"]] {
+        let input = ["scans", text(&scans), "--poses", text(&poses), "--json"];
+        let told: serde_json::Value = serde_json::from_str(&output(&[&input, format].concat())).unwrap();
+        assert_eq!((&told["scans"], &told["points"]), (&2.into(), &2.into()), "{told}");
+    }
+    let other = folder.path().join("other.txt");
+    fs::copy(&poses, &other).unwrap();
+    let refused = refusal(&["scans", text(&scans), "--poses", text(&other)]);
+    assert!(refused.contains("2 poses for 3 clouds (0.txt to optimized.txt), "), "{refused}");
+}
+
     fs::create_dir(&several).unwrap();
     fs::copy(repository("clouds/tests/data/scans.e57"), several.join("a.e57")).unwrap();
     fs::copy(repository("clouds/tests/data/scans.e57"), several.join("b.e57")).unwrap();

@@ -138,6 +138,34 @@ fn a_folder_is_read_in_natural_order_with_stamps_of_names() {
     assert_eq!(found, [("9.bin", None), ("10.bin", None), ("1700000000123456789.bin", stamp_ns)]);
 }
 
+/// A table of poses among texts, by whatever path it is named.
+#[test]
+fn files_that_are_named_for_something_else_are_no_clouds() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for name in ["1.csv", "2.csv"] {
+        fs::write(scans.join(name), "4 0 0\n").unwrap();
+    }
+    fs::write(scans.join("0_gps.csv"), "timestamp,tx,ty,tz\n0,1,2,3\n").unwrap();
+    fs::write(scans.join("lens.txt"), "500 500 320 240\n").unwrap();
+    assert!(Format::guess(&scans).is_err());
+    let other_path = scans.join("../scans/0_gps.csv");
+    assert_eq!(Format::guess_without(&scans, &[other_path.clone()]).unwrap(), Format::Text);
+    let options = OpenOptions {
+        not_clouds: vec![other_path, folder.path().join("nothing")],
+        intrinsics_path: Some(scans.join("lens.txt")),
+        ..OpenOptions::default()
+    };
+    let source = voxtile_clouds::read::open(&scans, &options).unwrap();
+    assert_eq!((source.len_hint(), source.ends()), (Some(2), Some(["1.csv", "2.csv"].map(str::to_owned))));
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(scans.join("0_gps.csv"), scans.join("3.csv")).unwrap();
+        assert_eq!(voxtile_clouds::read::open(&scans, &options).unwrap().len_hint(), Some(2));
+    }
+}
+
 #[test]
 fn a_bad_file_of_a_folder_is_passed_by() {
     let folder = tempfile::tempdir().unwrap();
