@@ -206,6 +206,23 @@ fn one_topic_needs_no_name_and_no_transforms_leave_clouds_without_poses() {
 }
 
 #[test]
+fn content_tells_a_recording_whatever_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["none.bag", "none.mcap"] {
+        for renamed in ["drive", "drive.bag", "drive.mcap.backup"] {
+            let path = folder.path().join(renamed);
+            std::fs::copy(data(name), &path).unwrap();
+            let (clouds, errors, _) = read(&[path], &topic("/points"));
+            assert_eq!((clouds.len(), errors), (4, vec![]), "{name} as {renamed}");
+        }
+    }
+    let path = folder.path().join("points.xyz");
+    std::fs::write(&path, "1 2 3\n").unwrap();
+    let Err(error) = open_recording(&[path]) else { panic!("points are no recording") };
+    assert!(error.to_string().contains("no recording by its content or its name"), "{error}");
+}
+
+#[test]
 fn gaps_between_transforms_may_be_limited() {
     let options = BagOptions { most_gap_ns: Some(10_000_000), ..topic("/points") };
     let (clouds, _, remarks) = read(&[data("lz4.bag")], &options);

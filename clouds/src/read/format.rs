@@ -155,6 +155,12 @@ impl Format {
         Err(Error::argument(path.display().to_string(), reason))
     }
 
+    /// What a file is by its content alone, if that tells it.
+    #[cfg(feature = "ros")]
+    pub(crate) fn of_content(path: &Path) -> Result<Option<Self>> {
+        Ok(Self::of_bytes(&first_bytes(path)?))
+    }
+
     /// What starts with these bytes.
     fn of_bytes(start: &[u8]) -> Option<Self> {
         let starts = |magic: &[u8]| start.starts_with(magic);
