@@ -56,6 +56,11 @@ pub trait CloudSource: Send {
         None
     }
 
+    /// Names of the first and the last cloud, if known before any is read.
+    fn ends(&self) -> Option<[String; 2]> {
+        None
+    }
+
     /// Moves to the next cloud, whether or not the points of the last were read. `None` after the last one.
     ///
     /// # Errors

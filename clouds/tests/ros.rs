@@ -8,6 +8,7 @@ use made::message::{F32, MessageWriter};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::slice::from_ref;
+use voxtile_clouds::poses::most_gap_ns;
 use voxtile_clouds::read::Format;
 use voxtile_clouds::ros::{BagOptions, PoseSource, open_bag, open_recording};
 use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
@@ -205,11 +206,35 @@ fn one_topic_needs_no_name_and_no_transforms_leave_clouds_without_poses() {
 }
 
 #[test]
+fn content_tells_a_recording_whatever_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["none.bag", "none.mcap"] {
+        for renamed in ["drive", "drive.bag", "drive.mcap.backup"] {
+            let path = folder.path().join(renamed);
+            std::fs::copy(data(name), &path).unwrap();
+            let (clouds, errors, _) = read(&[path], &topic("/points"));
+            assert_eq!((clouds.len(), errors), (4, vec![]), "{name} as {renamed}");
+        }
+    }
+    let path = folder.path().join("points.xyz");
+    std::fs::write(&path, "1 2 3\n").unwrap();
+    let Err(error) = open_recording(&[path]) else { panic!("points are no recording") };
+    assert!(error.to_string().contains("no recording by its content or its name"), "{error}");
+}
+
+#[test]
 fn gaps_between_transforms_may_be_limited() {
     let options = BagOptions { most_gap_ns: Some(10_000_000), ..topic("/points") };
     let (clouds, _, remarks) = read(&[data("lz4.bag")], &options);
     assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
-    assert!(remarks.iter().any(|remark| remark.contains("too far apart")), "{remarks:?}");
+    let why = "too far apart; --pose-tolerance allows for more";
+    assert!(remarks.iter().any(|remark| remark.contains(why)), "{remarks:?}");
+    // The map moves in odom five times a second.
+    for (tolerance_ns, posed) in [(99_999_999, 0), (100_000_000, 4)] {
+        let options = BagOptions { most_gap_ns: Some(most_gap_ns(tolerance_ns)), ..topic("/points") };
+        let (clouds, ..) = read(&[data("lz4.bag")], &options);
+        assert_eq!(clouds.iter().filter(|(head, _)| head.world_from_sensor.is_some()).count(), posed);
+    }
 }
 
 #[test]

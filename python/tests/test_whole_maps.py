@@ -72,6 +72,24 @@ def test_scans_are_what_the_files_hold(scans: Path, room: list[Scan]) -> None:
         voxtile.scans(scans, pose_tolerance=-1.0)
 
 
+def test_options_may_be_one_text_or_of_numpy(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
+    rows = np.arange(15, dtype="<f4").reshape(3, 5)
+    rows.tofile(tmp_path / "five.bin")
+    for fields in ("x,y,z,intensity,ring", ["x", "y", "z", "intensity", "ring"]):
+        ((points, _, intensities),) = voxtile.scans(tmp_path / "five.bin", fields=fields)
+        assert np.array_equal(points, rows[:, :3]) and np.array_equal(intensities, rows[:, 3])
+    told = voxtile.build(
+        scans,
+        tmp_path / "map",
+        resolution=np.float32(0.25),
+        count=np.int64(2),
+        no_rays=np.bool_(True),
+        keep_scans=np.bool_(False),
+        max_range=np.array(4.0),
+    )
+    assert (told["scans"], told["points"]) == (2, sum(len(points) for points, _ in room[:2]))
+
+
 def test_a_build_goes_on_where_the_command_left_it(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
     """Build and command know each other's maps and inputs."""
     whole, ours, theirs = tmp_path / "whole", tmp_path / "ours", tmp_path / "theirs"

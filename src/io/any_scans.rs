@@ -19,7 +19,8 @@ use voxtile_clouds::{CloudSource, stamp_of_name};
 ///
 /// Nothing that is known, options that do not fit, a file that cannot be read; scans without any poses.
 pub fn open_any_scans(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
-    Ok(options.selection.clone().of(open_all(path, options)?))
+    let options = options.with_not_clouds();
+    Ok(options.selection.clone().of(open_all(path, &options)?))
 }
 
 fn open_all(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
@@ -66,16 +67,17 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<(PathBuf, Format)> {
             }
         }
     }
+    let guess = |path: &Path| Format::guess_without(path, &options.open.not_clouds);
     match options.open.format {
-        Some(format) if inner.is_dir() && Format::guess(path).is_err() => Ok((inner, format)),
+        Some(format) if inner.is_dir() && guess(path).is_err() => Ok((inner, format)),
         Some(format) => Ok((path.to_owned(), format)),
-        None => match Format::guess(path) {
+        None => match guess(path) {
             Ok(format) => Ok((path.to_owned(), format)),
             // PCD has many beginnings; what is wrong with a file says its reader.
             Err(_) if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pcd")) => {
                 Ok((path.to_owned(), Format::Pcd))
             }
-            Err(_) if inner.is_dir() => Ok((inner.clone(), Format::guess(&inner)?)),
+            Err(_) if inner.is_dir() => Ok((inner.clone(), guess(&inner)?)),
             Err(error) => Err(error.into()),
         },
     }
@@ -160,7 +162,9 @@ fn poses_for(path: &Path, options: &ReadOptions, has_own: bool, clouds: Option<u
 /// Opens a recording; poses of a file go before its own.
 #[cfg(feature = "ros")]
 fn open_recording(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    use voxtile_clouds::poses::most_gap_ns;
     use voxtile_clouds::ros::{BagOptions, PoseSource, open_bag};
+    options.check_for_recording()?;
     let recording = &options.recording;
     let poses = match (&options.poses, &recording.odometry_topic) {
         (Some(_), _) => PoseSource::None,
@@ -172,7 +176,7 @@ fn open_recording(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSou
         odometry_topic: recording.odometry_topic.clone(),
         fixed_frame: recording.fixed_frame.clone(),
         poses,
-        most_gap_ns: Some(options.clouds.pose_tolerance_ns),
+        most_gap_ns: Some(most_gap_ns(options.clouds.pose_tolerance_ns)),
         scratch: options.open.scratch.clone(),
     };
     Ok(Box::new(open_bag(&[path.to_owned()], &bag)?))

@@ -35,6 +35,10 @@ impl CloudSource for PcdClouds {
         Some(self.files.len() as u64)
     }
 
+    fn ends(&self) -> Option<[String; 2]> {
+        Some([name_of(self.files.first()?), name_of(self.files.last()?)])
+    }
+
     fn next_cloud(&mut self) -> voxtile_clouds::Result<Option<CloudHead>> {
         let Some(path) = self.files.get(self.next) else { return Ok(None) };
         self.next += 1;

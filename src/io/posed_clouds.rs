@@ -12,8 +12,8 @@ use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, Deskew, Place, PoseAt, 
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CloudOptions {
-    /// Most nanoseconds between two poses of a file from which one between them is made, and from a cloud to a pose
-    /// that it takes: beyond, the cloud has no pose.
+    /// Most nanoseconds from a cloud to the nearer of the poses around it, which may be twice as much apart; a cloud
+    /// in a longer gap has no pose.
     pub pose_tolerance_ns: i64,
     /// Where the sensor is in the body that the poses are of.
     pub body_from_sensor: RigidPose,
@@ -99,9 +99,8 @@ impl PosedClouds {
         }
         if let CloudPoses::File(_, trajectory) = &poses
             && trajectory.span_ns().is_none()
-            && let Some(clouds) = source.len_hint()
         {
-            trajectory.check_clouds(clouds)?;
+            trajectory.check_clouds(&*source)?;
         }
         let (number, without_pose, is_at_end, has_pose, reasons, fields) = Default::default();
         let (stayed, without_times) = Default::default();
@@ -135,16 +134,18 @@ impl PosedClouds {
             (CloudPoses::File(_, trajectory), Some(stamp_ns)) if trajectory.span_ns().is_some() => {
                 match trajectory.at(stamp_ns, tolerance_ns) {
                     Found::Exact(pose) | Found::Between(pose) => Ok(pose),
-                    Found::TooFar { nearest_ns } => {
-                        let apart_s = (nearest_ns.saturating_sub(stamp_ns)).unsigned_abs() as f64 * 1e-9;
-                        Err(format!("the nearest pose is {apart_s:.3} s away, beyond the tolerance"))
+                    Found::Gap { gap_ns } => {
+                        let gap_s = gap_ns as f64 * 1e-9;
+                        Err(format!(
+                            "the poses around it are {gap_s:.3} s apart; --pose-tolerance allows for more"
+                        ))
                     }
                     Found::Before { first_ns } => Err(outside(first_ns, stamp_ns, "before the first pose")),
                     Found::After { last_ns } => Err(outside(stamp_ns, last_ns, "after the last pose")),
                     Found::WithoutStamps => Err("the poses have no time stamps".to_owned()),
                 }
             }
-            (CloudPoses::File(_, trajectory), _) => Ok(trajectory.of_cloud(number, self.source.len_hint())?),
+            (CloudPoses::File(_, trajectory), _) => Ok(trajectory.of_cloud(number, &*self.source)?),
         })
     }
 

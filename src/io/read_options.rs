@@ -1,5 +1,7 @@
 use super::posed_clouds::CloudOptions;
 use super::selected_scans::Selection;
+#[cfg(feature = "ros")]
+use crate::error::{Error, Result};
 use std::path::PathBuf;
 use voxtile_clouds::read::OpenOptions;
 
@@ -19,6 +21,31 @@ pub struct ReadOptions {
     pub clouds: CloudOptions,
     /// Which scans and points are taken.
     pub selection: Selection,
+}
+
+impl ReadOptions {
+    /// The same, with the files that are named for something else known to be no clouds.
+    pub(super) fn with_not_clouds(&self) -> Self {
+        let mut options = self.clone();
+        let named = [&self.poses, &self.calib, &self.open.intrinsics_path];
+        options.open.not_clouds.extend(named.into_iter().flatten().cloned());
+        options
+    }
+
+    /// Refuses what a recording says itself, and what would be passed over.
+    #[cfg(feature = "ros")]
+    pub(super) fn check_for_recording(&self) -> Result<()> {
+        if self.open.depth_scale.is_some() {
+            let reason = "depth images of a recording say themselves what they are in, 16UC1 millimetres and 32FC1 metres: \
+                          leave it out";
+            return Err(Error::argument("--depth-scale", reason));
+        }
+        if self.open.intrinsics_path.is_some() || self.open.intrinsics.is_some() {
+            let reason = "the camera of a recording is in the topic `camera_info` beside its depth images: leave it out";
+            return Err(Error::argument("--intrinsics", reason));
+        }
+        Ok(())
+    }
 }
 
 /// What to take of a recording.

@@ -92,6 +92,54 @@ fn recordings_of_either_ros_make_the_same_map() {
     assert!(!map.exists());
 }
 
+/// A backup is still a recording; what it says itself is not asked of anybody.
+#[cfg(feature = "ros")]
+#[test]
+fn recordings_are_known_by_their_content() {
+    let folder = TempDir::new().unwrap();
+    let camera = folder.path().join("camera.txt");
+    fs::write(&camera, "500 500 320 240\n").unwrap();
+    for name in ["none.bag", "none.mcap"] {
+        let path = folder.path().join("drive.backup");
+        fs::copy(repository(&format!("clouds/tests/data/ros/{name}")), &path).unwrap();
+        let input = ["scans", text(&path), "--topic", "/points"];
+        assert!(output(&[&input[..], &["--json"]].concat()).contains("\"scans\": 4"), "{name}");
+        for option in [["--depth-scale", "1000"], ["--intrinsics", text(&camera)]] {
+            let refused = refusal(&[&input[..], &option].concat());
+            assert!(refused.contains(option[0]) && refused.contains("leave it out"), "{refused}");
+        }
+    }
+}
+
+/// Depth images without their camera.
+#[test]
+fn the_option_for_a_camera_is_named() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("0.depth.png"), "").unwrap();
+    let refused = refusal(&["scans", text(folder.path())]);
+    assert!(refused.contains("--intrinsics FILE") && refused.contains("camera-intrinsics.txt"), "{refused}");
+}
+
+/// A recording and a file of poses go by one rule.
+#[cfg(feature = "ros")]
+#[test]
+fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
+    let folder = TempDir::new().unwrap();
+    let (bag, poses) = (repository("clouds/tests/data/ros/none.bag"), folder.path().join("poses.txt"));
+    // As its transforms: five a second, with the stamps of the clouds between them.
+    let rows = (0..4).map(|k| format!("1700000000.{:02} 0 0 1 0 0 0 1\n", 20 * k + 6));
+    fs::write(&poses, rows.collect::<String>()).unwrap();
+    for own in [&[][..], &["--poses", text(&poses)]] {
+        for (tolerance, scans) in [("0.1", 4), ("0.09", 0)] {
+            let input = ["scans", &bag, "--topic", "/points", "--pose-tolerance", tolerance, "--json"];
+            let told = output(&[&input, own].concat());
+            let found: serde_json::Value = serde_json::from_str(&told).unwrap();
+            assert_eq!(found["scans"], scans, "{own:?} {tolerance}: {told}");
+            assert_eq!(told.contains("apart; --pose-tolerance allows for more"), scans == 0, "{told}");
+        }
+    }
+}
+
 #[test]
 fn what_would_be_read_is_told_and_nothing_is_mapped() {
     let folder = TempDir::new().unwrap();
@@ -282,6 +330,28 @@ fn texts_beside_clouds_are_none() {
     }
 }
 
+/// The poses of texts lie among them under any name.
+#[test]
+fn a_file_of_poses_is_no_cloud() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for number in 0..2 {
+        fs::write(scans.join(format!("{number}.txt")), "4 0 0\n").unwrap();
+    }
+    let poses = scans.join("optimized.txt");
+    fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n").unwrap();
+    for format in [&[][..], &["--format", "xyz"]] {
+        let input = ["scans", text(&scans), "--poses", text(&poses), "--json"];
+        let told: serde_json::Value = serde_json::from_str(&output(&[&input, format].concat())).unwrap();
+        assert_eq!((&told["scans"], &told["points"]), (&2.into(), &2.into()), "{told}");
+    }
+    let other = folder.path().join("other.txt");
+    fs::copy(&poses, &other).unwrap();
+    let refused = refusal(&["scans", text(&scans), "--poses", text(&other)]);
+    assert!(refused.contains("2 poses for 3 clouds (0.txt to optimized.txt), "), "{refused}");
+}
+
 /// Clouds and poses by clocks that differ: a map of nothing would be no answer.
 #[test]
 fn clouds_of_which_none_has_a_pose_make_no_map() {
@@ -299,7 +369,7 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
         assert!(told.contains(part), "{told}");
     }
     // One is enough.
-    fs::write(&poses, "1599999999 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
+    fs::write(&poses, "1599999999.5 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("other");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
     let told = output(&["scans", text(&scans), "--poses", text(&poses)]);

@@ -1,6 +1,7 @@
 //! Files of poses: [`Trajectory`] reads them and tells the pose at a time.
 
 mod calib;
+mod gap;
 mod header;
 mod matrix;
 mod npy;
@@ -8,5 +9,6 @@ mod text;
 mod time_unit;
 mod trajectory;
 
+pub use gap::most_gap_ns;
 pub(crate) use matrix::matrix_of;
 pub use trajectory::{Found, Trajectory};

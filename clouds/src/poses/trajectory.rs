@@ -1,4 +1,6 @@
+use super::gap::most_gap_ns;
 use super::{npy, text};
+use crate::cloud::CloudSource;
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
 use std::path::{Path, PathBuf};
@@ -23,10 +25,10 @@ pub enum Found {
     Exact(RigidPose),
     /// Between two poses: positions along a line, rotations at constant speed.
     Between(RigidPose),
-    /// There are poses before and after, but none within the tolerance.
-    TooFar {
-        /// Stamp of the nearest pose.
-        nearest_ns: i64,
+    /// The poses before and after are too far apart for the tolerance.
+    Gap {
+        /// Nanoseconds from one to the other.
+        gap_ns: u64,
     },
     /// Before the first pose.
     Before {
@@ -101,7 +103,8 @@ impl Trajectory {
         Self { path: path.to_owned(), poses, stamps, rounding_ns, remarks }
     }
 
-    /// The pose at a time. A pose between two others needs one of them within the tolerance; none is ever extrapolated.
+    /// The pose at a time. Between two poses there is one if they are at most twice the tolerance apart, see
+    /// [`most_gap_ns`]; none is ever extrapolated.
     /// A time that is before the first stamp or after the last one only because that was rounded has the pose there.
     pub fn at(&self, stamp_ns: i64, tolerance_ns: i64) -> Found {
         let after = self.stamps.partition_point(|&(stamp, _)| stamp < stamp_ns);
@@ -111,11 +114,11 @@ impl Trajectory {
         match (earlier, later) {
             (_, Some((stamp, number))) if stamp == stamp_ns => Found::Exact(pose(number)),
             (Some((before_ns, before)), Some((after_ns, after))) => {
-                let (since, until) = (before_ns.abs_diff(stamp_ns), after_ns.abs_diff(stamp_ns));
-                if since.min(until) > u64::try_from(tolerance_ns).unwrap_or(0) {
-                    return Found::TooFar { nearest_ns: if since <= until { before_ns } else { after_ns } };
+                let gap_ns = before_ns.abs_diff(after_ns);
+                if gap_ns > most_gap_ns(tolerance_ns).unsigned_abs() {
+                    return Found::Gap { gap_ns };
                 }
-                let share = since as f64 / before_ns.abs_diff(after_ns) as f64;
+                let share = before_ns.abs_diff(stamp_ns) as f64 / gap_ns as f64;
                 Found::Between(pose(before).towards(&pose(after), share))
             }
             (None, Some((end_ns, number))) | (Some((end_ns, number)), None)
@@ -134,32 +137,34 @@ impl Trajectory {
         self.poses.get(number).copied()
     }
 
-    /// The pose of a cloud by its number, from 0, where stamps do not tell it. `clouds`: how many there are, if that is
-    /// known.
+    /// The pose of a cloud by its number, from 0, where stamps do not tell it.
     ///
     /// # Errors
     ///
     /// Not as many poses as clouds: which belong together is not known then.
-    pub fn of_cloud(&self, number: u64, clouds: Option<u64>) -> Result<RigidPose> {
-        if let Some(clouds) = clouds {
-            self.check_clouds(clouds)?;
-        }
+    pub fn of_cloud(&self, number: u64, source: &dyn CloudSource) -> Result<RigidPose> {
+        self.check_clouds(source)?;
         let pose = usize::try_from(number).ok().and_then(|number| self.by_number(number));
-        pose.ok_or_else(|| self.other_number(&format!("at least {}", number.saturating_add(1))))
+        pose.ok_or_else(|| self.other_number(&format!("at least {} clouds", number.saturating_add(1))))
     }
 
-    /// Checks that there are as many poses as clouds.
+    /// Checks that there are as many poses as clouds, if that number is known before they are read.
     ///
     /// # Errors
     ///
     /// There are not.
-    pub fn check_clouds(&self, clouds: u64) -> Result<()> {
-        if self.len() as u64 == clouds { Ok(()) } else { Err(self.other_number(&clouds.to_string())) }
+    pub fn check_clouds(&self, source: &dyn CloudSource) -> Result<()> {
+        let Some(clouds) = source.len_hint().filter(|clouds| *clouds != self.len() as u64) else {
+            return Ok(());
+        };
+        // A file that is no cloud is often at an end of the list.
+        let named = source.ends().map(|[first, last]| format!(" ({first} to {last})")).unwrap_or_default();
+        Err(self.other_number(&format!("{clouds} clouds{named}")))
     }
 
     fn other_number(&self, clouds: &str) -> Error {
         let reason = format!(
-            "{} poses for {clouds} clouds, which have no time stamps in common: there must be one pose a cloud, in \
+            "{} poses for {clouds}, which have no time stamps in common: there must be one pose a cloud, in \
              their order (files in the natural order of their names, scan2 before scan10)",
             self.len()
         );

@@ -16,13 +16,15 @@ struct E57 {
     scans: Vec<PointCloud>,
     next: usize,
     is_read: bool,
+    /// Whether the caller knows where the sensor of scans without a pose was.
+    has_origin: bool,
     crs: Option<String>,
     remarks: Vec<String>,
 }
 
 /// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
-/// frame of the file.
-pub(super) fn open(path: &Path) -> Result<Box<dyn CloudSource>> {
+/// frame of the file, and its sensor at the origin of that, if `has_origin` does not say that another one is known.
+pub(super) fn open(path: &Path, has_origin: bool) -> Result<Box<dyn CloudSource>> {
     let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let reader = guarded(|| E57Reader::new(BufReader::new(file)))
         .map_err(|reason| Error::format(path, Place::Byte(0), reason))?;
@@ -38,7 +40,16 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn CloudSource>> {
                 .into(),
         );
     }
-    Ok(Box::new(E57 { path: path.to_owned(), reader, scans, next: 0, is_read: true, crs, remarks }))
+    let bare = scans.iter().filter(|scan| scan.transform.is_none()).count();
+    if bare > 0 && !has_origin {
+        remarks.push(format!(
+            "{bare} of {} scans have no pose: their points are in the frame of the file, and without --poses or \
+             --sensor-origin the sensor is taken to be at its origin",
+            scans.len()
+        ));
+    }
+    let (next, is_read) = (0, true);
+    Ok(Box::new(E57 { path: path.to_owned(), reader, scans, next, is_read, has_origin, crs, remarks }))
 }
 
 /// The name of a field, as the library spells it.
@@ -81,7 +92,7 @@ impl CloudSource for E57 {
         let number = self.next;
         self.next += 1;
         self.is_read = false;
-        let pose = pose(scan);
+        let pose = pose(scan).or_else(|| (!self.has_origin).then_some(RigidPose::IDENTITY));
         if pose.is_some_and(|pose| !pose.is_valid()) {
             self.is_read = true;
             let reason = "the pose of the scan is not a rotation and a translation";

@@ -15,6 +15,7 @@ pub(super) struct Files {
     paths: std::vec::IntoIter<PathBuf>,
     files: u64,
     is_one_each: bool,
+    ends: Option<[String; 2]>,
     open: OpenFile,
     current: Option<(PathBuf, Box<dyn CloudSource>)>,
     crs: Option<String>,
@@ -26,9 +27,12 @@ pub(super) struct Files {
 impl Files {
     /// The clouds of files in this order. `is_one_each`: every file is one cloud.
     pub(super) fn new(format: String, paths: Vec<PathBuf>, is_one_each: bool, open: OpenFile) -> Self {
+        let ends =
+            paths.first().zip(paths.last()).map(|(first, last)| [first, last].map(|path| name_of(path)));
         Self {
             format,
             files: paths.len() as u64,
+            ends: ends.filter(|_| is_one_each),
             paths: paths.into_iter(),
             is_one_each,
             open,
@@ -93,6 +97,10 @@ impl CloudSource for Files {
 
     fn len_hint(&self) -> Option<u64> {
         self.is_one_each.then_some(self.files)
+    }
+
+    fn ends(&self) -> Option<[String; 2]> {
+        self.ends.clone()
     }
 
     fn next_cloud(&mut self) -> Result<Option<CloudHead>> {

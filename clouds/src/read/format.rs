@@ -3,7 +3,7 @@ use super::glance::{first_bytes, looks_like_text_points};
 use super::listing::Listing;
 use crate::error::{Error, Result};
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// What a file or a folder is.
@@ -108,9 +108,18 @@ impl Format {
     ///
     /// It cannot be read; it is of no known format, or of one that must be converted first.
     pub fn guess(path: &Path) -> Result<Self> {
+        Self::guess_without(path, &[])
+    }
+
+    /// As [`Format::guess`]; files of a folder that are known to be no clouds do not count.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Format::guess`].
+    pub fn guess_without(path: &Path, not_clouds: &[PathBuf]) -> Result<Self> {
         let meta = std::fs::metadata(path).map_err(|error| Error::io(path, "read", error))?;
         if meta.is_dir() {
-            return Listing::read(path)?.format(path);
+            return Listing::read(path, not_clouds)?.format(path);
         }
         let start = first_bytes(path)?;
         if start.is_empty() {
@@ -144,6 +153,12 @@ impl Format {
         }
         let reason = format!("is of no known format; known are {}", Self::names());
         Err(Error::argument(path.display().to_string(), reason))
+    }
+
+    /// What a file is by its content alone, if that tells it.
+    #[cfg(feature = "ros")]
+    pub(crate) fn of_content(path: &Path) -> Result<Option<Self>> {
+        Ok(Self::of_bytes(&first_bytes(path)?))
     }
 
     /// What starts with these bytes.

@@ -34,6 +34,10 @@ impl CloudSource for FromOrigin {
         self.source.len_hint()
     }
 
+    fn ends(&self) -> Option<[String; 2]> {
+        self.source.ends()
+    }
+
     fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
         let mut head = self.source.next_cloud()?;
         if let Some(head) = &mut head {

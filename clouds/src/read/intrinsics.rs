@@ -82,8 +82,8 @@ impl Intrinsics {
             folders.iter().flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|path| path.is_file());
         let Some(path) = found else {
             let reason = format!(
-                "depth images need the camera: give fx fy cx cy in pixels, or a file with them ({} in the folder or \
-                 beside it)",
+                "depth images need the camera: name a file with fx fy cx cy in pixels, or with a matrix of 3x3, by \
+                 --intrinsics FILE, or put it in the folder or beside it as {}",
                 NAMES.join(" or ")
             );
             return Err(Error::argument(folder.display().to_string(), reason));

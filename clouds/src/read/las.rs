@@ -22,7 +22,8 @@ pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSo
     if layout.is_compressed {
         super::laz_chunks::check(path, &file, &layout)?;
     }
-    let units = Units::of(&layout);
+    let mut units = Units::of(&layout);
+    units.remarks.extend(layout.remark.clone());
     let points = LasPoints::open(path, &layout, &units)?;
     let format = if layout.is_compressed { "LAZ" } else { "LAS" }.to_owned();
     let is_cut = points.has_times && options.scan_period_s > 0.0 && options.sensor_origin_m.is_none();

@@ -19,6 +19,8 @@ pub(super) struct Layout {
     pub(super) has_standard_time: bool,
     pub(super) has_wkt: bool,
     pub(super) records: Vec<Record>,
+    /// What a person should know of the number of points.
+    pub(super) remark: Option<String>,
 }
 
 /// A variable length record.
@@ -88,7 +90,9 @@ impl Layout {
             has_standard_time: encoding & 1 != 0,
             has_wkt: encoding & 16 != 0,
             records: Vec::new(),
+            remark: None,
         };
+        layout.count_what_is_there(is_large);
         let count = number(&layout.header, 100, 4);
         layout.read_records(file, header_bytes, count, points_at, 2).map_err(fail)?;
         if is_large {
@@ -138,6 +142,48 @@ impl Layout {
             at = next;
         }
         Ok(())
+    }
+
+    /// Compares the number of points with the room for them. A writer that was killed leaves 0 in the header, for the
+    /// number goes there last; then the file itself tells it. Any other number is what other programs go by, too.
+    fn count_what_is_there(&mut self, is_large: bool) {
+        if self.is_compressed {
+            return;
+        }
+        let room = (self.points_end(is_large) - self.points_at) / self.record_bytes;
+        if self.points == 0 && room > 0 {
+            self.announce(room, is_large);
+            let taken = self.points;
+            self.remark = Some(format!(
+                "the header announces no points, as a writer leaves it that was stopped: the {taken} that the file has \
+                 room for are read"
+            ));
+        } else if self.points < room {
+            let (points, behind) = (self.points, room - self.points);
+            self.remark = Some(format!(
+                "the header announces {points} points, which are read; the file has room for {behind} more behind them"
+            ));
+        }
+    }
+
+    /// Where points end at the latest: at what the header says to stand behind them, or with the file.
+    fn points_end(&self, is_large: bool) -> u64 {
+        let minor = number(&self.header, 25, 1);
+        // Wave packets since LAS 1.3, long records since LAS 1.4.
+        let waves_at = if minor >= 3 { number(&self.header, 227, 8) } else { 0 };
+        let records_at = if is_large { number(&self.header, 235, 8) } else { 0 };
+        let ends = [waves_at, records_at].into_iter().filter(|end| *end >= self.points_at);
+        ends.fold(self.file_bytes, u64::min)
+    }
+
+    /// Writes a number of points into the header, which the library goes by.
+    fn announce(&mut self, points: u64, is_large: bool) {
+        let short = u32::try_from(points).unwrap_or(u32::MAX);
+        self.has_large_count = is_large && u64::from(short) < points;
+        self.points = if self.has_large_count { points } else { u64::from(short) };
+        let (at, width) = if self.has_large_count { (247, 8) } else { (107, 4) };
+        let bytes = self.points.to_le_bytes();
+        self.header.iter_mut().skip(at).take(width).zip(bytes).for_each(|(byte, new)| *byte = new);
     }
 
     /// Points that are whole in a file that is not compressed.

@@ -50,13 +50,25 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
     if laz.items().iter().any(|item| (item.version() >= 3) != (compressor == LAYERED)) {
         return Err(wrong(100, format!("compressor {compressor} does not fit the parts of its points")));
     }
+    // A writer that was killed leaves 0 in the header. How many points there are does not follow from their bytes.
+    let check_count = |bytes: u64| {
+        if layout.points > 0 || bytes < point_bytes {
+            return Ok(());
+        }
+        let reason = format!(
+            "the header announces no points, but {bytes} bytes of compressed ones follow: the file was not finished; \
+             repair its header with the program that wrote it, or write the points again"
+        );
+        Err(wrong(if layout.has_large_count { 247 } else { 107 }, reason))
+    };
     if compressor == POINT_WISE {
-        return Ok(());
+        return check_count(layout.file_bytes - points_at);
     }
     let mut input = BufReader::new(file);
     let table_at = table_place(path, &mut input, layout)?;
     let (data_at, chunks) =
         (points_at + TABLE_PLACE_BYTES, number(&bytes_at(path, &mut input, table_at, 8)?, 4, 4));
+    check_count(table_at.saturating_sub(data_at))?;
     // Each chunk begins with a point that is not compressed.
     let most_chunks = (table_at - data_at.min(table_at)) / point_bytes.max(1) + 1;
     if chunks > most_chunks {

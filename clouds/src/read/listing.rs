@@ -3,6 +3,7 @@ use super::format::{Format, extension_of};
 use super::intrinsics::Intrinsics;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
+use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
 /// What a folder holds, in the natural order of names: `scan2` before `scan10`.
@@ -31,13 +32,17 @@ const BESIDE_CLOUDS: [&str; 12] = [
 const BAG2_MARK: &[u8] = b"rosbag2_bagfile_information";
 
 impl Listing {
-    pub(super) fn read(folder: &Path) -> Result<Self> {
+    /// Lists a folder, without files that are known to be no clouds, by whatever path they were named.
+    pub(super) fn read(folder: &Path, not_clouds: &[PathBuf]) -> Result<Self> {
         let fail = |error| Error::io(folder, "read", error);
         let (mut files, mut folders) = (Vec::new(), Vec::new());
+        let not_clouds: Vec<PathBuf> = not_clouds.iter().flat_map(|path| path.canonicalize().ok()).collect();
+        let here = folder.canonicalize().map_err(fail)?;
         for entry in std::fs::read_dir(folder).map_err(fail)? {
-            let path = entry.map_err(fail)?.path();
+            let entry = entry.map_err(fail)?;
+            let path = entry.path();
             let is_hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-            if is_hidden {
+            if is_hidden || (!not_clouds.is_empty() && not_clouds.contains(&place_of(&entry, &here))) {
                 continue;
             }
             if path.is_dir() {
@@ -134,6 +139,13 @@ impl Listing {
         };
         format!("no file of a known format ({}){hint}", Format::names())
     }
+}
+
+/// What an entry of a folder is called elsewhere, too. Only links are looked up: a folder may have a million files.
+fn place_of(entry: &DirEntry, folder: &Path) -> PathBuf {
+    let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
+    let target = is_link.then(|| entry.path().canonicalize().ok()).flatten();
+    target.unwrap_or_else(|| folder.join(entry.file_name()))
 }
 
 fn is_named_depth(path: &Path) -> bool {

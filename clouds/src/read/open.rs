@@ -22,7 +22,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> 
     check(options)?;
     let format = match options.format {
         Some(format) => format,
-        None => Format::guess(path)?,
+        None => Format::guess_without(path, &options.beside())?,
     };
     let source =
         if path.is_dir() { open_folder(path, format, options)? } else { open_file(path, format, options)? };
@@ -48,10 +48,13 @@ fn check(options: &OpenOptions) -> Result<()> {
 fn open_folder(path: &Path, format: Format, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
     match format {
         Format::DepthTum => return depth_tum::open(path, options),
-        Format::DepthImages => return depth_images::open(path, Listing::read(path)?.of(format), options),
+        Format::DepthImages => {
+            let images = Listing::read(path, &options.beside())?.of(format);
+            return depth_images::open(path, images, options);
+        }
         _ => check_is_read_here(path, format)?,
     }
-    let paths = Listing::read(path)?.of(format);
+    let paths = Listing::read(path, &options.beside())?.of(format);
     if paths.is_empty() {
         let endings = format.extensions().join(", .");
         return Err(Error::argument(
@@ -75,7 +78,7 @@ fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Box<d
         #[cfg(feature = "las")]
         Format::Las | Format::Laz | Format::Copc => return super::las::open(path, options),
         #[cfg(feature = "e57")]
-        Format::E57 => return super::e57::open(path),
+        Format::E57 => return super::e57::open(path, options.sensor_origin_m.is_some()),
         other => {
             check_is_read_here(path, other)?;
             let reason = format!("is a file; {other} needs a folder");

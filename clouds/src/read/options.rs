@@ -21,10 +21,19 @@ pub struct OpenOptions {
     pub intrinsics: Option<Intrinsics>,
     /// A file with the camera of depth images. `None`: `camera-intrinsics.txt` in the folder or beside it.
     pub intrinsics_path: Option<PathBuf>,
+    /// Files that are no clouds, though they may lie among them: poses, calibrations. The camera above is one anyway.
+    pub not_clouds: Vec<PathBuf>,
     /// Bytes of memory that sorting may take; beyond them it goes to temporary files.
     pub sort_memory_bytes: usize,
     /// Folder of temporary files; the system's own if `None`.
     pub scratch: Option<PathBuf>,
+}
+
+impl OpenOptions {
+    /// The files that are no clouds.
+    pub(super) fn beside(&self) -> Vec<PathBuf> {
+        self.not_clouds.iter().chain(&self.intrinsics_path).cloned().collect()
+    }
 }
 
 impl Default for OpenOptions {
@@ -37,6 +46,7 @@ impl Default for OpenOptions {
             depth_scale: None,
             intrinsics: None,
             intrinsics_path: None,
+            not_clouds: Vec::new(),
             sort_memory_bytes: 64 << 20,
             scratch: None,
         }

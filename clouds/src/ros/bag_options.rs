@@ -12,7 +12,7 @@ pub struct BagOptions {
     pub fixed_frame: Option<String>,
     /// Where poses come from.
     pub poses: PoseSource,
-    /// Between two poses further apart in time there is none.
+    /// Between two poses further apart in time there is none; see [`most_gap_ns`](crate::poses::most_gap_ns).
     pub most_gap_ns: Option<i64>,
     /// Folder that compressed files are unpacked into; the system's own for temporary files if `None`.
     pub scratch: Option<PathBuf>,

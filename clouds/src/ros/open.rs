@@ -4,6 +4,7 @@ use super::mcap_file::McapFile;
 use super::recording::Recording;
 use super::sequence::Sequence;
 use crate::error::{Error, Result};
+use crate::read::Format;
 use std::path::{Path, PathBuf};
 
 /// Opens a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
@@ -31,20 +32,28 @@ pub(super) fn open_recording_with(paths: &[PathBuf], scratch: Option<&Path>) -> 
     }
 }
 
-/// Opens a file by the end of its name.
+/// Opens a file by how it starts; where that is damaged, by the end of its name.
 pub(super) fn open_file(path: &Path) -> Result<Box<dyn Recording>> {
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
-        // A recorder that is killed leaves its file as `.bag.active`.
-        Some("bag" | "active") => Ok(Box::new(Bag1::open(path)?)),
-        Some("mcap") => Ok(Box::new(McapFile::open(path)?)),
-        Some("db3") => open_db3(path),
+    let format = match Format::of_content(path)? {
+        Some(format @ (Format::Bag1 | Format::Mcap | Format::Db3)) => Some(format),
+        _ => of_name(path),
+    };
+    match format {
+        Some(Format::Bag1) => Ok(Box::new(Bag1::open(path)?)),
+        Some(Format::Mcap) => Ok(Box::new(McapFile::open(path)?)),
+        Some(Format::Db3) => open_db3(path),
         _ => {
-            let reason =
-                "it is no recording by its name; known: .bag, .mcap, .db3, a folder with metadata.yaml";
+            let reason = "it is no recording by its content or its name; known: .bag, .mcap, .db3, a folder with \
+                          metadata.yaml";
             Err(Error::argument(path.display().to_string(), reason))
         }
     }
+}
+
+fn of_name(path: &Path) -> Option<Format> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase())?;
+    let formats = [Format::Bag1, Format::Mcap, Format::Db3];
+    formats.into_iter().find(|format| format.extensions().contains(&extension.as_str()))
 }
 
 #[cfg(feature = "sqlite")]

@@ -45,7 +45,9 @@ pub enum WhyNot {
     #[error("the stamp is after the last transform of {0}")]
     After(String),
     /// The transforms before and after the stamp are too far apart.
-    #[error("the transforms of {0} before and after the stamp are too far apart")]
+    #[error(
+        "the transforms of {0} before and after the stamp are too far apart; --pose-tolerance allows for more"
+    )]
     Gap(String),
     /// The frame moves in no other, so that nothing says where it was.
     #[error("no transform says how {0} moves")]
@@ -56,7 +58,8 @@ pub enum WhyNot {
 }
 
 impl Transforms {
-    /// Sets how far apart in time two samples may be that a pose is found between.
+    /// Sets how far apart in time two samples may be that a pose is found between; see
+    /// [`most_gap_ns`](crate::poses::most_gap_ns).
     pub fn set_most_gap_ns(&mut self, most_gap_ns: Option<i64>) {
         self.most_gap_ns = most_gap_ns;
     }

@@ -1,7 +1,10 @@
+use crate::made::voxels::write_voxels;
 use crate::support::{clouds, failure, fixture, wanted};
 use std::fs;
 use std::path::Path;
+use voxtile_clouds::RigidPose;
 use voxtile_clouds::read::{OpenOptions, open};
+use voxtile_clouds::write::VoxelFileFormat;
 
 /// Written by pye57 (libE57Format).
 #[test]
@@ -27,6 +30,26 @@ fn scans_have_poses_and_invalid_points_are_no_returns() {
         }
         assert_eq!(points.len(), 20);
     }
+}
+
+/// As programs write what is in one frame already: exports of voxels have no pose.
+#[test]
+fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bare.e57");
+    write_voxels(VoxelFileFormat::E57, &path, None);
+    let read = |options: &OpenOptions| {
+        let mut source = open(&path, options).unwrap();
+        let (head, points) = crate::support::all(source.as_mut()).unwrap().remove(0);
+        (head.world_from_sensor.unwrap(), points[0].position_m, source.remarks())
+    };
+    let (pose, first, remarks) = read(&OpenOptions::default());
+    assert_eq!((pose, first), (RigidPose::IDENTITY, [0.25; 3]));
+    assert!(remarks[0].starts_with("1 of 1 scans have no pose: ") && remarks[0].contains("--sensor-origin"));
+    let origin = OpenOptions { sensor_origin_m: Some([1.0, 2.0, 3.0]), ..OpenOptions::default() };
+    let (pose, first, remarks) = read(&origin);
+    assert_eq!((pose.position_m, first), ([1.0, 2.0, 3.0], [-0.75, -1.75, -2.75]));
+    assert!(remarks.is_empty(), "{remarks:?}");
 }
 
 #[test]

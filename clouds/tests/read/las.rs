@@ -2,6 +2,7 @@ use crate::support::{all, clouds, clouds_with, failure, fixture, shared_data, wa
 use std::fs;
 use voxtile_clouds::CloudPoint;
 use voxtile_clouds::read::{OpenOptions, open};
+use voxtile_clouds::write::{VoxelFileFormat, VoxelsHead, WriteOptions, open_sink};
 
 fn one_cloud() -> OpenOptions {
     OpenOptions { scan_period_s: 0.0, ..OpenOptions::default() }
@@ -105,6 +106,71 @@ fn a_file_that_is_cut_off_gives_what_is_whole() {
         assert!(error.contains("record 18: the file ends after 18 of 20 points"), "{error}");
         assert_eq!(points, 18);
     }
+}
+
+/// Writes a number of points into a header, which LAS 1.4 has twice.
+fn announce(bytes: &mut [u8], points: u64) {
+    bytes[107..111].copy_from_slice(&(points as u32).to_le_bytes());
+    if bytes[25] >= 4 {
+        bytes[247..255].copy_from_slice(&points.to_le_bytes());
+    }
+}
+
+/// A recorder writes the number of points last.
+#[test]
+fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("killed.las");
+    let whole = fs::read(fixture("timed.las")).unwrap();
+    for (announced, cut, points, remark) in [
+        (0, 5, 19, "announces no points, as a writer leaves it that was stopped: the 19 "),
+        (0, 20 * 28, 0, ""),
+        (15, 0, 15, "announces 15 points, which are read; the file has room for 5 more"),
+        (20, 0, 20, ""),
+    ] {
+        let mut bytes = whole[..whole.len() - cut].to_vec();
+        announce(&mut bytes, announced);
+        fs::write(&path, &bytes).unwrap();
+        for options in [one_cloud(), OpenOptions::default()] {
+            let mut source = open(&path, &options).unwrap();
+            let clouds = all(source.as_mut()).unwrap();
+            let found: usize = clouds.iter().map(|(_, points)| points.len()).sum();
+            let remarks = source.remarks().join("\n");
+            assert!(found == points && remarks.contains(remark), "{announced}: {found} {remarks}");
+            assert_eq!(remarks.is_empty(), remark.is_empty(), "{remarks}");
+        }
+    }
+    // Of compressed points the file does not tell how many there are.
+    let mut bytes = fs::read(fixture("timed.laz")).unwrap();
+    announce(&mut bytes, 0);
+    let path = folder.path().join("killed.laz");
+    fs::write(&path, &bytes).unwrap();
+    let (error, _) = failure(&path, &OpenOptions::default());
+    assert!(error.contains("the header announces no points, but "), "{error}");
+}
+
+/// What stands behind the points is none: long records of LAS 1.4.
+#[test]
+fn records_behind_points_are_not_taken_for_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("records.las");
+    let mut bytes = fs::read(fixture("feet.las")).unwrap();
+    let points_at = u64::from(u32::from_le_bytes(bytes[96..100].try_into().unwrap()));
+    announce(&mut bytes, 0);
+    bytes[235..243].copy_from_slice(&(points_at + 12 * 30).to_le_bytes());
+    fs::write(&path, &bytes).unwrap();
+    assert_eq!(clouds(&path)[0].1.len(), 12);
+}
+
+/// A LAZ file of no points, as writers close one, has no cloud with points and is none that was killed.
+#[test]
+fn compressed_files_may_be_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.laz");
+    let head = VoxelsHead { voxels: 0, resolution_m: 0.5, bounds_m: [[0.0; 3]; 2], occupied_from: 0.5 };
+    let sink = open_sink(VoxelFileFormat::Laz, &head, &path, &WriteOptions::beside(&path)).unwrap();
+    sink.finish().unwrap();
+    assert_eq!(clouds(&path).iter().map(|(_, points)| points.len()).sum::<usize>(), 0);
 }
 
 /// Found by fuzzing: coordinates that were no numbers, and hits all the same.

@@ -1,6 +1,6 @@
 use crate::support::{clouds, clouds_with, failure, fixture, wanted};
 use std::fs;
-use voxtile_clouds::read::OpenOptions;
+use voxtile_clouds::read::{Format, OpenOptions};
 use voxtile_clouds::{CloudPoint, RigidPose};
 
 #[test]
@@ -79,6 +79,52 @@ fn raw_floats_that_do_not_fit_their_columns_are_an_error() {
     assert_eq!(points, 0);
 }
 
+/// The points of a wall, a row each: with a ring, or as KITTI has them.
+fn raw_floats(points: usize, row: impl Fn(f32) -> Vec<f32>) -> Vec<u8> {
+    (0..points).flat_map(|k| row(k as f32)).flat_map(f32::to_le_bytes).collect()
+}
+
+#[test]
+fn five_columns_are_not_read_as_four() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("0.bin");
+    let wall = |k: f32| [8.25, 0.1 * k - 3.0, 0.03 * k];
+    fs::write(&path, raw_floats(400, |k| [&wall(k)[..], &[k % 97.0, k % 32.0]].concat())).unwrap();
+    let (error, points) = failure(&path, &OpenOptions::default());
+    assert!(error.contains("`--fields x,y,z,intensity,ring` or") && error.contains("0.bin"), "{error}");
+    assert_eq!(points, 0);
+    let five = ["x", "y", "z", "intensity", "ring"].map(str::to_owned).to_vec();
+    let (_, points) = clouds_with(&path, &OpenOptions { fields: Some(five), ..Default::default() }).remove(0);
+    assert_eq!((points.len(), points[1].position_m[0], points[33].intensity), (400, 8.25, 33.0));
+    let four = ["x", "y", "z", "intensity"].map(str::to_owned).to_vec();
+    let asked = OpenOptions { fields: Some(four), ..Default::default() };
+    assert_eq!(clouds_with(&path, &asked)[0].1.len(), 500);
+}
+
+#[test]
+fn no_file_of_four_columns_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("0.bin");
+    let grid = |k: f32| [(k / 20.0).floor(), k % 20.0, 2.0];
+    for (what, bytes) in [
+        ("intensities from 0 to 1", raw_floats(500, |k| vec![0.1 * k, -3.0, 0.5, k / 500.0])),
+        ("whole intensities", raw_floats(500, |k| vec![0.1 * k, -3.0, 0.5, k % 256.0])),
+        ("whole metres", raw_floats(400, |k| [&grid(k)[..], &[0.37]].concat())),
+        ("whole metres and intensities", raw_floats(400, |k| [&grid(k)[..], &[k % 256.0]].concat())),
+        ("whole metres and odd intensities", raw_floats(400, |k| [&grid(k)[..], &[1.5 + k]].concat())),
+        ("nothing but zeros", raw_floats(500, |_| vec![0.0; 4])),
+        ("one place", raw_floats(500, |_| vec![3.0, 3.0, 3.0, 700.5])),
+        ("no numbers", raw_floats(500, |k| vec![k, 1.0, 2.0, f32::NAN])),
+        ("few points", raw_floats(15, |k| vec![1.5, -2.5, k, 0.5])),
+        ("no points", Vec::new()),
+    ] {
+        fs::write(&path, &bytes).unwrap();
+        // What is empty has no format of its own.
+        let options = OpenOptions { format: Some(Format::Bin), ..OpenOptions::default() };
+        assert_eq!(clouds_with(&path, &options)[0].1.len(), bytes.len() / 16, "{what}");
+    }
+}
+
 #[test]
 fn a_folder_is_read_in_natural_order_with_stamps_of_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -90,6 +136,34 @@ fn a_folder_is_read_in_natural_order_with_stamps_of_names() {
     let found: Vec<_> = clouds.iter().map(|(head, _)| (head.name.as_str(), head.stamp_ns)).collect();
     let stamp_ns = Some(1_700_000_000_123_456_789);
     assert_eq!(found, [("9.bin", None), ("10.bin", None), ("1700000000123456789.bin", stamp_ns)]);
+}
+
+/// A table of poses among texts, by whatever path it is named.
+#[test]
+fn files_that_are_named_for_something_else_are_no_clouds() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for name in ["1.csv", "2.csv"] {
+        fs::write(scans.join(name), "4 0 0\n").unwrap();
+    }
+    fs::write(scans.join("0_gps.csv"), "timestamp,tx,ty,tz\n0,1,2,3\n").unwrap();
+    fs::write(scans.join("lens.txt"), "500 500 320 240\n").unwrap();
+    assert!(Format::guess(&scans).is_err());
+    let other_path = scans.join("../scans/0_gps.csv");
+    assert_eq!(Format::guess_without(&scans, &[other_path.clone()]).unwrap(), Format::Text);
+    let options = OpenOptions {
+        not_clouds: vec![other_path, folder.path().join("nothing")],
+        intrinsics_path: Some(scans.join("lens.txt")),
+        ..OpenOptions::default()
+    };
+    let source = voxtile_clouds::read::open(&scans, &options).unwrap();
+    assert_eq!((source.len_hint(), source.ends()), (Some(2), Some(["1.csv", "2.csv"].map(str::to_owned))));
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(scans.join("0_gps.csv"), scans.join("3.csv")).unwrap();
+        assert_eq!(voxtile_clouds::read::open(&scans, &options).unwrap().len_hint(), Some(2));
+    }
 }
 
 #[test]

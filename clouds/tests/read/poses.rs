@@ -1,8 +1,8 @@
 use crate::support::shared_data;
 use std::fs;
 use std::path::PathBuf;
-use voxtile_clouds::RigidPose;
-use voxtile_clouds::poses::{Found, Trajectory};
+use voxtile_clouds::poses::{Found, Trajectory, most_gap_ns};
+use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
 
 fn read(text: &str) -> voxtile_clouds::Result<Trajectory> {
     let folder = tempfile::tempdir().unwrap();
@@ -32,9 +32,16 @@ fn stamps_are_exact_and_poses_lie_between() {
     assert_eq!(half.position_m, [2.0, 2.0, 3.0]);
     let (sin, cos) = (std::f64::consts::PI / 8.0).sin_cos();
     assert!((half.quaternion[2] - sin).abs() < 1e-12 && (half.quaternion[3] - cos).abs() < 1e-12, "{half:?}");
-    let nearest_ns = FIRST_NS + 1_000_000_000;
-    assert_eq!(trajectory.at(nearest_ns + 2_000_000_000, 1_999_999_999), Found::TooFar { nearest_ns });
-    assert!(matches!(trajectory.at(nearest_ns + 2_000_000_000, 2_000_000_000), Found::Between(_)));
+    // A hole of ten seconds, near to its begin as in its middle.
+    for into_ns in [400_000_000, 5_000_000_000] {
+        let at_ns = FIRST_NS + 1_000_000_000 + into_ns;
+        assert_eq!(trajectory.at(at_ns, 4_999_999_999), Found::Gap { gap_ns: 10_000_000_000 });
+        assert!(matches!(trajectory.at(at_ns, 5_000_000_000), Found::Between(_)));
+    }
+    // Once a second, every moment is within half a second of a pose.
+    assert_eq!(trajectory.at(FIRST_NS + 1, 499_999_999), Found::Gap { gap_ns: 1_000_000_000 });
+    assert_eq!(most_gap_ns(i64::MAX), i64::MAX);
+    assert_eq!(most_gap_ns(-1), 0);
     assert_eq!(trajectory.by_number(0), Some(first));
     assert_eq!(trajectory.by_number(3), None);
 }
@@ -81,17 +88,45 @@ fn what_is_no_pose_is_an_error_with_its_line() {
     }
 }
 
+/// So many clouds, if that is known, which are never read.
+struct Clouds(Option<u64>);
+
+impl CloudSource for Clouds {
+    fn format(&self) -> &str {
+        "nothing"
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        self.0
+    }
+
+    fn ends(&self) -> Option<[String; 2]> {
+        Some(["1.txt", "trajectory.txt"].map(str::to_owned))
+    }
+
+    fn next_cloud(&mut self) -> voxtile_clouds::Result<Option<CloudHead>> {
+        Ok(None)
+    }
+
+    fn read_points(
+        &mut self,
+        _: &mut dyn FnMut(CloudPoint) -> voxtile_clouds::Result<()>,
+    ) -> voxtile_clouds::Result<()> {
+        Ok(())
+    }
+}
+
 #[test]
 fn poses_by_number_are_as_many_as_clouds() {
     let trajectory = read(TUM).unwrap();
-    assert_eq!(trajectory.of_cloud(2, Some(3)).unwrap(), trajectory.by_number(2).unwrap());
-    assert_eq!(trajectory.of_cloud(2, None).unwrap(), trajectory.by_number(2).unwrap());
+    assert_eq!(trajectory.of_cloud(2, &Clouds(Some(3))).unwrap(), trajectory.by_number(2).unwrap());
+    assert_eq!(trajectory.of_cloud(2, &Clouds(None)).unwrap(), trajectory.by_number(2).unwrap());
     for (number, clouds, counts) in [
-        (0, Some(4), "3 poses for 4 clouds"),
-        (0, Some(2), "3 poses for 2 clouds"),
-        (3, None, "3 poses for at least 4 clouds"),
+        (0, Some(4), "3 poses for 4 clouds (1.txt to trajectory.txt), which have no time stamps in common"),
+        (0, Some(2), "3 poses for 2 clouds (1.txt to trajectory.txt), "),
+        (3, None, "3 poses for at least 4 clouds, "),
     ] {
-        let error = trajectory.of_cloud(number, clouds).unwrap_err().to_string();
+        let error = trajectory.of_cloud(number, &Clouds(clouds)).unwrap_err().to_string();
         assert!(error.contains("poses.txt: ") && error.contains(counts), "{error}");
     }
 }

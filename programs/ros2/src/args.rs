@@ -43,7 +43,8 @@ pub struct Args {
     /// How long a cloud waits for the transforms around its stamp before it is dropped
     #[arg(long, value_name = "S", default_value_t = 1.0)]
     pub transform_wait: f64,
-    /// Largest gap between two transforms of a frame in which a pose is found
+    /// Most seconds from a cloud to the nearer of the transforms of a frame around it; gaps of up to twice as long
+    /// are filled
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     pub pose_tolerance: f64,
 

@@ -5,6 +5,7 @@ use crate::counters::Counters;
 use crate::stamp_check::{StampCheck, StampVerdict};
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
+use voxtile_clouds::poses::most_gap_ns;
 use voxtile_clouds::ros::messages::StampedPose;
 use voxtile_clouds::ros::{Transforms, WhyNot};
 
@@ -31,7 +32,7 @@ const MOST_NAME_BYTES: usize = 256;
 impl TransformBuffer {
     pub fn new(args: &Args) -> Self {
         let mut transforms = Transforms::default();
-        transforms.set_most_gap_ns(Some((args.pose_tolerance.max(0.0) * 1e9) as i64));
+        transforms.set_most_gap_ns(Some(most_gap_ns((args.pose_tolerance * 1e9) as i64)));
         let most_wait = Duration::try_from_secs_f64(args.transform_wait).unwrap_or_default();
         let fixed_frame = args.frame_id.trim_start_matches('/').to_owned();
         Self { transforms, stamps: StampCheck::default(), fixed_frame, most_wait, samples: (0, 0) }

@@ -30,7 +30,7 @@ class ReadOptions(TypedDict, total=False):
     topic: str | None
     odometry: str | None
     fixed_frame: str | None
-    fields: Sequence[str] | None
+    fields: str | Sequence[str] | None
     first: int
     count: int | None
     every: int
@@ -179,12 +179,15 @@ def _arguments(options: Mapping[str, Any]) -> list[str]:
     lists: list[str] = []
     for keyword, value in options.items():
         name = "--" + {"insert_mode": "insert"}.get(keyword, keyword).replace("_", "-")
+        # One number or truth value of NumPy: Python's own, which `is True` knows.
+        if hasattr(value, "dtype") and value.ndim == 0:
+            value = value.item()
         if value is None or value is False:
             continue
         if value is True:
             single.append(name)
         elif keyword == "fields":
-            single.append(f"{name}={','.join(value)}")
+            single.append(f"{name}={value if isinstance(value, str) else ','.join(value)}")
         elif isinstance(value, str | bytes | os.PathLike):
             single.append(f"{name}={os.fsdecode(value)}")
         elif isinstance(value, int | float) or not hasattr(value, "__iter__"):

@@ -18,7 +18,8 @@ pub struct ReadArgs {
     /// Frame of a recording that is the world [default: map, odom, or the root of its tree]
     #[arg(long, value_name = "FRAME")]
     pub fixed_frame: Option<String>,
-    /// Columns of a .bin file, each a float32: x,y,z,intensity,ring [default: x,y,z,intensity]
+    /// Columns of a .bin file, each a float32: x,y,z,intensity,ring; needed where it looks like more than four columns
+    /// [default: x,y,z,intensity]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub fields: Option<Vec<String>>,
     /// Pass over the first N scans
@@ -39,7 +40,7 @@ pub struct ReadArgs {
     /// calib.txt of KITTI, if --poses are its official ones, of the camera
     #[arg(long, value_name = "FILE", requires = "poses")]
     pub calib: Option<PathBuf>,
-    /// Most seconds between the poses around a scan, and so the longest gap that is filled
+    /// Most seconds from a scan to the nearer of the poses around it; gaps of up to twice as long are filled
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     pub pose_tolerance: f64,
     /// Where the sensor is in the body that --poses are of: tx ty tz qx qy qz qw, or a 3x4 matrix row by row

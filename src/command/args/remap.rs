@@ -39,7 +39,7 @@ pub struct RemapArgs {
     /// Where the sensor is in the body that the poses are of: tx ty tz qx qy qz qw, or 12 numbers of a 3x4 matrix
     #[arg(long, value_name = "N", num_args = 7..=12, allow_hyphen_values = true, requires = "poses")]
     pub extrinsic: Option<Vec<f64>>,
-    /// Most seconds between a scan and a pose that it takes
+    /// Most seconds from a scan to the nearer of the poses around it; gaps of up to twice as long are filled
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     pub pose_tolerance: f64,
     /// Leave scans alone that move and turn by no more than this, such as 0.02m,0.1deg
