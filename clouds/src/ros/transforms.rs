@@ -25,6 +25,21 @@ enum Link {
     Moving(BTreeMap<i64, RigidPose>),
 }
 
+impl Frame {
+    fn samples(&self) -> usize {
+        self.links.values().map(Link::samples).sum()
+    }
+}
+
+impl Link {
+    fn samples(&self) -> usize {
+        match self {
+            Self::Static(_) => 1,
+            Self::Moving(samples) => samples.len(),
+        }
+    }
+}
+
 /// Why the pose of a frame in another is not known at a time.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, thiserror::Error)]
 #[non_exhaustive]
@@ -104,17 +119,35 @@ impl Transforms {
     }
 
     /// Forgets samples that are older than this before the last one of the same frames, and returns how many samples
-    /// are left: a buffer of tf keeps its last seconds.
+    /// are left, with one for what is static: a buffer of tf keeps its last seconds.
     pub fn forget_older_than(&mut self, span_ns: i64) -> usize {
         let mut left = 0;
         for link in self.frames.values_mut().flat_map(|frame| frame.links.values_mut()) {
-            let Link::Moving(samples) = link else { continue };
-            if let Some((&last_ns, _)) = samples.last_key_value() {
+            if let Link::Moving(samples) = link
+                && let Some((&last_ns, _)) = samples.last_key_value()
+            {
                 *samples = samples.split_off(&last_ns.saturating_sub(span_ns));
             }
-            left += samples.len();
+            left += link.samples();
         }
         left
+    }
+
+    /// Forgets the older half of the frame that has most samples, and returns how many those were: who sends too many
+    /// takes no room of others. What it was in other parents than the last one goes first.
+    pub fn shrink_largest(&mut self) -> usize {
+        let largest = self.frames.values_mut().max_by_key(|frame| frame.samples());
+        let Some(frame) = largest else { return 0 };
+        let before = frame.samples();
+        let Frame { parent, links } = &mut *frame;
+        links.retain(|of, _| *of == *parent);
+        if let Some(Link::Moving(samples)) = links.get_mut(parent.as_str())
+            && samples.len() == before
+            && let Some(&middle_ns) = samples.keys().nth(before / 2)
+        {
+            *samples = samples.split_off(&middle_ns);
+        }
+        before - frame.samples()
     }
 
     /// Number of frames that have a parent.
@@ -169,28 +202,37 @@ impl Transforms {
         if target == source {
             return Ok(RigidPose::IDENTITY);
         }
+        let [from_target, from_source] = self.links_between(target, source)?;
+        let common_from_source = self.along(&from_source, stamp_ns)?;
+        let common_from_target = self.along(&from_target, stamp_ns)?;
+        Ok(common_from_target.inverse().then(&common_from_source))
+    }
+
+    /// The frames whose place in their parents leads from one frame to another: up to what is above both, from each.
+    ///
+    /// # Errors
+    ///
+    /// Why there is no such way.
+    pub fn links_between(&self, target_frame: &str, source_frame: &str) -> Result<[Vec<String>; 2], WhyNot> {
+        let (target, source) = (bare(target_frame), bare(source_frame));
         for frame in [target, source] {
             if !self.knows(frame) {
                 return Err(WhyNot::UnknownFrame(frame.to_owned()));
             }
         }
-        let (from_target, from_source) = (self.ancestors(target)?, self.ancestors(source)?);
+        let (mut from_target, mut from_source) = (self.ancestors(target)?, self.ancestors(source)?);
         let places: HashMap<&str, usize> = from_target.iter().map(String::as_str).zip(0..).collect();
         let common = (0..).zip(&from_source).find_map(|(k, frame)| Some((k, *places.get(frame.as_str())?)));
         let Some((source_links, target_links)) = common else {
             return Err(WhyNot::NotConnected(target.to_owned(), source.to_owned()));
         };
-        let common_from_source = self.along(from_source.iter().take(source_links), stamp_ns)?;
-        let common_from_target = self.along(from_target.iter().take(target_links), stamp_ns)?;
-        Ok(common_from_target.inverse().then(&common_from_source))
+        from_source.truncate(source_links);
+        from_target.truncate(target_links);
+        Ok([from_target, from_source])
     }
 
     /// The pose of the first frame in the parent of the last.
-    fn along<'f>(
-        &self,
-        frames: impl Iterator<Item = &'f String>,
-        stamp_ns: i64,
-    ) -> Result<RigidPose, WhyNot> {
+    fn along(&self, frames: &[String], stamp_ns: i64) -> Result<RigidPose, WhyNot> {
         let mut pose = RigidPose::IDENTITY;
         for child in frames {
             pose = self.in_parent(child, stamp_ns)?.then(&pose);
@@ -270,10 +312,29 @@ mod tests {
         }
         tf.insert("map", "odom", 2, at(0.7), false);
         tf.insert("base", "lidar", 0, RigidPose::IDENTITY, true);
-        assert_eq!((tf.forget_older_than(3), tf.frames()), (5, 3));
+        assert_eq!((tf.forget_older_than(3), tf.frames()), (6, 3));
         assert_eq!(tf.lookup("odom", "lidar", 5), Err(WhyNot::Before("base".into())));
         assert_eq!(tf.lookup("odom", "lidar", 6), Ok(at(0.3)));
         assert_eq!(tf.lookup("map", "odom", 2), Ok(at(0.7)));
+    }
+
+    #[test]
+    fn the_frame_with_most_samples_loses_the_older_half() {
+        let mut tf = Transforms::default();
+        for stamp_ns in 0..10 {
+            tf.insert("odom", "base", stamp_ns, at(0.3), false);
+        }
+        tf.insert("map", "odom", 2, at(0.7), false);
+        tf.insert("base", "lidar", 0, RigidPose::IDENTITY, true);
+        assert_eq!(tf.shrink_largest(), 5);
+        assert_eq!(tf.lookup("odom", "base", 4), Err(WhyNot::Before("base".into())));
+        assert_eq!(tf.lookup("odom", "lidar", 5), Ok(at(0.3)));
+        for parent in 0..20 {
+            tf.insert(&format!("p{parent}"), "lidar", 0, at(0.1), true);
+        }
+        assert_eq!((tf.shrink_largest(), tf.lookup("p19", "lidar", 7)), (20, Ok(at(0.1))));
+        assert_eq!((tf.shrink_largest(), tf.shrink_largest(), tf.shrink_largest()), (2, 1, 1));
+        assert_eq!((tf.shrink_largest(), tf.lookup("map", "odom", 2)), (0, Ok(at(0.7))));
     }
 
     #[test]

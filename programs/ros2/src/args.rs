@@ -38,15 +38,15 @@ pub struct Args {
     #[arg(long, value_name = "TOPIC")]
     pub path: Option<String>,
     /// A path by which no scan moves farther than this, or turns by half a degree, changes nothing
-    #[arg(long, value_name = "M", default_value_t = 0.05)]
+    #[arg(long, value_name = "M", default_value_t = 0.05, value_parser = metres, allow_negative_numbers = true)]
     pub path_tolerance: f64,
     /// How long a cloud waits for the transforms around its stamp before it is dropped
-    #[arg(long, value_name = "S", default_value_t = 1.0)]
-    pub transform_wait: f64,
+    #[arg(long, value_name = "S", default_value = "1", value_parser = seconds, allow_negative_numbers = true)]
+    pub transform_wait: Duration,
     /// Most seconds from a cloud to the nearer of the transforms of a frame around it; gaps of up to twice as long
     /// are filled
-    #[arg(long, value_name = "S", default_value_t = 0.5)]
-    pub pose_tolerance: f64,
+    #[arg(long, value_name = "S", default_value = "0.5", value_parser = seconds, allow_negative_numbers = true)]
+    pub pose_tolerance: Duration,
 
     /// Edge of a voxel of a new map
     #[arg(long, value_name = "M", default_value_t = 0.05)]
@@ -142,6 +142,25 @@ pub struct Args {
     /// Talk to other machines too; without it, the loopback interface alone is used
     #[arg(long)]
     pub network: bool,
+}
+
+/// What stamps can be apart: some hundred years.
+const MOST_S: f64 = 9e9;
+/// Farther than a map reaches.
+const MOST_M: f64 = 1e9;
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    within(text, MOST_S, "seconds").map(Duration::from_secs_f64)
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    within(text, MOST_M, "metres")
+}
+
+/// A number that is not below zero, and no more than this.
+fn within(text: &str, most: f64, unit: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.0..=most).contains(number));
+    number.ok_or_else(|| format!("give {unit}, from 0 to {most}"))
 }
 
 impl Args {

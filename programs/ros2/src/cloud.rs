@@ -1,4 +1,5 @@
 use std::time::Instant;
+use voxtile_clouds::RigidPose;
 
 /// A `sensor_msgs/PointCloud2` that waits for its pose, its points still in CDR.
 #[derive(Clone, Debug)]
@@ -11,4 +12,6 @@ pub struct Cloud {
     /// Bytes of memory that its points take on top, once they are decoded.
     pub points_bytes: usize,
     pub arrived: Instant,
+    /// Where its sensor was, if that had to be found before it is mapped.
+    pub pose: Option<RigidPose>,
 }

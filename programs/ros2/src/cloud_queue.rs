@@ -2,6 +2,7 @@ use crate::cloud::Cloud;
 use crate::counters::Counters;
 use crate::when_behind::WhenBehind;
 use std::collections::VecDeque;
+use voxtile_clouds::RigidPose;
 
 /// Clouds that wait, oldest first, in a bounded number of bytes. Decoded points count from the beginning, and those of
 /// the cloud that was taken until the next one is: so all of them have room, whenever they are mapped.
@@ -30,6 +31,8 @@ pub enum Verdict<P> {
 
 /// What a cloud takes beside its bytes: no flood of empty ones is free.
 const CLOUD_BYTES: usize = 256;
+/// Of a flood of clouds only the first ones get poses before they are mapped.
+const MOST_SETTLED: usize = 1000;
 
 impl CloudQueue {
     pub fn new(most_bytes: usize, topics: usize, when_behind: WhenBehind) -> Self {
@@ -70,6 +73,13 @@ impl CloudQueue {
         }
         self.bytes += bytes;
         self.clouds.push_back(cloud);
+    }
+
+    /// Gives clouds the poses that are known now, before what they come from is forgotten.
+    pub fn settle(&mut self, pose_of: impl Fn(&Cloud) -> Option<RigidPose>) {
+        for cloud in self.clouds.iter_mut().filter(|cloud| cloud.pose.is_none()).take(MOST_SETTLED) {
+            cloud.pose = pose_of(cloud);
+        }
     }
 
     /// Gives back the room of the cloud that was taken.
@@ -125,7 +135,7 @@ mod tests {
 
     fn cloud(topic: usize, stamp_ns: i64) -> Cloud {
         let (frame, cdr) = (String::new(), vec![0; 744]);
-        Cloud { topic, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now() }
+        Cloud { topic, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
     }
 
     fn stamps(queue: &mut CloudQueue) -> Vec<i64> {

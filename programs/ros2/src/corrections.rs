@@ -20,6 +20,8 @@ pub struct Corrections {
 
 /// A scan and a pose belong together whose stamps differ by no more; paths are often kept in seconds.
 const SAME_STAMP_NS: u64 = 1_000_000;
+/// Where stamps go back by more, another run begins.
+const ANOTHER_RUN_NS: i64 = 2_000_000_000;
 
 /// A scan that can be moved.
 struct Scan {
@@ -30,7 +32,7 @@ struct Scan {
 
 impl Corrections {
     /// A scan that the path does not name keeps its place relative to the nearest one, in time, that it names. Scans
-    /// without a stamp or a pose stay.
+    /// without a stamp or a pose stay, and so do those of earlier runs, which may have the same stamps.
     ///
     /// # Errors
     ///
@@ -42,9 +44,14 @@ impl Corrections {
         let mut path: Vec<(i64, RigidPose)> =
             path.iter().map(|pose| (pose.header.stamp_ns, pose.parent_from_child)).collect();
         path.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-        let mut scans = Vec::new();
+        let (mut scans, mut newest_ns) = (Vec::new(), i64::MIN);
         for record in records {
             if let (Some(stamp_ns), KeptFrame::Sensor(pose)) = (record.stamp_ns, &record.frame) {
+                if stamp_ns < newest_ns.saturating_sub(ANOTHER_RUN_NS) {
+                    scans.clear();
+                    newest_ns = i64::MIN;
+                }
+                newest_ns = newest_ns.max(stamp_ns);
                 let world_from_sensor = pose_of_numbers(pose);
                 scans.push(Scan { number: record.number, stamp_ns, world_from_sensor });
             }
@@ -157,6 +164,23 @@ mod tests {
         let found = Corrections::of(&records[2..4], &path).unwrap();
         let place = found.poses[0].1.position_m();
         assert!((0..3).all(|k| (place[k] - [10.0, -1.0, 0.0][k]).abs() < 1e-12), "{place:?}");
+    }
+
+    #[test]
+    fn scans_of_another_run_stay_though_they_have_the_same_stamps() {
+        let s = 1_000_000_000;
+        let stamps_s = [0, 1, 2, 3, 0, 2, 1, 4];
+        let records: Vec<_> = stamps_s
+            .iter()
+            .zip(1..)
+            .map(|(stamp_s, number)| record(number, Some(stamp_s * s), 0.0))
+            .collect();
+        let path = [pose(s, [0.0, 7.0, 0.0], STRAIGHT)];
+        let found = Corrections::of(&records, &path).unwrap();
+        let numbers: Vec<u64> = found.poses.iter().map(|(number, _)| *number).collect();
+        assert_eq!((found.named, numbers), (1, vec![5, 6, 7, 8]));
+        // Of one run all are moved, whichever node has mapped them.
+        assert_eq!(Corrections::of(&records[..4], &path).unwrap().poses.len(), 4);
     }
 
     #[test]

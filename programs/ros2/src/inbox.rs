@@ -51,7 +51,8 @@ impl Inbox {
             }
         };
         let (stamp_ns, frame) = (header.stamp_ns, header.frame_id);
-        let mut cloud = Cloud { topic, stamp_ns, frame, cdr, points_bytes, arrived: Instant::now() };
+        let mut cloud =
+            Cloud { topic, stamp_ns, frame, cdr, points_bytes, arrived: Instant::now(), pose: None };
         while state.queue.must_wait(&cloud) && !state.is_closed {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
@@ -64,11 +65,11 @@ impl Inbox {
     pub fn put_poses(&self, kind: MessageKind, cdr: &[u8], is_static: bool) {
         let poses = decode_poses(kind, Wire::Cdr, cdr);
         let mut state = self.lock();
-        let State { transforms, counters, .. } = &mut *state;
+        let State { queue, transforms, counters, .. } = &mut *state;
         match poses {
             Ok(poses) => {
                 let now = Instant::now();
-                poses.iter().for_each(|pose| transforms.insert(pose, is_static, now, counters));
+                poses.iter().for_each(|pose| transforms.insert(pose, is_static, now, queue, counters));
             }
             Err(error) => {
                 log::debug!("transforms cannot be decoded: {error}");
@@ -133,6 +134,15 @@ impl Inbox {
         (state.counters, state.queue.len())
     }
 
+    /// As if a sensor stood at the origin of the map.
+    #[cfg(test)]
+    pub fn put_mount(&self, frame: &str) {
+        let header = crate::messages::Header { frame_id: "map".to_owned(), ..Default::default() };
+        let mounts = vec![(header, frame, ([0.0; 3], [0.0, 0.0, 0.0, 1.0]))];
+        let body = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&mounts).unwrap();
+        self.put_poses(MessageKind::Tf, &[vec![0, 1, 0, 0], body].concat(), true);
+    }
+
     /// Lets readers go that wait for room.
     pub fn close(&self) {
         self.lock().is_closed = true;
@@ -161,7 +171,7 @@ mod tests {
     use clap::Parser;
 
     fn header() -> messages::Header {
-        messages::Header { frame_id: "map".to_owned(), ..messages::Header::default() }
+        messages::Header { frame_id: "lidar".to_owned(), ..messages::Header::default() }
     }
 
     #[test]
@@ -179,6 +189,19 @@ mod tests {
     }
 
     #[test]
+    fn clouds_in_the_frame_of_the_map_are_dropped_and_counted_at_once() {
+        let inbox = Inbox::new(&Args::parse_from(["voxtile-ros2", "-o", "map"]));
+        inbox.put_mount("lidar");
+        for frame in ["map", "/map", "lidar"] {
+            let header = messages::Header { frame_id: frame.to_owned(), ..header() };
+            inbox.put_cloud(0, messages::PointCloud2::of_points(header, vec![[1.0; 3]]).cdr());
+        }
+        assert_eq!(inbox.take(Duration::ZERO).unwrap().0.frame, "lidar");
+        let (counters, waiting) = inbox.counters();
+        assert_eq!((counters.received, counters.dropped_without_pose, waiting), (3, 2, 0));
+    }
+
+    #[test]
     fn what_waits_for_room_comes_in_when_the_cloud_before_is_mapped() {
         let inbox = Inbox::new(&Args::parse_from([
             "voxtile-ros2",
@@ -189,6 +212,7 @@ mod tests {
             "--when-behind",
             "wait",
         ]));
+        inbox.put_mount("lidar");
         let cloud = messages::PointCloud2::of_points(header(), vec![[1.0; 3]; 3000]).cdr();
         std::thread::scope(|scope| {
             scope.spawn(|| (0..4).for_each(|_| inbox.put_cloud(0, cloud.clone())));

@@ -31,6 +31,7 @@ mod refusal;
 mod remapping;
 mod services;
 mod stamp_check;
+mod stop_signals;
 mod transform_buffer;
 mod transport;
 mod when_behind;
@@ -40,7 +41,6 @@ use inbox::Inbox;
 use mapping::Mapping;
 use std::process::ExitCode;
 use std::sync::Arc;
-use voxtile::Stop;
 
 fn main() -> ExitCode {
     // So that --memory holds: DDS and the mapper have many threads.
@@ -61,12 +61,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    let stop = Stop::default();
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // A second one ends the process at once.
-        signal_hook::flag::register_conditional_shutdown(signal, 130, stop.flag())?;
-        signal_hook::flag::register(signal, stop.flag())?;
-    }
+    let stop = stop_signals::catch()?;
     let inbox = Arc::new(Inbox::new(args));
     // A map that cannot be opened is told before anybody sees a node.
     let (orders, placed_orders) = services::orders();

@@ -24,8 +24,11 @@ struct Child {
 pub enum StampVerdict {
     Take,
     Refuse,
-    /// The clock is another one: what was known of these frames is of no use. All of them if most have jumped.
-    Jump(Vec<String>),
+    /// The clock is another one since then: what was known of these frames is of no use. All of them if most have jumped.
+    Jump {
+        children: Vec<String>,
+        since: Instant,
+    },
 }
 
 /// So far ahead of all others a stamp is none, unless all of its frame are.
@@ -53,7 +56,12 @@ impl StampCheck {
             self.note(child, Child { off_since: Some(since), ..known });
             return StampVerdict::Refuse;
         }
-        StampVerdict::Jump(self.follow(child, stamp_ns, since, now))
+        StampVerdict::Jump { children: self.follow(child, stamp_ns, since, now), since }
+    }
+
+    /// The frames whose clocks may have jumped, and since when.
+    pub fn off(&self) -> impl Iterator<Item = (&str, Instant)> {
+        self.children.iter().filter_map(|(child, known)| Some((child.as_str(), known.off_since?)))
     }
 
     /// Follows the clock of a child that has been off since then, and returns whose past is of no use.
@@ -113,7 +121,7 @@ mod tests {
         for to in [900, 90] {
             let (mut check, now) = (StampCheck::default(), Instant::now());
             let stamps = [100, to, to, to + 1, to + 1, to + 1, to + 1, to + 2];
-            let jump = Jump(vec!["base".to_owned()]);
+            let jump = Jump { children: vec!["base".to_owned()], since: now + Duration::from_millis(100) };
             let expected = [Take, Refuse, Refuse, Refuse, Refuse, Refuse, jump, Take];
             assert_eq!(verdicts(&mut check, now, &stamps), expected, "to {to}");
         }
@@ -138,7 +146,7 @@ mod tests {
             let elapsed_ns = number * S / 100;
             check.verdict("other", other_s(number) * S, now);
             let verdict = check.verdict("good", good_s(number) * S + elapsed_ns, now);
-            if let Jump(forgotten) = &verdict {
+            if let Jump { children: forgotten, .. } = &verdict {
                 assert_eq!(forgotten, &["good"]);
             }
             refused += usize::from(verdict == Refuse);
@@ -167,7 +175,8 @@ mod tests {
         for number in 1..100 {
             let now = start + Duration::from_millis(20) * number as u32;
             for (child, stamp_s) in [("arm", 1000), ("odom", 5), ("base", 5)] {
-                if let Jump(mut forgotten) = check.verdict(child, stamp_s * S + number * S / 50, now) {
+                let verdict = check.verdict(child, stamp_s * S + number * S / 50, now);
+                if let Jump { children: mut forgotten, .. } = verdict {
                     forgotten.sort_unstable();
                     jumps.push(forgotten.join(" "));
                 }

@@ -1,6 +1,6 @@
 use crate::args::Args;
 use crate::cloud::Cloud;
-use crate::cloud_queue::Verdict;
+use crate::cloud_queue::{CloudQueue, Verdict};
 use crate::counters::Counters;
 use crate::stamp_check::{StampCheck, StampVerdict};
 use std::time::{Duration, Instant};
@@ -18,6 +18,8 @@ pub struct TransformBuffer {
     most_wait: Duration,
     /// Samples since the last time that old ones were forgotten, and those left then.
     samples: (usize, usize),
+    /// Whether somebody was told that clouds in the frame of the map are of no use.
+    has_warned: bool,
 }
 
 /// As long as the buffers of tf2 are.
@@ -32,24 +34,38 @@ const MOST_NAME_BYTES: usize = 256;
 impl TransformBuffer {
     pub fn new(args: &Args) -> Self {
         let mut transforms = Transforms::default();
-        transforms.set_most_gap_ns(Some(most_gap_ns((args.pose_tolerance * 1e9) as i64)));
-        let most_wait = Duration::try_from_secs_f64(args.transform_wait).unwrap_or_default();
-        let fixed_frame = args.frame_id.trim_start_matches('/').to_owned();
-        Self { transforms, stamps: StampCheck::default(), fixed_frame, most_wait, samples: (0, 0) }
+        let tolerance_ns = i64::try_from(args.pose_tolerance.as_nanos()).unwrap_or(i64::MAX);
+        transforms.set_most_gap_ns(Some(most_gap_ns(tolerance_ns)));
+        Self {
+            transforms,
+            stamps: StampCheck::default(),
+            fixed_frame: bare(&args.frame_id).to_owned(),
+            most_wait: args.transform_wait,
+            samples: (0, 0),
+            has_warned: false,
+        }
     }
 
-    pub fn insert(&mut self, pose: &StampedPose, is_static: bool, now: Instant, counters: &mut Counters) {
-        let (new, kept) = self.samples;
-        if new >= FORGET_EVERY {
-            self.samples = (0, self.transforms.forget_older_than(SPAN_NS));
+    /// Takes a transform. Clouds that wait get their poses before it replaces what they need.
+    pub fn insert(
+        &mut self,
+        pose: &StampedPose,
+        is_static: bool,
+        now: Instant,
+        queue: &mut CloudQueue,
+        counters: &mut Counters,
+    ) {
+        if self.samples.0 >= FORGET_EVERY {
+            self.make_room(queue, counters);
         }
+        let (new, kept) = self.samples;
         let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
         // Frames that are known stay in use, whoever floods the rest.
         let is_new = !self.transforms.knows(child);
         let is_full = new + kept >= MOST_SAMPLES || (is_new && self.transforms.frames() >= MOST_FRAMES);
         let is_refused = parent.len().max(child.len()) > MOST_NAME_BYTES
             || is_full
-            || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now))
+            || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now, queue))
             || !self.transforms.insert(
                 parent,
                 child,
@@ -61,16 +77,32 @@ impl TransformBuffer {
         self.samples.0 += 1;
     }
 
+    /// Forgets what is old, and of who floods the buffer so much that there is room for others.
+    fn make_room(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
+        queue.settle(|cloud| self.find(cloud).ok());
+        let mut left = self.transforms.forget_older_than(SPAN_NS);
+        while left > MOST_SAMPLES - FORGET_EVERY {
+            let lost = self.transforms.shrink_largest();
+            if lost == 0 {
+                break;
+            }
+            left -= lost;
+            counters.transforms_refused += lost as u64;
+        }
+        self.samples = (0, left);
+    }
+
     /// Whether a stamp is one of the robot's clock. If that of a frame has jumped, what was before it is forgotten.
-    fn is_of_now(&mut self, child: &str, stamp_ns: i64, now: Instant) -> bool {
+    fn is_of_now(&mut self, child: &str, stamp_ns: i64, now: Instant, queue: &mut CloudQueue) -> bool {
         match self.stamps.verdict(child, stamp_ns, now) {
             StampVerdict::Take => true,
             StampVerdict::Refuse => false,
-            StampVerdict::Jump(children) => {
+            StampVerdict::Jump { children, since } => {
                 let (count, of) = (children.len(), if children.len() > 1 { " and others" } else { "" });
                 log::warn!(
                     "the clock of {child}{of} has jumped: the transforms of {count} frames before are forgotten"
                 );
+                queue.settle(|cloud| if cloud.arrived < since { self.look_up(cloud).ok() } else { None });
                 for child in children {
                     if self.transforms.is_moving(&child) {
                         self.transforms.detach(&child);
@@ -82,9 +114,18 @@ impl TransformBuffer {
     }
 
     /// Whether a cloud has its pose, may still get it, or never will.
-    pub fn verdict(&self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
-        match self.transforms.lookup(&self.fixed_frame, &cloud.frame, cloud.stamp_ns) {
+    pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
+        match cloud.pose.map_or_else(|| self.find(cloud), Ok) {
             Ok(pose) => Verdict::Ready(pose),
+            Err(why @ WhyNot::AlreadyFixed(_)) => {
+                if !std::mem::replace(&mut self.has_warned, true) {
+                    log::warn!(
+                        "clouds are dropped: {why}. Publish them in the frame of the sensor, with its transforms, or give \
+                         with --frame-id a frame in which the sensor moves"
+                    );
+                }
+                Verdict::Hopeless
+            }
             // Transforms may come late and out of order.
             Err(why) if now.saturating_duration_since(cloud.arrived) < self.most_wait => {
                 log::trace!("a cloud of {} waits: {why}", cloud.frame);
@@ -97,19 +138,52 @@ impl TransformBuffer {
         }
     }
 
+    /// The pose of a cloud, if its clock is known now.
+    fn find(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
+        let pose = self.look_up(cloud)?;
+        // What came since then may be of another clock, which passes the same stamps again.
+        let mut off = self.stamps.off().filter(|(_, since)| *since <= cloud.arrived).peekable();
+        if off.peek().is_some() {
+            let links = self.transforms.links_between(&self.fixed_frame, &cloud.frame)?;
+            let is_between = |child: &str| links.iter().flatten().any(|link| link == bare(child));
+            if let Some((child, _)) = off.find(|(child, _)| is_between(child)) {
+                return Err(WhyNot::After(bare(child).to_owned()));
+            }
+        }
+        Ok(pose)
+    }
+
+    fn look_up(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
+        // A frame is at the origin of itself, and rays would begin there.
+        if bare(&cloud.frame) == self.fixed_frame {
+            return Err(WhyNot::AlreadyFixed(self.fixed_frame.clone()));
+        }
+        self.transforms.lookup(&self.fixed_frame, &cloud.frame, cloud.stamp_ns)
+    }
+
     fn tell(&self, why: &WhyNot) {
         log::debug!("a cloud is dropped, it has no pose in {}: {why}", self.fixed_frame);
     }
 }
 
+/// tf 1 wrote slashes before names, tf 2 does not know them.
+fn bare(frame: &str) -> &str {
+    frame.trim_start_matches('/')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::when_behind::WhenBehind;
     use clap::Parser;
     use voxtile_clouds::ros::messages::Header;
 
     fn buffer() -> TransformBuffer {
         TransformBuffer::new(&Args::parse_from(["voxtile-ros2", "-o", "map"]))
+    }
+
+    fn queue() -> CloudQueue {
+        CloudQueue::new(1 << 20, 1, WhenBehind::DropOldest)
     }
 
     fn pose(parent: &str, child: &str, stamp_ns: i64, x: f64) -> StampedPose {
@@ -122,18 +196,30 @@ mod tests {
 
     fn cloud(stamp_ns: i64) -> Cloud {
         let (frame, cdr) = ("lidar".to_owned(), Vec::new());
-        Cloud { topic: 0, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now() }
+        Cloud { topic: 0, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
     }
 
     #[test]
     fn a_cloud_waits_for_the_transform_behind_its_stamp_and_then_is_dropped() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         let cloud = cloud(150_000_000);
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, Instant::now(), &mut counters);
-        buffer.insert(&pose("map", "base", 100_000_000, 0.0), false, Instant::now(), &mut counters);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, Instant::now(), &mut queue(), &mut counters);
+        buffer.insert(
+            &pose("map", "base", 100_000_000, 0.0),
+            false,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
         assert_eq!(buffer.verdict(&cloud, cloud.arrived), Verdict::Waits);
         assert_eq!(buffer.verdict(&cloud, cloud.arrived + Duration::from_secs(2)), Verdict::Hopeless);
-        buffer.insert(&pose("map", "base", 200_000_000, 2.0), false, Instant::now(), &mut counters);
+        buffer.insert(
+            &pose("map", "base", 200_000_000, 2.0),
+            false,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
         let Verdict::Ready(found) = buffer.verdict(&cloud, cloud.arrived) else { panic!("no pose") };
         assert_eq!(found.position_m, [2.0, 0.0, 0.0]);
         assert_eq!(counters, Counters::default());
@@ -143,10 +229,10 @@ mod tests {
     fn a_stamp_in_the_future_costs_no_history_and_a_restart_forgets_it() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut counters);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut queue(), &mut counters);
         let mut tick = |buffer: &mut TransformBuffer, number: i64, stamp_ns: i64, x: f64| {
             let now = start + Duration::from_millis(20) * number as u32;
-            buffer.insert(&pose("map", "base", stamp_ns, x), false, now, &mut counters);
+            buffer.insert(&pose("map", "base", stamp_ns, x), false, now, &mut queue(), &mut counters);
         };
         for number in 0..3000 {
             tick(&mut buffer, number, 5 * S + number * S / 50, 3.0);
@@ -154,17 +240,18 @@ mod tests {
                 tick(&mut buffer, number, 900_000 * S, 9.0);
             }
         }
-        let found = |buffer: &TransformBuffer, stamp_ns: i64| match buffer.verdict(&cloud(stamp_ns), start) {
-            Verdict::Ready(pose) => Some(pose.position_m[0]),
-            _ => None,
-        };
-        assert_eq!(found(&buffer, 60 * S), Some(4.0));
+        let found =
+            |buffer: &mut TransformBuffer, stamp_ns: i64| match buffer.verdict(&cloud(stamp_ns), start) {
+                Verdict::Ready(pose) => Some(pose.position_m[0]),
+                _ => None,
+            };
+        assert_eq!(found(&mut buffer, 60 * S), Some(4.0));
         // The simulation begins anew, and passes the same stamps.
         for number in 3000..6000 {
             tick(&mut buffer, number, 5 * S + (number - 3000) * S / 50 + 7, 5.0);
         }
-        assert_eq!(found(&buffer, 60 * S), Some(6.0));
-        assert_eq!(found(&buffer, 5 * S + S / 10), None);
+        assert_eq!(found(&mut buffer, 60 * S), Some(6.0));
+        assert_eq!(found(&mut buffer, 5 * S + S / 10), None);
         assert!((300..330).contains(&counters.transforms_refused), "{counters}");
     }
 
@@ -172,13 +259,13 @@ mod tests {
     fn a_frame_whose_clock_falls_back_costs_the_others_no_history() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut counters);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut queue(), &mut counters);
         for number in 0..500 {
             let now = start + Duration::from_millis(20) * number as u32;
             let stamp_ns = 1000 * S + number * S / 50;
             let of_arm = if number < 250 { stamp_ns } else { number * S / 50 };
-            buffer.insert(&pose("base", "arm", of_arm, 0.0), false, now, &mut counters);
-            buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, now, &mut counters);
+            buffer.insert(&pose("base", "arm", of_arm, 0.0), false, now, &mut queue(), &mut counters);
+            buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, now, &mut queue(), &mut counters);
             let found = buffer.verdict(&cloud(stamp_ns), now);
             assert!(
                 matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 4.0),
@@ -189,21 +276,113 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_of_frames_or_samples_fills_the_buffer_and_no_more() {
+    fn a_flood_of_frames_fills_the_buffer_and_no_more() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         for frame in 0..MOST_FRAMES + 7 {
-            buffer.insert(&pose("map", &format!("f{frame}"), 0, 0.0), false, Instant::now(), &mut counters);
+            buffer.insert(
+                &pose("map", &format!("f{frame}"), 0, 0.0),
+                false,
+                Instant::now(),
+                &mut queue(),
+                &mut counters,
+            );
         }
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (MOST_FRAMES, 7));
-        buffer.insert(&pose("map", "f3", 1, 0.0), false, Instant::now(), &mut counters);
+        buffer.insert(&pose("map", "f3", 1, 0.0), false, Instant::now(), &mut queue(), &mut counters);
         assert_eq!(counters.transforms_refused, 7);
-        let (mut buffer, mut counters) = (self::buffer(), Counters::default());
-        for stamp_ns in 0..MOST_SAMPLES as i64 + 3000 {
-            buffer.insert(&pose("map", "base", stamp_ns, 0.0), false, Instant::now(), &mut counters);
+    }
+
+    #[test]
+    fn who_floods_the_buffer_loses_its_own_past_alone() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, now) = (buffer(), Counters::default(), Instant::now());
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, now, &mut queue(), &mut counters);
+        for tick in 0..100 {
+            buffer.insert(&pose("map", "base", tick * S / 50, 2.0), false, now, &mut queue(), &mut counters);
         }
-        assert!(counters.transforms_refused > 0);
+        for stamp_ns in 0..2 * MOST_SAMPLES as i64 {
+            buffer.insert(&pose("map", "flood", stamp_ns, 0.0), false, now, &mut queue(), &mut counters);
+        }
+        for tick in 100..200 {
+            buffer.insert(&pose("map", "base", tick * S / 50, 2.0), false, now, &mut queue(), &mut counters);
+        }
+        for stamp_ns in [S / 100, 2 * S - S / 100, 3 * S + S / 100] {
+            let found = buffer.verdict(&cloud(stamp_ns), now);
+            assert!(
+                matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0),
+                "{stamp_ns}: {found:?}"
+            );
+        }
+        assert!(counters.transforms_refused >= MOST_SAMPLES as u64, "{counters}");
         assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
-        buffer.insert(&pose("map", &"x".repeat(1 << 20), 0, 0.0), true, Instant::now(), &mut counters);
-        assert_eq!(buffer.transforms.frames(), 1);
+        // Parents are samples, too.
+        for parent in 0..MOST_SAMPLES + 2 * FORGET_EVERY {
+            let pose = pose(&format!("p{parent}"), "flood", 0, 0.0);
+            buffer.insert(&pose, true, now, &mut queue(), &mut counters);
+        }
+        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
+        assert!(matches!(buffer.verdict(&cloud(S / 100), now), Verdict::Ready(_)));
+    }
+
+    #[test]
+    fn a_long_name_is_no_frame() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        buffer.insert(
+            &pose("map", &"x".repeat(1 << 20), 0, 0.0),
+            true,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
+        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (0, 1));
+    }
+
+    #[test]
+    fn clouds_that_wait_for_long_keep_the_poses_that_they_had() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, mut queue, start) =
+            (buffer(), Counters::default(), queue(), Instant::now());
+        let mut tick = |buffer: &mut TransformBuffer, queue: &mut CloudQueue, number: i64| {
+            let now = start + Duration::from_millis(20) * number as u32;
+            let pose = pose("map", "lidar", number * S / 50, number as f64 / 50.0);
+            buffer.insert(&pose, false, now, queue, &mut counters);
+        };
+        queue.push(cloud(2 * S), &mut Counters::default());
+        queue.push(cloud(70 * S + S / 100), &mut Counters::default());
+        // The mapper comes to them after two minutes.
+        (0..6000).for_each(|number| tick(&mut buffer, &mut queue, number));
+        let now = start + Duration::from_secs(120);
+        let mut take = || queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, now));
+        let mut places_m = Vec::new();
+        while let Some((_, pose)) = take() {
+            places_m.push(pose.position_m[0]);
+        }
+        assert_eq!(places_m.len(), 2);
+        assert!((places_m[0] - 2.0).abs() + (places_m[1] - 70.01).abs() < 1e-9, "{places_m:?}");
+    }
+
+    #[test]
+    fn a_cloud_of_a_clock_that_has_gone_back_gets_no_pose_of_before() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, mut queue, start) =
+            (buffer(), Counters::default(), queue(), Instant::now());
+        let at = |number: i64| start + Duration::from_millis(20) * number as u32;
+        let mut tick = |buffer: &mut TransformBuffer, queue: &mut CloudQueue, number: i64, stamp_ns, x| {
+            buffer.insert(&pose("map", "lidar", stamp_ns, x), false, at(number), queue, &mut counters);
+        };
+        (0..300).for_each(|number| tick(&mut buffer, &mut queue, number, number * S / 50, 1.0));
+        let before = Cloud { arrived: at(299), ..cloud(5 * S + S / 100) };
+        queue.push(before.clone(), &mut Counters::default());
+        assert!(matches!(buffer.verdict(&before, at(299)), Verdict::Ready(_)));
+        // A bag is played again, from its second on.
+        tick(&mut buffer, &mut queue, 300, S, 9.0);
+        let again = Cloud { arrived: at(301), ..cloud(2 * S + S / 100) };
+        assert_eq!(buffer.verdict(&again, at(301)), Verdict::Waits);
+        assert!(matches!(buffer.verdict(&before, at(301)), Verdict::Ready(_)));
+        (301..400).for_each(|number| tick(&mut buffer, &mut queue, number, (number - 250) * S / 50, 9.0));
+        let found = buffer.verdict(&again, at(301));
+        assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 9.0), "{found:?}");
+        let taken = queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, at(400)));
+        assert_eq!(taken.map(|(_, pose)| pose.position_m[0]), Some(1.0));
     }
 }

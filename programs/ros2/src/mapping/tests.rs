@@ -27,9 +27,10 @@ fn open_on(disk: &FaultyDisk, folder: &Path, keeps_scans: bool) -> (Mapping, Ord
 }
 
 fn cloud(points_m: Vec<[f64; 3]>) -> Cloud {
-    let header = messages::Header { frame_id: "map".to_owned(), ..messages::Header::default() };
+    let frame = "lidar".to_owned();
+    let header = messages::Header { frame_id: frame.clone(), ..messages::Header::default() };
     let cdr = messages::PointCloud2::of_points(header, points_m).cdr();
-    Cloud { topic: 0, stamp_ns: 0, frame: "map".to_owned(), cdr, points_bytes: 0, arrived: Instant::now() }
+    Cloud { topic: 0, stamp_ns: 0, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
 }
 
 impl Mapping {
@@ -154,6 +155,7 @@ fn a_node_that_ends_by_an_error_leaves_what_was_mapped_durable() {
     let stop = Stop::default();
     stop.set();
     mapping.mapper.stop_with(stop);
+    mapping.inbox.put_mount("lidar");
     mapping.inbox.put_cloud(0, cloud(vec![[2.0, 0.0, 0.0]]).cdr);
     let error = mapping.run(&Stop::default()).unwrap_err();
     assert!(matches!(error.downcast_ref(), Some(Error::Stopped)), "{error:#}");

@@ -74,11 +74,12 @@ fn options_of(
             }
             Known::Switch(long) => match value {
                 Value::Bool(true) => (long.clone(), vec![format!("--{long}").into()]),
-                Value::Bool(false) => continue,
+                // Nothing, in the place of what an earlier file says.
+                Value::Bool(false) => (long, Vec::new()),
                 _ => return Err(no_value()),
             },
             // octomap_server's word for no limit.
-            Known::Option(long) if long == "max-range" && is_negative(&value) => continue,
+            Known::Option(long) if long == "max-range" && is_negative(&value) => (long, Vec::new()),
             Known::Option(long) => {
                 let values = match &value {
                     Value::List(values) => values.iter().map(Value::text).collect(),
@@ -168,6 +169,18 @@ mod tests {
     }
 
     #[test]
+    fn what_is_switched_off_later_is_off() {
+        let on = "/**: {ros__parameters: {output: m, network: true, keep_scans: true, max_range: 9.0}}";
+        let args = parsed(on, &[]).unwrap();
+        assert_eq!((args.network, args.keep_scans, args.max_range), (true, true, Some(9.0)));
+        let off = ["--ros-args", "-p", "network:=false", "-p", "keep_scans:=false", "-p", "max_range:=-1"];
+        let args = parsed(on, &off).unwrap();
+        assert_eq!((args.network, args.keep_scans, args.max_range), (false, false, None));
+        let args = parsed(on, &[&["--network", "--max-range", "7"], &off[..]].concat()).unwrap();
+        assert_eq!((args.network, args.keep_scans, args.max_range), (true, false, Some(7.0)));
+    }
+
+    #[test]
     fn what_is_not_known_or_wrong_is_told_with_its_place() {
         let with =
             |line: &str| parsed(&format!("/**: {{ros__parameters: {{{line}}}}}"), &["-o", "m"]).unwrap_err();
@@ -175,6 +188,15 @@ mod tests {
         assert!(with("resolution: fine").contains("p.yaml: parameter resolution: invalid value 'fine'"));
         assert!(with("network: 7").contains("parameter network has no value that it can have"));
         assert!(with("resolution: []").contains("parameter resolution has no value"));
+        for name in ["transform_wait", "pose_tolerance", "path_tolerance"] {
+            for value in ["-1", "-1e-9", "'nan'", "'inf'", "1e20"] {
+                let told = with(&format!("{name}: {value}"));
+                let option = name.replace('_', "-");
+                let place = format!("p.yaml: parameter {name}: invalid value");
+                assert!(told.contains(&place) && told.contains(&option), "{told}");
+                assert!(told.contains("give ") && told.contains("from 0 to "), "{told}");
+            }
+        }
         assert!(parsed("/**: 7", &["-o", "m"]).unwrap_err().contains("p.yaml"));
         assert!(parsed("{}", &[]).unwrap_err().contains("--output"));
     }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! LiveMap -> LiveView -> octomap, occupied_voxels, projected_map -> messages
-//! occupied_voxels -> VoxelChanges -> Changing: what viewers do not know yet
+//! occupied_voxels -> VoxelChanges -> Viewers -> Changing: what they do not know yet
 //! LocalView -> local_obstacles -> messages
 //! Health, Counters -> diagnostics
 //! Publishing: one thread beside the mapper; Outlet: a topic, and what was sent last
@@ -19,6 +19,7 @@ mod octomap;
 mod outlet;
 mod projected_map;
 mod publishing;
+mod viewers;
 mod voxel_changes;
 
 pub use extent::Extent;

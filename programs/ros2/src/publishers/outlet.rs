@@ -44,6 +44,6 @@ impl<M: Serialize> Outlet<M> {
 }
 
 /// Whether too much changed while a message was made.
-fn is_expired(error: &anyhow::Error) -> bool {
+pub(super) fn is_expired(error: &anyhow::Error) -> bool {
     matches!(error.downcast_ref(), Some(voxtile::Error::Expired))
 }

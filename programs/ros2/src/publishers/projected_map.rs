@@ -1,9 +1,13 @@
 use super::Extent;
 use crate::messages::{Header, MapMetaData, OccupancyGrid, Pose};
-use voxtile::{Aabb, MapQueries, MapView, Voxel};
+use voxtile::{Aabb, Grid, MapQueries, MapView, Voxel};
 use voxtile_clouds::write::{Column, FlatMap, VoxelRow, VoxelsHead};
 
-/// The voxels of a region from above, cell by cell what `voxtile export` writes for nav2.
+/// Most cells along an edge of a map without voxels, around the middle of its region: such a message comes through.
+const MOST_EMPTY_CELLS: f64 = 1000.0;
+
+/// The voxels of a region from above, cell by cell what `voxtile export` writes for nav2. Without voxels all of the
+/// region is unknown: nav2 takes no map without cells, and would keep the one before.
 ///
 /// # Errors
 ///
@@ -47,7 +51,11 @@ pub fn projected_map(
         origin: Pose::at([0.0; 3]),
     };
     if head.voxels == 0 {
-        return Ok(OccupancyGrid { header, info, data: Vec::new() });
+        let [(x, width), (y, height)] = [0, 1].map(|axis| empty_cells(&grid, region, axis));
+        (info.width, info.height) = (width, height);
+        info.origin = Pose::at([x, y, 0.0]);
+        let data = vec![OccupancyGrid::UNKNOWN; width as usize * height as usize];
+        return Ok(OccupancyGrid { header, info, data });
     }
     let mut flat = FlatMap::new(&head, extent.heights_m);
     let mut put = Ok(());
@@ -67,10 +75,49 @@ pub fn projected_map(
     Ok(OccupancyGrid { header, info, data })
 }
 
+/// Where the cells of a region without voxels begin along an axis, in metres, and how many there are.
+fn empty_cells(grid: &Grid, region: &Aabb, axis: usize) -> (f64, u32) {
+    let edge_m = grid.resolution_m();
+    let [least_m, most_m] = [region.min[axis], region.max[axis]];
+    let middle_m = 0.5 * (least_m + most_m);
+    // Of a region without an end there is none.
+    let middle_m = if middle_m.is_finite() { middle_m } else { 0.0 };
+    let reach_m = (0.5 * (most_m - least_m)).min(0.5 * MOST_EMPTY_CELLS * edge_m);
+    let first = ((middle_m - reach_m) / edge_m).floor();
+    let end = ((middle_m + reach_m) / edge_m).ceil();
+    (first * edge_m, (end - first).max(1.0) as u32)
+}
+
 fn cell_of(column: Column) -> u8 {
     match column {
         Column::Unknown => OccupancyGrid::UNKNOWN,
         Column::Free => OccupancyGrid::FREE,
         Column::Occupied => OccupancyGrid::OCCUPIED,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use voxtile::{MapConfig, OutOfCoreTileMapper};
+
+    #[test]
+    fn a_map_without_voxels_is_unknown_all_over_its_region() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = MapConfig::new(0.5, 16.0).unwrap();
+        let map = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
+        let of = |radius_m: f64| {
+            let extent = Extent { radius_m, heights_m: [f64::NEG_INFINITY, f64::INFINITY] };
+            projected_map(&map, &extent.around([10.0, -20.0, 0.0]), &extent, Header::default()).unwrap()
+        };
+        let flat = of(2.2);
+        assert_eq!((flat.info.width, flat.info.height, flat.data.len()), (10, 10, 100));
+        assert_eq!(flat.info.origin, Pose::at([7.5, -22.5, 0.0]));
+        assert!(flat.data.iter().all(|cell| *cell == OccupancyGrid::UNKNOWN));
+        for (radius_m, least, most) in [(1e-9, 1, 2), (1e9, 1000, 1001), (f64::INFINITY, 1000, 1001)] {
+            let flat = of(radius_m);
+            assert!((least..=most).contains(&flat.info.width), "{radius_m}: {}", flat.info.width);
+            assert_eq!(flat.data.len(), flat.info.width as usize * flat.info.height as usize);
+        }
     }
 }

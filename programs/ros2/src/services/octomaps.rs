@@ -13,7 +13,7 @@ pub fn around_sensor(map: &LiveMap, extent: &Extent, format: OctreeFormat, _: Em
     let made = make(map, &moment, &extent.around(moment.sensor_m), format);
     let map = made.unwrap_or_else(|error| {
         log::warn!("an octree that was asked for cannot be made: {error:#}");
-        Octomap { header: map.header(&moment), id: "OcTree".to_owned(), ..Octomap::default() }
+        empty(map, &moment, format)
     });
     OctomapResponse { map }
 }
@@ -35,6 +35,12 @@ pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxRespon
     }
 }
 
+/// A tree without nodes, of the kind that was asked for: readers make a tree of its resolution before they look further.
+fn empty(map: &LiveMap, moment: &Moment, format: OctreeFormat) -> Octomap {
+    let (binary, resolution) = (format == OctreeFormat::Bt, map.grid().resolution_m());
+    Octomap { header: map.header(moment), binary, id: "OcTree".to_owned(), resolution, data: Vec::new() }
+}
+
 fn make(map: &LiveMap, moment: &Moment, region: &Aabb, format: OctreeFormat) -> anyhow::Result<Octomap> {
     let ask = || octomap(&map.view(), region, format, map.header(moment));
     let mut made = ask();
@@ -46,4 +52,31 @@ fn make(map: &LiveMap, moment: &Moment, region: &Aabb, format: OctreeFormat) -> 
         made = ask();
     }
     made
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
+
+    #[test]
+    fn an_octree_that_cannot_be_made_is_an_empty_one_of_the_map() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = MapConfig::new(0.1, 10.0).unwrap();
+        let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
+        // Beyond the keys of an octree.
+        let origin = [9000.05, 0.05, 0.05];
+        let scan = Scan { origin, points: vec![[9001.05, 0.05, 0.05]], intensities: None };
+        mapper.insert_scan(&scan).unwrap();
+        let map = LiveMap::new("map".to_owned(), mapper.reader().unwrap(), origin, 7);
+        let extent = Extent { radius_m: 5.0, heights_m: [f64::NEG_INFINITY, f64::INFINITY] };
+        for (format, binary) in [(OctreeFormat::Bt, true), (OctreeFormat::Ot, false)] {
+            let made = around_sensor(&map, &extent, format, Empty::default()).map;
+            assert_eq!(
+                (made.binary, &*made.id, made.resolution, made.data.len()),
+                (binary, "OcTree", 0.1, 0)
+            );
+            assert_eq!((&*made.header.frame_id, made.header.stamp.nanosec), ("map", 7));
+        }
+    }
 }
