@@ -1,4 +1,4 @@
-use super::map_state::{MapState, Shown};
+use super::map_state::{Asked, MapState, Shown};
 use super::node_cache;
 use super::route::{At, MapId};
 use crate::command::map_at::{AnyMap, MapAt, open_any_map};
@@ -27,8 +27,6 @@ pub struct ServedMap {
     listed: Mutex<Option<(Stamp, Arc<Vec<Listed>>)>>,
     /// Snapshots that were looked at, those used last at the end.
     snapshots: Mutex<Vec<(Listed, Arc<MapState>)>>,
-    /// Held while the levels of a snapshot are made: others wait for the same, and memory stays bounded.
-    making: Mutex<()>,
 }
 
 /// A snapshot of the map. One that was deleted and made again is another: its flush tells.
@@ -37,6 +35,22 @@ pub struct Listed {
     pub name: String,
     pub flush_number: u64,
     pub tiles: u64,
+}
+
+/// What a request may have made on its way.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Makes {
+    Nothing,
+    /// The levels of snapshots: one request at a time does, so that memory stays bounded and none are made twice.
+    Levels,
+}
+
+/// What there is of a state that a path names.
+pub enum Found<T> {
+    Here(T),
+    /// Its levels are to be made first.
+    NotMade,
+    Nothing,
 }
 
 /// How often a map is looked at for a new flush.
@@ -88,7 +102,6 @@ impl ServedMap {
             now: RwLock::new(Arc::new(now)),
             listed: Mutex::default(),
             snapshots: Mutex::default(),
-            making: Mutex::default(),
         })
     }
 
@@ -124,34 +137,59 @@ impl ServedMap {
         listed
     }
 
-    /// The state that a path names; `None` if there is no such snapshot.
-    pub fn shown(&self, id: &MapId) -> crate::Result<Option<Shown>> {
-        let Some(after) = self.state(&id.at)? else { return Ok(None) };
-        let Some(since) = &id.since else { return Ok(Some(Shown::State(after))) };
-        Ok(self.state(since)?.map(|before| Shown::Change { before, after }))
+    /// The state that a path names.
+    pub fn shown(&self, id: &MapId, makes: Makes) -> crate::Result<Found<Shown>> {
+        let after = match self.state(&id.at, makes)? {
+            Found::Here(state) => state,
+            Found::NotMade => return Ok(Found::NotMade),
+            Found::Nothing => return Ok(Found::Nothing),
+        };
+        let Some(since) = &id.since else { return Ok(Found::Here(Shown::State(after))) };
+        Ok(match self.state(since, makes)? {
+            Found::Here(before) => Found::Here(Shown::Change { before, after }),
+            Found::NotMade => Found::NotMade,
+            Found::Nothing => Found::Nothing,
+        })
     }
 
-    fn state(&self, at: &At) -> crate::Result<Option<Arc<MapState>>> {
-        let At::Snapshot(name) = at else { return Ok(Some(self.now())) };
-        let listed = self.snapshots();
-        let Some(listed) = listed.iter().find(|listed| listed.name == name.as_str()) else { return Ok(None) };
-        if let Some(state) = self.kept(listed) {
-            return Ok(Some(state));
+    /// The map that a path names, for questions: nobody waits for the levels of a snapshot. `None` if there is no such
+    /// snapshot.
+    pub fn asked(&self, id: &MapId) -> crate::Result<Option<Asked>> {
+        if let Some(At::Snapshot(since)) = &id.since
+            && self.listed(since).is_none()
+        {
+            return Ok(None);
         }
-        let _making = self.making.lock();
-        // Perhaps it was made while this waited.
-        if let Some(state) = self.kept(listed) {
-            return Ok(Some(state));
+        let At::Snapshot(name) = &id.at else { return Ok(Some(Asked::State(self.now()))) };
+        let Some(listed) = self.listed(name) else { return Ok(None) };
+        Ok(Some(match self.kept(&listed) {
+            Some(state) => Asked::State(state),
+            None => Asked::Opened(self.opened(name)?),
+        }))
+    }
+
+    fn listed(&self, name: &SnapshotName) -> Option<Listed> {
+        self.snapshots().iter().find(|listed| listed.name == name.as_str()).cloned()
+    }
+
+    fn state(&self, at: &At, makes: Makes) -> crate::Result<Found<Arc<MapState>>> {
+        let At::Snapshot(name) = at else { return Ok(Found::Here(self.now())) };
+        let Some(listed) = self.listed(name) else { return Ok(Found::Nothing) };
+        if let Some(state) = self.kept(&listed) {
+            return Ok(Found::Here(state));
         }
-        let Some(state) = self.made(name)? else { return Ok(None) };
+        if makes == Makes::Nothing {
+            return Ok(Found::NotMade);
+        }
+        let Some(state) = self.made(name)? else { return Ok(Found::Nothing) };
         let mut kept = self.snapshots.lock();
         // One of this name that was deleted is of no use any more.
         kept.retain(|(known, _)| known.name != listed.name);
         if kept.len() == SNAPSHOTS_KEPT {
             kept.remove(0);
         }
-        kept.push((listed.clone(), state.clone()));
-        Ok(Some(state))
+        kept.push((listed, state.clone()));
+        Ok(Found::Here(state))
     }
 
     /// A snapshot that was looked at, which becomes the one used last.
@@ -163,10 +201,14 @@ impl ServedMap {
         Some(found.1)
     }
 
+    fn opened(&self, name: &SnapshotName) -> crate::Result<AnyMap> {
+        let at = MapAt { map: self.at.map.clone(), snapshot: Some(name.clone()) };
+        Ok(AnyMap::Map(Box::new(at.open()?)))
+    }
+
     /// A snapshot with its levels.
     fn made(&self, name: &SnapshotName) -> crate::Result<Option<Arc<MapState>>> {
-        let at = MapAt { map: self.at.map.clone(), snapshot: Some(name.clone()) };
-        let map = AnyMap::Map(Box::new(at.open()?));
+        let map = self.opened(name)?;
         let tiles = map.tile_indices();
         let Some(levels) = Levels::build(&map, &tiles, &self.store, &|_| true)? else { return Ok(None) };
         let state = MapState { map, levels, store: self.store.clone(), generation: 0, pending_tiles: 0 };

@@ -1,7 +1,8 @@
 use super::response::{Answer, Body, Keep, empty};
 use super::route::{Route, version_in};
-use super::served_map::ServedMap;
+use super::served_map::{Makes, ServedMap};
 use super::token::Token;
+use super::work::Work;
 use super::{answers, page};
 use bytes::Bytes;
 use http_body_util::BodyExt;
@@ -36,8 +37,10 @@ pub struct Server {
     token: Token,
     address: SocketAddr,
     changed: watch::Receiver<u64>,
-    /// Answers computed at once: each may hold a tile.
-    work: Semaphore,
+    /// Each of its answers may hold a tile.
+    work: Work,
+    /// Levels of snapshots: one at a time, on all cores. It takes seconds, so whoever waits holds no other work back.
+    making: Work,
 }
 
 impl Server {
@@ -48,7 +51,7 @@ impl Server {
         changed: watch::Receiver<u64>,
     ) -> Self {
         let threads = std::thread::available_parallelism().map_or(2, usize::from);
-        Self { maps, token, address, changed, work: Semaphore::new(threads) }
+        Self { maps, token, address, changed, work: Work::new(threads), making: Work::new(1) }
     }
 
     pub fn run(self, listener: TcpListener) -> anyhow::Result<()> {
@@ -169,15 +172,21 @@ impl Server {
                 None => Answer::error(StatusCode::NOT_FOUND, "there is no such file"),
             };
         }
+        let Route::Of(id, thing) = route else {
+            let server = self.clone();
+            return self.work.run(move || answers::maps(&server.maps)).await.unwrap_or_else(ending);
+        };
         let version = question.and_then(version_in);
-        let busy = || Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is ending");
-        let Ok(_permit) = self.work.acquire().await else { return busy() };
-        let server = self.clone();
-        let work = tokio::task::spawn_blocking(move || match &route {
-            Route::Of(id, thing) => answers::of_map(&server.maps, id, thing, version),
-            _ => answers::maps(&server.maps),
-        });
-        work.await.unwrap_or_else(|_| busy())
+        let ask = |makes| {
+            let (server, id, thing) = (self.clone(), id.clone(), thing.clone());
+            move || answers::of_map(&server.maps, &id, &thing, version, makes)
+        };
+        let answer = match self.work.run(ask(Makes::Nothing)).await {
+            // Levels that are to be made first.
+            Some(None) => self.making.run(ask(Makes::Levels)).await,
+            answer => answer,
+        };
+        answer.flatten().unwrap_or_else(ending)
     }
 
     /// What changes, as it does.
@@ -214,6 +223,10 @@ impl Server {
         *response.body_mut() = body.boxed_unsync();
         response
     }
+}
+
+fn ending() -> Answer {
+    Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is ending")
 }
 
 fn takes_gzip(request: &Request<Incoming>) -> bool {
