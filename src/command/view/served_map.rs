@@ -10,6 +10,7 @@ use crate::render::levels::{Levels, NodeStore};
 use crate::store::SnapshotName;
 use anyhow::Context;
 use parking_lot::{Mutex, RwLock};
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
@@ -89,7 +90,7 @@ impl ServedMap {
             AnyMap::Octree(_) => None,
         };
         let store = Arc::new(node_cache::open(id.as_deref().filter(|_| is_kept))?);
-        let levels = Levels::build(&map, &[], &store, &|_| true)?;
+        let levels = Levels::build(&map, &[], 0, &store, &|_| true)?;
         let levels = levels.context("the levels of a map without tiles")?;
         let pending_tiles = map.tile_indices().len() as u64;
         let now = MapState { map, levels, store: store.clone(), generation: 0, pending_tiles };
@@ -210,7 +211,9 @@ impl ServedMap {
     fn made(&self, name: &SnapshotName) -> crate::Result<Option<Arc<MapState>>> {
         let map = self.opened(name)?;
         let tiles = map.tile_indices();
-        let Some(levels) = Levels::build(&map, &tiles, &self.store, &|_| true)? else { return Ok(None) };
+        let Some(levels) = Levels::build(&map, &tiles, new_origin(), &self.store, &|_| true)? else {
+            return Ok(None);
+        };
         let state = MapState { map, levels, store: self.store.clone(), generation: 0, pending_tiles: 0 };
         Ok(Some(Arc::new(state)))
     }
@@ -249,6 +252,7 @@ impl ServedMap {
 
     fn show_newest(&self, changes: &watch::Sender<u64>) -> anyhow::Result<()> {
         let open = || open_any_map(&self.path);
+        let origin = new_origin();
         let mut tiles = open()?.tile_indices();
         tiles.sort_by_key(|tile| (tile.to_array().map(|k| k >> GROUP), *tile));
         let is_first = self.now().generation == 0;
@@ -258,7 +262,8 @@ impl ServedMap {
         loop {
             let map = open()?;
             let step = |_| true;
-            let levels = Levels::build(&map, &tiles[..end], &self.store, &step)?.context("stopped")?;
+            let levels =
+                Levels::build(&map, &tiles[..end], origin, &self.store, &step)?.context("stopped")?;
             if let Some(progress) = &progress {
                 progress.set(end as u64, tiles.len() as u64);
             }
@@ -283,4 +288,10 @@ impl ServedMap {
         *self.now.write() = Arc::new(state);
         changes.send_modify(|count| *count += 1);
     }
+}
+
+/// Tiles without versions, as those of OctoMap's files: a browser keeps their nodes for ever, and this server may have
+/// shown another file before, or the next one may.
+fn new_origin() -> u64 {
+    RandomState::new().build_hasher().finish()
 }
