@@ -33,7 +33,7 @@ pub fn export(args: &ExportArgs, watch: &Watch) -> anyhow::Result<Exported> {
         let progress = watch.over_tiles(tiles.len());
         let store = NodeStore::open(scratch_for(&args.output)?, &args.output)?;
         let levels =
-            Levels::build(map, &tiles, &store, &|_| !watch.stop().is_set())?.ok_or(Error::Stopped)?;
+            Levels::build(map, &tiles, 0, &store, &|_| !watch.stop().is_set())?.ok_or(Error::Stopped)?;
         if let Some(reason) = levels.unreadable().first() {
             // Whoever opens the folder would not know what is missing.
             return Err(anyhow::anyhow!("{reason}"));

@@ -257,6 +257,29 @@ fn octomap_files_and_several_maps_are_shown() {
     assert_eq!(viewer.get("maps/2/tileset.json").status, 404);
 }
 
+/// A browser keeps nodes for ever: another file at the same address must not have them under the same URLs.
+#[test]
+fn another_octomap_file_has_other_nodes() {
+    let (folder, map) = a_map();
+    let file = folder.path().join("walls.bt");
+    run(&["export", text(&map), "-o", text(&file), "-q"]);
+    let nodes = || {
+        let viewer = Viewer::ready(&[&file], &folder.path().join("cache"));
+        let nodes: BTreeSet<String> = viewer.nodes("0").into_iter().collect();
+        assert!(nodes.iter().all(|node| viewer.get(node).head.contains("immutable")));
+        nodes
+    };
+    let before = nodes();
+    run(&["clear", text(&map), "--region", "3", "-5", "-1", "4.5", "5", "3", "-q"]);
+    run(&["export", text(&map), "-o", text(&file), "-q"]);
+    let after = nodes();
+    let tiles = |nodes: &BTreeSet<String>| {
+        nodes.iter().map(|node| node.split('?').next().unwrap().to_owned()).collect::<BTreeSet<_>>()
+    };
+    assert!(tiles(&before).intersection(&tiles(&after)).count() > 0);
+    assert_eq!(before.intersection(&after).count(), 0);
+}
+
 #[test]
 fn strangers_get_nothing() {
     let (folder, map) = a_map();

@@ -192,6 +192,58 @@ try {
   // That it was gone, the browser says as well.
   assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
 
+  const isShown = (...ids) => `JSON.stringify(voxtile.shown) === '${JSON.stringify(ids)}' && document.getElementById('state').textContent === 'ready'`;
+  const follows = async (...maps) => {
+    const count = maps.reduce((sum, one) => sum + exported(one).size, 0);
+    await browser.value('document.getElementById("fit").click(); voxtile.detail = 0.1');
+    await browser.until(`document.getElementById('state').textContent === 'ready' && voxtile.voxels().count === ${count}`, 60);
+  };
+
+  await browser.open('about:blank');
+  await browser.open(url);
+  await browser.ready();
+  await browser.call('Network.enable');
+  await browser.call('Network.setBlockedURLs', { urls: ['*tileset.json*'] });
+  run('build', scan(2), '-o', map, '--append', '-q');
+  await browser.until('document.getElementById("message").textContent.includes("was not loaded")');
+  await browser.call('Network.setBlockedURLs', { urls: [] });
+  await follows(map);
+  assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
+  step('a flush that did not come is asked for again');
+
+  const hide = (isHidden) => browser.value(`Object.defineProperty(document, 'hidden', { value: ${isHidden}, configurable: true }); document.dispatchEvent(new Event('visibilitychange'))`);
+  await hide(true);
+  const generation = await browser.value('voxtile.generation[0]');
+  run('build', scan(3), '-o', map, '--append', '-q');
+  for (let shows = generation; shows === generation;) shows = (await (await fetch(`${url}maps.json`)).json()).maps[0].generation;
+  await new Promise((resolve) => setTimeout(resolve, 1000));
+  assert.equal(await browser.value('voxtile.generation[0]'), generation, 'a hidden page keeps no connection');
+  await hide(false);
+  await follows(map);
+  step('a hidden page keeps no connection, and catches up');
+
+  const other = join(work, 'other');
+  run('build', scan(4), '-o', other, '--resolution', '0.1', '-q');
+  const both = await view(map, other);
+  await browser.open('about:blank');
+  await browser.open(both);
+  await browser.ready();
+  await browser.value(`document.getElementById('snapshot').value = 'monday'; document.getElementById('snapshot').dispatchEvent(new Event('change'))`);
+  await browser.until(isShown('0@monday', '1'), 60);
+  await follows(`${map}@monday`, other);
+  run('snapshot', map, 'monday', '--delete');
+  await browser.until(isShown('0', '1'), 60);
+  await follows(map, other);
+  // Both at once: what is told of the first says nothing of the second.
+  const grown = [scan(5), scan(6)];
+  await Promise.all([map, other].map((one, k) => new Promise((resolve, reject) => {
+    const build = spawn(voxtile, ['build', grown[k], '-o', one, '--append', '-q'], { stdio: 'inherit' });
+    build.once('exit', (code) => (code ? reject(new Error(`build: ${code}`)) : resolve()));
+  })));
+  await follows(map, other);
+  assert.deepEqual(browser.told, []);
+  step('of several maps one without the snapshot is shown as it is; one that is deleted is left; all follow');
+
   if (process.argv[2]) {
     const city = await view(process.argv[2]);
     const maps = async () => (await (await fetch(`${city}maps.json`)).json()).maps[0];

@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import { TilesRenderer } from '3d-tiles-renderer';
+import { FAILED, TilesRenderer } from '3d-tiles-renderer';
 import { KIND, parseNode } from './node.js';
 import { bytesOf, meshOf } from './mesh.js';
 import { makeMaterial, tintLayer } from './material.js';
@@ -10,6 +10,9 @@ const BEST_ERROR = 2;
 const MOST_ERROR = 4096;
 // Tiles whose free or unknown voxels are shown at once.
 const MOST_NEAR = 24;
+// What did not come is asked for again, later each time.
+const FIRST_RETRY_MS = 2000;
+const LAST_RETRY_MS = 60000;
 
 // One map, or one state of it: nodes come and go as the camera moves.
 export class Layer {
@@ -23,6 +26,8 @@ export class Layer {
     this.materials = { free: makeMaterial(KIND.free, viewer.shared), unknown: makeMaterial(KIND.unknown, viewer.shared) };
     if (hue) tintLayer(this.material, hue);
     this.extra = new Map();
+    this.retryMs = FIRST_RETRY_MS;
+    this.generation = map.generation;
     this.tiles = this.open();
     this.next = null;
     this.isShown = true;
@@ -49,14 +54,51 @@ export class Layer {
     });
     tiles.setCamera(this.viewer.camera);
     tiles.setResolutionFromRenderer(this.viewer.camera, this.viewer.renderer);
-    tiles.addEventListener('load-error', ({ error }) => this.viewer.say(`A part of the map was not loaded: ${error.message}`));
+    tiles.lost = new Set();
+    tiles.addEventListener('load-error', ({ tile, error }) => this.lose(tiles, tile, error));
     tiles.addEventListener('needs-update', () => this.viewer.wake());
     this.group.add(tiles.group);
     return tiles;
   }
 
+  // A tile did not come, or the root where there is none.
+  lose(tiles, tile, error) {
+    const isNext = tiles === this.next;
+    if (this.isGone || (tiles !== this.tiles && !isNext)) return;
+    this.viewer.say(`A part of the map was not loaded: ${error.message}`);
+    if (tile) {
+      tiles.lost.add(tile);
+    } else if (isNext) {
+      // It would never be complete, and whatever is flushed would wait for it.
+      this.close(tiles);
+      [this.next, this.again, this.isBehind] = [null, false, true];
+    }
+    if (this.retryTimer) return;
+    this.retryTimer = setTimeout(() => this.retry(), this.retryMs);
+    this.retryMs = Math.min(2 * this.retryMs, LAST_RETRY_MS);
+  }
+
+  retry() {
+    this.retryTimer = null;
+    for (const tiles of [this.tiles, this.next]) {
+      if (!tiles) continue;
+      // What is in the cache is not asked for, not even if it failed.
+      for (const tile of tiles.lost) if (tile.internal.loadingState === FAILED) tiles.lruCache.remove(tile);
+      tiles.lost.clear();
+      tiles.resetFailedTiles();
+    }
+    if (this.isBehind) this.refresh();
+    this.viewer.wake();
+  }
+
+  close(tiles) {
+    this.group.remove(tiles.group);
+    tiles.dispose();
+  }
+
   // Loads the map as it is now beside what is shown, and swaps when what is in view has come.
   refresh() {
+    this.isBehind = false;
     if (this.next) {
       this.again = true;
       return;
@@ -77,9 +119,9 @@ export class Layer {
       tiles.calm = tiles.rootTileset && Layer.isIdle(tiles) ? (tiles.calm ?? 0) + 1 : 0;
     }
     if (this.next && Layer.isQuiet(this.next)) {
-      this.group.remove(this.tiles.group);
-      this.tiles.dispose();
+      this.close(this.tiles);
       [this.tiles, this.next] = [this.next, null];
+      if (this.tiles.lost.size === 0) this.retryMs = FIRST_RETRY_MS;
       this.tiles.group.visible = true;
       this.viewer.wake();
       if (this.again) {
@@ -186,6 +228,8 @@ export class Layer {
   }
 
   dispose() {
+    this.isGone = true;
+    clearTimeout(this.retryTimer);
     for (const tiles of [this.tiles, this.next]) tiles?.dispose();
     for (const mesh of this.extra.values()) mesh?.geometry.dispose();
     this.group.removeFromParent();

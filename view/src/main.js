@@ -43,9 +43,10 @@ let pathNumber = 0;
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
 
+// The names are those of the first map: another that has no such snapshot is shown as it is now.
 const idOf = (map) => {
-  const at = $('snapshot').value;
-  const since = $('since').value;
+  const [at, since] = ['snapshot', 'since'].map((id) => $(id).value)
+    .map((chosen) => map.snapshots.some(({ name }) => name === chosen) && chosen);
   return map.id + (at ? `@${at}` : '') + (since ? `~${since}` : '');
 };
 
@@ -122,12 +123,10 @@ function showMaps() {
 }
 
 async function readPath() {
-  const map = maps[0];
-  const at = $('snapshot').value;
   const number = ++pathNumber;
   let points = [];
   try {
-    ({ points } = await json(`maps/${map.id}${at ? `@${at}` : ''}/trajectory.json`));
+    ({ points } = await json(`maps/${idOf(maps[0]).split('~')[0]}/trajectory.json`));
   } catch (error) {
     say(`The way of the sensor is not known: ${error.message}`);
   }
@@ -316,47 +315,88 @@ window.addEventListener('hashchange', () => {
 
 // --- Live
 
-async function change(id) {
-  const known = maps.find((map) => map.id === id);
-  const [low, high, was] = [known.low, known.high, known.generation];
-  // Before that, the map was only being read.
-  const wasShown = known.pending_tiles === 0 && was > 0;
+const RETRY_MS = 1000;
+// The state of each map that the server told of last, and which server that was: another one counts anew.
+const told = new Map();
+let teller = null;
+let events = null;
+let isChanging = false;
+
+const isBehind = (layer) => told.has(layer.map.id) && layer.generation !== told.get(layer.map.id);
+const tell = (id, generation) => { if (generation > 0) told.set(id, Math.max(generation, told.get(id) ?? 0)); };
+
+// One change after the other: each reads what there is of all maps.
+async function catchUp() {
+  if (isChanging || !viewer.layers.some(isBehind)) return;
+  isChanging = true;
+  try {
+    await change();
+  } catch (error) {
+    say(`The change was not loaded: ${error.message}`);
+  }
+  isChanging = false;
+  // It failed, or there is more meanwhile.
+  if (viewer.layers.some(isBehind)) setTimeout(catchUp, RETRY_MS);
+}
+
+async function change() {
+  const before = maps;
   await readMaps();
   await readExtents().catch(() => {});
-  const map = maps.find((one) => one.id === id);
-  for (const layer of viewer.layers) {
-    layer.map = maps.find((one) => one.id === layer.map.id) ?? layer.map;
-    // A snapshot stays as it is.
-    if (layer.map.id === id && !layer.id.includes('@')) layer.refresh();
+  for (const { id, generation } of maps) tell(id, generation);
+  const behind = viewer.layers.filter(isBehind);
+  for (const layer of viewer.layers) layer.map = maps.find(({ id }) => id === layer.map.id) ?? layer.map;
+  if (viewer.layers.some((layer) => layer.id !== idOf(layer.map))) {
+    // A snapshot that is shown was deleted.
+    showMaps();
+  } else {
+    for (const layer of behind) {
+      // A snapshot stays as it is, unless another server has one of that name.
+      if (!layer.id.includes('@') || layer.generation === null) layer.refresh();
+      layer.generation = layer.map.generation;
+    }
   }
-  if (was === 0 || low === high) start();
+  const changed = before.filter((was) => maps.some(({ id, generation }) => id === was.id && generation !== was.generation));
+  if (changed.some(({ generation, low, high }) => generation === 0 || low === high)) start();
   else viewer.surround(allBounds());
-  if (wasShown && map.generation !== was) {
+  // Before that, the map was only being read.
+  if (changed.some((was) => was.pending_tiles === 0 && was.generation > 0)) {
     $('live').hidden = false;
-    $('live').title = `flush ${map.generation}`;
+    $('live').title = `flush ${Math.max(...maps.map(({ generation }) => generation))}`;
   }
   cut();
   paint();
   readPath();
 }
 
+// Whoever looks elsewhere keeps no connection: a browser has six for all pages of a server. What changes meanwhile is
+// told when it begins again.
 function follow() {
-  const events = new EventSource('events');
-  const tryChange = (id) => change(id).catch((error) => say(`The change was not loaded: ${error.message}`));
-  events.addEventListener('open', async () => {
+  events?.close();
+  events = null;
+  if (document.hidden) return;
+  events = new EventSource('events');
+  events.addEventListener('open', () => {
     if ($('state').textContent !== 'server gone') return;
     $('state').textContent = 'loading';
-    // What changed meanwhile was not told; a server that was started again counts from the beginning.
-    for (const { id } of maps) await tryChange(id);
     viewer.wake();
   });
   events.addEventListener('error', () => { $('state').textContent = 'server gone'; });
   events.addEventListener('changed', ({ data }) => {
-    const { map: id, generation } = JSON.parse(data);
-    const known = maps.find((map) => map.id === id);
-    if (known && known.generation !== generation) tryChange(id);
+    const { map: id, generation, server } = JSON.parse(data);
+    if (teller !== null && teller !== server) {
+      told.clear();
+      for (const layer of viewer.layers) layer.generation = null;
+    }
+    teller = server;
+    tell(id, generation);
+    catchUp();
   });
 }
+document.addEventListener('visibilitychange', () => {
+  // Not before the maps are shown.
+  if (viewer.layers.length > 0) follow();
+});
 
 function start() {
   viewer.center(allBounds());
@@ -457,7 +497,8 @@ function clickAt(x, y) {
 }
 
 viewer.listeners.push(() => {
-  const isReady = viewer.settled && viewer.layers.length > 0 && maps.every((map) => map.pending_tiles === 0 && map.generation > 0);
+  const isRead = maps.every((map) => map.pending_tiles === 0 && map.generation > 0);
+  const isReady = viewer.settled && viewer.layers.length > 0 && isRead && !viewer.layers.some(isBehind);
   if ($('state').textContent !== 'server gone') $('state').textContent = isReady ? 'ready' : 'loading';
   if (viewer.layers[0]?.scale && !viewer.scaled) {
     viewer.scaled = true;
@@ -504,6 +545,7 @@ window.voxtile = {
     viewer.wake();
   },
   get firstPictureMs() { return viewer.firstPictureMs; },
+  get shown() { return viewer.layers.map(({ id }) => id); },
   get generation() { return maps.map((map) => map.generation); },
 };
 

@@ -1,9 +1,10 @@
 //! What is computed for a request: it may read tiles, so a thread that may wait does it.
 
-use super::map_state::{MapState, Shown};
+use super::map_state::Shown;
 use super::response::{Answer, Keep};
 use super::route::{MapId, Thing};
-use super::served_map::ServedMap;
+use super::served_map::{Found, Makes, ServedMap};
+use crate::command::map_at::AnyMap;
 use crate::command::query::answer_at;
 use crate::mapper::MapView;
 use crate::query::UnknownAs;
@@ -47,25 +48,40 @@ fn describe(number: usize, map: &ServedMap) -> Value {
     })
 }
 
-/// What is asked of a map.
-pub fn of_map(maps: &[Arc<ServedMap>], id: &MapId, thing: &Thing, version: Option<u64>) -> Answer {
+/// What is asked of a map; `None` if that takes levels which are to be made first, and this may not.
+pub fn of_map(
+    maps: &[Arc<ServedMap>],
+    id: &MapId,
+    thing: &Thing,
+    version: Option<u64>,
+    makes: Makes,
+) -> Option<Answer> {
     let nothing = || Answer::error(StatusCode::NOT_FOUND, "there is no such map, snapshot or node");
-    let Some(map) = maps.get(id.number) else { return nothing() };
-    let answer = map.shown(id).and_then(|shown| match shown {
-        Some(shown) => of_state(&shown, thing, version),
-        None => Ok(None),
-    });
-    match answer {
+    let Some(map) = maps.get(id.number) else { return Some(nothing()) };
+    let answer = if thing.takes_levels() {
+        match map.shown(id, makes) {
+            Ok(Found::Here(shown)) => of_levels(&shown, thing, version),
+            Ok(Found::NotMade) => return None,
+            Ok(Found::Nothing) => Ok(None),
+            Err(error) => Err(error),
+        }
+    } else {
+        map.asked(id).and_then(|asked| match asked {
+            Some(asked) => question(asked.map(), thing),
+            None => Ok(None),
+        })
+    };
+    Some(match answer {
         Ok(answer) => answer.unwrap_or_else(nothing),
         Err(error) => {
             log::warn!("{error:#}");
             Answer::error(StatusCode::INTERNAL_SERVER_ERROR, &format!("{error:#}"))
         }
-    }
+    })
 }
 
 /// `version` is that which the request asks for: an answer of another one, of a newer state, is not kept as if it were.
-fn of_state(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
+fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
     let keep = match thing {
         Thing::Node(key, _) | Thing::Subtree(key) if version.is_some() && shown.version(*key)? == version => {
             Keep::ForEver
@@ -73,24 +89,42 @@ fn of_state(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option
         _ => Keep::No,
     };
     let kept = |answer: Answer| Answer { keep, ..answer };
-    let state = shown.state();
     Ok(match thing {
         Thing::Tileset => Some(Answer::json(shown.tileset()?)),
         Thing::Subtree(key) => shown.subtree(*key)?.map(Answer::json).map(kept),
         Thing::Node(key, kind) => shown.node(*key, *kind)?.map(|bytes| Answer::node(bytes, keep)),
-        Thing::Query(point) => Some(Answer::json(query(state, *point)?)),
-        Thing::Raycast(from, to) => Some(Answer::json(raycast(state, *from, *to)?)),
-        Thing::Trajectory => {
-            let (scans, points) = state.trajectory(TRAJECTORY)?;
-            Some(Answer::json(json!({ "scans": scans, "points": points })))
-        }
+        Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory => None,
     })
 }
 
+/// What a map says without its levels.
+fn question(map: &AnyMap, thing: &Thing) -> Result<Option<Answer>> {
+    let answer = match thing {
+        Thing::Query(point) => query(map, *point)?,
+        Thing::Raycast(from, to) => raycast(map, *from, *to)?,
+        Thing::Trajectory => {
+            let (scans, points) = trajectory(map, TRAJECTORY)?;
+            json!({ "scans": scans, "points": points })
+        }
+        Thing::Tileset | Thing::Subtree(_) | Thing::Node(..) => return Ok(None),
+    };
+    Ok(Some(Answer::json(answer)))
+}
+
+/// Where the sensor was, scan by scan, at most so many places; and how many scans there are.
+fn trajectory(map: &AnyMap, most: usize) -> Result<(u64, Vec<Point>)> {
+    let AnyMap::Map(map) = map else { return Ok((0, Vec::new())) };
+    let scans = map.scans()?;
+    let step = scans.len().div_ceil(most).max(1);
+    let last = scans.last().filter(|_| scans.len() % step != 1 && step > 1);
+    let points = scans.iter().step_by(step).chain(last).map(|scan| scan.origin_m).collect();
+    Ok((scans.len() as u64, points))
+}
+
 /// As `voxtile query --json`, and which voxel and tile it is.
-fn query(state: &MapState, point: Point) -> Result<Value> {
-    let grid = state.map.config().grid;
-    let mut answer = json!(answer_at(&state.map, point)?);
+fn query(map: &AnyMap, point: Point) -> Result<Value> {
+    let grid = map.config().grid;
+    let mut answer = json!(answer_at(map, point)?);
     if let (Some(voxel), Some(object)) = (grid.voxel_of(point), answer.as_object_mut()) {
         object.insert("voxel_m".into(), json!(extent(&grid, voxel)));
         object.insert("tile".into(), json!(grid.tile_of_voxel(voxel).to_array()));
@@ -103,11 +137,11 @@ fn extent(grid: &crate::Grid, voxel: VoxelIndex) -> Aabb {
 }
 
 /// Whether one point is seen from another: the voxel of the second may be occupied itself.
-fn raycast(state: &MapState, from: Point, to: Point) -> Result<Value> {
-    let grid = state.map.config().grid;
+fn raycast(map: &AnyMap, from: Point, to: Point) -> Result<Value> {
+    let grid = map.config().grid;
     let is_end = |center: Point| grid.voxel_of(center) == grid.voxel_of(to);
-    let hit = state.map.cast_segment(from, to, UnknownAs::Free)?;
-    let first = state.map.cast_segment(from, to, UnknownAs::Obstacle)?;
+    let hit = map.cast_segment(from, to, UnknownAs::Free)?;
+    let first = map.cast_segment(from, to, UnknownAs::Obstacle)?;
     let blocked = hit.filter(|hit| !is_end(hit.center_m));
     let unknown = first.filter(|hit| hit.probability.is_none() && !is_end(hit.center_m));
     Ok(json!({

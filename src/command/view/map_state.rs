@@ -1,8 +1,8 @@
+use crate::Result;
 use crate::command::map_at::AnyMap;
 use crate::render::levels::{
     Difference, Kind, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, TilesetNodes, subtree, tileset,
 };
-use crate::{Point, Result};
 use std::sync::Arc;
 
 /// One state of a map: as of a flush, or a snapshot.
@@ -21,6 +21,21 @@ pub struct MapState {
 pub enum Shown {
     State(Arc<MapState>),
     Change { before: Arc<MapState>, after: Arc<MapState> },
+}
+
+/// A map that questions are asked of, which takes no levels.
+pub enum Asked {
+    State(Arc<MapState>),
+    Opened(AnyMap),
+}
+
+impl Asked {
+    pub fn map(&self) -> &AnyMap {
+        match self {
+            Self::State(state) => &state.map,
+            Self::Opened(map) => map,
+        }
+    }
 }
 
 impl Shown {
@@ -76,15 +91,5 @@ fn difference<'a>(before: &'a MapState, after: &'a MapState) -> Result<Differenc
 impl MapState {
     pub fn nodes(&self) -> LevelsOf<'_, AnyMap> {
         LevelsOf { levels: &self.levels, map: &self.map }
-    }
-
-    /// Where the sensor was, scan by scan, at most so many places; and how many scans there are.
-    pub fn trajectory(&self, most: usize) -> Result<(u64, Vec<Point>)> {
-        let AnyMap::Map(map) = &self.map else { return Ok((0, Vec::new())) };
-        let scans = map.scans()?;
-        let step = scans.len().div_ceil(most).max(1);
-        let last = scans.last().filter(|_| scans.len() % step != 1 && step > 1);
-        let points = scans.iter().step_by(step).chain(last).map(|scan| scan.origin_m).collect();
-        Ok((scans.len() as u64, points))
     }
 }

@@ -1,7 +1,7 @@
 //! `voxtile view`: maps in a browser.
 //!
 //! ```text
-//! request -> server    connections, their limits and timeouts       server
+//! request -> server    connections, their limits and timeouts       server, work
 //!         -> Route     what a path asks for, or nothing             route, token
 //!         -> answers   JSON of a query, a tileset, bytes of a node  answers
 //!            ServedMap one map, followed while somebody writes it   served_map
@@ -19,6 +19,7 @@ mod route;
 mod served_map;
 mod server;
 mod token;
+mod work;
 
 use crate::command::args::ViewArgs;
 use crate::command::json;

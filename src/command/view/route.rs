@@ -71,6 +71,11 @@ impl Route {
 }
 
 impl Thing {
+    /// Whether it is of the levels of a state; everything else is asked of the map itself.
+    pub fn takes_levels(&self) -> bool {
+        matches!(self, Self::Tileset | Self::Subtree(_) | Self::Node(..))
+    }
+
     fn of(path: &str, question: &str) -> Option<Self> {
         let key = |text: &str, extension| text.strip_suffix(extension)?.parse().ok();
         match path {

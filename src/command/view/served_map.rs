@@ -1,4 +1,4 @@
-use super::map_state::{MapState, Shown};
+use super::map_state::{Asked, MapState, Shown};
 use super::node_cache;
 use super::route::{At, MapId};
 use crate::command::map_at::{AnyMap, MapAt, open_any_map};
@@ -10,6 +10,7 @@ use crate::render::levels::{Levels, NodeStore};
 use crate::store::SnapshotName;
 use anyhow::Context;
 use parking_lot::{Mutex, RwLock};
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
@@ -27,8 +28,6 @@ pub struct ServedMap {
     listed: Mutex<Option<(Stamp, Arc<Vec<Listed>>)>>,
     /// Snapshots that were looked at, those used last at the end.
     snapshots: Mutex<Vec<(Listed, Arc<MapState>)>>,
-    /// Held while the levels of a snapshot are made: others wait for the same, and memory stays bounded.
-    making: Mutex<()>,
 }
 
 /// A snapshot of the map. One that was deleted and made again is another: its flush tells.
@@ -37,6 +36,22 @@ pub struct Listed {
     pub name: String,
     pub flush_number: u64,
     pub tiles: u64,
+}
+
+/// What a request may have made on its way.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Makes {
+    Nothing,
+    /// The levels of snapshots: one request at a time does, so that memory stays bounded and none are made twice.
+    Levels,
+}
+
+/// What there is of a state that a path names.
+pub enum Found<T> {
+    Here(T),
+    /// Its levels are to be made first.
+    NotMade,
+    Nothing,
 }
 
 /// How often a map is looked at for a new flush.
@@ -75,7 +90,7 @@ impl ServedMap {
             AnyMap::Octree(_) => None,
         };
         let store = Arc::new(node_cache::open(id.as_deref().filter(|_| is_kept))?);
-        let levels = Levels::build(&map, &[], &store, &|_| true)?;
+        let levels = Levels::build(&map, &[], 0, &store, &|_| true)?;
         let levels = levels.context("the levels of a map without tiles")?;
         let pending_tiles = map.tile_indices().len() as u64;
         let now = MapState { map, levels, store: store.clone(), generation: 0, pending_tiles };
@@ -88,7 +103,6 @@ impl ServedMap {
             now: RwLock::new(Arc::new(now)),
             listed: Mutex::default(),
             snapshots: Mutex::default(),
-            making: Mutex::default(),
         })
     }
 
@@ -124,34 +138,59 @@ impl ServedMap {
         listed
     }
 
-    /// The state that a path names; `None` if there is no such snapshot.
-    pub fn shown(&self, id: &MapId) -> crate::Result<Option<Shown>> {
-        let Some(after) = self.state(&id.at)? else { return Ok(None) };
-        let Some(since) = &id.since else { return Ok(Some(Shown::State(after))) };
-        Ok(self.state(since)?.map(|before| Shown::Change { before, after }))
+    /// The state that a path names.
+    pub fn shown(&self, id: &MapId, makes: Makes) -> crate::Result<Found<Shown>> {
+        let after = match self.state(&id.at, makes)? {
+            Found::Here(state) => state,
+            Found::NotMade => return Ok(Found::NotMade),
+            Found::Nothing => return Ok(Found::Nothing),
+        };
+        let Some(since) = &id.since else { return Ok(Found::Here(Shown::State(after))) };
+        Ok(match self.state(since, makes)? {
+            Found::Here(before) => Found::Here(Shown::Change { before, after }),
+            Found::NotMade => Found::NotMade,
+            Found::Nothing => Found::Nothing,
+        })
     }
 
-    fn state(&self, at: &At) -> crate::Result<Option<Arc<MapState>>> {
-        let At::Snapshot(name) = at else { return Ok(Some(self.now())) };
-        let listed = self.snapshots();
-        let Some(listed) = listed.iter().find(|listed| listed.name == name.as_str()) else { return Ok(None) };
-        if let Some(state) = self.kept(listed) {
-            return Ok(Some(state));
+    /// The map that a path names, for questions: nobody waits for the levels of a snapshot. `None` if there is no such
+    /// snapshot.
+    pub fn asked(&self, id: &MapId) -> crate::Result<Option<Asked>> {
+        if let Some(At::Snapshot(since)) = &id.since
+            && self.listed(since).is_none()
+        {
+            return Ok(None);
         }
-        let _making = self.making.lock();
-        // Perhaps it was made while this waited.
-        if let Some(state) = self.kept(listed) {
-            return Ok(Some(state));
+        let At::Snapshot(name) = &id.at else { return Ok(Some(Asked::State(self.now()))) };
+        let Some(listed) = self.listed(name) else { return Ok(None) };
+        Ok(Some(match self.kept(&listed) {
+            Some(state) => Asked::State(state),
+            None => Asked::Opened(self.opened(name)?),
+        }))
+    }
+
+    fn listed(&self, name: &SnapshotName) -> Option<Listed> {
+        self.snapshots().iter().find(|listed| listed.name == name.as_str()).cloned()
+    }
+
+    fn state(&self, at: &At, makes: Makes) -> crate::Result<Found<Arc<MapState>>> {
+        let At::Snapshot(name) = at else { return Ok(Found::Here(self.now())) };
+        let Some(listed) = self.listed(name) else { return Ok(Found::Nothing) };
+        if let Some(state) = self.kept(&listed) {
+            return Ok(Found::Here(state));
         }
-        let Some(state) = self.made(name)? else { return Ok(None) };
+        if makes == Makes::Nothing {
+            return Ok(Found::NotMade);
+        }
+        let Some(state) = self.made(name)? else { return Ok(Found::Nothing) };
         let mut kept = self.snapshots.lock();
         // One of this name that was deleted is of no use any more.
         kept.retain(|(known, _)| known.name != listed.name);
         if kept.len() == SNAPSHOTS_KEPT {
             kept.remove(0);
         }
-        kept.push((listed.clone(), state.clone()));
-        Ok(Some(state))
+        kept.push((listed, state.clone()));
+        Ok(Found::Here(state))
     }
 
     /// A snapshot that was looked at, which becomes the one used last.
@@ -163,12 +202,18 @@ impl ServedMap {
         Some(found.1)
     }
 
+    fn opened(&self, name: &SnapshotName) -> crate::Result<AnyMap> {
+        let at = MapAt { map: self.at.map.clone(), snapshot: Some(name.clone()) };
+        Ok(AnyMap::Map(Box::new(at.open()?)))
+    }
+
     /// A snapshot with its levels.
     fn made(&self, name: &SnapshotName) -> crate::Result<Option<Arc<MapState>>> {
-        let at = MapAt { map: self.at.map.clone(), snapshot: Some(name.clone()) };
-        let map = AnyMap::Map(Box::new(at.open()?));
+        let map = self.opened(name)?;
         let tiles = map.tile_indices();
-        let Some(levels) = Levels::build(&map, &tiles, &self.store, &|_| true)? else { return Ok(None) };
+        let Some(levels) = Levels::build(&map, &tiles, new_origin(), &self.store, &|_| true)? else {
+            return Ok(None);
+        };
         let state = MapState { map, levels, store: self.store.clone(), generation: 0, pending_tiles: 0 };
         Ok(Some(Arc::new(state)))
     }
@@ -207,6 +252,7 @@ impl ServedMap {
 
     fn show_newest(&self, changes: &watch::Sender<u64>) -> anyhow::Result<()> {
         let open = || open_any_map(&self.path);
+        let origin = new_origin();
         let mut tiles = open()?.tile_indices();
         tiles.sort_by_key(|tile| (tile.to_array().map(|k| k >> GROUP), *tile));
         let is_first = self.now().generation == 0;
@@ -216,7 +262,8 @@ impl ServedMap {
         loop {
             let map = open()?;
             let step = |_| true;
-            let levels = Levels::build(&map, &tiles[..end], &self.store, &step)?.context("stopped")?;
+            let levels =
+                Levels::build(&map, &tiles[..end], origin, &self.store, &step)?.context("stopped")?;
             if let Some(progress) = &progress {
                 progress.set(end as u64, tiles.len() as u64);
             }
@@ -241,4 +288,10 @@ impl ServedMap {
         *self.now.write() = Arc::new(state);
         changes.send_modify(|count| *count += 1);
     }
+}
+
+/// Tiles without versions, as those of OctoMap's files: a browser keeps their nodes for ever, and this server may have
+/// shown another file before, or the next one may.
+fn new_origin() -> u64 {
+    RandomState::new().build_hasher().finish()
 }

@@ -1,7 +1,8 @@
 use super::response::{Answer, Body, Keep, empty};
 use super::route::{Route, version_in};
-use super::served_map::ServedMap;
+use super::served_map::{Makes, ServedMap};
 use super::token::Token;
+use super::work::Work;
 use super::{answers, page};
 use bytes::Bytes;
 use http_body_util::BodyExt;
@@ -15,6 +16,7 @@ use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::convert::Infallible;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,8 +38,12 @@ pub struct Server {
     token: Token,
     address: SocketAddr,
     changed: watch::Receiver<u64>,
-    /// Answers computed at once: each may hold a tile.
-    work: Semaphore,
+    /// Tells a page whether generations are counted anew.
+    id: String,
+    /// Each of its answers may hold a tile.
+    work: Work,
+    /// Levels of snapshots: one at a time, on all cores. It takes seconds, so whoever waits holds no other work back.
+    making: Work,
 }
 
 impl Server {
@@ -48,7 +54,8 @@ impl Server {
         changed: watch::Receiver<u64>,
     ) -> Self {
         let threads = std::thread::available_parallelism().map_or(2, usize::from);
-        Self { maps, token, address, changed, work: Semaphore::new(threads) }
+        let id = format!("{:016x}", RandomState::new().build_hasher().finish());
+        Self { id, maps, token, address, changed, work: Work::new(threads), making: Work::new(1) }
     }
 
     pub fn run(self, listener: TcpListener) -> anyhow::Result<()> {
@@ -169,21 +176,27 @@ impl Server {
                 None => Answer::error(StatusCode::NOT_FOUND, "there is no such file"),
             };
         }
+        let Route::Of(id, thing) = route else {
+            let server = self.clone();
+            return self.work.run(move || answers::maps(&server.maps)).await.unwrap_or_else(ending);
+        };
         let version = question.and_then(version_in);
-        let busy = || Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is ending");
-        let Ok(_permit) = self.work.acquire().await else { return busy() };
-        let server = self.clone();
-        let work = tokio::task::spawn_blocking(move || match &route {
-            Route::Of(id, thing) => answers::of_map(&server.maps, id, thing, version),
-            _ => answers::maps(&server.maps),
-        });
-        work.await.unwrap_or_else(|_| busy())
+        let ask = |makes| {
+            let (server, id, thing) = (self.clone(), id.clone(), thing.clone());
+            move || answers::of_map(&server.maps, &id, &thing, version, makes)
+        };
+        let answer = match self.work.run(ask(Makes::Nothing)).await {
+            // Levels that are to be made first.
+            Some(None) => self.making.run(ask(Makes::Levels)).await,
+            answer => answer,
+        };
+        answer.flatten().unwrap_or_else(ending)
     }
 
     /// What changes, as it does.
     fn events(&self) -> Response<Body> {
         let (mut sender, body) = Channel::<Bytes, Infallible>::new(4);
-        let (maps, mut changed) = (self.maps.clone(), self.changed.clone());
+        let (id, maps, mut changed) = (self.id.clone(), self.maps.clone(), self.changed.clone());
         tokio::spawn(async move {
             let mut told = vec![0; maps.len()];
             loop {
@@ -192,7 +205,8 @@ impl Server {
                 for (number, map) in maps.iter().enumerate() {
                     let generation = map.now().generation;
                     if std::mem::replace(&mut told[number], generation) != generation {
-                        let data = serde_json::json!({ "map": number.to_string(), "generation": generation });
+                        let map = number.to_string();
+                        let data = serde_json::json!({ "map": map, "generation": generation, "server": id });
                         text += &format!("event: changed\ndata: {data}\n\n");
                     }
                 }
@@ -214,6 +228,10 @@ impl Server {
         *response.body_mut() = body.boxed_unsync();
         response
     }
+}
+
+fn ending() -> Answer {
+    Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is ending")
 }
 
 fn takes_gzip(request: &Request<Incoming>) -> bool {
@@ -241,4 +259,56 @@ async fn stop_signal() -> std::io::Result<()> {
 #[cfg(not(unix))]
 async fn stop_signal() -> std::io::Result<()> {
     tokio::signal::ctrl_c().await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::route::{At, MapId, Thing};
+    use super::*;
+    use crate::mapper::OutOfCoreTileMapper;
+    use crate::store::SnapshotName;
+    use crate::{MapConfig, Mapper, Scan};
+    use tokio::time::timeout;
+
+    #[test]
+    fn who_waits_for_levels_of_a_snapshot_holds_nobody_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, name) = (folder.path().join("map"), SnapshotName::new("monday").unwrap());
+        let mut map = OutOfCoreTileMapper::create(&path, MapConfig::new(0.1, 1.0).unwrap()).unwrap();
+        map.insert_scan(&Scan { points: vec![[2.0, 0.0, 0.0]], ..Scan::default() }).unwrap();
+        map.snapshot(&name).unwrap();
+        drop(map);
+        let maps = vec![Arc::new(ServedMap::open(&path, false).unwrap())];
+        let (_changes, changed) = watch::channel(0);
+        let address = SocketAddr::from(([127, 0, 0, 1], 0));
+        let server = Arc::new(Server::new(maps, Token::new("sesame_42").unwrap(), address, changed));
+        let of_snapshot =
+            |thing| Route::Of(MapId { number: 0, at: At::Snapshot(name.clone()), since: None }, thing);
+        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let (end, may_end) = std::sync::mpsc::channel::<()>();
+            let making = server.clone();
+            tokio::spawn(async move { making.making.run(move || may_end.recv()).await });
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            let waiting: Vec<_> = (0..100)
+                .map(|_| {
+                    let (server, route) = (server.clone(), of_snapshot(Thing::Tileset));
+                    tokio::spawn(async move { server.compute(route, None).await })
+                })
+                .collect();
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            let at = [2.0, 0.0, 0.0];
+            for thing in [Thing::Trajectory, Thing::Query(at), Thing::Raycast([0.0; 3], at)] {
+                let answer = timeout(Duration::from_secs(60), server.compute(of_snapshot(thing), None)).await;
+                assert_eq!(answer.expect("no answer").status, StatusCode::OK);
+            }
+            let answer = timeout(Duration::from_secs(60), server.compute(Route::Maps, None)).await;
+            assert_eq!(answer.expect("no answer").status, StatusCode::OK);
+            assert!(waiting.iter().all(|waiting| !waiting.is_finished()));
+            end.send(()).unwrap();
+            for waiting in waiting {
+                assert_eq!(waiting.await.unwrap().status, StatusCode::OK);
+            }
+        });
+    }
 }

@@ -22,7 +22,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
 /// map.insert_scan(&Scan { points: vec![[5.0, 0.0, 0.0]], ..Scan::default() })?;
 /// let store = NodeStore::open(std::io::Cursor::new(Vec::new()), "nodes")?;
-/// let levels = Levels::build(&map, &map.tile_indices(), &store, &|_| true)?.expect("not stopped");
+/// let levels = Levels::build(&map, &map.tile_indices(), 0, &store, &|_| true)?.expect("not stopped");
 /// let top = levels.tops()[0];
 /// assert!(levels.node(&map, &store, top, Kind::Occupied)?.is_some());
 /// # Ok(())
@@ -61,8 +61,10 @@ impl Levels {
     /// is told how many tiles were read since the last call; if it returns `false` the work stops, and the result is
     /// `None`. What was made until then stays in the store.
     ///
-    /// Tiles that are damaged are left out; [`Levels::unreadable`] says which. A store that other maps use too, or the
-    /// same map at other times, takes only maps whose tiles have versions: not files of OctoMap.
+    /// Tiles that are damaged are left out; [`Levels::unreadable`] says which.
+    ///
+    /// Nodes are known by the versions of their tiles. Tiles of OctoMap's files and of maps without a log have none:
+    /// `origin` stands for what is in them, another number for every map, and for the same map at another time.
     ///
     /// Memory: some sixty bytes a tile, and a few tiles for each thread.
     ///
@@ -72,6 +74,7 @@ impl Levels {
     pub fn build<V: MapView>(
         map: &V,
         tiles: &[TileIndex],
+        origin: u64,
         store: &NodeStore,
         progress: &(dyn Fn(u64) -> bool + Sync),
     ) -> Result<Option<Self>> {
@@ -79,7 +82,7 @@ impl Levels {
         let mut unreadable = Vec::new();
         loop {
             let damaged = Mutex::new(Vec::new());
-            let levels = Self::build_without(map, tiles, &left_out, store, progress, &damaged)?;
+            let levels = Self::build_without(map, tiles, origin, &left_out, store, progress, &damaged)?;
             let damaged = damaged.into_inner();
             if damaged.is_empty() {
                 return Ok(levels.map(|levels| Self { unreadable, ..levels }));
@@ -95,6 +98,7 @@ impl Levels {
     fn build_without<V: MapView>(
         map: &V,
         tiles: &[TileIndex],
+        origin: u64,
         left_out: &BTreeSet<TileIndex>,
         store: &NodeStore,
         progress: &(dyn Fn(u64) -> bool + Sync),
@@ -113,7 +117,7 @@ impl Levels {
         let mut level: Vec<(NodeKey, Node)> = tiles
             .iter()
             .filter(|tile| !left_out.contains(tile))
-            .map(|&tile| (scheme.key_of_tile(tile), levels.node_of_tile(map, tile)))
+            .map(|&tile| (scheme.key_of_tile(tile), levels.node_of_tile(map, tile, origin)))
             .collect();
         level.sort_unstable_by_key(|(key, _)| *key);
         levels.nodes.extend(level.iter().copied());
@@ -156,15 +160,20 @@ impl Levels {
     }
 
     /// What the index of the map tells of a tile.
-    fn node_of_tile<V: MapView>(&self, map: &V, tile: TileIndex) -> Node {
+    fn node_of_tile<V: MapView>(&self, map: &V, tile: TileIndex, origin: u64) -> Node {
         let version = map.version_of_tile(tile);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&HOW_NODES_ARE_MADE.to_le_bytes());
         hasher.update(&self.config.occupied_log_odds().to_le_bytes());
         hasher.update(tile.to_array().map(i32::to_le_bytes).as_flattened());
-        if let Some(version) = version {
-            hasher.update(&version.table.bytes.to_le_bytes());
-            hasher.update(&version.table.crc.to_le_bytes());
+        match version {
+            Some(version) => {
+                hasher.update(&version.table.bytes.to_le_bytes());
+                hasher.update(&version.table.crc.to_le_bytes());
+            }
+            None => {
+                hasher.update(&origin.to_le_bytes());
+            }
         }
         Node {
             version: first_eight(&hasher),

@@ -62,7 +62,7 @@ fn memory_store() -> NodeStore {
 }
 
 fn levels_of(map: &InMemoryMapper, store: &NodeStore) -> Levels {
-    Levels::build(map, &map.tile_indices(), store, &|_| true).unwrap().unwrap()
+    Levels::build(map, &map.tile_indices(), 0, store, &|_| true).unwrap().unwrap()
 }
 
 /// The voxels of a node by the map's own indices: the lowest of each of its cells.
@@ -286,4 +286,29 @@ fn what_is_no_key_is_refused() {
     let key = NodeKey { level: 3, index: [-1, 2, i32::MIN] };
     assert_eq!(key.to_string().parse(), Ok(key));
     assert!(key.children().all(|child| child.parent() == key));
+}
+
+/// Such tiles have no versions: a store, or a browser, that has nodes of one map must not take them for the other's.
+#[test]
+fn nodes_of_tiles_without_versions_are_known_by_their_origin() {
+    let (one, other) = (map_of(8, &[[1.0; 3]]), map_of(8, &[[2.0; 3]]));
+    let store = memory_store();
+    let levels = |map: &InMemoryMapper, origin| {
+        Levels::build(map, &map.tile_indices(), origin, &store, &|_| true).unwrap().unwrap()
+    };
+    let versions = |levels: &Levels| {
+        let keys = levels.keys().into_iter();
+        keys.map(|key| (key, levels.get(key).unwrap().version)).collect::<BTreeSet<_>>()
+    };
+    let (first, second) = (levels(&one, 1), levels(&other, 2));
+    assert_eq!(first.keys(), second.keys());
+    assert!(versions(&first).is_disjoint(&versions(&second)));
+    assert_eq!(versions(&first), versions(&levels(&one, 1)));
+    for (levels, map) in [(&first, &one), (&second, &other)] {
+        for key in levels.keys() {
+            let alone = levels_of(map, &memory_store());
+            let wanted = voxels_of(&alone, map, &memory_store(), key);
+            assert_eq!(voxels_of(levels, map, &store, key), wanted);
+        }
+    }
 }
