@@ -119,8 +119,8 @@ fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
     Ok(Box::new(PosedClouds::new(clouds, path, poses, options.clouds.clone())?))
 }
 
-/// Whether the lines of a file of poses are those of the files, one by one. They are not where stamps tell otherwise, and
-/// where the file is of a form that only [`Trajectory`] reads.
+/// Whether the lines of a file of poses are those of the files, one by one. They are not where stamps tell otherwise,
+/// and where the file is of a form that only [`Trajectory`] reads.
 fn are_line_by_line(poses: &Path, files: &[PathBuf]) -> bool {
     let trajectory = Trajectory::read(poses, None);
     let Ok(lines) = Poses::read(poses) else {
