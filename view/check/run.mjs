@@ -237,7 +237,7 @@ try {
   // Both at once: what is told of the first says nothing of the second.
   const grown = [scan(5), scan(6)];
   await Promise.all([map, other].map((one, k) => new Promise((resolve, reject) => {
-    const build = spawn(voxtile, ['build', grown[k], '-o', one, '--append', '-q'], { stdio: 'inherit' });
+    const build = spawn(voxtile, ['build', grown[k], '-o', one, '--append', '-q'], { stdio: ['ignore', 'ignore', 'inherit'] });
     build.once('exit', (code) => (code ? reject(new Error(`build: ${code}`)) : resolve()));
   })));
   await follows(map, other);

@@ -7,7 +7,7 @@ pub struct Counters {
     pub dropped_behind: u64,
     /// Left out by `thin`.
     pub thinned: u64,
-    /// No transforms on both sides of their stamp in time.
+    /// No transforms on both sides of their stamp in time, or in the frame of the map already.
     pub dropped_without_pose: u64,
     /// Clouds and transforms that could not be decoded, or not whole.
     pub malformed: u64,

@@ -69,7 +69,7 @@ impl Viewers {
         self.failed = Some(version);
     }
 
-    /// Whether even no change is to be sent.
+    /// Whether they are to be told all, even if nothing has changed.
     pub fn is_whole_due(&self) -> bool {
         self.is_whole_due
     }
