@@ -24,7 +24,8 @@ struct Child {
 pub enum StampVerdict {
     Take,
     Refuse,
-    /// The clock is another one since then: what was known of these frames is of no use. All of them if most have jumped.
+    /// The clock is another one since then: what was known of these frames is of no use. All of them if most have
+    /// jumped.
     Jump {
         children: Vec<String>,
         since: Instant,

@@ -7,8 +7,8 @@ use voxtile::Stop;
 /// As shells tell that a signal has ended a process.
 const INTERRUPTED: i32 = 130;
 
-/// SIGINT and SIGTERM ask to stop. A second one of the same kind ends the process at once: `ros2 launch` sends the other
-/// kind by itself when the last flush takes long.
+/// SIGINT and SIGTERM ask to stop. A second one of the same kind ends the process at once: `ros2 launch` sends the
+/// other kind by itself when the last flush takes long.
 ///
 /// # Errors
 ///

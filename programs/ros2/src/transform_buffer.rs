@@ -120,8 +120,8 @@ impl TransformBuffer {
             Err(why @ WhyNot::AlreadyFixed(_)) => {
                 if !std::mem::replace(&mut self.has_warned, true) {
                     log::warn!(
-                        "clouds are dropped: {why}. Publish them in the frame of the sensor, with its transforms, or give \
-                         with --frame-id a frame in which the sensor moves"
+                        "clouds are dropped: {why}. Publish them in the frame of the sensor, with its transforms, or \
+                         give with --frame-id a frame in which the sensor moves"
                     );
                 }
                 Verdict::Hopeless

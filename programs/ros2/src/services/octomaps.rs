@@ -35,7 +35,7 @@ pub fn in_box(map: &LiveMap, request: OctomapInBoxRequest) -> OctomapInBoxRespon
     }
 }
 
-/// A tree without nodes, of the kind that was asked for: readers make a tree of its resolution before they look further.
+/// A tree without nodes, of the kind that was asked for: readers make one of its resolution before they look further.
 fn empty(map: &LiveMap, moment: &Moment, format: OctreeFormat) -> Octomap {
     let (binary, resolution) = (format == OctreeFormat::Bt, map.grid().resolution_m());
     Octomap { header: map.header(moment), binary, id: "OcTree".to_owned(), resolution, data: Vec::new() }
