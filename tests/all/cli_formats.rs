@@ -103,7 +103,7 @@ fn recordings_are_known_by_their_content() {
         let path = folder.path().join("drive.backup");
         fs::copy(repository(&format!("clouds/tests/data/ros/{name}")), &path).unwrap();
         let input = ["scans", text(&path), "--topic", "/points"];
-        assert!(output(&[&input[..], &["--json"]].concat()).contains("\"scans\": 4"), "{name}");
+        assert!(output(&[&input[..], &["--json"]].concat()).contains("\"scans\":4,"), "{name}");
         for option in [["--depth-scale", "1000"], ["--intrinsics", text(&camera)]] {
             let refused = refusal(&[&input[..], &option].concat());
             assert!(refused.contains(option[0]) && refused.contains("leave it out"), "{refused}");
@@ -130,12 +130,11 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
     let rows = (0..4).map(|k| format!("1700000000.{:02} 0 0 1 0 0 0 1\n", 20 * k + 6));
     fs::write(&poses, rows.collect::<String>()).unwrap();
     for own in [&[][..], &["--poses", text(&poses)]] {
-        for (tolerance, scans) in [("0.1", 4), ("0.09", 0)] {
+        for (tolerance, is_filled) in [("0.1", true), ("0.09", false)] {
             let input = ["scans", &bag, "--topic", "/points", "--pose-tolerance", tolerance, "--json"];
             let told = output(&[&input, own].concat());
-            let found: serde_json::Value = serde_json::from_str(&told).unwrap();
-            assert_eq!(found["scans"], scans, "{own:?} {tolerance}: {told}");
-            assert_eq!(told.contains("apart; --pose-tolerance allows for more"), scans == 0, "{told}");
+            assert_eq!(told.contains("4 clouds have no pose"), !is_filled, "{own:?} {tolerance}: {told}");
+            assert_eq!(told.contains("apart; --pose-tolerance allows for more"), !is_filled, "{told}");
         }
     }
 }
