@@ -1,19 +1,13 @@
+use super::file_fetch::fetch_file;
 use super::manifest::{MANIFEST, Manifest};
 use super::object_name::{OBJECTS, ObjectName};
+use super::remote_store::{READING, SENDING, remote_store};
 use crate::error::{Error, Result};
-use crate::store::{Disk, FsDisk};
 use bytes::Bytes;
 use futures_util::TryStreamExt;
-use object_store::aws::AmazonS3Builder;
-use object_store::azure::MicrosoftAzureBuilder;
-use object_store::gcp::GoogleCloudStorageBuilder;
-use object_store::http::HttpBuilder;
 use object_store::path::Path as Key;
-use object_store::{
-    BackoffConfig, ClientOptions, GetOptions, GetRange, ObjectStore, ObjectStoreExt, PutMode, PutOptions,
-    RetryConfig, UpdateVersion,
-};
-use std::io::{self, Write};
+use object_store::{GetOptions, GetRange, ObjectStore, ObjectStoreExt, PutMode, PutOptions, UpdateVersion};
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -31,6 +25,8 @@ pub struct Bucket {
     /// As the user wrote it, for messages.
     url: String,
     store: Arc<dyn ObjectStore>,
+    /// The same for objects that are put, which takes longer.
+    sending: Arc<dyn ObjectStore>,
     prefix: Key,
     can_write: bool,
 }
@@ -54,8 +50,10 @@ pub(super) struct StoredObject {
     pub(super) name: String,
     pub(super) is_url: bool,
     pub(super) bytes: u64,
-    key: Key,
-    e_tag: Option<String>,
+    pub(super) key: Key,
+    pub(super) e_tag: Option<String>,
+    /// When it was put, in seconds of Unix time; 0 where the store does not tell.
+    pub(super) modified_s: i64,
 }
 
 /// How often content is fetched that is not what its name says: a proxy may have cut it off.
@@ -66,6 +64,9 @@ const LATEST_RETRY: Duration = Duration::from_secs(10);
 
 /// How long an answer may keep us waiting before we look up.
 const PATIENCE: Duration = Duration::from_millis(100);
+
+/// What helps where an object is lost or damaged.
+pub(super) const SEND_AGAIN: &str = "send all of the map again with `voxtile push --resend`";
 
 /// The longest manifest or page that is read.
 const MOST_LIST_BYTES: u64 = 1 << 28;
@@ -91,48 +92,13 @@ impl Bucket {
         if rest.contains(['?', '#']) {
             return Err(wrong("has a query or a fragment; give keys by the environment".to_owned()));
         }
-        let retry = RetryConfig {
-            backoff: BackoffConfig { max_backoff: Duration::from_secs(5), ..BackoffConfig::default() },
-            max_retries: 6,
-            retry_timeout: Duration::from_secs(60),
-        };
-        let refused = |error: object_store::Error| wrong(told(&error));
         let root = format!("{scheme}://{host}");
         choose_tls();
-        let store: Arc<dyn ObjectStore> = match scheme {
-            "s3" => {
-                // Whoever names an endpoint without TLS means it: a server of their own.
-                let endpoint = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
-                let endpoint = endpoint.iter().find_map(|name| std::env::var(name).ok());
-                let builder = AmazonS3Builder::from_env().with_url(&root).with_retry(retry);
-                let builder = match endpoint {
-                    Some(endpoint) => {
-                        let is_plain = endpoint.starts_with("http://");
-                        let builder = builder.with_endpoint(endpoint);
-                        if is_plain { builder.with_allow_http(true) } else { builder }
-                    }
-                    None => builder,
-                };
-                Arc::new(builder.build().map_err(refused)?)
-            }
-            "gs" => {
-                let builder = GoogleCloudStorageBuilder::from_env().with_url(&root).with_retry(retry);
-                Arc::new(builder.build().map_err(refused)?)
-            }
-            "http" | "https" => {
-                let options = ClientOptions::new().with_allow_http(scheme == "http");
-                let builder = HttpBuilder::new().with_url(&root).with_retry(retry);
-                Arc::new(builder.with_client_options(options).build().map_err(refused)?)
-            }
-            "az" | "abfs" | "abfss" => {
-                let builder = MicrosoftAzureBuilder::from_env().with_url(&root).with_retry(retry);
-                Arc::new(builder.build().map_err(refused)?)
-            }
-            _ => return Err(no_bucket()),
-        };
+        let store = remote_store(url, scheme, &root, READING)?.ok_or_else(no_bucket)?;
+        let sending = remote_store(url, scheme, &root, SENDING)?.ok_or_else(no_bucket)?;
         let prefix = Key::parse(prefix.trim_end_matches('/')).map_err(|error| wrong(error.to_string()))?;
         let can_write = !scheme.starts_with("http");
-        Ok(Self { url: url.trim_end_matches('/').to_owned(), store, prefix, can_write })
+        Ok(Self { url: url.trim_end_matches('/').to_owned(), store, sending, prefix, can_write })
     }
 
     /// A place below a prefix of any object store; `url` is what messages call it.
@@ -142,7 +108,7 @@ impl Bucket {
     /// [`Error::InvalidArgument`] for a prefix that no object has.
     pub fn on(store: Arc<dyn ObjectStore>, prefix: &str, url: &str) -> Result<Self> {
         let prefix = Key::parse(prefix).map_err(|error| Error::argument(url, error.to_string()))?;
-        Ok(Self { url: url.to_owned(), store, prefix, can_write: true })
+        Ok(Self { url: url.to_owned(), sending: store.clone(), store, prefix, can_write: true })
     }
 
     /// Its URL.
@@ -168,17 +134,37 @@ impl Bucket {
 
     /// The manifest; `None` if there is none.
     pub(super) fn manifest(&self) -> Result<Option<FoundManifest>> {
-        let key = self.key(MANIFEST);
-        let failed = |error| Error::io(&self.path().join(MANIFEST), "read", error);
-        let (bytes, version) = match self.get(key.clone(), MOST_LIST_BYTES).wait() {
-            Ok(found) => found,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(failed(error)),
-        };
-        let manifest = Manifest::from_bytes(&bytes).map_err(|reason| {
-            failed(io::Error::new(io::ErrorKind::InvalidData, format!("{key}: {reason}")))
-        })?;
+        let Some((bytes, version)) = self.manifest_bytes()? else { return Ok(None) };
+        let manifest = Manifest::from_bytes(&bytes).map_err(|reason| self.is_no_manifest(&reason))?;
         Ok(Some(FoundManifest { manifest, version }))
+    }
+
+    /// The manifest for who puts another in its place: one that is damaged is only told from its successor. What a
+    /// later version has written is not damaged.
+    pub(super) fn replaceable_manifest(&self) -> Result<Option<(Option<Manifest>, UpdateVersion)>> {
+        let Some((bytes, version)) = self.manifest_bytes()? else { return Ok(None) };
+        match Manifest::from_bytes(&bytes) {
+            Err(reason) if Manifest::is_of_later_version(&bytes) => Err(self.is_no_manifest(&reason)),
+            Err(reason) => {
+                log::warn!("{}: {reason}; it is replaced", self.path().join(MANIFEST).display());
+                Ok(Some((None, version)))
+            }
+            Ok(manifest) => Ok(Some((Some(manifest), version))),
+        }
+    }
+
+    fn manifest_bytes(&self) -> Result<Option<(Bytes, UpdateVersion)>> {
+        match self.get(self.key(MANIFEST), MOST_LIST_BYTES).wait() {
+            Ok(found) => Ok(Some(found)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Error::io(&self.path().join(MANIFEST), "read", error)),
+        }
+    }
+
+    fn is_no_manifest(&self, reason: &str) -> Error {
+        let reason = format!("{}: {reason}", self.key(MANIFEST));
+        let error = io::Error::new(io::ErrorKind::InvalidData, reason);
+        Error::io(&self.path().join(MANIFEST), "read", error)
     }
 
     /// Puts a manifest in place of the one that was found, if that is still there.
@@ -187,21 +173,23 @@ impl Bucket {
     ///
     /// One of the kind `AlreadyExists` if it is not; a store that refuses.
     pub(super) fn replace_manifest(&self, manifest: &Manifest, found: Option<UpdateVersion>) -> Result<()> {
-        let (store, key) = (self.store.clone(), self.key(MANIFEST));
+        let (store, key) = (self.sending.clone(), self.key(MANIFEST));
         let failed = |error| Error::io(&self.path().join(MANIFEST), "write", error);
-        let bytes = manifest.to_bytes().map_err(|error| failed(error.into()))?;
+        let bytes = Bytes::from(manifest.to_bytes().map_err(|error| failed(error.into()))?);
         let mode = found.map_or(PutMode::Create, PutMode::Update);
         let options = PutOptions { mode, ..PutOptions::default() };
-        let put = pending(async move {
-            let outcome = store.put_opts(&key, bytes.into(), options).await;
-            Ok(outcome.map(drop))
-        });
-        match put.wait().map_err(failed)? {
-            Ok(()) => Ok(()),
-            Err(object_store::Error::Precondition { .. } | object_store::Error::AlreadyExists { .. }) => {
+        let content = bytes.clone();
+        let put = pending(async move { Ok(store.put_opts(&key, content.into(), options).await) });
+        let Err(error) = put.wait().map_err(failed)? else { return Ok(()) };
+        // A request whose answer was lost is made again, and finds in its way what it has put itself.
+        if self.manifest_bytes().is_ok_and(|found| found.is_some_and(|(found, _)| found == bytes)) {
+            return Ok(());
+        }
+        match error {
+            object_store::Error::Precondition { .. } | object_store::Error::AlreadyExists { .. } => {
                 Err(self.overtaken())
             }
-            Err(error) => Err(failed(io::Error::other(told(&error)))),
+            error => Err(failed(io::Error::other(told(&error)))),
         }
     }
 
@@ -224,7 +212,7 @@ impl Bucket {
                     return Ok(content);
                 }
             }
-            let reason = format!("object {key}: its content is not what its name says; push the map again");
+            let reason = format!("object {key}: its content is not what its name says; {SEND_AGAIN}");
             Err(io::Error::new(io::ErrorKind::InvalidData, reason))
         })
     }
@@ -245,12 +233,19 @@ impl Bucket {
         self.fetch(name, MOST_LIST_BYTES).wait()
     }
 
-    /// Begins to put an object.
-    pub(super) fn put(&self, name: ObjectName, content: Bytes) -> Pending<()> {
-        let (store, key) = (self.store.clone(), self.key(&name.key()));
+    /// Begins to put an object; `false` if that is there already, of which the store is asked before where `asks`.
+    pub(super) fn put(&self, name: ObjectName, content: Bytes, asks: bool) -> Pending<bool> {
+        let (store, sending, key) = (self.store.clone(), self.sending.clone(), self.key(&name.key()));
         pending(async move {
-            let put = store.put(&key, content.into()).await;
-            put.map(drop).map_err(|error| refused(&key, &error))
+            // A name is of one content, and an object is there whole or not at all. Who may not ask may put.
+            if asks
+                && let Ok(there) = store.head(&key).await
+                && there.size == content.len() as u64
+            {
+                return Ok(false);
+            }
+            let put = sending.put(&key, content.into()).await;
+            put.map(|_| true).map_err(|error| refused(&key, &error))
         })
     }
 
@@ -280,10 +275,29 @@ impl Bucket {
         })
     }
 
-    /// Whether a map is there.
-    pub fn has_map(&self) -> bool {
-        let (store, key) = (self.store.clone(), self.key(MANIFEST));
-        pending(async move { store.head(&key).await.map_err(|error| refused(&key, &error)) }).wait().is_ok()
+    /// Whether a map is there. `is_stopped` is asked ten times a second.
+    ///
+    /// # Errors
+    ///
+    /// A store that refuses or does not answer; [`Error::Stopped`].
+    pub fn has_map(&self, is_stopped: &dyn Fn() -> bool) -> Result<bool> {
+        let (store, key, prefix) = (self.store.clone(), self.key(MANIFEST), self.prefix.clone());
+        let asked = pending(async move {
+            match store.head(&key).await {
+                Ok(_) => Ok(true),
+                Err(object_store::Error::NotFound { .. }) => Ok(false),
+                Err(error) => {
+                    let error = refused(&key, &error);
+                    // Where nothing may be listed, stores do not say that an object is missing. A file is no map.
+                    let is_file = error.kind() == io::ErrorKind::PermissionDenied
+                        && !prefix.as_ref().is_empty()
+                        && store.head(&prefix).await.is_ok_and(|file| file.size > 0);
+                    if is_file { Ok(false) } else { Err(error) }
+                }
+            }
+        });
+        let answer = asked.wait_unless(is_stopped).ok_or(Error::Stopped)?;
+        answer.map_err(|error| Error::io(self.path(), "look for a map in", error))
     }
 
     /// Begins to list the object of the URL itself, or those below it, by name.
@@ -294,6 +308,7 @@ impl Bucket {
                 name,
                 is_url,
                 bytes: meta.size,
+                modified_s: meta.last_modified.timestamp(),
                 key: meta.location,
                 e_tag: meta.e_tag,
             };
@@ -322,16 +337,7 @@ impl Bucket {
     /// Begins to fetch an object into a file, as it was when it was listed.
     pub(super) fn fetch_file(&self, object: StoredObject, to: PathBuf) -> Pending<()> {
         let store = self.store.clone();
-        pending(async move {
-            let began = Instant::now();
-            for _ in 1..FETCHES {
-                match fetch_file_once(&store, &object, &to).await {
-                    Err(error) if error.kind() == io::ErrorKind::Other && began.elapsed() < LATEST_RETRY => {}
-                    outcome => return outcome,
-                }
-            }
-            fetch_file_once(&store, &object, &to).await
-        })
+        pending(async move { fetch_file(&store, &object, &to).await })
     }
 
     fn get(&self, key: Key, most_bytes: u64) -> Pending<(Bytes, UpdateVersion)> {
@@ -442,32 +448,8 @@ async fn get_once(
     Ok((content.into(), version))
 }
 
-async fn fetch_file_once(store: &dyn ObjectStore, object: &StoredObject, to: &Path) -> io::Result<()> {
-    let key = &object.key;
-    let options = GetOptions { if_match: object.e_tag.clone(), ..GetOptions::default() };
-    let found = match store.get_opts(key, options).await {
-        Ok(found) => found,
-        Err(object_store::Error::Precondition { .. }) => {
-            let reason = format!("object {key}: it was changed while it was read; begin again");
-            return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
-        }
-        Err(error) => return Err(refused(key, &error)),
-    };
-    let mut stream = found.into_stream();
-    let on_disk = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", to.display()));
-    let (mut file, mut bytes) = (FsDisk.create(to).map_err(on_disk)?, 0);
-    while let Some(chunk) = stream.try_next().await.map_err(|error| refused(key, &error))? {
-        file.write_all(&chunk).map_err(on_disk)?;
-        bytes += chunk.len() as u64;
-    }
-    if bytes == object.bytes {
-        return Ok(());
-    }
-    Err(io::Error::other(format!("object {key}: {bytes} bytes came, and it has {}", object.bytes)))
-}
-
 /// The refusal of an object store, which names the object.
-fn refused(key: &Key, error: &object_store::Error) -> io::Error {
+pub(super) fn refused(key: &Key, error: &object_store::Error) -> io::Error {
     let kind = match error {
         object_store::Error::NotFound { .. } => io::ErrorKind::NotFound,
         object_store::Error::PermissionDenied { .. } | object_store::Error::Unauthenticated { .. } => {
@@ -478,8 +460,19 @@ fn refused(key: &Key, error: &object_store::Error) -> io::Error {
     io::Error::new(kind, format!("object {key}: {}", told(error)))
 }
 
+/// An object that is missing is no file that is missing: the map does name it.
+pub(super) fn missing_object(error: io::Error) -> io::Error {
+    if error.kind() != io::ErrorKind::NotFound {
+        return error;
+    }
+    let reason = format!(
+        "{error}; if the map was pushed with --prune meanwhile, open it again; else {SEND_AGAIN} from its folder"
+    );
+    io::Error::other(reason)
+}
+
 /// An error with its causes, on one line.
-fn told(error: &object_store::Error) -> String {
+pub(super) fn told(error: &object_store::Error) -> String {
     let mut text = error.to_string();
     let mut cause = std::error::Error::source(error);
     while let Some(error) = cause {

@@ -1,4 +1,4 @@
-use super::bucket::{Bucket, Pending};
+use super::bucket::{Bucket, Pending, missing_object};
 use super::file_list::FileList;
 use super::manifest::{PART_BYTES, StoredFile};
 use super::part_reader::PartReader;
@@ -131,7 +131,7 @@ impl Disk for BucketDisk {
             let begin = at % PART_BYTES;
             let range = begin..(begin + (end - at)).min(PART_BYTES);
             let wanted = range.end - range.start;
-            let content = self.bucket.fetch_bytes(part, range).wait()?;
+            let content = self.bucket.fetch_bytes(part, range).wait().map_err(missing_object)?;
             if content.len() as u64 != wanted {
                 return Err(io::ErrorKind::UnexpectedEof.into());
             }

@@ -1,4 +1,4 @@
-use super::bucket::Bucket;
+use super::bucket::{Bucket, missing_object};
 use super::manifest::{Files, Manifest, StoredFile, page_from_bytes};
 use super::object_name::ObjectName;
 use crate::space::TileIndex;
@@ -62,6 +62,11 @@ impl FileList {
         self.page_names.keys().map(String::as_str)
     }
 
+    /// Whether a page is this object.
+    pub(super) fn has_page(&self, name: &str, object: ObjectName) -> bool {
+        self.page_names.get(name) == Some(&object)
+    }
+
     /// The files that belong to no tile.
     pub(super) fn own_files(&self) -> &Files {
         &self.files
@@ -77,7 +82,7 @@ impl FileList {
         if let Some(page) = self.pages.lock().unwrap_or_else(PoisonError::into_inner).get(name) {
             return Ok(Some(page.clone()));
         }
-        let content = self.bucket.fetch_list(*object)?;
+        let content = self.bucket.fetch_list(*object).map_err(missing_object)?;
         let page = page_from_bytes(name, &content).map_err(|reason| {
             io::Error::new(io::ErrorKind::InvalidData, format!("object {}: {reason}", object.key()))
         })?;

@@ -1,3 +1,4 @@
+use super::bucket::SEND_AGAIN;
 use super::object_name::ObjectName;
 use crate::space::TileIndex;
 use crate::store::{FileVersion, tile_of_folder};
@@ -91,10 +92,19 @@ impl Manifest {
         }
         let computed = manifest.computed_checksum().map_err(|error| error.to_string())?;
         if manifest.checksum.take() != Some(computed) {
-            return Err("its checksum does not match; push the map again".to_owned());
+            return Err(format!("its checksum does not match; {SEND_AGAIN}"));
         }
         check_files(&manifest.files)?;
         Ok(manifest)
+    }
+
+    /// Whether a later version of voxtile wrote what this one cannot read.
+    pub(super) fn is_of_later_version(bytes: &[u8]) -> bool {
+        let found: serde_json::Result<serde_json::Value> = serde_json::from_slice(bytes);
+        found.is_ok_and(|found| {
+            found["format"] == FORMAT
+                && found["version"].as_u64().is_some_and(|version| version > VERSION.into())
+        })
     }
 
     /// The page that lists the files of a tile.
@@ -179,10 +189,12 @@ mod tests {
         assert_eq!(Manifest::from_bytes(text.as_bytes()), Ok(good));
         let newer = text.replace("\"version\": 1", "\"version\": 2");
         assert!(Manifest::from_bytes(newer.as_bytes()).unwrap_err().contains("version is 2"));
+        assert!(Manifest::is_of_later_version(newer.as_bytes()));
+        assert!(!Manifest::is_of_later_version(&text.as_bytes()[1..]));
         let other = text.replace("voxtile bucket", "tiles");
         assert!(Manifest::from_bytes(other.as_bytes()).unwrap_err().contains("its format"));
         let changed = text.replace("\"flush_number\": 3", "\"flush_number\": 4");
-        assert!(Manifest::from_bytes(changed.as_bytes()).unwrap_err().contains("its checksum"));
+        assert!(Manifest::from_bytes(changed.as_bytes()).unwrap_err().contains("push --resend"));
         let file = StoredFile { bytes: 5, crc32: None, scan_number: None, parts: Vec::new() };
         let short = Manifest { files: Files::from([("a".to_owned(), file)]), ..Manifest::new(None, 3, 7) };
         let short = Manifest::from_bytes(&short.to_bytes().unwrap()).unwrap_err();

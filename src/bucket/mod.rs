@@ -10,11 +10,12 @@
 //! | module | content |
 //! |---|---|
 //! | `bucket` | [`Bucket`]: gets and puts objects, with retries; every error names its object |
+//! | `remote_store` | the stores of URLs, and how long their clients wait |
 //! | `object_name` | objects are named by the BLAKE3 of their content |
 //! | `manifest` | the one object that changes: which files the map has, by pages of tiles |
 //! | `file_list` | the list of files, with the pages that were asked for |
 //! | `bucket_disk`, `part_reader` | a map in a bucket as files that can be read |
-//! | `fetched_files` | scans and other files of any bucket, for what reads files |
+//! | `fetched_files`, `file_fetch` | scans and other files of any bucket, for what reads files |
 //! | `known_states` | what a folder builds on: the states that were pushed from it or pulled into it |
 //! | `push`, `sender`, `prune`, `pull` | maps to buckets and back |
 //!
@@ -24,6 +25,7 @@
 mod bucket;
 mod bucket_disk;
 mod fetched_files;
+mod file_fetch;
 mod file_list;
 mod known_states;
 mod manifest;
@@ -32,6 +34,7 @@ mod part_reader;
 mod prune;
 mod pull;
 mod push;
+mod remote_store;
 mod sender;
 
 /// The crate of [`Bucket::on`], in the version that voxtile uses.

@@ -1,4 +1,4 @@
-use super::bucket::{Bucket, Pending};
+use super::bucket::{Bucket, Pending, missing_object};
 use super::manifest::{PART_BYTES, StoredFile};
 use crate::store::DiskRead;
 use bytes::{Buf, Bytes};
@@ -48,7 +48,7 @@ impl PartReader {
     /// Takes the part that was asked for; `false` at the end of the file.
     fn take_part(&mut self) -> io::Result<bool> {
         let (number, Some(coming)) = (self.next - 1, self.coming.take()) else { return Ok(false) };
-        self.part = coming.wait().map_err(missing_part)?;
+        self.part = coming.wait().map_err(missing_object)?;
         let wanted = (self.file.bytes - number as u64 * PART_BYTES).min(PART_BYTES);
         if self.part.len() as u64 != wanted {
             let (found, name) = (self.part.len(), self.file.parts.get(number).map(|name| name.key()));
@@ -59,17 +59,6 @@ impl PartReader {
         self.ask();
         Ok(true)
     }
-}
-
-/// A part that is missing is no file that is missing: the map does name the file.
-fn missing_part(error: io::Error) -> io::Error {
-    if error.kind() != io::ErrorKind::NotFound {
-        return error;
-    }
-    let reason = format!(
-        "{error}; if the map was pushed with --prune meanwhile, open it again; else push it again from its folder"
-    );
-    io::Error::other(reason)
 }
 
 impl Read for PartReader {

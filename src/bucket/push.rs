@@ -26,6 +26,9 @@ pub struct PushOptions {
     /// Replace whatever earlier state of the same map is there, also one that the folder does not build on: what that
     /// has and the folder lacks is lost.
     pub replaces: bool,
+    /// Send everything, also what is there by its name or by the last manifest: objects there that were lost or damaged
+    /// are whole then, and a manifest that cannot be read is replaced, whatever map it was of.
+    pub resends: bool,
 }
 
 /// What a push did.
@@ -78,12 +81,13 @@ pub fn push(
     let manifest = manifest.map_err(|error| push.overtaken().unwrap_or(error))?;
     push.check_is_same_or_later(&manifest, map.folder())?;
     push.put(&map, &manifest)?;
+    let sent = push.sender.sent();
     let mut pushed = Pushed {
         flush_number: manifest.flush_number,
         tiles: manifest.tiles,
-        tiles_sent: push.tiles_sent,
-        objects_sent: push.sender.objects,
-        bytes_sent: push.sender.bytes,
+        tiles_sent: sent.tiles.len() as u64,
+        objects_sent: sent.objects,
+        bytes_sent: sent.bytes,
         bytes: manifest.bytes,
         objects_pruned: 0,
     };
@@ -102,26 +106,30 @@ struct Push<'a> {
     /// What the folder builds on, if that is known.
     known: Option<KnownStates>,
     replaces: bool,
-    /// Its files.
+    /// Its files; none where nothing that is there is believed.
     list: Option<FileList>,
     sender: Sender<'a>,
     /// Files of tiles that an earlier attempt has sent.
     sent: FxHashMap<String, StoredFile>,
-    tiles_sent: u64,
 }
 
 impl<'a> Push<'a> {
     fn begin(bucket: &'a Bucket, map: &MapPath, options: PushOptions) -> Result<Self> {
         let (disk, folder) = map.clone().into_parts();
         let known = KnownStates::read(&*disk, &folder)?;
-        let found = bucket.manifest()?;
-        let (before, version) = found.map(|found| (found.manifest, found.version)).unzip();
-        let list = before.clone().map(|before| FileList::new(bucket.clone(), before));
-        let mut sender = Sender::new(bucket);
+        let (before, version) = if options.resends {
+            bucket.replaceable_manifest()?.unzip()
+        } else {
+            bucket.manifest()?.map(|found| (Some(found.manifest), found.version)).unzip()
+        };
+        let before = before.flatten();
+        let believed = before.clone().filter(|_| !options.resends);
+        let list = believed.map(|before| FileList::new(bucket.clone(), before));
+        let mut sender = Sender::new(bucket, !options.resends);
         sender.note(list.iter().flat_map(|list| list.own_files().values()));
         let sent = FxHashMap::default();
         let replaces = options.replaces;
-        Ok(Self { bucket, before, version, known, replaces, list, sender, sent, tiles_sent: 0 })
+        Ok(Self { bucket, before, version, known, replaces, list, sender, sent })
     }
 
     /// Sends what the bucket lacks of the map's last flush; the manifest that names all of it.
@@ -149,6 +157,7 @@ impl<'a> Push<'a> {
             let object = self.send_page(&name, &page)?;
             manifest.pages.insert(name, object);
         }
+        self.sender.begin(None);
         for file in store.committed_files(&snapshots)? {
             let path = file.path.clone();
             let stored = self.send_file(&store, file, None)?;
@@ -266,7 +275,7 @@ impl<'a> Push<'a> {
         before: &Files,
         page: &mut Files,
     ) -> Result<()> {
-        let objects = self.sender.objects;
+        self.sender.begin(Some(tile));
         for file in store.committed_files_of(tile, snapshots)? {
             let path = file.path.clone();
             let known = match &file.content {
@@ -282,7 +291,6 @@ impl<'a> Push<'a> {
             };
             page.insert(path, stored);
         }
-        self.tiles_sent += u64::from(self.sender.objects > objects);
         Ok(())
     }
 
@@ -293,10 +301,11 @@ impl<'a> Push<'a> {
         // What no reader would take is not sent.
         page_from_bytes(name, &content).map_err(|reason| failed(io::Error::other(reason)))?;
         let object = ObjectName::of(&content);
-        match &self.before {
-            Some(before) if before.pages.get(name) == Some(&object) => Ok(object),
-            _ => self.sender.send(content.into()),
+        if self.list.as_ref().is_some_and(|list| list.has_page(name, object)) {
+            return Ok(object);
         }
+        self.sender.begin(None);
+        self.sender.send(content.into())
     }
 
     /// Sends the parts of a file that the bucket lacks.

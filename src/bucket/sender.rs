@@ -2,6 +2,7 @@ use super::bucket::{Bucket, Pending};
 use super::manifest::{PART_BYTES, StoredFile};
 use super::object_name::ObjectName;
 use crate::error::{Error, Result};
+use crate::space::TileIndex;
 use bytes::Bytes;
 use rustc_hash::FxHashSet;
 use std::collections::VecDeque;
@@ -13,18 +14,59 @@ pub(super) struct Sender<'a> {
     bucket: &'a Bucket,
     /// Objects that are there, or on their way.
     known: FxHashSet<ObjectName>,
-    in_flight: VecDeque<Pending<()>>,
-    /// Objects that were sent, and their bytes.
+    in_flight: VecDeque<OnItsWay>,
+    /// Whether the bucket may have objects that no manifest names.
+    asks: bool,
+    /// Objects in a row that were asked for and not there.
+    missing: usize,
+    /// The tile whose objects come next.
+    tile: Option<TileIndex>,
+    sent: Sent,
+}
+
+/// What was sent, beside what was there.
+#[derive(Default)]
+pub(super) struct Sent {
     pub(super) objects: u64,
     pub(super) bytes: u64,
+    /// Tiles of which something was sent.
+    pub(super) tiles: FxHashSet<TileIndex>,
+}
+
+struct OnItsWay {
+    pending: Pending<bool>,
+    bytes: u64,
+    tile: Option<TileIndex>,
+    was_asked_for: bool,
 }
 
 /// Parts on their way at a time: with 16 MiB a part at most, 128 MiB of memory.
 const MOST_IN_FLIGHT: usize = 8;
 
+/// A push that was interrupted has left objects behind, in the order in which they are sent again. After so many that
+/// are not there, small ones are sent without a question: it takes as long as they do.
+const MOST_MISSING: usize = 32;
+
+/// Objects from here on are always asked for.
+const LARGE_BYTES: usize = 1 << 20;
+
 impl<'a> Sender<'a> {
-    pub(super) fn new(bucket: &'a Bucket) -> Self {
-        Self { bucket, known: FxHashSet::default(), in_flight: VecDeque::new(), objects: 0, bytes: 0 }
+    /// `asks` for objects before it sends them: they may have been left by a push that was interrupted.
+    pub(super) fn new(bucket: &'a Bucket, asks: bool) -> Self {
+        Self {
+            bucket,
+            known: FxHashSet::default(),
+            in_flight: VecDeque::new(),
+            asks,
+            missing: 0,
+            tile: None,
+            sent: Sent::default(),
+        }
+    }
+
+    /// What comes next is of this tile.
+    pub(super) fn begin(&mut self, tile: Option<TileIndex>) {
+        self.tile = tile;
     }
 
     /// Notes objects that are there.
@@ -52,9 +94,10 @@ impl<'a> Sender<'a> {
         let name = ObjectName::of(&content);
         if self.known.insert(name) {
             self.wait_until(MOST_IN_FLIGHT - 1)?;
-            self.objects += 1;
-            self.bytes += content.len() as u64;
-            self.in_flight.push_back(self.bucket.put(name, content));
+            let was_asked_for = self.asks && (content.len() >= LARGE_BYTES || self.missing < MOST_MISSING);
+            let bytes = content.len() as u64;
+            let pending = self.bucket.put(name, content, was_asked_for);
+            self.in_flight.push_back(OnItsWay { pending, bytes, tile: self.tile, was_asked_for });
         }
         Ok(name)
     }
@@ -64,12 +107,25 @@ impl<'a> Sender<'a> {
         self.wait_until(0)
     }
 
+    /// What was sent until [`finish`](Self::finish).
+    pub(super) fn sent(&self) -> &Sent {
+        &self.sent
+    }
+
     fn wait_until(&mut self, in_flight: usize) -> Result<()> {
         while self.in_flight.len() > in_flight
-            && let Some(pending) = self.in_flight.pop_front()
+            && let Some(OnItsWay { pending, bytes, tile, was_asked_for }) = self.in_flight.pop_front()
         {
-            let sent: io::Result<()> = pending.wait();
-            sent.map_err(|error| Error::io(self.bucket.path(), "write", error))?;
+            let answer: io::Result<bool> = pending.wait();
+            let is_sent = answer.map_err(|error| Error::io(self.bucket.path(), "write", error))?;
+            if is_sent {
+                self.missing += usize::from(was_asked_for);
+                self.sent.objects += 1;
+                self.sent.bytes += bytes;
+                self.sent.tiles.extend(tile);
+            } else {
+                self.missing = 0;
+            }
         }
         Ok(())
     }

@@ -9,6 +9,7 @@ use super::watch::Watch;
 use super::{build as scans_to_map, export as map_to_file, scan_input};
 use crate::Error;
 use crate::io::ScanSource;
+use crate::scan::Stop;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser};
 use serde_json::Value;
@@ -62,7 +63,7 @@ pub fn export(arguments: Vec<OsString>, watch: &Watch) -> Result<Value, CallErro
 /// Arguments that make no sense, and an input that cannot be read.
 pub fn open_scans(scans: &Path, arguments: Vec<OsString>) -> Result<Box<dyn ScanSource + Send>, CallError> {
     let options = read_options(&parse::<ReadArgs>(arguments)?)?;
-    Ok(scan_input::open(scans, &options)?)
+    Ok(scan_input::open(scans, &options, &Stop::default())?)
 }
 
 fn told(summary: Option<Summary>) -> Result<Value, CallError> {

@@ -13,8 +13,8 @@ pub struct FetchedSource {
 
 impl FetchedSource {
     /// Fetches all files at a URL, then reads them as those of a folder.
-    pub fn open(url: &str, options: &ReadOptions) -> Result<Self> {
-        let files = fetch(url, &Stop::default())?;
+    pub fn open(url: &str, options: &ReadOptions, stop: &Stop) -> Result<Self> {
+        let files = fetch(url, stop)?;
         Ok(Self { source: open_any_scans(files.path(), options)?, _files: files })
     }
 }

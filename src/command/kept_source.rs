@@ -3,7 +3,7 @@ use crate::command::new_poses::{PoseFile, poses_for, records_of};
 use crate::command::place::{is_map_at, url_of};
 use crate::io::{PointStore, ScanHead, ScanSource};
 use crate::mapper::KeptScans;
-use crate::scan::{Pose, ScanPoints};
+use crate::scan::{Pose, ScanPoints, Stop};
 use crate::{Error, Result};
 use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
@@ -19,15 +19,23 @@ pub struct KeptSource {
     fingerprint: String,
 }
 
-/// Whether a path names a map that may keep scans, or a snapshot of one.
-pub fn is_map(path: &Path) -> bool {
+/// Whether a path names a map that may keep scans, or a snapshot of one. Of a URL nobody knows before the store
+/// answers.
+pub fn is_map(path: &Path, stop: &Stop) -> Result<bool> {
     let has_files =
         |path: &Path| ["metadata.json", "commits.log"].iter().all(|name| path.join(name).is_file());
     let text = path.to_str().and_then(|text| text.rsplit_once('@'));
-    if let Some(url) = url_of(path) {
-        return is_map_at(url) || text.is_some_and(|(url, _)| url.contains("://") && is_map_at(url));
+    let Some(url) = url_of(path) else {
+        return Ok(has_files(path) || text.is_some_and(|(map, _)| has_files(Path::new(map))));
+    };
+    if is_map_at(url, stop)? {
+        return Ok(true);
     }
-    has_files(path) || text.is_some_and(|(map, _)| has_files(Path::new(map)))
+    match text {
+        // Not the name of a user before that of a host.
+        Some((map, snapshot)) if !snapshot.contains('/') && map.contains("://") => is_map_at(map, stop),
+        _ => Ok(false),
+    }
 }
 
 impl KeptSource {

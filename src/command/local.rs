@@ -121,7 +121,7 @@ fn run_setup(
     setup: &Setup,
     mut panels: Option<&mut Vec<Panel>>,
 ) -> anyhow::Result<Row> {
-    let mut source = scan_input::open(input.scans.path(), &read_options(&args.read)?)?;
+    let mut source = scan_input::open(input.scans.path(), &read_options(&args.read)?, &input.stop)?;
     let scans = source.len_hint();
     let progress = Progress::over_scans(scans);
     let mut map = LocalMap::new(args.resolution, setup.parameters)?;

@@ -38,15 +38,19 @@ pub fn check_is_folder(map: &Path) -> Result<()> {
     Err(Error::argument(url, reason))
 }
 
-/// Whether there is a map at a URL; false where nobody can tell.
+/// Whether there is a map at a URL; false where the command was built without buckets.
+///
+/// # Errors
+///
+/// As for [`Bucket::open`](crate::bucket::Bucket::open) and [`Bucket::has_map`](crate::bucket::Bucket::has_map).
 #[cfg(feature = "bucket")]
-pub fn is_map_at(url: &str) -> bool {
-    crate::bucket::Bucket::open(url).is_ok_and(|bucket| bucket.has_map())
+pub fn is_map_at(url: &str, stop: &Stop) -> Result<bool> {
+    crate::bucket::Bucket::open(url)?.has_map(&|| stop.is_set())
 }
 
 #[cfg(not(feature = "bucket"))]
-pub fn is_map_at(_: &str) -> bool {
-    false
+pub fn is_map_at(_: &str, _: &Stop) -> Result<bool> {
+    Ok(false)
 }
 
 /// Opens the scans at a URL that is none of a map.
@@ -56,12 +60,12 @@ pub fn is_map_at(_: &str) -> bool {
 /// As for [`Bucket::open`](crate::bucket::Bucket::open) and
 /// [`FetchedFiles::fetch`](crate::bucket::FetchedFiles::fetch); a URL, where the command was built without buckets.
 #[cfg(feature = "bucket")]
-pub fn scans_at(url: &str, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
-    Ok(Box::new(super::fetched_source::FetchedSource::open(url, options)?))
+pub fn scans_at(url: &str, options: &ReadOptions, stop: &Stop) -> Result<Box<dyn ScanSource + Send>> {
+    Ok(Box::new(super::fetched_source::FetchedSource::open(url, options, stop)?))
 }
 
 #[cfg(not(feature = "bucket"))]
-pub fn scans_at(url: &str, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+pub fn scans_at(url: &str, _: &ReadOptions, _: &Stop) -> Result<Box<dyn ScanSource + Send>> {
     Err(without_buckets(url))
 }
 
@@ -80,7 +84,10 @@ impl LocalScans {
     /// As for [`scans_at`]; [`Error::Stopped`].
     #[cfg(feature = "bucket")]
     pub fn of(scans: &Path, stop: &Stop) -> Result<Self> {
-        let url = url_of(scans).filter(|_| !super::kept_source::is_map(scans));
+        let url = match url_of(scans) {
+            Some(url) if !super::kept_source::is_map(scans, stop)? => Some(url),
+            _ => None,
+        };
         let fetched = url.map(|url| super::fetched_source::fetch(url, stop)).transpose()?;
         let path = fetched.as_ref().map_or(scans, |files| files.path()).to_owned();
         Ok(Self { path, _fetched: fetched })

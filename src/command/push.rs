@@ -23,7 +23,7 @@ struct Summary<'a> {
 pub fn run(args: &PushArgs) -> anyhow::Result<ExitCode> {
     let bucket = Bucket::open(&args.url)?;
     let progress = Progress::over_tiles(0);
-    let options = PushOptions { prunes: args.prune, replaces: args.replace };
+    let options = PushOptions { prunes: args.prune, replaces: args.replace, resends: args.resend };
     let pushed = push(whole_map(&args.map)?, &bucket, options, |done, all| progress.set(done, all))?;
     drop(progress);
     let mut out = std::io::stdout().lock();

@@ -2,6 +2,7 @@ use crate::command::kept_source::{KeptSource, is_map};
 use crate::command::new_poses::PoseFile;
 use crate::command::place::{scans_at, url_of};
 use crate::io::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
+use crate::scan::Stop;
 use crate::{Error, Result};
 use std::io::{BufReader, stdin};
 use std::path::Path;
@@ -14,14 +15,15 @@ pub fn is_standard_input(scans: &Path) -> bool {
     scans == Path::new("-")
 }
 
-/// Opens scans, which are a scan stream if they come from standard input.
-pub fn open(scans: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
-    if is_map(scans) && options.open.format.is_none() {
+/// Opens scans, which are a scan stream if they come from standard input. Once it is to stop, nothing waits for a
+/// bucket.
+pub fn open(scans: &Path, options: &ReadOptions, stop: &Stop) -> Result<Box<dyn ScanSource + Send>> {
+    if options.open.format.is_none() && is_map(scans, stop)? {
         let source = KeptSource::open(scans, PoseFile::of_reading(options).as_ref())?;
         return Ok(options.selection.clone().of(Box::new(source)));
     }
     if let Some(url) = url_of(scans) {
-        return scans_at(url, options);
+        return scans_at(url, options, stop);
     }
     if !is_standard_input(scans) {
         return open_any_scans(scans, options);

@@ -91,9 +91,9 @@ impl ScanReader {
             local => local?,
         };
         let (path, own_options, here) = (local.path().to_owned(), options.clone(), room.clone());
-        let named = scans.clone();
+        let (named, own_stop) = (scans.clone(), stop.clone());
         let read = move || {
-            let mut source = match scan_input::open(&path, &own_options) {
+            let mut source = match scan_input::open(&path, &own_options, &own_stop) {
                 Ok(source) => source,
                 Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
             };
@@ -119,7 +119,7 @@ impl ScanReader {
             }
             Err(error) => {
                 log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
-                let source = scan_input::open(local.path(), &options)?;
+                let source = scan_input::open(local.path(), &options, &stop)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((
                     Self { place: Place::Here(source, here, mark), stop, ahead: None, _scans: local },

@@ -9,6 +9,7 @@ use crate::command::scan_input;
 use crate::command::stop_signal;
 use crate::io::{PointRoom, ScanSource};
 use crate::mapper::MapReader;
+use crate::scan::Stop;
 use crate::space::Point;
 use crate::store::ScanRecord;
 use anyhow::Context;
@@ -58,7 +59,7 @@ struct Row {
 
 pub fn run(args: &ScansArgs) -> anyhow::Result<ExitCode> {
     let mut out = BufWriter::new(std::io::stdout().lock());
-    let overview = if is_map(&args.data) { of_map(args, &mut out)? } else { of_input(args, &mut out)? };
+    let overview = if is_map(&args.data)? { of_map(args, &mut out)? } else { of_input(args, &mut out)? };
     if args.json {
         json::print(&overview, &mut out)?;
     } else {
@@ -68,12 +69,13 @@ pub fn run(args: &ScansArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn is_map(path: &Path) -> bool {
+fn is_map(path: &Path) -> crate::Result<bool> {
     let has_metadata = |path: &Path| path.join("metadata.json").is_file();
     let text = path.to_str().and_then(|text| text.rsplit_once('@'));
     match url_of(path) {
-        Some(_) => kept_source::is_map(path),
-        None => has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map))),
+        // Nothing is to be removed yet: signals do what they always do.
+        Some(_) => kept_source::is_map(path, &Stop::default()),
+        None => Ok(has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map)))),
     }
 }
 
@@ -119,7 +121,7 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
     options.clouds.may_lack_poses = true;
     let stop = stop_signal::catch_if_fetched(&args.data)?;
     let local = LocalScans::of(&args.data, &stop)?;
-    let mut source: Box<dyn ScanSource + Send> = scan_input::open(local.path(), &options)?;
+    let mut source: Box<dyn ScanSource + Send> = scan_input::open(local.path(), &options, &stop)?;
     let progress = Progress::over_scans(source.len_hint());
     let room = PointRoom::new(ROOM_BYTES, &std::env::temp_dir());
     let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };

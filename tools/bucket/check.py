@@ -200,7 +200,12 @@ def check(port):
         said = voxtile("pull", url, WORK / "broken", port=port, fails=True)
         assert name in said, said
         shutil.rmtree(WORK / "broken.unfinished", ignore_errors=True)
+    assert "push --resend" in said, said
     print("objects that were changed, cut and missing are named")
+    voxtile("push", WORK / "pulled", url, "--resend", port=port)
+    assert voxtile("digest", url, port=port) == digest
+    voxtile("verify", url, port=port)
+    print("and sent again with --resend")
 
     check_scans(s3, port, bad)
 

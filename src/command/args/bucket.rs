@@ -15,6 +15,10 @@ pub struct PushArgs {
     /// Replace a state there that a copy of this map went to on a way of its own; what only that state has is lost
     #[arg(long)]
     pub replace: bool,
+    /// Send everything, also what should be there already: mends a map there of which objects were lost or damaged; a
+    /// manifest there that cannot be read is replaced, whatever map it was of
+    #[arg(long)]
+    pub resend: bool,
     /// Print JSON; sizes in bytes
     #[arg(long)]
     pub json: bool,
