@@ -55,7 +55,7 @@ fn amazon(root: &str, waits: Waits) -> AmazonS3Builder {
     let endpoint = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
     let endpoint = endpoint.iter().find_map(|name| std::env::var(name).ok());
     let mut builder = AmazonS3Builder::from_env().with_url(root).with_retry(waits.retry());
-    for (key, value) in waits.settings("AWS") {
+    for (key, value) in waits.settings(Some("AWS")) {
         builder = builder.with_config(AmazonS3ConfigKey::Client(key), value);
     }
     match endpoint {
@@ -71,7 +71,7 @@ fn amazon(root: &str, waits: Waits) -> AmazonS3Builder {
 fn google(root: &str, waits: Waits) -> GoogleCloudStorageBuilder {
     let builder = GoogleCloudStorageBuilder::from_env().with_url(root).with_retry(waits.retry());
     waits
-        .settings("GOOGLE")
+        .settings(Some("GOOGLE"))
         .into_iter()
         .fold(builder, |builder, (key, value)| builder.with_config(GoogleConfigKey::Client(key), value))
 }
@@ -79,7 +79,7 @@ fn google(root: &str, waits: Waits) -> GoogleCloudStorageBuilder {
 fn azure(root: &str, waits: Waits) -> MicrosoftAzureBuilder {
     let builder = MicrosoftAzureBuilder::from_env().with_url(root).with_retry(waits.retry());
     waits
-        .settings("AZURE")
+        .settings(Some("AZURE"))
         .into_iter()
         .fold(builder, |builder, (key, value)| builder.with_config(AzureConfigKey::Client(key), value))
 }
@@ -87,7 +87,7 @@ fn azure(root: &str, waits: Waits) -> MicrosoftAzureBuilder {
 fn web(root: &str, is_plain: bool, waits: Waits) -> HttpBuilder {
     let builder = HttpBuilder::new().with_url(root).with_retry(waits.retry());
     let builder = builder.with_config(ClientConfigKey::AllowHttp, is_plain.to_string());
-    waits.settings("HTTP").into_iter().fold(builder, |builder, (key, value)| builder.with_config(key, value))
+    waits.settings(None).into_iter().fold(builder, |builder, (key, value)| builder.with_config(key, value))
 }
 
 impl Waits {
@@ -99,11 +99,12 @@ impl Waits {
         }
     }
 
-    /// As settings of a client. What the environment says for this store stays, such as `AWS_TIMEOUT`.
-    fn settings(self, store: &str) -> Vec<(ClientConfigKey, String)> {
+    /// As settings of a client. What the environment says for a store that asks it stays, such as `AWS_TIMEOUT`.
+    fn settings(self, store: Option<&str>) -> Vec<(ClientConfigKey, String)> {
         let all = [("READ_TIMEOUT", ClientConfigKey::ReadTimeout, self.silent)];
         let all = all.into_iter().chain([("TIMEOUT", ClientConfigKey::Timeout, Some(self.whole))]);
-        let own = all.filter(|(name, ..)| std::env::var_os(format!("{store}_{name}")).is_none());
+        let is_said = |name| store.is_some_and(|store| std::env::var_os(format!("{store}_{name}")).is_some());
+        let own = all.filter(|(name, ..)| !is_said(*name));
         own.filter_map(|(_, key, wait)| Some((key, format!("{} seconds", wait?.as_secs())))).collect()
     }
 }
