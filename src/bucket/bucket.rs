@@ -93,7 +93,6 @@ impl Bucket {
             return Err(wrong("has a query or a fragment; give keys by the environment".to_owned()));
         }
         let root = format!("{scheme}://{host}");
-        choose_tls();
         let store = remote_store(url, scheme, &root, READING)?.ok_or_else(no_bucket)?;
         let sending = remote_store(url, scheme, &root, SENDING)?.ok_or_else(no_bucket)?;
         let prefix = Key::parse(prefix.trim_end_matches('/')).map_err(|error| wrong(error.to_string()))?;
@@ -489,10 +488,4 @@ pub(super) fn told(error: &object_store::Error) -> String {
         text = format!("no keys: set {keys} in the environment; without them this was tried: {text}");
     }
     text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// Of the two libraries that could encrypt, the one that the rest of voxtile has.
-fn choose_tls() {
-    // Whoever has chosen one before keeps it.
-    let _ = rustls::crypto::ring::default_provider().install_default();
 }

@@ -40,6 +40,7 @@ pub(super) fn remote_store(
     root: &str,
     waits: Waits,
 ) -> Result<Option<Arc<dyn ObjectStore>>> {
+    choose_tls();
     let refused = |error: object_store::Error| Error::argument(url, super::bucket::told(&error));
     Ok(Some(match scheme {
         "s3" => Arc::new(amazon(root, waits).build().map_err(refused)?),
@@ -48,6 +49,12 @@ pub(super) fn remote_store(
         "http" | "https" => Arc::new(web(root, scheme == "http", waits).build().map_err(refused)?),
         _ => return Ok(None),
     }))
+}
+
+/// Of the two libraries that could encrypt, the one that the rest of voxtile has.
+fn choose_tls() {
+    // Whoever has chosen one before keeps it.
+    let _ = rustls::crypto::ring::default_provider().install_default();
 }
 
 fn amazon(root: &str, waits: Waits) -> AmazonS3Builder {
