@@ -13,9 +13,6 @@ pub(super) struct Poses {
 
 /// How much of a file is read to identify it.
 const GLANCE_BYTES: u64 = 1 << 14;
-/// A line with a stamp that is nearer to the one in a file's name is the line of that file: some programs write
-/// milliseconds.
-const SAME_STAMP_S: f64 = 1e-3;
 /// Numbers in file names are compared with time stamps if both exceed this many seconds: counters do not.
 const LEAST_STAMP_S: f64 = 1e6;
 
@@ -64,18 +61,6 @@ impl Poses {
         Ok(())
     }
 
-    pub(super) fn len(&self) -> usize {
-        self.poses.len()
-    }
-
-    /// Whether each line has the stamp, in nanoseconds, in its place.
-    pub(super) fn have_stamps(&self, stamps_ns: &[i64]) -> bool {
-        let is_same = |(&stamp_ns, &(_, stamp_s)): (&i64, &(u64, f64))| {
-            (stamp_ns as f64 * 1e-9 - stamp_s).abs() <= SAME_STAMP_S
-        };
-        self.stamps.len() == stamps_ns.len() && stamps_ns.iter().zip(&self.stamps).all(is_same)
-    }
-
     pub(super) fn into_poses(self) -> Vec<Pose> {
         self.poses
     }
@@ -97,6 +82,21 @@ impl Poses {
         let most = sorted[sorted.len() / 2];
         let beside = |&k: &usize| (apart[k] - most).abs() > 0.5 * spacing;
         (0..apart.len()).find(beside).map(|k| (&files[k], (apart[k] - most).abs()))
+    }
+}
+
+#[cfg(feature = "clouds")]
+impl Poses {
+    pub(super) fn len(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// Whether each line has the stamp, in nanoseconds, in its place, up to the milliseconds that some programs write.
+    pub(super) fn have_stamps(&self, stamps_ns: &[i64]) -> bool {
+        let is_same = |(&stamp_ns, &(_, stamp_s)): (&i64, &(u64, f64))| {
+            (stamp_ns as f64 * 1e-9 - stamp_s).abs() <= 1e-3
+        };
+        self.stamps.len() == stamps_ns.len() && stamps_ns.iter().zip(&self.stamps).all(is_same)
     }
 }
 

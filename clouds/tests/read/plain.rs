@@ -151,7 +151,7 @@ fn files_that_are_named_for_something_else_are_no_clouds() {
     fs::write(scans.join("lens.txt"), "500 500 320 240\n").unwrap();
     assert!(Format::guess(&scans).is_err());
     let other_path = scans.join("../scans/0_gps.csv");
-    assert_eq!(Format::guess_without(&scans, &[other_path.clone()]).unwrap(), Format::Text);
+    assert_eq!(Format::guess_without(&scans, std::slice::from_ref(&other_path)).unwrap(), Format::Text);
     let options = OpenOptions {
         not_clouds: vec![other_path, folder.path().join("nothing")],
         intrinsics_path: Some(scans.join("lens.txt")),
