@@ -9,11 +9,14 @@ use voxtile::bucket::object_store::{
     ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
 
+/// What becomes of a request, after so many others.
+type Faults = dyn Fn(&Asked, usize) -> Fault + Send + Sync;
+
 /// A store in memory that notes what it is asked for, and does to some of it what a test wants.
 pub struct FaultyStore {
     inner: Arc<InMemory>,
     asked: Mutex<Vec<Asked>>,
-    fault: Box<dyn Fn(&Asked, usize) -> Fault + Send + Sync>,
+    fault: Box<Faults>,
 }
 
 /// One request.
