@@ -190,7 +190,9 @@ impl OutOfCoreTileMapper {
     /// [`OutOfCoreTileMapper::end_flush`] waits for it. One that is under way ends first.
     ///
     /// Tiles that a scan changes before they are written are in memory twice; both count in the limit. A tile that has
-    /// to go waits in the compact form; the mapper waits for the flush where these fill their part of the memory.
+    /// to go waits in the compact form; the mapper waits for the flush where these fill their part of the memory. Where
+    /// the lists of very many small tiles would take more than a sixteenth of the limit, the map is flushed before this
+    /// returns.
     ///
     /// # Errors
     ///

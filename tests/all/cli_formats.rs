@@ -136,6 +136,11 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
             assert_eq!(told.contains("4 clouds have no pose"), !is_filled, "{own:?} {tolerance}: {told}");
             assert_eq!(told.contains("apart; --pose-tolerance allows for more"), !is_filled, "{told}");
         }
+        let map = folder.path().join("map");
+        let input = ["build", &bag, "--topic", "/points", "--pose-tolerance", "0.01", "-o", text(&map)];
+        let refused = refusal(&[&input, own].concat());
+        assert!(refused.contains("none of its 4 clouds has a pose"), "{refused}");
+        assert!(refused.contains("apart; --pose-tolerance allows for more"), "{refused}");
     }
 }
 

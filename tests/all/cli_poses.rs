@@ -116,6 +116,11 @@ fn pcd_files_take_every_form_of_poses() {
     let map = folder.path().join("map");
     let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
     assert!(told.contains("line 2") && told.contains("`six` is not a number"), "{told}");
+    // A file that is no scan is often at an end of the list.
+    let three = "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n".repeat(3);
+    fs::write(&file, three).unwrap();
+    let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
+    assert!(told.contains("3 poses for 2 clouds (0.pcd to 1.pcd)"), "{told}");
 }
 
 #[test]

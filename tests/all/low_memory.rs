@@ -217,6 +217,35 @@ fn a_flush_that_stands_still_stops_no_scan() {
     assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), expected.digest().unwrap());
 }
 
+/// A flush beside the mapper has lists of its tiles, which nothing could make room for if these are small and many.
+#[test]
+fn a_flush_of_very_many_small_tiles_is_done_at_once() {
+    let folder = memory_folder();
+    let path = folder.path().join("map");
+    let config = MapConfig::new(0.2, 0.8).unwrap().with_range(0.0, 100.0);
+    let points = (0..150).map(|ray| {
+        let azimuth = 2.4 * f64::from(ray);
+        [80.0 * azimuth.cos(), 80.0 * azimuth.sin(), 0.1 * f64::from(ray) - 7.0]
+    });
+    let scan = Scan { origin: [0.03, 0.04, 0.5], points: points.collect(), intensities: None };
+    let mut expected = InMemoryMapper::new(config.clone()).unwrap();
+    expected.insert_scan(&scan).unwrap();
+    assert!(expected.tile_indices().len() > 15_000, "{}", expected.tile_indices().len());
+    let limited = config.with_memory_bytes(24 << 20);
+    let map = MapPath::on(UnsyncedDisk::shared(), &path);
+    let mut mapper = OutOfCoreTileMapper::create(map, limited).unwrap();
+    mapper.insert_scan(&scan).unwrap();
+    mapper.begin_flush().unwrap();
+    assert!(!mapper.is_flushing());
+    assert_eq!(mapper.flushed_scan_number(), 1);
+    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), expected.digest().unwrap());
+    // A few tiles go beside the mapper, however many there are.
+    mapper.insert_points(&ScanRef::in_world([0.0; 3], &[[3.0, 0.0, 0.0]])).unwrap();
+    mapper.begin_flush().unwrap();
+    mapper.end_flush().unwrap();
+    assert_eq!(mapper.flushed_scan_number(), 2);
+}
+
 #[test]
 fn tables_that_are_kept_for_a_reader_count_as_memory() {
     let folder = memory_folder();

@@ -1,5 +1,6 @@
 use super::flusher::FlushedTile;
 use super::held_tile::HeldTile;
+use super::unapplied_tile::UnappliedTile;
 use crate::persistence::CompactTile;
 use crate::space::{TileIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
@@ -15,12 +16,36 @@ pub(super) struct Flight {
     tiles: FxHashMap<TileIndex, FlightTile>,
     /// Bytes of memory of tiles that the flush alone holds.
     own_bytes: usize,
-    /// Bytes of memory for one tile that it makes.
-    bytes_to_make: usize,
+    /// Bytes of memory of its lists, and for one tile that it makes.
+    other_bytes: usize,
     /// Tiles that were being saved as they are when it began: it waits for that, and does not write them.
     saving: Vec<(TileIndex, CompactTile)>,
     /// Those of them that could not be saved: it writes them after all.
     unsaved: Vec<(TileIndex, CompactTile)>,
+}
+
+/// How many tiles a flush is to write, by what it keeps of each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct FlightSize {
+    pub(super) resident: usize,
+    pub(super) compact: usize,
+    pub(super) unapplied: usize,
+}
+
+impl FlightSize {
+    /// Bytes of memory of the lists, beside the tiles: of small tiles, these take more than the tiles do.
+    pub(super) fn bytes(self) -> usize {
+        /// What the allocator adds to a block.
+        const BLOCK: usize = 16;
+        /// The counts of an `Arc`.
+        const COUNTS: usize = 16;
+        let all = self.resident + self.compact + self.unapplied;
+        // A list or a table that has just grown is half empty.
+        let slots = 2 * (size_of::<FlushedTile>() + hash_table_bytes::<(TileIndex, FlightTile)>(1));
+        all * slots
+            + self.resident * (size_of::<HeldTile>() + COUNTS + BLOCK)
+            + self.unapplied * (UnappliedTile::OWN_BYTES + BLOCK)
+    }
 }
 
 /// A tile on its way to disk.
@@ -35,14 +60,15 @@ struct FlightTile {
 }
 
 impl Flight {
-    /// A flush of some tiles, which takes so many bytes of memory to make one, and of others that are being saved.
+    /// A flush of some tiles, and of others that are being saved. `other_bytes`: of memory of its lists, and of a tile
+    /// that it makes.
     pub(super) fn of<'a>(
         tiles: impl Iterator<Item = &'a FlushedTile>,
-        bytes_to_make: usize,
+        other_bytes: usize,
         saving: Vec<(TileIndex, CompactTile)>,
     ) -> Self {
         let tiles = tiles.map(|tile| (tile.index(), FlightTile::of(tile))).collect();
-        Self { tiles, bytes_to_make, saving, ..Self::default() }
+        Self { tiles, other_bytes, saving, ..Self::default() }
     }
 
     /// Notes that a save has ended; tells whether it failed, and it is up to the flush to write the tile.
@@ -132,9 +158,7 @@ impl Flight {
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.own_bytes
-            + self.bytes_to_make
-            + hash_table_bytes::<(TileIndex, FlightTile)>(self.tiles.capacity())
+        self.own_bytes + self.other_bytes
     }
 }
 

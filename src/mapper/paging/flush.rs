@@ -1,6 +1,7 @@
 //! How a map becomes durable: buffered updates are applied, dirty tiles written, and all of it committed at once.
 
-use super::flight::Flight;
+use super::contents::TileContents;
+use super::flight::{Flight, FlightSize};
 use super::flusher::{BegunFlush, FlushedTile};
 use super::held_tile::HeldTile;
 use super::shared_contents::unlocked;
@@ -71,17 +72,24 @@ impl TilePager<'_> {
     }
 
     /// Begins a flush of the map as it is now: what dirty tiles hold, which goes on to be shared with the cache; what
-    /// is buffered for others; and the scans that were noted. One that is under way ends first.
-    pub(super) fn begin_flush(&mut self) -> Result<BegunFlush> {
+    /// is buffered for others; and the scans that were noted. One that is under way ends first. `None` if it is done
+    /// by now: it would have had to keep lists of too many small tiles.
+    pub(super) fn begin_flush(&mut self) -> Result<Option<BegunFlush>> {
         self.end_flight();
         self.contents.take_flush_error().map_or(Ok(()), Err)?;
+        let list_bytes = self.flight_size().bytes();
+        let plan = self.contents.cache.plan();
+        if plan.is_enforced && list_bytes > plan.flight_bytes {
+            self.flush()?;
+            return Ok(None);
+        }
         self.write_suspects()?;
         self.upgrade()?;
         // A tile that could not be saved stays dirty, and the flush saves it again; so this error is dropped.
         self.take_saved();
         let _ = self.disk.take_save_error();
-        let bytes_to_make = self.bytes_to_make();
-        let bytes_beyond = bytes_to_make.saturating_sub(self.contents.flush_reserve);
+        let flight_bytes = list_bytes + self.bytes_to_make();
+        let bytes_beyond = flight_bytes.saturating_sub(self.contents.flush_reserve);
         self.evict_until(bytes_beyond, self.contents.cache.plan().tiles)?;
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
         let files = self.store().reader()?;
@@ -107,9 +115,19 @@ impl TilePager<'_> {
         let residents = tiles.iter().skip(after_saves).position(is_resident);
         let first = residents.map_or(tiles.len(), |first| after_saves + first);
         let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
-        self.contents.flight = Some(Flight::of(tiles.iter().chain(&compact), bytes_to_make, saving));
+        self.contents.flight = Some(Flight::of(tiles.iter().chain(&compact), flight_bytes, saving));
         self.contents.flush_reserve = self.contents.flush_reserve.max(1);
-        Ok(BegunFlush { scan_number, tiles, compact, after_saves, soon_changed, writer, files, commit })
+        Ok(Some(BegunFlush { scan_number, tiles, compact, after_saves, soon_changed, writer, files, commit }))
+    }
+
+    /// How many tiles a flush beside the mapper would have to write.
+    fn flight_size(&self) -> FlightSize {
+        let TileContents { cache, buffer, .. } = &*self.contents;
+        FlightSize {
+            resident: cache.used_last_first().filter(|tile| tile.is_dirty()).count(),
+            compact: cache.dirty_compact(),
+            unapplied: buffer.tiles().count(),
+        }
     }
 
     /// Tiles in the compact form that are being saved as they are, and for which no updates are buffered.

@@ -30,6 +30,8 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(in crate::mapper) reader_bytes: usize,
     /// Most bytes of what views hold that has changed since.
     pub(super) view_bytes: usize,
+    /// Most bytes of the lists of a flush beside the mapper.
+    pub(super) flight_bytes: usize,
 }
 
 const OFTEN_SCANS: u32 = 8;
@@ -51,6 +53,7 @@ impl MemoryPlan {
                 index_bytes: 0,
                 reader_bytes: 64 << 20,
                 view_bytes: usize::MAX,
+                flight_bytes: usize::MAX,
             },
             // Buffered updates are small beside their tiles; a larger buffer saves reads and writes.
             MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
@@ -103,6 +106,7 @@ impl MemoryPlan {
             index_bytes: 0,
             reader_bytes: bytes / 16,
             view_bytes: bytes / 8,
+            flight_bytes: bytes / 16,
         }
     }
 }

@@ -57,7 +57,7 @@ impl PagedTiles {
     ///
     /// Why an earlier one has failed; tiles that cannot be read, a disk that refuses.
     pub(in crate::mapper) fn begin_flush(&self) -> Result<()> {
-        let begun = self.pager().begin_flush()?;
+        let Some(begun) = self.pager().begin_flush()? else { return Ok(()) };
         let (contents, disk) = (self.contents.clone(), self.disk.clone());
         let (progress, on_progress) = channel();
         self.flusher.give(FlushJob { contents, disk, begun, progress }, on_progress);

@@ -247,6 +247,11 @@ impl TileCache {
         self.compact.unsaved()
     }
 
+    /// How many tiles in the compact form are dirty.
+    pub(super) fn dirty_compact(&self) -> usize {
+        self.compact.dirty()
+    }
+
     /// The dirty tiles in the compact form that are being saved, in no particular order.
     pub(super) fn saving_compact(&self) -> impl Iterator<Item = (TileIndex, CompactTile)> {
         self.compact.saving()

@@ -16,6 +16,9 @@ pub(super) struct UnappliedTile {
 }
 
 impl UnappliedTile {
+    /// Bytes of memory beside those of [`bytes`](Self::bytes), about: its location names a folder and a file.
+    pub(super) const OWN_BYTES: usize = size_of::<Self>() + 2 * 96;
+
     /// Makes the tile.
     ///
     /// # Errors

@@ -23,6 +23,8 @@ pub struct HardScan {
     pub limit_mib: usize,
     /// Whether every ray counts.
     pub per_ray: bool,
+    /// Whether a flush beside the mapper begins after each scan, in place of every minute.
+    pub is_flushed: bool,
 }
 
 /// What is mapped.
@@ -81,7 +83,8 @@ impl HardScan {
             Points::Survey { survey, scans } => format!("`{}`, {scans} scans", survey.name()),
         };
         let each = if self.per_ray { ", every ray" } else { "" };
-        format!("{points}{each}; voxels of {} m, tiles of {} m", self.resolution_m, self.tile_size_m)
+        let flushed = if self.is_flushed { ", flushed after each scan" } else { "" };
+        format!("{points}{each}{flushed}; voxels of {} m, tiles of {} m", self.resolution_m, self.tile_size_m)
     }
 
     /// Writes the input; returns its file.
@@ -134,6 +137,9 @@ impl HardScan {
         let mut arguments = vec!["build", "--json", "--storage", "compact", "--memory", &memory];
         arguments.extend(["--resolution", &resolution, "--tile-size", &tile, "--max-range", &reach]);
         arguments.extend(["--insert", if self.per_ray { "per-ray" } else { "per-scan" }]);
+        if self.is_flushed {
+            arguments.extend(["--flush-every", "0s"]);
+        }
         let before = children_cpu_s()?;
         let output = command()?.args(arguments).arg(input).arg("-o").arg(map).output()?;
         let cpu_s = children_cpu_s()? - before;

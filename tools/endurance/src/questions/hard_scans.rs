@@ -93,6 +93,7 @@ fn cases(setting: &Setting) -> Vec<HardScan> {
         tile_size_m,
         limit_mib,
         per_ray: false,
+        is_flushed: false,
     };
     let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(4, 2) };
     let mut cases = vec![

@@ -36,8 +36,10 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         };
         let limit_mib = least + random.below(setting.size(200, 60)) as usize + 40;
         let name = format!("random {tried}");
-        let hard =
-            HardScan { name, points, resolution_m, tile_size_m, limit_mib, per_ray: random.below(3) == 0 };
+        let per_ray = random.below(3) == 0;
+        // On a slow disk one begins anyway.
+        let is_flushed = random.below(2) == 0;
+        let hard = HardScan { name, points, resolution_m, tile_size_m, limit_mib, per_ray, is_flushed };
         let input = hard.write(&setting.work)?;
         let taken = match hard.build(&input, &setting.work.join("hard"), true) {
             Ok(taken) => taken,
