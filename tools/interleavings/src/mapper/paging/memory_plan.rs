@@ -13,6 +13,7 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) often_scans: u32,
     compact_bytes: usize,
     pub(super) view_bytes: usize,
+    pub(super) flight_bytes: usize,
 }
 
 impl MemoryPlan {
@@ -27,6 +28,7 @@ impl MemoryPlan {
             often_scans: 1,
             compact_bytes: 1 << 10,
             view_bytes: 2 << 10,
+            flight_bytes: usize::MAX,
         }
     }
 
