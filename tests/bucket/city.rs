@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::bucket::{Bucket, BucketDisk, PushOptions, Pushed, push};
 use voxtile::integrity::verify;
-use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
+use voxtile::{MapConfig, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Scan, Storage};
 
 pub const KEEP: PushOptions = PushOptions { prunes: false, replaces: false, resends: false };
 pub const PRUNE: PushOptions = PushOptions { prunes: true, ..KEEP };

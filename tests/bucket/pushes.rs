@@ -6,7 +6,6 @@ use crate::city::{
 };
 use crate::server::Server;
 use std::path::Path;
-use std::time::Duration;
 use tempfile::TempDir;
 use testkit::random_scans::Random;
 use voxtile::bucket::object_store::path::Path as Key;
