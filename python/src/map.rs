@@ -335,7 +335,8 @@ impl Map {
     /// Makes everything so far durable, as a whole. Nothing to do for a map that is read.
     ///
     /// With `wait=False` it returns at once, and what it makes durable is the map as of now, while scans go on;
-    /// `flushed_scan_number` tells when that is done. If it fails, the next flush says why.
+    /// `flushed_scan_number` tells when that is done. If it fails, the next flush says why. Where very many small tiles
+    /// wait and memory is short, it flushes before it returns.
     #[pyo3(signature = (*, wait=true))]
     fn flush(&self, py: Python<'_>, wait: bool) -> PyResult<()> {
         if !matches!(*self.source(py)?, Source::Writer { .. }) {

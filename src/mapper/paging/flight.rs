@@ -60,7 +60,7 @@ struct FlightTile {
 }
 
 impl Flight {
-    /// A flush of some tiles, and of others that are being saved. `other_bytes`: of memory of its lists, and of a tile
+    /// A flush of some tiles, and of others that are being saved. `other_bytes` are those of its lists and of a tile
     /// that it makes.
     pub(super) fn of<'a>(
         tiles: impl Iterator<Item = &'a FlushedTile>,

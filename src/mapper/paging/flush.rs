@@ -78,8 +78,7 @@ impl TilePager<'_> {
         self.end_flight();
         self.contents.take_flush_error().map_or(Ok(()), Err)?;
         let list_bytes = self.flight_size().bytes();
-        let plan = self.contents.cache.plan();
-        if plan.is_enforced && list_bytes > plan.flight_bytes {
+        if list_bytes > self.contents.cache.plan().flight_bytes {
             self.flush()?;
             return Ok(None);
         }

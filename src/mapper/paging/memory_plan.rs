@@ -59,7 +59,8 @@ impl MemoryPlan {
             MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
             // For tests: the limit is below the least that works, so it is not enforced.
             MemoryLimit::Tight(bytes) => {
-                Self { least_scan_bytes: 0, is_enforced: false, ..Self::shares_of(bytes) }
+                let (is_enforced, least_scan_bytes, flight_bytes) = (false, 0, usize::MAX);
+                Self { least_scan_bytes, is_enforced, flight_bytes, ..Self::shares_of(bytes) }
             }
         }
     }
