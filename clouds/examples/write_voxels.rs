@@ -51,7 +51,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         voxels: rows.len() as u64,
         resolution_m: arguments.resolution_m,
         bounds_m,
-        occupied_from: 0.5,
+        occupied_log_odds: 0.0,
     };
     let mut options = WriteOptions::beside(&arguments.output);
     options.crs = Some("LOCAL_CS[\"voxels\",UNIT[\"metre\",1]]".to_owned());

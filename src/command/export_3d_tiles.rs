@@ -138,7 +138,7 @@ impl Export<'_> {
             voxels: voxels.len() as u64,
             resolution_m: edge_m,
             bounds_m: [[0.0; 3]; 2],
-            occupied_from: 0.5,
+            occupied_log_odds: 0.0,
         };
         let mut options = WriteOptions::beside(&path);
         // Coordinates begin at the node's corner.

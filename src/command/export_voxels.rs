@@ -102,7 +102,7 @@ impl<'a> Chosen<'a> {
             voxels: 0,
             resolution_m: config.grid.resolution_m(),
             bounds_m: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
-            occupied_from: config.occupancy_threshold,
+            occupied_log_odds: config.occupied_log_odds(),
         };
         self.for_each(map, &mut || (), &mut |row| {
             head.voxels += 1;

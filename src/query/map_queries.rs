@@ -1,4 +1,6 @@
-use super::{Occupancy, OctreeExport, coarse, digest, merged, octree_blocks, point, region};
+use super::{
+    Columns, Occupancy, OctreeExport, coarse, columns, digest, merged, octree_blocks, point, region,
+};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::octree::Octree;
@@ -69,6 +71,16 @@ pub trait MapQueries: MapView + Sized {
         visit: impl FnMut(Voxel),
     ) -> Result<()> {
         region::for_each_occupied(self, min_probability, region, visit)
+    }
+
+    /// What is known of each column of voxels whose center is in the half-open box, for robots that drive. Voxels count
+    /// that reach between two heights in metres; the answer is the least rectangle around the observed ones of the box.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read; more than 2^31 columns.
+    fn columns_in(&self, region: &Aabb, heights_m: [f64; 2]) -> Result<Columns> {
+        columns::columns_in(self, region, heights_m)
     }
 
     /// The occupied voxels of the whole map. For large maps use [`MapQueries::for_each_occupied`].

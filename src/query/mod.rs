@@ -10,6 +10,7 @@
 //! | a point, many points | [`Occupancy`]: unknown, free or occupied, with the probability |
 //! | a point at a coarse depth | the same, for the largest log-odds under that octree node |
 //! | a region, the whole map | its voxels, streamed |
+//! | a region from above | [`Columns`]: unknown, free or occupied, for each column of voxels |
 //! | a ray, many rays, a segment | [`Hit`]: the first occupied voxel, exactly as single steps would find it |
 //! | a sphere, a box, a swept sphere | [`Hit`]: an occupied voxel that it touches |
 //! | nearest occupied | [`Hit`]: the occupied voxel with the nearest center |
@@ -20,6 +21,7 @@
 
 mod coarse;
 mod collision;
+mod columns;
 mod digest;
 mod hit;
 mod map_queries;
@@ -44,6 +46,7 @@ mod sifted_tiles;
 mod tile_cursor;
 mod united;
 
+pub use columns::{Column, Columns};
 pub use hit::Hit;
 pub use map_queries::MapQueries;
 pub use occupancy::{Occupancy, UnknownAs};

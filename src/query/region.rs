@@ -137,12 +137,16 @@ impl BrickPart {
     }
 
     fn of(voxel: VoxelIndex, within: &VoxelBox) -> Self {
-        let voxels = brick_of(voxel);
+        let part = Self { code: BrickCode::of_voxel(voxel), voxels: brick_of(voxel), mask: [u64::MAX; 8] };
+        Self { mask: part.mask_in(within), ..part }
+    }
+
+    /// The places of the brick whose voxels lie in a box.
+    pub(super) fn mask_in(&self, within: &VoxelBox) -> BrickMask {
         let local = |corner: VoxelIndex| {
-            std::array::from_fn(|k| corner[k].saturating_sub(voxels.min[k]).clamp(0, BRICK_EDGE))
+            std::array::from_fn(|k| corner[k].saturating_sub(self.voxels.min[k]).clamp(0, BRICK_EDGE))
         };
-        let mask = mask_of_box(local(within.min), local(within.end));
-        Self { code: BrickCode::of_voxel(voxel), voxels, mask }
+        mask_of_box(local(within.min), local(within.end))
     }
 
     /// Whether there may be voxels whose log-odds are at least a threshold.

@@ -537,3 +537,28 @@ fn a_folder_of_3d_tiles_is_whole() {
     assert_eq!(told["nodes"], nodes);
     assert!(told["voxels"].as_u64().unwrap() > 300);
 }
+
+/// Their probability is 0.5 exactly, from which voxels are occupied.
+#[test]
+fn what_is_free_stays_free_in_files_from_above_however_much_has_faded() {
+    let folder = TempDir::new().unwrap();
+    let map = near_map(&folder);
+    let files = |when: &str| {
+        ["pgm", "png", "glb"].map(|extension| {
+            // The picture is named in a file beside it.
+            let out = folder.path().join(when);
+            fs::create_dir_all(&out).unwrap();
+            let out = out.join(format!("map.{extension}"));
+            output(&["export", text(&map), "-o", text(&out), "--what", "all"]);
+            fs::read(out).unwrap()
+        })
+    };
+    let before = files("before");
+    let picture = &before[0];
+    assert!(picture.contains(&254) && picture.contains(&0), "free and occupied columns");
+    output(&["decay", text(&map), "--halflife", "0.001"]);
+    let faded = files("faded");
+    for (number, name) in ["pgm", "png", "glb"].into_iter().enumerate() {
+        assert!(faded[number] == before[number], "{name}");
+    }
+}

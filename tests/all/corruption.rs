@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::integrity::{Finding, Repair, Severity, Verification, verify};
+use voxtile::integrity::{self, Action, ActionKind, Finding, Repair, Severity, Verification, verify};
 use voxtile::space::TileIndex;
 use voxtile::store::{TileFile, TileStore, tile_of_folder};
 use voxtile::{Error, MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
@@ -65,7 +65,7 @@ fn findings(disk: &FaultyDisk) -> (Verification, Vec<Finding>) {
 }
 
 fn repair(disk: &FaultyDisk) -> voxtile::Result<Repair> {
-    voxtile::integrity::repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ())
+    integrity::repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ())
 }
 
 fn tile_of(path: &Path) -> Option<TileIndex> {
@@ -601,6 +601,29 @@ fn metadata_of_another_map_takes_nothing_from_this_one() {
             assert_eq!((map_id, scan_number), (index(&whole).0, 2), "{what}");
             assert!(findings(&disk).0.is_whole(), "{what}");
         }
+    }
+}
+
+/// As it is where the writer was killed between the record of a commit and `metadata.json`.
+#[test]
+fn metadata_behind_the_log_is_brought_up_to_it_and_nothing_is_lost() {
+    for storage in STORAGES {
+        let disk = small_map(storage);
+        let metadata = Path::new("/map/metadata.json");
+        let earlier = disk.files()[metadata].clone();
+        let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
+        mapper.insert_scan(&scan(5)).unwrap();
+        mapper.flush().unwrap();
+        drop(mapper);
+        let (before, now) = (contents(&disk).unwrap(), disk.files()[metadata].clone());
+        disk.put(metadata, &earlier);
+        let mut actions = Vec::new();
+        let done = |action: &Action| actions.push((action.kind, action.path.clone()));
+        let repaired = integrity::repair(MapPath::on(disk.shared(), map()), done, |_, _| ()).unwrap();
+        assert!(repaired.is_complete(), "{storage}: {repaired:?}");
+        assert_eq!(actions, [(ActionKind::Derived, metadata.to_owned())], "{storage}");
+        assert_eq!((&disk.files()[metadata], contents(&disk).unwrap()), (&now, before), "{storage}");
+        assert_eq!(repair(&disk).unwrap().actions, 0, "{storage}");
     }
 }
 

@@ -1,4 +1,4 @@
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
@@ -6,7 +6,7 @@ use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::mapper::OctreeMap;
 use voxtile::octree::read;
-use voxtile::query::{RayQuery, Shape, UnknownAs};
+use voxtile::query::{Column, RayQuery, Shape, UnknownAs};
 use voxtile::scan::{PointBatch, RayWalk};
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::space::{Aabb, MortonCode, VoxelIndex, VoxelKey};
@@ -525,4 +525,62 @@ fn a_tile_that_a_pruned_cube_fills_fits_into_memory() {
     assert_eq!(map.config().grid.voxels_per_tile_edge(), 400);
     assert!(matches!(map.occupancy_at([-1.0; 3]).unwrap(), Occupancy::Free(_)));
     assert!(matches!(map.occupancy_at([1.0; 3]).unwrap(), Occupancy::Unknown));
+}
+
+/// What is known of columns, by every voxel of the map.
+fn naive_columns(map: &impl MapView, region: &Aabb, heights_m: [f64; 2]) -> BTreeMap<[i32; 2], Column> {
+    let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
+    let half_m = 0.5 * grid.resolution_m();
+    let mut columns = BTreeMap::new();
+    for (voxel @ [x, y, _], (bits, _)) in voxels_of(map) {
+        let center_m @ [_, _, z_m] = grid.center_m(voxel);
+        if !region.contains(center_m) {
+            continue;
+        }
+        let column = columns.entry([x, y]).or_insert(Column::Unknown);
+        if z_m + half_m > heights_m[0] && z_m - half_m < heights_m[1] {
+            let is_occupied = f64::from_bits(bits) >= occupied_from || *column == Column::Occupied;
+            *column = if is_occupied { Column::Occupied } else { Column::Free };
+        }
+    }
+    columns
+}
+
+#[test]
+fn columns_from_above_are_those_of_every_voxel() {
+    let folder = TempDir::new().unwrap();
+    let (in_memory, out_of_core) = maps(&folder);
+    let mut random = Random(70);
+    let mut found = [0; 3];
+    for number in 0..60 {
+        let reach_m = random.between(0.1, 6.0);
+        let corner = random.point([0.0; 3], 4.0);
+        let region = match number {
+            0 => Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] },
+            // Borders through centers.
+            1..10 => Aabb { min: [-1.05, -0.95, -2.05], max: [1.05, 1.15, 0.05] },
+            _ => Aabb { min: corner, max: corner.map(|at| at + reach_m) },
+        };
+        let from_m = random.between(-3.0, 2.0);
+        let heights_m = match number % 3 {
+            0 => [f64::NEG_INFINITY, f64::INFINITY],
+            1 => [from_m, from_m + random.between(0.0, 2.0)],
+            _ => [-0.5, 0.3],
+        };
+        let naive = naive_columns(&in_memory, &region, heights_m);
+        let columns = in_memory.columns_in(&region, heights_m).unwrap();
+        assert_eq!(out_of_core.columns_in(&region, heights_m).unwrap(), columns);
+        let ([x, y], [width, height]) = (columns.first(), columns.size());
+        let along = |k: usize| naive.keys().map(move |column| column[k]);
+        let least = [0, 1].map(|k| along(k).min().unwrap_or(0));
+        let size = [0, 1].map(|k| along(k).max().map_or(0, |most| (most - least[k]) as usize + 1));
+        assert_eq!(([x, y], [width, height]), (least, size), "{region:?}");
+        assert_eq!(columns.states().len(), width * height);
+        for (number, &state) in columns.states().iter().enumerate() {
+            let column = [x + (number % width) as i32, y + (number / width) as i32];
+            assert_eq!(state, naive.get(&column).copied().unwrap_or(Column::Unknown), "{column:?}");
+            found[state as usize] += 1;
+        }
+    }
+    assert!(found.iter().all(|count| *count > 500), "{found:?}");
 }

@@ -193,3 +193,34 @@ fn snapshots_of_maps_that_do_not_list_them_are_read_and_listed_at_the_next_commi
     delete_snapshot(MapPath::on(disk.shared(), map()), &name("s2")).unwrap();
     assert_eq!((kept(&disk), damaged(&disk).len()), (0, 0));
 }
+
+/// Copies by hand, files of other maps, notes: the log names none of them, and a deleted snapshot is told from them.
+#[test]
+fn what_somebody_else_put_beside_the_snapshots_stays() {
+    let (disk, digests) = with_two();
+    let (other, _) = with_two();
+    let files = disk.files();
+    let put: [(PathBuf, &[u8]); 3] = [
+        (path("copy"), &files[&path("s1")]),
+        (path("other"), &other.files()[&path("s1")]),
+        (path("notes"), b"what the snapshots are of"),
+    ];
+    put.iter().for_each(|(path, bytes)| disk.put(path, bytes));
+    let deleted = files[&path("s2")].clone();
+    delete_snapshot(MapPath::on(disk.shared(), map()), &name("s2")).unwrap();
+    // As the disk has it if the power goes before the removal is durable.
+    disk.put(&path("s2"), &deleted);
+    go_on(&disk, 6..8).unwrap();
+    let left = disk.files();
+    assert!(!left.contains_key(&path("s2")));
+    for (path, bytes) in &put {
+        assert_eq!(left.get(path).map(Vec::as_slice), Some(*bytes), "{}", path.display());
+    }
+    assert_eq!(digest_of(&disk, Some("s1")).unwrap(), digests[0]);
+    repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
+    let left = disk.files();
+    for (path, bytes) in &put {
+        assert!(left.values().any(|file| file == bytes), "{}", path.display());
+    }
+    assert_eq!(digest_of(&disk, Some("s1")).unwrap(), digests[0]);
+}

@@ -4,7 +4,7 @@ use crate::error::Result;
 
 /// What is known of a column of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Column {
+pub(super) enum Column {
     /// No voxel of it was seen.
     Unknown,
     /// Voxels were seen, and none of them is occupied.
@@ -15,7 +15,7 @@ pub enum Column {
 
 /// A map seen from above, for robots that drive: a state for each column of voxels between two heights.
 #[derive(Clone, Debug)]
-pub struct FlatMap {
+pub(super) struct FlatMap {
     head: VoxelsHead,
     heights_m: [f64; 2],
     grid: Option<ColumnGrid<Column>>,
@@ -23,7 +23,7 @@ pub struct FlatMap {
 
 impl FlatMap {
     /// A map of what will be announced; voxels count that reach between the two heights.
-    pub fn new(head: &VoxelsHead, heights_m: [f64; 2]) -> Self {
+    pub(super) fn new(head: &VoxelsHead, heights_m: [f64; 2]) -> Self {
         Self { head: head.clone(), heights_m, grid: None }
     }
 
@@ -32,7 +32,7 @@ impl FlatMap {
     /// # Errors
     ///
     /// A box that has more columns than a flat map may have; a voxel outside of it.
-    pub fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+    pub(super) fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
         let grid = match &mut self.grid {
             Some(grid) => grid,
             none => none.insert(ColumnGrid::new(&self.head, voxel, Column::Unknown)?),
@@ -43,7 +43,7 @@ impl FlatMap {
         if z + half <= least || z - half >= most {
             return Ok(());
         }
-        if voxel.probability >= self.head.occupied_from {
+        if voxel.log_odds >= self.head.occupied_log_odds {
             *column = Column::Occupied;
         } else if *column == Column::Unknown {
             *column = Column::Free;
@@ -56,7 +56,7 @@ impl FlatMap {
     /// # Errors
     ///
     /// No voxel came.
-    pub fn size(&self) -> Result<[usize; 2]> {
+    pub(super) fn size(&self) -> Result<[usize; 2]> {
         self.grid().map(ColumnGrid::size)
     }
 
@@ -65,7 +65,7 @@ impl FlatMap {
     /// # Errors
     ///
     /// No voxel came.
-    pub fn corner_m(&self) -> Result<[f64; 3]> {
+    pub(super) fn corner_m(&self) -> Result<[f64; 3]> {
         self.grid().map(ColumnGrid::corner_m)
     }
 
@@ -74,7 +74,7 @@ impl FlatMap {
     /// # Errors
     ///
     /// No voxel came.
-    pub fn columns(&self) -> Result<&[Column]> {
+    pub(super) fn columns(&self) -> Result<&[Column]> {
         self.grid().map(ColumnGrid::cells)
     }
 

@@ -94,7 +94,7 @@ impl VertexKind {
 
 impl VoxelSink for GlbSink {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
-        if voxel.probability < self.head.occupied_from {
+        if voxel.log_odds < self.head.occupied_log_odds {
             return Ok(());
         }
         self.lattice.get_or_insert_with(|| Lattice::of(voxel, self.head.resolution_m));

@@ -46,7 +46,7 @@ impl VoxelSink for HeightmapSink {
         };
         let share = layers_per_value(grid);
         let (column, layer) = grid.column(voxel)?;
-        if voxel.probability >= self.head.occupied_from {
+        if voxel.log_odds >= self.head.occupied_log_odds {
             let value = u16::try_from(1 + layer / share).unwrap_or(u16::MAX);
             *column = value.max(*column);
         }

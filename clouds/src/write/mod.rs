@@ -7,7 +7,6 @@
 //! A sink writes to the path that it is given; who calls renames it when it is whole. What cannot be written in the
 //! order of the voxels is sorted in files without names beside the output: memory does not grow with the voxels, but
 //! for the flat grids of [`VoxelFileFormat::Nav2Map`] and [`VoxelFileFormat::Heightmap`].
-//! [`FlatMap`] is the former without a file.
 
 mod autoware;
 mod column_grid;
@@ -50,7 +49,6 @@ mod testing;
 mod xyz;
 mod zip_store;
 
-pub use flat_map::{Column, FlatMap};
 pub use format::VoxelFileFormat;
 pub use open::open_sink;
 pub use options::WriteOptions;

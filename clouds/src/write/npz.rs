@@ -95,8 +95,12 @@ mod tests {
     fn archive(zip64_from: u64) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npz");
-        let head =
-            VoxelsHead { voxels: 2, resolution_m: 0.5, bounds_m: [[0.0; 3], [1.0; 3]], occupied_from: 0.5 };
+        let head = VoxelsHead {
+            voxels: 2,
+            resolution_m: 0.5,
+            bounds_m: [[0.0; 3], [1.0; 3]],
+            occupied_log_odds: 0.0,
+        };
         let zip = ZipStore::create(&path).unwrap().with_zip64_from(zip64_from);
         let mut sink = Box::new(NpzSink::in_zip(zip, &head, &WriteOptions::beside(&path)).unwrap());
         for x in [0.25, 0.75] {

@@ -21,6 +21,6 @@ pub(super) fn head_of(rows: &[VoxelRow]) -> VoxelsHead {
         voxels: rows.len() as u64,
         resolution_m: RESOLUTION_M,
         bounds_m: [f64::min, f64::max].map(|pick| std::array::from_fn(|k| bound(k, pick).unwrap_or(0.0))),
-        occupied_from: 0.5,
+        occupied_log_odds: 0.0,
     }
 }

@@ -26,7 +26,7 @@ pub fn write_voxels(format: VoxelFileFormat, path: &Path, crs: Option<&str>) {
         voxels: VOXELS as u64,
         resolution_m: 0.5,
         bounds_m: [bound(f64::min), bound(f64::max)],
-        occupied_from: 0.5,
+        occupied_log_odds: 0.0,
     };
     let options = WriteOptions { crs: crs.map(str::to_owned), ..WriteOptions::beside(path) };
     let mut sink = open_sink(format, &head, path, &options).unwrap();

@@ -57,7 +57,7 @@ fn what_is_no_number_of_a_system_is_refused() {
         voxels: 0,
         resolution_m: 0.5,
         bounds_m: [[0.0; 3]; 2],
-        occupied_from: 0.5,
+        occupied_log_odds: 0.0,
     };
     for crs in ["EPSG:", "EPSG:100000", "EPSG:4326+5773"] {
         let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };

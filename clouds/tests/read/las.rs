@@ -169,7 +169,7 @@ fn records_behind_points_are_not_taken_for_points() {
 fn compressed_files_may_be_empty() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty.laz");
-    let head = VoxelsHead { voxels: 0, resolution_m: 0.5, bounds_m: [[0.0; 3]; 2], occupied_from: 0.5 };
+    let head = VoxelsHead { voxels: 0, resolution_m: 0.5, bounds_m: [[0.0; 3]; 2], occupied_log_odds: 0.0 };
     let sink = open_sink(VoxelFileFormat::Laz, &head, &path, &WriteOptions::beside(&path)).unwrap();
     sink.finish().unwrap();
     assert_eq!(clouds(&path).iter().map(|(_, points)| points.len()).sum::<usize>(), 0);

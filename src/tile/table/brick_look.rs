@@ -23,6 +23,11 @@ impl BrickLook<'_> {
         self.brick.observed[place / 64] >> (place % 64) & 1 == 1
     }
 
+    /// The observed voxels.
+    pub(crate) fn observed(&self) -> BrickMask {
+        self.brick.observed
+    }
+
     /// The observed voxels whose log-odds are at least a threshold.
     pub(crate) fn mask_from(&self, log_odds: f64) -> BrickMask {
         self.brick.mask_from(log_odds, self.palette)

@@ -1,7 +1,7 @@
 use super::Extent;
 use crate::messages::{Header, MapMetaData, OccupancyGrid, Pose};
-use voxtile::{Aabb, Grid, MapQueries, MapView, Voxel};
-use voxtile_clouds::write::{Column, FlatMap, VoxelRow, VoxelsHead};
+use voxtile::query::Column;
+use voxtile::{Aabb, Grid, MapQueries, MapView};
 
 /// Most cells along an edge of a map without voxels, around the middle of its region: such a message comes through.
 const MOST_EMPTY_CELLS: f64 = 1000.0;
@@ -18,31 +18,8 @@ pub fn projected_map(
     extent: &Extent,
     header: Header,
 ) -> anyhow::Result<OccupancyGrid> {
-    let config = map.config();
-    let grid = config.grid;
-    let row_of = |voxel: &Voxel| VoxelRow {
-        index: voxel.index,
-        center_m: grid.center_m(voxel.index),
-        probability: voxel.evidence.probability(),
-        log_odds: voxel.evidence.log_odds,
-        observation_count: voxel.evidence.observation_count,
-        tile: grid.tile_of_voxel(voxel.index).to_array(),
-    };
-    let mut head = VoxelsHead {
-        voxels: 0,
-        resolution_m: grid.resolution_m(),
-        bounds_m: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
-        occupied_from: config.occupancy_threshold,
-    };
-    map.for_each_voxel_in(region, |voxel| {
-        let center_m = grid.center_m(voxel.index);
-        let [least, most] = head.bounds_m;
-        head.bounds_m = [
-            std::array::from_fn(|k| least[k].min(center_m[k])),
-            std::array::from_fn(|k| most[k].max(center_m[k])),
-        ];
-        head.voxels += 1;
-    })?;
+    let grid = map.config().grid;
+    let columns = map.columns_in(region, extent.heights_m)?;
     let mut info = MapMetaData {
         map_load_time: header.stamp,
         resolution: grid.resolution_m() as f32,
@@ -50,28 +27,18 @@ pub fn projected_map(
         height: 0,
         origin: Pose::at([0.0; 3]),
     };
-    if head.voxels == 0 {
+    let [width, height] = columns.size();
+    if width == 0 {
         let [(x, width), (y, height)] = [0, 1].map(|axis| empty_cells(&grid, region, axis));
         (info.width, info.height) = (width, height);
         info.origin = Pose::at([x, y, 0.0]);
         let data = vec![OccupancyGrid::UNKNOWN; width as usize * height as usize];
         return Ok(OccupancyGrid { header, info, data });
     }
-    let mut flat = FlatMap::new(&head, extent.heights_m);
-    let mut put = Ok(());
-    map.for_each_voxel_in(region, |voxel| {
-        if put.is_ok() {
-            put = flat.put(&row_of(&voxel));
-        }
-    })?;
-    put?;
-    let [width, height] = flat.size()?;
-    let [x, y, _] = flat.corner_m()?;
     (info.width, info.height) = (u32::try_from(width)?, u32::try_from(height)?);
+    let [x, y] = columns.first().map(|index| grid.corner_m(index));
     info.origin = Pose::at([x, y, 0.0]);
-    // The picture begins at the top, the message at the bottom.
-    let rows = flat.columns()?.chunks(width.max(1)).rev();
-    let data = rows.flatten().copied().map(cell_of).collect();
+    let data = columns.states().iter().copied().map(cell_of).collect();
     Ok(OccupancyGrid { header, info, data })
 }
 
