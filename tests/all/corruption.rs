@@ -615,14 +615,20 @@ fn metadata_behind_the_log_is_brought_up_to_it_and_nothing_is_lost() {
         mapper.insert_scan(&scan(5)).unwrap();
         mapper.flush().unwrap();
         drop(mapper);
-        let (before, now) = (contents(&disk).unwrap(), disk.files()[metadata].clone());
+        // The number of scans in the list is not part of a commit.
+        let told = |disk: &FaultyDisk| {
+            let text = String::from_utf8(disk.files()[metadata].clone()).unwrap();
+            let is_kept = |line: &&str| !["scan_records", "crc32"].iter().any(|key| line.contains(key));
+            text.lines().filter(is_kept).map(str::to_owned).collect::<Vec<_>>()
+        };
+        let (before, now) = (contents(&disk).unwrap(), told(&disk));
         disk.put(metadata, &earlier);
         let mut actions = Vec::new();
         let done = |action: &Action| actions.push((action.kind, action.path.clone()));
         let repaired = integrity::repair(MapPath::on(disk.shared(), map()), done, |_, _| ()).unwrap();
         assert!(repaired.is_complete(), "{storage}: {repaired:?}");
         assert_eq!(actions, [(ActionKind::Derived, metadata.to_owned())], "{storage}");
-        assert_eq!((&disk.files()[metadata], contents(&disk).unwrap()), (&now, before), "{storage}");
+        assert_eq!((told(&disk), contents(&disk).unwrap()), (now, before), "{storage}");
         assert_eq!(repair(&disk).unwrap().actions, 0, "{storage}");
     }
 }
