@@ -26,7 +26,7 @@ pub struct VoxelsHead {
     pub resolution_m: f64,
     /// A box around the centers of all voxels, in true coordinates in metres.
     pub bounds_m: [[f64; 3]; 2],
-    /// Log-odds from which on a voxel is occupied. The probability does not tell: that of faded log-odds is exactly 0.5.
+    /// Log-odds from which on a voxel is occupied. The probability does not tell: faded log-odds have exactly 0.5.
     pub occupied_log_odds: f64,
 }
 
