@@ -1,4 +1,5 @@
 use crate::space::VoxelIndex;
+pub(super) use crate::space::ones;
 
 /// The place of a cell among the 4 x 4 x 4 cells of its parent, from the lowest two bits of each index.
 #[inline]
@@ -11,16 +12,6 @@ pub(super) fn place_of([x, y, z]: VoxelIndex) -> usize {
 pub(super) fn cell_at(parent: VoxelIndex, place: usize) -> VoxelIndex {
     let place = place as i32;
     [parent[0] << 2 | place & 3, parent[1] << 2 | place >> 2 & 3, parent[2] << 2 | place >> 4]
-}
-
-/// The places of a mask, ascending.
-#[inline]
-pub(super) fn ones(mut mask: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let place = mask.trailing_zeros() as usize;
-        mask &= mask.wrapping_sub(1);
-        (place < 64).then_some(place)
-    })
 }
 
 /// Moves each place `p` of a mask to `p ^ flip`, where `flip` combines 3 (x), 12 (y) and 48 (z): mirrors the mask along

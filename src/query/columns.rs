@@ -1,7 +1,7 @@
 use super::region::{bricks_in, tiles_in};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
-use crate::space::{Aabb, BrickMask, VoxelBox};
+use crate::space::{Aabb, BrickMask, VoxelBox, ones};
 use crate::tile::Tile;
 use rustc_hash::FxHashMap;
 
@@ -122,21 +122,13 @@ fn from_above(mask: &BrickMask) -> u64 {
 }
 
 /// Where a column of a brick is along x and y.
-fn place_of(column: u32) -> [i64; 2] {
-    [0, 1].map(|axis| (0..3).map(|k| i64::from(column >> (2 * k + axis) & 1) << k).sum())
-}
-
-fn ones(mut mask: u64) -> impl Iterator<Item = u32> {
-    std::iter::from_fn(move || {
-        let one = (mask != 0).then(|| mask.trailing_zeros())?;
-        mask &= mask - 1;
-        Some(one)
-    })
+fn place_of(column: usize) -> [i64; 2] {
+    [0, 1].map(|axis| (0..3).map(|k| ((column >> (2 * k + axis) & 1) << k) as i64).sum())
 }
 
 /// Puts the columns of bricks into the least rectangle around all observed voxels.
 fn spread(bricks: &FxHashMap<[i32; 2], BrickColumns>, resolution_m: f64) -> Result<Columns> {
-    let at = |corner: &[i32; 2], column: u32| {
+    let at = |corner: &[i32; 2], column: usize| {
         let place = place_of(column);
         [0, 1].map(|k| i64::from(corner[k]) + place[k])
     };

@@ -67,6 +67,16 @@ pub const fn add_to_mask(mask: &mut BrickMask, place: usize) {
     mask[place / 64] |= 1 << (place % 64);
 }
 
+/// The places of the bits that are set, lowest first.
+#[inline]
+pub(crate) fn ones(mut mask: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = mask.trailing_zeros() as usize;
+        mask &= mask.wrapping_sub(1);
+        (place < 64).then_some(place)
+    })
+}
+
 /// The places of a brick whose voxel satisfies `min <= local < end` along every axis, each in 0..=8.
 pub fn mask_of_box(min: [i32; 3], end: [i32; 3]) -> BrickMask {
     let below = |axis: usize, k: i32| &BELOW[axis][k.clamp(0, BRICK_EDGE) as usize];
