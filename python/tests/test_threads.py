@@ -41,6 +41,79 @@ def test_a_reader_asks_while_another_thread_inserts(tmp_path: Path) -> None:
         assert alone.digest() == digest
 
 
+ARRAYS = """
+    import os
+    import sys
+    import threading
+    import time
+    import numpy as np
+    import voxtile
+
+    random = np.random.default_rng(1)
+    points = random.uniform(-8, 8, (5_000, 3))
+    directions = random.normal(size=(3_000, 3))
+    boxes = np.hstack([points[:50], points[:50] + 0.5])
+    until = time.monotonic() + float(sys.argv[2])
+    failures, answers, is_over = [], 0, False
+
+    def ask() -> None:
+        global answers
+        questions = [
+            lambda: found.cast_rays(np.zeros((3_000, 3)), directions, max_range=10.0),
+            lambda: found.occupancy(points),
+            lambda: found.log_odds(points),
+            lambda: found.counts(points),
+            lambda: found.nearest(points[:50], 2.0),
+            lambda: found.collides(boxes),
+            lambda: found.occupied(),
+            lambda: found.to_dense([[-2, -2, -2], [2, 2, 2]]),
+        ]
+        number = 0
+        try:
+            while not is_over:
+                questions[number % len(questions)]()
+                number += 1
+                answers += 1
+        except BaseException as error:
+            failures.append(error)
+
+    with voxtile.Map.create(sys.argv[1], 0.1, tile_size=1.6) as found:
+        threads = [threading.Thread(target=ask) for _ in range(int(sys.argv[3]))]
+        for thread in threads:
+            thread.start()
+        while time.monotonic() < until and not failures:
+            pose = np.eye(4)
+            pose[:3, 3] = random.uniform(-3, 3, 3)
+            found.insert(random.uniform(-5, 5, (2_000, 3)), pose)
+            if found.scan_number % 8 == 0:
+                found.flush(wait=found.scan_number % 16 == 0)
+        is_over = True
+        for thread in threads:
+            thread.join(timeout=60)
+        assert not failures, failures
+        assert not any(thread.is_alive() for thread in threads), "a question waits for ever"
+        print(f"{answers} arrays of answers, {found.scan_number} scans")
+    """
+
+
+@pytest.mark.parametrize("threads", [1, 4, 8])
+def test_arrays_of_questions_while_another_thread_inserts(tmp_path: Path, threads: int) -> None:
+    """The long form: VOXTILE_READER_SECONDS=300."""
+    seconds = float(os.environ.get("VOXTILE_READER_SECONDS", "1"))
+    # Questions that begin on the stack of a waiting one would soon need more than a small stack.
+    stacks = {"RUST_MIN_STACK": str(256 << 10)}
+    done = subprocess.run(
+        ["sh", "-c", 'ulimit -s 256; exec "$@"', "sh", sys.executable, "-c", textwrap.dedent(ARRAYS)]
+        + [str(tmp_path / "map"), str(seconds), str(threads)],
+        env=os.environ | stacks,
+        capture_output=True,
+        text=True,
+        timeout=seconds + 120,
+    )
+    assert done.returncode == 0, (done.returncode, done.stdout, done.stderr)
+    print(done.stdout)
+
+
 def test_two_threads_two_maps_and_one(tmp_path: Path) -> None:
     scans = scans_of(2, count=12, points=1000)
 

@@ -62,6 +62,8 @@ mod interrupted;
 mod kept_scans;
 /// What each folder may know.
 mod layering;
+/// Many queries at once beside the mapper, in threads with small stacks.
+mod live_arrays;
 /// Readers in other threads beside the mapper.
 mod live_readers;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.

@@ -12,9 +12,8 @@ use std::sync::Arc;
 /// it waits while the mapper changes tiles in memory, which is the shorter part of inserting a scan. Queries that
 /// belong together ask a [`LiveView`].
 ///
-/// Do not call the mapper from a thread of the rayon pool in which readers ask arrays of questions (from inside of
-/// `rayon::join` or `ThreadPool::install`, say): while the thread that changes tiles waits for its own work, rayon may
-/// give it a question to answer, which waits for the change. Give the mapper a thread of its own, as above the planner.
+/// Threads of any rayon pool may ask, and so may parallel loops over single queries: while the mapper changes tiles it
+/// uses threads of its own.
 ///
 /// After the mapper is dropped it goes on seeing the last scan, until another writer opens the map.
 ///

@@ -28,14 +28,14 @@ const ATTEMPTS: usize = 8;
 
 impl LiveView {
     pub(super) fn open(shared: Arc<Shared>) -> Self {
-        let mut contents = shared.contents.lock_to_read();
+        let mut contents = shared.contents.lock();
         let (id, scan_number, bounds) = (contents.open_view(), contents.scan_number(), contents.bounds());
         drop(contents);
         Self { shared, id, scan_number, bounds }
     }
 
     fn read(&self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
-        let state = || self.shared.contents.lock_to_read().state_for(self.id, index);
+        let state = || self.shared.contents.lock().state_for(self.id, index);
         let mut moved = None;
         for _ in 0..ATTEMPTS {
             let (stored, is_past) = match state()? {
@@ -106,7 +106,7 @@ impl MapView for LiveView {
     }
 
     fn tile_indices(&self) -> Vec<TileIndex> {
-        self.shared.contents.lock_to_read().tiles()
+        self.shared.contents.lock().tiles()
     }
 
     fn tile_bounds(&self) -> Option<TileBox> {
@@ -114,11 +114,11 @@ impl MapView for LiveView {
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {
-        self.shared.contents.lock_to_read().may_hold(index)
+        self.shared.contents.lock().may_hold(index)
     }
 
     fn cached_tile_indices(&self) -> Vec<TileIndex> {
-        self.shared.contents.lock_to_read().resident_tiles()
+        self.shared.contents.lock().resident_tiles()
     }
 
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {

@@ -31,6 +31,7 @@ mod tile_cache;
 mod tile_disk;
 mod tile_pager;
 mod tile_state;
+mod tile_threads;
 mod unapplied_tile;
 mod views;
 mod write_buffer;

@@ -1,7 +1,7 @@
+use super::tile_threads::TileThreads;
 use crate::space::TileIndex;
 use crate::tile::Tile;
 use lru::LruCache;
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -111,21 +111,22 @@ impl ResidentTiles {
         Some(answer)
     }
 
-    /// Changes many tiles side by side, each with what is given for it.
+    /// Changes many tiles in parallel, each with what is given for it.
     pub(super) fn change_all<T: Send>(
         &mut self,
+        threads: &TileThreads,
         mut given: FxHashMap<TileIndex, T>,
         change: impl Fn(&mut Tile, T) + Sync,
     ) {
         let changed =
             self.tiles.iter_mut().filter_map(|(index, resident)| Some((resident, given.remove(index)?)));
-        let mut changed: Vec<(&mut Resident, T)> = changed.collect();
+        let changed: Vec<(&mut Resident, T)> = changed.collect();
         self.bytes -= changed.iter().map(|(resident, _)| resident.bytes).sum::<usize>();
-        let bytes = changed.par_drain(..).map(|(resident, given)| {
+        let bytes = threads.map(changed, |(resident, given)| {
             resident.change(|tile| change(tile, given));
             resident.bytes
         });
-        self.bytes += bytes.sum::<usize>();
+        self.bytes += bytes.into_iter().sum::<usize>();
     }
 }
 

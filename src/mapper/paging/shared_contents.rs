@@ -24,8 +24,9 @@ impl SharedContents {
         Self { contents: Mutex::new(contents), closed: Condvar::new() }
     }
 
-    /// Locks the contents for the mapper.
-    pub(super) fn lock(&self) -> ContentsGuard<'_> {
+    /// Locks the contents. Whoever holds the lock needs no thread of a pool that others use: all of its threads may wait
+    /// for the lock.
+    pub(in crate::mapper) fn lock(&self) -> ContentsGuard<'_> {
         self.contents.lock()
     }
 
@@ -41,28 +42,12 @@ impl SharedContents {
 
     /// Ends a look at the map.
     pub(in crate::mapper) fn close_view(&self, view: ViewId) {
-        let mut contents = self.lock_to_read();
+        let mut contents = self.lock();
         let dropped = contents.views.close(view);
         drop(contents);
         self.closed.notify_all();
         // After the lock is released: freeing copies of tiles takes time.
         drop(dropped);
-    }
-
-    /// Locks the contents for a reader.
-    ///
-    /// The mapper changes tiles on all cores while it holds the lock. A worker thread that only waited would keep it
-    /// from that, for ever if all of them did.
-    pub(in crate::mapper) fn lock_to_read(&self) -> ContentsGuard<'_> {
-        while rayon::current_thread_index().is_some() {
-            if let Some(guard) = self.contents.try_lock() {
-                return guard;
-            }
-            if rayon::yield_now() != Some(rayon::Yield::Executed) {
-                std::thread::yield_now();
-            }
-        }
-        self.contents.lock()
     }
 }
 

@@ -2,13 +2,13 @@ use super::compact_tiles::CompactTiles;
 use super::flight::Flight;
 use super::memory_plan::MemoryPlan;
 use super::resident_tiles::ResidentTiles;
+use super::tile_threads::TileThreads;
 use crate::config::{MapConfig, Storage};
 use crate::error::Result;
 use crate::mapper::statistics::{IoCounts, MapStatistics, MemoryCounts};
 use crate::persistence::CompactTile;
 use crate::space::{Grid, TileIndex};
 use crate::tile::{OctreeFactory, Table, Tile};
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -24,6 +24,7 @@ pub(super) struct TileCache {
     /// Declared after the tiles, so dropped after them: the octree worker does not write trees that are going away.
     octrees: OctreeFactory,
     compact: CompactTiles,
+    threads: TileThreads,
     /// Bytes of memory that are kept free for inserting scans: what the largest so far took.
     scan_bytes: usize,
     hits: u64,
@@ -56,11 +57,17 @@ impl TileCache {
             resident: ResidentTiles::default(),
             octrees: OctreeFactory::new(config.octree),
             compact: CompactTiles::default(),
+            threads: TileThreads::default(),
             scan_bytes: plan.least_scan_bytes,
             hits: 0,
             encoded: 0,
             decoded: 0,
         }
+    }
+
+    /// Changes tiles in threads that take no other work from now on: other threads wait for the lock on the contents.
+    pub(super) fn use_threads(&mut self, threads: TileThreads) {
+        self.threads = threads;
     }
 
     /// How the memory is shared out.
@@ -129,12 +136,11 @@ impl TileCache {
         given: Vec<(TileIndex, T)>,
         fill: impl Fn(&mut Tile, T) + Sync,
     ) {
-        let made = given.into_par_iter().map(|(index, given)| {
+        let made = self.threads.map(given, |(index, given)| {
             let mut tile = Tile::empty(&self.grid, &self.octrees, index);
             fill(&mut tile, given);
             Arc::new(tile)
         });
-        let made: Vec<_> = made.collect();
         made.into_iter().for_each(|tile| self.resident.put(tile));
     }
 
@@ -155,13 +161,13 @@ impl TileCache {
         given: FxHashMap<TileIndex, T>,
         change: impl Fn(&mut Tile, T) + Sync,
     ) {
-        self.resident.change_all(given, change);
+        self.resident.change_all(&self.threads, given, change);
     }
 
     pub(super) fn sync_octrees(&mut self) {
         let stale = self.resident.iter().filter(|tile| !tile.is_octree_synced());
         let stale = stale.map(|tile| (tile.index(), ())).collect();
-        self.resident.change_all(stale, |tile, ()| tile.sync_octree());
+        self.resident.change_all(&self.threads, stale, |tile, ()| tile.sync_octree());
     }
 
     /// Drops a resident tile.

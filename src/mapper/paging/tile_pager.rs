@@ -3,6 +3,7 @@ use super::shared_contents::{ContentsGuard, SharedContents, unlocked};
 use super::shared_disk::DiskGuard;
 use super::tile_cache::Cached;
 use super::tile_disk::TileDisk;
+use super::tile_threads::TileThreads;
 use super::write_buffer::WriteBuffer;
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
@@ -499,9 +500,11 @@ impl TilePager<'_> {
     ///
     /// # Errors
     ///
-    /// For a map of the original format, as for [`TilePager::upgrade`].
+    /// For a map of the original format, as for [`TilePager::upgrade`]; a system that gives no threads.
     pub(in crate::mapper) fn open_to_readers(&mut self, bytes: usize) -> Result<TileReader> {
         self.upgrade()?;
+        let threads = TileThreads::own(self.store().folder())?;
+        self.contents.cache.use_threads(threads);
         let store = self.disk.store();
         let versions = store.tiles().filter_map(|tile| Some((tile, store.version(tile)?)));
         self.contents.views.watch_disk(bytes, versions, store.orphans().into_iter());

@@ -185,6 +185,7 @@ mod mapper {
         mod tile_pager {
             source!("tile_pager.rs");
         }
+        mod tile_threads;
         mod write_buffer {
             source!("write_buffer.rs");
         }

@@ -17,15 +17,11 @@ impl SharedContents {
         Self(Mutex::new(contents))
     }
 
-    pub(super) fn lock(&self) -> ContentsGuard<'_> {
+    pub(in crate::mapper) fn lock(&self) -> ContentsGuard<'_> {
         ContentsGuard { contents: &self.0, guard: Some(self.0.lock().unwrap()) }
     }
 
     pub(super) fn wait_for_views(&self, _: &mut ContentsGuard<'_>) {}
-
-    pub(in crate::mapper) fn lock_to_read(&self) -> ContentsGuard<'_> {
-        self.lock()
-    }
 }
 
 impl Deref for ContentsGuard<'_> {

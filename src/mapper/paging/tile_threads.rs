@@ -1,0 +1,78 @@
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::io;
+use std::panic::resume_unwind;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::thread;
+
+/// The threads that change tiles in parallel while the mapper holds the lock on the contents.
+#[derive(Clone, Debug, Default)]
+pub(super) enum TileThreads {
+    /// Those of the caller's rayon pool: no other thread waits for the lock.
+    #[default]
+    OfCaller,
+    /// Threads that take no other work. Readers wait for the lock in threads of any pool. If all threads of the
+    /// caller's pool waited for it, parallel work in that pool would never begin.
+    Own(Arc<ThreadPool>),
+}
+
+/// All maps of the process share these threads; they end with the last map that uses them.
+static SHARED: Mutex<Weak<ThreadPool>> = Mutex::new(Weak::new());
+
+impl TileThreads {
+    /// Starts threads that take no other work, as many as the caller's pool has.
+    ///
+    /// # Errors
+    ///
+    /// A system that gives no threads; `folder` is the map's, for the error.
+    pub(super) fn own(folder: &Path) -> Result<Self> {
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(threads) = shared.upgrade() {
+            return Ok(Self::Own(threads));
+        }
+        let threads = ThreadPoolBuilder::new()
+            .num_threads(rayon::current_num_threads())
+            .thread_name(|number| format!("voxtile-tiles-{number}"))
+            .build();
+        let threads =
+            threads.map_err(|error| Error::io(folder, "start threads for", io::Error::other(error)))?;
+        let threads = Arc::new(threads);
+        *shared = Arc::downgrade(&threads);
+        Ok(Self::Own(threads))
+    }
+
+    /// Does `work` with each item in these threads; returns the results in the order of the items.
+    pub(super) fn map<T: Send, R: Send>(&self, items: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
+        if items.len() < 2 {
+            return items.into_iter().map(work).collect();
+        }
+        let all = || items.into_par_iter().map(&work).collect();
+        match self {
+            Self::OfCaller => all(),
+            Self::Own(threads) if rayon::current_thread_index().is_none() => threads.install(all),
+            Self::Own(threads) => install_idle(threads, all),
+        }
+    }
+}
+
+/// Runs `work` in the threads of a pool, and waits without doing anything else.
+///
+/// A rayon worker that waits for another pool takes other work of its own pool meanwhile. That may be a question which
+/// needs the lock that the mapper holds. A plain thread only waits.
+fn install_idle<R: Send>(threads: &ThreadPool, work: impl FnOnce() -> R + Send) -> R {
+    /// The stack of a thread that only waits.
+    const STACK_BYTES: usize = 128 << 10;
+    let work = Mutex::new(Some(work));
+    let run = || {
+        let work = work.lock().unwrap_or_else(PoisonError::into_inner).take();
+        work.map(|work| threads.install(work))
+    };
+    let done = thread::scope(|scope| {
+        let waiting = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, run);
+        waiting.ok().and_then(|waiting| waiting.join().unwrap_or_else(|panic| resume_unwind(panic)))
+    });
+    // If the system gives no thread, this one does not stay idle, which is better than a failure.
+    done.or_else(run).expect("the work is done once, here or in the thread")
+}
