@@ -8,7 +8,7 @@ use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
 use crate::scan::updates::{
     BrickRuns, MappedTiles, Misses, Run, ScanUpdates, TileRuns, TileUpdates, brick_code, bricks_by_tile,
-    in_order_of_tiles, part_in_tile,
+    in_order_of_tiles, part_in_tile, small_tiles_of_brick,
 };
 use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex, is_in_mask};
 use rayon::prelude::*;
@@ -113,16 +113,22 @@ impl PerRayCollector {
         self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
     }
 
-    /// The updates by mapped tile. Bricks across a tile border are split.
-    fn runs_by_tile(&self, mapped: MappedTiles<'_>) -> Vec<(TileIndex, TileRuns)> {
+    /// Visits the updates by mapped tile. Bricks across a tile border are split; with more bricks than
+    /// `bricks_at_a_time` a tile may come several times, with other voxels each time.
+    fn for_each_tile(
+        &self,
+        mapped: MappedTiles<'_>,
+        bricks_at_a_time: usize,
+        mut visit: impl FnMut(TileIndex, TileRuns),
+    ) {
         let (bricks, indices) = self.bricks();
         let ended = self.ended_by_brick(&bricks);
-        let runs_of_tile = |(tile, numbers): (TileIndex, Vec<u32>)| {
+        let runs_of_tile = |first: usize, tile: TileIndex, numbers: Vec<u32>| {
             let mut scratch = Scratch::default();
             let mut runs = TileRuns::default();
-            for number in numbers {
-                let index = indices[number as usize];
-                let brick = Brick { counts: bricks[number as usize], ended: ended.of_brick(number) };
+            for number in numbers.into_iter().map(|number| first + number as usize) {
+                let index = indices[number];
+                let brick = Brick { counts: bricks[number], ended: ended.of_brick(number) };
                 let (ended, misses) = brick.runs(&part_in_tile(mapped.grid, tile, index), &mut scratch);
                 if !(ended.is_empty() && misses.is_empty()) {
                     runs.push(BrickRuns { brick: brick_code(index), runs: ended, misses });
@@ -130,7 +136,12 @@ impl PerRayCollector {
             }
             (tile, runs)
         };
-        bricks_by_tile(mapped, &indices).into_par_iter().map(runs_of_tile).collect()
+        for (number, some) in indices.chunks(bricks_at_a_time).enumerate() {
+            let first = number * bricks_at_a_time;
+            let tiles = bricks_by_tile(mapped, some).into_par_iter();
+            let runs: Vec<_> = tiles.map(|(tile, numbers)| runs_of_tile(first, tile, numbers)).collect();
+            runs.into_iter().for_each(|(tile, runs)| visit(tile, runs));
+        }
     }
 
     /// The bricks of all pages, page by page, and their indices: their voxels' indices divided by 8.
@@ -179,8 +190,7 @@ struct EndedByBrick {
 }
 
 impl EndedByBrick {
-    fn of_brick(&self, number: u32) -> &[Run] {
-        let number = number as usize;
+    fn of_brick(&self, number: usize) -> &[Run] {
         let start = number.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.runs[start as usize..self.ends[number] as usize]
     }
@@ -270,19 +280,26 @@ fn kept<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
     count
 }
 
+/// Tiles smaller than bricks whose updates are in memory at a time, on their way to parts.
+const SMALL_TILES_AT_A_TIME: usize = 4096;
+
 /// Moves the updates of several collectors to `parts`; the first collector saw the first rays.
 pub(crate) fn drain_in_order(
     mapped: MappedTiles<'_>,
     collectors: &mut [PerRayCollector],
     parts: &ScanParts<'_>,
 ) {
+    let bricks_at_a_time = match small_tiles_of_brick(mapped.grid) {
+        1 => usize::MAX,
+        tiles => SMALL_TILES_AT_A_TIME / tiles,
+    };
     for collector in collectors {
-        for (tile, runs) in collector.runs_by_tile(mapped) {
+        collector.for_each_tile(mapped, bricks_at_a_time, |tile, runs| {
             let (hits, misses) = runs.hits_and_misses();
             if hits + misses > 0 {
                 parts.add(std::iter::once((tile, TileUpdates::Runs(runs), (hits, misses))));
             }
-        }
+        });
         if let Some(far) = &mut collector.far {
             parts.add(far.take());
         }
@@ -297,14 +314,14 @@ pub(crate) fn updates_in_order(
 ) -> ScanUpdates {
     let mut tiles: FxHashMap<TileIndex, Vec<TileRuns>> = FxHashMap::default();
     for collector in collectors {
-        for (tile, runs) in collector.runs_by_tile(mapped) {
+        collector.for_each_tile(mapped, usize::MAX, |tile, runs| {
             let (hits, misses) = runs.hits_and_misses();
             if hits + misses > 0 {
                 report.hits += hits;
                 report.misses += misses;
                 tiles.entry(tile).or_default().push(runs);
             }
-        }
+        });
     }
     let of_tile = |(tile, parts)| (tile, TileUpdates::Runs(TileRuns::merged(parts)));
     in_order_of_tiles(mapped.grid, tiles.into_iter().map(of_tile).collect(), report)

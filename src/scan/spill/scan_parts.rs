@@ -3,7 +3,9 @@ use super::part_log::{MakeScratch, NONE, PartLog};
 use crate::scan::pages::MarkedBrick;
 use crate::scan::per_scan::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
 use crate::scan::stop::Stop;
-use crate::scan::updates::{BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles};
+use crate::scan::updates::{
+    BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles, small_tiles_of_brick,
+};
 use crate::scan::{PackedUpdates, ScanReport};
 use crate::space::{TileIndex, TileTable, TileValue, put_number, take_number};
 use std::io;
@@ -68,7 +70,7 @@ impl TileValue for PartList {
     }
 }
 
-/// Bricks that are converted to updates at a time.
+/// Bricks that are converted to updates at a time, each of one tile.
 const BRICKS_AT_A_TIME: usize = 4096;
 
 impl<'a> ScanParts<'a> {
@@ -109,12 +111,12 @@ impl<'a> ScanParts<'a> {
 
     /// Adds marked bricks, in insertion per scan.
     pub(crate) fn add_marked(&self, bricks: impl Iterator<Item = MarkedBrick>, intensities: &Intensities) {
-        let mut some = Vec::with_capacity(BRICKS_AT_A_TIME);
+        let at_a_time = BRICKS_AT_A_TIME / small_tiles_of_brick(self.mapped.grid);
+        let mut some = Vec::with_capacity(at_a_time);
         let mut bricks = bricks.peekable();
         while !self.stop.is_set() && bricks.peek().is_some() {
             some.clear();
-            // A page adds at most 512 more.
-            some.extend(bricks.by_ref().take(BRICKS_AT_A_TIME));
+            some.extend(bricks.by_ref().take(at_a_time));
             let tiles = updates_by_tile(self.mapped, &some, intensities).into_iter();
             self.add(tiles.map(|(tile, bricks)| {
                 let counts = hits_and_misses(&bricks);

@@ -92,7 +92,7 @@ impl<'a> ScanRays<'a> {
         let (collectors, report) =
             self.collect_per_scan(collectors, threads, &limit.of_collector(threads), Some(parts))?;
         self.stop.check()?;
-        if parts.is_empty() && limit.has_room_for(collectors) {
+        if parts.is_empty() && limit.has_room_for(collectors, self.mapped.grid) {
             return Ok(PerScanUpdates::Whole(self.merge(collectors, report)));
         }
         collectors.par_iter_mut().for_each(|collector| collector.finish(parts));

@@ -1,4 +1,6 @@
 use crate::scan::per_scan::PerScanCollector;
+use crate::scan::updates::small_tiles_of_brick;
+use crate::space::Grid;
 
 /// The memory limit for tracing a scan.
 #[derive(Clone, Copy, Debug)]
@@ -48,9 +50,9 @@ impl TraceLimit {
         wanted.min(self.bytes / MIN_COLLECTOR_BYTES).max(1)
     }
 
-    /// Whether the updates of these collectors fit.
-    pub(crate) fn has_room_for(&self, collectors: &[PerScanCollector]) -> bool {
-        let max_bricks = self.bytes / 2 / UPDATE_BYTES;
+    /// Whether the updates of these collectors fit, by tile of `grid`.
+    pub(crate) fn has_room_for(&self, collectors: &[PerScanCollector], grid: &Grid) -> bool {
+        let max_bricks = self.bytes / 2 / UPDATE_BYTES / small_tiles_of_brick(grid);
         let marks_bytes: usize = collectors.iter().map(PerScanCollector::marks_bytes).sum();
         // A page has at most 512 bricks; they are counted only if that might be too many.
         marks_bytes / FAST_PAGE_BYTES * 2 * 512 < max_bricks

@@ -21,6 +21,19 @@ pub(crate) fn bricks_by_tile(mapped: MappedTiles<'_>, indices: &[VoxelIndex]) ->
     tiles.into_iter().map(in_order).collect()
 }
 
+/// Into how many tiles a brick is divided where tiles are smaller than bricks, at most; 1 where they are not.
+///
+/// A list by tile takes so many times the memory of the bricks that it is made of.
+pub(crate) fn small_tiles_of_brick(grid: &Grid) -> usize {
+    let (tile, brick) = (grid.voxels_per_tile_edge() as usize, BRICK_EDGE as usize);
+    if tile >= brick {
+        return 1;
+    }
+    // Tiles whose edge divides that of a brick are aligned with it; others may begin before it.
+    let along_edge = if brick.is_multiple_of(tile) { brick / tile } else { (brick - 1).div_ceil(tile) + 1 };
+    along_edge.pow(3)
+}
+
 /// Code of the brick with this index.
 pub(crate) fn brick_code(index: VoxelIndex) -> BrickCode {
     BrickCode::of_voxel(index.map(|k| k * BRICK_EDGE))
@@ -54,4 +67,24 @@ pub(crate) fn in_order_of_tiles(
     });
     report.tiles_touched = tiles.len() as u64;
     ScanUpdates { tiles, report }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_brick_overlaps_more_small_tiles_than_the_bound() {
+        for edge in 2..8 {
+            let grid = Grid::new(1.0, f64::from(edge)).unwrap();
+            let bricks = (-edge..edge).map(|k| [k, 0, k]);
+            let most = bricks.map(|brick| tiles_of_brick(&grid, brick).count()).max().unwrap();
+            assert!(most <= small_tiles_of_brick(&grid), "{most} tiles of {edge} voxels");
+        }
+        assert_eq!(
+            [2, 3, 4, 5, 7].map(|n| small_tiles_of_brick(&Grid::new(1.0, n.into()).unwrap())),
+            [64, 64, 8, 27, 8]
+        );
+        assert_eq!(small_tiles_of_brick(&Grid::new(1.0, 8.0).unwrap()), 1);
+    }
 }
