@@ -10,7 +10,7 @@ use super::{
     scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
-use super::{pull, push};
+use super::{place, pull, push};
 use crate::begin_with_one_heap;
 use clap::Parser;
 use std::ffi::OsString;
@@ -33,6 +33,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         log.parse_default_env();
     }
     log.init();
+    #[cfg(feature = "bucket")]
+    if let Some(timeout) = cli.bucket_timeout {
+        place::set_bucket_timeout(timeout);
+    }
     let Cli { command, threads, quiet, .. } = cli;
     let json_to = JsonTo::of(&command);
     if quiet {
