@@ -221,7 +221,7 @@ impl Bucket {
                     Err(failure) => failure,
                 };
                 // The state there decides: an attempt whose answer was lost finds what it has put itself.
-                let now = request.attempt(0, get_once(&request, &store, &key, MOST_LIST_BYTES)).await;
+                let now = request.ask(get_once(&request, &store, &key, MOST_LIST_BYTES)).await;
                 let is_unchanged = match now {
                     Ok((now, _)) if now == content => return Ok(true),
                     Ok((_, version)) => Some(found.as_ref() == Some(&version)),
@@ -283,7 +283,7 @@ impl Bucket {
         self.pending_put(&name.key(), content.len() as u64, move |request| async move {
             // A name is of one content, and an object is there whole or not at all. Who may not ask may put.
             if asks
-                && let Ok(there) = request.attempt(0, async { Ok(store.head(&key).await?) }).await
+                && let Ok(there) = request.ask(async { Ok(store.head(&key).await?) }).await
                 && there.size == content.len() as u64
             {
                 return Ok(false);

@@ -13,8 +13,9 @@ use tokio::time::{sleep, timeout_at};
 
 /// One request to a store with all its attempts: how far it is, and how long it may remain without progress.
 ///
-/// Progress is [`PROGRESS_BYTES`] more in either direction, or the end of the request. An attempt without progress for
-/// half of the limit is ended and begun again; a request without progress for all of it fails.
+/// An attempt in which fewer than [`PROGRESS_BYTES`] move for half of the limit is ended and begun again. The request fails
+/// if such idle times add up to the limit before an attempt gets farther than all before it: what is sent again is not
+/// idle time, and no progress either.
 #[derive(Debug)]
 pub(super) struct Request {
     verb: &'static str,
@@ -32,12 +33,12 @@ struct State {
     fruitless: u32,
     /// Bytes of the object that have been received, or sent by this attempt.
     moved: u64,
-    /// The most that `moved` was at the end of an attempt.
+    /// The farthest that an attempt has got, in steps of progress.
     farthest: u64,
-    /// `moved` and the time at the last progress of this attempt.
+    /// `moved` and the time when this attempt began or last moved enough.
     mark: (u64, Instant),
-    /// The last progress of any attempt.
-    progress_at: Instant,
+    /// How long earlier attempts and the pauses between them were idle since the last progress.
+    idle: Duration,
     /// The server that the last attempt asked.
     address: Option<String>,
     /// What the server answered to the last attempt.
@@ -94,7 +95,7 @@ impl Request {
             moved: 0,
             farthest: 0,
             mark: (0, now),
-            progress_at: now,
+            idle: Duration::ZERO,
             address: None,
             status: None,
             is_unreachable: false,
@@ -103,13 +104,45 @@ impl Request {
         Arc::new(Self { verb, key, limit, health, began: now, state: Mutex::new(state) })
     }
 
-    /// Makes an attempt, which goes on after the bytes that are kept of earlier ones.
+    /// Makes an attempt, which continues after the bytes that are kept of earlier ones.
     pub(super) async fn attempt<T>(
         &self,
         kept: u64,
         attempt: impl Future<Output = Result<T, Failure>>,
     ) -> Result<T, Failure> {
-        self.begin_attempt(kept);
+        self.state.lock().attempts += 1;
+        let outcome = self.run(kept, attempt).await;
+        if outcome.is_ok() {
+            // A long file takes several ranges.
+            self.state.lock().attempts = 0;
+        }
+        outcome
+    }
+
+    /// Asks the store on the way, within the same bound.
+    pub(super) async fn ask<T>(
+        &self,
+        question: impl Future<Output = Result<T, Failure>>,
+    ) -> Result<T, Failure> {
+        self.run(0, question).await
+    }
+
+    async fn run<T>(
+        &self,
+        kept: u64,
+        attempt: impl Future<Output = Result<T, Failure>>,
+    ) -> Result<T, Failure> {
+        self.begin(kept);
+        let outcome = self.bounded(attempt).await;
+        if outcome.is_err() {
+            let mut state = self.state.lock();
+            let idle = state.mark.1.elapsed();
+            state.idle += idle;
+        }
+        outcome
+    }
+
+    async fn bounded<T>(&self, attempt: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
         let mut attempt = pin!(attempt);
         loop {
             let deadline = self.deadline();
@@ -144,9 +177,6 @@ impl Request {
         let pause = {
             let mut state = self.state.lock();
             state.fruitless += 1;
-            if state.moved >= state.farthest + PROGRESS_BYTES {
-                (state.farthest, state.fruitless) = (state.moved, 0);
-            }
             let lacks_keys = reason.starts_with("no keys");
             let most = match (state.is_unreachable && !self.health.has_answered()) || lacks_keys {
                 true => MAX_UNREACHABLE,
@@ -154,7 +184,8 @@ impl Request {
             };
             let doublings = state.fruitless.saturating_sub(1).min(16);
             let pause = FIRST_PAUSE.saturating_mul(1 << doublings).min(LONGEST_PAUSE);
-            let is_over = Instant::now() + pause >= state.progress_at + self.limit;
+            state.idle += pause;
+            let is_over = state.idle >= self.limit;
             state.last_failure = Some(reason.clone());
             if is_over || state.fruitless >= most { None } else { Some(pause) }
         };
@@ -169,8 +200,10 @@ impl Request {
         let mut state = self.state.lock();
         state.moved += bytes;
         if state.moved >= state.mark.0 + PROGRESS_BYTES {
-            let now = Instant::now();
-            (state.mark, state.progress_at) = ((state.moved, now), now);
+            state.mark = (state.moved, Instant::now());
+        }
+        if state.moved >= state.farthest + PROGRESS_BYTES {
+            (state.farthest, state.idle, state.fruitless) = (state.moved, Duration::ZERO, 0);
         }
     }
 
@@ -197,13 +230,12 @@ impl Request {
     /// Reports what is waited for.
     pub(super) fn report(&self, waited: Duration) {
         if self.health.may_report() {
-            log::warn!("waiting for {} s: {self}", waited.as_secs().max(1));
+            log::warn!("waiting for {:.1} s: {self}", waited.as_secs_f64());
         }
     }
 
-    fn begin_attempt(&self, kept: u64) {
+    fn begin(&self, kept: u64) {
         let mut state = self.state.lock();
-        state.attempts += 1;
         (state.moved, state.mark) = (kept, (kept, Instant::now()));
         (state.status, state.is_unreachable) = (None, false);
     }
@@ -211,7 +243,7 @@ impl Request {
     /// When this attempt ends unless there is progress before.
     fn deadline(&self) -> Instant {
         let state = self.state.lock();
-        (state.mark.1 + self.limit / 2).min(state.progress_at + self.limit)
+        state.mark.1 + (self.limit / 2).min(self.limit.saturating_sub(state.idle))
     }
 
     /// Whether an error is the answer of a store, and not one of the way there.
@@ -222,9 +254,10 @@ impl Request {
     /// Whether the same request would be refused again.
     fn is_final(&self, error: &object_store::Error) -> bool {
         match error {
-            // 408 and 429 ask for another attempt.
             object_store::Error::Generic { .. } => {
+                // 408 and 429 ask for another attempt. A store without HTTP says so of a range in words.
                 matches!(self.state.lock().status, Some(300..=407 | 409..=428 | 430..=499))
+                    || told(error).contains("but object was only")
             }
             object_store::Error::JoinError { .. } => false,
             _ => true,
@@ -267,8 +300,8 @@ impl fmt::Display for Request {
         if let Some(address) = &state.address {
             write!(f, " of {address}")?;
         }
-        let (since, limit) = (self.began.elapsed().as_secs(), self.limit.as_secs_f64());
-        write!(f, ", begun {since} s ago, attempt {}, {} bytes", state.attempts.max(1), state.moved)?;
+        let (since, limit) = (self.began.elapsed().as_secs_f64(), self.limit.as_secs_f64());
+        write!(f, ", begun {since:.1} s ago, attempt {}, {} bytes", state.attempts.max(1), state.moved)?;
         write!(f, ", given up after {limit} s without progress")?;
         match &state.last_failure {
             Some(failure) => write!(f, "; the attempt before failed: {failure}"),

@@ -14,11 +14,12 @@ pub(super) struct StoreHealth {
 const REPORT_EVERY: Duration = Duration::from_secs(5);
 
 impl StoreHealth {
-    /// `url` is what messages call the store.
+    /// `url` is what messages call the bucket.
     pub(super) fn new(url: &str) -> Self {
         Self { url: url.to_owned(), has_answered: AtomicBool::new(false), reported: Mutex::new(None) }
     }
 
+    /// What messages call the bucket.
     pub(super) fn url(&self) -> &str {
         &self.url
     }

@@ -29,6 +29,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     // The command line before the environment, where it says something.
     let mut log = env_logger::Builder::new();
     log.filter_level(cli.log_level()).format_timestamp(None);
+    log.target(env_logger::Target::Pipe(Box::new(progress::AboveBar)));
     if !cli.quiet && cli.verbose == 0 {
         log.parse_default_env();
     }

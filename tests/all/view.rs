@@ -568,7 +568,8 @@ fn clients_that_read_nothing_hold_little_memory() {
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     assert!(viewer.get("page.js").body.len() > 500_000);
     let before = viewer.resident_bytes();
-    let request = format!("GET /{TOKEN}/page.js HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address);
+    // More than the system's own buffers take.
+    let request = format!("GET /{TOKEN}/page.js HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address).repeat(12);
     let silent: Vec<TcpStream> = (0..400)
         .map(|_| {
             let mut stream = viewer.connect();
@@ -580,8 +581,9 @@ fn clients_that_read_nothing_hold_little_memory() {
     for stream in &silent {
         assert_eq!(stream.peek(&mut [0; 12]).unwrap(), 12);
     }
+    std::thread::sleep(Duration::from_millis(500));
     let grown = viewer.resident_bytes().saturating_sub(before);
-    assert!(grown < 48 << 20, "{grown} bytes more");
+    assert!(grown < 64 << 20, "{grown} bytes more");
     assert_eq!(viewer.get("maps.json").status, 200);
 }
 

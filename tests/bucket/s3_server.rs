@@ -28,6 +28,8 @@ pub struct Asked {
     pub method: String,
     /// The path, with the bucket.
     pub key: String,
+    /// Bytes that are put.
+    pub bytes: usize,
     /// The first byte that is asked for.
     pub from: Option<usize>,
 }
@@ -106,7 +108,7 @@ impl State {
         let mut head = [0; 4096];
         let mut peeked = 0;
         let since = Instant::now();
-        while !head[..peeked].windows(2).any(|end| end == b"\r\n") && since.elapsed() < LONG {
+        while !head[..peeked].windows(4).any(|end| end == b"\r\n\r\n") && since.elapsed() < LONG {
             peeked = stream.peek(&mut head)?;
             if peeked == 0 {
                 return Ok(());
@@ -116,8 +118,13 @@ impl State {
         let mut words = first.split(' ');
         let (method, key) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
         let key = key.trim_start_matches('/').to_owned();
-        let from = first.split("ange: bytes=").nth(1).and_then(|from| from.split('-').next()?.parse().ok());
-        let asked = Asked { method: method.to_owned(), key, from };
+        let first_lower = first.to_ascii_lowercase();
+        let number = |name: &str| {
+            let value = first_lower.split(name).nth(1)?;
+            value.split(|letter: char| !letter.is_ascii_digit()).next()?.parse().ok()
+        };
+        let (bytes, from) = (number("\ncontent-length: ").unwrap_or(0), number("\nrange: bytes="));
+        let asked = Asked { method: method.to_owned(), key, bytes, from };
         let (trouble, number) = {
             let mut all = self.asked.lock().unwrap();
             all.push(asked.clone());

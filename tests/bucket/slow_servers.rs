@@ -8,9 +8,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
 use voxtile::bucket::object_store::throttle::{ThrottleConfig, ThrottledStore};
 use voxtile::bucket::{Bucket, FetchedFiles, push};
-use voxtile::{Error, Storage};
+use voxtile::{Error, MapConfig, Mapper, OutOfCoreTileMapper, Storage};
 
 const URL: &str = "s3://robots/maps/city";
 
@@ -65,6 +66,25 @@ fn a_put_without_an_answer_is_reported_and_given_up() {
     server.trouble(|_, _| Trouble::None);
     push_all(&server, &map);
     assert_eq!(texts(&run(&server, &["digest", URL]).0)[0].trim(), digest(map.as_ref()));
+}
+
+/// What is sent again is no progress.
+#[test]
+fn a_long_object_without_an_answer_is_given_up() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = folder.path().join("map");
+    let config = MapConfig::new(0.05, 3.2).unwrap().with_range(0.0, 3.0);
+    let mut mapper = OutOfCoreTileMapper::create(&map, config).unwrap();
+    mapper.insert_scan(&random_scan(&mut Random(1), [0.0; 3], 3_000)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    let is_long = |asked: &Asked| asked.method == "PUT" && asked.bytes > 100_000;
+    server.trouble(move |asked, _| if is_long(asked) { Trouble::Silent } else { Trouble::None });
+    let (failed, took) = run(&server, &["push", map.to_str().unwrap(), URL, "--bucket-timeout", "2"]);
+    let said = texts(&failed)[1].clone();
+    assert!(server.asked().iter().any(is_long), "{:?}", server.asked());
+    assert!(said.contains("no answer to PUT") && said.contains("s and 2 attempts"), "{said}");
+    assert!(took < Duration::from_secs(20), "{took:?}");
 }
 
 #[test]
