@@ -1,13 +1,14 @@
 mod decode_error;
 mod format_error;
+mod unanswered;
 
 use crate::space::{GridError, TileIndex};
 pub use decode_error::DecodeError;
 pub use format_error::{FormatError, Place};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 use std::{fmt, io};
 use thiserror::Error;
+pub use unanswered::Unanswered;
 
 /// A result whose error is voxtile's [`Error`](enum@Error).
 pub type Result<T> = std::result::Result<T, Error>;
@@ -125,16 +126,8 @@ pub enum Error {
     NoAnswer {
         /// The URL of the bucket.
         path: PathBuf,
-        /// What was asked for: `GET`, `PUT`, `HEAD`, `DELETE` or `LIST`, and the object.
-        request: String,
-        /// The server that was asked, if that is known.
-        server: Option<String>,
-        /// Since the request began.
-        waited: Duration,
-        /// How often it was tried.
-        attempts: u32,
-        /// The bound on the time without progress.
-        limit: Duration,
+        /// What was asked, how often and for how long.
+        unanswered: Box<Unanswered>,
         /// How the last attempt failed.
         #[source]
         cause: io::Error,
@@ -251,25 +244,11 @@ fn fmt_io(path: &Path, action: &str, cause: &io::Error, f: &mut fmt::Formatter<'
 
 fn fmt_no_answer(
     path: &Path,
-    request: &str,
-    server: &Option<String>,
-    waited: &Duration,
-    attempts: &u32,
-    limit: &Duration,
+    unanswered: &Unanswered,
     cause: &io::Error,
     f: &mut fmt::Formatter<'_>,
 ) -> fmt::Result {
-    write!(f, "{}: no answer to {request}", path.display())?;
-    if let Some(server) = server {
-        write!(f, " from {server}")?;
-    }
-    write!(
-        f,
-        " in {:.1} s and {attempts} attempts; check the network and the server and try again, or allow more than {} s \
-         without progress (--bucket-timeout, VOXTILE_BUCKET_TIMEOUT)",
-        waited.as_secs_f64(),
-        limit.as_secs_f64()
-    )?;
+    write!(f, "{}: no answer to {unanswered}", path.display())?;
     fmt_cause(cause, f)
 }
 

@@ -1,6 +1,6 @@
 use super::bucket::{refused, told};
 use super::store_health::StoreHealth;
-use crate::error::Error;
+use crate::error::{Error, Unanswered};
 use object_store::path::Path as Key;
 use parking_lot::Mutex;
 use std::fmt;
@@ -268,11 +268,13 @@ impl Request {
         let state = self.state.lock();
         let error = Error::NoAnswer {
             path: self.health.url().into(),
-            request: format!("{} {}", self.verb, self.key),
-            server: state.address.clone(),
-            waited: self.began.elapsed(),
-            attempts: state.attempts,
-            limit: self.limit,
+            unanswered: Box::new(Unanswered {
+                request: format!("{} {}", self.verb, self.key),
+                server: state.address.clone(),
+                waited: self.began.elapsed(),
+                attempts: state.attempts,
+                limit: self.limit,
+            }),
             cause: io::Error::other(reason),
         };
         io::Error::new(io::ErrorKind::TimedOut, error)
