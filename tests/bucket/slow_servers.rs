@@ -100,7 +100,7 @@ fn a_third_of_the_connections_may_be_reset() {
     assert!(began.elapsed() < Duration::from_secs(30), "{:?}", began.elapsed());
     // Content that breaks off is continued.
     server.trouble(|asked, _| if asked.from.is_none() { Trouble::CutOff } else { Trouble::None });
-    let (found, _) = run(&server, &["digest", URL, "--bucket-timeout", "5"]);
+    let (found, _) = run(&server, &["digest", URL, "--bucket-timeout", "1"]);
     assert_ne!(found.status.code(), Some(0), "the manifest is never whole");
     server.trouble(|asked, _| match is_object(asked, "GET") && asked.from.is_none() {
         true => Trouble::CutOff,
