@@ -1,5 +1,6 @@
 mod decode_error;
 mod format_error;
+mod unanswered;
 
 use crate::space::{GridError, TileIndex};
 pub use decode_error::DecodeError;
@@ -7,6 +8,7 @@ pub use format_error::{FormatError, Place};
 use std::path::{Path, PathBuf};
 use std::{fmt, io};
 use thiserror::Error;
+pub use unanswered::Unanswered;
 
 /// A result whose error is voxtile's [`Error`](enum@Error).
 pub type Result<T> = std::result::Result<T, Error>;
@@ -119,6 +121,17 @@ pub enum Error {
     /// What was under way was to be given up, and is: nothing of it is in the map.
     #[error("stopped as asked; the map is as before")]
     Stopped,
+    /// A server stopped answering: look at the network and the server, then try again.
+    #[error(fmt = fmt_no_answer)]
+    NoAnswer {
+        /// The URL of the bucket.
+        path: PathBuf,
+        /// What was asked, how often and for how long.
+        unanswered: Box<Unanswered>,
+        /// How the last attempt failed.
+        #[source]
+        cause: io::Error,
+    },
     /// The operation would undo unsaved work: flush first, or say that it may be lost.
     #[error("tile {tile} has updates that are not on disk; flush first, or ask to discard them")]
     UnsavedChanges {
@@ -167,6 +180,7 @@ impl Error {
             Self::Changed { .. } => "changed",
             Self::Expired => "expired",
             Self::Stopped => "stopped",
+            Self::NoAnswer { .. } => "no_answer",
             Self::UnsavedChanges { .. } => "unsaved_changes",
             Self::TooLarge { .. } => "too_large",
         }
@@ -183,6 +197,7 @@ impl Error {
             | Self::Mismatch { path, .. }
             | Self::Locked { path }
             | Self::LockLost { path }
+            | Self::NoAnswer { path, .. }
             | Self::Changed { path } => Some(path),
             Self::InvalidArgument { .. }
             | Self::Grid(_)
@@ -210,14 +225,30 @@ impl Error {
         }
     }
 
-    /// A refusal of the operating system about a path.
+    /// A refusal of the operating system about a path. An [`Error::NoAnswer`] or [`Error::Stopped`] that a
+    /// [`Disk`](crate::store::Disk) has put into the cause is returned as it is.
     pub fn io(path: &Path, action: &'static str, cause: io::Error) -> Self {
-        Self::Io { path: path.to_owned(), action, cause }
+        let kind = cause.kind();
+        match cause.downcast() {
+            Ok(error @ (Self::NoAnswer { .. } | Self::Stopped)) => error,
+            Ok(error) => Self::Io { path: path.to_owned(), action, cause: io::Error::new(kind, error) },
+            Err(cause) => Self::Io { path: path.to_owned(), action, cause },
+        }
     }
 }
 
 fn fmt_io(path: &Path, action: &str, cause: &io::Error, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     write!(f, "{}: cannot {action}", path.display())?;
+    fmt_cause(cause, f)
+}
+
+fn fmt_no_answer(
+    path: &Path,
+    unanswered: &Unanswered,
+    cause: &io::Error,
+    f: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    write!(f, "{}: no answer to {unanswered}", path.display())?;
     fmt_cause(cause, f)
 }
 

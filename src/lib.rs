@@ -98,7 +98,7 @@ pub mod tile;
 pub use config::{
     InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
 };
-pub use error::{DecodeError, Error, FormatError, Place, Result};
+pub use error::{DecodeError, Error, FormatError, Place, Result, Unanswered};
 pub use mapper::{
     InMemoryMapper, LiveReader, LiveView, MapOptions, MapReader, MapView, Mapper, OutOfCoreTileMapper,
 };

@@ -1,41 +1,43 @@
+use super::content::{fetch_bytes, fetch_whole, get_once};
 use super::file_fetch::fetch_file;
 use super::manifest::{MANIFEST, Manifest};
 use super::object_name::{OBJECTS, ObjectName};
-use super::remote_store::{READING, SENDING, remote_store};
+use super::pending::Pending;
+use super::remote_store::remote_store;
+use super::request::{Failure, PROGRESS_BYTES, Request, retried};
+use super::store_health::StoreHealth;
 use crate::error::{Error, Result};
 use bytes::Bytes;
 use futures_util::TryStreamExt;
 use object_store::path::Path as Key;
-use object_store::{GetOptions, GetRange, ObjectStore, ObjectStoreExt, PutMode, PutOptions, UpdateVersion};
+use object_store::{ObjectStore, ObjectStoreExt, PutMode, PutOptions, UpdateVersion};
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
-use tokio::runtime::Runtime;
-use tokio::task::AbortHandle;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// A place for one map in an object store.
 ///
-/// Its calls wait for the network. What fails for a reason that may pass is tried again, for a minute at most; every
-/// error names its object.
+/// Its calls wait for the network. What fails for a reason that may pass is tried again. A request that makes no progress
+/// for a [`timeout`](Bucket::with_timeout) fails with [`Error::NoAnswer`]: progress is 16 KiB more of an object, or the
+/// answer. An attempt without progress for half of the timeout is ended and begun again; an object that is fetched
+/// continues at the byte reached. 20 attempts in a row that get no farther are the last, 4 where the server was never
+/// reached. A wait of 8 seconds, or a quarter of the timeout, is reported as a warning of the crate `log`. Every error
+/// names its object.
 #[derive(Clone, Debug)]
 pub struct Bucket {
     /// As the user wrote it, for messages.
     url: String,
     store: Arc<dyn ObjectStore>,
-    /// The same for objects that are put, which takes longer.
-    sending: Arc<dyn ObjectStore>,
     prefix: Key,
     can_write: bool,
-}
-
-/// What a request will answer, while others are made.
-pub(super) struct Pending<T> {
-    answer: Receiver<io::Result<T>>,
-    /// Ends the request.
-    task: Option<AbortHandle>,
+    /// Whether the store's client counts what it sends.
+    counts_sent: bool,
+    health: Arc<StoreHealth>,
+    timeout: Duration,
+    stop: Arc<AtomicBool>,
 }
 
 /// A manifest and what tells it from its successor.
@@ -56,14 +58,14 @@ pub(super) struct StoredObject {
     pub(super) modified_s: i64,
 }
 
-/// How often content is fetched that is not what its name says: a proxy may have cut it off.
-const FETCHES: usize = 3;
+/// The environment variable with the bound on a request without progress, in seconds.
+const TIMEOUT_VARIABLE: &str = "VOXTILE_BUCKET_TIMEOUT";
 
-/// What took longer to fail is not tried again.
-const LATEST_RETRY: Duration = Duration::from_secs(10);
+/// The bounds of that bound.
+const TIMEOUTS_S: std::ops::RangeInclusive<f64> = 0.1..=86_400.0;
 
-/// How long an answer may keep us waiting before we look up.
-const PATIENCE: Duration = Duration::from_millis(100);
+/// Of a store that does not count what it is sent, an object has the timeout for each such part.
+const UNCOUNTED_BYTES: u64 = 1 << 20;
 
 /// What helps where an object is lost or damaged.
 pub(super) const SEND_AGAIN: &str = "send all of the map again with `voxtile push --resend`";
@@ -72,10 +74,14 @@ pub(super) const SEND_AGAIN: &str = "send all of the map again with `voxtile pus
 const MOST_LIST_BYTES: u64 = 1 << 28;
 
 impl Bucket {
+    /// How long a request may remain without progress, unless something else is asked for.
+    pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
+
     /// The bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`, and for reading
     /// `https://HOST/MAP`. Keys, region and endpoint come from the environment, by the names that each store's own
     /// tools use: `AWS_ACCESS_KEY_ID`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `GOOGLE_SERVICE_ACCOUNT`,
-    /// `AZURE_STORAGE_ACCOUNT_NAME` and so on.
+    /// `AZURE_STORAGE_ACCOUNT_NAME` and so on. `VOXTILE_BUCKET_TIMEOUT` is the [timeout](Bucket::with_timeout) in
+    /// seconds.
     ///
     /// # Errors
     ///
@@ -93,21 +99,50 @@ impl Bucket {
             return Err(wrong("has a query or a fragment; give keys by the environment".to_owned()));
         }
         let root = format!("{scheme}://{host}");
-        let store = remote_store(url, scheme, &root, READING)?.ok_or_else(no_bucket)?;
-        let sending = remote_store(url, scheme, &root, SENDING)?.ok_or_else(no_bucket)?;
+        let store = remote_store(url, scheme, &root)?.ok_or_else(no_bucket)?;
         let prefix = Key::parse(prefix.trim_end_matches('/')).map_err(|error| wrong(error.to_string()))?;
         let can_write = !scheme.starts_with("http");
-        Ok(Self { url: url.trim_end_matches('/').to_owned(), store, sending, prefix, can_write })
+        let url = url.trim_end_matches('/');
+        let timeout = timeout_of_environment()?;
+        Ok(Self { can_write, counts_sent: true, ..Self::new(store, prefix, url) }.with_timeout(timeout))
     }
 
-    /// A place below a prefix of any object store; `url` is what messages call it.
+    /// A place below a prefix of any object store; `url` is what messages call it. The store should not retry by itself.
+    /// How much of an object it has sent is not known: instead, an object to be put has the timeout for each MiB.
     ///
     /// # Errors
     ///
     /// [`Error::InvalidArgument`] for a prefix that no object has.
     pub fn on(store: Arc<dyn ObjectStore>, prefix: &str, url: &str) -> Result<Self> {
         let prefix = Key::parse(prefix).map_err(|error| Error::argument(url, error.to_string()))?;
-        Ok(Self { url: url.to_owned(), sending: store.clone(), store, prefix, can_write: true })
+        Ok(Self::new(store, prefix, url))
+    }
+
+    fn new(store: Arc<dyn ObjectStore>, prefix: Key, url: &str) -> Self {
+        Self {
+            url: url.to_owned(),
+            store,
+            prefix,
+            can_write: true,
+            counts_sent: false,
+            health: Arc::new(StoreHealth::new(url)),
+            timeout: Self::DEFAULT_TIMEOUT,
+            stop: Arc::default(),
+        }
+    }
+
+    /// Fails requests that remain without progress for so long; from 0.1 s to a day. Put what a slow link needs for
+    /// 32 KiB.
+    pub fn with_timeout(mut self, timeout: Duration) -> Self {
+        let [least, most] = [*TIMEOUTS_S.start(), *TIMEOUTS_S.end()].map(Duration::from_secs_f64);
+        self.timeout = timeout.clamp(least, most);
+        self
+    }
+
+    /// Fails all waits with [`Error::Stopped`] once the flag is set; it is looked at ten times a second.
+    pub fn with_stop(mut self, stop: Arc<AtomicBool>) -> Self {
+        self.stop = stop;
+        self
     }
 
     /// Its URL.
@@ -153,7 +188,7 @@ impl Bucket {
     }
 
     fn manifest_bytes(&self) -> Result<Option<(Bytes, UpdateVersion)>> {
-        match self.get(self.key(MANIFEST), MOST_LIST_BYTES).wait() {
+        match self.get_manifest().wait() {
             Ok(found) => Ok(Some(found)),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(Error::io(&self.path().join(MANIFEST), "read", error)),
@@ -172,23 +207,45 @@ impl Bucket {
     ///
     /// One of the kind `AlreadyExists` if it is not; a store that refuses.
     pub(super) fn replace_manifest(&self, manifest: &Manifest, found: Option<UpdateVersion>) -> Result<()> {
-        let (store, key) = (self.sending.clone(), self.key(MANIFEST));
+        let (store, key) = (self.store.clone(), self.key(MANIFEST));
         let failed = |error| Error::io(&self.path().join(MANIFEST), "write", error);
         let bytes = Bytes::from(manifest.to_bytes().map_err(|error| failed(error.into()))?);
-        let mode = found.map_or(PutMode::Create, PutMode::Update);
-        let options = PutOptions { mode, ..PutOptions::default() };
         let content = bytes.clone();
-        let put = pending(async move { Ok(store.put_opts(&key, content.into(), options).await) });
-        let Err(error) = put.wait().map_err(failed)? else { return Ok(()) };
-        // A request whose answer was lost is made again, and finds in its way what it has put itself.
-        if self.manifest_bytes().is_ok_and(|found| found.is_some_and(|(found, _)| found == bytes)) {
-            return Ok(());
-        }
-        match error {
-            object_store::Error::Precondition { .. } | object_store::Error::AlreadyExists { .. } => {
-                Err(self.overtaken())
+        let put = self.pending_put(MANIFEST, bytes.len() as u64, move |request| async move {
+            loop {
+                let mode = found.clone().map_or(PutMode::Create, PutMode::Update);
+                let options = PutOptions { mode, ..PutOptions::default() };
+                let put = store.put_opts(&key, content.clone().into(), options);
+                let failure = match request.attempt(0, async { Ok(put.await?) }).await {
+                    Ok(_) => return Ok(true),
+                    Err(failure) => failure,
+                };
+                // The state there decides: an attempt whose answer was lost finds what it has put itself.
+                let now = request.ask(get_once(&request, &store, &key, MOST_LIST_BYTES)).await;
+                let is_unchanged = match now {
+                    Ok((now, _)) if now == content => return Ok(true),
+                    Ok((_, version)) => Some(found.as_ref() == Some(&version)),
+                    Err(Failure::Refused(object_store::Error::NotFound { .. })) => Some(found.is_none()),
+                    Err(_) => None,
+                };
+                match (is_unchanged, failure) {
+                    (Some(false), _) => return Ok(false),
+                    // A conflict with an attempt of ours that the store has not finished, or whose answer was lost.
+                    (
+                        _,
+                        Failure::Refused(
+                            error @ (object_store::Error::Precondition { .. }
+                            | object_store::Error::AlreadyExists { .. }),
+                        ),
+                    ) => request.retry_after(Failure::Broken(error)).await?,
+                    (_, failure) => request.retry_after(failure).await?,
+                }
             }
-            error => Err(failed(io::Error::other(told(&error)))),
+        });
+        match put.wait() {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(self.overtaken()),
+            Err(error) => Err(failed(error)),
         }
     }
 
@@ -201,29 +258,17 @@ impl Bucket {
 
     /// Begins to fetch an object, whose content is compared with its name.
     pub(super) fn fetch(&self, name: ObjectName, most_bytes: u64) -> Pending<Bytes> {
-        let this = self.clone();
-        pending(async move {
-            let key = this.key(&name.key());
-            for _ in 0..FETCHES {
-                let (content, _) = get(&this.store, &key, None, most_bytes).await?;
-                // Hashing is work, though short beside the way over the network.
-                if ObjectName::of(&content) == name {
-                    return Ok(content);
-                }
-            }
-            let reason = format!("object {key}: its content is not what its name says; {SEND_AGAIN}");
-            Err(io::Error::new(io::ErrorKind::InvalidData, reason))
+        let (store, key) = (self.store.clone(), self.key(&name.key()));
+        self.pending("GET", &name.key(), move |request| async move {
+            fetch_whole(&request, &store, &key, name, most_bytes).await
         })
     }
 
     /// Begins to fetch some bytes of an object. Nothing tells here whether they are the right ones.
     pub(super) fn fetch_bytes(&self, name: ObjectName, range: Range<u64>) -> Pending<Bytes> {
-        let this = self.clone();
-        pending(async move {
-            let key = this.key(&name.key());
-            let bytes = range.end.saturating_sub(range.start);
-            let (content, _) = get(&this.store, &key, Some(range), bytes).await?;
-            Ok(content)
+        let (store, key) = (self.store.clone(), self.key(&name.key()));
+        self.pending("GET", &name.key(), move |request| async move {
+            fetch_bytes(&request, &store, &key, range).await
         })
     }
 
@@ -234,31 +279,40 @@ impl Bucket {
 
     /// Begins to put an object; `false` if that is there already, of which the store is asked before where `asks`.
     pub(super) fn put(&self, name: ObjectName, content: Bytes, asks: bool) -> Pending<bool> {
-        let (store, sending, key) = (self.store.clone(), self.sending.clone(), self.key(&name.key()));
-        pending(async move {
+        let (store, key) = (self.store.clone(), self.key(&name.key()));
+        self.pending_put(&name.key(), content.len() as u64, move |request| async move {
             // A name is of one content, and an object is there whole or not at all. Who may not ask may put.
             if asks
-                && let Ok(there) = store.head(&key).await
+                && let Ok(there) = request.ask(async { Ok(store.head(&key).await?) }).await
                 && there.size == content.len() as u64
             {
                 return Ok(false);
             }
-            let put = sending.put(&key, content.into()).await;
-            put.map(|_| true).map_err(|error| refused(&key, &error))
+            loop {
+                let put = store.put(&key, content.clone().into());
+                match request.attempt(0, async { Ok(put.await?) }).await {
+                    Ok(_) => return Ok(true),
+                    Err(failure) => request.retry_after(failure).await?,
+                }
+            }
         })
     }
 
     /// When the manifest was put, and the objects put before then.
     pub(super) fn objects_before_manifest(&self) -> io::Result<Vec<ObjectName>> {
         let (store, key, folder) = (self.store.clone(), self.key(MANIFEST), self.key(OBJECTS));
-        pending(async move {
-            let manifest = store.head(&key).await.map_err(|error| refused(&key, &error))?;
-            let listed = store.list(Some(&folder)).try_filter_map(|object| {
-                let is_older = object.last_modified < manifest.last_modified;
-                let name = object.location.filename().and_then(ObjectName::from_digits);
-                std::future::ready(Ok(name.filter(|_| is_older)))
-            });
-            listed.try_collect().await.map_err(|error| refused(&folder, &error))
+        self.pending("LIST", OBJECTS, move |request| async move {
+            let list = || async {
+                let manifest = store.head(&key).await?;
+                let listed = store.list(Some(&folder)).try_filter_map(|object| {
+                    request.moved(BYTES_OF_ENTRY);
+                    let is_older = object.last_modified < manifest.last_modified;
+                    let name = object.location.filename().and_then(ObjectName::from_digits);
+                    std::future::ready(Ok(name.filter(|_| is_older)))
+                });
+                Ok(listed.try_collect().await?)
+            };
+            retried(&request, list).await
         })
         .wait()
     }
@@ -266,11 +320,14 @@ impl Bucket {
     /// Begins to remove an object; one that is not there is removed.
     pub(super) fn remove(&self, name: ObjectName) -> Pending<()> {
         let (store, key) = (self.store.clone(), self.key(&name.key()));
-        pending(async move {
-            match store.delete(&key).await {
-                Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
-                Err(error) => Err(refused(&key, &error)),
-            }
+        self.pending("DELETE", &name.key(), move |request| async move {
+            let delete = || async {
+                match store.delete(&key).await {
+                    Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
+                    Err(error) => Err(error.into()),
+                }
+            };
+            retried(&request, delete).await
         })
     }
 
@@ -281,16 +338,17 @@ impl Bucket {
     /// A store that refuses or does not answer; [`Error::Stopped`].
     pub fn has_map(&self, is_stopped: &dyn Fn() -> bool) -> Result<bool> {
         let (store, key, prefix) = (self.store.clone(), self.key(MANIFEST), self.prefix.clone());
-        let asked = pending(async move {
-            match store.head(&key).await {
+        let asked = self.pending("HEAD", MANIFEST, move |request| async move {
+            match retried(&request, || async { Ok(store.head(&key).await?) }).await {
                 Ok(_) => Ok(true),
-                Err(object_store::Error::NotFound { .. }) => Ok(false),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
                 Err(error) => {
-                    let error = refused(&key, &error);
                     // Where nothing may be listed, stores do not say that an object is missing. A file is no map.
                     let is_file = error.kind() == io::ErrorKind::PermissionDenied
                         && !prefix.as_ref().is_empty()
-                        && store.head(&prefix).await.is_ok_and(|file| file.size > 0);
+                        && retried(&request, || async { Ok(store.head(&prefix).await?) })
+                            .await
+                            .is_ok_and(|file| file.size > 0);
                     if is_file { Ok(false) } else { Err(error) }
                 }
             }
@@ -302,7 +360,7 @@ impl Bucket {
     /// Begins to list the object of the URL itself, or those below it, by name.
     pub(super) fn objects_below(&self) -> Pending<Vec<StoredObject>> {
         let (store, prefix) = (self.store.clone(), self.prefix.clone());
-        pending(async move {
+        self.pending("LIST", "", move |request| async move {
             let object = |meta: object_store::ObjectMeta, name: String, is_url| StoredObject {
                 name,
                 is_url,
@@ -311,23 +369,27 @@ impl Bucket {
                 key: meta.location,
                 e_tag: meta.e_tag,
             };
-            match store.head(&prefix).await {
+            match retried(&request, || async { Ok(store.head(&prefix).await?) }).await {
                 Ok(meta) if meta.size > 0 => {
                     let name = prefix.filename().unwrap_or_default().to_owned();
                     return Ok(vec![object(meta, name, true)]);
                 }
-                Ok(_) | Err(object_store::Error::NotFound { .. }) => {}
-                Err(error) => return Err(refused(&prefix, &error)),
+                Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
             }
-            let listed = store.list(Some(&prefix)).try_filter_map(|meta| {
-                let name: Option<Key> = meta.location.prefix_match(&prefix).map(|parts| parts.collect());
-                // Some tools put an empty object where a folder would be.
-                let is_file = meta.size > 0 || meta.location.extension().is_some();
-                let name = name.filter(|name| is_file && !name.as_ref().is_empty());
-                std::future::ready(Ok(name.map(|name| object(meta, name.as_ref().to_owned(), false))))
-            });
-            let mut objects: Vec<StoredObject> =
-                listed.try_collect().await.map_err(|error| refused(&prefix, &error))?;
+            let list = || async {
+                let listed = store.list(Some(&prefix)).try_filter_map(|meta| {
+                    request.moved(BYTES_OF_ENTRY);
+                    let name: Option<Key> = meta.location.prefix_match(&prefix).map(|parts| parts.collect());
+                    // Some tools put an empty object where a folder would be.
+                    let is_file = meta.size > 0 || meta.location.extension().is_some();
+                    let name = name.filter(|name| is_file && !name.as_ref().is_empty());
+                    std::future::ready(Ok(name.map(|name| object(meta, name.as_ref().to_owned(), false))))
+                });
+                Ok(listed.try_collect::<Vec<_>>().await?)
+            };
+            let mut objects = retried(&request, list).await?;
             objects.sort_by(|a, b| a.name.cmp(&b.name));
             Ok(objects)
         })
@@ -336,115 +398,68 @@ impl Bucket {
     /// Begins to fetch an object into a file, as it was when it was listed.
     pub(super) fn fetch_file(&self, object: StoredObject, to: PathBuf) -> Pending<()> {
         let store = self.store.clone();
-        pending(async move { fetch_file(&store, &object, &to).await })
+        let request = Request::new("GET", object.key.clone(), self.timeout, self.health.clone());
+        Pending::begin(request, self.stop.clone(), move |request| async move {
+            fetch_file(&request, &store, &object, &to).await
+        })
     }
 
-    fn get(&self, key: Key, most_bytes: u64) -> Pending<(Bytes, UpdateVersion)> {
-        let store = self.store.clone();
-        pending(async move { get(&store, &key, None, most_bytes).await })
+    fn get_manifest(&self) -> Pending<(Bytes, UpdateVersion)> {
+        let (store, key) = (self.store.clone(), self.key(MANIFEST));
+        self.pending("GET", MANIFEST, move |request| async move {
+            retried(&request, || get_once(&request, &store, &key, MOST_LIST_BYTES)).await
+        })
     }
 
     fn key(&self, name: &str) -> Key {
         let name = Key::from(name);
         self.prefix.parts().chain(name.parts()).collect()
     }
-}
 
-impl<T> Pending<T> {
-    /// Waits for the answer.
-    pub(super) fn wait(self) -> io::Result<T> {
-        self.answer.recv().unwrap_or_else(|_| Err(given_up()))
+    /// Begins a request about an object, or about all below the prefix.
+    fn pending<T: Send + 'static, F: Future<Output = io::Result<T>> + Send + 'static>(
+        &self,
+        verb: &'static str,
+        name: &str,
+        request: impl FnOnce(Arc<Request>) -> F,
+    ) -> Pending<T> {
+        let about = Request::new(verb, self.key(name), self.timeout, self.health.clone());
+        Pending::begin(about, self.stop.clone(), request)
     }
 
-    /// Waits for the answer; `None` if that is to stop before it comes. Nothing of the request goes on then.
-    pub(super) fn wait_unless(self, is_stopped: &dyn Fn() -> bool) -> Option<io::Result<T>> {
-        while !is_stopped() {
-            match self.answer.recv_timeout(PATIENCE) {
-                Ok(answer) => return Some(answer),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Some(Err(given_up())),
-            }
-        }
-        self.give_up();
-        None
-    }
-
-    /// Ends the request, and waits until nothing of it goes on.
-    pub(super) fn give_up(self) {
-        if let Some(task) = &self.task {
-            task.abort();
-        }
-        // An answer after all, or the end of who would have sent one.
-        let _ = self.answer.recv();
+    /// Begins to put an object of so many bytes.
+    fn pending_put<T: Send + 'static, F: Future<Output = io::Result<T>> + Send + 'static>(
+        &self,
+        name: &str,
+        bytes: u64,
+        request: impl FnOnce(Arc<Request>) -> F,
+    ) -> Pending<T> {
+        let times = if self.counts_sent { 1 } else { bytes.div_ceil(UNCOUNTED_BYTES).max(1) };
+        let timeout = self.timeout.saturating_mul(u32::try_from(times).unwrap_or(u32::MAX));
+        let about = Request::new("PUT", self.key(name), timeout, self.health.clone());
+        Pending::begin(about, self.stop.clone(), request)
     }
 }
 
-fn given_up() -> io::Error {
-    io::Error::other("the request was given up")
-}
+/// What an entry of a list counts as: of a list that arrives page by page, each page is progress.
+const BYTES_OF_ENTRY: u64 = PROGRESS_BYTES;
 
-/// Begins a request on threads of its own, so that the caller may be on any thread, even one of another runtime.
-fn pending<T: Send + 'static>(request: impl Future<Output = io::Result<T>> + Send + 'static) -> Pending<T> {
-    static RUNTIME: OnceLock<io::Result<Runtime>> = OnceLock::new();
-    let new = || {
-        let mut builder = tokio::runtime::Builder::new_multi_thread();
-        builder.worker_threads(2).thread_name("voxtile-bucket").enable_all().build()
-    };
-    let (out, answer) = sync_channel(1);
-    let task = match RUNTIME.get_or_init(new) {
-        Ok(runtime) => Some(runtime.spawn(async move { out.send(request.await) }).abort_handle()),
-        Err(error) => {
-            let reason = format!("no threads for the network: {error}");
-            let _ = out.send(Err(io::Error::other(reason)));
-            None
-        }
-    };
-    Pending { answer, task }
-}
-
-/// Gets an object, or some of its bytes. An answer that is cut off is asked for again; the store itself does that only
-/// before it begins.
-async fn get(
-    store: &dyn ObjectStore,
-    key: &Key,
-    range: Option<Range<u64>>,
-    most_bytes: u64,
-) -> io::Result<(Bytes, UpdateVersion)> {
-    let began = Instant::now();
-    for _ in 1..FETCHES {
-        match get_once(store, key, range.clone(), most_bytes).await {
-            Err(error) if error.kind() == io::ErrorKind::Other && began.elapsed() < LATEST_RETRY => {}
-            outcome => return outcome,
-        }
+/// The bound that the environment sets.
+fn timeout_of_environment() -> Result<Duration> {
+    let Some(text) = std::env::var_os(TIMEOUT_VARIABLE) else { return Ok(Bucket::DEFAULT_TIMEOUT) };
+    let seconds = text.to_str().and_then(|text| text.trim().parse().ok());
+    match seconds.filter(|seconds| TIMEOUTS_S.contains(seconds)) {
+        Some(seconds) => Ok(Duration::from_secs_f64(seconds)),
+        None => Err(Error::argument(
+            TIMEOUT_VARIABLE,
+            format!(
+                "is {}; give seconds from {} to {}",
+                text.display(),
+                TIMEOUTS_S.start(),
+                TIMEOUTS_S.end()
+            ),
+        )),
     }
-    get_once(store, key, range, most_bytes).await
-}
-
-async fn get_once(
-    store: &dyn ObjectStore,
-    key: &Key,
-    range: Option<Range<u64>>,
-    most_bytes: u64,
-) -> io::Result<(Bytes, UpdateVersion)> {
-    let options = GetOptions { range: range.map(GetRange::Bounded), ..GetOptions::default() };
-    let found = store.get_opts(key, options).await.map_err(|error| refused(key, &error))?;
-    let bytes = found.range.end.saturating_sub(found.range.start);
-    if bytes > most_bytes {
-        let reason = format!("object {key}: {bytes} bytes, and at most {most_bytes} belong there");
-        return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
-    }
-    let version = UpdateVersion { e_tag: found.meta.e_tag.clone(), version: found.meta.version.clone() };
-    // A server may send more than it said.
-    let mut content = Vec::new();
-    let mut stream = found.into_stream();
-    while let Some(chunk) = stream.try_next().await.map_err(|error| refused(key, &error))? {
-        content.extend_from_slice(&chunk);
-        if content.len() as u64 > most_bytes {
-            let reason = format!("object {key}: more than the {most_bytes} bytes that belong there");
-            return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
-        }
-    }
-    Ok((content.into(), version))
 }
 
 /// The refusal of an object store, which names the object.

@@ -1,7 +1,8 @@
-use super::bucket::{Bucket, Pending, missing_object};
+use super::bucket::{Bucket, missing_object};
 use super::file_list::FileList;
 use super::manifest::{PART_BYTES, StoredFile};
 use super::part_reader::PartReader;
+use super::pending::Pending;
 use crate::error::{Error, Result};
 use crate::scratch::Scratch;
 use crate::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, MapPath, ReaderWatch};
@@ -164,6 +165,7 @@ impl Disk for BucketDisk {
     }
 
     fn newer(&self) -> io::Result<Option<Arc<dyn Disk>>> {
+        // An `Error::NoAnswer` stays what it is: `Error::io` takes it out again.
         let newer = Self::open(self.bucket.clone()).map_err(io::Error::other)?;
         Ok((newer.version != self.version).then(|| Arc::new(newer) as Arc<dyn Disk>))
     }

@@ -1,4 +1,5 @@
-use super::bucket::{Bucket, Pending, StoredObject};
+use super::bucket::{Bucket, StoredObject};
+use super::pending::Pending;
 use crate::error::{Error, Result};
 use crate::store::{Disk, FsDisk};
 use std::collections::VecDeque;

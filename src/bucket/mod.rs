@@ -9,8 +9,11 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `bucket` | [`Bucket`]: gets and puts objects, with retries; every error names its object |
-//! | `remote_store` | the stores of URLs, and how long their clients wait |
+//! | `bucket` | [`Bucket`]: gets and puts objects; every error names its object |
+//! | `request`, `store_health` | one request: its attempts, its progress, the bound on it, reports of a long wait |
+//! | `pending` | a request that goes on while others are made |
+//! | `content` | content of objects, continued after a break |
+//! | `remote_store`, `counting_client` | the stores of URLs, and a client that counts what it sends |
 //! | `object_name` | objects are named by the BLAKE3 of their content |
 //! | `manifest` | the one object that changes: which files the map has, by pages of tiles |
 //! | `file_list` | the list of files, with the pages that were asked for |
@@ -24,6 +27,8 @@
 #[expect(clippy::module_inception, reason = "the noun that the rest is about")]
 mod bucket;
 mod bucket_disk;
+mod content;
+mod counting_client;
 mod fetched_files;
 mod file_fetch;
 mod file_list;
@@ -31,11 +36,14 @@ mod known_states;
 mod manifest;
 mod object_name;
 mod part_reader;
+mod pending;
 mod prune;
 mod pull;
 mod push;
 mod remote_store;
+mod request;
 mod sender;
+mod store_health;
 
 /// The crate of [`Bucket::on`], in the version that voxtile uses.
 pub use ::object_store;

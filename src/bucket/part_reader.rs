@@ -1,5 +1,6 @@
-use super::bucket::{Bucket, Pending, missing_object};
+use super::bucket::{Bucket, missing_object};
 use super::manifest::{PART_BYTES, StoredFile};
+use super::pending::Pending;
 use crate::store::DiskRead;
 use bytes::{Buf, Bytes};
 use std::io::{self, Read};

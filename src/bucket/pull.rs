@@ -1,9 +1,10 @@
-use super::bucket::{Bucket, Pending};
+use super::bucket::Bucket;
 use super::file_list::FileList;
 use super::known_states::{BUCKET_STATES, BUCKET_STATES_NEXT, KnownStates};
 use super::manifest::{Manifest, PART_BYTES, StoredFile};
 use super::object_name::ObjectName;
 use super::part_reader::PartReader;
+use super::pending::Pending;
 use crate::error::{Error, Result};
 use crate::store::{
     Disk, DiskRead, EntryKind, FileChecksum, FsDisk, KEPT_SCANS, Layout, MapPath, SNAPSHOTS, TileFile,

@@ -78,7 +78,11 @@ pub fn push(
         }
         manifest = push.send_map(&map, &mut progress);
     }
-    let manifest = manifest.map_err(|error| push.overtaken().unwrap_or(error))?;
+    let manifest = manifest.map_err(|error| match error {
+        // Another question would wait as long.
+        Error::NoAnswer { .. } | Error::Stopped => error,
+        error => push.overtaken().unwrap_or(error),
+    })?;
     push.check_is_same_or_later(&manifest, map.folder())?;
     push.put(&map, &manifest)?;
     let sent = push.sender.sent();

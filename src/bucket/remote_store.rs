@@ -1,52 +1,30 @@
+use super::counting_client::CountingConnector;
 use crate::error::{Error, Result};
 use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
 use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
 use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
 use object_store::http::HttpBuilder;
-use object_store::{BackoffConfig, ClientConfigKey, ObjectStore, RetryConfig};
+use object_store::{ClientConfigKey, ObjectStore, RetryConfig};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How long a client waits for a server that it has reached; a server that cannot be reached is noticed in seconds.
-#[derive(Clone, Copy)]
-pub(super) struct Waits {
-    /// Without a byte of the answer. What is sent counts as waiting, so there is none for sending.
-    silent: Option<Duration>,
-    /// For a whole request, with its content.
-    whole: Duration,
-    /// How long after it began a request is begun again.
-    retried: Duration,
-}
-
-/// For what is read: a server that goes on sending may take its time, as one that sends a file whole has to.
-pub(super) const READING: Waits = Waits {
-    silent: Some(Duration::from_secs(30)),
-    whole: Duration::from_secs(24 * 60 * 60),
-    retried: Duration::from_secs(60),
-};
-
-/// For what is sent: eight parts of 16 MiB at once at 1.2 Mbit/s. A signature is good for a quarter of an hour.
-pub(super) const SENDING: Waits =
-    Waits { silent: None, whole: Duration::from_secs(15 * 60), retried: Duration::from_secs(4 * 60) };
+/// The bound on a whole request with its content. Requests that make no progress end earlier (`Request`); one that does
+/// may take its time, as a server that sends a file whole has to.
+const WHOLE: &str = "1 day";
 
 /// The store of a URL, by its scheme and its first part; `None` for a scheme of no store.
 ///
 /// # Errors
 ///
 /// [`Error::InvalidArgument`] if the environment lacks something.
-pub(super) fn remote_store(
-    url: &str,
-    scheme: &str,
-    root: &str,
-    waits: Waits,
-) -> Result<Option<Arc<dyn ObjectStore>>> {
+pub(super) fn remote_store(url: &str, scheme: &str, root: &str) -> Result<Option<Arc<dyn ObjectStore>>> {
     choose_tls();
     let refused = |error: object_store::Error| Error::argument(url, super::bucket::told(&error));
     Ok(Some(match scheme {
-        "s3" => Arc::new(amazon(root, waits).build().map_err(refused)?),
-        "gs" => Arc::new(google(root, waits).build().map_err(refused)?),
-        "az" | "abfs" | "abfss" => Arc::new(azure(root, waits).build().map_err(refused)?),
-        "http" | "https" => Arc::new(web(root, scheme == "http", waits).build().map_err(refused)?),
+        "s3" => Arc::new(amazon(root).build().map_err(refused)?),
+        "gs" => Arc::new(google(root).build().map_err(refused)?),
+        "az" | "abfs" | "abfss" => Arc::new(azure(root).build().map_err(refused)?),
+        "http" | "https" => Arc::new(web(root, scheme == "http").build().map_err(refused)?),
         _ => return Ok(None),
     }))
 }
@@ -57,13 +35,16 @@ fn choose_tls() {
     let _ = rustls::crypto::ring::default_provider().install_default();
 }
 
-fn amazon(root: &str, waits: Waits) -> AmazonS3Builder {
+fn amazon(root: &str) -> AmazonS3Builder {
     // Whoever names an endpoint without TLS means it: a server of their own.
     let endpoint = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
     let endpoint = endpoint.iter().find_map(|name| std::env::var(name).ok());
-    let mut builder = AmazonS3Builder::from_env().with_url(root).with_retry(waits.retry());
-    for (key, value) in waits.settings(Some("AWS")) {
-        builder = builder.with_config(AmazonS3ConfigKey::Client(key), value);
+    let mut builder = AmazonS3Builder::from_env()
+        .with_url(root)
+        .with_retry(no_retries())
+        .with_http_connector(CountingConnector);
+    if !is_set("AWS_TIMEOUT") {
+        builder = builder.with_config(AmazonS3ConfigKey::Client(ClientConfigKey::Timeout), WHOLE);
     }
     match endpoint {
         Some(endpoint) => {
@@ -75,45 +56,39 @@ fn amazon(root: &str, waits: Waits) -> AmazonS3Builder {
     }
 }
 
-fn google(root: &str, waits: Waits) -> GoogleCloudStorageBuilder {
-    let builder = GoogleCloudStorageBuilder::from_env().with_url(root).with_retry(waits.retry());
-    waits
-        .settings(Some("GOOGLE"))
-        .into_iter()
-        .fold(builder, |builder, (key, value)| builder.with_config(GoogleConfigKey::Client(key), value))
+fn google(root: &str) -> GoogleCloudStorageBuilder {
+    let builder = GoogleCloudStorageBuilder::from_env().with_url(root).with_retry(no_retries());
+    let builder = builder.with_http_connector(CountingConnector);
+    if is_set("GOOGLE_TIMEOUT") {
+        return builder;
+    }
+    builder.with_config(GoogleConfigKey::Client(ClientConfigKey::Timeout), WHOLE)
 }
 
-fn azure(root: &str, waits: Waits) -> MicrosoftAzureBuilder {
-    let builder = MicrosoftAzureBuilder::from_env().with_url(root).with_retry(waits.retry());
-    waits
-        .settings(Some("AZURE"))
-        .into_iter()
-        .fold(builder, |builder, (key, value)| builder.with_config(AzureConfigKey::Client(key), value))
+fn azure(root: &str) -> MicrosoftAzureBuilder {
+    let builder = MicrosoftAzureBuilder::from_env().with_url(root).with_retry(no_retries());
+    let builder = builder.with_http_connector(CountingConnector);
+    if is_set("AZURE_TIMEOUT") {
+        return builder;
+    }
+    builder.with_config(AzureConfigKey::Client(ClientConfigKey::Timeout), WHOLE)
 }
 
-fn web(root: &str, is_plain: bool, waits: Waits) -> HttpBuilder {
-    let builder = HttpBuilder::new().with_url(root).with_retry(waits.retry());
+fn web(root: &str, is_plain: bool) -> HttpBuilder {
+    let builder = HttpBuilder::new().with_url(root).with_retry(no_retries());
+    let builder = builder.with_http_connector(CountingConnector);
     let builder = builder.with_config(ClientConfigKey::AllowHttp, is_plain.to_string());
-    waits.settings(None).into_iter().fold(builder, |builder, (key, value)| builder.with_config(key, value))
+    builder.with_config(ClientConfigKey::Timeout, WHOLE)
 }
 
-impl Waits {
-    fn retry(self) -> RetryConfig {
-        RetryConfig {
-            backoff: BackoffConfig { max_backoff: Duration::from_secs(5), ..BackoffConfig::default() },
-            max_retries: 6,
-            retry_timeout: self.retried,
-        }
-    }
+/// What fails is tried again by `Request`, which keeps what came before and knows the bound.
+fn no_retries() -> RetryConfig {
+    RetryConfig { max_retries: 0, retry_timeout: Duration::ZERO, ..RetryConfig::default() }
+}
 
-    /// As settings of a client. What the environment says for a store that asks it stays, such as `AWS_TIMEOUT`.
-    fn settings(self, store: Option<&str>) -> Vec<(ClientConfigKey, String)> {
-        let all = [("READ_TIMEOUT", ClientConfigKey::ReadTimeout, self.silent)];
-        let all = all.into_iter().chain([("TIMEOUT", ClientConfigKey::Timeout, Some(self.whole))]);
-        let is_said = |name| store.is_some_and(|store| std::env::var_os(format!("{store}_{name}")).is_some());
-        let own = all.filter(|(name, ..)| !is_said(*name));
-        own.filter_map(|(_, key, wait)| Some((key, format!("{} seconds", wait?.as_secs())))).collect()
-    }
+/// The environment's own bound counts.
+fn is_set(name: &str) -> bool {
+    std::env::var_os(name).is_some()
 }
 
 #[cfg(test)]
@@ -123,23 +98,16 @@ mod tests {
     /// A part of 16 MiB takes longer than the client's own 30 seconds where eight share a slow link.
     #[test]
     fn all_clients_wait_for_slow_links() {
-        for (waits, silent) in [(READING, Some("30 seconds".to_owned())), (SENDING, None)] {
-            let keys = [ClientConfigKey::ReadTimeout, ClientConfigKey::Timeout];
-            let amazon = amazon("s3://robots", waits);
-            let google = google("gs://robots", waits);
-            let azure = azure("az://robots", waits);
-            let of = [
-                keys.map(|key| amazon.get_config_value(&AmazonS3ConfigKey::Client(key))),
-                keys.map(|key| google.get_config_value(&GoogleConfigKey::Client(key))),
-                keys.map(|key| azure.get_config_value(&AzureConfigKey::Client(key))),
-            ];
-            for [read, whole] in of {
-                assert_eq!(read, silent);
-                let whole = whole.unwrap();
-                let seconds: u64 = whole.split(' ').next().unwrap().parse().unwrap();
-                assert!(seconds >= 15 * 60, "{whole}");
-            }
-            assert!(remote_store("http://host/map", "http", "http://host", waits).unwrap().is_some());
+        let (amazon, google, azure) = (amazon("s3://robots"), google("gs://robots"), azure("az://robots"));
+        let bounds = [
+            amazon.get_config_value(&AmazonS3ConfigKey::Client(ClientConfigKey::Timeout)),
+            google.get_config_value(&GoogleConfigKey::Client(ClientConfigKey::Timeout)),
+            azure.get_config_value(&AzureConfigKey::Client(ClientConfigKey::Timeout)),
+        ];
+        for bound in bounds {
+            let bound = humantime::parse_duration(&bound.unwrap()).unwrap();
+            assert!(bound >= Duration::from_secs(15 * 60), "{bound:?}");
         }
+        assert!(remote_store("http://host/map", "http", "http://host").unwrap().is_some());
     }
 }

@@ -1,6 +1,7 @@
-use super::bucket::{Bucket, Pending};
+use super::bucket::Bucket;
 use super::manifest::{PART_BYTES, StoredFile};
 use super::object_name::ObjectName;
+use super::pending::Pending;
 use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use bytes::Bytes;

@@ -26,6 +26,8 @@ pub use remap::{RemapArgs, RemovePointsArgs, RemoveScansArgs, ReworkArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
+#[cfg(feature = "bucket")]
+use std::time::Duration;
 #[cfg(feature = "view")]
 pub use view::ViewArgs;
 
@@ -46,6 +48,11 @@ pub struct Cli {
     /// Say nothing but errors: no warnings, no progress bars
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
+    /// Give up a request to a bucket that makes no progress (16 KiB, or an answer) for so many seconds [default:
+    /// VOXTILE_BUCKET_TIMEOUT, or 60]
+    #[cfg(feature = "bucket")]
+    #[arg(long, global = true, value_name = "SECONDS", value_parser = bucket::timeout_of)]
+    pub bucket_timeout: Option<Duration>,
 }
 
 impl Cli {

@@ -1,5 +1,6 @@
 use crate::Result;
-use crate::bucket::{Bucket, FetchedFiles};
+use crate::bucket::FetchedFiles;
+use crate::command::place::bucket_at;
 use crate::command::progress::Progress;
 use crate::io::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_any_scans};
 use crate::scan::Stop;
@@ -21,7 +22,7 @@ impl FetchedSource {
 
 /// Fetches all files at a URL, until it is asked to stop.
 pub fn fetch(url: &str, stop: &Stop) -> Result<FetchedFiles> {
-    let bucket = Bucket::open(url)?;
+    let bucket = bucket_at(url)?;
     let progress = Progress::over_bytes();
     let is_stopped = || stop.is_set();
     let report = |done, all| progress.set(done, all);

@@ -38,6 +38,31 @@ pub fn check_is_folder(map: &Path) -> Result<()> {
     Err(Error::argument(url, reason))
 }
 
+/// How long a request to a bucket may remain without progress, if the command line says so.
+#[cfg(feature = "bucket")]
+static BUCKET_TIMEOUT: std::sync::OnceLock<std::time::Duration> = std::sync::OnceLock::new();
+
+/// Sets the bound for all buckets of this process.
+#[cfg(feature = "bucket")]
+pub fn set_bucket_timeout(timeout: std::time::Duration) {
+    // The command line is read once.
+    let _ = BUCKET_TIMEOUT.set(timeout);
+}
+
+/// The bucket of a URL, whose waits end with the first signal that is caught.
+///
+/// # Errors
+///
+/// As for [`Bucket::open`](crate::bucket::Bucket::open).
+#[cfg(feature = "bucket")]
+pub fn bucket_at(url: &str) -> Result<crate::bucket::Bucket> {
+    let bucket = crate::bucket::Bucket::open(url)?.with_stop(super::stop_signal::flag_of_signals());
+    Ok(match BUCKET_TIMEOUT.get() {
+        Some(timeout) => bucket.with_timeout(*timeout),
+        None => bucket,
+    })
+}
+
 /// Whether there is a map at a URL; false where the command was built without buckets.
 ///
 /// # Errors
@@ -45,7 +70,7 @@ pub fn check_is_folder(map: &Path) -> Result<()> {
 /// As for [`Bucket::open`](crate::bucket::Bucket::open) and [`Bucket::has_map`](crate::bucket::Bucket::has_map).
 #[cfg(feature = "bucket")]
 pub fn is_map_at(url: &str, stop: &Stop) -> Result<bool> {
-    crate::bucket::Bucket::open(url)?.has_map(&|| stop.is_set())
+    bucket_at(url)?.has_map(&|| stop.is_set())
 }
 
 #[cfg(not(feature = "bucket"))]
@@ -106,8 +131,7 @@ impl LocalScans {
 
 #[cfg(feature = "bucket")]
 fn in_bucket(url: &str) -> Result<MapPath> {
-    use crate::bucket::{Bucket, BucketDisk};
-    Ok(BucketDisk::open(Bucket::open(url)?)?.into_map_path())
+    Ok(crate::bucket::BucketDisk::open(bucket_at(url)?)?.into_map_path())
 }
 
 #[cfg(not(feature = "bucket"))]

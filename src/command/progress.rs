@@ -2,7 +2,8 @@ use crate::command::memory::resident_bytes;
 use crate::command::watch::Listener;
 use crate::mapper::{MapStatistics, MapView};
 use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::Write;
+use parking_lot::Mutex;
+use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A bar on standard error for long work; nothing where that is no terminal. Or another program hears of each step.
@@ -12,6 +13,24 @@ pub struct Progress {
 }
 
 static ARE_HIDDEN: AtomicBool = AtomicBool::new(false);
+
+/// The bar that was made last, if it is still there.
+static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Standard error for the log, whose lines go above the bar.
+pub struct AboveBar;
+
+impl Write for AboveBar {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let write = || io::stderr().write_all(bytes).map(|()| bytes.len());
+        let shown = SHOWN.lock().clone();
+        shown.map_or_else(write, |bar| bar.suspend(write))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
 
 /// Shows no bar from here on.
 pub fn hide_all() {
@@ -47,6 +66,7 @@ impl Progress {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
         bar.set_style(style(template));
+        *SHOWN.lock() = Some(bar.clone());
         Self { bar, listener: None }
     }
 
@@ -110,6 +130,7 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+        SHOWN.lock().take_if(|shown| shown.is_finished());
     }
 }
 

@@ -1,8 +1,8 @@
-use crate::bucket::{Bucket, Pulled, pull};
+use crate::bucket::{Pulled, pull};
 use crate::command::args::PullArgs;
 use crate::command::json;
 use crate::command::memory;
-use crate::command::place::check_is_folder;
+use crate::command::place::{bucket_at, check_is_folder};
 use crate::command::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -22,7 +22,7 @@ struct Summary<'a> {
 
 pub fn run(args: &PullArgs) -> anyhow::Result<ExitCode> {
     check_is_folder(&args.map)?;
-    let bucket = Bucket::open(&args.url)?;
+    let bucket = bucket_at(&args.url)?;
     let progress = Progress::over_bytes();
     let pulled = pull(&bucket, &args.map, args.replace, |done, all| progress.set(done, all))?;
     drop(progress);

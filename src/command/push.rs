@@ -1,8 +1,9 @@
-use crate::bucket::{Bucket, PushOptions, Pushed, push};
+use crate::bucket::{PushOptions, Pushed, push};
 use crate::command::args::PushArgs;
 use crate::command::json;
 use crate::command::map_at::whole_map;
 use crate::command::memory;
+use crate::command::place::bucket_at;
 use crate::command::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -21,7 +22,7 @@ struct Summary<'a> {
 }
 
 pub fn run(args: &PushArgs) -> anyhow::Result<ExitCode> {
-    let bucket = Bucket::open(&args.url)?;
+    let bucket = bucket_at(&args.url)?;
     let progress = Progress::over_tiles(0);
     let options = PushOptions { prunes: args.prune, replaces: args.replace, resends: args.resend };
     let pushed = push(whole_map(&args.map)?, &bucket, options, |done, all| progress.set(done, all))?;

@@ -10,7 +10,7 @@ use super::{
     scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
-use super::{pull, push};
+use super::{place, pull, push};
 use crate::begin_with_one_heap;
 use clap::Parser;
 use std::ffi::OsString;
@@ -29,10 +29,15 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     // The command line before the environment, where it says something.
     let mut log = env_logger::Builder::new();
     log.filter_level(cli.log_level()).format_timestamp(None);
+    log.target(env_logger::Target::Pipe(Box::new(progress::AboveBar)));
     if !cli.quiet && cli.verbose == 0 {
         log.parse_default_env();
     }
     log.init();
+    #[cfg(feature = "bucket")]
+    if let Some(timeout) = cli.bucket_timeout {
+        place::set_bucket_timeout(timeout);
+    }
     let Cli { command, threads, quiet, .. } = cli;
     let json_to = JsonTo::of(&command);
     if quiet {

@@ -113,6 +113,7 @@ impl ScanReader {
                 let mut reader =
                     Self { place: Place::Thread { requests, answers }, stop, ahead: None, _scans: local };
                 match reader.wait(&mut || Ok(()))? {
+                    Some(Answer::Opened(Err(Error::Stopped))) => Ok(None),
                     Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
                     _ => Ok(None),
                 }
@@ -268,6 +269,7 @@ fn read(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking) -> crate::
             Ok(Read::Scan(ReadScan { scan, mark }))
         }
         Ok(None) => Ok(Read::End),
+        Err(Error::Stopped) => Ok(Read::Stopped),
         Err(error) if source.pass_unread() => Ok(Read::Unread(error)),
         Err(error) => Err(error),
     }

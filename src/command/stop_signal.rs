@@ -6,13 +6,22 @@ use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use std::io::Write;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
 /// A signal so soon after the first is no second one: a shell and what runs in it may both send one.
 const GRACE: Duration = Duration::from_millis(500);
+
+/// The stop of the signals that are caught.
+static ASKED: OnceLock<Stop> = OnceLock::new();
+
+/// The flag that a first signal sets, for waits of the library; never set where signals are not caught.
+#[cfg(feature = "bucket")]
+pub fn flag_of_signals() -> Arc<AtomicBool> {
+    ASKED.get().map(Stop::flag).unwrap_or_default()
+}
 
 /// Catches Ctrl-C and SIGTERM. The first asks to stop and says what a second will lose; the second ends the process at
 /// once.
@@ -51,7 +60,7 @@ pub fn catch_if_fetched(scans: &Path) -> anyhow::Result<Stop> {
 }
 
 fn catch_saying(first_answer: &'static str, second_answer: &'static str) -> anyhow::Result<Stop> {
-    let stop = Stop::default();
+    let stop = ASKED.get_or_init(Stop::default).clone();
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let asked = stop.clone();
     let answer = move || {

@@ -559,3 +559,51 @@ fn what_cannot_be_shown_is_refused_at_once() {
         refused(&[text(&map), "--listen", &taken.local_addr().unwrap().to_string()]).contains("--listen")
     );
 }
+
+/// The page's script is the largest answer that needs no map; the memory for it is that of one.
+#[cfg(target_os = "linux")]
+#[test]
+fn clients_that_read_nothing_hold_little_memory() {
+    let (folder, map) = a_map();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    assert!(viewer.get("page.js").body.len() > 500_000);
+    let before = viewer.resident_bytes();
+    // More than the system's own buffers take.
+    let request = format!("GET /{TOKEN}/page.js HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address).repeat(12);
+    let silent: Vec<TcpStream> = (0..400)
+        .map(|_| {
+            let mut stream = viewer.connect();
+            stream.write_all(request.as_bytes()).unwrap();
+            stream
+        })
+        .collect();
+    // All of them are being answered.
+    for stream in &silent {
+        assert_eq!(stream.peek(&mut [0; 12]).unwrap(), 12);
+    }
+    std::thread::sleep(Duration::from_millis(500));
+    let grown = viewer.resident_bytes().saturating_sub(before);
+    assert!(grown < 64 << 20, "{grown} bytes more");
+    assert_eq!(viewer.get("maps.json").status, 200);
+}
+
+#[test]
+fn a_question_that_is_wrong_is_the_clients_error() {
+    let (folder, map) = a_map();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    for path in [
+        "maps/0/raycast?from=0,0,0&to=1e6,0,0",
+        "maps/0/raycast?from=0,0,0&to=1e300,0,0",
+        "maps/0/query?x=1e300&y=0&z=0",
+        "maps/0/node/0/2147483647/2147483647/-2147483648.vox",
+        "maps/0/subtree/31/2147483647/0/0.json",
+        "maps/0@nothing/tileset.json",
+        "maps/9/tileset.json",
+    ] {
+        let reply = viewer.get(path);
+        assert!(reply.status < 500, "{path}: {} {}", reply.status, String::from_utf8_lossy(&reply.body));
+    }
+    let far = viewer.get("maps/0/raycast?from=0,0,0&to=1e6,0,0");
+    let said = String::from_utf8_lossy(&far.body).into_owned();
+    assert!(far.status == 400 && said.contains("ask for at most"), "{}: {said}", far.status);
+}

@@ -20,7 +20,9 @@ fn whether_there_is_a_map_is_known_or_an_error() {
     let server = Server::new();
     server.put(&Key::from("maps/city/manifest.json"), b"{}".to_vec());
     server.put(&Key::from("drive/one.pcd"), b"points".to_vec());
-    let on = |store: Arc<dyn ObjectStore>, prefix: &str| Bucket::on(store, prefix, "s3://test").unwrap();
+    let on = |store: Arc<dyn ObjectStore>, prefix: &str| {
+        Bucket::on(store, prefix, "s3://test").unwrap().with_timeout(Duration::from_secs(1))
+    };
     assert!(server.bucket().has_map(&|| false).unwrap());
     assert!(!on(server.store.clone(), "drive").has_map(&|| false).unwrap());
     let fails = FaultyStore::new(server.store.clone(), |_, _| Fault::Fails);

@@ -109,6 +109,12 @@ class StoppedError(VoxtileError):
     kind = "stopped"
 
 
+class NoAnswerError(VoxtileError):
+    """A server stopped answering: look at the network and the server, then try again."""
+
+    kind = "no_answer"
+
+
 class UnsavedChangesError(VoxtileError):
     """A tile has updates that are not on disk: flush first."""
 

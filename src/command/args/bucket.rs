@@ -1,5 +1,15 @@
 use clap::Args;
 use std::path::PathBuf;
+use std::time::Duration;
+
+/// A number of seconds from 0.1 to a day.
+pub fn timeout_of(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
+    match (0.1..=86_400.0).contains(&seconds) {
+        true => Ok(Duration::from_secs_f64(seconds)),
+        false => Err("must be from 0.1 to 86400 seconds".to_owned()),
+    }
+}
 
 #[derive(Debug, Args)]
 pub struct PushArgs {

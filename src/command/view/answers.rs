@@ -9,7 +9,7 @@ use crate::command::query::answer_at;
 use crate::mapper::MapView;
 use crate::query::UnknownAs;
 use crate::space::{Aabb, VoxelIndex};
-use crate::{Point, Queries, Result};
+use crate::{Error, Point, Queries, Result};
 use hyper::StatusCode;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -74,10 +74,23 @@ pub fn of_map(
     Some(match answer {
         Ok(answer) => answer.unwrap_or_else(nothing),
         Err(error) => {
-            log::warn!("{error:#}");
-            Answer::error(StatusCode::INTERNAL_SERVER_ERROR, &format!("{error:#}"))
+            let status = status_of(&error);
+            if status.is_server_error() {
+                log::warn!("{error:#}");
+            }
+            Answer::error(status, &format!("{error:#}"))
         }
     })
+}
+
+/// Whose error it is: of the request, of the moment, of a bucket, or of the map.
+fn status_of(error: &Error) -> StatusCode {
+    match error {
+        Error::InvalidArgument { .. } | Error::TooLarge { .. } => StatusCode::BAD_REQUEST,
+        Error::Changed { .. } | Error::Expired | Error::Stopped => StatusCode::SERVICE_UNAVAILABLE,
+        Error::NoAnswer { .. } => StatusCode::GATEWAY_TIMEOUT,
+        _ => StatusCode::INTERNAL_SERVER_ERROR,
+    }
 }
 
 /// `version` is that which the request asks for: an answer of another one, of a newer state, is not kept as if it were.

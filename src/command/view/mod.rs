@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! request -> server    connections, their limits and timeouts       server, work
+//!                      what answers that are being sent hold        answer_memory
 //!         -> Route     what a path asks for, or nothing             route, token
 //!         -> answers   JSON of a query, a tileset, bytes of a node  answers
 //!            ServedMap one map, followed while somebody writes it   served_map
@@ -10,6 +11,7 @@
 //!
 //! The page is `view/dist`, made by `view/bundle.sh`. docs/view.md has the interface.
 
+mod answer_memory;
 mod answers;
 mod map_state;
 mod node_cache;

@@ -1,11 +1,13 @@
+use bytes::Bytes;
 use std::sync::LazyLock;
 
 /// A file of the page.
 pub struct PageFile {
     pub name: &'static str,
     pub kind: &'static str,
+    pub plain: Bytes,
     /// Compressed as gzip.
-    pub gzip: Vec<u8>,
+    pub gzip: Bytes,
 }
 
 /// Made by `view/bundle.sh`.
@@ -17,7 +19,11 @@ const FILES: [(&str, &str, &[u8]); 4] = [
 ];
 
 static PAGE: LazyLock<Vec<PageFile>> = LazyLock::new(|| {
-    FILES.map(|(name, kind, bytes)| PageFile { name, kind, gzip: super::response::gzip(bytes) }).into()
+    let file = |(name, kind, bytes)| {
+        let gzip = super::response::gzip(bytes).into();
+        PageFile { name, kind, plain: Bytes::from_static(bytes), gzip }
+    };
+    FILES.map(file).into()
 });
 
 pub fn file(name: &str) -> Option<&'static PageFile> {

@@ -1,10 +1,11 @@
+use super::answer_memory::AnswerMemory;
 use bytes::Bytes;
 use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use http_body_util::combinators::UnsyncBoxBody;
 use http_body_util::{BodyExt, Full};
-use hyper::header::{CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, HeaderValue};
+use hyper::header::{CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, HeaderValue, RETRY_AFTER};
 use hyper::{Response, StatusCode};
 use std::convert::Infallible;
 use std::io::{Read, Write};
@@ -25,7 +26,9 @@ pub struct Answer {
     pub status: StatusCode,
     pub kind: &'static str,
     /// Compressed as gzip.
-    pub gzip: Vec<u8>,
+    pub gzip: Bytes,
+    /// Not compressed, of an answer that all clients share: it takes no memory of its own.
+    pub shared: Option<Bytes>,
     pub keep: Keep,
 }
 
@@ -46,19 +49,36 @@ impl Answer {
         if let Some(object) = value.as_object_mut().filter(|object| !object.contains_key("asset")) {
             object.insert("version".into(), 1.into());
         }
-        Self { status: StatusCode::OK, kind: JSON, gzip: gzip(value.to_string().as_bytes()), keep: Keep::No }
+        Self::new(JSON, gzip(value.to_string().as_bytes()), Keep::No)
     }
 
     pub fn node(gzip: Vec<u8>, keep: Keep) -> Self {
-        Self { status: StatusCode::OK, kind: "application/octet-stream", gzip, keep }
+        Self::new("application/octet-stream", gzip, keep)
+    }
+
+    fn new(kind: &'static str, gzip: Vec<u8>, keep: Keep) -> Self {
+        Self { status: StatusCode::OK, kind, gzip: gzip.into(), shared: None, keep }
     }
 
     pub fn error(status: StatusCode, reason: &str) -> Self {
         Self { status, ..Self::json(serde_json::json!({ "error": reason })) }
     }
 
-    pub fn into_response(self, takes_gzip: bool) -> Response<Body> {
-        let bytes = if takes_gzip { self.gzip } else { plain(&self.gzip) };
+    /// The response; another one if the answers of other clients hold too much memory.
+    pub fn into_response(self, takes_gzip: bool, memory: &AnswerMemory) -> Response<Body> {
+        let bytes = match (takes_gzip, self.shared) {
+            (true, Some(_)) => Some(self.gzip),
+            (false, Some(plain)) => Some(plain),
+            (true, None) => memory.hold(self.gzip),
+            (false, None) => memory.hold(plain(&self.gzip).into()),
+        };
+        let Some(bytes) = bytes else {
+            let reason = "clients that do not read hold the memory for answers; ask again in some seconds";
+            let mut response =
+                Self::error(StatusCode::SERVICE_UNAVAILABLE, reason).into_response(takes_gzip, memory);
+            response.headers_mut().insert(RETRY_AFTER, HeaderValue::from_static("5"));
+            return response;
+        };
         let mut response = empty(self.status);
         let headers = response.headers_mut();
         headers.insert(CONTENT_TYPE, HeaderValue::from_static(self.kind));
@@ -70,7 +90,7 @@ impl Answer {
             Keep::ForEver => "private, max-age=31536000, immutable",
         };
         headers.insert(CACHE_CONTROL, HeaderValue::from_static(keep));
-        *response.body_mut() = Full::new(Bytes::from(bytes)).boxed_unsync();
+        *response.body_mut() = Full::new(bytes).boxed_unsync();
         response
     }
 }

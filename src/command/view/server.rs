@@ -1,3 +1,4 @@
+use super::answer_memory::AnswerMemory;
 use super::response::{Answer, Body, Keep, empty};
 use super::route::{Route, version_in};
 use super::served_map::{Makes, ServedMap};
@@ -29,6 +30,8 @@ const CONNECTIONS: usize = 512;
 const SILENCE: Duration = Duration::from_secs(5);
 /// One that takes nothing of an answer for so long, too.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// What a connection may hold of a request; of an answer, what is on its way beside the answer itself.
+const BUFFER_BYTES: usize = 32 << 10;
 /// Something is sent this often to those who wait for events.
 const ALIVE_EVERY: Duration = Duration::from_secs(15);
 
@@ -44,6 +47,7 @@ pub struct Server {
     work: Work,
     /// Levels of snapshots: one at a time, on all cores. It takes seconds, so whoever waits holds no other work back.
     making: Work,
+    memory: AnswerMemory,
 }
 
 impl Server {
@@ -55,7 +59,8 @@ impl Server {
     ) -> Self {
         let threads = std::thread::available_parallelism().map_or(2, usize::from);
         let id = format!("{:016x}", RandomState::new().build_hasher().finish());
-        Self { id, maps, token, address, changed, work: Work::new(threads), making: Work::new(1) }
+        let (work, making, memory) = (Work::new(threads), Work::new(1), AnswerMemory::new());
+        Self { id, maps, token, address, changed, work, making, memory }
     }
 
     pub fn run(self, listener: TcpListener) -> anyhow::Result<()> {
@@ -99,6 +104,7 @@ impl Server {
                 let connection = http1::Builder::new()
                     .timer(TokioTimer::new())
                     .header_read_timeout(SILENCE)
+                    .max_buf_size(BUFFER_BYTES)
                     .serve_connection(TokioIo::new(Box::pin(stream)), service);
                 if let Err(error) = connection.await {
                     log::debug!("a connection ended: {error}");
@@ -120,10 +126,12 @@ impl Server {
                 response
             }
             Ok(Route::Events) if !is_head => self.events(),
-            Ok(route) => self.compute(route, request.uri().query()).await.into_response(takes_gzip),
+            Ok(route) => {
+                self.compute(route, request.uri().query()).await.into_response(takes_gzip, &self.memory)
+            }
             Err(answer) => {
                 let is_wrong_method = answer.status == StatusCode::METHOD_NOT_ALLOWED;
-                let mut response = answer.into_response(takes_gzip);
+                let mut response = answer.into_response(takes_gzip, &self.memory);
                 // Strangers keep no connection.
                 response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
                 if is_wrong_method {
@@ -171,6 +179,7 @@ impl Server {
                     status: StatusCode::OK,
                     kind: file.kind,
                     gzip: file.gzip.clone(),
+                    shared: Some(file.plain.clone()),
                     keep: Keep::No,
                 },
                 None => Answer::error(StatusCode::NOT_FOUND, "there is no such file"),

@@ -1,0 +1,34 @@
+use std::fmt;
+use std::time::Duration;
+
+/// A request that a server did not answer in time.
+#[derive(Clone, Debug)]
+pub struct Unanswered {
+    /// What was asked for: `GET`, `PUT`, `HEAD`, `DELETE` or `LIST`, and the object.
+    pub request: String,
+    /// The server that was asked, if that is known.
+    pub server: Option<String>,
+    /// Since the request began.
+    pub waited: Duration,
+    /// How often it was tried.
+    pub attempts: u32,
+    /// The bound on the time without progress.
+    pub limit: Duration,
+}
+
+impl fmt::Display for Unanswered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.request)?;
+        if let Some(server) = &self.server {
+            write!(f, " from {server}")?;
+        }
+        write!(
+            f,
+            " in {:.1} s and {} attempts; check the network and the server and try again, or allow more than {} s \
+             without progress (--bucket-timeout, VOXTILE_BUCKET_TIMEOUT)",
+            self.waited.as_secs_f64(),
+            self.attempts,
+            self.limit.as_secs_f64()
+        )
+    }
+}
