@@ -8,7 +8,7 @@ use super::layout::{Layout, TileFile};
 use super::map_files::MapFiles;
 use super::map_folder;
 use super::place;
-use super::recovery::recover::{recover, remove_uncommitted};
+use super::recovery::recover::{recover, remove_uncommitted, settle_own_files};
 use super::scans::{ScanKeeper, ScanList};
 use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
@@ -109,9 +109,15 @@ impl TileStore {
                 store.committer.replace_log(&store.files, store.versions.commits())?;
             }
             store.recover()?;
+            if store.is_metadata_behind() {
+                // Readers would wait for it. Those that the map has may see the last commit.
+                store.keep_for_late_readers();
+                store.tidy_up();
+            }
         } else {
-            let foreign = store.versions.foreign();
-            store.leftovers_removed = remove_uncommitted(&**store.disk(), store.layout(), foreign)?;
+            let (disk, layout, foreign) = (&**store.disk(), store.layout(), store.versions.foreign());
+            store.leftovers_removed =
+                settle_own_files(disk, layout)? + remove_uncommitted(disk, layout, foreign)?;
         }
         Ok(store)
     }
@@ -130,8 +136,9 @@ impl TileStore {
         self.leftovers_removed = found.removed;
         let removed = &self.versions.commits().last_removed;
         self.checkpoint = Checkpoint::of_leftovers(found.unrenamed, found.renamed, removed);
+        self.run_checkpoint()?;
         self.remove_unneeded_scans();
-        self.run_checkpoint()
+        Ok(())
     }
 
     /// Opens a map for reading beside a writer: takes no lock and writes nothing. The store sees the last flush, and

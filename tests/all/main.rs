@@ -62,6 +62,8 @@ mod interrupted;
 mod kept_scans;
 /// What each folder may know.
 mod layering;
+/// Files that a killed command, or one that the disk refused, leaves in a map.
+mod leftovers;
 /// Readers in other threads beside the mapper.
 mod live_readers;
 /// The local map against a naive one, after every update; what planners ask; archives beside it.
