@@ -162,8 +162,16 @@ struct Verifier<'a, F, P> {
 const LEFT: &str = "left behind by a process that was killed or that the disk refused, or being written";
 
 /// Of points and lists of scans that no flush needs.
-const IDLE_SCANS: &str = "of scans that neither the map nor a snapshot has: left behind by a process that was killed or \
-                          that the disk refused, perhaps with removed scans; or being written";
+const IDLE_SCANS: &str = "of scans that neither the map nor a snapshot has: left behind by a process that was killed \
+                          or that the disk refused, perhaps with removed scans; or being written";
+
+/// Of `MAP.remapping`.
+const SECOND_MAP: &str = "a second map, of a remapping beside a mapper that is at work or was killed; the next one, \
+                          `remove-scans` and `remove-points` remove it";
+
+/// Of `MAP.unfinished`.
+const UNFINISHED_MAP: &str = "a map that is being made to take this one's place, or the one that it replaced, left \
+                              behind; the next `voxtile pull --replace` removes it";
 
 /// Length of a log, and its last bytes. The checksum of the last record is among them, so that no two states of a log
 /// have the same.
@@ -181,10 +189,11 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         (self.found)(&finding);
     }
 
-    /// Reports a file that the next writer removes or renames.
+    /// Reports a file that the next writer removes or renames; what has its name and is no file stays.
     fn leftover(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
-        self.counts.leftovers += 1;
-        self.report(Finding::note(path, tile, reason));
+        let is_file = matches!(self.disk.kind(path), Ok(Some(EntryKind::File(_))));
+        self.counts.leftovers += u64::from(is_file);
+        self.report(Finding::note(path, tile, if is_file { reason } else { "no part of a map" }));
     }
 
     fn damage(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
@@ -408,18 +417,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     /// Looks for a second map that a change of this one makes beside it. Where that cannot be told there is none.
     fn look_beside(&mut self, folder: &Path) {
-        let reasons = [
-            (
-                "remapping",
-                "a second map, of a remapping beside a mapper that is at work or was killed; the next one, \
-                           `remove-scans` and `remove-points` remove it",
-            ),
-            (
-                "unfinished",
-                "a map that is being made to take this one's place, or the one that it replaced, left \
-                            behind; the next `voxtile pull --replace` removes it",
-            ),
-        ];
+        let reasons = [("remapping", SECOND_MAP), ("unfinished", UNFINISHED_MAP)];
         for (extension, reason) in reasons.into_iter().filter(|_| folder.file_name().is_some()) {
             let path = folder.with_added_extension(extension);
             if let Ok(Some(EntryKind::Folder)) = self.disk.kind(&path) {
@@ -479,7 +477,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let is_named = now.is_some_and(|now| now.tiles.contains(tile));
         if now.is_some_and(|now| now.last_removed.contains(&tile)) {
             let reason = "taken out of the map; its files go when the map is next opened for writing";
-            self.leftover(folder, Some(tile), reason);
+            self.counts.leftovers += 1;
+            self.report(Finding::note(folder, Some(tile), reason));
         } else if !is_named {
             let path = self.layout.current(tile, TileFile::Table);
             self.damage(&path, Some(tile), "commits.log does not name this tile");

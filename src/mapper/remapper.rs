@@ -70,8 +70,8 @@ impl Remapper {
         })
     }
 
-    /// Commits, with a note where the poses are no longer those of the map's inputs; then `release` removes what nothing
-    /// needs any more. Returns its result.
+    /// Commits, with a note where the poses are no longer those of the map's inputs; then `release` removes what
+    /// nothing needs any more. Returns its result.
     pub(crate) fn finish<T>(
         mut self,
         have_poses_changed: bool,

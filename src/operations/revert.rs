@@ -33,16 +33,17 @@ pub struct Reverted {
 /// go on seeing what they see.
 ///
 /// What came after the snapshot is in no map any more, unless `keep_as` names a snapshot to be made of it before.
-/// A call that was killed can be repeated: a snapshot `keep_as` of the state that would be kept now is that of the first
-/// attempt, and where the map is as of the snapshot `name` already, nothing is done if the name `keep_as` is taken.
+/// A call that was killed can be repeated: a snapshot `keep_as` of the state that would be kept now is that of the
+/// first attempt, and where the map is as of the snapshot `name` already, nothing is done if the name `keep_as` is
+/// taken.
 ///
 /// `progress` is told the tiles done and all. Memory: the lists of tiles of the map and of the snapshot, and one tile.
 ///
 /// # Errors
 ///
 /// [`Error::InvalidArgument`] if there is no such snapshot, [`Error::AlreadyExists`] if there is one with the name
-/// `keep_as` and of another state; no map there, another writer, a damaged table, a disk that refuses. The map is as it was then; a snapshot
-/// `keep_as` may have been made.
+/// `keep_as` and of another state; no map there, another writer, a damaged table, a disk that refuses. The map is as it
+/// was then; a snapshot `keep_as` may have been made.
 pub fn revert(
     folder: impl Into<MapPath>,
     name: &SnapshotName,

@@ -40,8 +40,8 @@ pub struct SnapshotInfo {
 ///
 /// # Errors
 ///
-/// [`Error::AlreadyExists`] if there is a snapshot of this name and of another state; no map there, another writer, a disk that refuses:
-/// there is no such snapshot then.
+/// [`Error::AlreadyExists`] if there is a snapshot of this name and of another state; no map there, another writer, a
+/// disk that refuses: there is no such snapshot then.
 pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;

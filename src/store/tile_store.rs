@@ -48,6 +48,8 @@ pub struct TileStore {
     pub(super) kept: KeptTables,
     /// How many files of an earlier writer opening has removed.
     pub(super) leftovers_removed: u64,
+    /// Whether opening has brought `metadata.json` up to the log.
+    has_replaced_metadata: bool,
     /// The snapshot that was opened in place of the map as it is.
     pub(super) opened_snapshot: Option<SnapshotName>,
     /// Held by a reader, so that a writer keeps what it sees.
@@ -113,6 +115,7 @@ impl TileStore {
                 // Readers would wait for it. Those that the map has may see the last commit.
                 store.keep_for_late_readers();
                 store.tidy_up();
+                store.has_replaced_metadata = !store.is_metadata_behind();
             }
         } else {
             let (disk, layout, foreign) = (&**store.disk(), store.layout(), store.versions.foreign());
@@ -234,6 +237,7 @@ impl TileStore {
             keeper,
             kept: KeptTables::default(),
             leftovers_removed: 0,
+            has_replaced_metadata: false,
             opened_snapshot: None,
             shared_metadata: None,
         }
@@ -290,6 +294,11 @@ impl TileStore {
     /// How many files that an earlier writer left behind were removed when the store was opened.
     pub fn leftovers_removed(&self) -> u64 {
         self.leftovers_removed
+    }
+
+    /// Whether `metadata.json` was older than the log and was replaced when the store was opened.
+    pub fn has_replaced_metadata(&self) -> bool {
+        self.has_replaced_metadata
     }
 
     /// Whether the tile has a version on disk, committed or not.

@@ -47,9 +47,9 @@ pub struct ScansRemoved {
 ///
 /// # Errors
 ///
-/// As for [`remap`](super::remap()); no scan that is selected. An error that names a file of kept scans and says so comes
-/// after the scans are gone from the map, and before they are gone from that file. What befalls a snapshot, which may hold some of the
-/// scans then, is told once the map and the other snapshots are done.
+/// As for [`remap`](super::remap()); no scan that is selected; a disk that refuses to remove files of scans that are no
+/// longer in the map, which the same call tries again. What befalls a snapshot, which may hold some of the scans then,
+/// is told once the map and the other snapshots are done.
 pub fn remove_scans(
     map: impl Into<MapPath>,
     scans: &ScanSelection,

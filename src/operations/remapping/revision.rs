@@ -6,7 +6,8 @@ use crate::persistence::config_from;
 use crate::scan::{Pose, ScanPoints, ScanReport, Stop};
 use crate::space::{Aabb, TileIndex, TileSelection};
 use crate::store::{
-    CatalogEntry, Disk, KeptFrame, KeptRecord, Layout, MapPath, SideFolder, SnapshotName, TileStore,
+    CatalogEntry, Disk, EntryKind, KeptFrame, KeptRecord, Layout, MapPath, SideFolder, SnapshotName,
+    TileStore,
 };
 use rustc_hash::FxHashSet;
 use serde::Serialize;
@@ -137,7 +138,17 @@ fn release(store: &mut TileStore) -> Result<()> {
 }
 
 /// Removes the second map that a remapping beside a mapper left when it was killed: it has the evidence of all scans.
+/// Another map that has this name by chance has another id, and stays.
 fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) {
+    let second = folder.with_added_extension("remapping");
+    if !matches!(disk.kind(&second), Ok(Some(EntryKind::Folder))) {
+        return;
+    }
+    let id_of = |folder: &Path| TileStore::open_read_only(disk.clone(), folder).ok()?.map_id();
+    let id = id_of(folder);
+    if id.is_none() || id_of(&second) != id {
+        return;
+    }
     match SideFolder::begin(disk, folder) {
         // At work, or a path without a name that none could be beside.
         Ok(_) | Err(Error::Locked { .. } | Error::InvalidArgument { .. }) => {}
@@ -163,7 +174,7 @@ pub(super) fn complete(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
     })
 }
 
-/// Makes the snapshot of the map as it is, if there is to be one; one that an earlier attempt made of this state counts.
+/// Makes the snapshot of the map as it is, if there is to be one. One of this state that is there already counts.
 pub(super) fn keep_as_it_is(store: &mut TileStore, how: &Rework) -> Result<()> {
     let Some(name) = &how.keep_as else { return Ok(()) };
     store.create_snapshot(name)
