@@ -73,7 +73,11 @@ impl KnownStates {
             disk.rename(&next, &path)?;
             disk.sync_folder(folder)
         };
-        write().map_err(|error| Error::io(&path, "write", error))
+        write().map_err(|error| {
+            // Written anew by the next attempt, which may never come.
+            let _ = disk.remove_file(&next);
+            Error::io(&path, "write", error)
+        })
     }
 
     fn to_text(&self) -> String {

@@ -50,6 +50,10 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
     }
     let would = if args.rework.dry_run { "would be " } else { "" };
     writeln!(out, "removed   {} scans {would}gone", HumanCount(removed.scans_removed))?;
+    if removed.files_removed > 0 {
+        let files = HumanCount(removed.files_removed);
+        writeln!(out, "completed an earlier removal: {files} files with removed scans are gone")?;
+    }
     if removed.scans_removed > 0 {
         rework::print(&removed.mapped, args.rework.dry_run, &mut out)?;
     }

@@ -6,6 +6,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
+    let was_there = !args.delete && new_snapshot(&args.map, &args.name).is_ok();
     let info = if args.delete {
         // What it was, before it is gone.
         let info = snapshots(&args.map)?.into_iter().find(|info| info.name == args.name.as_str());
@@ -25,7 +26,8 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
     } else if info.is_none() {
         writeln!(out, "kept      {}", args.name)?;
     } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {
-        writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles")?;
+        let before = if was_there { "; it was there already" } else { "" };
+        writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles{before}")?;
     }
     Ok(ExitCode::SUCCESS)
 }

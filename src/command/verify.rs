@@ -64,6 +64,7 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
         voxels,
         table_bytes,
         damage,
+        leftovers,
         snapshots,
         ..
     } = verification;
@@ -76,6 +77,14 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
     )?;
     if *snapshots > 0 {
         writeln!(out, "{} snapshots", HumanCount(*snapshots))?;
+    }
+    if *leftovers > 0 {
+        let (leftovers, map) = (HumanCount(*leftovers), args.map.display());
+        writeln!(
+            out,
+            "leftovers: {leftovers} files that no flush needs, named above; the next process that writes to the map \
+             removes them or gives them their names, as does `voxtile repair {map}`"
+        )?;
     }
     match (damage, verified) {
         (0, true) => writeln!(out, "whole: every checksum matches"),

@@ -4,6 +4,7 @@ use crate::store::{
     CatalogEntry, Disk, KeptAsOf, Layout, Salvaged, ScanRecord, TileStore, check_points, salvage_entries,
 };
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Reads every scan that a map keeps; returns what is damaged.
@@ -33,6 +34,30 @@ pub(super) fn check_kept_scans(disk: &Arc<dyn Disk>, store: &TileStore) -> Resul
             }
         }
     }
+}
+
+/// The files of scans that neither the last flush nor a snapshot needs. `store` may be behind a writer by now, so they
+/// are looked for a second time. None where a catalog or a snapshot is damaged, which may need any.
+///
+/// # Errors
+///
+/// A disk that refuses more than single files.
+pub(super) fn find_idle(disk: &Arc<dyn Disk>, store: &TileStore) -> Result<Vec<PathBuf>> {
+    let idle_in = |store: &TileStore| -> Result<Vec<PathBuf>> {
+        match store.idle_scan_files() {
+            Err(Error::Damaged { .. }) => Ok(Vec::new()),
+            Err(error) if Finding::is_of_file(&error) => Ok(Vec::new()),
+            idle => Ok(idle?.unwrap_or_default()),
+        }
+    };
+    let mut idle = idle_in(store)?;
+    if !idle.is_empty() {
+        // One that cannot be opened any more is being changed.
+        let now = TileStore::open_read_only(disk.clone(), store.folder()).ok();
+        let idle_now = now.as_ref().map(idle_in).transpose()?.unwrap_or_default();
+        idle.retain(|path| idle_now.contains(path));
+    }
+    Ok(idle)
 }
 
 /// What is whole of the scans that a map keeps.

@@ -328,7 +328,10 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 self.quarantine_copy(&self.layout.metadata(), "its bounds change")?;
             }
             store.forget(&lost)?;
-        } else if store.commits().torn.is_some() || store.is_metadata_behind() {
+        } else if store.commits().torn.is_some()
+            || store.is_metadata_behind()
+            || store.has_replaced_metadata()
+        {
             store.checkpoint()?;
             self.note(
                 ActionKind::Derived,

@@ -60,7 +60,9 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                     self.quarantine(&path, why(&path))?;
                 }
             }
-            store.release_scans();
+            if let Err(error) = store.release_scans() {
+                log::warn!("kept scans that nothing needs remain: {error:#}");
+            }
         }
         self.counts.scans_lost += left.scans_lost;
         let reason = match left.scans_lost {

@@ -1,5 +1,5 @@
 use super::finding::{Finding, Severity};
-use super::kept_scans::check_kept_scans;
+use super::kept_scans::{check_kept_scans, find_idle};
 use super::rebuild::{self, Index};
 use super::snapshots::{WholeTables, lost_tiles};
 use super::tile_check::{check_tile, first_difference, write_octree};
@@ -39,6 +39,10 @@ pub struct Verification {
     pub damage: u64,
     /// Findings that are none.
     pub notes: u64,
+    /// Those of them that are files which no flush needs: left behind by a process that was killed or that the disk
+    /// refused, or of one at work. The next process that opens the map for writing removes them or gives them their
+    /// names.
+    pub leftovers: u64,
 }
 
 impl Verification {
@@ -154,6 +158,21 @@ struct Verifier<'a, F, P> {
     now: Option<(LogEnd, Option<Commits>)>,
 }
 
+/// Of a file that waits to take the place of another.
+const LEFT: &str = "left behind by a process that was killed or that the disk refused, or being written";
+
+/// Of points and lists of scans that no flush needs.
+const IDLE_SCANS: &str = "of scans that neither the map nor a snapshot has: left behind by a process that was killed \
+                          or that the disk refused, perhaps with removed scans; or being written";
+
+/// Of `MAP.remapping`.
+const SECOND_MAP: &str = "a second map, of a remapping beside a mapper that is at work or was killed; the next one, \
+                          `remove-scans` and `remove-points` remove it";
+
+/// Of `MAP.unfinished`.
+const UNFINISHED_MAP: &str = "a map that is being made to take this one's place, or the one that it replaced, left \
+                              behind; the next `voxtile pull --replace` removes it";
+
 /// Length of a log, and its last bytes. The checksum of the last record is among them, so that no two states of a log
 /// have the same.
 type LogEnd = (u64, Vec<u8>);
@@ -168,6 +187,13 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             Severity::Note => self.counts.notes += 1,
         }
         (self.found)(&finding);
+    }
+
+    /// Reports a file that the next writer removes or renames; what has its name and is no file stays.
+    fn leftover(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
+        let is_file = matches!(self.disk.kind(path), Ok(Some(EntryKind::File(_))));
+        self.counts.leftovers += u64::from(is_file);
+        self.report(Finding::note(path, tile, if is_file { reason } else { "no part of a map" }));
     }
 
     fn damage(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
@@ -204,6 +230,9 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             return Ok(());
         }
         let seen = self.verify_snapshots(disk, store, config)?;
+        for path in find_idle(disk, store)? {
+            self.leftover(&path, None, IDLE_SCANS);
+        }
         self.look_around(&seen, |tile| tiles.binary_search(&tile).is_ok())
     }
 
@@ -337,10 +366,13 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             let reason = match SnapshotName::new(&*name) {
                 Ok(name) if self.listed.as_ref().is_none_or(|listed| listed.contains(&name)) => continue,
                 Ok(_) => "no snapshot of the map: commits.log does not name it",
-                Err(_) if name == SNAPSHOT_NEXT => "left behind, or being written",
-                Err(_) => "no snapshot: it has no name of one",
+                Err(_) if name == SNAPSHOT_NEXT => LEFT,
+                Err(_) => {
+                    self.report(Finding::note(&path, None, "no snapshot: it has no name of one"));
+                    continue;
+                }
             };
-            self.report(Finding::note(&path, None, reason));
+            self.leftover(&path, None, reason);
         }
         Ok(())
     }
@@ -359,20 +391,48 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 }
                 // What was pushed or pulled (`bucket::known_states`).
                 ("bucket_states", _) => {}
-                // What of it belongs to the map has been read; the rest goes when a writer opens the map.
-                (KEPT_SCANS, _) => {}
+                (KEPT_SCANS, _) => self.look_into_kept_scans(&path)?,
                 (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
                 (QUARANTINE, _) => {
-                    self.report(Finding::note(&path, None, "taken out of the map by a repair"))
+                    let reason = "taken out of the map by a repair, perhaps with scans that were removed since; \
+                                  delete it once nothing in it is wanted";
+                    self.report(Finding::note(&path, None, reason));
                 }
                 (_, Some(tile)) => {
                     let is_known = is_known(tile) || self.told.contains(&tile);
                     self.look_into(&path, tile, seen, is_known)?;
                 }
-                (name, None) if name.ends_with(".next") => {
-                    self.report(Finding::note(&path, None, "left behind, or being written"));
+                (name, None) if Layout::is_next_of_map(name) => self.leftover(&path, None, LEFT),
+                ("bucket_states.next", None) => {
+                    let reason =
+                        "left behind by a push that was killed, or being written; the next push replaces it";
+                    self.report(Finding::note(&path, None, reason));
                 }
                 _ => self.report(Finding::note(&path, None, "no part of a map")),
+            }
+        }
+        self.look_beside(&folder);
+        Ok(())
+    }
+
+    /// Looks for a second map that a change of this one makes beside it. Where that cannot be told there is none.
+    fn look_beside(&mut self, folder: &Path) {
+        let reasons = [("remapping", SECOND_MAP), ("unfinished", UNFINISHED_MAP)];
+        for (extension, reason) in reasons.into_iter().filter(|_| folder.file_name().is_some()) {
+            let path = folder.with_added_extension(extension);
+            if let Ok(Some(EntryKind::Folder)) = self.disk.kind(&path) {
+                self.report(Finding::note(&path, None, reason));
+            }
+        }
+    }
+
+    fn look_into_kept_scans(&mut self, folder: &Path) -> Result<()> {
+        if self.kind(folder)? != Some(EntryKind::Folder) {
+            return Ok(());
+        }
+        for name in self.list(folder)? {
+            if !Layout::is_of_kept_scans(&name) {
+                self.report(Finding::note(&folder.join(&name), None, "no part of a map"));
             }
         }
         Ok(())
@@ -399,12 +459,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             if kept.is_some_and(|flush_number| seen.contains_key(&(tile, flush_number))) {
                 continue;
             }
-            if name.ends_with(".next") || kept.is_some() {
-                self.report(Finding::note(
-                    &path,
-                    Some(tile),
-                    "left behind, being written, or kept for a reader",
-                ));
+            if self.layout.is_next_of_tile(&name) {
+                self.leftover(&path, Some(tile), LEFT);
+            } else if kept.is_some() {
+                self.leftover(&path, Some(tile), "replaced; kept for a reader, or left behind");
             } else if self.layout.files().iter().all(|file| file.name(self.layout.storage()) != name) {
                 self.report(Finding::note(&path, Some(tile), "no part of a map"));
             } else {
@@ -419,6 +477,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let is_named = now.is_some_and(|now| now.tiles.contains(tile));
         if now.is_some_and(|now| now.last_removed.contains(&tile)) {
             let reason = "taken out of the map; its files go when the map is next opened for writing";
+            self.counts.leftovers += 1;
             self.report(Finding::note(folder, Some(tile), reason));
         } else if !is_named {
             let path = self.layout.current(tile, TileFile::Table);

@@ -70,11 +70,14 @@ impl Remapper {
         })
     }
 
-    /// Commits, with a note where the poses are no longer those of the map's inputs; then removes what nothing needs
-    /// any more.
-    pub(crate) fn finish(mut self, have_poses_changed: bool) -> Result<()> {
+    /// Commits, with a note where the poses are no longer those of the map's inputs; then `release` removes what
+    /// nothing needs any more. Returns its result.
+    pub(crate) fn finish<T>(
+        mut self,
+        have_poses_changed: bool,
+        release: impl FnOnce(&mut TileStore) -> T,
+    ) -> Result<T> {
         self.mapper.commit_again(self.scan_number, have_poses_changed)?;
-        self.mapper.with_store(TileStore::release_scans);
-        Ok(())
+        Ok(self.mapper.with_store(release))
     }
 }

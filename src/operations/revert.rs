@@ -1,4 +1,3 @@
-use super::snapshot::check_is_free;
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::persistence::TileSaver;
@@ -24,6 +23,9 @@ pub struct Reverted {
     pub tiles_restored: u64,
     /// Tiles that were not there then, and are not any more.
     pub tiles_removed: u64,
+    /// The map was as of the snapshot already, and the name `keep_as` was taken: nothing was done. An earlier call did
+    /// it, or nothing has changed since.
+    pub was_done: bool,
 }
 
 /// Makes the map in `folder` again what it was when a snapshot was made: tiles, scan number and input. It is one commit
@@ -31,13 +33,17 @@ pub struct Reverted {
 /// go on seeing what they see.
 ///
 /// What came after the snapshot is in no map any more, unless `keep_as` names a snapshot to be made of it before.
+/// A call that was killed can be repeated: a snapshot `keep_as` of the state that would be kept now is that of the
+/// first attempt, and where the map is as of the snapshot `name` already, nothing is done if the name `keep_as` is
+/// taken.
+///
 /// `progress` is told the tiles done and all. Memory: the lists of tiles of the map and of the snapshot, and one tile.
 ///
 /// # Errors
 ///
 /// [`Error::InvalidArgument`] if there is no such snapshot, [`Error::AlreadyExists`] if there is one with the name
-/// `keep_as`; no map there, another writer, a damaged table, a disk that refuses. The map is as it was then; a snapshot
-/// `keep_as` may have been made.
+/// `keep_as` and of another state; no map there, another writer, a damaged table, a disk that refuses. The map is as it
+/// was then; a snapshot `keep_as` may have been made.
 pub fn revert(
     folder: impl Into<MapPath>,
     name: &SnapshotName,
@@ -50,7 +56,20 @@ pub fn revert(
     let past = TileStore::open_snapshot(disk.clone(), folder, name)?;
     check_is_of_map(&store, &past)?;
     if let Some(keep_as) = keep_as {
-        check_is_free(&store, keep_as)?;
+        if store.snapshot_names()?.contains(keep_as) && store.is_as(&past)? {
+            let (scan_number, tiles) = (store.commits().scan_number, store.count_tiles() as u64);
+            let flush_number = store.commits().flush_number;
+            let (scan_number_before, was_done) = (scan_number, true);
+            let reverted = Reverted {
+                scan_number_before,
+                scan_number,
+                flush_number,
+                tiles,
+                was_done,
+                ..Reverted::default()
+            };
+            return Ok(reverted);
+        }
         store.create_snapshot(keep_as)?;
     }
     let outcome = revert_to(&mut store, &past, progress);

@@ -1,7 +1,7 @@
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, OutOfCoreTileMapper};
 use crate::space::TileIndex;
-use crate::store::{Layout, MapPath, Snapshot, SnapshotName, TileStore};
+use crate::store::{MapPath, Snapshot, SnapshotName, TileStore};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -35,12 +35,13 @@ pub struct SnapshotInfo {
 }
 
 /// Keeps the last flush of the map in `folder` under a name. A map of the original format gets an id and checksums
-/// first, as before any change.
+/// first, as before any change. A snapshot of this name that keeps this very state is left as it is, so a call that was
+/// killed can be repeated.
 ///
 /// # Errors
 ///
-/// [`Error::AlreadyExists`] if there is a snapshot of this name; no map there, another writer, a disk that refuses:
-/// there is no such snapshot then.
+/// [`Error::AlreadyExists`] if there is a snapshot of this name and of another state; no map there, another writer, a
+/// disk that refuses: there is no such snapshot then.
 pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
@@ -107,17 +108,6 @@ pub fn new_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<S
     let (disk, folder) = folder.into().into_parts();
     let store = TileStore::open_read_only(disk, &folder)?;
     Ok(SnapshotInfo::of(&store.snapshot(name)?))
-}
-
-/// Whether a map has room for a snapshot of this name, without making it.
-pub(super) fn check_is_free(store: &TileStore, name: &SnapshotName) -> Result<()> {
-    match store.snapshot_names()?.contains(name) {
-        false => Ok(()),
-        true => {
-            let hint = "choose another name, or delete that snapshot first";
-            Err(Error::AlreadyExists { path: Layout::new(store.folder()).snapshot(name), hint })
-        }
-    }
 }
 
 /// Who sees each of the kept tables.

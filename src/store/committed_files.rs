@@ -70,9 +70,15 @@ impl TileStore {
         let kept = self.layout().kept_scans();
         if self.keeps_scans() && self.disk().kind_at(&kept)? == Some(EntryKind::Folder) {
             let mut names = self.disk().list(&kept).map_err(|error| Error::io(&kept, "list", error))?;
-            names.retain(|name| Layout::generation_of(name).is_some() || Layout::segment_of(name).is_some());
+            names.retain(|name| Layout::is_of_kept_scans(name));
             names.sort_unstable();
-            files.extend(names.into_iter().map(|name| self.stored(kept.join(name), None)));
+            // What is to be gone from the map is not copied. Where a catalog is damaged, any may be needed.
+            let idle = match self.idle_scan_files_beside(snapshots) {
+                Err(Error::Damaged { .. }) => Vec::new(),
+                idle => idle?,
+            };
+            let needed = names.into_iter().map(|name| kept.join(name)).filter(|path| !idle.contains(path));
+            files.extend(needed.map(|path| self.stored(path, None)));
         }
         let scans = self.layout().scans();
         if let Some(EntryKind::File(_)) = self.disk().kind_at(&scans)? {

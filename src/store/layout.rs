@@ -91,7 +91,7 @@ impl Layout {
 
     /// What is to take the place of a damaged `scans.bin`.
     pub(super) fn scans_next(&self) -> PathBuf {
-        self.folder.join("scans.bin.next")
+        self.folder.join(SCANS_NEXT)
     }
 
     /// The folder of the scans that the map keeps.
@@ -117,6 +117,11 @@ impl Layout {
     /// The number of a segment's name; `None` for another name.
     pub(super) fn segment_of(name: &str) -> Option<u64> {
         number_behind(SEGMENT_PREFIX, name)
+    }
+
+    /// Whether a file of the folder of kept scans has this name.
+    pub fn is_of_kept_scans(name: &str) -> bool {
+        Self::generation_of(name).is_some() || Self::segment_of(name).is_some()
     }
 
     /// The file that a writer holds locked.
@@ -176,11 +181,28 @@ impl Layout {
         self.folder.join(QUARANTINE)
     }
 
+    /// Whether a file of the map's own folder has this name until it takes the place of another, or is given up.
+    pub fn is_next_of_map(name: &str) -> bool {
+        OWN_NEXT.contains(&name) || name == SCANS_NEXT
+    }
+
+    /// The same of a file in the folder of a tile.
+    pub fn is_next_of_tile(&self, name: &str) -> bool {
+        let is_version = self.files().iter().any(|file| file.next_name(self.storage) == name);
+        is_version || name == SPILL || name == REPLACEMENT
+    }
+
     /// The version of a tile's file that waits for the next commit.
     pub fn next(&self, tile: TileIndex, file: TileFile) -> PathBuf {
         self.tile_folder(tile).join(file.next_name(self.storage))
     }
 }
+
+/// What takes the place of `metadata.json` and of `commits.log`, until it is whole.
+pub(super) const OWN_NEXT: [&str; 2] = ["metadata.json.next", "commits.log.next"];
+
+/// What takes the place of a damaged `scans.bin`.
+const SCANS_NEXT: &str = "scans.bin.next";
 
 /// The name of the file of updates that wait for a tile. Like all that no commit names, it ends with `.next`.
 pub(super) const SPILL: &str = "updates.next";

@@ -65,7 +65,11 @@ pub(super) fn replace<T>(
         disk.rename(&next, path)?;
         Ok(written)
     };
-    replaced().map_err(|error| Error::io(path, "replace", error))
+    replaced().map_err(|error| {
+        // Written anew by the next attempt, which may never come.
+        let _ = disk.remove_file(&next);
+        Error::io(path, "replace", error)
+    })
 }
 
 /// Removes the folder of a tile that is no part of the map. It stays if somebody else's files are in it, perhaps under

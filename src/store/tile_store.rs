@@ -8,7 +8,7 @@ use super::layout::{Layout, TileFile};
 use super::map_files::MapFiles;
 use super::map_folder;
 use super::place;
-use super::recovery::recover::{recover, remove_uncommitted};
+use super::recovery::recover::{recover, remove_uncommitted, settle_own_files};
 use super::scans::{ScanKeeper, ScanList};
 use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
@@ -48,6 +48,8 @@ pub struct TileStore {
     pub(super) kept: KeptTables,
     /// How many files of an earlier writer opening has removed.
     pub(super) leftovers_removed: u64,
+    /// Whether opening has brought `metadata.json` up to the log.
+    has_replaced_metadata: bool,
     /// The snapshot that was opened in place of the map as it is.
     pub(super) opened_snapshot: Option<SnapshotName>,
     /// Held by a reader, so that a writer keeps what it sees.
@@ -109,9 +111,16 @@ impl TileStore {
                 store.committer.replace_log(&store.files, store.versions.commits())?;
             }
             store.recover()?;
+            if store.is_metadata_behind() {
+                // Readers would wait for it. Those that the map has may see the last commit.
+                store.keep_for_late_readers();
+                store.tidy_up();
+                store.has_replaced_metadata = !store.is_metadata_behind();
+            }
         } else {
-            let foreign = store.versions.foreign();
-            store.leftovers_removed = remove_uncommitted(&**store.disk(), store.layout(), foreign)?;
+            let (disk, layout, foreign) = (&**store.disk(), store.layout(), store.versions.foreign());
+            store.leftovers_removed =
+                settle_own_files(disk, layout)? + remove_uncommitted(disk, layout, foreign)?;
         }
         Ok(store)
     }
@@ -130,8 +139,9 @@ impl TileStore {
         self.leftovers_removed = found.removed;
         let removed = &self.versions.commits().last_removed;
         self.checkpoint = Checkpoint::of_leftovers(found.unrenamed, found.renamed, removed);
+        self.run_checkpoint()?;
         self.remove_unneeded_scans();
-        self.run_checkpoint()
+        Ok(())
     }
 
     /// Opens a map for reading beside a writer: takes no lock and writes nothing. The store sees the last flush, and
@@ -227,6 +237,7 @@ impl TileStore {
             keeper,
             kept: KeptTables::default(),
             leftovers_removed: 0,
+            has_replaced_metadata: false,
             opened_snapshot: None,
             shared_metadata: None,
         }
@@ -283,6 +294,11 @@ impl TileStore {
     /// How many files that an earlier writer left behind were removed when the store was opened.
     pub fn leftovers_removed(&self) -> u64 {
         self.leftovers_removed
+    }
+
+    /// Whether `metadata.json` was older than the log and was replaced when the store was opened.
+    pub fn has_replaced_metadata(&self) -> bool {
+        self.has_replaced_metadata
     }
 
     /// Whether the tile has a version on disk, committed or not.

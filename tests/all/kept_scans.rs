@@ -69,10 +69,9 @@ fn kept_points(disk: &FaultyDisk) -> Result<Vec<Vec<[f64; 3]>>> {
     MapReader::open(at(disk), 1)?.kept_scans()?.map(of_scan).collect()
 }
 
+/// Segments that could not be synced may be left behind.
 fn is_whole(disk: &FaultyDisk) -> bool {
-    let mut findings = 0;
-    verify(at(disk), |_| findings += 1, |_, _| ()).unwrap();
-    findings == 0
+    verify(at(disk), |_| (), |_, _| ()).unwrap().is_whole()
 }
 
 #[test]

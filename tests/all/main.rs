@@ -62,6 +62,8 @@ mod interrupted;
 mod kept_scans;
 /// What each folder may know.
 mod layering;
+/// Files that a killed command, or one that the disk refused, leaves in a map.
+mod leftovers;
 /// Many queries at once beside the mapper, in threads with small stacks.
 mod live_arrays;
 /// Readers in other threads beside the mapper.

@@ -11,6 +11,8 @@
 /// Less and less room for addresses, until a process cannot even start.
 #[cfg(target_os = "linux")]
 mod addresses;
+/// Commands that are killed after a commit or a snapshot, and repeated.
+mod completed;
 /// Inputs that are added by one command, repeated until it succeeds.
 mod exactly_once;
 /// SIGKILL at random times, resumed until the end.

@@ -139,7 +139,9 @@ impl RemapBeside {
         let stop = self.how.rework.stop.clone();
         let mut remapper = Remapper::begin(store, touched.config.clone(), tiles, stop)?;
         remapper.take_over(&mut side)?;
-        remapper.finish(true)?;
+        if let Err(error) = remapper.finish(true, TileStore::release_scans)? {
+            log::warn!("{}: committed, but not tidied up: {error:#}", self.folder.display());
+        }
         Ok(self.remapped)
     }
 }

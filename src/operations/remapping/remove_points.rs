@@ -1,5 +1,5 @@
 use super::filtered_scan::FilteredScan;
-use super::revision::{Fate, MappedAgain, Rework, check_region, rework};
+use super::revision::{Fate, MappedAgain, Rework, check_region, complete, rework};
 use crate::error::Result;
 use crate::mapper::MapReader;
 use crate::scan::ScanPoints;
@@ -54,6 +54,10 @@ pub fn remove_points(
         true => Fate::Loses(*region),
         false => Fate::Stays,
     };
-    let mapped = rework(MapPath::on(disk, &folder), seen, how, fate, progress)?;
+    let mapped = rework(MapPath::on(disk.clone(), &folder), seen, how, fate, progress)?;
+    if mapped.scans_changed == 0 && !how.is_dry_run {
+        // An earlier call may have been killed after its commit.
+        complete(disk, &folder)?;
+    }
     Ok(PointsRemoved { mapped, points_removed })
 }

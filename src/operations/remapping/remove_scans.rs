@@ -1,4 +1,4 @@
-use super::revision::{Fate, MappedAgain, Rework, rework};
+use super::revision::{Fate, MappedAgain, Rework, complete, rework};
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::operations::snapshot::delete_snapshot;
@@ -26,6 +26,9 @@ pub struct ScansRemoved {
     pub mapped: MappedAgain,
     /// Scans that are gone from the map.
     pub scans_removed: u64,
+    /// Files of scans that an earlier removal took out of the map and could not remove, because it was killed or the
+    /// disk refused, and that are gone now. Counted only where the map kept none of the scans any more.
+    pub files_removed: u64,
     /// Snapshots that still hold some of them.
     pub snapshots_with_them: Vec<SnapshotName>,
     /// Snapshots that held some of them and were deleted.
@@ -35,14 +38,18 @@ pub struct ScansRemoved {
 /// Takes scans out of a map, as if they had never been inserted, and their points out of its files. They keep their
 /// numbers, which no other scan gets.
 ///
+/// A removal that was killed after it had changed the map is completed by the same call, as by the next process that
+/// opens the map for writing: the files of the removed scans go.
+///
 /// Snapshots stay what they are, with what they hold of these scans, unless `from_snapshots`: then those that hold any
 /// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later, the
 /// same call deletes those that are left. `progress` is told the scans done and all.
 ///
 /// # Errors
 ///
-/// As for [`remap`](super::remap()); no scan that is selected. What befalls a snapshot, which may hold some of the
-/// scans then, is told once the map and the other snapshots are done.
+/// As for [`remap`](super::remap()); no scan that is selected; a disk that refuses to remove files of scans that are no
+/// longer in the map, which the same call tries again. What befalls a snapshot, which may hold some of the scans then,
+/// is told once the map and the other snapshots are done.
 pub fn remove_scans(
     map: impl Into<MapPath>,
     scans: &ScanSelection,
@@ -63,7 +70,7 @@ pub fn remove_scans(
         }
     }
     outcome?;
-    if removed.scans_removed == 0 && !removed.has_found_snapshots() {
+    if removed.scans_removed + removed.files_removed == 0 && !removed.has_found_snapshots() {
         return Err(none_selected(scans, &MapReader::open(path(), 1)?));
     }
     Ok(removed)
@@ -81,18 +88,42 @@ fn remove_from_map(
         let reader = MapReader::open(path(), 1)?;
         let selection = Selection::of(scans, &reader);
         let scans_removed = selection.count(&reader)?;
-        if scans_removed == 0 && from_snapshots {
-            return Ok(ScansRemoved::default());
+        if scans_removed == 0 {
+            if !from_snapshots {
+                reader.check_keeps_all()?;
+            }
+            let refusal = none_selected(scans, &reader);
+            // A reader would have the tables kept that the removal replaced.
+            drop(reader);
+            let files_removed = if how.is_dry_run { 0 } else { complete_earlier(path())? };
+            return match from_snapshots || files_removed > 0 {
+                true => Ok(ScansRemoved { files_removed, ..ScansRemoved::default() }),
+                false => Err(refusal),
+            };
         }
         reader.check_keeps_all()?;
-        if scans_removed == 0 {
-            return Err(none_selected(scans, &reader));
-        }
         (selection, scans_removed, reader.flush_number())
     };
     let fate = |record: &KeptRecord| if selection.has(record) { Fate::Goes } else { Fate::Stays };
     let mapped = rework(path(), seen, how, fate, progress)?;
     Ok(ScansRemoved { mapped, scans_removed, ..ScansRemoved::default() })
+}
+
+/// Completes a removal that was committed and then killed, or that the disk kept from its end. Returns how many files
+/// of kept scans are gone by this.
+fn complete_earlier(map: MapPath) -> Result<u64> {
+    let (disk, folder) = map.into_parts();
+    let idle = TileStore::open_read_only(disk.clone(), &folder)?.idle_scan_files()?.unwrap_or_default();
+    match complete(disk.clone(), &folder) {
+        // The other writer has done it when it opened the map.
+        Err(Error::Locked { .. }) if idle.is_empty() => return Ok(0),
+        completed => completed?,
+    }
+    let mut removed = 0;
+    for path in idle {
+        removed += u64::from(disk.kind_at(&path)?.is_none());
+    }
+    Ok(removed)
 }
 
 impl ScansRemoved {

@@ -2,14 +2,17 @@ use super::filtered_scan::FilteredScan;
 use crate::config::{MapConfig, MemoryLimit};
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScan, Remapper, TileFinder, check_keeps_all};
-use crate::operations::snapshot::check_is_free;
 use crate::persistence::config_from;
 use crate::scan::{Pose, ScanPoints, ScanReport, Stop};
 use crate::space::{Aabb, TileIndex, TileSelection};
-use crate::store::{CatalogEntry, Disk, KeptFrame, KeptRecord, Layout, MapPath, SnapshotName, TileStore};
+use crate::store::{
+    CatalogEntry, Disk, EntryKind, KeptFrame, KeptRecord, Layout, MapPath, SideFolder, SnapshotName,
+    TileStore,
+};
 use rustc_hash::FxHashSet;
 use serde::Serialize;
 use std::collections::BTreeSet;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -114,13 +117,66 @@ pub(super) fn rework(
         return Ok(revision.counts);
     }
     keep_as_it_is(&mut store, how)?;
-    tidied(disk, &folder, revision.map(store, touched, &mut progress))
+    let takes_points = !touched.segments.is_empty();
+    let (counts, released) = tidied(disk.clone(), &folder, revision.map(store, touched, &mut progress))?;
+    if takes_points {
+        remove_second_map(disk.clone(), &folder);
+    }
+    match released {
+        // Points that are to be gone must not remain: once more, by another opening of the map.
+        Err(_) if takes_points => complete(disk, &folder)?,
+        Err(error) => log::warn!("{}: committed, but not tidied up: {error:#}", folder.display()),
+        Ok(()) => {}
+    }
+    Ok(counts)
 }
 
-/// Makes the snapshot of the map as it is, if there is to be one.
+/// Does what a commit leaves to do, and removes what nothing needs any more of kept scans, durably.
+fn release(store: &mut TileStore) -> Result<()> {
+    store.checkpoint()?;
+    store.release_scans()
+}
+
+/// Removes the second map that a remapping beside a mapper left when it was killed: it has the evidence of all scans.
+/// Another map that has this name by chance has another id, and stays.
+fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) {
+    let second = folder.with_added_extension("remapping");
+    if !matches!(disk.kind(&second), Ok(Some(EntryKind::Folder))) {
+        return;
+    }
+    let id_of = |folder: &Path| TileStore::open_read_only(disk.clone(), folder).ok()?.map_id();
+    let id = id_of(folder);
+    if id.is_none() || id_of(&second) != id {
+        return;
+    }
+    match SideFolder::begin(disk, folder) {
+        // At work, or a path without a name that none could be beside.
+        Ok(_) | Err(Error::Locked { .. } | Error::InvalidArgument { .. }) => {}
+        Err(error) => log::warn!("{error:#}"),
+    }
+}
+
+/// Completes a removal that was committed: what it took out of the map is in no file any more, except for snapshots.
+pub(super) fn complete(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
+    remove_second_map(disk.clone(), folder);
+    TileStore::open(disk, folder).and_then(|mut store| release(&mut store)).map_err(|error| match error {
+        Error::Io { path, action, cause } => {
+            let hint = "points that were removed from the map are still in its files; run this again";
+            Error::Io { path, action, cause: io::Error::new(cause.kind(), format!("{cause}; {hint}")) }
+        }
+        Error::Damaged { path, tile, mut cause } => {
+            cause.reason.push_str(
+                "; points that were removed from the map are still in its files; repair the map, and run this again",
+            );
+            Error::Damaged { path, tile, cause }
+        }
+        other => other,
+    })
+}
+
+/// Makes the snapshot of the map as it is, if there is to be one. One of this state that is there already counts.
 pub(super) fn keep_as_it_is(store: &mut TileStore, how: &Rework) -> Result<()> {
     let Some(name) = &how.keep_as else { return Ok(()) };
-    check_is_free(store, name)?;
     store.create_snapshot(name)
 }
 
@@ -286,13 +342,13 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<F> {
         self.map_points(scan.record().clone(), touched, pose.is_some(), |selection| map(&scan, selection))
     }
 
-    /// Maps the touched tiles again and commits.
+    /// Maps the touched tiles again and commits. Returns what became of the files that nothing needs any more, too.
     fn map(
         mut self,
         store: TileStore,
         touched: Touched,
         progress: &mut impl FnMut(u64, u64),
-    ) -> Result<MappedAgain> {
+    ) -> Result<(MappedAgain, Result<()>)> {
         let layout = store.layout().clone();
         let mut records = store.kept_records()?;
         let tiles: Vec<_> = store.tiles().filter(|&tile| touched.has(tile)).collect();
@@ -325,8 +381,8 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<F> {
             remapper.put(&CatalogEntry::Kept(Box::new(record)))?;
         }
         progress(done, self.counts.scans);
-        remapper.finish(have_poses_changed)?;
-        Ok(self.counts)
+        let released = remapper.finish(have_poses_changed, release)?;
+        Ok((self.counts, released))
     }
 
     /// Maps what a scan says about touched tiles; returns its new record.

@@ -2,7 +2,7 @@ use crate::error::{Error, Result, is_of_medium};
 use crate::space::{TileIndex, TileTable};
 use crate::store::commit::commits::Commits;
 use crate::store::disk::{Disk, EntryKind};
-use crate::store::layout::{Layout, REPLACEMENT, SPILL, tile_of_folder};
+use crate::store::layout::{Layout, OWN_NEXT, REPLACEMENT, SPILL, tile_of_folder};
 use crate::store::map_folder;
 use crate::store::snapshots::seen_tables::{KeptFlushes, SeenTables};
 use crate::store::snapshots::snapshot_file::Snapshot;
@@ -14,9 +14,6 @@ use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
-
-/// What a writer may have left beside the map's own two files.
-const OWN_NEXT: [&str; 2] = ["metadata.json.next", "commits.log.next"];
 
 /// What a crash left behind that is not to be removed.
 #[derive(Debug, Default)]
@@ -49,11 +46,8 @@ pub(in crate::store) fn recover(
     let removed: FxHashSet<TileIndex> = commits.last_removed.iter().copied().collect();
     let mut leftovers = Leftovers::default();
     let (mut kept, mut empty_folders) = (KeptFlushes::default(), Vec::new());
+    leftovers.removed += settle_own_files(disk, layout)?;
     for name in list(disk, layout.folder())? {
-        let path = layout.folder().join(&name);
-        if OWN_NEXT.contains(&&*name) {
-            remove(disk, &path, &mut leftovers.removed)?;
-        }
         let Some(tile) = tile_of_folder(&name) else { continue };
         let version = commits.tiles.get(tile);
         let is_of_last_commit = commits.last_changed.contains(tile);
@@ -89,6 +83,25 @@ pub(in crate::store) fn recover(
         tolerate(map_folder::remove_unless_used(disk, &path), &path, "remove")?;
     }
     Ok(leftovers)
+}
+
+/// Removes what was to take the place of the map's own files and did not, except for a list of scans whose predecessor
+/// is in quarantine: that gets its name. Returns how many files were removed.
+pub(in crate::store) fn settle_own_files(disk: &dyn Disk, layout: &Layout) -> Result<u64> {
+    let mut removed = 0;
+    for name in OWN_NEXT {
+        remove(disk, &layout.folder().join(name), &mut removed)?;
+    }
+    let (scans, next) = (layout.scans(), layout.scans_next());
+    match kind(disk, &scans)? {
+        // It was synced before the damaged one was taken away.
+        None if matches!(kind(disk, &next)?, Some(EntryKind::File(_))) => {
+            tolerate(disk.rename(&next, &scans), &next, "rename")?;
+            tolerate(disk.sync_folder(layout.folder()), layout.folder(), "sync")?;
+        }
+        _ => remove(disk, &next, &mut removed)?,
+    }
+    Ok(removed)
 }
 
 /// Finishes what the log says of snapshots: one that was made gets its name, one that was deleted loses its file.

@@ -179,8 +179,7 @@ fn check_kept_scans(disk: &dyn Disk, layout: &Layout) -> Result<()> {
     if disk.kind_at(&folder)? != Some(EntryKind::Folder) {
         return Err(not_of_a_map(&folder));
     }
-    let is_own = |name: &str| Layout::generation_of(name).is_some() || Layout::segment_of(name).is_some();
-    match list(disk, &folder)?.into_iter().find(|name| !is_own(name)) {
+    match list(disk, &folder)?.into_iter().find(|name| !Layout::is_of_kept_scans(name)) {
         Some(name) => Err(not_of_a_map(&folder.join(name))),
         None => Ok(()),
     }

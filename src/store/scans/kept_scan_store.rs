@@ -3,7 +3,7 @@
 use super::catalog::{KeptAsOf, KeptRecords, generation_of};
 use super::catalog_entry::{CatalogEntry, SegmentPlace};
 use super::catalog_salvage::{Salvaged, salvage_entries};
-use super::scan_keeper::{Catalog, remove_unneeded};
+use super::scan_keeper::{Catalog, unneeded};
 use super::scan_list::read_scans;
 use crate::error::{Error, Result};
 use crate::space::Point;
@@ -124,21 +124,75 @@ impl TileStore {
         KeptAsOf { flush_number: commits.flush_number, scan_number: commits.scan_number }
     }
 
-    /// Removes catalogs and segments that neither the map nor a snapshot needs.
+    /// Removes catalogs and segments that neither the map nor a snapshot needs. What the disk refuses remains until the
+    /// map is next opened for writing.
     pub(in crate::store) fn remove_unneeded_scans(&mut self) {
-        if !self.keeper.is_on() {
-            return;
+        if let Err(error) = self.release_scans() {
+            log::warn!("kept scans that nothing needs remain: {error:#}");
         }
+    }
+
+    /// Removes catalogs and segments that neither the map nor a snapshot needs, durably.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; a catalog that cannot be read, which may need any.
+    pub fn release_scans(&mut self) -> Result<()> {
         // A snapshot that cannot be read may need any.
-        let Some(mut flushes) = self.kept.snapshots().kept_scans_of(self.committer.snapshots()) else {
-            return;
+        let Some(flushes) = self.kept.snapshots().kept_scans_of(self.committer.snapshots()) else {
+            return Ok(());
         };
-        flushes.push(self.last_commit());
         let is_new = |segment| self.keeper.is_writing(segment);
-        match remove_unneeded(&**self.files.disk(), self.files.layout(), &flushes, is_new) {
-            Ok(removed) => self.leftovers_removed += removed,
-            Err(error) => log::warn!("kept scans that nothing needs stay: {error:#}"),
+        let files = self.unneeded_scans(flushes, is_new)?;
+        for path in &files {
+            self.files.remove_file(path)?;
+            self.leftovers_removed += 1;
         }
+        // Also what an attempt before could not make durable: a power cut would bring the scans back.
+        match self.is_keeping_scans() || !files.is_empty() {
+            true if self.files.kind(&self.layout().kept_scans())?.is_some() => {
+                self.files.sync_folder(&self.layout().kept_scans())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether the map keeps its scans as of the last commit; one that begins to has no catalog yet.
+    fn is_keeping_scans(&self) -> bool {
+        self.metadata().ext.as_ref().is_some_and(|ext| ext.keeps_scans)
+    }
+
+    /// The catalogs and segments that neither the last commit nor a snapshot needs, in order: a writer that ended early
+    /// did not remove them, or one at work has not committed them yet. `None` where a snapshot cannot be read, which may
+    /// need any of them.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; a catalog that cannot be read, which may need any.
+    pub(crate) fn idle_scan_files(&self) -> Result<Option<Vec<PathBuf>>> {
+        match self.read_snapshots() {
+            Ok(snapshots) => self.idle_scan_files_beside(&snapshots).map(Some),
+            Err(Error::Damaged { .. }) => Ok(None),
+            Err(error) if error.is_of_medium() => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The same where the snapshots are known.
+    pub(in crate::store) fn idle_scan_files_beside(&self, snapshots: &[Snapshot]) -> Result<Vec<PathBuf>> {
+        self.unneeded_scans(snapshots.iter().filter_map(kept_as_of).collect(), |_| false)
+    }
+
+    /// The catalogs and segments that neither the last commit needs nor one of these flushes.
+    fn unneeded_scans(
+        &self,
+        mut flushes: Vec<KeptAsOf>,
+        is_new: impl Fn(u64) -> bool,
+    ) -> Result<Vec<PathBuf>> {
+        if self.is_keeping_scans() {
+            flushes.push(self.last_commit());
+        }
+        unneeded(&**self.disk(), self.layout(), &flushes, is_new)
     }
 
     /// The file of the catalog of the last commit, if there is one.
@@ -197,9 +251,23 @@ impl TileStore {
         Ok(names.iter().map(|name| folder.join(name)).collect())
     }
 
-    /// Removes what neither the map nor a snapshot needs of kept scans.
-    pub fn release_scans(&mut self) {
-        self.remove_unneeded_scans();
+    /// Whether the scans of the last commit are those of another state of the map with the same metadata.
+    pub(in crate::store) fn has_scans_of(&self, past: &Self) -> Result<bool> {
+        if !self.is_keeping_scans() {
+            let listed = |store: &Self| {
+                let flush_number = store.commits().flush_number;
+                read_scans(&**store.disk(), store.layout(), flush_number, store.listed_records())
+            };
+            return Ok(listed(self)? == listed(past)?);
+        }
+        let (mut now, mut then) = (self.kept_records()?, past.kept_records()?);
+        loop {
+            match (now.next_entry()?, then.next_entry()?) {
+                (None, None) => return Ok(true),
+                (now, then) if now == then => {}
+                _ => return Ok(false),
+            }
+        }
     }
 
     /// Makes the kept scans those of an earlier commit again, which is open as `past`.

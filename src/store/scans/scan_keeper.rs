@@ -9,6 +9,7 @@ use crate::store::map_files::MapFiles;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::io;
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 /// What a writer knows of the scans that its map keeps.
@@ -429,17 +430,24 @@ impl ScanKeeper {
     }
 }
 
-/// Removes the catalogs and segments that no flush in `flushes` needs, but no new segments.
+/// The catalogs and segments that no flush in `flushes` needs, in order; new segments are left out.
 ///
 /// # Errors
 ///
-/// A catalog that cannot be read to its end: it keeps all. A disk that refuses.
-pub(in crate::store) fn remove_unneeded(
+/// A catalog that cannot be read to its end: it may need any segment. A disk that refuses.
+pub(in crate::store) fn unneeded(
     disk: &dyn Disk,
     layout: &Layout,
     flushes: &[KeptAsOf],
     is_new: impl Fn(u64) -> bool,
-) -> Result<u64> {
+) -> Result<Vec<PathBuf>> {
+    let folder = layout.kept_scans();
+    let mut names = match disk.list(&folder) {
+        // A map that keeps scans and lacks the folder is damaged.
+        Err(error) if error.kind() == io::ErrorKind::NotFound && flushes.is_empty() => return Ok(Vec::new()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        names => names.map_err(|error| Error::io(&folder, "list", error))?,
+    };
     let (mut generations, mut segments) = (BTreeSet::new(), BTreeSet::new());
     for &as_of in flushes {
         generations.extend(generation_of(disk, layout, as_of.flush_number)?);
@@ -448,26 +456,14 @@ pub(in crate::store) fn remove_unneeded(
             segments.insert(scan.place.segment);
         }
     }
-    let folder = layout.kept_scans();
-    let names = match disk.list(&folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
-        names => names.map_err(|error| Error::io(&folder, "list", error))?,
-    };
-    let mut removed = 0;
-    for name in names {
-        let is_needed = match (Layout::generation_of(&name), Layout::segment_of(&name)) {
-            (Some(generation), _) => generations.contains(&generation),
-            (_, Some(segment)) => segments.contains(&segment) || is_new(segment),
-            // Not voxtile's.
-            _ => true,
-        };
-        if !is_needed {
-            let path = folder.join(name);
-            disk.remove_file(&path).map_err(|error| Error::io(&path, "remove", error))?;
-            removed += 1;
-        }
-    }
-    Ok(removed)
+    names.retain(|name| match (Layout::generation_of(name), Layout::segment_of(name)) {
+        (Some(generation), _) => !generations.contains(&generation),
+        (_, Some(segment)) => !segments.contains(&segment) && !is_new(segment),
+        // Not voxtile's.
+        _ => false,
+    });
+    names.sort_unstable();
+    Ok(names.iter().map(|name| folder.join(name)).collect())
 }
 
 /// Removes catalogs of commits that never happened.

@@ -90,16 +90,22 @@ impl TileStore {
     /// replaced. What is written and not committed is no part of it. When this returns it is durable; after an error
     /// there is none.
     ///
+    /// Where there is one of this name and of this very state, an earlier attempt made it: nothing is done.
+    ///
     /// # Errors
     ///
-    /// [`Error::AlreadyExists`] if there is one of this name; a map of the original format, which must be upgraded
-    /// first; a disk that refuses.
+    /// [`Error::AlreadyExists`] if there is one of this name and of another state; a map of the original format, which
+    /// must be upgraded first; a disk that refuses.
     pub fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.finish_earlier_work()?;
         let map_id = self.committer.logged_map_id()?;
         let (folder, path) = (self.layout().snapshots(), self.layout().snapshot(name));
         let has_folder = Snapshot::has_folder(&**self.disk(), self.layout())?;
         let mut listed = self.committer.snapshots().cloned().unwrap_or_default();
+        if listed.contains(name) && self.is_kept_as(name) {
+            log::info!("{}: the snapshot {name} is of this state already", self.folder().display());
+            return Ok(());
+        }
         if listed.contains(name) || has_folder && self.files.kind(&path)?.is_some() {
             let hint = "choose another name, or delete that snapshot first";
             return Err(Error::AlreadyExists { path, hint });
@@ -129,6 +135,29 @@ impl TileStore {
         self.checkpoint.name_snapshot(name);
         self.finish_snapshot_commit();
         Ok(())
+    }
+
+    /// Whether a snapshot of this name can be read and keeps the state of the last commit.
+    fn is_kept_as(&self, name: &SnapshotName) -> bool {
+        self.snapshot(name).and_then(|snapshot| self.is_as(&self.at(&snapshot))).unwrap_or(false)
+    }
+
+    /// Whether the last commit left the map as `past`, a snapshot of it, says: the same tiles, scans, parameters and
+    /// inputs. Flush numbers may differ: creating and deleting snapshots are flushes, too.
+    ///
+    /// # Errors
+    ///
+    /// A list of scans that is damaged; a disk that refuses.
+    pub fn is_as(&self, past: &Self) -> Result<bool> {
+        let without_snapshots = |store: &Self| {
+            let mut metadata = store.metadata().clone();
+            metadata.ext.iter_mut().for_each(|ext| ext.snapshots = None);
+            metadata
+        };
+        let is_same = self.commits().scan_number == past.commits().scan_number
+            && self.commits().tiles == past.commits().tiles
+            && without_snapshots(self).is_same_but_for_progress(&without_snapshots(past));
+        Ok(is_same && self.has_scans_of(past)?)
     }
 
     /// Writes what a snapshot says in place of what it said before.

@@ -37,6 +37,8 @@ impl FaultyDisk {
             stays: matches!(fault, Fault::Breaks(_)),
             operations: 0,
             changes: 0,
+            renames: 0,
+            refused_names: BTreeSet::new(),
             has_room: true,
             has_links: true,
             crashed: false,
@@ -62,6 +64,11 @@ impl FaultyDisk {
         self.state().changes
     }
 
+    /// Number of renames so far.
+    pub fn renames(&self) -> u64 {
+        self.state().renames
+    }
+
     /// How often a file was opened to be read from its beginning.
     pub fn times_opened(&self, path: &Path) -> u64 {
         self.state().opened.get(path).copied().unwrap_or_default()
@@ -83,6 +90,7 @@ impl FaultyDisk {
         let mut state = self.state();
         (state.has_room, state.fault) = (true, Fault::None);
         state.broken.clear();
+        state.refused_names.clear();
     }
 
     /// Makes every operation on a file or folder fail.
@@ -110,6 +118,7 @@ impl FaultyDisk {
         let mut state = self.state();
         state.broken.clear();
         state.unreadable.clear();
+        state.refused_names.clear();
         state.fault = Fault::None;
     }
 
@@ -121,7 +130,7 @@ impl FaultyDisk {
     /// What fails from now on; operations are counted anew.
     pub fn set_fault(&self, fault: Fault) {
         let mut state = self.state();
-        (state.fault, state.operations, state.changes) = (fault, 0, 0);
+        (state.fault, state.operations, state.changes, state.renames) = (fault, 0, 0, 0);
     }
 
     /// The disk as it is found when the power is back.

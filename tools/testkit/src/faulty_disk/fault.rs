@@ -8,6 +8,9 @@ pub enum Fault {
     /// The operation fails, and from then on every operation on the same file or folder, until
     /// [`super::FaultyDisk::mend`]: what a disk does with sectors that it cannot read or write.
     Breaks(u64),
+    /// The rename of this number, counted from 0 among renames, fails, and from then on every rename to the same name,
+    /// until [`super::FaultyDisk::mend`] or [`super::FaultyDisk::make_room`].
+    RefusesRename(u64),
     /// The change fails; and a sync that fails leaves the file as it was on the medium, while later syncs of the same
     /// bytes report success, as Linux does.
     LosesSync(u64),

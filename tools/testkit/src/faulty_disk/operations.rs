@@ -118,6 +118,7 @@ impl Disk for FaultyDisk {
         let mut state = self.state();
         let path = if state.broken.contains(to) { to } else { from };
         state.attempt(Kind::Changes, path)?;
+        state.attempt_rename(to)?;
         let Some(entry) = state.names.get(from).copied() else { return Err(io::ErrorKind::NotFound.into()) };
         match (entry, state.names.get(to)) {
             (_, None) | (Entry::File(_), Some(Entry::File(_))) => {}

@@ -20,6 +20,9 @@ pub(super) struct State {
     pub(super) stays: bool,
     pub(super) operations: u64,
     pub(super) changes: u64,
+    pub(super) renames: u64,
+    /// Names that no file gets.
+    pub(super) refused_names: BTreeSet<PathBuf>,
     pub(super) has_room: bool,
     pub(super) has_links: bool,
     pub(super) crashed: bool,
@@ -71,6 +74,18 @@ impl State {
                 error(io::ErrorKind::ReadOnlyFilesystem)
             }
             _ => Verdict::Goes,
+        }
+    }
+
+    /// Whether a file gets another name, as far as [`Fault::RefusesRename`] goes.
+    pub(super) fn attempt_rename(&mut self, to: &Path) -> io::Result<()> {
+        if self.fault == Fault::RefusesRename(self.renames) {
+            self.refused_names.insert(to.to_owned());
+        }
+        self.renames += 1;
+        match self.refused_names.contains(to) {
+            true => Err(io::Error::other("input/output error")),
+            false => Ok(()),
         }
     }
 

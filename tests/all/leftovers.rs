@@ -1,0 +1,549 @@
+//! What a command that is killed, or that the disk refuses a rename, leaves in a map: reported by `verify`, completed by
+//! the next writer and by the same command.
+
+use crate::support::{message_of, some_of};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
+use voxtile::integrity::{Verification, repair, verify};
+use voxtile::operations::{
+    Decay, NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, decay, delete_snapshot,
+    kept_bytes, remap, remove_points, remove_scans, revert, snapshot,
+};
+use voxtile::store::{SnapshotName, TileStore};
+use voxtile::{
+    Aabb, Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
+    OutOfCoreTileMapper, Pose, Result, ScanRef, Storage,
+};
+
+fn map() -> &'static Path {
+    Path::new("/city/map")
+}
+
+fn at(disk: &FaultyDisk) -> MapPath {
+    MapPath::on(disk.shared(), map())
+}
+
+fn name(name: &str) -> SnapshotName {
+    SnapshotName::new(name).unwrap()
+}
+
+fn config(storage: Storage, keeps_scans: bool) -> MapConfig {
+    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_storage(storage);
+    config.with_kept_scans(keeps_scans).with_cache_tiles(2).with_write_buffer_bytes(600)
+}
+
+fn rework() -> Rework {
+    Rework::default().with_memory_bytes(MemoryLimit::least_bytes(&config(Storage::OctoMap, true).grid))
+}
+
+fn pose(number: u64, by_m: f64) -> Pose {
+    Pose::from_quaternion([3.0 * (number % 4) as f64 + by_m, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]).unwrap()
+}
+
+/// Maps scans with these numbers, with a flush after each.
+fn build(disk: &FaultyDisk, config: MapConfig, numbers: std::ops::Range<u64>) -> Result<()> {
+    let mut mapper = match OutOfCoreTileMapper::open(at(disk), config.clone()) {
+        Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(at(disk), config)?,
+        opened => opened?,
+    };
+    for number in numbers.filter(|&number| number >= mapper.scan_number()).collect::<Vec<_>>() {
+        let scan = random_scan(&mut Random(number), [0.0; 3], 5);
+        mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &scan.points))?;
+        mapper.flush()?;
+    }
+    mapper.flush()
+}
+
+/// A map of four scans, with a snapshot of the first three.
+fn four_scans(storage: Storage, keeps_scans: bool) -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    build(&disk, config(storage, keeps_scans), 0..3).unwrap();
+    snapshot(at(&disk), &name("third")).unwrap();
+    build(&disk, config(storage, keeps_scans), 3..4).unwrap();
+    disk.copy()
+}
+
+fn findings(disk: &FaultyDisk) -> (Verification, BTreeSet<PathBuf>) {
+    let mut found = BTreeSet::new();
+    let verification = verify(at(disk), |finding| found.extend([finding.path.clone()]), |_, _| ()).unwrap();
+    (verification, found)
+}
+
+/// Files that wait for their names.
+fn waiting(disk: &FaultyDisk) -> Vec<PathBuf> {
+    disk.files()
+        .into_keys()
+        .filter(|path| {
+            path.extension().is_some_and(|extension| extension == "next") || path.ends_with(".next")
+        })
+        .collect()
+}
+
+fn region() -> Aabb {
+    Aabb { min: [-1.0, -1.0, -1.0], max: [4.1, 4.0, 4.0] }
+}
+
+/// A process that changes a map.
+type Work = fn(&FaultyDisk) -> Result<()>;
+
+fn appended(disk: &FaultyDisk) -> Result<()> {
+    let config = MapReader::config_of(at(disk))?;
+    build(disk, config.with_range(0.3, 3.0).with_cache_tiles(2).with_write_buffer_bytes(600), 4..9)
+}
+
+fn cleared(disk: &FaultyDisk) -> Result<()> {
+    clear(at(disk), &Part::Inside(region()), |_, _| ()).map(drop)
+}
+
+fn faded(disk: &FaultyDisk) -> Result<()> {
+    decay(at(disk), &Decay::new(2.0).with_forget_below(0.25), |_, _| ()).map(drop)
+}
+
+fn kept(disk: &FaultyDisk) -> Result<()> {
+    snapshot(at(disk), &name("now-and-then"))
+}
+
+fn deleted(disk: &FaultyDisk) -> Result<()> {
+    match delete_snapshot(at(disk), &name("third")) {
+        // Done by an attempt before.
+        Err(Error::InvalidArgument { .. }) => Ok(()),
+        deleted => deleted,
+    }
+}
+
+fn reverted(disk: &FaultyDisk) -> Result<()> {
+    revert(at(disk), &name("third"), Some(&name("fourth")), |_, _| ()).map(drop)
+}
+
+fn new_poses() -> NewPoses {
+    NewPoses::Numbered(vec![(1, pose(0, 0.7)), (3, pose(2, 0.7))])
+}
+
+fn moved(disk: &FaultyDisk) -> Result<()> {
+    remap(at(disk), &new_poses(), &Remap::new(rework().with_keep_as(name("before"))), |_, _| ()).map(drop)
+}
+
+fn moved_beside(disk: &FaultyDisk) -> Result<()> {
+    let how = Remap::new(rework().with_keep_as(name("before")));
+    let mut beside = RemapBeside::begin(at(disk), &new_poses(), &how)?;
+    beside.follow(|_| ())?;
+    beside.finish().map(drop)
+}
+
+fn removed(disk: &FaultyDisk) -> Result<()> {
+    let scans = ScanSelection::Numbers(2, 2);
+    match remove_scans(at(disk), &scans, false, &rework(), |_, _| ()) {
+        // Done by an attempt before, to its end.
+        Err(Error::InvalidArgument { .. }) => Ok(()),
+        removed => removed.map(drop),
+    }
+}
+
+fn removed_kept(disk: &FaultyDisk) -> Result<()> {
+    let (scans, how) = (ScanSelection::Numbers(2, 2), rework().with_keep_as(name("before")));
+    match remove_scans(at(disk), &scans, false, &how, |_, _| ()) {
+        Err(Error::InvalidArgument { .. }) => Ok(()),
+        removed => removed.map(drop),
+    }
+}
+
+fn points_removed(disk: &FaultyDisk) -> Result<()> {
+    remove_points(at(disk), &region(), &rework(), |_, _| ()).map(drop)
+}
+
+fn points_removed_kept(disk: &FaultyDisk) -> Result<()> {
+    remove_points(at(disk), &region(), &rework().with_keep_as(name("before")), |_, _| ()).map(drop)
+}
+
+/// Repairs a map whose list of scans and one octree are damaged.
+fn repaired(disk: &FaultyDisk) -> Result<()> {
+    repair(at(disk), |_| (), |_, _| ()).map(drop)
+}
+
+fn damaged(storage: Storage) -> FaultyDisk {
+    let disk = four_scans(storage, false);
+    let files = disk.files();
+    let list = &files[&map().join("scans.bin")];
+    disk.put(&map().join("scans.bin"), &list[..list.len() - 5]);
+    disk.make_unreadable(&map().join("scans.bin"));
+    if let Some((octree, bytes)) = files.iter().find(|(path, _)| path.ends_with("octree.bt")) {
+        disk.put(octree, &bytes[1..]);
+    }
+    disk
+}
+
+/// The same without the files that voxtile adds.
+fn foreign() -> FaultyDisk {
+    let disk = four_scans(Storage::OctoMap, false);
+    ["commits.log", "snapshots", "scans.bin"].iter().for_each(|name| disk.take(&map().join(name)));
+    let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
+    disk.put(&map().join("metadata.json"), metadata);
+    for (path, bytes) in disk.files() {
+        if path.ends_with("iwlo_meta.bin") {
+            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
+            disk.put(&path, &bytes[..16 + 18 * count]);
+        } else if path.to_string_lossy().contains(".flush") {
+            disk.take(&path);
+        }
+    }
+    disk.copy()
+}
+
+fn all_works() -> Vec<(&'static str, FaultyDisk, Work)> {
+    let mut works: Vec<(&'static str, FaultyDisk, Work)> = Vec::new();
+    for storage in [Storage::OctoMap, Storage::Compact] {
+        let (plain, keeping) = (four_scans(storage, false), four_scans(storage, true));
+        works.push(("append", plain.copy(), appended));
+        works.push(("append kept scans", keeping.copy(), appended));
+        works.push(("clear", plain.copy(), cleared));
+        works.push(("decay", plain.copy(), faded));
+        works.push(("snapshot", plain.copy(), kept));
+        works.push(("delete", plain.copy(), deleted));
+        works.push(("revert", plain.copy(), reverted));
+        works.push(("revert kept scans", keeping.copy(), reverted));
+        works.push(("remap", keeping.copy(), moved));
+        works.push(("remap beside", keeping.copy(), moved_beside));
+        works.push(("remove scans", keeping.copy(), removed));
+        works.push(("remove points", keeping.copy(), points_removed));
+        works.push(("repair", damaged(storage), repaired));
+    }
+    works.push(("upgrade", foreign(), kept));
+    works
+}
+
+/// What `info` says of the bytes on disk: of the map, and of readers.
+fn bytes_of(disk: &FaultyDisk) -> (Option<(u64, u64)>, u64) {
+    let reader = MapReader::open(at(disk), 1).unwrap();
+    (reader.disk_bytes(), kept_bytes(at(disk)).unwrap().reader_bytes)
+}
+
+/// What `info` counts is what is left once everything is in order.
+#[test]
+fn files_that_could_not_be_renamed_are_reported_and_the_next_writer_settles_them() {
+    let (mut faults, mut kinds) = (0, BTreeMap::<String, u64>::new());
+    for (what, start, work) in all_works() {
+        let undisturbed = start.copy();
+        undisturbed.set_fault(Fault::None);
+        // What cannot be read stays so.
+        let begin = || {
+            let disk = start.copy();
+            if what == "repair" {
+                disk.make_unreadable(&map().join("scans.bin"));
+            }
+            disk
+        };
+        work(&undisturbed).unwrap_or_else(|error| panic!("{what}: {error:#}"));
+        for at_rename in some_of(0..undisturbed.renames(), 16) {
+            let disk = begin();
+            disk.set_fault(Fault::RefusesRename(at_rename));
+            let outcome = work(&disk);
+            let what = format!("{what}, rename {at_rename}");
+            faults += 1;
+            if outcome.is_ok() {
+                let left = waiting(&disk);
+                for path in &left {
+                    let of = path.file_name().unwrap().to_string_lossy().into_owned();
+                    *kinds.entry(of).or_default() += 1;
+                }
+                let (verification, found) = findings(&disk);
+                assert_eq!(verification.damage, 0, "{what}: {found:?}");
+                assert!(left.iter().all(|path| found.contains(path)), "{what}: {left:?}, found {found:?}");
+                assert!(verification.leftovers >= left.len() as u64, "{what}");
+                let before = bytes_of(&disk);
+                disk.make_room();
+                drop(
+                    TileStore::open(disk.shared(), map()).unwrap_or_else(|error| panic!("{what}: {error:#}")),
+                );
+                assert_eq!(waiting(&disk), Vec::<PathBuf>::new(), "{what}");
+                assert_eq!(findings(&disk).0.leftovers, 0, "{what}");
+                assert_eq!(bytes_of(&disk), before, "{what}");
+                assert_eq!(before.1, 0, "{what}: there is no reader");
+            } else {
+                disk.make_room();
+                work(&disk).unwrap_or_else(|error| panic!("{what}: again: {error:#}"));
+                assert_eq!(waiting(&disk), Vec::<PathBuf>::new(), "{what}: again");
+            }
+        }
+    }
+    println!("{faults} renames refused; left by commands that ended well: {kinds:?}");
+    assert!(faults > 20);
+}
+
+/// Files that no act of today leaves, too.
+#[test]
+fn files_that_replace_others_are_reported_and_removed_whatever_the_map() {
+    for start in [four_scans(Storage::Compact, false), foreign()] {
+        let names = ["metadata.json.next", "commits.log.next", "scans.bin.next"];
+        names.iter().for_each(|name| start.put(&map().join(name), b"half"));
+        if !start.files().contains_key(&map().join("scans.bin")) {
+            start.put(&map().join("scans.bin"), b"");
+        }
+        let (verification, found) = findings(&start);
+        assert_eq!(verification.leftovers, 3, "{found:?}");
+        assert!(names.iter().all(|name| found.contains(&map().join(name))));
+        drop(TileStore::open(start.shared(), map()).unwrap());
+        assert_eq!(waiting(&start), Vec::<PathBuf>::new());
+    }
+}
+
+/// The segments of the kept scans, and how many scans the map keeps.
+fn segments(disk: &FaultyDisk) -> (BTreeSet<String>, u64) {
+    let is_segment = |path: &PathBuf| {
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        name.starts_with("segment.").then_some(name)
+    };
+    let found = disk.files().keys().filter_map(is_segment).collect();
+    (found, MapReader::open(at(disk), 1).unwrap().kept_scans().unwrap().count() as u64)
+}
+
+/// A map of three scans in one segment.
+fn one_segment() -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config(Storage::Compact, true)).unwrap();
+    for number in 0..3 {
+        let scan = random_scan(&mut Random(number), [0.0; 3], 5);
+        mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &scan.points)).unwrap();
+    }
+    mapper.flush().unwrap();
+    drop(mapper);
+    disk.copy()
+}
+
+/// The first segment has the removed scan: whatever is killed and wherever, as long as it is there `verify` reports it,
+/// and the same call removes it, as does the next writer.
+#[test]
+fn points_of_removed_scans_are_reported_and_gone_after_the_same_call() {
+    let start = one_segment();
+    let done = start.copy();
+    removed(&done).unwrap();
+    assert_eq!(segments(&done), (BTreeSet::from(["segment.2".to_owned()]), 2));
+    let (mut left, changes) = (0, done.changes());
+    for at in some_of(0..changes, 3) {
+        let disk = start.copy();
+        disk.set_fault(Fault::Crashes(at));
+        let _ = removed(&disk);
+        for disk in
+            [disk.after_kill(), disk.after_crash(Unsynced::Shuffled(at)), disk.after_crash(Unsynced::Dropped)]
+        {
+            let what = format!("change {at} of {changes}");
+            let (there, scans) = segments(&disk);
+            let is_left = scans == 2 && there.contains("segment.1");
+            if is_left {
+                left += 1;
+                let (verification, found) = findings(&disk);
+                assert!(found.contains(&map().join("kept_scans/segment.1")), "{what}: {found:?}");
+                assert!(verification.is_whole() && verification.leftovers > 0, "{what}");
+                // By another writer.
+                let other = disk.copy();
+                drop(TileStore::open(other.shared(), map()).unwrap());
+                assert!(!segments(&other).0.contains("segment.1"), "{what}");
+                let again =
+                    remove_scans(self::at(&disk), &ScanSelection::Numbers(2, 2), false, &rework(), |_, _| ());
+                assert!(again.unwrap().files_removed > 0, "{what}");
+            } else {
+                removed(&disk).unwrap();
+            }
+            assert_eq!(segments(&disk), segments(&done), "{what}");
+            let (verification, found) = findings(&disk);
+            assert_eq!(verification.leftovers, 0, "{what}, {scans} scans: {found:?}");
+            // Durably.
+            let dropped = disk.after_crash(Unsynced::Dropped);
+            assert_eq!(segments(&dropped), segments(&done), "{what}");
+        }
+    }
+    assert!(left > 0);
+}
+
+/// A copy of the map, as in a bucket, has no file that is to be gone.
+#[test]
+fn a_copy_of_a_map_leaves_out_what_a_killed_removal_left() {
+    let start = one_segment();
+    let done = start.copy();
+    removed(&done).unwrap();
+    let mut left = 0;
+    for change in 0..done.changes() {
+        let disk = start.copy();
+        disk.set_fault(Fault::Crashes(change));
+        let _ = removed(&disk);
+        let disk = disk.after_kill();
+        if segments(&disk).1 == 2 {
+            let store = TileStore::open_read_only(disk.shared(), map()).unwrap();
+            let files = store.committed_files(&store.read_snapshots().unwrap()).unwrap();
+            let kept: Vec<_> =
+                files.iter().map(|file| &*file.path).filter(|path| path.starts_with("kept_scans/")).collect();
+            left += u64::from(segments(&disk).0.contains("segment.1"));
+            assert_eq!(kept.len(), 2, "change {change}: {kept:?}");
+            assert!(kept.contains(&"kept_scans/segment.2"), "change {change}: {kept:?}");
+        }
+    }
+    assert!(left > 0);
+}
+
+/// Readers need not wait for `metadata.json` once a writer has been there, whether that commits anything or not.
+#[test]
+fn a_writer_replaces_metadata_that_are_behind_the_log() {
+    let start = four_scans(Storage::Compact, false);
+    let done = start.copy();
+    faded(&done).unwrap();
+    let mut behind = 0;
+    for change in 0..done.changes() {
+        let disk = start.copy();
+        disk.set_fault(Fault::Crashes(change));
+        let _ = faded(&disk);
+        let disk = disk.after_kill();
+        let is_behind = || TileStore::open_read_only(disk.shared(), map()).unwrap().is_metadata_behind();
+        behind += u64::from(is_behind());
+        drop(TileStore::open(disk.shared(), map()).unwrap());
+        assert!(!is_behind(), "change {change}");
+    }
+    assert!(behind > 0);
+}
+
+/// A disk that refuses to remove them is an error, and not a warning.
+#[test]
+fn a_removal_whose_files_remain_is_an_error() {
+    let start = one_segment();
+    let done = start.copy();
+    removed(&done).unwrap();
+    let mut refused = 0;
+    for operation in some_of(0..done.operations(), 3) {
+        let disk = start.copy();
+        disk.set_fault(Fault::Breaks(operation));
+        let outcome = removed(&disk);
+        let files = disk.files();
+        let is_left = files.contains_key(&map().join("kept_scans/segment.1"));
+        refused += u64::from(outcome.is_err());
+        assert!(outcome.is_err() || !is_left, "operation {operation}");
+        disk.mend();
+        removed(&disk).unwrap();
+        assert_eq!(segments(&disk).0, segments(&done).0, "operation {operation}");
+    }
+    assert!(refused > 0);
+}
+
+/// A map that keeps no scans any more keeps none of an earlier state either, once no snapshot has that.
+#[test]
+fn kept_scans_go_with_the_last_snapshot_that_has_them() {
+    let disk = FaultyDisk::new(Fault::None);
+    build(&disk, config(Storage::Compact, false), 0..1).unwrap();
+    snapshot(at(&disk), &name("without")).unwrap();
+    build(&disk, config(Storage::Compact, true), 1..2).unwrap();
+    snapshot(at(&disk), &name("with")).unwrap();
+    revert(at(&disk), &name("without"), None, |_, _| ()).unwrap();
+    let has_scans = || disk.files().keys().any(|path| path.starts_with(map().join("kept_scans")));
+    assert!(has_scans());
+    delete_snapshot(at(&disk), &name("with")).unwrap();
+    assert!(!has_scans());
+    assert_eq!(findings(&disk).0.notes, 0);
+}
+
+/// A second map that a remapping beside a mapper left has evidence of all scans.
+#[test]
+fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
+    let start = four_scans(Storage::Compact, true);
+    delete_snapshot(at(&start), &name("third")).unwrap();
+    let beside = RemapBeside::begin(at(&start), &new_poses(), &Remap::new(rework())).unwrap();
+    let disk = start.after_kill();
+    drop(beside);
+    let second = Path::new("/city/map.remapping");
+    assert!(findings(&disk).1.contains(second));
+    removed(&disk).unwrap();
+    assert!(!disk.files().keys().any(|path| path.starts_with(second)), "{:?}", disk.files().keys());
+    assert!(!findings(&disk).1.contains(second));
+}
+
+fn digest(disk: &FaultyDisk) -> blake3::Hash {
+    MapReader::open(at(disk), 1).unwrap().digest().unwrap()
+}
+
+fn names(disk: &FaultyDisk) -> Vec<String> {
+    let infos = voxtile::operations::snapshots(at(disk)).unwrap();
+    let mut names: Vec<_> =
+        infos.into_iter().map(|info| format!("{} of scan {}", info.name, info.scan_number)).collect();
+    names.sort_unstable();
+    names
+}
+
+/// Whatever is killed and wherever: the same call ends as if nothing had happened, although it makes a name first.
+#[test]
+fn a_call_that_makes_a_snapshot_first_can_be_repeated_after_a_kill() {
+    let works: [(&str, Work); 6] = [
+        ("snapshot", kept),
+        ("revert", reverted),
+        ("remap", moved),
+        ("remap beside", moved_beside),
+        ("remove scans", removed_kept),
+        ("remove points", points_removed_kept),
+    ];
+    for (what, work) in works {
+        for (storage, one_in) in [(Storage::Compact, 8), (Storage::OctoMap, 24)] {
+            let start = four_scans(storage, true);
+            let done = start.copy();
+            work(&done).unwrap();
+            let (before, after) = (digest(&start), digest(&done));
+            assert_eq!(before == after, what == "snapshot");
+            for at in some_of(0..done.changes(), one_in) {
+                let disk = start.copy();
+                disk.set_fault(Fault::Crashes(at));
+                let _ = work(&disk);
+                let disk = disk.after_kill();
+                let what = format!("{what}, change {at}");
+                assert!([before, after].contains(&digest(&disk)), "{what}");
+                work(&disk).unwrap_or_else(|error| panic!("{what}: again: {error:#}"));
+                assert_eq!((digest(&disk), names(&disk)), (after, names(&done)), "{what}");
+                assert!(findings(&disk).0.is_whole(), "{what}");
+            }
+        }
+    }
+}
+
+/// A name that is taken by another state stays refused.
+#[test]
+fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
+    let disk = four_scans(Storage::Compact, true);
+    let third = Some(name("third"));
+    let before = (digest(&disk), names(&disk));
+    let how = rework().with_keep_as(third.clone());
+    let refusals = [
+        message_of(snapshot(at(&disk), &name("third"))),
+        message_of(remap(at(&disk), &new_poses(), &Remap::new(how.clone()), |_, _| ())),
+        message_of(remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), false, &how, |_, _| ())),
+        message_of(remove_points(at(&disk), &region(), &how, |_, _| ())),
+        message_of(revert(at(&disk), &name("third"), third.as_ref(), |_, _| ())),
+    ];
+    for message in refusals {
+        assert!(message.contains("snapshots/third"), "{message}");
+    }
+    assert_eq!((digest(&disk), names(&disk)), before);
+    // The same tiles and another scan.
+    snapshot(at(&disk), &name("fourth")).unwrap();
+    snapshot(at(&disk), &name("fourth")).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(at(&disk), config(Storage::Compact, true)).unwrap();
+    mapper.insert_points(&ScanRef::in_sensor(pose(0, 0.0), &[] as &[[f64; 3]])).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    assert!(message_of(snapshot(at(&disk), &name("fourth"))).contains("snapshots/fourth"));
+    // Nothing but the pose of that scan, which is in no tile.
+    snapshot(at(&disk), &name("fifth")).unwrap();
+    let poses = NewPoses::Numbered(vec![(5, pose(0, 9.0))]);
+    remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()).unwrap();
+    assert!(message_of(snapshot(at(&disk), &name("fifth"))).contains("snapshots/fifth"));
+}
+
+/// Beside a writer with scans that are not flushed nothing is damage, and what it flushes is no leftover.
+#[test]
+fn a_writer_at_work_is_no_damage_and_its_flushed_scans_are_no_leftovers() {
+    let disk = four_scans(Storage::Compact, true);
+    let mut mapper = OutOfCoreTileMapper::open(at(&disk), config(Storage::Compact, true)).unwrap();
+    for number in 4..8 {
+        let scan = random_scan(&mut Random(number), [0.0; 3], 5);
+        mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &scan.points)).unwrap();
+        let (verification, found) = findings(&disk);
+        assert!(verification.is_whole(), "{found:?}");
+        mapper.flush().unwrap();
+        let (verification, found) = findings(&disk);
+        assert_eq!((verification.damage, verification.leftovers), (0, 0), "{found:?}");
+    }
+}
