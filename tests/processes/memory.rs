@@ -1,7 +1,10 @@
 use crate::survey::{folder_for_maps, voxtile};
 use serde_json::Value;
+use std::fs::File;
 use std::path::Path;
 use std::process::Stdio;
+use testkit::random_scans::Random;
+use voxtile::Scan;
 use voxtile::io::ScanStreamWriter;
 use voxtile::simulation::Survey;
 
@@ -61,6 +64,35 @@ fn a_build_keeps_to_its_memory() {
         assert!(peak(&small) < MEMORY + (48 << 20), "{name}: {} bytes", peak(&small));
         assert!(peak(&large) > MEMORY + (48 << 20), "{name} does not need more than the limit");
     }
+}
+
+/// A brick of a scan is divided into 64 tiles of two voxels, each with its own lists: they count in the limit.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_build_of_tiles_of_two_voxels_keeps_to_its_memory() {
+    const MEMORY: u64 = 20 << 20;
+    /// Half of what is promised: the scan is small, so that the test is quick.
+    const BESIDE: u64 = 24 << 20;
+    let (folder, map) = folder_for_maps();
+    let mut random = Random(1);
+    let on_sphere = |_| {
+        let direction = random.point([0.0; 3], 1.0);
+        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+        direction.map(|x| 12.0 * x / length)
+    };
+    let scan = Scan { origin: [0.0; 3], points: (0..200).map(on_sphere).collect(), intensities: None };
+    let input = folder.path().join("sphere.scans");
+    let mut writer = ScanStreamWriter::new(File::create(&input).unwrap(), "sphere", true).unwrap();
+    writer.write_world(&scan).unwrap();
+    drop(writer);
+    let how =
+        ["--resolution", "0.1", "--tile-size", "0.2", "--storage", "compact", "--threads", "1", "--json"];
+    let mut command = voxtile();
+    command.arg("build").arg(&input).arg("-o").arg(&map).args(how).args(["--memory", &MEMORY.to_string()]);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let built: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(peak(&built) < MEMORY + BESIDE, "{} bytes", peak(&built));
 }
 
 /// What looks at a whole map takes no more memory for a long drive than for a short one, and octree files keep to the
