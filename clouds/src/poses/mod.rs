@@ -5,6 +5,7 @@ mod gap;
 mod header;
 mod matrix;
 mod npy;
+mod pose_rows;
 mod text;
 mod time_unit;
 mod trajectory;

@@ -1,7 +1,7 @@
 use super::matrix::matrix_of;
+use super::pose_rows::{PoseRows, Row};
 use super::text::pose;
 use super::time_unit::{digits_of_value, stamp_of_value};
-use super::trajectory::Row;
 use crate::error::{Error, Place, Result};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -20,8 +20,8 @@ pub(super) fn is_npy(path: &Path) -> Result<bool> {
     Ok(start == MAGIC)
 }
 
-/// Reads an array of poses: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
-pub(super) fn read(path: &Path) -> Result<Vec<Row>> {
+/// Takes the poses of an array: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
+pub(super) fn read(path: &Path, poses: &mut PoseRows) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
     let mut input = BufReader::new(File::open(path).map_err(fail)?);
@@ -41,7 +41,6 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>> {
     let (width, rows, columns) = layout(&header).map_err(|reason| wrong(10, reason))?;
     let data_at = 8 + if is_long { 4 } else { 2 } + header_bytes as u64;
     let (mut record, mut numbers, mut digits) = (vec![0; columns * width], Vec::new(), None);
-    let mut poses = Vec::new();
     for row in 0..rows {
         let at = data_at.saturating_add(row.saturating_mul((columns * width) as u64));
         input
@@ -66,9 +65,9 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>> {
             }
             _ => Row { stamp_ns: None, pose: matrix_of(&numbers).map_err(bad)? },
         };
-        poses.push(row);
+        poses.push(row)?;
     }
-    Ok(poses)
+    Ok(())
 }
 
 /// Bytes of a number, rows, numbers in a row.

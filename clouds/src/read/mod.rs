@@ -23,7 +23,7 @@ mod las_layout;
 #[cfg(feature = "las")]
 mod las_points;
 #[cfg(feature = "las")]
-mod las_runs;
+mod las_record;
 #[cfg(feature = "las")]
 mod las_scans;
 #[cfg(feature = "las")]

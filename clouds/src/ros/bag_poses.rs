@@ -1,12 +1,14 @@
 use super::bag_options::{BagOptions, PoseSource};
 use super::bag_topic::{choose_poses, kind_of};
-use super::messages::{MessageKind, StampedPose, decode_poses};
+use super::messages::{MessageKind, StampedPose, visit_poses};
 use super::pose_lookup::PoseLookup;
 use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
+use super::sample_spool::SampleSpool;
 use super::transforms::{Transforms, WhyNot};
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
+use crate::spill::Budget;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -24,6 +26,14 @@ pub(super) struct BagPoses {
     remarks: Vec<String>,
 }
 
+/// Memory that a sample takes.
+const SAMPLE_BYTES: usize = 96;
+/// Most pairs of a frame and its parent; a robot has a hundred.
+const MAX_LINKS: usize = 10_000;
+/// A longer name of a frame is damage.
+const MAX_NAME_BYTES: usize = 256;
+/// Most reasons that are counted for clouds without a pose.
+const MAX_REASONS: usize = 100;
 /// The frames that a robot moves by, if a pose does not name its own.
 const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
 
@@ -50,7 +60,7 @@ impl BagPoses {
             _ => None,
         };
         wanted.extend(odometry);
-        poses.read_topics(recording, &topics, &wanted, odometry)?;
+        poses.read_topics(recording, &topics, &wanted, odometry, &options.budget())?;
         match odometry.and_then(|index| topics.get(index)) {
             Some(topic) if poses.track.poses.is_empty() => Err(poses.without_track(topic)),
             _ => Ok(poses),
@@ -78,16 +88,28 @@ impl BagPoses {
         topics: &[Topic],
         wanted: &[usize],
         odometry: Option<usize>,
+        budget: &Budget,
     ) -> Result<()> {
-        let (mut bad, mut invalid) = (Vec::new(), 0_u64);
+        let (mut bad, mut first_bad, mut invalid, mut beyond) = (0_u64, None, 0_u64, 0_u64);
+        let mut note = |what: String| {
+            bad += 1;
+            first_bad.get_or_insert(what);
+        };
+        let share = budget.bytes / 2;
+        let (mut links, mut in_memory, mut spool) = (0, 0, None);
         let transforms = Arc::make_mut(&mut self.transforms);
         recording.begin(wanted)?;
         loop {
-            let message = match recording.next_message() {
+            if in_memory > share / SAMPLE_BYTES {
+                let spool = spool.get_or_insert_with(|| SampleSpool::new(budget, share));
+                spool.take(transforms.samples_mut().chain([&mut self.track.poses]))?;
+                in_memory = 0;
+            }
+            let mut message = match recording.next_message() {
                 Ok(Some(message)) => message,
                 Ok(None) => break,
                 Err(error) => {
-                    bad.push(error.to_string());
+                    note(error.to_string());
                     continue;
                 }
             };
@@ -97,26 +119,47 @@ impl BagPoses {
             else {
                 continue;
             };
-            match decode_poses(kind, wire, &message.data) {
-                Ok(poses) if Some(message.topic) == odometry => {
-                    poses.into_iter().for_each(|pose| self.track.insert(pose));
+            let data = match message.data.load(budget.whole_bytes()) {
+                Ok(data) => data,
+                Err(error) => {
+                    note(format!("{}: {error}", topic.name));
+                    continue;
                 }
-                Ok(poses) => {
-                    let is_static = topic.name.ends_with("tf_static");
-                    for StampedPose { header, child_frame, parent_from_child } in poses {
-                        let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
-                        let is_taken =
-                            transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static);
-                        invalid += u64::from(!is_taken);
-                    }
+            };
+            let is_track = Some(message.topic) == odometry;
+            let is_static = topic.name.ends_with("tf_static");
+            let decoded = visit_poses(kind, wire, data, &mut |pose| {
+                in_memory += 1;
+                if is_track {
+                    return self.track.insert(pose);
                 }
-                Err(error) => bad.push(format!("{}: {error}", topic.name)),
+                let StampedPose { header, child_frame, parent_from_child } = pose;
+                let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
+                let is_new = !transforms.has_link(parent, &child_frame);
+                if is_new && (links >= MAX_LINKS || parent.len().max(child_frame.len()) > MAX_NAME_BYTES) {
+                    beyond += 1;
+                    return;
+                }
+                let is_taken =
+                    transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static);
+                links += usize::from(is_new && is_taken);
+                invalid += u64::from(!is_taken);
+            });
+            if let Err(error) = decoded {
+                note(format!("{}: {error}", topic.name));
             }
         }
-        if let Some(first) = bad.first() {
+        if let Some(spool) = spool {
+            spool.finish(transforms.samples_mut().chain([&mut self.track.poses]))?;
+        }
+        if let Some(first) = first_bad {
+            self.remarks
+                .push(format!("{bad} messages or chunks with poses cannot be read; the first: {first}"));
+        }
+        if beyond > 0 {
             self.remarks.push(format!(
-                "{} messages or chunks with poses cannot be read; the first: {first}",
-                bad.len()
+                "{beyond} transforms are left out: their frames are more than {MAX_LINKS}, or have names of more than \
+                 {MAX_NAME_BYTES} bytes"
             ));
         }
         if invalid > 0 {
@@ -128,16 +171,31 @@ impl BagPoses {
     }
 
     /// Where the sensor was; counts why not.
-    pub(super) fn world_from_sensor(&mut self, sensor_frame: &str, stamp_ns: i64) -> Option<RigidPose> {
+    pub(super) fn world_from_sensor(
+        &mut self,
+        sensor_frame: &str,
+        stamp_ns: i64,
+    ) -> Result<Option<RigidPose>> {
         let found = match self.source {
-            PoseSource::None => return None,
+            PoseSource::None => return Ok(None),
             PoseSource::Odometry if !self.track.poses.is_empty() => {
                 self.settle_track(sensor_frame);
                 self.find(sensor_frame, stamp_ns)
             }
             _ => self.find(sensor_frame, stamp_ns),
         };
-        found.map_err(|why| *self.without.entry(why.to_string()).or_default() += 1).ok()
+        match found {
+            Ok(pose) => Ok(Some(pose)),
+            Err(WhyNot::Unreadable(why)) => Err(Error::argument("poses of the recording", why)),
+            Err(why) => {
+                let mut why = why.to_string();
+                if self.without.len() >= MAX_REASONS && !self.without.contains_key(&why) {
+                    why = "other reasons".to_owned();
+                }
+                *self.without.entry(why).or_default() += 1;
+                Ok(None)
+            }
+        }
     }
 
     fn find(&self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
@@ -185,8 +243,9 @@ impl BagPoses {
             transforms.detach(&parent);
             self.fixed_frame = Some(parent.clone());
         }
-        for (stamp_ns, pose) in poses {
-            odd += u64::from(!transforms.insert(&parent, &child, stamp_ns, pose, false));
+        let count = poses.len() as u64;
+        if !transforms.attach(&parent, &child, poses) {
+            odd += count;
         }
         if odd > 0 {
             let remark = format!(

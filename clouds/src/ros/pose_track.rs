@@ -1,6 +1,5 @@
 use super::messages::StampedPose;
-use crate::pose::RigidPose;
-use std::collections::BTreeMap;
+use super::samples::Samples;
 
 /// The poses of a topic, all of one frame in another. Every message of a path tells all the way so far: a pose is kept
 /// once for each stamp, whatever the number of messages that tell it.
@@ -11,7 +10,7 @@ pub(super) struct PoseTrack {
     /// Empty if the poses do not say.
     pub(super) child: String,
     /// By stamp; of two poses of the same stamp the later one counts.
-    pub(super) poses: BTreeMap<i64, RigidPose>,
+    pub(super) poses: Samples,
     /// Number of poses that are not valid or of other frames.
     pub(super) odd: u64,
 }

@@ -1,5 +1,7 @@
+use super::samples::Samples;
 use crate::pose::RigidPose;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use crate::spill::TimedPose;
+use std::collections::{HashMap, HashSet};
 
 /// The tree of frames of a recording: where each frame was in its parent, over time.
 #[derive(Clone, Debug, Default)]
@@ -22,7 +24,7 @@ enum Link {
     /// At any time.
     Static(RigidPose),
     /// By stamp.
-    Moving(BTreeMap<i64, RigidPose>),
+    Moving(Samples),
 }
 
 impl Frame {
@@ -70,6 +72,9 @@ pub enum WhyNot {
     /// The points are in the fixed frame already, and where the sensor was is not known.
     #[error("the points are in the frame {0} already; nothing says where the sensor was")]
     AlreadyFixed(String),
+    /// A temporary file cannot be read.
+    #[error("{0}")]
+    Unreadable(String),
 }
 
 impl Transforms {
@@ -102,14 +107,42 @@ impl Transforms {
             parent.clone_into(&mut frame.parent);
         }
         match frame.links.get_mut(parent) {
-            Some(Link::Moving(samples)) if !is_static => drop(samples.insert(stamp_ns, parent_from_child)),
+            Some(Link::Moving(samples)) if !is_static => samples.insert(stamp_ns, parent_from_child),
             Some(link) if is_static => *link = Link::Static(parent_from_child),
             _ if is_static => drop(frame.links.insert(parent.to_owned(), Link::Static(parent_from_child))),
             _ => {
-                let samples = BTreeMap::from([(stamp_ns, parent_from_child)]);
+                let mut samples = Samples::default();
+                samples.insert(stamp_ns, parent_from_child);
                 frame.links.insert(parent.to_owned(), Link::Moving(samples));
             }
         }
+        true
+    }
+
+    /// Whether it is known, or was, where a child was in a parent.
+    pub(super) fn has_link(&self, parent: &str, child: &str) -> bool {
+        self.frames.get(bare(child)).is_some_and(|frame| frame.links.contains_key(bare(parent)))
+    }
+
+    /// The samples of all links that move.
+    pub(super) fn samples_mut(&mut self) -> impl Iterator<Item = &mut Samples> {
+        let links = self.frames.values_mut().flat_map(|frame| frame.links.values_mut());
+        links.filter_map(|link| match link {
+            Link::Moving(samples) => Some(samples),
+            Link::Static(_) => None,
+        })
+    }
+
+    /// Puts samples in the place of what is known of a child in a parent, which becomes its parent. Returns whether
+    /// they were taken: frames without a name or in themselves are not.
+    pub(super) fn attach(&mut self, parent: &str, child: &str, samples: Samples) -> bool {
+        let (parent, child) = (bare(parent), bare(child));
+        if parent.is_empty() || child.is_empty() || parent == child {
+            return false;
+        }
+        let frame = self.frames.entry(child.to_owned()).or_default();
+        parent.clone_into(&mut frame.parent);
+        frame.links.insert(parent.to_owned(), Link::Moving(samples));
         true
     }
 
@@ -123,10 +156,8 @@ impl Transforms {
     pub fn forget_older_than(&mut self, span_ns: i64) -> usize {
         let mut left = 0;
         for link in self.frames.values_mut().flat_map(|frame| frame.links.values_mut()) {
-            if let Link::Moving(samples) = link
-                && let Some((&last_ns, _)) = samples.last_key_value()
-            {
-                *samples = samples.split_off(&last_ns.saturating_sub(span_ns));
+            if let Link::Moving(samples) = link {
+                samples.forget_older_than(span_ns);
             }
             left += link.samples();
         }
@@ -143,9 +174,8 @@ impl Transforms {
         links.retain(|of, _| *of == *parent);
         if let Some(Link::Moving(samples)) = links.get_mut(parent.as_str())
             && samples.len() == before
-            && let Some(&middle_ns) = samples.keys().nth(before / 2)
         {
-            *samples = samples.split_off(&middle_ns);
+            samples.forget_older_half();
         }
         before - frame.samples()
     }
@@ -247,19 +277,22 @@ impl Transforms {
             Some(Link::Moving(samples)) => samples,
             None => return Err(WhyNot::UnknownFrame(child.to_owned())),
         };
-        let before = samples.range(..=stamp_ns).next_back();
-        let Some((&before_ns, before)) = before else { return Err(WhyNot::Before(child.to_owned())) };
+        let (before, after) =
+            samples.around(stamp_ns).map_err(|error| WhyNot::Unreadable(error.to_string()))?;
+        let Some(TimedPose { stamp_ns: before_ns, pose: before }) = before else {
+            return Err(WhyNot::Before(child.to_owned()));
+        };
         if before_ns == stamp_ns {
-            return Ok(*before);
+            return Ok(before);
         }
-        let Some((&after_ns, after)) = samples.range(stamp_ns..).next() else {
+        let Some(TimedPose { stamp_ns: after_ns, pose: after }) = after else {
             return Err(WhyNot::After(child.to_owned()));
         };
         let gap_ns = after_ns.saturating_sub(before_ns);
         if self.most_gap_ns.is_some_and(|most| gap_ns > most) {
             return Err(WhyNot::Gap(child.to_owned()));
         }
-        Ok(before.towards(after, stamp_ns.saturating_sub(before_ns) as f64 / gap_ns as f64))
+        Ok(before.towards(&after, stamp_ns.saturating_sub(before_ns) as f64 / gap_ns as f64))
     }
 }
 

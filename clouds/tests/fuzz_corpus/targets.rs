@@ -79,12 +79,8 @@ fn seal_page(page: &mut [u8; 1024]) {
 }
 
 fn clouds(data: &[u8], name: &str, format: Format, scan_period_s: f64) -> bool {
-    let options = OpenOptions {
-        format: Some(format),
-        scan_period_s,
-        sort_memory_bytes: 1 << 16,
-        ..OpenOptions::default()
-    };
+    let options =
+        OpenOptions { format: Some(format), scan_period_s, memory_bytes: 1 << 16, ..OpenOptions::default() };
     with_file(name, data, |path| {
         open(path, &options).is_ok_and(|mut source| drain(source.as_mut(), data.len()))
     })
